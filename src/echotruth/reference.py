@@ -1,0 +1,127 @@
+"""What is generated from the models: the JSON schema and the tables of keys and arrays.
+
+    python -m echotruth.reference
+
+writes config/schema.json, config/README.md and docs/schema.md below the current folder.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from echotruth.config.sections import UNITS, Config, Section, unit_of
+from echotruth.repository import schema
+
+_HEAD = """# Configuration
+
+A configuration is a YAML file; every key not given takes its default. Unknown keys
+and impossible values are refused before anything runs. `schema.json` beside this page lets
+editors complete and check the YAML. Units are in the keys.
+
+This page is generated from `src/echotruth/config/sections.py` by `make reference`.
+
+"""
+
+_TREE = """# The tree on disk
+
+One Zarr hierarchy, format 3, that `xarray.open_datatree` reads by itself. Every array is rectangular over
+case, view and frame; a shard is what one job wrote, a chunk one frame of it, with a crc32c checksum.
+Sizes of `SIZE` are the image sizes of the configuration (512, 256, 128 px). `nan`, 0 and "" stand where
+there is nothing: outside the wall, or in the row of a case that failed (`cases/status`).
+Axes, signs and reference states are in `conventions.md`.
+
+The root carries the attributes title, summary, references, config (the whole configuration), seed, code (version of
+each stage's source) and packages (their versions). Coordinates stand in every group whose arrays have their dimension.
+
+Beside the repository lie `cases.csv` (the same table as the group `cases`), `registry.txt` (row of every case),
+`ledger/` (a record for every finished job: checksums, seed, time taken), `figures/` and `logs/`.
+
+This page is generated from `src/echotruth/repository/schema.py` by `make reference`.
+
+"""
+
+
+def table() -> str:
+    """The page of keys: unit, default and meaning of each."""
+    return _HEAD + "\n".join(_section(Config, "", "Top level"))
+
+
+def tree() -> str:
+    """The page of arrays: group by group."""
+    parts = [_TREE]
+    cases = "One more array for every key of the configuration that a case could vary, named and measured as the key.\n"
+    groups = {"cases": schema.CASES} | schema.STAGES | {f"{name}/SIZE": each for name, each in schema.SIZED.items()}
+    for path, arrays in groups.items():
+        parts += [f"## {path}\n", *_arrays(arrays), cases if path == "cases" else ""]
+    return "\n".join([*parts, "## Coordinates\n", *_arrays(schema.COORDINATES)])
+
+
+def json_schema() -> str:
+    """The JSON schema of a configuration."""
+    return json.dumps(Config.model_json_schema(), indent=1) + "\n"
+
+
+def files() -> dict[str, str]:
+    """Path of each generated file to its text."""
+    return {"config/schema.json": json_schema(), "config/README.md": table(), "docs/schema.md": tree()}
+
+
+def _arrays(arrays: tuple[schema.Array, ...]) -> list[str]:
+    rows = [
+        f"| `{array.name}` | {', '.join(array.dims)} | {array.dtype} | {array.units} | {array.long_name} |"
+        for array in arrays
+    ]
+    return ["| array | dimensions | type | units | what |", "|---|---|---|---|---|", *rows, ""]
+
+
+def _section(model: type[BaseModel], prefix: str, title: str) -> list[str]:
+    lines = [f"## {title}\n"]
+    if prefix:
+        lines += [f"{model.__doc__}\n"]
+    lines += ["| key | unit | default | meaning |", "|---|---|---|---|"]
+    inner: list[str] = []
+    for key, field in model.model_fields.items():
+        section = _inner(field)
+        mapping = section is not None and "dict" in str(field.annotation)
+        if section is None or mapping:
+            lines.append(f"| `{prefix}{key}` | {_unit(key)} | {_default(field)} | {_meaning(field)} |")
+        if section is not None:
+            path = f"{prefix}{key}.NAME." if mapping else f"{prefix}{key}."
+            inner += _section(section, path, path.removesuffix("."))
+    return [*lines, "", *inner]
+
+
+def _inner(field: FieldInfo) -> type[Section] | None:
+    for annotation in (field.annotation, *get_args(field.annotation)):
+        if isinstance(annotation, type) and issubclass(annotation, Section):
+            return annotation
+    return None
+
+
+def _unit(key: str) -> str:
+    unit = unit_of(key)
+    return unit.replace("_per_", "/").replace("per_", "1/") if unit in UNITS else ""
+
+
+def _default(field: FieldInfo) -> str:
+    default: Any = field.get_default(call_default_factory=True)
+    if default is PydanticUndefined:
+        return ""
+    if isinstance(default, dict):
+        return ", ".join(f"`{name}`" for name in default) or "none"
+    return "`null`" if default is None else f"`{json.dumps(default)}`"
+
+
+def _meaning(field: FieldInfo) -> str:
+    return " ".join((field.description or "").split())
+
+
+if __name__ == "__main__":
+    for name, text in files().items():
+        Path(name).write_text(text, encoding="utf-8")

@@ -1,0 +1,224 @@
+"""The tree on disk, array by array. `docs/schema.md` is made from this module."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from echotruth.config import Config
+from echotruth.config.sections import unit_of
+
+
+@dataclass(frozen=True)
+class Array:
+    """One array of the repository.
+
+    Attributes
+    ----------
+    name : str
+        Its name in its group.
+    dims : tuple of str
+        Names of its dimensions, in order.
+    dtype : str
+    units : str
+        SI, as UDUNITS writes them; "1" for numbers without one.
+    long_name : str
+        What it holds, for people and for plots.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    dtype: str
+    units: str
+    long_name: str
+
+    @property
+    def leading(self) -> int:
+        """Number of leading dimensions that name the job which owns a shard: case, or case and view."""
+        return sum(dim in ("case", "view") for dim in self.dims)
+
+    @property
+    def fill(self) -> float | int | str:
+        """Value where nothing was written."""
+        return {"f": float("nan"), "s": ""}.get(self.dtype[0], 0)
+
+
+def _array(name: str, dims: str, dtype: str, units: str, long_name: str) -> Array:
+    return Array(name, tuple(dims.split()), dtype, units, long_name)
+
+
+GEOMETRY = (
+    _array("node_position", "case node xyz", "float64", "m", "position of the nodes, unloaded"),
+    _array("cell_node", "case cell local_node", "int32", "1", "nodes of the quadratic tetrahedra, in VTK's order"),
+    _array("endo", "case endo_facet facet_node", "int32", "1", "nodes of the endocardial triangles"),
+    _array("epi", "case epi_facet facet_node", "int32", "1", "nodes of the epicardial triangles"),
+    _array("base", "case base_facet facet_node", "int32", "1", "nodes of the basal triangles"),
+)
+
+FIBRES = (
+    _array("wall_depth", "case node", "float64", "1", "wall depth, 0 at the endocardium and 1 at the epicardium"),
+    _array("fibre", "case cell xyz", "float64", "1", "unit vector along the fibres at cell centroids, unloaded"),
+    _array("sheet", "case cell xyz", "float64", "1", "unit vector along the sheets at cell centroids, unloaded"),
+    _array("helix_angle", "case cell", "float64", "rad", "helix angle at cell centroids, read back from the fibres"),
+    _array("layer", "case cell", "uint8", "1", "transmural layer of the cell centroid, 1 at the endocardium"),
+    _array("segment", "case cell", "uint8", "1", "AHA segment of the cell centroid"),
+)
+
+MECHANICS = (
+    _array("pressure", "case frame", "float64", "Pa", "cavity pressure met"),
+    _array("volume", "case frame", "float64", "m3", "cavity volume met"),
+    _array("pressure_asked", "case frame", "float64", "Pa", "cavity pressure asked for"),
+    _array("volume_asked", "case frame", "float64", "m3", "cavity volume asked for"),
+    _array("active_tension", "case frame", "float64", "Pa", "active tension T_Ca, solved"),
+    _array("displacement", "case frame node xyz", "float64", "m", "displacement of the nodes from unloaded"),
+    _array("stiffness", "case", "float64", "Pa", "stiffness C of the wall"),
+    _array("es_frame", "case", "int32", "1", "frame of end-systole"),
+    _array("newton_steps", "case frame", "int32", "1", "Newton steps taken to reach the frame"),
+)
+
+_STRAIN = "case frame cell strain_component"
+_FIBRE_STRAIN = "case frame cell fibre_component"
+KINEMATICS = (
+    _array("deformation_gradient", "case frame cell row column", "float32", "1", "F at cell centroids, from unloaded"),
+    _array("strain", _STRAIN, "float32", "1", "strain from ED along wall axes at cell centroids"),
+    _array("strain_unloaded", _STRAIN, "float32", "1", "strain from unloaded along wall axes at cell centroids"),
+    _array("fibre_strain", _FIBRE_STRAIN, "float32", "1", "strain from ED along fibre axes at cell centroids"),
+    _array("fibre_strain_unloaded", _FIBRE_STRAIN, "float32", "1", "strain from unloaded along fibre axes"),
+    _array("strain_mean", "case frame strain_component", "float64", "1", "wall mean of the strain from ED"),
+    _array("strain_sd", "case frame strain_component", "float64", "1", "standard deviation of the strain from ED"),
+    _array("layer_strain", "case frame layer strain_component", "float64", "1", "mean strain from ED of each layer"),
+    _array("volume_ratio_min", "case frame", "float64", "1", "smallest det F of all quadrature points"),
+    _array("volume_ratio_mean", "case frame", "float64", "1", "wall mean of det F"),
+)
+
+PHANTOM = (
+    _array("scatterers", "case view", "int32", "1", "number of scatterers"),
+    _array("origin", "case view xyz", "float64", "m", "centre of the array in the heart frame"),
+    _array("axes", "case view vector xyz", "float64", "1", "lateral, axial and elevation axes in the heart frame"),
+    _array("centre", "case view plane", "float64", "m", "origin of polar components in the image"),
+)
+
+_PIXEL = "case view frame axial lateral"
+TRUTH = (
+    _array("displacement", f"{_PIXEL} vector", "float32", "m", "displacement from ED of the tissue at the pixel"),
+    _array("strain", f"{_PIXEL} strain_component", "float32", "1", "strain from ED of the tissue at the pixel"),
+    _array("mask", _PIXEL, "bool", "1", "whether the pixel centre is in the wall"),
+    _array("layer", _PIXEL, "uint8", "1", "transmural layer, 1 at the endocardium, 0 outside"),
+    _array("segment", _PIXEL, "uint8", "1", "AHA segment, 0 outside"),
+    _array("wall_depth", _PIXEL, "float32", "1", "wall depth, 0 at the endocardium and 1 at the epicardium"),
+)
+
+BMODE = (_array("image", _PIXEL, "uint8", "1", "B-mode grey level"),)
+
+TRACKING = (
+    _array(
+        "displacement", "case view tracker frame axial lateral plane", "float32", "m", "tracked displacement from ED"
+    ),
+    _array("quality", "case view tracker frame axial lateral", "float32", "1", "height of the correlation peak"),
+)
+
+_TRACKED = "case view tracker"
+EVALUATION = (
+    _array("true_displacement", "case view frame axial lateral plane", "float32", "m", "true displacement from ED"),
+    _array("through_plane", "case view frame axial lateral", "float32", "m", "true displacement out of the plane"),
+    _array("layer", "case view axial lateral", "uint8", "1", "transmural layer of the point at ED, 0 outside"),
+    _array("segment", "case view axial lateral", "uint8", "1", "AHA segment of the point at ED, 0 outside"),
+    _array("rms_error", f"{_TRACKED} region measure", "float64", "m", "RMS error of displacement at ES"),
+    _array("nrmse", f"{_TRACKED} region measure", "float64", "1", "RMS error over RMS of the true displacement at ES"),
+    _array("tracked_spread", f"{_TRACKED} region polar", "float64", "m", "standard deviation of displacement at ES"),
+    _array("true_spread", f"{_TRACKED} region polar", "float64", "m", "the same of the true displacement"),
+    _array("tracked_spread_change", _TRACKED, "float64", "percent", "fall of tangential spread, endo- to epicardium"),
+    _array("true_spread_change", _TRACKED, "float64", "percent", "the same of the true displacement"),
+    _array("tracked_segment", f"{_TRACKED} aha polar", "float64", "m", "mean displacement of a segment at ES"),
+    _array("true_segment", f"{_TRACKED} aha polar", "float64", "m", "the same of the true displacement"),
+    _array("coverage", _TRACKED, "float64", "1", "share of the wall's points with an estimate"),
+)
+
+COORDINATES = (
+    _array("case", "case", "string", "1", "case id"),
+    _array("view", "view", "string", "1", "imaging plane"),
+    _array("frame", "frame", "int32", "1", "frame of the cycle, 0 at end-diastole"),
+    _array("time", "case frame", "float64", "s", "time since end-diastole"),
+    _array("tracker", "tracker", "string", "1", "tracker"),
+    _array("axial", "axial", "float64", "m", "depth below the array"),
+    _array("lateral", "lateral", "float64", "m", "lateral position"),
+    _array("xyz", "xyz", "string", "1", "axis of the heart frame"),
+    _array("vector", "vector", "string", "1", "axis of the image"),
+    _array("plane", "plane", "string", "1", "axis in the image plane"),
+    _array("strain_component", "strain_component", "string", "1", "radial, circumferential, longitudinal"),
+    _array("fibre_component", "fibre_component", "string", "1", "fibre, sheet, normal"),
+    _array("layer", "layer", "int32", "1", "transmural layer, 1 at the endocardium"),
+    _array("region", "region", "int32", "1", "transmural layer, 0 for the whole wall"),
+    _array("aha", "aha", "int32", "1", "AHA segment"),
+    _array("polar", "polar", "string", "1", "radial, tangential (long axis: transverse, longitudinal)"),
+    _array("measure", "measure", "string", "1", "polar component, or the vector as a whole"),
+)
+
+LABELS: dict[str, tuple[str, ...]] = {
+    "xyz": ("x", "y", "z"),
+    "vector": ("lateral", "axial", "elevation"),
+    "plane": ("lateral", "axial"),
+    "strain_component": ("RR", "CC", "LL", "RC", "RL", "CL"),
+    "fibre_component": ("ff", "ss", "nn", "fs", "fn", "sn"),
+    "polar": ("radial", "tangential"),
+    "measure": ("radial", "tangential", "total"),
+}
+"""Labels of the dimensions that are the same in every repository."""
+
+STAGES = {
+    "geometry": GEOMETRY,
+    "fibres": FIBRES,
+    "mechanics": MECHANICS,
+    "kinematics": KINEMATICS,
+    "phantom": PHANTOM,
+}
+"""Stages whose arrays stand once."""
+
+SIZED = {"truth": TRUTH, "bmode": BMODE, "tracking": TRACKING, "evaluation": EVALUATION}
+"""Stages whose arrays stand once for every image size, in a group named by it."""
+
+
+CASES = (
+    _array("status", "case", "string", "1", "complete, failed (no solution), or retired (not of this configuration)"),
+    _array("reason", "case", "string", "1", "why a case is not complete"),
+)
+"""Beside these the group `cases` holds one array for every key that a case could vary, in the key's unit."""
+
+
+def parameters(columns: dict[str, NDArray[Any]]) -> tuple[Array, ...]:
+    """Arrays of the group `cases` for the columns of the table of cases."""
+    kinds = {"f": "float64", "i": "int64", "b": "bool"}
+    arrays = [
+        Array(key, ("case",), kinds.get(values.dtype.kind, "string"), _UNITS.get(unit_of(key), "1"), key)
+        for key, values in ((name.removeprefix("cases:"), values) for name, values in columns.items())
+    ]
+    return (*CASES, *arrays)
+
+
+_UNITS = {
+    "um": "um",
+    "mm": "mm",
+    "per_mm3": "mm-3",
+    "uL": "uL",
+    "per_min": "min-1",
+    "mmHg": "mmHg",
+    "kPa": "kPa",
+    "MHz": "MHz",
+    "m_per_s": "m s-1",
+    "deg": "degree",
+}
+
+
+def groups(config: Config) -> dict[str, tuple[Array, ...]]:
+    """Path of every group below the root to its arrays, coordinates left out."""
+    sized = {f"{stage}/{size}": arrays for stage, arrays in SIZED.items() for size in config.bmode.sizes}
+    return {"cases": CASES} | STAGES | sized
+
+
+def coordinates(arrays: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Coordinates of a group: those along a dimension of its arrays."""
+    dims = {dim for array in arrays for dim in array.dims}
+    taken = {array.name for array in arrays}
+    return tuple(array for array in COORDINATES if dims >= set(array.dims) and array.name not in taken)

@@ -1,0 +1,69 @@
+"""A configuration that cannot be run is refused in one sentence with file, key, value and remedy."""
+
+from pathlib import Path
+
+import pytest
+
+from echotruth.config import Config
+from echotruth.config.loading import ConfigError, load
+
+ROOT = Path(__file__).parents[2]
+
+BAD = {
+    "geometry: {epi_radius_mm: 1.2}": "geometry.epi_radius_mm = 1.2: must be greater than endo_radius_mm = 1.45",
+    "loop: {esv_uL: 60, edv_uL: 50}": "loop.esv_uL = 60.0: must be smaller than edv_uL = 50.0",
+    "fibres: {endo_deg: 95}": "fibres.endo_deg = 95: should be less than or equal to 90",
+    "fibres: {endo_deg: .nan}": "fibres.endo_deg = nan: should be a finite number",
+    "fibres: {endo_deg: high}": "fibres.endo_deg = 'high': should be a valid number",
+    "loop: {frames: 0}": "loop.frames = 0: should be greater than or equal to 2",
+    "loop: {frames: '40'}": "loop.frames = '40': should be a valid integer",
+    "geometri: {}": "geometri is not a key: did you mean geometry?",
+    "views: {mid: {positon: 0.5}}": "views.mid.positon is not a key: did you mean views.mid.position?",
+    "views: {mid: {plane: sagittal}}": "views.mid.plane = 'sagittal': should be 'short_axis' or 'long_axis'",
+    "bmode: {downsampling: [1, 3]}": "bmode.downsampling = [1, 3]: every entry must divide size_px = 512",
+    "tracking: {trackers: {wide: {window_px: 256}}}": "window_px = 256: must not exceed the smallest image, 128 px",
+    "tracking: {trackers: {both: {window_mm: 1.0}}}": "give either window_px or window_mm",
+    "rf: {focus_mm: 12}": "rf.focus_mm = 12.0: must be smaller than bmode.field_of_view_mm = 12",
+    "name: a/b": "name = 'a/b': use letters, digits",
+    "a: [": "line 1: expected the node content",
+    "seed: 1\nseed: 2": "key 'seed' stands twice",
+    "- 3": "holds list, where a mapping",
+}
+
+
+@pytest.mark.parametrize("text", BAD, ids=lambda text: text.replace(" ", ""))
+def test_refused_in_one_sentence(tmp_path, text):
+    file = tmp_path / "bad.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load(file)
+    message = str(caught.value)
+    assert message.startswith(str(file))
+    assert BAD[text] in message
+    assert "\n" not in message
+
+
+def test_frequency_above_nyquist_is_refused_with_the_rate_it_needs(tmp_path):
+    file = tmp_path / "bad.yaml"
+    file.write_text("probe: {frequency_MHz: 60}")
+    with pytest.raises(ConfigError, match=r"above the Nyquist frequency of sampling_MHz = 100.*204 MHz"):
+        load(file)
+
+
+def test_missing_file_is_named(tmp_path):
+    with pytest.raises(ConfigError, match=r"nowhere\.yaml: cannot be read"):
+        load(tmp_path / "nowhere.yaml")
+
+
+@pytest.mark.parametrize("name", ["demo", "paper", "sweep"])
+def test_shipped_configurations_are_accepted(name):
+    assert load(ROOT / f"config/{name}.yaml").name == name
+
+
+def test_dumped_configuration_reads_back_the_same(tmp_path):
+    import yaml
+
+    config = Config(seed=3)
+    file = tmp_path / "again.yaml"
+    file.write_text(yaml.safe_dump(config.model_dump(mode="json")))
+    assert load(file) == config

@@ -1,0 +1,40 @@
+"""Versions: code is known by what it does, settings by what they say."""
+
+from pathlib import Path
+
+from echotruth.config import Bmode, Tracker
+from echotruth.provenance import _closure, _tree, code_version, settings_version
+
+ROOT = Path(__file__).parents[1]
+
+
+def _version(tmp_path, text):
+    script = tmp_path / "script.py"
+    script.write_text(text)
+    for cached in (code_version, _tree):  # one file, two texts
+        cached.cache_clear()
+    return code_version(str(script))
+
+
+def test_comments_layout_and_docstrings_do_not_change_the_version(tmp_path):
+    plain = _version(tmp_path, "def f(x):\n    return x + 1\n")
+    dressed = _version(tmp_path, '"""Says."""\n\ndef f(x):\n    """Does."""\n    # adds\n    return (x   + 1)\n')
+    assert plain == dressed
+
+
+def test_another_statement_changes_the_version(tmp_path):
+    assert _version(tmp_path, "x = 1\n") != _version(tmp_path, "x = 2\n")
+
+
+def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_path):
+    def closure(stage):
+        return _closure((str(ROOT / f"workflow/scripts/{stage}.py"),))
+
+    assert "echotruth.mechanics.solver" in closure("mechanics")
+    assert "echotruth.mechanics.solver" not in closure("tracking")
+    assert "echotruth.tracking.phase_correlation" not in closure("mechanics") | closure("rf")
+
+
+def test_settings_version_depends_on_values_alone():
+    assert settings_version(Bmode(), 1) == settings_version(Bmode(), 1)
+    assert settings_version(Tracker()) != settings_version(Tracker(taper="hann"))
