@@ -1,0 +1,80 @@
+"""The seventeen segments of the left ventricle (Cerqueira 2002, Circulation 105:539) and their bullseye."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+
+NAMES = (
+    "basal anterior",
+    "basal anteroseptal",
+    "basal inferoseptal",
+    "basal inferior",
+    "basal inferolateral",
+    "basal anterolateral",
+    "mid anterior",
+    "mid anteroseptal",
+    "mid inferoseptal",
+    "mid inferior",
+    "mid inferolateral",
+    "mid anterolateral",
+    "apical anterior",
+    "apical septal",
+    "apical inferior",
+    "apical lateral",
+    "apex",
+)
+"""Names of segments 1..17."""
+
+APEX = 17
+
+
+def segment(position: np.ndarray, apex_z: float) -> np.ndarray:
+    """AHA segment of points of the wall.
+
+    Parameters
+    ----------
+    position : ndarray of shape (..., 3)
+        Unloaded x, y, z in the heart frame, m: the base at z = 0, anterior +y, septal +x.
+    apex_z : float
+        z of the unloaded endocardial apex, m, negative.
+
+    Returns
+    -------
+    ndarray of shape (...), uint8
+        1..17; 17 is the wall beyond the endocardial apex. 0 where a position is NaN.
+
+    Raises
+    ------
+    ValueError
+        If the apex is not below the base.
+    """
+    if not apex_z < 0:
+        raise ValueError(f"The endocardial apex must lie below the base plane (z < 0), not at z = {apex_z} m.")
+    x, y, z = np.moveaxis(np.asarray(position, float), -1, 0)
+    depth = 3 * z / apex_z
+    # Turn from anterior through the septum, the way the numbers run.
+    turn = pi / 2 - np.arctan2(y, x)
+    result = np.full(z.shape, APEX, float)
+    for ring, count, first in ((2, 4, 13), (1, 6, 7), (0, 6, 1)):
+        sector = np.floor(turn / (2 * pi / count) + 0.5) % count
+        # The base plane itself moves within rounding, so the basal ring has no upper end.
+        result = np.where(depth < ring + 1, first + sector, result)
+    return np.where(np.isfinite(turn + depth), result, 0).astype(np.uint8)
+
+
+def _rings() -> tuple[tuple[float, float, float, float], ...]:
+    """Sectors counter-clockwise from segment 1 at the top of the page, base outermost."""
+    sectors = []
+    for count, inner in ((6, 0.75), (6, 0.5), (4, 0.25)):
+        width = 2 * pi / count
+        for k in range(count):
+            start = pi / 2 + (k - 0.5) * width
+            sectors.append((inner, inner + 0.25, start, start + width))
+    return (*sectors, (0.0, 0.25, 0.0, 2 * pi))
+
+
+RINGS = _rings()
+"""Bullseye of segments 1..17: inner radius, outer radius (of a unit disc), start and stop angle, rad,
+counter-clockwise on the page from its right. Seen from the apex: anterior at the top, septum on the left."""

@@ -1,0 +1,48 @@
+"""The beating heart as imaging and evaluation see it: a mesh, its labels and its motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Heart:
+    """A mesh that moves.
+
+    Attributes
+    ----------
+    nodes : ndarray of shape (n_nodes, 3), m
+        Unloaded.
+    cells : ndarray of shape (n_cells, 10)
+    displacement : ndarray of shape (frame, n_nodes, 3), m
+        From unloaded; frame 0 is end-diastole.
+    wall_depth : ndarray of shape (n_nodes,)
+    endo : ndarray of shape (n_facets, 6)
+        Nodes of the endocardial triangles.
+    layers : int
+        Number of transmural layers.
+    es : int
+        Frame of end-systole.
+    """
+
+    nodes: Floats
+    cells: NDArray[np.int32]
+    displacement: Floats
+    wall_depth: Floats
+    endo: NDArray[np.int32]
+    layers: int
+    es: int
+
+    @property
+    def apex(self) -> float:
+        """z of the unloaded endocardial apex, m."""
+        return float(self.nodes[self.endo.ravel(), 2].min())
+
+    def positions(self, frame: int) -> Floats:
+        """Nodes in a frame, (n_nodes, 3), m."""
+        return self.nodes + self.displacement[frame]

@@ -1,0 +1,1 @@
+"""From a configuration to a beating left ventricle with known motion."""

@@ -1,0 +1,128 @@
+"""Volume of the cavity, and the load of the blood on the endocardium.
+
+The volume is a third of the flux of the position through the endocardium; the lid
+lies in the plane of the base, z = 0, through the origin, and adds nothing. On
+quadratic triangles the integral is exact, its gradient is the force of a unit
+pressure that follows the wall, and its Hessian is symmetric.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from echotruth.mechanics.quadrature import triangle
+from echotruth.tetrahedra import Floats, Integers
+
+_EDGES = np.array([(0, 1), (1, 2), (2, 0)])
+
+
+def triangle_shape(xi: Floats) -> tuple[Floats, Floats]:
+    """Quadratic shape functions of a triangle.
+
+    Parameters
+    ----------
+    xi : ndarray of shape (n, 2)
+
+    Returns
+    -------
+    value : ndarray of shape (n, 6)
+    slope : ndarray of shape (n, 6, 2)
+        Zienkiewicz & Taylor, The Finite Element Method, vol. 1, section 6.
+    """
+    corner = np.column_stack([1 - xi.sum(axis=1), xi])
+    step = np.vstack([-np.ones(2), np.eye(2)])
+    a, b = _EDGES.T
+    value = np.hstack([corner * (2 * corner - 1), 4 * corner[:, a] * corner[:, b]])
+    middle = 4 * (corner[:, a, None] * step[b] + corner[:, b, None] * step[a])
+    return value, np.concatenate([(4 * corner[..., None] - 1) * step, middle], axis=1)
+
+
+_XI, _WEIGHT = triangle()
+_VALUE, _SLOPE = triangle_shape(_XI)
+
+
+def cavity_volume(nodes: NDArray[np.float64], endo: Integers) -> float:
+    """Volume between the endocardium and the plane of the base.
+
+    Parameters
+    ----------
+    nodes : ndarray of shape (n_nodes, 3), m
+        Of the deformed wall; the rim of the cavity lies in z = 0.
+    endo : ndarray of shape (n_facets, 6)
+
+    Returns
+    -------
+    float, m^3
+        Minus a third of the flux of the position, as the facets' normals point into the cavity.
+    """
+    x = nodes[endo]
+    position = np.einsum("qa,fai->fqi", _VALUE, x)
+    first, second = (np.einsum("qa,fai->fqi", _SLOPE[..., k], x) for k in (0, 1))
+    flux = np.sum(position * np.cross(first, second), axis=-1)
+    return -float(np.sum(np.einsum("fq,q->f", flux, _WEIGHT))) / 3
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def load(nodes: Floats, endo: Integers, gradient: Floats, hessian: Floats) -> None:
+    """First and second derivatives of the volume of the cavity, facet by facet.
+
+    Parameters
+    ----------
+    nodes : ndarray of shape (n_nodes, 3), m
+    endo : ndarray of shape (n_facets, 6)
+    gradient : ndarray of shape (n_facets, 6, 3), m^2
+        Filled.
+    hessian : ndarray of shape (n_facets, 18, 18), m
+        Filled. Rows and columns run over node and axis.
+    """
+    for f in prange(endo.shape[0]):
+        _facet(nodes, endo[f], gradient[f], hessian[f])
+
+
+@njit(cache=True, error_model="numpy")
+def _facet(nodes: Floats, facet: Integers, gradient: Floats, hessian: Floats) -> None:
+    gradient[:] = 0.0
+    hessian[:] = 0.0
+    slots, factors = np.empty((3, 3)), np.empty((6, 3))
+    for q in range(_WEIGHT.shape[0]):
+        factors[:, 0], factors[:, 1:] = _VALUE[q], _SLOPE[q]
+        slots[:] = 0.0
+        for a in range(6):
+            for s in range(3):
+                slots[s] += factors[a, s] * nodes[facet[a]]
+        _add_point(factors, slots, -_WEIGHT[q] / 3, gradient, hessian)
+
+
+@njit(cache=True, error_model="numpy")
+def _add_point(factors: Floats, slots: Floats, weight: float, gradient: Floats, hessian: Floats) -> None:
+    """Add the derivatives of weight * det(position, first, second), the slots, at one point."""
+    for s in range(3):
+        normal = weight * _cross(slots[(s + 1) % 3], slots[(s + 2) % 3])
+        for a in range(6):
+            gradient[a] += factors[a, s] * normal
+    for a in range(6):
+        for b in range(6):
+            if a != b:
+                _add_pair(factors[a], factors[b], slots, weight, hessian[3 * a : 3 * a + 3, 3 * b : 3 * b + 3])
+
+
+@njit(cache=True, error_model="numpy")
+def _add_pair(a: Floats, b: Floats, slots: Floats, weight: float, block: Floats) -> None:
+    """Add the second derivatives of det(position, first, second) by two nodes: a matrix u, v -> det(u, v, axis)."""
+    axis = np.zeros(3)
+    for s in range(3):
+        p, q = (s + 1) % 3, (s + 2) % 3
+        axis += weight * (a[p] * b[q] - a[q] * b[p]) * slots[s]
+    block[0, 1] += axis[2]
+    block[1, 0] -= axis[2]
+    block[1, 2] += axis[0]
+    block[2, 1] -= axis[0]
+    block[2, 0] += axis[1]
+    block[0, 2] -= axis[1]
+
+
+@njit(cache=True, error_model="numpy")
+def _cross(a: Floats, b: Floats) -> NDArray[np.float64]:
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -1,0 +1,182 @@
+"""Deformation and strain of the wall.
+
+Strains are Green-Lagrange, in the axes of the wall or of the fibre, relative to the
+unloaded state or to end-diastole (F_rel = F F_ED^-1, along axes carried to ED).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.mechanics.fibres import CENTROID, axes_about, gradients, unit
+from echotruth.mechanics.quadrature import tetrahedron
+from echotruth.tetrahedra import Floats, Mesh
+
+RCL = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Components RR, CC, LL, RC, RL, CL."""
+
+FIBRE = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (2, 1))
+"""Components ff, ss, nn, fs, fn, sn of axes in the order f, s, n."""
+
+
+def deformation_gradient(mesh: Mesh, displacement: Floats, xi: Floats = CENTROID) -> Floats:
+    """F from the unloaded state.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    displacement : ndarray of shape (n_nodes, 3), m
+    xi : ndarray of shape (n_points, 3), optional
+        Local coordinates, the same in every tetrahedron; the centroid if not given.
+
+    Returns
+    -------
+    ndarray of shape (n_cells, n_points, 3, 3)
+    """
+    slope, _ = gradients(mesh, xi)
+    return np.eye(3) + np.einsum("cai,cqaj->cqij", displacement[mesh.cells], slope)
+
+
+def carried_axes(axes: Floats, gradient: Floats) -> Floats:
+    """Wall axes carried along.
+
+    Parameters
+    ----------
+    axes, gradient : ndarray of shape (..., 3, 3)
+        Rows R, C, L of the unloaded wall, and F.
+
+    Returns
+    -------
+    ndarray of shape (..., 3, 3)
+        R along F^-T R, the normal of the deformed surfaces of equal depth; C and L as in the unloaded wall.
+    """
+    return axes_about(np.einsum("...ji,...j->...i", np.linalg.inv(gradient), axes[..., 0, :]))
+
+
+def carried_fibres(frames: Floats, gradient: Floats) -> Floats:
+    """Fibre axes carried along.
+
+    Parameters
+    ----------
+    frames, gradient : ndarray of shape (..., 3, 3)
+        Rows f, s, n of the unloaded wall, and F.
+
+    Returns
+    -------
+    ndarray of shape (..., 3, 3)
+        f along F f, n along F^-T n (the two stay orthogonal) and s = n x f.
+    """
+    fibre = unit(np.einsum("...ij,...j->...i", gradient, frames[..., 0, :]))
+    normal = unit(np.einsum("...ji,...j->...i", np.linalg.inv(gradient), frames[..., 2, :]))
+    return np.stack([fibre, np.cross(normal, fibre), normal], axis=-2)
+
+
+def strain(gradient: Floats, axes: Floats, components: tuple[tuple[int, int], ...]) -> Floats:
+    """Green-Lagrange strain E = (F^T F - I) / 2 along axes.
+
+    Parameters
+    ----------
+    gradient, axes : ndarray of shape (..., 3, 3)
+        F, and rows of the axes.
+    components : pairs of axes
+
+    Returns
+    -------
+    ndarray of shape (..., len(components))
+    """
+    along = np.einsum("...ij,...kj->...ik", gradient, axes)
+    whole = (np.einsum("...ki,...kj->...ij", along, along) - np.eye(3)) / 2
+    return np.stack([whole[..., i, j] for i, j in components], axis=-1)
+
+
+def volume_ratios(mesh: Mesh, displacement: Floats) -> tuple[Floats, Floats]:
+    """J at the quadrature points.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    displacement : ndarray of shape (n_frames, n_nodes, 3), m
+
+    Returns
+    -------
+    smallest, mean : ndarray of shape (n_frames,)
+        The mean is weighted by unloaded volume.
+    """
+    xi, weight = tetrahedron()
+    slope, volume = gradients(mesh, xi)
+    volume = volume * weight
+    ratio = np.empty((2, len(displacement)))
+    for frame, moved in enumerate(displacement):
+        j = np.linalg.det(np.eye(3) + np.einsum("cai,cqaj->cqij", moved[mesh.cells], slope))
+        ratio[:, frame] = j.min(), np.sum(j * volume) / np.sum(volume)
+    return ratio[0], ratio[1]
+
+
+def weighted(values: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Mean and standard deviation over cells.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_frames, n_cells, n_components)
+    weight : ndarray of shape (n_cells,)
+        Their volumes.
+
+    Returns
+    -------
+    mean, sd : ndarray of shape (n_frames, n_components)
+    """
+    share = (weight / np.sum(weight))[:, None]
+    mean = np.sum(values * share, axis=1)
+    return mean, np.sqrt(np.sum((values - mean[:, None]) ** 2 * share, axis=1))
+
+
+def motion(mesh: Mesh, displacement: Floats, axes: Floats, frames: Floats) -> dict[str, NDArray]:
+    """Deformation and strain at the centroids, relative to the unloaded state and to ED (frame 0).
+
+    Parameters
+    ----------
+    mesh : Mesh
+    displacement : ndarray of shape (n_frames, n_nodes, 3), m
+    axes, frames : ndarray of shape (n_cells, 3, 3)
+        Rows R, C, L and rows f, s, n of the unloaded wall at the centroids.
+
+    Returns
+    -------
+    dict
+        `deformation_gradient` (frame, cell, 3, 3) from the unloaded state; `strain_unloaded` and
+        `strain` (frame, cell, 6: RR, CC, LL, RC, RL, CL); `fibre_strain_unloaded` and `fibre_strain`
+        (frame, cell, 6: ff, ss, nn, fs, fn, sn).
+    """
+    gradient = np.stack([deformation_gradient(mesh, moved)[:, 0] for moved in displacement])
+    relative = gradient @ np.linalg.inv(gradient[0])
+    return {
+        "deformation_gradient": gradient,
+        "strain_unloaded": strain(gradient, axes, RCL),
+        "strain": strain(relative, carried_axes(axes, gradient[0]), RCL),
+        "fibre_strain_unloaded": strain(gradient, frames, FIBRE),
+        "fibre_strain": strain(relative, carried_fibres(frames, gradient[0]), FIBRE),
+    }
+
+
+def layer_strain(strains: Floats, weight: Floats, layer: NDArray[np.integer], layers: int) -> Floats:
+    """Mean strain of each layer.
+
+    Parameters
+    ----------
+    strains : ndarray of shape (n_frames, n_cells, 6)
+    weight : ndarray of shape (n_cells,)
+    layer : ndarray of shape (n_cells,)
+        1 to `layers`.
+    layers : int
+
+    Returns
+    -------
+    ndarray of shape (n_frames, layers, 6)
+        Not a number for a layer in which no cell has its centroid.
+    """
+    means = np.full((len(strains), layers, strains.shape[-1]), np.nan)
+    for number in np.unique(layer):
+        inside = layer == number
+        means[:, number - 1] = weighted(strains[:, inside], weight[inside])[0]
+    return means

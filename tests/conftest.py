@@ -1,0 +1,34 @@
+"""Meshes and motions of which everything is known."""
+
+import numpy as np
+import pytest
+
+from echotruth.config import Geometry
+from echotruth.heart import Heart
+from echotruth.mechanics.fibres import wall_depth
+from echotruth.mechanics.geometry import left_ventricle
+from echotruth.tetrahedra import Mesh
+
+COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
+
+
+@pytest.fixture(scope="session")
+def coarse_mesh() -> Mesh:
+    """A ventricle of few cells."""
+    return left_ventricle(COARSE)
+
+
+@pytest.fixture(scope="session")
+def affine() -> tuple[np.ndarray, np.ndarray]:
+    """A turn by 9 degrees about the long axis, a squeeze, and a lift: deformation gradient and shift (m)."""
+    turn = np.radians(9)
+    around = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    return around @ np.diag([0.85, 0.85, 0.93]), np.array([0.1e-3, -0.05e-3, 0.2e-3])
+
+
+@pytest.fixture(scope="session")
+def twisting_heart(coarse_mesh, affine) -> Heart:
+    """A ventricle that is at rest in frame 0 and moved by an affine map in frame 1."""
+    nodes, (matrix, shift) = coarse_mesh.nodes, affine
+    motion = np.stack([np.zeros_like(nodes), nodes @ (matrix - np.eye(3)).T + shift])
+    return Heart(nodes, coarse_mesh.cells, motion, wall_depth(coarse_mesh), coarse_mesh.endo, layers=6, es=1)

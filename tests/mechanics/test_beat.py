@@ -1,0 +1,176 @@
+"""A whole beat: the loop is met, energy is conserved, the strains are those computed independently."""
+
+import numba
+import numpy as np
+import pytest
+
+from echotruth.config import Config, Fibres, Geometry, Loop, Material, Mechanics
+from echotruth.mechanics import fibres, kinematics
+from echotruth.mechanics.beat import beat
+from echotruth.mechanics.cavity import cavity_volume
+from echotruth.mechanics.fibres import gradients
+from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.quadrature import tetrahedron
+
+COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
+SHAPES = {
+    "geometry": {"node_position", "cell_node", "endo", "epi", "base"},
+    "fibres": {"wall_depth", "fibre", "sheet", "helix_angle", "layer", "segment"},
+    "mechanics": {
+        *("time", "pressure", "volume", "pressure_asked", "volume_asked", "active_tension"),
+        *("displacement", "stiffness", "es_frame", "newton_steps"),
+    },
+    "kinematics": {
+        *("deformation_gradient", "strain_unloaded", "strain", "fibre_strain_unloaded", "fibre_strain"),
+        *("strain_mean", "strain_sd", "layer_strain", "volume_ratio_min", "volume_ratio_mean"),
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def case():
+    return beat(Config(geometry=COARSE))
+
+
+@pytest.fixture(scope="module")
+def unloaded():
+    mesh = left_ventricle(COARSE)
+    xi, weight = tetrahedron()
+    slope, volume = gradients(mesh, xi)
+    return mesh, slope, volume * weight, fibres.fibre_frames(mesh, fibres.wall_depth(mesh), Fibres(), xi)
+
+
+def energies(unloaded, displacement):
+    """Passive energy over C, active energy over T_Ca and energy of volume change, by the printed formulas."""
+    section, (mesh, slope, volume, frames) = Material(), unloaded
+    f = np.eye(3) + np.einsum("cai,cqaj->cqij", displacement[mesh.cells], slope)
+    j = np.linalg.det(f)
+    along = np.einsum("cqij,cqkj->cqik", f, frames)
+    c = np.einsum("cqki,cqkj->cqij", along, along)
+    e = (c * j[..., None, None] ** (-2 / 3) - np.eye(3)) / 2
+    q = section.fibre * e[..., 0, 0] ** 2 + 2 * section.shear * (e[..., 0, 1] ** 2 + e[..., 0, 2] ** 2)
+    q += section.transverse * (e[..., 1, 1] ** 2 + e[..., 2, 2] ** 2 + 2 * e[..., 1, 2] ** 2)
+    stretch, beta = np.sqrt(c[..., 0, 0]), section.length_dependence
+    active = (1 - beta) * np.log(stretch) + beta * (stretch - 1)
+    cells = volume.sum(axis=1)
+    growth = np.sum(j * volume, axis=1) / cells - 1
+    bulk = section.si().bulk_modulus / 2 * np.sum(cells * growth**2)
+    return np.sum((np.exp(q) - 1) / 2 * volume), np.sum(active * volume), bulk
+
+
+def test_arrays_are_those_of_the_schema(case):
+    assert {group: set(arrays) for group, arrays in case.items()} == SHAPES
+    cells, frames = len(case["geometry"]["cell"]), 40
+    assert case["geometry"]["cell"].dtype == np.int32
+    assert case["fibres"]["layer"].dtype == np.uint8
+    assert case["mechanics"]["displacement"].shape == (frames, len(case["geometry"]["node_position"]), 3)
+    assert case["kinematics"]["deformation_gradient"].shape == (frames, cells, 3, 3)
+    assert case["kinematics"]["strain"].shape == (frames, cells, 6)
+    assert case["kinematics"]["strain"].dtype == np.float32
+    assert case["kinematics"]["layer_strain"].shape == (frames, 6, 6)
+
+
+def test_loop_is_met_at_every_frame(case):
+    mechanics = case["mechanics"]
+    np.testing.assert_allclose(mechanics["volume"], mechanics["volume_asked"], rtol=1e-7)
+    np.testing.assert_array_equal(mechanics["pressure"], mechanics["pressure_asked"])
+    positions = case["geometry"]["node_position"] + mechanics["displacement"][20]
+    assert cavity_volume(positions, case["geometry"]["endo"]) == pytest.approx(mechanics["volume_asked"][20], rel=1e-7)
+
+
+def test_tension_is_never_negative_and_vanishes_at_ed(case):
+    tension = case["mechanics"]["active_tension"]
+    assert tension[0] == 0
+    assert tension.min() > -1.0
+    assert tension[-1] < 100
+
+
+def test_base_keeps_its_plane_and_does_not_turn(case):
+    rim = np.unique(case["geometry"]["base"])
+    moved = case["mechanics"]["displacement"][:, rim]
+    assert np.all(moved[..., 2] == 0)
+    np.testing.assert_allclose(np.cross(moved, case["geometry"]["node_position"][rim])[..., 2], 0, atol=1e-18)
+
+
+def test_wall_keeps_its_volume(case):
+    kinematics = case["kinematics"]
+    assert kinematics["volume_ratio_min"].min() > 0
+    assert np.abs(kinematics["volume_ratio_mean"] - 1).max() < 0.02
+
+
+def test_pressure_does_the_work_that_the_wall_takes_up(case, unloaded):
+    """Virtual work of one frame, with energies written down anew."""
+    mesh, mechanics = unloaded[0], case["mechanics"]
+    frame, step = 12, 1e-4
+    here, change = mechanics["displacement"][frame], np.diff(mechanics["displacement"], axis=0)[frame]
+
+    def energy(share):
+        passive, active, bulk = energies(unloaded, here + share * change)
+        return mechanics["stiffness"] * passive + mechanics["active_tension"][frame] * active + bulk
+
+    def volume(share):
+        return cavity_volume(mesh.nodes + here + share * change, mesh.endo)
+
+    inside = (energy(step) - energy(-step)) / (2 * step)
+    outside = mechanics["pressure"][frame] * (volume(step) - volume(-step)) / (2 * step)
+    assert inside == pytest.approx(outside, rel=1e-6)
+
+
+def test_stroke_work_is_the_work_of_the_fibres(case, unloaded):
+    mechanics = case["mechanics"]
+    fibre = np.array([energies(unloaded, moved)[1] for moved in mechanics["displacement"]])
+
+    def around(force, way):
+        force, way = np.append(force, force[0]), np.append(way, way[0])
+        return np.sum((force[1:] + force[:-1]) / 2 * np.diff(way))
+
+    stroke = -around(mechanics["pressure"], mechanics["volume"])
+    assert stroke > 0
+    assert -around(mechanics["active_tension"], fibre) == pytest.approx(stroke, rel=0.02)
+
+
+def test_angles_read_back_are_those_asked_for(case):
+    mesh = left_ventricle(COARSE)
+    centre = fibres.at_points(mesh, case["fibres"]["wall_depth"], fibres.CENTROID)[:, 0]
+    np.testing.assert_allclose(np.degrees(case["fibres"]["helix_angle"]), 84 - 126 * centre, atol=1e-9)
+
+
+def test_stored_deformation_is_that_of_the_stored_displacement(case):
+    mesh = left_ventricle(COARSE)
+    gradient = kinematics.deformation_gradient(mesh, case["mechanics"]["displacement"][19])[:, 0]
+    np.testing.assert_allclose(case["kinematics"]["deformation_gradient"][19], gradient, rtol=1e-6, atol=1e-6)
+
+
+def test_given_stiffness_scales_the_volumes():
+    stiff = Config(
+        geometry=COARSE, loop=Loop(frames=4), mechanics=Mechanics(material=Material(stiffness_kPa=2.0), base="fixed")
+    )
+    mechanics = beat(stiff)["mechanics"]
+    assert mechanics["stiffness"] == 2000
+    assert mechanics["volume"][0] < 49e-9
+    np.testing.assert_allclose(mechanics["volume"], mechanics["volume_asked"], rtol=1e-7)
+
+
+def test_few_frames_converge_and_bytes_do_not_depend_on_threads():
+    before, runs = numba.get_num_threads(), []
+    for threads in (1, before):
+        numba.set_num_threads(threads)
+        runs.append(beat(Config(geometry=COARSE, loop=Loop(frames=10))))
+    numba.set_num_threads(before)
+    for group, arrays in runs[0].items():
+        for name, values in arrays.items():
+            assert values.tobytes() == runs[1][group][name].tobytes(), f"{group}/{name}"
+
+
+@pytest.mark.slow
+def test_default_heart_has_the_strains_computed_independently():
+    """Wall means at ES against ED of an axisymmetric mixed solution of the same heart."""
+    case = beat(Config())
+    es, mechanics = int(case["mechanics"]["es_frame"]), case["mechanics"]
+    mean, sd = (case["kinematics"][name][es] for name in ("strain_mean", "strain_sd"))
+    np.testing.assert_allclose(mean[:3], [0.54, -0.170, -0.095], atol=0.03)
+    np.testing.assert_allclose(sd[:3], [0.24, 0.052, 0.021], atol=0.03)
+    assert mechanics["stiffness"] == pytest.approx(1100, rel=0.03)
+    assert mechanics["active_tension"][es] == pytest.approx(43e3, rel=0.03)
+    np.testing.assert_allclose(mechanics["volume"], mechanics["volume_asked"], rtol=1e-6)
+    assert case["kinematics"]["volume_ratio_min"].min() > 0

@@ -1,0 +1,46 @@
+"""Quadratic tetrahedra: shape functions, interpolation and gradients against polynomials."""
+
+import numpy as np
+import pytest
+
+from echotruth.tetrahedra import EDGES, MaterialPoints, gradient, interpolate, shape, shape_gradient
+
+
+@pytest.fixture(scope="module")
+def points(coarse_mesh):
+    random = np.random.default_rng(1)
+    n = 500
+    xi = np.diff(np.sort(random.random((n, 3)), axis=1), prepend=0.0, axis=1)
+    return MaterialPoints(random.integers(0, len(coarse_mesh.cells), n).astype(np.int32), xi)
+
+
+def test_shape_functions_are_one_at_their_node_and_zero_at_the_others():
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    nodes = np.vstack([corners, corners[EDGES].mean(axis=1)])
+    assert np.allclose(shape(nodes), np.eye(10), atol=1e-14)
+
+
+def test_shape_functions_add_up_to_one_and_their_gradients_to_zero(points):
+    assert np.allclose(shape(points.xi).sum(axis=1), 1)
+    assert np.allclose(shape_gradient(points.xi).sum(axis=1), 0, atol=1e-13)
+
+
+def test_gradients_are_those_of_the_shape_functions(points):
+    step = 1e-6
+    for axis, unit in enumerate(np.eye(3)):
+        slope = (shape(points.xi + step * unit) - shape(points.xi - step * unit)) / (2 * step)
+        assert np.allclose(slope, shape_gradient(points.xi)[..., axis], atol=1e-8)
+
+
+def test_a_linear_field_is_interpolated_exactly_though_the_cells_are_curved(coarse_mesh, points):
+    place = interpolate(coarse_mesh.nodes, coarse_mesh.cells, points)
+    matrix, shift = np.array([[1.0, 2, 3], [0, -1, 4], [2, 0, 1]]), np.array([1e-3, 0, 0])
+    field = interpolate(coarse_mesh.nodes @ matrix.T + shift, coarse_mesh.cells, points)
+    assert np.allclose(field, place @ matrix.T + shift, atol=1e-17)
+
+
+def test_the_gradient_of_an_affine_motion_is_its_matrix(coarse_mesh, points):
+    matrix = np.array([[1.1, 0.2, 0], [-0.1, 0.9, 0.3], [0, 0.1, 1.2]])
+    moved = coarse_mesh.nodes @ matrix.T
+    assert np.allclose(gradient(moved, coarse_mesh.nodes, coarse_mesh.cells, points), matrix, atol=1e-12)
+    assert np.allclose(gradient(coarse_mesh.nodes, moved, coarse_mesh.cells, points), np.linalg.inv(matrix), atol=1e-12)
