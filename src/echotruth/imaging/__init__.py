@@ -1,0 +1,1 @@
+"""From a beating heart to a clip: phantom, probe, RF, beamforming, B-mode, and the truth in every pixel."""

@@ -1,0 +1,143 @@
+"""The truth in the image: the motion of the tissue at every pixel, by the interpolation that carries the scatterers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.aha import segment
+from echotruth.heart import Heart
+from echotruth.imaging.view import Plane
+from echotruth.location import locate
+from echotruth.mechanics import kinematics
+from echotruth.mechanics.fibres import axes_about, layer
+from echotruth.tetrahedra import MaterialPoints, gradient, interpolate
+
+Floats = NDArray[np.float64]
+
+
+def truth(heart: Heart, frame: int, plane: Plane, axial: Floats, lateral: Floats) -> dict[str, NDArray[np.generic]]:
+    """What the tissue at each pixel of a frame has done since end-diastole.
+
+    Parameters
+    ----------
+    heart : Heart
+    frame : int
+    plane : Plane
+    axial, lateral : ndarray of shape (n_axial,), (n_lateral,), m
+        Pixel centres.
+
+    Returns
+    -------
+    dict of ndarray of shape (n_axial, n_lateral, ...)
+        displacement (3; lateral, axial, elevation; m), strain (6; RR, CC, LL, RC, RL, CL), mask, layer,
+        segment, wall_depth. Outside the wall: NaN, False or 0.
+    """
+    pixels = np.stack(np.broadcast_arrays(lateral, axial[:, None], 0.0), axis=-1).reshape(-1, 3)
+    points = locate(heart.positions(frame), heart.cells, plane.heart(pixels))
+    inside = points.cell >= 0
+    wall = MaterialPoints(points.cell[inside], points.xi[inside])
+    values = {
+        "displacement": displacement(heart, frame, wall) @ plane.axes.T,
+        "strain": strain(heart, frame, wall),
+        "mask": np.ones(len(wall), bool),
+        **labels(heart, wall),
+    }
+    return {name: _on_pixels(value, inside, (len(axial), len(lateral))) for name, value in values.items()}
+
+
+def follow(heart: Heart, plane: Plane, places: Floats) -> dict[str, NDArray[np.generic]]:
+    """The true motion of the tissue that is at given places of the image at end-diastole.
+
+    Parameters
+    ----------
+    heart : Heart
+    plane : Plane
+    places : ndarray of shape (n_axial, n_lateral, 2), m
+        Lateral, axial.
+
+    Returns
+    -------
+    dict of ndarray
+        true_displacement (frame, n_axial, n_lateral, 2; lateral, axial; m) and through_plane
+        (frame, n_axial, n_lateral; m) since end-diastole; layer and segment (n_axial, n_lateral) at end-diastole.
+        Outside the wall: NaN or 0.
+    """
+    shape = places.shape[:2]
+    flat = np.column_stack([places.reshape(-1, 2), np.zeros(shape[0] * shape[1])])
+    points = locate(heart.positions(0), heart.cells, plane.heart(flat))
+    inside = points.cell >= 0
+    wall = MaterialPoints(points.cell[inside], points.xi[inside])
+    moved = [displacement(heart, frame, wall) @ plane.axes.T for frame in range(len(heart.displacement))]
+    motion = np.stack([_on_pixels(each, inside, shape) for each in moved])
+    at_ed = labels(heart, wall)
+    return {
+        "true_displacement": motion[..., :2],
+        "through_plane": motion[..., 2],
+        "layer": _on_pixels(at_ed["layer"], inside, shape),
+        "segment": _on_pixels(at_ed["segment"], inside, shape),
+    }
+
+
+def displacement(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
+    """Displacement of material points since end-diastole, (n, 3) in the heart frame, m."""
+    return interpolate(heart.displacement[frame] - heart.displacement[0], heart.cells, points)
+
+
+def strain(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
+    """Green-Lagrange strain of material points since end-diastole along the wall's axes there, (n, 6)."""
+    at_ed = heart.positions(0)
+    normal = gradient(heart.wall_depth, at_ed, heart.cells, points)
+    deformation = gradient(heart.positions(frame), at_ed, heart.cells, points)
+    return kinematics.strain(deformation, axes_about(normal), kinematics.RCL)
+
+
+def labels(heart: Heart, points: MaterialPoints) -> dict[str, NDArray[np.generic]]:
+    """Wall depth (0 to 1), layer and AHA segment of material points, each (n,)."""
+    depth = np.clip(interpolate(heart.wall_depth, heart.cells, points), 0, 1)
+    unloaded = interpolate(heart.nodes, heart.cells, points)
+    return {
+        "wall_depth": depth,
+        "layer": layer(depth, heart.layers).astype(np.uint8),
+        "segment": segment(unloaded, heart.apex),
+    }
+
+
+def cavity_centre(heart: Heart, plane: Plane) -> Floats:
+    """Centroid of the cavity in a short-axis plane at end-diastole: lateral, axial, m.
+
+    The plane cuts the endocardial triangles in segments; the centroid is that of the polygon they enclose,
+    summed from its middle by Green's theorem.
+    """
+    corners = plane.image(heart.positions(0)[_quarters(heart.endo)])
+    pieces = np.array([cut for triangle in corners if (cut := _cut(triangle)) is not None])
+    if not len(pieces):
+        return np.full(2, np.nan)
+    middle = pieces.mean(axis=(0, 1))
+    a, b = (pieces - middle).transpose(1, 0, 2)
+    area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+    return middle + (area[:, None] * (a + b) / 3).sum(axis=0) / area.sum()
+
+
+def _quarters(facets: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Each quadratic triangle as four straight ones, through the middles of its edges."""
+    return facets[:, [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)]].reshape(-1, 3)
+
+
+def _cut(triangle: Floats) -> Floats | None:
+    """Where the image plane (elevation 0) cuts a triangle: its two ends, or None."""
+    ends = []
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        low, high = triangle[a], triangle[b]
+        if (low[2] < 0) != (high[2] < 0):
+            ends.append(low[:2] + (high[:2] - low[:2]) * low[2] / (low[2] - high[2]))
+    return np.array(ends) if len(ends) == 2 else None
+
+
+def _on_pixels(values: NDArray[np.generic], inside: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.generic]:
+    floating = values.dtype.kind == "f"
+    image = np.full(
+        (len(inside), *values.shape[1:]), np.nan if floating else 0, np.float32 if floating else values.dtype
+    )
+    image[inside] = values
+    return image.reshape(*shape, *values.shape[1:])

@@ -1,0 +1,98 @@
+"""Truth: pixels know the motion, strain and place of their tissue, as exactly as the scatterers do."""
+
+import numpy as np
+import pytest
+
+from echotruth.config import Config, Phantom
+from echotruth.imaging.phantom import seed
+from echotruth.imaging.truth import cavity_centre, displacement, follow, truth
+from echotruth.imaging.view import plane
+from echotruth.location import locate
+from echotruth.tetrahedra import interpolate
+
+CONFIG = Config()
+AXIS = (np.arange(96) + 0.5) / 96 * 12e-3
+
+
+@pytest.fixture(scope="module")
+def mid(twisting_heart):
+    return plane(CONFIG.views["mid"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+
+
+@pytest.fixture(scope="module")
+def moved(twisting_heart, mid):
+    return truth(twisting_heart, 1, mid, AXIS, AXIS - 6e-3)
+
+
+def _places(mask, mid):
+    axial, lateral = AXIS[np.nonzero(mask)[0]], AXIS[np.nonzero(mask)[1]] - 6e-3
+    return mid.heart(np.column_stack([lateral, axial, np.zeros(len(axial))]))
+
+
+def test_displacement_of_an_affine_motion_is_the_formula(moved, mid, affine):
+    matrix, shift = affine
+    now = _places(moved["mask"], mid)
+    before = (now - shift) @ np.linalg.inv(matrix).T
+    expected = (now - before) @ mid.axes.T
+    assert np.abs(moved["displacement"][moved["mask"]] - expected).max() < 1e-10  # stored in single precision
+
+
+def test_strain_of_an_affine_motion_is_the_formula(moved, affine):
+    # Squeezed by 0.85 across and 0.93 along the axis: E_CC is the same at every point; the trace is invariant.
+    matrix, _ = affine
+    green = (matrix.T @ matrix - np.eye(3)) / 2
+    strain = moved["strain"][moved["mask"]]
+    assert np.allclose(strain[:, 1], green[0, 0], atol=1e-6)
+    assert np.allclose(strain[:, :3].sum(axis=1), np.trace(green), atol=1e-6)
+
+
+def test_a_scatterer_and_the_pixel_at_its_place_agree_to_round_off(twisting_heart):
+    heart = twisting_heart
+    scattered = seed(Phantom(density_per_mm3=200.0), heart.nodes, heart.cells, np.random.default_rng(0)).points
+    at_pixel = locate(heart.positions(1), heart.cells, interpolate(heart.positions(1), heart.cells, scattered))
+    difference = displacement(heart, 1, scattered) - displacement(heart, 1, at_pixel)
+    assert np.abs(difference).max() < 1e-16
+
+
+def test_nothing_moves_at_end_diastole(twisting_heart, mid):
+    still = truth(twisting_heart, 0, mid, AXIS, AXIS - 6e-3)
+    assert np.all(still["displacement"][still["mask"]] == 0)
+    assert np.abs(still["strain"][still["mask"]]).max() < 1e-12
+
+
+def test_labels_are_of_the_wall_and_nothing_is_known_outside(moved):
+    inside, outside = moved["mask"], ~moved["mask"]
+    assert inside.any() and outside.any()
+    assert set(np.unique(moved["layer"][inside])) == set(range(1, 7))
+    assert set(np.unique(moved["segment"][inside])) == set(range(7, 13))
+    assert np.isnan(moved["displacement"][outside]).all() and np.isnan(moved["wall_depth"][outside]).all()
+    assert not moved["layer"][outside].any() and not moved["segment"][outside].any()
+    assert np.array_equal(moved["layer"][inside], np.clip(np.floor(6 * moved["wall_depth"][inside]) + 1, 1, 6))
+
+
+def test_the_wall_in_the_image_has_the_area_of_the_wall_in_the_plane(twisting_heart, mid):
+    # The unloaded wall's cut is an annulus between two ellipses of revolution (science of the default geometry).
+    fine = (np.arange(512) + 0.5) / 512 * 12e-3
+    still = truth(twisting_heart, 0, mid, fine, fine - 6e-3)
+    height = mid.origin[2] + 1.40e-3  # above the equator
+    radii = [r * np.sqrt(1 - (height / length) ** 2) for r, length in ((1.45e-3, 5.40e-3), (2.45e-3, 6.20e-3))]
+    expected = np.pi * (radii[1] ** 2 - radii[0] ** 2)
+    assert still["mask"].sum() * (12e-3 / 512) ** 2 == pytest.approx(expected, rel=0.01)
+
+
+def test_tracked_points_are_followed_from_where_they_were_at_end_diastole(twisting_heart, mid, affine):
+    matrix, shift = affine
+    places = np.stack(np.meshgrid(AXIS[::8] - 6e-3, AXIS[::8]), axis=-1)
+    motion = follow(twisting_heart, mid, places)
+    inside = motion["layer"] > 0
+    start = mid.heart(np.column_stack([places[inside], np.zeros(inside.sum())]))
+    expected = (start @ (matrix - np.eye(3)).T + shift) @ mid.axes.T
+    assert np.allclose(motion["true_displacement"][1][inside], expected[:, :2], atol=1e-10)
+    assert np.allclose(motion["through_plane"][1][inside], expected[:, 2], atol=1e-10)
+    assert np.isnan(motion["true_displacement"][1][~inside]).all()
+
+
+def test_the_cavity_centre_is_on_the_axis_and_moves_with_a_shifted_heart(twisting_heart, mid):
+    assert np.allclose(cavity_centre(twisting_heart, mid), [0, 6.5e-3], atol=1e-6)
+    shifted = twisting_heart.__class__(**{**vars(twisting_heart), "nodes": twisting_heart.nodes + [0.3e-3, 0.2e-3, 0]})
+    assert np.allclose(cavity_centre(shifted, mid), [-0.3e-3, 6.3e-3], atol=1e-6)
