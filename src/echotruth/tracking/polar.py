@@ -1,0 +1,56 @@
+"""In-plane vectors along the directions of the ventricle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+COMPONENTS = ("radial", "tangential")
+"""Short axis: radial and circumferential. Long axis: transverse and longitudinal."""
+
+
+def directions(position: np.ndarray, origin: np.ndarray, plane: str) -> np.ndarray:
+    """Unit vectors at every point.
+
+    Short axis: away from the origin, and counter-clockwise as seen in the image, whose axial axis points down.
+    Long axis: away from the line of the long axis, and from apex to base, which is down.
+
+    Parameters
+    ----------
+    position : ndarray of shape (point, 2)
+        Lateral, axial, m.
+    origin : ndarray of shape (2,)
+        Centre of the cavity (short axis), or a point of the long axis: lateral, axial, m.
+    plane : {"short_axis", "long_axis"}
+
+    Returns
+    -------
+    ndarray of shape (point, 2, 2)
+        Component (radial, tangential) by axis (lateral, axial); NaN at the origin of a short-axis view.
+    """
+    arm = np.asarray(position, float) - np.asarray(origin, float)
+    if plane == "short_axis":
+        length = np.hypot(arm[:, 0], arm[:, 1])
+        lateral, axial = (arm / np.where(length > 0, length, np.nan)[:, None]).T
+        return np.stack([np.stack([lateral, axial], -1), np.stack([axial, -lateral], -1)], -2)
+    if plane == "long_axis":
+        away, zero = np.where(arm[:, 0] >= 0, 1.0, -1.0), np.zeros(len(arm))
+        return np.stack([np.stack([away, zero], -1), np.stack([zero, zero + 1], -1)], -2)
+    raise ValueError(f"The plane must be short_axis or long_axis, not {plane}.")
+
+
+def resolve(vector: np.ndarray, position: np.ndarray, origin: np.ndarray, plane: str) -> np.ndarray:
+    """Polar components of in-plane vectors.
+
+    Parameters
+    ----------
+    vector : ndarray of shape (..., point, 2)
+        Lateral, axial, any unit.
+    position, origin, plane
+        As for :func:`directions`.
+
+    Returns
+    -------
+    ndarray of shape (..., point, 2)
+        Radial, tangential, in the unit of the vectors.
+    """
+    return np.einsum("...i,...ci->...c", vector, directions(position, origin, plane))

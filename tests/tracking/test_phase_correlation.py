@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from echotruth.tracking.phase_correlation import displacement, fraction, phases
+from echotruth.tracking.windows import arrange
+
+
+def match(first, second, side, taper="none"):
+    windows = arrange(first.shape, side, 0.5)
+    return displacement(*(phases(image, windows, taper, 255) for image in (first, second)), side)
+
+
+@pytest.mark.parametrize("shift", [(0, 0), (5, 0), (0, -7), (-3, 11)])
+def test_sign_and_axis_order_of_a_rolled_image(shift):
+    first = np.random.default_rng(1).integers(0, 256, (64, 64)).astype(np.uint8)
+    second = np.roll(first, (shift[1], shift[0]), axis=(0, 1))
+    moved, peak = match(first, second, 64)
+    np.testing.assert_allclose(moved[0, 0], shift, atol=1e-9)
+    assert peak[0, 0] == pytest.approx(1, abs=1e-3)
+
+
+@pytest.mark.parametrize("taper", ["none", "hann"])
+def test_whole_pixel_shift_of_speckle_is_found_to_the_pixel(shifted, taper):
+    moved, _ = match(shifted(128, 0, 0), shifted(128, 4, -6), 64, taper)
+    np.testing.assert_array_equal(moved.round(), np.broadcast_to([4, -6], moved.shape))
+
+
+@pytest.mark.parametrize("taper", ["none", "hann"])
+@pytest.mark.parametrize("shift", [0.2, 0.4, 0.5, 0.7, 2.3])
+def test_bias_of_sub_pixel_shifts_is_below_a_tenth_of_a_pixel(shifted, shift, taper):
+    moved, _ = match(shifted(256, 0, 0), shifted(256, shift, -shift), 64, taper)
+    error = moved - [shift, -shift]
+    assert np.abs(np.median(error, axis=(0, 1))).max() < 0.1
+    assert np.abs(error.mean((0, 1))).max() < 0.12
+
+
+def test_fraction_is_exact_for_the_peak_of_a_shifted_texture():
+    shift = np.linspace(-0.49, 0.49, 21)
+    np.testing.assert_allclose(fraction(*(np.sinc(k - shift) for k in (-1, 0, 1))), shift, atol=1e-12)
+
+
+def test_window_without_texture_has_no_displacement(shifted):
+    image = shifted(96, 0, 0)
+    image[:, 48:] = 0
+    moved, peak = match(image, image, 32)
+    assert np.isfinite(moved[:, 0]).all() and np.isnan(moved[:, -1]).all() and np.isnan(peak[:, -1]).all()
