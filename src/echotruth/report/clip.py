@@ -1,0 +1,204 @@
+"""A B-mode clip with the true motion of the wall drawn on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.text import Text
+from PIL import Image
+
+from echotruth.report import style
+
+MOTION = "#ffb000"
+"""Colour of the true motion."""
+
+LARGEST = 3_000_000
+"""Bytes of a GIF."""
+
+RATE = 20
+"""Frames a second of the moving picture, a slow motion."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A clip and the motion in it.
+
+    Attributes
+    ----------
+    image : ndarray of shape (frame, axial, lateral), uint8
+        Grey levels.
+    spacing : float
+        Distance of pixel centres, m.
+    time : ndarray of shape (frame,)
+        Since end-diastole, s.
+    position : ndarray of shape (point, 2)
+        Lateral, axial place of the points in frame 0, px.
+    displacement : ndarray of shape (frame, point, 2)
+        Lateral, axial displacement since frame 0, m; NaN where there is none.
+    """
+
+    image: np.ndarray
+    spacing: float
+    time: np.ndarray
+    position: np.ndarray
+    displacement: np.ndarray
+
+    @property
+    def path(self) -> np.ndarray:
+        """Places of the points, px, shape (frame, point, 2)."""
+        return self.position + self.displacement / self.spacing
+
+
+def thin(position: np.ndarray, distance: float) -> np.ndarray:
+    """Choose points no closer to one another than a distance, in their order.
+
+    Parameters
+    ----------
+    position : ndarray of shape (point, 2)
+        Any unit.
+    distance : float
+        In the same unit.
+
+    Returns
+    -------
+    ndarray of int
+        Indices of the chosen points.
+    """
+    chosen: list[int] = []
+    for k, place in enumerate(position):
+        if not chosen or np.linalg.norm(position[chosen] - place, axis=1).min() >= distance:
+            chosen.append(k)
+    return np.array(chosen, int)
+
+
+@style.styled
+def render(clip: Clip, side: int) -> np.ndarray:
+    """Draw every frame, cut to the moving wall: grey image, paths so far and arrows from end-diastole.
+
+    Parameters
+    ----------
+    clip : Clip
+    side : int
+        Side of the square frames, px; even.
+
+    Returns
+    -------
+    ndarray of shape (frame, side, side, 3), uint8
+        RGB.
+    """
+    left, right, bottom, top = _crop(clip)
+    sheet = style.figure(4, 4)
+    sheet.set_layout_engine("none")
+    axes = sheet.add_axes((0, 0, 1, 1))
+    axes.axis("off")
+    shown = axes.imshow(clip.image[0], cmap="gray", vmin=0, vmax=255, interpolation="bilinear")
+    trails = axes.add_collection(LineCollection([], colors=MOTION, linewidths=0.8, alpha=0.45))
+    arrows = axes.quiver(
+        *clip.position.T,
+        *np.zeros_like(clip.position.T),
+        angles="xy",
+        scale_units="xy",
+        scale=1,
+        color=MOTION,
+        width=0.006,
+        headwidth=3.6,
+        headlength=3.8,
+        headaxislength=3.4,
+        minlength=0.5,
+    )
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+    label = _scale_bar(axes, clip, (left, bottom))
+    frames = []
+    for t, image in enumerate(clip.image):
+        shown.set_data(image)
+        trails.set_segments(list(clip.path[: t + 1].swapaxes(0, 1)))
+        arrows.set_UVC(*np.nan_to_num(clip.path[t] - clip.position).T)
+        label.set_text(f"{clip.time[t] * 1e3:.0f} ms")
+        sheet.set_dpi(side / 4)
+        sheet.canvas.draw()
+        frames.append(np.asarray(sheet.canvas.buffer_rgba())[..., :3].copy())
+    return np.stack(frames)
+
+
+def _crop(clip: Clip) -> tuple[float, float, float, float]:
+    """Square about the wall through the whole cycle, within the image: left, right, bottom, top, px."""
+    low, high = np.nanmin(clip.path, (0, 1)), np.nanmax(clip.path, (0, 1))
+    half = min(0.5 * (high - low).max() + 0.7e-3 / clip.spacing, (min(clip.image.shape[1:]) - 1) / 2)
+    size = np.array(clip.image.shape[:0:-1])
+    centre = np.clip((low + high) / 2, half, size - 1 - half)
+    (left, upper), (right, lower) = centre - half, centre + half
+    return left, right, lower, upper
+
+
+def _scale_bar(axes: Axes, clip: Clip, corner: tuple[float, float]) -> Text:
+    """A millimetre in the lower left corner; returns the label of the time beside it."""
+    width = axes.get_xlim()[1] - axes.get_xlim()[0]
+    length = 1e-3 / clip.spacing
+    x, y = corner[0] + 0.05 * width, corner[1] - 0.05 * width
+    axes.plot([x, x + length], [y, y], color="white", linewidth=2.5, solid_capstyle="butt")
+    axes.text(x + length / 2, y - 0.02 * width, "1 mm", color="white", ha="center", va="bottom", fontsize=9)
+    return axes.text(corner[0] + 0.95 * width, y, "", color="white", ha="right", va="baseline", fontsize=10)
+
+
+def gif(path: str | Path, frames: np.ndarray, rate: float = RATE) -> Path:
+    """Write a GIF that loops, with as many greys as its size allows.
+
+    Parameters
+    ----------
+    path : str or Path
+    frames : ndarray of shape (frame, height, width, 3), uint8
+        RGB.
+    rate : float
+        Frames a second.
+
+    Returns
+    -------
+    Path
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    for colours in (64, 40, 28, 20, 14):
+        palette = Image.fromarray(frames.reshape(-1, *frames.shape[2:])[:: max(1, len(frames) // 8)]).quantize(colours)
+        pictures = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+        pictures[0].save(
+            path, save_all=True, append_images=pictures[1:], duration=round(1000 / rate), loop=0, optimize=False
+        )
+        if path.stat().st_size <= LARGEST:
+            break
+    return path
+
+
+def mp4(path: str | Path, frames: np.ndarray, rate: float = RATE, beats: int = 3) -> Path:
+    """Write an H.264 film that plays in browsers.
+
+    Parameters
+    ----------
+    path : str or Path
+    frames : ndarray of shape (frame, height, width, 3), uint8
+        RGB, height and width even.
+    rate : float
+        Frames a second.
+    beats : int
+        How often the clip is repeated.
+
+    Returns
+    -------
+    Path
+    """
+    import imageio_ffmpeg
+
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    size = frames.shape[2], frames.shape[1]
+    film = imageio_ffmpeg.write_frames(
+        str(path), size, fps=rate, codec="libx264", pix_fmt_out="yuv420p", quality=6, macro_block_size=2
+    )
+    film.send(None)
+    for frame in np.concatenate([frames] * beats):
+        film.send(np.ascontiguousarray(frame))
+    film.close()
+    return path

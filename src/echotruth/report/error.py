@@ -1,0 +1,75 @@
+"""Error of tracked circumferential displacement through the wall (the paper's figure 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from echotruth.report import style
+
+SIZES = (("blue", "o"), ("red", "s"), ("#556b2f", "v"))
+"""Colour and marker of the image sizes, the largest first, as in the paper."""
+
+TRACKERS = (("--", "none"), ("-", "full"), (":", "none"), ("-.", "full"))
+"""Line style and filling of the trackers, in the order of the configuration."""
+
+Errors = Mapping[str, Mapping[str, Mapping[int, np.ndarray]]]
+
+
+@style.styled
+def draw(path: str | Path, errors: Errors, longitudinal: Collection[str] = ()) -> Path:
+    """Draw the error by layer, one panel a view.
+
+    Parameters
+    ----------
+    path : str or Path
+        Picture to write.
+    errors : mapping of view to mapping of tracker to mapping of image size to ndarray of shape (layer,)
+        RMS error of circumferential (long axis: longitudinal) displacement at end-systole, m,
+        the endocardium first; NaN where there is none.
+    longitudinal : collection of str
+        Long-axis views, in which the component is the longitudinal one.
+
+    Returns
+    -------
+    Path
+        The picture.
+    """
+    sheet = style.figure(2.5 * len(errors) + 0.9, 3.9)
+    panels = sheet.subplots(1, len(errors), sharey=True, squeeze=False)[0]
+    for panel, (view, trackers) in zip(panels, errors.items(), strict=True):
+        for (line, fill), sizes in zip(TRACKERS, trackers.values(), strict=False):
+            for (colour, marker), values in zip(SIZES, sizes.values(), strict=False):
+                _curve(panel, np.asarray(values), {"color": colour, "marker": marker, "ls": line, "fillstyle": fill})
+        component = "longitudinal" if view in longitudinal else "circumferential"
+        panel.set_title(style.title(view), pad=16)
+        panel.text(0.5, 1.02, component, ha="center", color="#555555", transform=panel.transAxes)
+        panel.set(xlabel="Layer, endo → epi", ylim=(0, None))
+    panels[0].set_ylabel("RMS error of displacement at ES (µm)")
+    _legend(sheet, next(iter(errors.values())))
+    return style.save(sheet, path)
+
+
+def _curve(axes: Axes, values: np.ndarray, look: dict[str, str]) -> None:
+    layer = np.arange(1, len(values) + 1)
+    axes.plot(layer, values * 1e6, markersize=6, linewidth=1.2, **look)
+    axes.set_xticks(layer)
+    axes.set_xlim(0.6, len(values) + 0.4)
+
+
+def _legend(sheet: Figure, trackers: Mapping[str, Mapping[int, np.ndarray]]) -> None:
+    sizes = next(iter(trackers.values()))
+    marks = [
+        Line2D([], [], color=colour, marker=marker, ls="none", label=f"{size} × {size} px")
+        for (colour, marker), size in zip(SIZES, sizes, strict=False)
+    ]
+    lines = [
+        Line2D([], [], color="#444444", ls=line, marker="D", markersize=5, fillstyle=fill, linewidth=1.2, label=name)
+        for (line, fill), name in zip(TRACKERS, trackers, strict=False)
+    ]
+    sheet.legend(handles=marks + lines, loc="outside lower center", ncols=len(marks) + len(lines))

@@ -1,0 +1,65 @@
+"""Strain of the wall over the cycle: mean and spread, and the circumferential strain of its layers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from echotruth.report import style
+
+DIRECTIONS = (("RR", style.RADIAL), ("CC", style.CIRCUMFERENTIAL), ("LL", style.LONGITUDINAL))
+"""Normal strains in the order of the arrays."""
+
+
+@style.styled
+def draw(path: str | Path, time: np.ndarray, es: int, mean: np.ndarray, sd: np.ndarray, layers: np.ndarray) -> Path:
+    """Draw strain since end-diastole.
+
+    Parameters
+    ----------
+    path : str or Path
+        Picture to write.
+    time : ndarray of shape (frame,)
+        Since end-diastole, s.
+    es : int
+        Frame of end-systole.
+    mean, sd : ndarray of shape (frame, strain component)
+        Mean and standard deviation over the wall, components RR, CC, LL first.
+    layers : ndarray of shape (frame, layer, strain component)
+        Mean of every layer, the endocardium first.
+
+    Returns
+    -------
+    Path
+        The picture.
+    """
+    sheet = style.figure(8.6, 4.2)
+    left, right = sheet.subplots(1, 2)
+    for k, (name, colour) in enumerate(DIRECTIONS):
+        centre, spread = 100 * mean[:, k], 100 * sd[:, k]
+        label = f"$E_{{{name}}}$ {centre[es]:+.1f} ± {spread[es]:.1f}".replace("-", "−")
+        left.fill_between(time * 1e3, centre - spread, centre + spread, color=colour, alpha=0.18, linewidth=0)
+        left.plot(time * 1e3, centre, color=colour, label=label)
+    left.set(title="Wall mean ± standard deviation", ylabel="Strain since ED (%)")
+    count = layers.shape[1]
+    for k, colour in enumerate(style.layer_colours(count)):
+        place = {0: " endo", count - 1: " epi"}.get(k, "")
+        right.plot(time * 1e3, 100 * layers[:, k, 1], color=colour, label=f"{k + 1}{place}")
+    right.set(title="Circumferential strain by layer", ylabel="$E_{CC}$ since ED (%)")
+    for panel, columns, name in ((left, 3, "at ES (%)"), (right, min(count, 6), "layer")):
+        panel.legend(
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.16),
+            ncols=columns,
+            title=name,
+            columnspacing=1,
+            handlelength=1.2,
+        )
+    for panel in (left, right):
+        panel.axvline(time[es] * 1e3, color="#555555", linewidth=0.9, linestyle=":")
+        panel.axhline(0, color="#555555", linewidth=0.6)
+        panel.text(time[es] * 1e3, 0.99, " ES", color="#555555", va="top", transform=panel.get_xaxis_transform())
+        panel.set_xlabel("Time since end-diastole (ms)")
+        panel.margins(x=0.01)
+    return style.save(sheet, path)

@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+from echotruth.report import bullseye, error, loop, resolutions, strain, views
+
+TIME = np.arange(10) * 3e-3
+WAVE = np.sin(np.pi * np.arange(10) / 10) ** 2
+
+
+def seen(path):
+    """The picture as RGB, after checking that something is drawn on it."""
+    picture = np.asarray(Image.open(path).convert("RGB"))
+    assert picture.shape[0] > 300 and picture.shape[1] > 300 and picture.std() > 5
+    return picture
+
+
+def test_loop(tmp_path):
+    pressure, volume = 500 + 13000 * WAVE, 50e-9 - 30e-9 * WAVE
+    asked = np.stack([pressure, volume])
+    seen(loop.draw(tmp_path / "loop.png", TIME, 5, 4e4 * WAVE, 1.01 * asked, asked))
+
+
+@pytest.mark.parametrize("layers", [1, 6, 10])
+def test_strain(tmp_path, layers):
+    mean = WAVE[:, None] * [0.5, -0.18, -0.1, 0, 0, 0]
+    by_layer = np.repeat(mean[:, None], layers, axis=1)
+    seen(strain.draw(tmp_path / "strain.png", TIME, 5, mean, 0.2 * abs(mean), by_layer))
+
+
+def test_resolutions(tmp_path):
+    images = [np.random.default_rng(0).integers(0, 256, (n, n)).astype(np.uint8) for n in (64, 32, 16)]
+    seen(resolutions.draw(tmp_path / "resolutions.png", images, 12e-3))
+    seen(resolutions.draw(tmp_path / "one.png", images[:1], 120e-3))
+
+
+def test_views(tmp_path):
+    image = np.random.default_rng(0).integers(0, 256, (64, 64)).astype(np.uint8)
+    wall = np.zeros((64, 64), bool)
+    wall[20:40, 20:40] = True
+    pictures = {"mid": [views.Picture(image, wall)] * 2, "long_axis": [views.Picture(image, wall & False)] * 2}
+    seen(views.draw(tmp_path / "views.png", pictures, 12e-3))
+
+
+def test_error(tmp_path):
+    curves = {"faithful": {64: np.full(6, 3e-5), 32: np.full(6, np.nan)}, "corrected": {64: np.full(6, 1e-5)}}
+    seen(error.draw(tmp_path / "error.png", {"mid": curves, "long_axis": curves}, ["long_axis"]))
+
+
+def test_bullseye_without_data_is_hatched_throughout(tmp_path):
+    nothing = np.full(17, np.nan)
+    seen(bullseye.draw(tmp_path / "bullseye.png", nothing, nothing))
+
+
+@pytest.mark.parametrize("number, place", [(1, (0, 0.85)), (2, (-0.74, 0.43)), (10, (0, -0.6)), (16, (0.38, 0.1))])
+def test_segments_lie_where_they_should(number, place):
+    """One segment red, the others blue: anterior at the top, septum on the left, base outermost."""
+    sheet = Figure()
+    axes = sheet.subplots()
+    values = np.full(17, -1.0)
+    values[number - 1] = 1.0
+    bullseye.disc(axes, values, bullseye.TwoSlopeNorm(0, -1, 1))
+    hit = [wedge for wedge in axes.patches if wedge.get_path().contains_point(place)]
+    assert len(hit) == 1
+    red, _, blue, _ = hit[0].get_facecolor()
+    assert red > blue
+
+
+def test_same_figure_same_bytes(tmp_path):
+    curves = {"mid": {"faithful": {64: np.full(6, 3e-5)}}}
+    first, second = (error.draw(tmp_path / name, curves).read_bytes() for name in ("a.png", "b.png"))
+    assert first == second
