@@ -1,0 +1,37 @@
+"""One job a heart and view: phantom, truth, RF and B-mode, all frames and image sizes in one go.
+
+The stages stand in one job because a job's start costs more than handing arrays on through a scratch folder.
+"""
+
+SCRATCH = FOLDER / "scratch/{case}/{view}"
+
+
+rule imaging:
+    input:
+        record("mechanics"),
+    output:
+        phantom=record("phantom", view="{view}"),
+        truth=record("truth", view="{view}"),
+        rf=record("rf", view="{view}"),
+        bmode=record("bmode", view="{view}"),
+    params:
+        scratch=SCRATCH,
+        code=code("phantom", "truth", "rf", "bmode"),
+        settings=lambda wildcards: imaging_settings(CASES[wildcards.case].config, wildcards.view),
+    log:
+        FOLDER / "logs/imaging/{case}/{view}.log",
+    shell:
+        """
+        rm -rf {params.scratch}
+        for stage in phantom truth rf bmode; do
+            {PYTHON} {SCRIPTS}/$stage.py {FOLDER} {wildcards.case} {wildcards.view} \
+                --scratch {params.scratch} --threads {threads}
+        done 2>&1 | tee {log}
+        rm -rf {params.scratch}
+        """
+
+
+def imaging_settings(config, view):
+    place = list(config.views).index(view)
+    stages = (config.phantom, config.probe, config.rf, config.bmode)
+    return settings_version(config.seed, config.views[view], place, *stages)

@@ -1,0 +1,32 @@
+"""Figures of a repository, gathered in one page by `snakemake --report`."""
+
+FIGURES = FOLDER / "figures"
+CAPTIONS = Path(workflow.basedir) / "workflow/report"
+
+
+def figure(name, category, title):
+    """A figure with its caption, which stands under the name of the figure in workflow/report."""
+    caption = CAPTIONS / f"{Path(name).stem}.rst"
+    return report(FIGURES / name, caption=str(caption), category=category, labels={"figure": title})
+
+
+rule report:
+    input:
+        rules.repository.output,
+    output:
+        heart=figure("heart.png", "1 Heart", "Heart at ED and ES"),
+        loop=figure("loop.png", "1 Heart", "Pressure-volume loop and active tension"),
+        strain=figure("strain.png", "1 Heart", "Strain over the cycle"),
+        clip=figure("clip.gif", "2 Images", "Clip with its true motion"),
+        resolutions=figure("resolutions.png", "2 Images", "Three resolutions"),
+        views=figure("views.png", "2 Images", "All views at ED and ES"),
+        bullseye=figure("bullseye.png", "3 Tracking", "Bullseye, FE and tracked"),
+        error=figure("error.png", "3 Tracking", "Error by layer and resolution"),
+        scores=figure("scores.csv", "3 Tracking", "Scores"),
+        movie=FIGURES / "clip.mp4",
+    params:
+        code=code("report"),
+    log:
+        FOLDER / "logs/report.log",
+    shell:
+        "{PYTHON} {SCRIPTS}/report.py {FOLDER} 2>&1 | tee {log}"

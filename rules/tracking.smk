@@ -1,0 +1,20 @@
+"""One job a heart and view: every tracker at every image size, scored against the truth."""
+
+
+rule tracking:
+    input:
+        record("bmode", view="{view}"),
+    output:
+        tracking=record("tracking", view="{view}"),
+        evaluation=record("evaluation", view="{view}"),
+    params:
+        code=code("tracking", "evaluation"),
+        settings=settings_version(CONFIG.tracking),
+    log:
+        FOLDER / "logs/tracking/{case}/{view}.log",
+    shell:
+        """
+        for stage in tracking evaluation; do
+            {PYTHON} {SCRIPTS}/$stage.py {FOLDER} {wildcards.case} {wildcards.view} --threads {threads}
+        done 2>&1 | tee {log}
+        """

@@ -1,0 +1,105 @@
+"""The command line: `echotruth check`, `echotruth cases`, `echotruth run`."""
+
+from __future__ import annotations
+
+import argparse
+import fcntl
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import echotruth
+from echotruth.cases import expand, table
+from echotruth.config import Config
+from echotruth.config.loading import ConfigError, load
+
+
+def main() -> None:
+    """Entry point of the command `echotruth`."""
+    arguments, options = _parser().parse_known_args()
+    if options and arguments.command != "run":
+        sys.exit(f"echotruth {arguments.command}: {options[0]} is not an option: see echotruth --help")
+    try:
+        config = load(arguments.config)
+        cases = expand(config, arguments.config)
+    except ConfigError as error:
+        sys.exit(f"echotruth: {error}")
+    if arguments.command == "check":
+        print(f"{arguments.config}: fine, {len(cases)} cases of {len(config.views)} views each")
+    elif arguments.command == "cases":
+        table(cases).to_csv(sys.stdout, index=False)
+    else:
+        sys.exit(run(arguments.config, config, options))
+
+
+def run(path: str, config: Config, options: list[str]) -> int:
+    """Run the workflow of a configuration, then write its report; the exit status of Snakemake.
+
+    Parameters
+    ----------
+    path : str
+        The configuration's file.
+    config : Config
+        What it says.
+    options : list of str
+        Handed on to Snakemake, as `--cores 4` or `-n`.
+    """
+    if not Path("Snakefile").is_file():
+        return _complain("no Snakefile here: run this in a checkout of echotruth")
+    folder = Path("out") / config.name
+    snakemake = [sys.executable, "-m", "snakemake", "--configfile", path]
+    with _alone(folder):
+        # A killed run leaves Snakemake's own lock behind; ours dies with its process, so nobody is at work here.
+        _quietly([*snakemake, "--unlock"])
+        status = subprocess.call([*snakemake, *options])
+        if status or {"-n", "--dry-run", "--dryrun"} & set(options):
+            return status
+        report = folder / "report.html"
+        status = _quietly([*snakemake, "--report", str(report)])
+    if status == 0:
+        print(f"\nRepository: {folder / f'{config.name}.zarr'}\nReport:     {report}")
+    return status
+
+
+def _quietly(command: list[str]) -> int:
+    """Run a command whose words matter only when it fails."""
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    if done.returncode:
+        print(done.stdout, file=sys.stderr)
+    return done.returncode
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Hold a lock of the kernel on a repository's folder; wait for whoever holds it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / ".lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            print(f"echotruth: another run is at work in {folder}; waiting for it to end", file=sys.stderr)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        os.set_inheritable(lock.fileno(), True)
+        yield
+
+
+def _complain(sentence: str) -> int:
+    print(f"echotruth: {sentence}", file=sys.stderr)
+    return 2
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="echotruth", description=echotruth.__doc__)
+    parser.add_argument("--version", action="version", version=echotruth.__version__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    for name, text in (
+        ("check", "check a configuration"),
+        ("cases", "print the cases of a configuration as CSV"),
+        ("run", "make the repository and the report of a configuration; further options go to Snakemake"),
+    ):
+        command = commands.add_parser(name, help=text, description=text)
+        command.add_argument("config", help="YAML file, as config/demo.yaml")
+    return parser

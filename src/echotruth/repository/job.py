@@ -1,0 +1,192 @@
+"""A job: one script's work on one heart, or one heart and view, and its record in the ledger."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from echotruth.cases import Case, find, generator
+from echotruth.config import View
+from echotruth.config.loading import load
+from echotruth.heart import Heart
+from echotruth.provenance import code_version
+from echotruth.repository import ledger
+from echotruth.repository.store import Store, Values
+
+Result = dict[str, Values]
+log = logging.getLogger("echotruth")
+
+
+class CannotBeMade(ValueError):
+    """A heart that has no solution: it is recorded and left out, and the other hearts go on."""
+
+
+class Job:
+    """Where a script finds its inputs and puts its results.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the repository, `out/NAME`.
+    stage : str
+        Name of the stage.
+    case : str
+        Case id.
+    view : str, optional
+        Name of the view, for stages that work on one.
+    scratch : Path, optional
+        Folder for what stages of one view hand on without keeping it.
+    """
+
+    def __init__(
+        self, folder: Path, stage: str, case: str, view: str | None = None, scratch: Path | None = None
+    ) -> None:
+        self.folder, self.stage = folder, stage
+        self.case: Case = find(load(folder / "config.yaml"), case)
+        self.view_name, self.scratch = view, scratch
+        self.store = Store(folder / f"{self.case.config.name}.zarr")
+        self.row = ledger.rows(folder / "registry.txt")[case]
+
+    @property
+    def view(self) -> View:
+        """Settings of the view."""
+        return self.case.config.views[str(self.view_name)]
+
+    @property
+    def random(self) -> np.random.Generator:
+        """Random numbers of this stage, case and view."""
+        return generator(self.case, str(self.view_name), self.stage)
+
+    @property
+    def place(self) -> tuple[int, ...]:
+        """Row of the case, and index of the view where there is one."""
+        views = list(self.case.config.views)
+        return (self.row,) if self.view_name is None else (self.row, views.index(self.view_name))
+
+    @property
+    def record(self) -> Path:
+        """Where this job's record stands."""
+        return record_path(self.folder, self.stage, self.case.id, self.view_name)
+
+    def read(self, group: str, *names: str) -> dict[str, Any]:
+        """Arrays of a group for this case (and view)."""
+        return self.store.read(group, *self.place, names=names or None)
+
+    @property
+    def heart(self) -> Heart:
+        """The heart of this case, as the mechanics left it."""
+        geometry, fibres, mechanics = (
+            self.store.read(group, self.row) for group in ("geometry", "fibres", "mechanics")
+        )
+        return Heart(
+            nodes=geometry["node_position"],
+            cells=geometry["cell_node"],
+            displacement=mechanics["displacement"],
+            wall_depth=fibres["wall_depth"],
+            endo=geometry["endo"],
+            layers=self.case.config.fibres.layers,
+            es=int(mechanics["es_frame"]),
+        )
+
+    def hand_on(self, **arrays: Any) -> None:
+        """Leave arrays in the scratch folder for the next stage of this view."""
+        if self.scratch is not None:
+            self.scratch.mkdir(parents=True, exist_ok=True)
+            np.savez(self.scratch / f"{self.stage}.npz", **arrays)
+
+    def take(self, stage: str) -> dict[str, Any]:
+        """Arrays an earlier stage of this view handed on."""
+        with np.load(Path(self.scratch or ".") / f"{stage}.npz") as file:
+            return dict(file)
+
+    def heart_failed(self) -> str | None:
+        """Why this heart has no motion, or None where it has."""
+        path = record_path(self.folder, "mechanics", self.case.id)
+        return ledger.read(path).get("reason") if path.exists() else None
+
+    def commit(self, result: Result, seconds: float) -> None:
+        """Write the results and then the record that says so."""
+        files: list[Path] = []
+        for group, values in result.items():
+            self.store.write(group, values, *self.place)
+            files += self.store.files(group, *self.place)
+        self._record(status="complete", seconds=round(seconds, 3), sha256=ledger.checksums(files, self.store.path))
+
+    def give_up(self, status: str, reason: str) -> None:
+        """Record that there is no result, and why."""
+        self._record(status=status, reason=reason)
+
+    def _record(self, **entries: Any) -> None:
+        named = {"stage": self.stage, "case": self.case.id, "view": self.view_name, "seed": self.case.config.seed}
+        ledger.commit(self.record, named | {"code": code_version(sys.argv[0])} | entries)
+
+
+def record_path(folder: Path, stage: str, case: str, view: str | None = None) -> Path:
+    """Where the record of a job stands: ledger/STAGE/CASE.json or ledger/STAGE/CASE/VIEW.json."""
+    name = f"{case}.json" if view is None else f"{case}/{view}.json"
+    return folder / "ledger" / stage / name
+
+
+def main(stage: str, work: Callable[[Job], Result], description: str | None, per_view: bool = True) -> None:
+    """Run the work of a script from its command line."""
+    arguments = _parser(stage, description, per_view).parse_args()
+    job = _open(stage, arguments)
+    _prepare(job, arguments.threads)
+    if stage != "mechanics" and (reason := job.heart_failed()):
+        job.give_up("skipped", reason)
+        return
+    start = time.perf_counter()
+    try:
+        result = _single_blas(work, job)
+    except CannotBeMade as error:
+        log.warning("gives up: %s", error)
+        job.give_up("failed", str(error))
+        return
+    job.commit(result, time.perf_counter() - start)
+    log.info("done in %.1f s", time.perf_counter() - start)
+
+
+def _open(stage: str, arguments: argparse.Namespace) -> Job:
+    try:
+        view = getattr(arguments, "view", None)
+        job = Job(arguments.repository, stage, arguments.case, view, getattr(arguments, "scratch", None))
+    except ValueError as error:
+        sys.exit(f"{stage}: {error}")
+    if view is not None and view not in job.case.config.views:
+        sys.exit(f"{stage}: {view} is not a view of {arguments.repository}: use {', '.join(job.case.config.views)}")
+    return job
+
+
+def _single_blas(work: Callable[[Job], Result], job: Job) -> Result:
+    """BLAS on one thread: its sums depend on how many there are, and the bytes must not."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        return work(job)
+
+
+def _prepare(job: Job, threads: int) -> None:
+    import numba
+
+    numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))
+    place = " ".join(filter(None, [job.stage, job.case.id, job.view_name]))
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format=f"{place}: %(message)s", force=True)
+    logging.getLogger("numba").setLevel(logging.WARNING)
+
+
+def _parser(stage: str, description: str | None, per_view: bool) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=stage, description=description)
+    parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
+    parser.add_argument("case", help="case id, as in cases.csv")
+    if per_view:
+        parser.add_argument("view", help="name of the view")
+        parser.add_argument("--scratch", type=Path, help="folder in which stages hand on what is not kept")
+    parser.add_argument("--threads", type=int, default=1, help="threads to use; the results do not depend on it")
+    return parser

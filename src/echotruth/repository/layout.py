@@ -1,0 +1,104 @@
+"""Lengths of the dimensions and values of the coordinates of a repository."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from echotruth.config import Config
+from echotruth.repository import schema
+from echotruth.tetrahedra import Mesh
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def sizes(mesh: Mesh) -> dict[str, int]:
+    """Lengths of the dimensions that carry no labels.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        That of any case: all share their numbering.
+    """
+    return {
+        "node": len(mesh.nodes),
+        "cell": len(mesh.cells),
+        "local_node": mesh.cells.shape[1],
+        "facet_node": mesh.endo.shape[1],
+        "endo_facet": len(mesh.endo),
+        "epi_facet": len(mesh.epi),
+        "base_facet": len(mesh.base),
+        "row": 3,
+        "column": 3,
+    }
+
+
+def positions(
+    config: Config, pixel_centres: Callable[..., tuple[ArrayLike, ArrayLike]], grid: Callable[..., ArrayLike]
+) -> dict[str, ArrayLike]:
+    """Where the pixels and the tracked points of every image size are.
+
+    Parameters
+    ----------
+    config : Config
+    pixel_centres : callable
+        (bmode, size) to axial and lateral pixel centres, m.
+    grid : callable
+        (shape, step) to points (axial, lateral, 2), lateral and axial, px.
+
+    Returns
+    -------
+    dict
+        `group:axial` and `group:lateral`, m.
+    """
+    places: dict[str, ArrayLike] = {}
+    for size in config.bmode.sizes:
+        axial, lateral = map(np.asarray, pixel_centres(config.bmode, size))
+        points = np.asarray(grid((size, size), config.tracking.grid_px)).astype(int)
+        for stage in ("truth", "bmode"):
+            places |= {f"{stage}/{size}:axial": axial, f"{stage}/{size}:lateral": lateral}
+        for stage in ("tracking", "evaluation"):
+            places |= {
+                f"{stage}/{size}:axial": axial[points[:, 0, 1]],
+                f"{stage}/{size}:lateral": lateral[points[0, :, 0]],
+            }
+    return places
+
+
+def labels(config: Config, rows: list[str], times: ArrayLike) -> dict[str, ArrayLike]:
+    """Values of the coordinates that are the same in every group.
+
+    Parameters
+    ----------
+    config : Config
+    rows : list of str
+        Case ids in the order of their rows.
+    times : ndarray of shape (case, frame), s
+    """
+    layers = np.arange(1, config.fibres.layers + 1)
+    common = {
+        "case": rows,
+        "view": list(config.views),
+        "frame": np.arange(config.loop.frames),
+        "time": times,
+        "tracker": list(config.tracking.trackers),
+        "layer": layers,
+        "region": [0, *layers],
+        "aha": np.arange(1, 18),
+    }
+    return schema.LABELS | common
+
+
+def columns(table: pd.DataFrame, rows: list[str]) -> dict[str, NDArray[Any]]:
+    """Columns of the table of cases by the row each case has, as `cases:KEY`; NaN, 0 or "" for retired cases."""
+    placed = table.set_index("case").reindex(rows)
+    found = {}
+    for key, column in table.set_index("case").items():
+        text = column.map(lambda value: isinstance(value, str)).any()
+        numbers = placed[key].fillna("") if text else placed[key].astype(float)
+        found[f"cases:{key}"] = np.asarray(numbers, dtype=str if text else float)
+    return found

@@ -1,0 +1,60 @@
+"""The ledger: one record for every finished job, its commit mark, and the rows given to cases."""
+
+from __future__ import annotations
+
+import json
+import os
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+
+def commit(path: Path, record: dict[str, Any]) -> None:
+    """Write a record whole or not at all: on disk before it takes its name."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{os.getpid()}")
+    with draft.open("w", encoding="utf-8") as file:
+        json.dump(record, file, indent=1, sort_keys=True)
+        file.write("\n")
+        file.flush()
+        os.fsync(file.fileno())
+    draft.replace(path)
+
+
+def read(path: Path) -> dict[str, Any]:
+    """A record."""
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def checksums(files: list[Path], root: Path) -> dict[str, str]:
+    """Path below `root` to SHA-256 of each file."""
+    return {file.relative_to(root).as_posix(): sha256(file.read_bytes()).hexdigest() for file in files}
+
+
+def rows(registry: Path) -> dict[str, int]:
+    """Row of every case ever registered: one id a line, its line is its row."""
+    known = registry.read_text(encoding="utf-8").split() if registry.exists() else []
+    return {id: row for row, id in enumerate(known)}
+
+
+def register(registry: Path, ids: list[str]) -> dict[str, int]:
+    """Give new cases the next rows; none is ever moved.
+
+    Parameters
+    ----------
+    registry : Path
+    ids : list of str
+        Cases of the configuration.
+
+    Returns
+    -------
+    dict
+        Row of every case ever registered.
+    """
+    known = list(rows(registry))
+    known += [id for id in ids if id not in set(known)]
+    draft = registry.with_name(f".{registry.name}")
+    registry.parent.mkdir(parents=True, exist_ok=True)
+    draft.write_text("".join(f"{id}\n" for id in known), encoding="utf-8")
+    draft.replace(registry)
+    return rows(registry)

@@ -1,0 +1,81 @@
+"""Publication: verify what the ledger says was written, and describe the whole."""
+
+from __future__ import annotations
+
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from echotruth.cases import expand
+from echotruth.config import Config
+from echotruth.config.loading import load
+from echotruth.provenance import packages
+from echotruth.repository import ledger
+from echotruth.repository.job import record_path
+from echotruth.repository.store import Store
+
+VIEW_STAGES = ("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
+"""Stages with a record for every view of a case."""
+
+
+class Damaged(ValueError):
+    """A file that is not what its job wrote."""
+
+
+def publish(folder: Path) -> dict[str, Any]:
+    """Verify every shard against the ledger, write the verdicts and the attributes of the whole.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the repository, `out/NAME`.
+
+    Returns
+    -------
+    dict
+        Number of complete and of failed cases, and of verified files.
+
+    Raises
+    ------
+    Damaged
+        Where a file is missing or differs from what its job wrote.
+    """
+    config = load(folder / "config.yaml")
+    store = Store(folder / f"{config.name}.zarr")
+    rows = ledger.rows(folder / "registry.txt")
+    records = {case.id: _records(folder, config, case.id) for case in expand(config)}
+    files = sum(_verify(store.path, path, ledger.read(path)) for paths in records.values() for path in paths)
+    verdicts = {case: ledger.read(paths[0]) for case, paths in records.items()}
+    retired = {"status": "retired", "reason": "not a case of this configuration"}
+    for column in ("status", "reason"):
+        store.write_column(column, [verdicts.get(case, retired).get(column, "") for case in rows])
+    store.describe(_attributes(config, records))
+    complete = sum(verdict["status"] == "complete" for verdict in verdicts.values())
+    return {"complete": complete, "failed": len(verdicts) - complete, "files": files}
+
+
+def _records(folder: Path, config: Config, case: str) -> list[Path]:
+    of_views = [record_path(folder, stage, case, view) for stage in VIEW_STAGES for view in config.views]
+    return [record_path(folder, "mechanics", case), *of_views]
+
+
+def _verify(root: Path, path: Path, record: dict[str, Any]) -> int:
+    """Compare the files of a record with their checksums; how many there are."""
+    for name, expected in record.get("sha256", {}).items():
+        file = root / name
+        if not file.is_file() or sha256(file.read_bytes()).hexdigest() != expected:
+            raise Damaged(f"{file}: is not what its job wrote: delete {path} and run again")
+    return len(record.get("sha256", {}))
+
+
+def _attributes(config: Config, records: dict[str, list[Path]]) -> dict[str, Any]:
+    first = next(iter(records.values()))
+    return {
+        "title": f"echotruth repository {config.name}: synthetic echocardiograms with their true motion",
+        "summary": "Finite-element hearts, B-mode clips, the true motion of every pixel, and trackers scored by it",
+        "references": "Mukherjee et al., Synthetic ultrasound images to benchmark echocardiography-based biomechanics",
+        "config": config.model_dump(mode="json"),
+        "seed": config.seed,
+        "code": {record["stage"]: record["code"] for record in map(ledger.read, first)},
+        "packages": packages(),
+    }

@@ -1,0 +1,42 @@
+"""Expand the sweep into cases and lay out the repository for them."""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from echotruth.cases import expand, table
+from echotruth.config.loading import ConfigError, validate
+from echotruth.imaging.bmode import pixel_centres
+from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.loop import read_loop
+from echotruth.repository import layout, ledger, schema
+from echotruth.repository.store import Store
+from echotruth.tracking import grid
+
+parser = argparse.ArgumentParser(description=__doc__)
+parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
+parser.add_argument("config", type=argparse.FileType("r"), help="YAML file, or - for standard input")
+arguments = parser.parse_args()
+
+try:
+    config = validate(yaml.safe_load(arguments.config) or {}, arguments.config.name)
+    cases = {case.id: case for case in expand(config, arguments.config.name)}
+except ConfigError as error:
+    sys.exit(str(error))
+
+arguments.repository.mkdir(parents=True, exist_ok=True)
+rows = list(ledger.register(arguments.repository / "registry.txt", list(cases)))
+times = np.full((len(rows), config.loop.frames), np.nan)
+for id, case in cases.items():
+    times[rows.index(id)] = read_loop(case.config.loop).time
+frame = table(list(cases.values()))
+columns = layout.columns(frame, rows)
+sizes = layout.sizes(left_ventricle(config.geometry))
+labels = layout.labels(config, rows, times) | layout.positions(config, pixel_centres, grid) | columns
+arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
+Store(arguments.repository / f"{config.name}.zarr").lay_out(arrays, sizes, labels)
+frame.to_csv(arguments.repository / "cases.csv", index=False)
+(arguments.repository / "config.yaml").write_text(yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False))

@@ -1,0 +1,16 @@
+"""FE update: geometry, fibres, mechanics and kinematics of one heart through its loop."""
+
+from echotruth.mechanics.beat import beat
+from echotruth.mechanics.solver import Diverged
+from echotruth.repository.job import CannotBeMade, Job, Result, main
+
+
+def work(job: Job) -> Result:
+    try:
+        return beat(job.case.config)
+    except Diverged as error:
+        raise CannotBeMade(str(error)) from error
+
+
+if __name__ == "__main__":
+    main("mechanics", work, __doc__, per_view=False)

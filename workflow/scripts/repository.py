@@ -1,0 +1,18 @@
+"""Verify what all jobs wrote, and publish the repository as one hierarchy."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from echotruth.repository import ledger
+from echotruth.repository.publication import Damaged, publish
+
+parser = argparse.ArgumentParser(description=__doc__)
+parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
+folder = parser.parse_args().repository
+try:
+    summary = publish(folder)
+except Damaged as error:
+    sys.exit(str(error))
+ledger.commit(folder / "ledger/repository.json", summary)
+print(f"repository: {summary['complete']} complete, {summary['failed']} failed, {summary['files']} files verified")

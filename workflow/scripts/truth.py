@@ -1,0 +1,26 @@
+"""The true motion, strain and labels at every pixel of every frame and image size."""
+
+import logging
+
+import numpy as np
+
+from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.truth import truth
+from echotruth.imaging.view import Plane
+from echotruth.repository.job import Job, Result, main
+
+
+def work(job: Job) -> Result:
+    heart, bmode = job.heart, job.case.config.bmode
+    plane = Plane(**job.read("phantom", "origin", "axes"))
+    result: Result = {}
+    for size in bmode.sizes:
+        axial, lateral = pixel_centres(bmode, size)
+        frames = [truth(heart, frame, plane, axial, lateral) for frame in range(len(heart.displacement))]
+        result[f"truth/{size}"] = {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
+        logging.getLogger("echotruth").info("%d px", size)
+    return result
+
+
+if __name__ == "__main__":
+    main("truth", work, __doc__)
