@@ -60,8 +60,8 @@ def energies(unloaded, displacement):
 
 def test_arrays_are_those_of_the_schema(case):
     assert {group: set(arrays) for group, arrays in case.items()} == SHAPES
-    cells, frames = len(case["geometry"]["cell"]), 40
-    assert case["geometry"]["cell"].dtype == np.int32
+    cells, frames = len(case["geometry"]["cell_node"]), 40
+    assert case["geometry"]["cell_node"].dtype == np.int32
     assert case["fibres"]["layer"].dtype == np.uint8
     assert case["mechanics"]["displacement"].shape == (frames, len(case["geometry"]["node_position"]), 3)
     assert case["kinematics"]["deformation_gradient"].shape == (frames, cells, 3, 3)

@@ -191,4 +191,5 @@ class Tangent:
 
 def norm(vector: Floats) -> float:
     """Euclidean norm, summed on one thread."""
-    return float(np.sqrt(np.sum(vector**2)))
+    with np.errstate(over="ignore"):  # a trial step may go anywhere; an infinite norm refuses it
+        return float(np.sqrt(np.sum(vector**2)))

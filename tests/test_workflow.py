@@ -1,0 +1,219 @@
+"""The whole workflow on coarse hearts: what it makes, what it reruns, and that a killed run ends in the same bytes."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+ROOT = Path(__file__).parents[1]
+CONFIG = """\
+name: tiny
+geometry: {circumferential_elements: 12, longitudinal_elements: 6, transmural_elements: 1}
+loop: {frames: 10}
+views:
+  mid: {position: 0.5}
+  long_axis: {plane: long_axis}
+phantom: {density_per_mm3: 200}
+probe: {elements: 16}
+rf: {lines: 64}
+bmode: {size_px: 128, downsampling: [1, 2]}
+tracking:
+  trackers:
+    faithful: {window_px: 16}
+    corrected: {window_px: 16, taper: hann, reference: previous}
+cases:
+  seed: [1, 2]
+"""
+RUN = "from echotruth.cli import main; main()"
+"""What the command `echotruth` does, without its entry point."""
+
+
+class Checkout:
+    """A copy of what the workflow runs from, with the package of `source`."""
+
+    def __init__(self, folder, source=None):
+        self.folder, self.source = folder, source or folder
+        for name in ("Snakefile", "rules", "workflow", "profiles", *([] if source else ["src"])):
+            copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+            folder.mkdir(exist_ok=True)
+            copy(ROOT / name, folder / name)
+        (folder / "tiny.yaml").write_text(CONFIG)
+        self.out = folder / "out/tiny"
+
+    def start(self, *command):
+        """A process of its own group."""
+        surroundings = os.environ | {"PYTHONPATH": str(self.source / "src"), "MPLBACKEND": "agg"}
+        return subprocess.Popen(
+            [sys.executable, *command],
+            cwd=self.folder,
+            env=surroundings,
+            start_new_session=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    def run(self, *command):
+        """What the process says, once it has ended well."""
+        process = self.start(*command)
+        said, _ = process.communicate()
+        assert process.returncode == 0, said
+        return said
+
+    def snakemake(self, *options):
+        return self.run("-m", "snakemake", "--configfile", "tiny.yaml", *options)
+
+    @property
+    def bytes(self):
+        """Path below the store to hash, of every file in it."""
+        root = self.out / "tiny.zarr"
+        files = [path for path in root.rglob("*") if path.is_file()]
+        return {path.relative_to(root).as_posix(): sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A checkout in which the workflow ran on two cores."""
+    checkout = Checkout(tmp_path_factory.mktemp("first") / "echotruth")
+    checkout.snakemake("--cores", "2")
+    return checkout
+
+
+@pytest.fixture(scope="module")
+def tree(made):
+    with xr.open_datatree(made.out / "tiny.zarr") as opened:
+        yield opened
+
+
+def documented():
+    """Heading of docs/schema.md to the rows of its table, by array: dimensions, type and units."""
+    groups, heading = {}, None
+    for line in (ROOT / "docs/schema.md").read_text().splitlines():
+        if line.startswith("## "):
+            heading = line[3:]
+            groups[heading] = {}
+        elif line.startswith("| `"):
+            name, dims, dtype, units, long_name = (cell.strip() for cell in line.strip("|").split("|"))
+            groups[heading][name.strip("`")] = (tuple(dims.split(", ")), dtype, units, long_name)
+    return groups
+
+
+def found(variable):
+    dtype = "string" if variable.dtype.kind in "OTU" else str(variable.dtype)
+    return variable.dims, dtype, variable.attrs.get("units"), variable.attrs.get("long_name")
+
+
+def expected(coordinates, arrays):
+    """Arrays of a group and the coordinates that stand beside them."""
+    dims = {dim for array in arrays.values() for dim in array[0]}
+    return {name: row for name, row in coordinates.items() if dims >= set(row[0])} | arrays
+
+
+def test_tree_holds_what_the_schema_page_says_and_nothing_else(made, tree):
+    groups = documented()
+    coordinates = groups.pop("Coordinates")
+    cases = groups.pop("cases")
+    paths = {path.replace("SIZE", size): rows for path, rows in groups.items() for size in ("128", "64")}
+    nodes = {node.path.strip("/"): node.to_dataset(inherit=False).variables for node in tree.subtree}
+    nodes = {path: variables for path, variables in nodes.items() if variables}
+    assert set(nodes) == {*paths, "cases"}
+    for path, rows in paths.items():
+        assert {name: found(variable) for name, variable in nodes[path].items()} == expected(coordinates, rows), path
+    keys = set(pd.read_csv(made.out / "cases.csv").columns) - {"case"}
+    assert set(nodes["cases"]) == {*cases, *keys, "case"}
+    assert all(nodes["cases"][name].dims == ("case",) for name in keys)
+
+
+def test_every_array_has_named_dimensions_units_and_a_long_name(tree):
+    for node in tree.subtree:
+        for name, variable in node.to_dataset(inherit=False).variables.items():
+            assert not any(dim.startswith("dim_") for dim in variable.dims), name
+            assert variable.attrs["units"] and variable.attrs["long_name"], name
+
+
+def test_root_says_what_the_repository_is(tree):
+    assert {"title", "summary", "references", "config", "seed", "code", "packages"} <= set(tree.attrs)
+    assert set(tree["cases/status"].values) == {"complete"}
+
+
+def test_loop_is_met_at_every_frame_without_loss_of_volume(tree):
+    mechanics, kinematics = tree["mechanics"], tree["kinematics"]
+    for name in ("pressure", "volume"):
+        np.testing.assert_allclose(mechanics[name], mechanics[f"{name}_asked"], rtol=5e-3)
+    assert float(kinematics["volume_ratio_min"].min()) > 0
+    assert float(abs(kinematics["volume_ratio_mean"] - 1).max()) < 0.02
+
+
+def test_seeds_differ_in_speckle_and_not_in_mechanics(tree):
+    displacement, image = tree["mechanics/displacement"].values, tree["bmode/128/image"].values
+    np.testing.assert_array_equal(displacement[0], displacement[1])
+    assert (image[0] != image[1]).any()
+
+
+def test_every_view_shows_wall_and_speckle_and_is_tracked(tree):
+    for size in (128, 64):
+        assert tree[f"truth/{size}/mask"].any(("axial", "lateral")).all()
+        assert (tree[f"bmode/{size}/image"].std(("axial", "lateral")) > 5).all()
+        assert (tree[f"evaluation/{size}/coverage"] > 0.5).all()
+
+
+def test_figures_stand_beside_the_repository_and_scratch_does_not(made):
+    assert {path.suffix for path in (made.out / "figures").iterdir()} == {".png", ".gif", ".csv", ".mp4"}
+    assert not [path for path in made.out.glob("scratch/*/*") if any(path.iterdir())]
+
+
+def test_second_run_has_nothing_to_do(made):
+    assert "Nothing to be done" in made.snakemake("-n", "--cores", "2")
+
+
+def test_changed_tracker_reruns_tracking_and_what_follows_it(made):
+    changed = made.folder / "changed.yaml"
+    changed.write_text(CONFIG.replace("faithful: {window_px: 16}", "faithful: {window_px: 32}"))
+    said = made.run("-m", "snakemake", "-n", "--configfile", changed.name, "--cores", "2")
+    jobs = dict(re.findall(r"^(\w+) +(\d+)$", said, re.MULTILINE))
+    jobs.pop("total")
+    assert jobs == {"all": "1", "cases": "1", "tracking": "4", "repository": "1", "report": "1"}
+
+
+@pytest.fixture(scope="module")
+def killed(made, tmp_path_factory):
+    """A checkout whose run on one core was killed amid imaging and then taken up again; mechanics done before it."""
+    checkout = Checkout(tmp_path_factory.mktemp("second") / "echotruth", made.folder)
+    shutil.copytree(made.folder / ".snakemake/numba", checkout.folder / ".snakemake/numba")
+    process = checkout.start("-m", "snakemake", "--configfile", "tiny.yaml", "--cores", "1")
+    end = time.monotonic() + 120
+    while not list(checkout.out.glob("scratch/*/*/phantom.npz")):
+        assert process.poll() is None and time.monotonic() < end
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    before = {path: path.stat().st_mtime_ns for path in checkout.out.glob("ledger/mechanics/*.json")}
+    unfinished = len(list(checkout.out.glob("ledger/bmode/*/*.json")))
+    checkout.run("-c", RUN, "run", "tiny.yaml", "--cores", "1")
+    return checkout, before, unfinished
+
+
+def test_killed_run_taken_up_again_gives_the_bytes_of_an_unbroken_run_on_more_cores(made, killed):
+    checkout, _, unfinished = killed
+    assert unfinished < 4
+    assert made.bytes == checkout.bytes
+
+
+def test_killed_run_keeps_the_mechanics_it_had(killed):
+    _, before, _ = killed
+    assert before
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+def test_run_leaves_the_report(killed):
+    assert (killed[0].out / "report.html").stat().st_size > 10_000
