@@ -45,6 +45,9 @@ def record(stage, case="{case}", view=None):
     return record_path(FOLDER, stage, case, view)
 
 
+report: "workflow/report/workflow.rst"
+
+
 wildcard_constraints:
     case="|".join(CASES),
     view="|".join(CONFIG.views),
