@@ -10,7 +10,7 @@ from echotruth.imaging.scanner import Scanner, imaging_depth
 
 SPEED, CENTRE, SAMPLING = 1540.0, 25e6, 100e6
 WAVELENGTH = SPEED / CENTRE
-DEVIATION = 17.5e6 / np.sqrt(8 * np.log(2))
+DEVIATION = 12.5e6 / np.sqrt(8 * np.log(2))
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_lateral_width_in_focus_is_that_of_two_hann_apertures(narrow):
 def test_axial_width_is_that_of_the_pulse(narrow):
     """A Gaussian spectrum of width B has an envelope of width 4 ln 2 / (pi B) in time."""
     image = np.abs(narrow.lines(at(6.5e-3), np.ones(1)))
-    expected = 4 * np.log(2) / (np.pi * 17.5e6) * SPEED / 2
+    expected = 4 * np.log(2) / (np.pi * 12.5e6) * SPEED / 2
     assert full_width(narrow.range, image[30]) == pytest.approx(expected, rel=0.03)
 
 

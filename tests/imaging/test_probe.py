@@ -56,7 +56,7 @@ def test_spectrum_is_cut_below_nyquist_and_above_zero():
 
 def test_pulse_is_the_sinusoid_in_a_gaussian_window():
     time = np.linspace(-80e-9, 80e-9, 161)
-    deviation = 17.5e6 / np.sqrt(8 * np.log(2))
+    deviation = 12.5e6 / np.sqrt(8 * np.log(2))
     window = np.exp(-2 * (np.pi * deviation * time) ** 2)
     assert np.allclose(pulse(Probe(), time), window * np.cos(2 * np.pi * 25e6 * time), atol=6e-3)
 

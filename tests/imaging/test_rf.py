@@ -9,7 +9,7 @@ from echotruth.imaging.rf import FullMatrix
 from echotruth.imaging.transmit import FocusedTransmits, line_angles, transmit_delays
 
 SPEED, CENTRE = 1540.0, 25e6
-DEVIATION = 17.5e6 / np.sqrt(8 * np.log(2))
+DEVIATION = 12.5e6 / np.sqrt(8 * np.log(2))
 DEPTH = 11e-3
 
 

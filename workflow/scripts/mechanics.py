@@ -1,6 +1,8 @@
 """FE update: geometry, fibres, mechanics and kinematics of one heart through its loop."""
 
 from echotruth.mechanics.beat import beat
+from echotruth.mechanics.geometry import GeometryError
+from echotruth.mechanics.loop import LoopError
 from echotruth.mechanics.solver import Diverged
 from echotruth.repository.job import CannotBeMade, Job, Result, main
 
@@ -8,7 +10,7 @@ from echotruth.repository.job import CannotBeMade, Job, Result, main
 def work(job: Job) -> Result:
     try:
         return beat(job.case.config)
-    except Diverged as error:
+    except (Diverged, GeometryError, LoopError) as error:
         raise CannotBeMade(str(error)) from error
 
 

@@ -111,10 +111,20 @@ def _sentence(error: ErrorDetails) -> str:
 
 
 def _remedy(error: ErrorDetails, context: dict[str, Any]) -> str:
-    message = error["msg"]
+    message = _PLAIN.get(error["type"], error["msg"])
     if error["type"] == "string_pattern_mismatch":
         return f"use letters, digits and underscores only (pattern {context['pattern']})"
     return message.removeprefix("Input ").removeprefix("Value error, ")
+
+
+_PLAIN = {
+    "model_type": "must be a mapping of keys to values",
+    "dict_type": "must be a mapping of names to settings",
+    "list_type": "must be a list, as [1, 2]",
+    "tuple_type": "must be a list, as [1, 2, 4]",
+    "too_short": "must hold at least one entry",
+}
+"""Words for what pydantic says in the terms of Python."""
 
 
 def _nearest(place: list[Any]) -> str:
