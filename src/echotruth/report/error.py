@@ -50,7 +50,7 @@ def draw(path: str | Path, errors: Errors, longitudinal: Collection[str] = ()) -
         panel.set_title(style.title(view), pad=16)
         panel.text(0.5, 1.02, component, ha="center", color="#555555", transform=panel.transAxes)
         panel.set(xlabel="Layer, endo → epi")
-    # The panels share their axis: its lower end is set when all of them are drawn, or it keeps the first one's upper end.
+    # The panels share this axis: set before the others are drawn, it would keep the first panel's upper end.
     panels[0].set(ylabel="RMS error of displacement at ES (µm)", ylim=(0, None))
     _legend(sheet, next(iter(errors.values())))
     return style.save(sheet, path)
