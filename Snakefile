@@ -38,7 +38,7 @@ def code(*stages):
 
 # A compiled function is cached by the file it stands in, not by those it calls from: one cache a version of the code.
 ALL_CODE = code(*(script.stem for script in SCRIPTS.glob("*.py")))
-shell.prefix(f"export NUMBA_CACHE_DIR={Path('.snakemake/numba').absolute() / ALL_CODE}; ")
+shell.prefix(f"set -euo pipefail; export NUMBA_CACHE_DIR={Path('.snakemake/numba').absolute() / ALL_CODE}; ")
 
 
 def record(stage, case="{case}", view=None):

@@ -3,7 +3,8 @@
 The stages stand in one job because a job's start costs more than handing arrays on through a scratch folder.
 """
 
-SCRATCH = FOLDER / "scratch/{case}/{view}"
+# A string: Snakemake fills in wildcards in strings alone.
+SCRATCH = str(FOLDER / "scratch/{case}/{view}")
 
 
 rule imaging:
