@@ -3,8 +3,10 @@
     snakemake --configfile config/demo.yaml
 """
 
+import re
 import sys
 from pathlib import Path
+from shlex import quote
 
 from snakemake.exceptions import WorkflowError
 
@@ -28,7 +30,7 @@ except ConfigError as error:
 
 FOLDER = Path("out") / CONFIG.name
 SCRIPTS = Path(workflow.basedir) / "workflow/scripts"
-PYTHON = sys.executable
+RUN = f"{quote(sys.executable)} {quote(str(SCRIPTS))}"  # {RUN}/rf.py runs a script
 
 
 def code(*stages):
@@ -38,7 +40,8 @@ def code(*stages):
 
 # A compiled function is cached by the file it stands in, not by those it calls from: one cache a version of the code.
 ALL_CODE = code(*(script.stem for script in SCRIPTS.glob("*.py")))
-shell.prefix(f"set -euo pipefail; export NUMBA_CACHE_DIR={Path('.snakemake/numba').absolute() / ALL_CODE}; ")
+CACHE = quote(str(Path(".snakemake/numba").absolute() / ALL_CODE))
+shell.prefix(f"set -euo pipefail; export NUMBA_CACHE_DIR={CACHE}; ")
 
 
 def record(stage, case="{case}", view=None):
@@ -49,7 +52,7 @@ report: "workflow/report/workflow.rst"
 
 
 wildcard_constraints:
-    case="|".join(CASES),
+    case="|".join(map(re.escape, CASES)),
     view="|".join(CONFIG.views),
 
 

@@ -25,7 +25,7 @@ rule imaging:
         """
         rm -rf {params.scratch}
         for stage in phantom truth rf bmode; do
-            {PYTHON} {SCRIPTS}/$stage.py {FOLDER} {wildcards.case} {wildcards.view} \
+            {RUN}/$stage.py {FOLDER} {wildcards.case} {wildcards.view} \
                 --scratch {params.scratch} --threads {threads}
         done 2>&1 | tee {log}
         rm -rf {params.scratch}

@@ -13,7 +13,7 @@ rule mechanics:
         FOLDER / "logs/mechanics/{case}.log",
     threads: max(1, workflow.cores // len(CASES))
     shell:
-        "{PYTHON} {SCRIPTS}/mechanics.py {FOLDER} {wildcards.case} --threads {threads} 2>&1 | tee {log}"
+        "{RUN}/mechanics.py {FOLDER} {wildcards.case} --threads {threads} 2>&1 | tee {log}"
 
 
 def mechanics_settings(config):

@@ -29,4 +29,4 @@ rule report:
     log:
         FOLDER / "logs/report.log",
     shell:
-        "{PYTHON} {SCRIPTS}/report.py {FOLDER} 2>&1 | tee {log}"
+        "{RUN}/report.py {FOLDER} 2>&1 | tee {log}"

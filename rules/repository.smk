@@ -12,7 +12,7 @@ rule cases:
     log:
         FOLDER / "logs/cases.log",
     shell:
-        "printf %s {params.config:q} | {PYTHON} {SCRIPTS}/cases.py {FOLDER} - 2>&1 | tee {log}"
+        "printf %s {params.config:q} | {RUN}/cases.py {FOLDER} - 2>&1 | tee {log}"
 
 
 rule repository:
@@ -27,4 +27,4 @@ rule repository:
     log:
         FOLDER / "logs/repository.log",
     shell:
-        "{PYTHON} {SCRIPTS}/repository.py {FOLDER} 2>&1 | tee {log}"
+        "{RUN}/repository.py {FOLDER} 2>&1 | tee {log}"

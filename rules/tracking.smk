@@ -15,6 +15,6 @@ rule tracking:
     shell:
         """
         for stage in tracking evaluation; do
-            {PYTHON} {SCRIPTS}/$stage.py {FOLDER} {wildcards.case} {wildcards.view} --threads {threads}
+            {RUN}/$stage.py {FOLDER} {wildcards.case} {wildcards.view} --threads {threads}
         done 2>&1 | tee {log}
         """
