@@ -3,9 +3,6 @@
 The stages stand in one job because a job's start costs more than handing arrays on through a scratch folder.
 """
 
-# A string: Snakemake fills in wildcards in strings alone.
-SCRATCH = str(FOLDER / "scratch/{case}/{view}")
-
 
 rule imaging:
     input:
@@ -16,7 +13,8 @@ rule imaging:
         rf=record("rf", view="{view}"),
         bmode=record("bmode", view="{view}"),
     params:
-        scratch=SCRATCH,
+        # A string, for Snakemake fills in wildcards in strings alone.
+        scratch=str(FOLDER / "scratch/{case}/{view}"),
         code=code("phantom", "truth", "rf", "bmode"),
         settings=lambda wildcards: imaging_settings(CASES[wildcards.case].config, wildcards.view),
     log:
@@ -25,8 +23,7 @@ rule imaging:
         """
         rm -rf {params.scratch}
         for stage in phantom truth rf bmode; do
-            {RUN}/$stage.py {FOLDER} {wildcards.case} {wildcards.view} \
-                --scratch {params.scratch} --threads {threads}
+            {RUN}/$stage.py {FOLDER} {wildcards.case} {wildcards.view} --threads {threads}
         done 2>&1 | tee {log}
         rm -rf {params.scratch}
         """

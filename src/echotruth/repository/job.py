@@ -18,7 +18,7 @@ from echotruth.config.loading import load
 from echotruth.heart import Heart
 from echotruth.provenance import code_version
 from echotruth.repository import ledger
-from echotruth.repository.store import Store, Values
+from echotruth.repository.store import NotWritten, Store, Values
 
 Result = dict[str, Values]
 log = logging.getLogger("echotruth")
@@ -41,16 +41,12 @@ class Job:
         Case id.
     view : str, optional
         Name of the view, for stages that work on one.
-    scratch : Path, optional
-        Folder for what stages of one view hand on without keeping it.
     """
 
-    def __init__(
-        self, folder: Path, stage: str, case: str, view: str | None = None, scratch: Path | None = None
-    ) -> None:
+    def __init__(self, folder: Path, stage: str, case: str, view: str | None = None) -> None:
         self.folder, self.stage = folder, stage
         self.case: Case = find(load(folder / "config.yaml"), case)
-        self.view_name, self.scratch = view, scratch
+        self.view_name = view
         self.store = Store(folder / f"{self.case.config.name}.zarr")
         self.row = ledger.rows(folder / "registry.txt")[case]
 
@@ -69,6 +65,11 @@ class Job:
         """Row of the case, and index of the view where there is one."""
         views = list(self.case.config.views)
         return (self.row,) if self.view_name is None else (self.row, views.index(self.view_name))
+
+    @property
+    def scratch(self) -> Path:
+        """Folder for what the stages of one view hand on without keeping it."""
+        return self.folder / "scratch" / self.case.id / str(self.view_name)
 
     @property
     def record(self) -> Path:
@@ -97,13 +98,15 @@ class Job:
 
     def hand_on(self, **arrays: Any) -> None:
         """Leave arrays in the scratch folder for the next stage of this view."""
-        if self.scratch is not None:
-            self.scratch.mkdir(parents=True, exist_ok=True)
-            np.savez(self.scratch / f"{self.stage}.npz", **arrays)
+        self.scratch.mkdir(parents=True, exist_ok=True)
+        np.savez(self.scratch / f"{self.stage}.npz", **arrays)
 
     def take(self, stage: str) -> dict[str, Any]:
         """Arrays an earlier stage of this view handed on."""
-        with np.load(Path(self.scratch or ".") / f"{stage}.npz") as file:
+        path = self.scratch / f"{stage}.npz"
+        if not path.is_file():
+            raise NotWritten(f"{path}: is not there: run the stage {stage} first")
+        with np.load(path) as file:
             return dict(file)
 
     def heart_failed(self) -> str | None:
@@ -145,6 +148,8 @@ def main(stage: str, work: Callable[[Job], Result], description: str | None, per
     start = time.perf_counter()
     try:
         result = _single_blas(work, job)
+    except NotWritten as error:
+        sys.exit(f"{stage}: {error}")
     except CannotBeMade as error:
         log.warning("gives up: %s", error)
         job.give_up("failed", str(error))
@@ -156,7 +161,7 @@ def main(stage: str, work: Callable[[Job], Result], description: str | None, per
 def _open(stage: str, arguments: argparse.Namespace) -> Job:
     try:
         view = getattr(arguments, "view", None)
-        job = Job(arguments.repository, stage, arguments.case, view, getattr(arguments, "scratch", None))
+        job = Job(arguments.repository, stage, arguments.case, view)
     except ValueError as error:
         sys.exit(f"{stage}: {error}")
     if view is not None and view not in job.case.config.views:
@@ -187,6 +192,5 @@ def _parser(stage: str, description: str | None, per_view: bool) -> argparse.Arg
     parser.add_argument("case", help="case id, as in cases.csv")
     if per_view:
         parser.add_argument("view", help="name of the view")
-        parser.add_argument("--scratch", type=Path, help="folder in which stages hand on what is not kept")
     parser.add_argument("--threads", type=int, default=1, help="threads to use; the results do not depend on it")
     return parser

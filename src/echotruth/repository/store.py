@@ -23,6 +23,10 @@ from echotruth.repository.schema import Array
 Values = dict[str, ArrayLike]
 
 
+class NotWritten(ValueError):
+    """An array of which the job that owns it has not written its part."""
+
+
 class Store:
     """A repository on disk.
 
@@ -82,8 +86,18 @@ class Store:
     def read(self, group: str, *row: int, names: tuple[str, ...] | None = None) -> dict[str, NDArray[Any]]:
         """Arrays of a group for one case (and view); a missing or damaged shard is an error."""
         arrays = self._open(group, "r")
-        wanted = names or [array.name for array in schema_of(group)]
-        return {name: np.asarray(arrays[name][row[: array_of(group, name).leading]]) for name in wanted}
+        wanted = [array_of(group, name) for name in names] if names else schema_of(group)
+        for array in wanted:
+            self._require_written(group, array, row[: array.leading])
+        return {array.name: np.asarray(arrays[array.name][row[: array.leading]]) for array in wanted}
+
+    def _require_written(self, group: str, array: Array, row: tuple[int, ...]) -> None:
+        """Zarr reads a missing shard as fill values; here it is an error."""
+        if not self.path.joinpath(group, array.name, "c", *map(str, row)).exists():
+            stage = group.partition("/")[0]
+            raise NotWritten(
+                f"{self.path}: {group}/{array.name} holds nothing in row {row}: run the stage {stage} first"
+            )
 
     def files(self, group: str, *row: int) -> list[Path]:
         """Files that hold what one job wrote in a group, in a fixed order."""
