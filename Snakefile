@@ -4,6 +4,7 @@
 """
 
 import re
+import subprocess
 import sys
 from pathlib import Path
 from shlex import quote
@@ -15,6 +16,7 @@ from echotruth.config.loading import ConfigError, validate
 from echotruth.mechanics.loop import read_loop
 from echotruth.provenance import code_version, settings_version
 from echotruth.repository.job import record_path
+from echotruth.repository.publication import VIEW_STAGES
 
 if not config:
 
@@ -66,5 +68,6 @@ include: "rules/report.smk"
 rule all:
     default_target: True
     input:
+        RECORDS,
         rules.repository.output,
         rules.report.output,

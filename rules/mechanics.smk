@@ -2,8 +2,6 @@
 
 
 rule mechanics:
-    input:
-        ancient(rules.cases.output.config),
     output:
         record("mechanics"),
     params:

@@ -1,29 +1,28 @@
-"""Cases and arrays before the first heart; attributes, verification and the ledger's verdict after the last."""
+"""Cases and arrays before the first job; verification, verdicts and attributes after the last."""
 
 
-rule cases:
-    output:
-        # Not the registry: Snakemake removes outputs before it runs a rule again, and rows are for ever.
-        table=FOLDER / "cases.csv",
-        config=FOLDER / "config.yaml",
-    params:
-        config=CONFIG.model_dump_json(),
-        code=code("cases"),
-    log:
-        FOLDER / "logs/cases.log",
-    shell:
-        "printf %s {params.config:q} | {RUN}/cases.py {FOLDER} - 2>&1 | tee {log}"
+# Not a rule: every heart would hang on it, and Snakemake looks no further below a rule that is to run again
+# (not even where its output is `ancient`), so that a changed tracker would be overlooked. What is there already stays.
+onstart:
+    command = [sys.executable, str(SCRIPTS / "cases.py"), str(FOLDER), "-"]
+    subprocess.run(command, input=CONFIG.model_dump_json(), text=True, check=True)
+
+
+# Every record by name: one that a failed job lost is asked for even where what was made from it is there.
+RECORDS = [
+    *(record("mechanics", case) for case in CASES),
+    *(record(stage, case, view) for stage in VIEW_STAGES for case in CASES for view in CONFIG.views),
+]
 
 
 rule repository:
     input:
-        rules.cases.output,
-        expand(record("mechanics"), case=CASES),
-        expand(record("evaluation", view="{view}"), case=CASES, view=CONFIG.views),
+        RECORDS,
     output:
         FOLDER / "ledger/repository.json",
     params:
-        code=code("repository"),
+        config=CONFIG.model_dump_json(),
+        code=code("cases", "repository"),
     log:
         FOLDER / "logs/repository.log",
     shell:

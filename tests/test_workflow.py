@@ -176,13 +176,38 @@ def test_second_run_has_nothing_to_do(made):
     assert "Nothing to be done" in made.snakemake("-n", "--cores", "2")
 
 
+def planned(made, text):
+    """Rule to number of jobs that a configuration would run."""
+    (made.folder / "changed.yaml").write_text(text)
+    said = made.run("-m", "snakemake", "-n", "--configfile", "changed.yaml", "--cores", "2")
+    return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", said, re.MULTILINE)}
+
+
 def test_changed_tracker_reruns_tracking_and_what_follows_it(made):
-    changed = made.folder / "changed.yaml"
-    changed.write_text(CONFIG.replace("faithful: {window_px: 16}", "faithful: {window_px: 32}"))
-    said = made.run("-m", "snakemake", "-n", "--configfile", changed.name, "--cores", "2")
-    jobs = dict(re.findall(r"^(\w+) +(\d+)$", said, re.MULTILINE))
-    jobs.pop("total")
-    assert jobs == {"all": "1", "cases": "1", "tracking": "4", "repository": "1", "report": "1"}
+    jobs = planned(made, CONFIG.replace("faithful: {window_px: 16}", "faithful: {window_px: 32}"))
+    assert jobs["tracking"] == 4 and jobs["repository"] == jobs["report"] == 1
+    assert not {"mechanics", "imaging"} & set(jobs)
+
+
+def test_changed_probe_reruns_imaging_and_not_mechanics(made):
+    jobs = planned(made, CONFIG.replace("elements: 16}", "elements: 20}"))
+    assert jobs["imaging"] == jobs["tracking"] == 4
+    assert "mechanics" not in jobs
+
+
+def test_changed_mechanics_reruns_everything(made):
+    jobs = planned(made, CONFIG + "mechanics: {base: fixed}\n")
+    assert (jobs["mechanics"], jobs["imaging"], jobs["tracking"]) == (2, 4, 4)
+
+
+@pytest.mark.parametrize("stage, rule", [("phantom", "imaging"), ("bmode", "imaging"), ("tracking", "tracking")])
+def test_record_that_a_failed_job_lost_is_made_again(made, stage, rule):
+    record = next(made.out.glob(f"ledger/{stage}/*/mid.json"))
+    aside = record.rename(made.folder / "aside.json")
+    try:
+        assert planned(made, CONFIG).get(rule) == 1
+    finally:
+        aside.rename(record)
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,10 @@ from echotruth.repository.schema import Array
 Values = dict[str, ArrayLike]
 
 
+# A shard that holds nothing but fill values is a result too: it must stand on disk like any other.
+zarr.config.set({"array.write_empty_chunks": True})
+
+
 class NotWritten(ValueError):
     """An array of which the job that owns it has not written its part."""
 
@@ -93,22 +97,19 @@ class Store:
 
     def _require_written(self, group: str, array: Array, row: tuple[int, ...]) -> None:
         """Zarr reads a missing shard as fill values; here it is an error."""
-        if not self.path.joinpath(group, array.name, "c", *map(str, row)).exists():
-            stage = group.partition("/")[0]
-            raise NotWritten(
-                f"{self.path}: {group}/{array.name} holds nothing in row {row}: run the stage {stage} first"
-            )
+        if not self._shard(group, array, row).is_file():
+            first = f"run the stage {group.partition('/')[0]} first"
+            raise NotWritten(f"{self.path}: {group}/{array.name} holds nothing in row {row}: {first}")
+
+    def _shard(self, group: str, array: Array, row: tuple[int, ...]) -> Path:
+        """The one file in which a job's part of an array stands."""
+        indices = (*row, *[0] * (len(array.dims) - len(row)))
+        return self.path.joinpath(group, array.name, "c", *map(str, indices))
 
     def files(self, group: str, *row: int) -> list[Path]:
         """Files that hold what one job wrote in a group, in a fixed order."""
-        found = []
-        for array in schema_of(group):
-            if array.leading == len(row):
-                place = self.path / group / array.name / "c"
-                found += [path for path in place.joinpath(*map(str, row)).rglob("*") if path.is_file()]
-                if place.joinpath(*map(str, row)).is_file():
-                    found.append(place.joinpath(*map(str, row)))
-        return sorted(found)
+        shards = (self._shard(group, array, row) for array in schema_of(group) if array.leading == len(row))
+        return sorted(shard for shard in shards if shard.is_file())
 
     def write_column(self, name: str, values: ArrayLike) -> None:
         """Write a column of the table of cases, one value a row."""
@@ -153,6 +154,8 @@ def _require(group: zarr.Group, array: Array, sizes: dict[str, int], coordinates
     old = group.get(array.name)
     if not isinstance(old, zarr.Array) or not _grows(old, array, shape):
         return _create(group, array, shape, coordinates)
+    if old.shape != shape and array.dtype == "string":
+        return _create(group, array, shape, coordinates)  # in one chunk, and written as a whole when published
     if old.shape != shape:
         old.resize(shape)
     return old
@@ -191,7 +194,6 @@ def _create(group: zarr.Group, array: Array, shape: tuple[int, ...], coordinates
         fill_value=array.fill,
         dimension_names=array.dims,
         attributes=attributes,
-        config={"write_empty_chunks": True},
         overwrite=True,
     )
 

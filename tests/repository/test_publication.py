@@ -1,0 +1,129 @@
+"""A repository is published when every file is what its job wrote."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+import yaml
+import zarr
+
+from echotruth.cases import expand, table
+from echotruth.config import Bmode, Config, Geometry, Loop, Tracker, Tracking, View
+from echotruth.imaging.bmode import pixel_centres
+from echotruth.mechanics.geometry import left_ventricle
+from echotruth.repository import layout, ledger, schema
+from echotruth.repository.job import Job
+from echotruth.repository.publication import VIEW_STAGES, Damaged, publish
+from echotruth.repository.store import Store, schema_of
+from echotruth.tracking import grid
+
+CONFIG = Config(
+    name="small",
+    geometry=Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1),
+    loop=Loop(frames=4),
+    views={"mid": View(), "long_axis": View(plane="long_axis")},
+    bmode=Bmode(size_px=64, downsampling=(1, 2)),
+    tracking=Tracking(trackers={"one": Tracker(window_px=16)}),
+    cases={"seed": [1, 2]},
+)
+CASES = expand(CONFIG)
+GROUPS = {"mechanics": ("geometry", "fibres", "mechanics", "kinematics"), "phantom": ("phantom",), "rf": ()}
+GROUPS |= {stage: (f"{stage}/64", f"{stage}/32") for stage in schema.SIZED}
+
+
+def blank(store: Store, group: str) -> dict:
+    """Ones in the shape of every array of one job."""
+    opened = zarr.open_group(store.path, path=group, mode="r", use_consolidated=False)
+    return {array.name: np.ones(opened[array.name].shape[array.leading :]) for array in schema_of(group)}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    """A repository of two cases, all of whose jobs are done."""
+    monkeypatch.setattr(sys, "argv", [__file__])
+    folder = tmp_path / "small"
+    folder.mkdir()
+    (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG.model_dump(mode="json")))
+    rows = list(ledger.register(folder / "registry.txt", [case.id for case in CASES]))
+    columns = layout.columns(table(CASES), rows)
+    labels = layout.labels(CONFIG, rows, np.zeros((len(rows), 4))) | layout.positions(CONFIG, pixel_centres, grid)
+    groups = schema.groups(CONFIG) | {"cases": schema.parameters(columns)}
+    Store(folder / "small.zarr").lay_out(groups, layout.sizes(left_ventricle(CONFIG.geometry)), labels | columns)
+    for case in CASES:
+        for stage, view in [("mechanics", None), *((stage, view) for stage in VIEW_STAGES for view in CONFIG.views)]:
+            job = Job(folder, stage, case.id, view)
+            job.commit({group: blank(job.store, group) for group in GROUPS[stage]}, 1.0)
+    return folder
+
+
+def test_whole_repository_is_verified_and_opens(folder):
+    summary = publish(folder)
+    assert (summary["complete"], summary["failed"]) == (2, 0)
+    tree = xr.open_datatree(folder / "small.zarr")
+    assert list(tree["cases/status"].values) == ["complete", "complete"]
+    assert set(tree.attrs["code"]) == {"mechanics", *VIEW_STAGES}
+
+
+def test_every_file_that_a_job_wrote_is_verified(folder):
+    written = {
+        path
+        for stage in GROUPS.values()
+        for group in stage
+        for array in schema_of(group)
+        for path in (folder / "small.zarr" / group / array.name / "c").rglob("*")
+        if path.is_file()
+    }
+    assert publish(folder)["files"] == len(written)
+
+
+def test_publishing_twice_gives_the_same_bytes(folder):
+    def content():
+        return {path: path.read_bytes() for path in (folder / "small.zarr").rglob("*") if path.is_file()}
+
+    publish(folder)
+    first = content()
+    publish(folder)
+    assert content() == first
+
+
+@pytest.mark.parametrize("harm", ["changed", "truncated", "missing"])
+@pytest.mark.parametrize("group, row", [("bmode/64", (1, 0)), ("mechanics", (0,)), ("evaluation/32", (0, 1))])
+def test_damaged_file_and_its_record_are_named(folder, group, row, harm):
+    file = Store(folder / "small.zarr").files(group, *row)[0]
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content if harm == "changed" else content[:-1])
+    if harm == "missing":
+        file.unlink()
+    with pytest.raises(Damaged) as caught:
+        publish(folder)
+    assert str(file) in str(caught.value)
+    assert f"ledger/{group.partition('/')[0]}/{CASES[row[0]].id}" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_heart_without_a_solution_is_told_with_its_reason(folder):
+    for stage, view in [("mechanics", None), *((stage, view) for stage in VIEW_STAGES for view in CONFIG.views)]:
+        status = "failed" if view is None else "skipped"
+        Job(folder, stage, CASES[1].id, view).give_up(status, "no equilibrium at frame 3")
+    assert publish(folder)["failed"] == 1
+    cases = xr.open_datatree(folder / "small.zarr")["cases"]
+    assert list(cases["status"].values) == ["complete", "failed"]
+    assert list(cases["reason"].values) == ["", "no equilibrium at frame 3"]
+
+
+def test_case_no_longer_asked_for_is_retired(folder):
+    fewer = CONFIG.model_copy(update={"cases": {"seed": [1]}})
+    (folder / "config.yaml").write_text(yaml.safe_dump(fewer.model_dump(mode="json")))
+    assert publish(folder)["complete"] == 1
+    assert list(xr.open_datatree(folder / "small.zarr")["cases/status"].values) == ["complete", "retired"]
+
+
+def test_table_of_cases_has_a_row_a_case(folder):
+    publish(folder)
+    tree = xr.open_datatree(folder / "small.zarr")
+    frame = pd.DataFrame({"seed": tree["cases/seed"].values}, index=tree["cases/case"].values)
+    assert frame["seed"].to_dict() == {case.id: case.config.seed for case in CASES}

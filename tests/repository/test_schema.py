@@ -1,0 +1,52 @@
+"""The schema says one thing of every array, in units that readers know."""
+
+import numpy as np
+import pytest
+
+from echotruth.config import Bmode, Config
+from echotruth.repository import schema
+
+ALL = [*schema.CASES, *schema.COORDINATES]
+ALL += [array for arrays in (schema.STAGES | schema.SIZED).values() for array in arrays]
+
+
+@pytest.mark.parametrize("array", ALL, ids=lambda array: f"{array.name}-{len(array.dims)}")
+def test_array_is_whole(array):
+    assert array.dims and array.long_name
+    assert array.units in {"1", "m", "m3", "s", "Pa", "rad", "percent"}
+    assert array.dtype == "string" or np.dtype(array.dtype).name == array.dtype
+    assert array.dims[: array.leading] == tuple(dim for dim in array.dims if dim in ("case", "view"))
+
+
+def test_names_stand_once_in_a_group():
+    for arrays in (schema.STAGES | schema.SIZED).values():
+        names = [array.name for array in (*arrays, *schema.coordinates(arrays))]
+        assert len(names) == len(set(names))
+
+
+def test_labels_belong_to_coordinates():
+    assert set(schema.LABELS) <= {array.name for array in schema.COORDINATES}
+
+
+def test_sized_groups_stand_once_for_every_image_size():
+    groups = schema.groups(Config(bmode=Bmode(size_px=256, downsampling=(1, 4)), tracking=_tracking()))
+    assert {path for path in groups if "/" in path} == {f"{stage}/{px}" for stage in schema.SIZED for px in (256, 64)}
+
+
+def test_fill_says_that_nothing_was_written():
+    assert np.isnan(schema.Array("a", ("case",), "float32", "m", "a").fill)
+    assert schema.Array("a", ("case",), "string", "1", "a").fill == ""
+    assert schema.Array("a", ("case",), "uint8", "1", "a").fill == 0
+
+
+def test_columns_of_cases_carry_the_unit_of_their_key():
+    columns = {"cases:fibres.endo_deg": np.array([84.0]), "cases:loop.file": np.array(["mouse"])}
+    *_, angle, file = schema.parameters(columns)
+    assert (angle.name, angle.dtype, angle.units) == ("fibres.endo_deg", "float64", "degree")
+    assert (file.name, file.dtype, file.units) == ("loop.file", "string", "1")
+
+
+def _tracking():
+    from echotruth.config import Tracker, Tracking
+
+    return Tracking(trackers={"one": Tracker(window_px=32)})

@@ -1,0 +1,92 @@
+"""What is installed, by pip or by conda, is one list; and nothing in the repository belongs to one machine."""
+
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+CONDA_NAMES = {"matplotlib": "matplotlib-base"}
+CONDA_ONLY = {"python", "pip", "hatchling"}
+
+
+def requirements(*extras):
+    listed = [
+        *PROJECT["dependencies"],
+        *(entry for extra in extras for entry in PROJECT["optional-dependencies"][extra]),
+    ]
+    return [Requirement(entry) for entry in listed]
+
+
+def conda():
+    """Name to bounds of every conda package."""
+    entries = yaml.safe_load((ROOT / "environment.yml").read_text())["dependencies"]
+    return {name: bounds.strip() for name, _, bounds in (entry.partition(" ") for entry in entries)}
+
+
+def lock():
+    """Name to the entries of requirements.lock: version, marker, number of hashes."""
+    text = (ROOT / "requirements.lock").read_text().replace("\\\n", " ")
+    found = {}
+    for line in filter(str.strip, text.splitlines()):
+        entry = re.fullmatch(r"([a-z0-9._-]+)==(\S+) *(?:;(.*?))?((?: +--hash=sha256:[0-9a-f]{64})+) *", line)
+        assert entry, f"not pinned and hashed: {line[:80]}"
+        found.setdefault(entry[1], []).append(entry[2])
+    return found
+
+
+def tracked():
+    """Path to text of the files that git keeps."""
+    try:
+        listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True).stdout
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("not a git checkout")
+    paths = [ROOT / name for name in listed.split("\0") if name]
+    return {path.relative_to(ROOT): path.read_text("utf-8", "replace") for path in paths if path.is_file()}
+
+
+def test_conda_asks_for_what_pip_asks_for():
+    expected = {CONDA_NAMES.get(each.name, each.name): str(each.specifier) for each in requirements("test")}
+    assert {name: bounds for name, bounds in conda().items() if name not in CONDA_ONLY} == expected
+
+
+def test_conda_has_the_same_python():
+    assert set(conda()["python"].split(",")) == set(PROJECT["requires-python"].split(","))
+    assert set(conda()) >= CONDA_ONLY
+
+
+@pytest.mark.parametrize("requirement", requirements("test", "build"), ids=lambda each: each.name)
+def test_lock_pins_and_hashes_a_version_within_bounds(requirement):
+    versions = lock()[requirement.name]
+    assert versions and all(requirement.specifier.contains(version) for version in versions)
+
+
+def test_no_tracked_file_names_a_registry_or_a_folder_of_one_machine():
+    hosts = ["py" + "pi.org", "python" + "hosted.org", "ana" + "conda.org", "repo.ana" + "conda.com", "index" + "-url"]
+    folders = ["/ho" + "me/", "/wo" + "rk/", "/Us" + "ers/", "/ro" + "ot/"]
+    absolute = re.compile("|".join(rf"(?<![\w.}}*]){folder}\w" for folder in folders))
+    for path, text in tracked().items():
+        assert not [host for host in hosts if host in text], path
+        assert not absolute.search(text), path
+
+
+def test_licence_is_the_one_declared():
+    text = (ROOT / "LICENSE").read_text()
+    assert PROJECT["license"] == "BSD-3-Clause"
+    assert text.startswith("BSD 3-Clause License") and "Neither the name of the copyright holder" in " ".join(
+        text.split()
+    )
+
+
+def test_citation_names_the_paper_and_the_version():
+    import echotruth
+
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    paper = "Synthetic ultrasound images to benchmark echocardiography-based biomechanics"
+    assert citation["preferred-citation"]["title"] == paper
+    assert citation["version"] == echotruth.__version__ and citation["license"] == PROJECT["license"]
