@@ -9,7 +9,7 @@ rule mechanics:
         settings=lambda wildcards: mechanics_settings(CASES[wildcards.case].config),
     log:
         FOLDER / "logs/mechanics/{case}.log",
-    threads: max(1, workflow.cores // len(CASES))
+    threads: max(1, (workflow.cores or 1) // len(CASES))
     shell:
         "{RUN}/mechanics.py {FOLDER} {wildcards.case} --threads {threads} 2>&1 | tee {log}"
 

@@ -55,7 +55,8 @@ def run(path: str, config: Config, options: list[str]) -> int:
         # A killed run leaves Snakemake's own lock behind; ours dies with its process, so nobody is at work here.
         _quietly([*snakemake, "--unlock"])
         status = subprocess.call([*snakemake, *options])
-        if status or {"-n", "--dry-run", "--dryrun"} & set(options):
+        planned_only = {"-n", "--dry-run", "--dryrun"} & set(options)
+        if status or planned_only or not (folder / "figures/scores.csv").is_file():
             return status
         report = folder / "report.html"
         status = _quietly([*snakemake, "--report", str(report)])
