@@ -71,7 +71,7 @@ def test_labels_are_of_the_wall_and_nothing_is_known_outside(moved):
 
 
 def test_the_wall_in_the_image_has_the_area_of_the_wall_in_the_plane(twisting_heart, mid):
-    # The unloaded wall's cut is an annulus between two ellipses of revolution (science of the default geometry).
+    # The unloaded wall's cut is an annulus between two ellipses of revolution.
     fine = (np.arange(512) + 0.5) / 512 * 12e-3
     still = truth(twisting_heart, 0, mid, fine, fine - 6e-3)
     height = mid.origin[2] + 1.40e-3  # above the equator
