@@ -28,14 +28,15 @@ except ConfigError as error:
     sys.exit(str(error))
 
 arguments.repository.mkdir(parents=True, exist_ok=True)
-rows = list(ledger.register(arguments.repository / "registry.txt", list(cases)))
+rows = ledger.register(arguments.repository / "registry.txt", list(cases))
 times = np.full((len(rows), config.loop.frames), np.nan)
+loops = {loop: read_loop(loop) for loop in {case.config.loop for case in cases.values()}}
 for id, case in cases.items():
-    times[rows.index(id)] = read_loop(case.config.loop).time
+    times[rows[id]] = loops[case.config.loop].time
 frame = table(list(cases.values()))
-columns = layout.columns(frame, rows)
+columns = layout.columns(frame, list(rows))
 sizes = layout.sizes(left_ventricle(config.geometry))
-labels = layout.labels(config, rows, times) | layout.positions(config, pixel_centres, grid) | columns
+labels = layout.labels(config, list(rows), times) | layout.positions(config, pixel_centres, grid) | columns
 arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
 Store(arguments.repository / f"{config.name}.zarr").lay_out(arrays, sizes, labels)
 frame.to_csv(arguments.repository / "cases.csv", index=False)

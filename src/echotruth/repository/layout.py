@@ -94,11 +94,10 @@ def labels(config: Config, rows: list[str], times: ArrayLike) -> dict[str, Array
 
 
 def columns(table: pd.DataFrame, rows: list[str]) -> dict[str, NDArray[Any]]:
-    """Columns of the table of cases by the row each case has, as `cases:KEY`; NaN, 0 or "" for retired cases."""
-    placed = table.set_index("case").reindex(rows)
+    """Columns of the table of cases by the row each case has, as `cases:KEY`; NaN or "" for retired cases."""
     found = {}
-    for key, column in table.set_index("case").items():
+    for key, column in table.set_index("case").reindex(rows).items():
         text = column.map(lambda value: isinstance(value, str)).any()
-        numbers = placed[key].fillna("") if text else placed[key].astype(float)
-        found[f"cases:{key}"] = np.asarray(numbers, dtype=str if text else float)
+        values = column.fillna("") if text else column.astype(float)
+        found[f"cases:{key}"] = np.asarray(values, dtype=str if text else float)
     return found
