@@ -13,7 +13,7 @@ import numpy as np
 
 from echotruth.config import Config, Loop, Section
 from echotruth.config.loading import ConfigError, resolved
-from echotruth.config.sections import unit_of
+from echotruth.section import unit_of
 
 if TYPE_CHECKING:
     import pandas as pd

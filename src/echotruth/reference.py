@@ -15,8 +15,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from echotruth.config.sections import UNITS, Config, Section, unit_of
+from echotruth.config import Config
 from echotruth.repository import schema
+from echotruth.section import UNITS, Section, unit_of
 
 _HEAD = """# Configuration
 
@@ -24,7 +25,7 @@ A configuration is a YAML file; every key not given takes its default. Unknown k
 and impossible values are refused before anything runs. `schema.json` beside this page lets
 editors complete and check the YAML. Units are in the keys.
 
-This page is generated from `src/echotruth/config/sections.py` by `make reference`.
+This page is generated from `src/echotruth/config` by `make reference`.
 
 """
 

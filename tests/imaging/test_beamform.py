@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from echotruth.config.sections import Bmode, Probe, Rf
+from echotruth.config import Bmode, Probe, Rf
 from echotruth.imaging.scanner import Scanner, imaging_depth
 
 SPEED, CENTRE, SAMPLING = 1540.0, 25e6, 100e6

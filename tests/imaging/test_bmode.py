@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.config.sections import Bmode
+from echotruth.config import Bmode
 from echotruth.imaging.bmode import clip, downsample, envelope, log_compress, pixel_centres, scan_convert
 
 BMODE = Bmode(size_px=128, downsampling=(1, 2, 4))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from echotruth.config.sections import Probe
+from echotruth.config import Probe
 from echotruth.imaging.probe import (
     ElevationProfile,
     apodization,

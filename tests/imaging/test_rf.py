@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from echotruth.config.sections import Probe, Rf
+from echotruth.config import Probe, Rf
 from echotruth.imaging.rf import FullMatrix
 from echotruth.imaging.transmit import FocusedTransmits, line_angles, transmit_delays
 

@@ -1,21 +1,13 @@
 """Configuration: models, reading of files, generated reference."""
 
-from echotruth.config.sections import (
-    Bmode,
-    Config,
-    Fibres,
-    Geometry,
-    Loop,
-    Material,
-    Mechanics,
-    Phantom,
-    Probe,
-    Rf,
-    Section,
-    Tracker,
-    Tracking,
-    View,
-)
+from echotruth.config.fibres import Fibres
+from echotruth.config.geometry import Geometry
+from echotruth.config.imaging import Bmode, Phantom, Probe, Rf, View
+from echotruth.config.loop import Loop
+from echotruth.config.mechanics import Material, Mechanics
+from echotruth.config.sections import Config
+from echotruth.config.tracking import Tracker, Tracking
+from echotruth.section import Section
 
 __all__ = [
     "Bmode",

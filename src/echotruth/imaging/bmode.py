@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echotruth.config.sections import Bmode
+from echotruth.config import Bmode
 
 
 def envelope(lines: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from math import log, pi, sqrt
 import numba
 import numpy as np
 
-from echotruth.config.sections import Probe
+from echotruth.config import Probe
 
 FAINTEST = 0.01
 """Spectrum of the pulse, relative to its maximum, below which it is cut (-40 dB)."""

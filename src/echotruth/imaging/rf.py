@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import fft
 
-from echotruth.config.sections import Probe
+from echotruth.config import Probe
 from echotruth.imaging import deposit
 from echotruth.imaging.probe import ElevationProfile, element_centres, pulse_band, pulse_spectrum, spectral_width
 

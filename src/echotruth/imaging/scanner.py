@@ -6,7 +6,7 @@ from math import hypot
 
 import numpy as np
 
-from echotruth.config.sections import Bmode, Probe, Rf
+from echotruth.config import Bmode, Probe, Rf
 from echotruth.imaging.beamform import ReceiveFocus
 from echotruth.imaging.probe import apodization, element_centres
 from echotruth.imaging.transmit import FocusedTransmits, line_angles

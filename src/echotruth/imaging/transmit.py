@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from scipy import fft
 
-from echotruth.config.sections import Probe, Rf
+from echotruth.config import Probe, Rf
 from echotruth.imaging.probe import apodization, element_centres
 from echotruth.imaging.rf import FullMatrix
 

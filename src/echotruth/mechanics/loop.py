@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.config import Loop
-from echotruth.config.sections import UNITS
+from echotruth.section import UNITS
 
 Floats = NDArray[np.float64]
 

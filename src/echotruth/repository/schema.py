@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from echotruth.config import Config
-from echotruth.config.sections import unit_of
+from echotruth.section import unit_of
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,117 @@
+"""Views, phantom, probe and images."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, FiniteFloat, model_validator
+
+from echotruth.section import Positive, Section, impossible
+
+
+class View(Section):
+    """An imaging plane."""
+
+    plane: Literal["short_axis", "long_axis"] = "short_axis"
+    """Short axis: across the long axis. Long axis: along it, seen from the apex."""
+    position: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.5
+    """Short axis only: place of the plane at end-diastole, 0 at the base, 1 at the endocardial apex."""
+    rotation_deg: Annotated[FiniteFloat, Field(ge=-180, le=180)] = 0.0
+    """Long axis only: turn of the plane about the long axis; 0 cuts septum and lateral wall."""
+
+
+class Phantom(Section):
+    """Scatterers in the wall."""
+
+    density_per_mm3: Positive = 5000.0
+    """Scatterers per cubic millimetre of unloaded wall; the default is some thirty a resolution cell, enough
+    for fully developed speckle from normally distributed amplitudes, which count for a third."""
+    in_plane_only: bool = False
+    """Scatterers lie in the imaging plane and move within it, as the paper's phantom is printed."""
+
+
+class Probe(Section):
+    """A phased array."""
+
+    elements: Annotated[int, Field(ge=2, le=512)] = 64
+    """Number of elements."""
+    frequency_MHz: Positive = 25.0
+    """Centre frequency."""
+    bandwidth: Annotated[FiniteFloat, Field(gt=0.05, lt=1.5)] = 0.5
+    """Two-way -6 dB bandwidth of burst and array over centre frequency: 55 um of axial resolution."""
+    pitch_um: Positive = 46.0
+    """Distance of element centres."""
+    width_um: Positive = 41.0
+    """Width of an element."""
+    height_mm: Positive = 1.0
+    """Height of the elements (elevation)."""
+    elevation_focus_mm: Positive = 6.5
+    """Focus of the lens in elevation."""
+    sound_speed_m_per_s: Annotated[FiniteFloat, Field(ge=300, le=6000)] = 1540.0
+    """Speed of sound."""
+    sampling_MHz: Positive = 100.0
+    """Sampling frequency of the RF."""
+
+    @model_validator(mode="after")
+    def _can_be_sampled(self) -> Probe:
+        top = self.frequency_MHz * (1 + self.bandwidth)
+        if self.sampling_MHz < 2 * top:
+            remedy = (
+                f"its band reaches {top:g} MHz, above the Nyquist frequency of sampling_MHz = {self.sampling_MHz:g}: "
+                f"lower it, or sample at {2 * top:g} MHz or more"
+            )
+            raise impossible("frequency_MHz", self.frequency_MHz, remedy)
+        if self.width_um > self.pitch_um:
+            raise impossible("width_um", self.width_um, f"must not exceed pitch_um = {self.pitch_um}")
+        return self
+
+
+class Rf(Section):
+    """Focused lines of a sector scan."""
+
+    focus_mm: Positive = 6.5
+    """Transmit focus."""
+    lines: Annotated[int, Field(ge=16, le=2048)] = 256
+    """Lines of the sector."""
+    sector_deg: Annotated[FiniteFloat, Field(gt=5, le=120)] = 64.0
+    """Opening angle of the sector."""
+    apodization: Literal["hann", "none"] = "hann"
+    """Weights over the aperture, on transmit and receive."""
+
+
+class Bmode(Section):
+    """From RF to 8-bit images."""
+
+    field_of_view_mm: Positive = 12.0
+    """Side of the square image; the array stands in the middle of its upper edge."""
+    size_px: Annotated[int, Field(ge=32, le=4096)] = 512
+    """Pixels along a side of the full image."""
+    downsampling: Annotated[tuple[Annotated[int, Field(ge=1, le=64)], ...], Field(min_length=1)] = (1, 2, 4)
+    """Sizes kept, as divisors of the full size."""
+    dynamic_range_dB: Annotated[FiniteFloat, Field(gt=10, le=120)] = 55.0
+    """Range of the log compression below the brightest echo of the clip."""
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Pixels along a side of every image size kept, largest first."""
+        return tuple(self.size_px // divisor for divisor in sorted(self.downsampling))
+
+    @model_validator(mode="after")
+    def _divides(self) -> Bmode:
+        for divisor in self.downsampling:
+            if self.size_px % divisor or self.size_px // divisor < 16:
+                remedy = f"every entry must divide size_px = {self.size_px} and leave 16 px or more"
+                raise impossible("downsampling", list(self.downsampling), remedy)
+        if len(set(self.downsampling)) < len(self.downsampling):
+            raise impossible("downsampling", list(self.downsampling), "entries must differ")
+        return self
+
+
+def standard_views() -> dict[str, View]:
+    """Three short-axis planes and a long-axis one, as in the paper."""
+    return {
+        "base": View(position=0.2),
+        "mid": View(position=0.5),
+        "apex": View(position=0.8),
+        "long_axis": View(plane="long_axis"),
+    }

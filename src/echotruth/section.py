@@ -1,0 +1,60 @@
+"""A part of the configuration.
+
+Keys carry their unit; :meth:`Section.si` gives the values in SI units.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from types import SimpleNamespace
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints
+from pydantic_core import PydanticCustomError
+
+UNITS: dict[str, float] = {
+    "um": 1e-6,
+    "mm": 1e-3,
+    "per_mm3": 1e9,
+    "uL": 1e-9,
+    "ms": 1e-3,
+    "per_min": 1 / 60,
+    "mmHg": 133.322387415,
+    "kPa": 1e3,
+    "MHz": 1e6,
+    "m_per_s": 1.0,
+    "deg": pi / 180,
+}
+"""Suffix of a key to the factor that makes its value SI (mmHg: NIST SP 811, appendix B.8)."""
+
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+Angle = Annotated[FiniteFloat, Field(ge=-90, le=90)]
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=40)]
+
+
+def impossible(key: str, value: object, remedy: str) -> PydanticCustomError:
+    """An error about one key of a section whose value cannot stand beside its neighbours."""
+    return PydanticCustomError("impossible", "{remedy}", {"key": key, "value": value, "remedy": remedy})
+
+
+def unit_of(key: str) -> str:
+    """Unit suffix of a configuration key, or an empty string."""
+    return next((unit for unit in UNITS if key.endswith(f"_{unit}")), "")
+
+
+class Section(BaseModel):
+    """A part of the configuration: unknown keys are refused, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
+
+    def si(self) -> SimpleNamespace:
+        """Values in SI units under their names without the unit (`pitch_um` becomes `pitch`, m)."""
+        values: dict[str, Any] = {}
+        for key in type(self).model_fields:
+            value, unit = getattr(self, key), unit_of(key)
+            if isinstance(value, Section):
+                value = value.si()
+            elif value is not None and unit:
+                value *= UNITS[unit]
+            values[key.removesuffix(f"_{unit}")] = value
+        return SimpleNamespace(**values)
