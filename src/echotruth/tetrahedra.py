@@ -31,6 +31,8 @@ class Mesh:
     endo, epi, base : ndarray of shape (n_facets, 6)
         Quadratic triangles of the boundary: three vertices, then the middles of edges 01, 12, 20;
         their normals point out of the wall.
+    fibre, sheet : ndarray of shape (n_cells, 3), optional
+        Directions of fibres and sheets that came with the mesh, of any length.
     """
 
     nodes: Floats
@@ -38,6 +40,8 @@ class Mesh:
     endo: Integers
     epi: Integers
     base: Integers
+    fibre: Floats | None = None
+    sheet: Floats | None = None
 
 
 @dataclass(frozen=True)

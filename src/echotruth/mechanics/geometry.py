@@ -1,33 +1,20 @@
-"""The unloaded left ventricle: a truncated thick ellipsoid of quadratic tetrahedra.
-
-Points of the wall have three parameters: wall depth w (0 endocardium, 1
-epicardium), distance r from the apex to the base along the shell (0 to 1) and
-azimuth. The mesh is made in these parameters and mapped to the wall, so that the
-middles of edges lie on the curved shells.
-"""
+"""The left ventricle to be solved: an ellipsoid, or the wall in a file."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from echotruth.config import Geometry
+from echotruth.mechanics.ellipsoid import ellipsoid
 from echotruth.mechanics.quadrature import tetrahedron
-from echotruth.tetrahedra import EDGES, Floats, Integers, Mesh, shape_gradient
+from echotruth.mechanics.soundness import GeometryError, jacobians
+from echotruth.tetrahedra import Floats, Mesh
 
-FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
-"""Vertices of the faces of a tetrahedron; the normals point out."""
-
-_SAMPLES = 2001
-"""Points of the table that turns arc length into angle."""
-
-
-class GeometryError(ValueError):
-    """A ventricle that cannot be meshed."""
+__all__ = ["GeometryError", "cell_volumes", "left_ventricle"]
 
 
 def left_ventricle(geometry: Geometry) -> Mesh:
-    """Mesh of the truncated thick ellipsoid.
+    """Mesh of the left ventricle.
 
     Parameters
     ----------
@@ -36,27 +23,19 @@ def left_ventricle(geometry: Geometry) -> Mesh:
     Returns
     -------
     Mesh
-        Unloaded wall, in metres: long axis z from apex to base, base in the plane z = 0.
-        It is the idealised ventricle of Land et al., Proc R Soc A 471 (2015) 20150641, with other axes.
+        Wall in the heart frame, in metres: long axis z from apex to base, the base in or about the plane z = 0,
+        in the state that `geometry.state` names.
 
     Raises
     ------
     GeometryError
-        If a tetrahedron is turned inside out by the curvature of the wall.
+        If there is no such ventricle, in one sentence with the remedy.
     """
-    triangles, disc = _disc(geometry.circumferential_elements, geometry.longitudinal_elements)
-    layers = geometry.transmural_elements
-    vertices = np.vstack([np.column_stack([np.full(len(disc), k / layers), disc]) for k in range(layers + 1)])
-    tetrahedra = _extrude(triangles, len(disc), layers)
-    cells, parameters = _quadratic(tetrahedra, vertices)
-    nodes = _wall(parameters, geometry)
-    _orient(nodes, cells)
-    facets = _boundary(cells)
-    depth, r, _ = parameters[facets].transpose(2, 0, 1)
-    sides = [np.all(side, axis=1) for side in (depth == 0, depth == 1, r == 1)]
-    mesh = Mesh(nodes, cells, *(facets[side] for side in sides))
-    _check(mesh)
-    return mesh
+    if geometry.file is None:
+        return ellipsoid(geometry)
+    from echotruth.mechanics.heart_file import heart_of
+
+    return heart_of(geometry)
 
 
 def cell_volumes(mesh: Mesh) -> Floats:
@@ -70,128 +49,4 @@ def cell_volumes(mesh: Mesh) -> Floats:
     -------
     ndarray of shape (n_cells,), m^3
     """
-    return np.einsum("cq,q->c", _jacobians(mesh.nodes, mesh.cells), tetrahedron()[1])
-
-
-def _disc(around: int, rings: int) -> tuple[Integers, Floats]:
-    """Triangles of a disc: the apex, then rings of 6, 12, ... up to `around` points."""
-    sizes = [1] + [min(6 * k, around) for k in range(1, rings + 1)]
-    start = np.cumsum([0, *sizes])
-    angle, points, triangles = 0.0, [(0.0, 0.0)], []
-    for k in range(1, rings + 1):
-        # Rings of equal size are turned by half a step, for triangles with nearly equal sides.
-        angle += np.pi / around if sizes[k] == sizes[k - 1] else 0.0
-        points += [(k / rings, angle + 2 * np.pi * i / sizes[k]) for i in range(sizes[k])]
-        band = _turned(sizes[k]) if sizes[k] == sizes[k - 1] else _growing(k)
-        triangles += [[start[k - 1 + ring] + i for ring, i in corners] for corners in band]
-    return np.array(triangles, dtype=np.int32), np.array(points)
-
-
-def _turned(n: int) -> list[list[tuple[int, int]]]:
-    """Triangles between two rings of n points, the outer (ring 1) half a step ahead."""
-    band = []
-    for i in range(n):
-        j = (i + 1) % n
-        band += [[(0, i), (1, i), (0, j)], [(0, j), (1, i), (1, j)]]
-    return band
-
-
-def _growing(k: int) -> list[list[tuple[int, int]]]:
-    """Triangles between rings of 6 (k - 1) and 6 k points: six sectors, each of k upright and k - 1 turned."""
-    inner, outer = max(6 * (k - 1), 1), 6 * k
-    band = []
-    for sector in range(6):
-        a, b = sector * (k - 1), sector * k
-        for i in range(k):
-            band.append([(0, (a + i) % inner), (1, (b + i) % outer), (1, (b + i + 1) % outer)])
-        for i in range(k - 1):
-            band.append([(0, (a + i) % inner), (1, (b + i + 1) % outer), (0, (a + i + 1) % inner)])
-    return band
-
-
-def _extrude(triangles: Integers, n_points: int, layers: int) -> Integers:
-    """Tetrahedra of the prisms over the triangles.
-
-    The diagonal of each quadrilateral starts at its smallest vertex, so that
-    neighbours agree (Dompierre et al., How to subdivide pyramids, prisms and hexahedra, 1999).
-    """
-    order = np.array([np.roll(t, -int(np.argmin(t))) for t in triangles])
-    prisms = np.vstack([np.hstack([order, order + n_points]) + k * n_points for k in range(layers)])
-    flip = prisms[:, 1] < prisms[:, 2]
-    low = np.where(flip[:, None], prisms[:, [0, 1, 2, 5]], prisms[:, [0, 1, 2, 4]])
-    middle = np.where(flip[:, None], prisms[:, [0, 1, 5, 4]], prisms[:, [0, 4, 2, 5]])
-    return np.vstack([low, middle, prisms[:, [0, 4, 5, 3]]]).astype(np.int32)
-
-
-def _quadratic(tetrahedra: Integers, vertices: Floats) -> tuple[Integers, Floats]:
-    """Add the middles of the edges, in parameters."""
-    ends = np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1)
-    edges, number = np.unique(ends, axis=0, return_inverse=True)
-    cells = np.hstack([tetrahedra, len(vertices) + number.reshape(-1, 6)]).astype(np.int32)
-    a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]
-    turn = (b[:, 2] - a[:, 2] + np.pi) % (2 * np.pi) - np.pi
-    azimuth = a[:, 2] + turn / 2
-    # The apex has no azimuth of its own; it takes that of the other end.
-    azimuth = np.where(a[:, 1] == 0, b[:, 2], np.where(b[:, 1] == 0, a[:, 2], azimuth))
-    middle = np.column_stack([(a[:, 0] + b[:, 0]) / 2, (a[:, 1] + b[:, 1]) / 2, azimuth])
-    return cells, np.vstack([vertices, middle])
-
-
-def _wall(parameters: Floats, geometry: Geometry) -> Floats:
-    """Position (m) of points given by depth, distance from the apex and azimuth."""
-    depth, r, azimuth = parameters.T
-    size = geometry.si()
-    (endo_x, endo_z), (epi_x, epi_z) = (
-        _shell(r, radius, length, size.base)
-        for radius, length in ((size.endo_radius, size.endo_length), (size.epi_radius, size.epi_length))
-    )
-    x = (1 - depth) * endo_x + depth * epi_x
-    z = (1 - depth) * endo_z + depth * epi_z
-    return geometry.scale * np.column_stack([x * np.cos(azimuth), x * np.sin(azimuth), z])
-
-
-def _shell(r: Floats, radius: float, length: float, base: float) -> tuple[Floats, Floats]:
-    """Distance from the axis and height (m) on an ellipsoid cut by the plane z = 0.
-
-    Half of the spacing is even in arc length, half in the angle of the ellipse:
-    small elements where the apex is most curved.
-    """
-    angle = np.linspace(0, np.arccos(-base / length), _SAMPLES)
-    speed = np.hypot(radius * np.cos(angle), length * np.sin(angle))
-    arc = np.concatenate([[0], np.cumsum((speed[1:] + speed[:-1]) / 2)])
-    course = (arc / arc[-1] + angle / angle[-1]) / 2
-    theta = np.interp(r, course, angle)
-    height = np.where(r == 1, 0.0, -base - length * np.cos(theta))
-    return radius * np.sin(theta), height
-
-
-def _orient(nodes: Floats, cells: Integers) -> None:
-    """Swap two vertices of the tetrahedra that are left-handed."""
-    a, b, c, d = nodes[cells[:, :4]].transpose(1, 0, 2)
-    left = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0
-    cells[left] = cells[left][:, [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]]
-
-
-def _boundary(cells: Integers) -> Integers:
-    """Quadratic triangles that belong to one tetrahedron only."""
-    edge_of = {frozenset(edge.tolist()): 4 + i for i, edge in enumerate(EDGES)}
-    middles = [[edge_of[frozenset((int(f[i]), int(f[(i + 1) % 3])))] for i in range(3)] for f in FACES]
-    local = np.hstack([FACES, np.array(middles)])
-    facets = cells[:, local].reshape(-1, 6)
-    key = np.sort(facets[:, :3], axis=1)
-    _, number, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
-    return facets[count[number.ravel()] == 1]
-
-
-def _jacobians(nodes: Floats, cells: Integers) -> NDArray[np.float64]:
-    """Determinant of the map from the reference tetrahedron at its quadrature points, (cell, point)."""
-    return np.linalg.det(np.einsum("cai,qaj->cqij", nodes[cells], shape_gradient(tetrahedron()[0])))
-
-
-def _check(mesh: Mesh) -> None:
-    inside_out = np.flatnonzero(_jacobians(mesh.nodes, mesh.cells).min(axis=1) <= 0)
-    if len(inside_out):
-        raise GeometryError(
-            f"{len(inside_out)} of {len(mesh.cells)} tetrahedra of the wall are inside out: raise "
-            "longitudinal_elements or circumferential_elements, or make the apex less pointed."
-        )
+    return np.einsum("cq,q->c", jacobians(mesh.nodes, mesh.cells), tetrahedron()[1])

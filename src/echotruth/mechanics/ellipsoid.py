@@ -1,0 +1,72 @@
+"""The truncated thick ellipsoid, the idealised ventricle of Land et al., Proc R Soc A 471 (2015) 20150641."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from echotruth import anatomy
+from echotruth.config import Geometry
+from echotruth.mechanics.soundness import check_cavity, check_turned
+from echotruth.mechanics.template import course, laid_through
+from echotruth.section import UNITS
+from echotruth.tetrahedra import Floats, Mesh
+
+
+def ellipsoid(geometry: Geometry) -> Mesh:
+    """Mesh of the ellipsoid of a preset, with its lengths and factors changed as asked.
+
+    Parameters
+    ----------
+    geometry : Geometry
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    GeometryError
+        If a tetrahedron is turned inside out by the curvature of the wall.
+    """
+    endo, epi = shells(geometry)
+    mesh = laid_through(partial(_wall, endo, epi), geometry)
+    remedy = "raise longitudinal_elements or circumferential_elements, or make the apex less pointed"
+    check_turned(mesh, "geometry", remedy)
+    check_cavity(mesh, "geometry", "set geometry.scale and the lengths, which are in millimetres, to those of a heart")
+    return mesh
+
+
+def shells(geometry: Geometry) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Semi-axes of both ellipsoids across and along the long axis, and height of the base above their equator.
+
+    Parameters
+    ----------
+    geometry : Geometry
+
+    Returns
+    -------
+    endo, epi : tuple of float, m
+        The cavity is dilated and elongated, then the wall put around it, then all scaled.
+    """
+    size = {key: value * UNITS["mm"] * geometry.scale for key, value in anatomy.lengths(geometry).items()}
+    along = geometry.dilation * geometry.elongation
+    radius, length = size["endo_radius_mm"] * geometry.dilation, size["endo_length_mm"] * along
+    wall, apex_wall = (size[key] * geometry.hypertrophy for key in ("wall_mm", "apex_wall_mm"))
+    base = size["base_mm"] * along
+    return (radius, length, base), (radius + wall, length + apex_wall, base)
+
+
+def _wall(endo: tuple[float, ...], epi: tuple[float, ...], depth: Floats, r: Floats, azimuth: Floats) -> Floats:
+    """Position (m) of points given by depth, distance from the apex and azimuth."""
+    (endo_x, endo_z), (epi_x, epi_z) = _shell(r, *endo), _shell(r, *epi)
+    x = (1 - depth) * endo_x + depth * epi_x
+    z = (1 - depth) * endo_z + depth * epi_z
+    return np.column_stack([x * np.cos(azimuth), x * np.sin(azimuth), z])
+
+
+def _shell(r: Floats, radius: float, length: float, base: float) -> tuple[Floats, Floats]:
+    """Distance from the axis and height (m) on an ellipsoid cut by the plane z = 0."""
+    theta = course(r, radius, length, base)
+    return radius * np.sin(theta), np.where(r == 1, 0.0, -base - length * np.cos(theta))

@@ -1,0 +1,48 @@
+"""Keys of the shape: what stands in for those not given, and sweeps over them."""
+
+import pytest
+
+from echotruth.anatomy import PRESETS
+from echotruth.cases import expand
+from echotruth.config import Config, Geometry
+from echotruth.config.loading import ConfigError, validate
+
+
+@pytest.mark.parametrize("species", PRESETS)
+def test_settled_geometry_says_the_lengths_of_its_preset(species):
+    settled = Geometry(preset=species).settled()
+    assert {key: getattr(settled, key) for key in PRESETS[species]} == PRESETS[species]
+    assert settled.settled() == settled
+
+
+def test_wall_from_a_file_has_no_lengths_of_an_ellipsoid():
+    assert Geometry(file="heart.vtu").settled().wall_mm is None
+
+
+def test_preset_is_swept():
+    cases = expand(Config(cases={"geometry.preset": ["mouse", "rat", "human"]}))
+    radii = [case.config.geometry.settled().endo_radius_mm for case in cases]
+    assert radii == [PRESETS[species]["endo_radius_mm"] for species in ("mouse", "rat", "human")]
+
+
+@pytest.mark.parametrize("key", ["wall_mm", "endo_length_mm", "elongation", "scale", "hypertrophy", "dilation"])
+def test_length_or_factor_is_swept(key):
+    values = [0.8, 1.0, 1.3] if key != "endo_length_mm" else [4.0, 5.0]
+    cases = expand(Config(cases={f"geometry.{key}": values}))
+    assert [getattr(case.config.geometry.settled(), key) for case in cases] == values
+
+
+def test_keys_of_a_file_are_read_from_yaml_as_they_stand():
+    geometry = {
+        "file": "heart.vtu",
+        "keep": {"array": "_volume-id", "values": [1, 7]},
+        "sides": {"array": "side", "endo": [1], "base": ["lid"]},
+        "septum_point": [1.0, 2, 3.5],
+    }
+    found = validate({"geometry": geometry}, "a.yaml").geometry
+    assert found.keep.values == [1, 7] and found.sides.epi == [] and found.septum_point == [1, 2, 3.5]
+
+
+def test_combination_that_makes_no_ellipsoid_is_refused():
+    with pytest.raises(ConfigError, match=r"geometry\.base_mm = 1\.4: must lie within \+-endo_length_mm = 1\.2"):
+        expand(Config(cases={"geometry.endo_length_mm": [5.4, 1.2]}))

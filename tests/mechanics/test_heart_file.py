@@ -1,0 +1,138 @@
+"""From a file to the heart frame; the walls that are refused on the way, and a human heart."""
+
+from importlib.metadata import PackageNotFoundError, files
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista
+
+from echotruth.config import Geometry
+from echotruth.config.geometry import Labels
+from echotruth.config.loading import load
+from echotruth.mechanics import soundness
+from echotruth.mechanics.body import read
+from echotruth.mechanics.cavity import cavity_volume
+from echotruth.mechanics.facets import boundary
+from echotruth.mechanics.geometry import GeometryError, cell_volumes, left_ventricle
+from echotruth.mechanics.heart_file import quadratic
+from echotruth.mechanics.sides import BASE, ENDO, EPI, with_sides
+from echotruth.mechanics.soundness import scaled_jacobian
+from echotruth.mechanics.tissue import wall_of
+
+EXAMPLE = Path(__file__).parents[2] / "config/rodero.yaml"
+
+
+@pytest.fixture
+def surface(lying):
+    return np.vstack([lying.mesh.endo, lying.mesh.epi, lying.mesh.base])
+
+
+def test_linear_tetrahedra_get_straight_middles(lying, written):
+    linear = lying.mesh.cells[:, :4]
+    mesh = left_ventricle(Geometry(file=written(lying.nodes, linear)))
+    assert mesh.cells.shape == lying.mesh.cells.shape and len(mesh.nodes) == len(lying.mesh.nodes)
+    nodes, cells = quadratic(lying.nodes, linear)
+    np.testing.assert_allclose(nodes[cells[:, 4]], nodes[cells[:, :2]].mean(axis=1))
+    assert [len(mesh.endo), len(mesh.epi), len(mesh.base)] == [
+        len(side) for side in (lying.mesh.endo, lying.mesh.epi, lying.mesh.base)
+    ]
+    assert np.all(mesh.nodes[mesh.base, 2] == 0) and mesh.nodes[:, 2].max() < 1e-9
+
+
+def test_septum_is_turned_to_x_by_its_cells(lying, written):
+    azimuth = lying.mesh.nodes[lying.mesh.cells[:, :4]].mean(axis=1)
+    septal = np.abs(np.arctan2(azimuth[:, 1], azimuth[:, 0])) < 0.9
+    file = written(lying.nodes, lying.mesh.cells, part=np.where(septal, 7, 1))
+    mesh = left_ventricle(Geometry(file=file, septum=Labels(array="part", values=[7])))
+    middle = mesh.nodes[mesh.cells[septal, :4]].mean(axis=(0, 1))
+    assert middle[0] > 0 and middle[1] == pytest.approx(0, abs=1e-6)
+
+
+def test_surface_that_does_not_close(lying, surface, surface_written):
+    with pytest.raises(GeometryError, match=r"does not close round the wall \(\d+ open and 0 crowded edges of \d+\)"):
+        left_ventricle(Geometry(file=surface_written(lying.nodes, surface[3:]), remesh=True))
+
+
+def test_surface_passed_round_in_any_direction(lying, surface, surface_written):
+    turned = surface[:, :3].copy()
+    turned[::2] = turned[::2, ::-1]
+    one = left_ventricle(Geometry(file=surface_written(lying.nodes, surface), remesh=True))
+    other = left_ventricle(Geometry(file=surface_written(lying.nodes, turned, "turned.stl"), remesh=True))
+    np.testing.assert_allclose(one.nodes, other.nodes, atol=1e-8)
+
+
+def test_two_surfaces(tmp_path):
+    pyvista.merge([pyvista.Sphere(radius=5), pyvista.Sphere(radius=3)]).extract_surface(algorithm=None).save(
+        tmp_path / "two.stl"
+    )
+    with pytest.raises(GeometryError, match="holds 2 surfaces that do not touch: join endocardium and epicardium"):
+        left_ventricle(Geometry(file=str(tmp_path / "two.stl"), remesh=True))
+
+
+@pytest.mark.parametrize(
+    ("keys", "reason"),
+    [
+        ({}, r"holds a surface, not tetrahedra: set geometry\.remesh: true"),
+        ({"remesh": True, "keep": Labels(array="part", values=[1])}, r"geometry\.keep chooses among tetrahedra"),
+        ({"remesh": True, "fibre": "f"}, r"geometry\.fibre chooses among tetrahedra, and a surface has none"),
+    ],
+)
+def test_keys_that_a_surface_cannot_have(lying, surface, surface_written, keys, reason):
+    with pytest.raises(GeometryError, match=reason):
+        left_ventricle(Geometry(file=surface_written(lying.nodes, surface), **keys))
+
+
+@pytest.mark.parametrize("unit", ["m", "um"])
+def test_wrong_unit(lying, written, unit):
+    with pytest.raises(
+        GeometryError, match=rf"the cavity holds .*: set geometry\.unit, now {unit}, to one of m, cm, mm"
+    ):
+        left_ventricle(Geometry(file=written(lying.nodes, lying.mesh.cells), unit=unit))
+
+
+def test_sliver_is_refused_with_the_remedy(lying, written, monkeypatch):
+    monkeypatch.setattr(soundness, "FLATTEST", 0.3)
+    with pytest.raises(GeometryError, match=r"are flat .*: mesh the wall anew with geometry\.remesh: true"):
+        left_ventricle(Geometry(file=written(lying.nodes, lying.mesh.cells)))
+
+
+@pytest.fixture(scope="module")
+def example():
+    """The shipped example, with the data where the package that carries them is installed."""
+    name = "rodero_01_fullheart_2.0mm.vtu"
+    try:
+        found = [str(path.locate()) for path in files("ansys-health-heart") or [] if path.name == name]
+    except PackageNotFoundError:
+        found = []
+    if not found:
+        pytest.skip("ansys-health-heart is not installed")
+    return load(EXAMPLE).geometry.model_copy(update={"file": found[0]})
+
+
+def test_sides_of_a_human_heart_are_those_of_its_coordinates(example):
+    body = wall_of(read(example), example.keep)
+    skin = with_sides(body, boundary(body.cells)[0], None)
+    transmural = body.node_arrays["transmural"][skin.facets].mean(axis=1)
+    assert np.quantile(transmural[skin.side == ENDO], 0.98) < 0.1
+    assert np.median(transmural[skin.side == EPI]) == 1.0
+    assert 500 < np.sum(skin.side == BASE) < 3000
+
+
+def test_human_heart_is_filled_anew(example):
+    mesh = left_ventricle(example)
+    assert 85e-6 < cavity_volume(mesh.nodes, mesh.endo) < 130e-6
+    assert 100e-6 < cell_volumes(mesh).sum() < 165e-6
+    assert scaled_jacobian(mesh.nodes, mesh.cells).min() > 0.1
+    assert np.all(mesh.nodes[mesh.base, 2] == 0)
+
+
+def test_human_heart_as_it_is(example):
+    mesh = left_ventricle(example.model_copy(update={"remesh": False}))
+    assert 100e-6 < cavity_volume(mesh.nodes, mesh.endo) < 160e-6
+    assert len(mesh.cells) > 180_000 and scaled_jacobian(mesh.nodes, mesh.cells).min() > 0.1
+
+
+def test_fibres_of_the_human_heart_are_a_placeholder(example):
+    with pytest.raises(GeometryError, match="'fiber' points one way in all of the wall, a placeholder"):
+        left_ventricle(example.model_copy(update={"fibre": "fiber"}))
