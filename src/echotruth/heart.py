@@ -28,6 +28,8 @@ class Heart:
         Number of transmural layers.
     es : int
         Frame of end-systole.
+    region : ndarray of shape (n_cells,), uint8, optional
+        Region of disease of each cell: 0 healthy, 1 infarct, 2 border zone, 3 late activation.
     """
 
     nodes: Floats
@@ -37,6 +39,7 @@ class Heart:
     endo: NDArray[np.int32]
     layers: int
     es: int
+    region: NDArray[np.uint8] | None = None
 
     @property
     def apex(self) -> float:

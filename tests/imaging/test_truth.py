@@ -1,5 +1,7 @@
 """Truth: pixels know the motion, strain and place of their tissue, as exactly as the scatterers do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -96,3 +98,16 @@ def test_the_cavity_centre_is_on_the_axis_and_moves_with_a_shifted_heart(twistin
     assert np.allclose(cavity_centre(twisting_heart, mid), [0, 6.5e-3], atol=1e-6)
     shifted = twisting_heart.__class__(**{**vars(twisting_heart), "nodes": twisting_heart.nodes + [0.3e-3, 0.2e-3, 0]})
     assert np.allclose(cavity_centre(shifted, mid), [-0.3e-3, 6.3e-3], atol=1e-6)
+
+
+def test_the_region_of_disease_is_that_of_the_tissue_at_the_pixel(twisting_heart, mid, moved, affine):
+    assert not moved["region"].any()
+    corners = twisting_heart.nodes[twisting_heart.cells[:, :4]]
+    septal = (corners[..., 0].mean(axis=1) > 0).astype(np.uint8)
+    ill = truth(replace(twisting_heart, region=septal), 1, mid, AXIS, AXIS - 6e-3)
+    matrix, shift = affine
+    before = (_places(ill["mask"], mid) - shift) @ np.linalg.inv(matrix).T
+    # A cell of this coarse mesh is 1 mm wide, and the seam runs along its faces.
+    clear = np.abs(before[:, 0]) > 0.6e-3
+    assert np.array_equal(ill["region"][ill["mask"]][clear], (before[clear, 0] > 0).astype(np.uint8))
+    assert not ill["region"][~ill["mask"]].any() and ill["region"].dtype == np.uint8

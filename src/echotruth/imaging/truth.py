@@ -31,7 +31,7 @@ def truth(heart: Heart, frame: int, plane: Plane, axial: Floats, lateral: Floats
     -------
     dict of ndarray of shape (n_axial, n_lateral, ...)
         displacement (3; lateral, axial, elevation; m), strain (6; RR, CC, LL, RC, RL, CL), mask, layer,
-        segment, wall_depth. Outside the wall: NaN, False or 0.
+        segment, region, wall_depth. Outside the wall: NaN, False or 0.
     """
     pixels = np.stack(np.broadcast_arrays(lateral, axial[:, None], 0.0), axis=-1).reshape(-1, 3)
     points = locate(heart.positions(frame), heart.cells, plane.heart(pixels))
@@ -93,13 +93,14 @@ def strain(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
 
 
 def labels(heart: Heart, points: MaterialPoints) -> dict[str, NDArray[np.generic]]:
-    """Wall depth (0 to 1), layer and AHA segment of material points, each (n,)."""
+    """Wall depth (0 to 1), layer, AHA segment and region of disease of material points, each (n,)."""
     depth = np.clip(interpolate(heart.wall_depth, heart.cells, points), 0, 1)
     unloaded = interpolate(heart.nodes, heart.cells, points)
     return {
         "wall_depth": depth,
         "layer": layer(depth, heart.layers).astype(np.uint8),
         "segment": segment(unloaded, heart.apex),
+        "region": np.zeros(len(points), np.uint8) if heart.region is None else heart.region[points.cell],
     }
 
 

@@ -1,0 +1,50 @@
+"""Disease is refused in one sentence where it cannot be, survives writing and reading, and can be swept."""
+
+import json
+
+import pytest
+import yaml
+
+from echotruth.cases import expand, table
+from echotruth.config import Config
+from echotruth.config.loading import ConfigError, validate
+from echotruth.repository import layout
+
+INFARCT, LATE = "pathology.infarct", "pathology.late_activation"
+BAD = [
+    (INFARCT, {"segments": [7, 18]}, "segments.1 = 18: should be less than or equal to 17"),
+    (INFARCT, {"segments": []}, "segments = []: must hold at least one entry"),
+    (INFARCT, {"segments": [7, 7]}, "segments = [7, 7]: list each segment once"),
+    (INFARCT, {"segments": [7], "radius_mm": 1}, "radius_mm = 1.0: give either segments or radius_mm"),
+    (INFARCT, {"tension_scale": 1.2}, "tension_scale = 1.2: should be less than or equal to 1"),
+    (INFARCT, {"transmurality": 0}, "transmurality = 0: should be greater than 0"),
+    (INFARCT, {"segment": [1]}, "segment is not a key: did you mean pathology.infarct.segments?"),
+    (LATE, {"delay_ms": {18: 3}}, "delay_ms.18 = 18: should be less than or equal to 17"),
+    (LATE, {"delay_ms": {5: -3}}, "delay_ms.5 = -3: should be greater than or equal to 0"),
+    (LATE, {"delay_ms": {"lateral": 3}}, "delay_ms.lateral = 'lateral': should be a valid integer"),
+    (LATE, {"preset": "lbbb", "delay_ms": {5: 3}}, "delay_ms = {5: 3.0}: give either preset or delay_ms"),
+    (LATE, {"preset": "rbbb"}, "preset = 'rbbb': should be 'lbbb'"),
+]
+
+
+@pytest.mark.parametrize(("section", "keys", "sentence"), BAD, ids=lambda part: str(part)[:30])
+def test_a_disease_that_cannot_be_is_refused(section, keys, sentence):
+    with pytest.raises(ConfigError) as caught:
+        validate({"pathology": {section.split(".")[1]: keys}}, "bad.yaml")
+    assert f"bad.yaml: {section}.{sentence}" in str(caught.value)
+
+
+@pytest.mark.parametrize("written", [yaml.safe_dump, json.dumps])
+def test_delays_survive_writing_and_reading(written):
+    config = validate({"pathology": {"late_activation": {"delay_ms": {5: 8, 11: 4.5}}}}, "late.yaml")
+    assert validate(yaml.safe_load(written(config.model_dump(mode="json"))), "again.yaml") == config
+    assert config.pathology.late_activation.si().delay == {5: pytest.approx(8e-3), 11: pytest.approx(4.5e-3)}
+
+
+def test_disease_can_be_swept_with_a_healthy_heart_beside_it():
+    sweep = {f"{INFARCT}.segments": [None, [7], [7, 8]], f"{INFARCT}.tension_scale": [0.0, 0.5]}
+    cases = expand(Config(cases=sweep))
+    assert [case.config.pathology.infarct.segments for case in cases[::2]] == [None, [7], [7, 8]]
+    columns = layout.columns(table(cases), [case.id for case in cases])
+    assert list(columns[f"cases:{INFARCT}.segments"]) == ["", "", "7", "7", "7 8", "7 8"]
+    assert list(columns[f"cases:{INFARCT}.tension_scale"]) == [0, 0.5] * 3

@@ -1,0 +1,136 @@
+"""Disease is where it was asked for, of the size asked for, and fades as asked for."""
+
+import numpy as np
+import pytest
+
+from echotruth.config import Geometry, Pathology
+from echotruth.config.pathology import Infarct, LateActivation
+from echotruth.mechanics.geometry import cell_volumes, left_ventricle
+from echotruth.mechanics.pathology import PathologyError, centre_of_ball, tissue
+
+CONTRACTING, STIFF = {"tension_scale": 0.2}, {"stiffness_scale": 8.0}
+
+
+class Hemisphere:
+    """Half a thick sphere, radii 2 and 4 mm: volumes and distances are those of the textbook."""
+
+    def __init__(self):
+        size = {"endo_radius_mm": 2.0, "endo_length_mm": 2.0, "wall_mm": 2.0, "apex_wall_mm": 2.0, "base_mm": 0.0}
+        elements = {"circumferential_elements": 36, "longitudinal_elements": 12, "transmural_elements": 6}
+        self.mesh = left_ventricle(Geometry(**size, **elements))
+        self.depth = (np.linalg.norm(self.mesh.nodes, axis=1) - 2e-3) / 2e-3
+        self.volume = cell_volumes(self.mesh)
+        corners = self.mesh.nodes[self.mesh.cells[:, :4]]
+        self.centre = corners.mean(axis=1)
+
+    def with_(self, **infarct):
+        return tissue(self.mesh, self.depth, Pathology(infarct=Infarct(**infarct)))
+
+    def late(self, **late):
+        return tissue(self.mesh, self.depth, Pathology(late_activation=LateActivation(**late)))
+
+
+@pytest.fixture(scope="module")
+def hemisphere():
+    return Hemisphere()
+
+
+def test_nothing_ails_a_heart_by_default(hemisphere):
+    healthy = hemisphere.with_()
+    assert healthy.region.dtype == np.uint8
+    assert not healthy.region.any() and not healthy.activation_delay.any()
+    assert np.all(healthy.stiffness_scale == 1) and np.all(healthy.tension_scale == 1)
+
+
+def test_a_ball_is_centred_in_the_wall_and_has_the_volume_of_a_ball(hemisphere):
+    infarct = Infarct(radius_mm=0.95, position=0.5, azimuth_deg=-120.0)
+    centre = centre_of_ball(hemisphere.mesh, hemisphere.depth, infarct)
+    assert np.linalg.norm(centre) == pytest.approx(3e-3, abs=3e-6)
+    assert centre[2] == pytest.approx(-1e-3)
+    assert np.degrees(np.arctan2(centre[1], centre[0])) == pytest.approx(-120)
+    ill = hemisphere.with_(radius_mm=0.95, azimuth_deg=-120.0).region == 1
+    assert hemisphere.volume[ill].sum() == pytest.approx(4 / 3 * np.pi * 0.95e-3**3, rel=0.04)
+    assert np.linalg.norm(hemisphere.centre[ill] - centre, axis=1).max() < 1e-3
+
+
+def test_segments_have_their_volume_and_their_place(hemisphere):
+    # Cut by planes above the endocardial apex, the hollow of the sphere is a cylinder: pi (16 - 4) mm2 of wall.
+    ill = hemisphere.with_(segments=[1, 7]).region == 1
+    assert hemisphere.volume[ill].sum() == pytest.approx(2 * np.pi * 12e-6 * (2e-3 / 3) / 6, rel=0.04)
+    x, y, z = hemisphere.centre[ill].T
+    assert np.all(np.abs(np.degrees(np.arctan2(y, x)) - 90) < 31)
+    assert z.min() > -1.34e-3 and z.max() < 0
+
+
+def test_an_infarct_is_stiff_and_does_not_contract(hemisphere):
+    ill = hemisphere.with_(segments=[9])
+    inside = ill.region == 1
+    assert set(ill.tension_scale[inside]) == {0.0} and set(ill.stiffness_scale[inside]) == {10.0}
+    assert set(ill.tension_scale[~inside]) == {1.0} and set(ill.stiffness_scale[~inside]) == {1.0}
+
+
+def test_a_subendocardial_infarct_keeps_to_the_depth(hemisphere):
+    ill = hemisphere.with_(segments=[1, 2, 3, 4, 5, 6], transmurality=0.5).region == 1
+    assert np.linalg.norm(hemisphere.centre[ill], axis=1).max() < 3.05e-3
+    # Between the planes, the inner half of the wall is the cylinder pi (9 - 4) mm2 across.
+    assert hemisphere.volume[ill].sum() == pytest.approx(np.pi * 5e-6 * 2e-3 / 3, rel=0.05)
+
+
+def test_the_border_zone_fades_linearly_with_the_distance(hemisphere):
+    ball = {"radius_mm": 0.7, "position": 0.6, "azimuth_deg": 180.0}
+    ill = hemisphere.with_(**ball, border_mm=0.8, **CONTRACTING, **STIFF)
+    centre = centre_of_ball(hemisphere.mesh, hemisphere.depth, Infarct(**ball))
+    beyond = np.linalg.norm(hemisphere.centre - centre, axis=1) - 0.7e-3
+    share = np.clip(1 - beyond / 0.8e-3, 0, 1)
+    # The samples of the infarct are a quarter of an edge apart.
+    np.testing.assert_allclose(ill.stiffness_scale, 1 + 7 * share, atol=7 * 0.15)
+    np.testing.assert_allclose(ill.stiffness_scale - 1, (1 - ill.tension_scale) * 7 / 0.8, atol=1e-12)
+    border = ill.region == 2
+    assert np.all(beyond[border] > -0.02e-3) and np.all(beyond[border] < 0.8e-3)
+    assert np.all((ill.tension_scale[border] > 0.2) & (ill.tension_scale[border] < 1))
+    assert np.all(ill.region[beyond > 0.81e-3] == 0)
+    assert np.std(ill.stiffness_scale[border] - 1 - 7 * share[border]) < 0.15
+
+
+def test_without_a_border_the_edge_is_sharp(hemisphere):
+    assert set(hemisphere.with_(radius_mm=1.0).region) == {0, 1}
+
+
+def test_delays_are_those_of_the_segments(hemisphere):
+    late = hemisphere.late(delay_ms={5: 20.0, 11: 15.0, 8: 0.0}, scale=0.5)
+    assert set(late.activation_delay) == {0.0, 7.5e-3, 10e-3}
+    np.testing.assert_array_equal(late.region, np.where(late.activation_delay > 0, 3, 0))
+    x, y, z = hemisphere.centre[late.activation_delay == 10e-3].T
+    assert np.all((x < 0) & (y < 0)) and z.min() > -0.67e-3
+    assert np.all(late.tension_scale == 1)
+
+
+def test_left_bundle_branch_block_goes_from_the_septum_to_the_lateral_wall(hemisphere):
+    late = hemisphere.late(preset="lbbb")
+    azimuth = np.abs(np.degrees(np.arctan2(hemisphere.centre[:, 1], hemisphere.centre[:, 0])))
+    above = hemisphere.centre[:, 2] > -1.3e-3
+    assert not late.activation_delay[above & (azimuth < 58)].any()
+    np.testing.assert_allclose(late.activation_delay[above & (azimuth > 62) & (azimuth < 118)], 4e-3)
+    np.testing.assert_allclose(late.activation_delay[above & (azimuth > 122)], 8e-3)
+
+
+def test_an_infarct_goes_before_its_border_and_that_before_lateness(hemisphere):
+    both = Pathology(
+        infarct=Infarct(segments=[5], border_mm=0.3), late_activation=LateActivation(delay_ms={5: 9.0, 6: 9.0})
+    )
+    ill = tissue(hemisphere.mesh, hemisphere.depth, both)
+    assert set(ill.region) == {0, 1, 2, 3}
+    np.testing.assert_allclose(ill.activation_delay[ill.region == 1], 9e-3)
+    assert np.all(ill.tension_scale[ill.region == 3] == 1)
+
+
+@pytest.mark.parametrize(
+    ("infarct", "sentence"),
+    [
+        ({"radius_mm": 0.001}, r"radius_mm = 0.001 at position 0.5 and azimuth_deg 90.0: no cell .*: raise it"),
+        ({"segments": [17], "transmurality": 0.01}, r"segments = \[17\]: no cell .*: name segments that the mesh has"),
+    ],
+)
+def test_an_infarct_that_is_nowhere_is_refused(hemisphere, infarct, sentence):
+    with pytest.raises(PathologyError, match=sentence):
+        hemisphere.with_(**infarct)
