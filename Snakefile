@@ -13,9 +13,10 @@ from snakemake.exceptions import WorkflowError
 
 from echotruth.cases import expand as expand_cases
 from echotruth.config.loading import ConfigError, validate
+from echotruth.mechanics.body import fingerprint
 from echotruth.mechanics.loop import read_loop
 from echotruth.provenance import code_version, settings_version
-from echotruth.repository.job import record_path
+from echotruth.repository.job import GATES, record_path
 from echotruth.repository.publication import VIEW_STAGES
 
 if not config:
@@ -60,6 +61,7 @@ wildcard_constraints:
 
 include: "rules/repository.smk"
 include: "rules/mechanics.smk"
+include: "rules/physiology.smk"
 include: "rules/imaging.smk"
 include: "rules/tracking.smk"
 include: "rules/report.smk"

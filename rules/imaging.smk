@@ -6,7 +6,7 @@ The stages stand in one job because a job's start costs more than handing arrays
 
 rule imaging:
     input:
-        record("mechanics"),
+        record("physiology"),
     output:
         phantom=record("phantom", view="{view}"),
         truth=record("truth", view="{view}"),

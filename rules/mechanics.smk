@@ -16,5 +16,9 @@ rule mechanics:
 
 def mechanics_settings(config):
     loop = read_loop(config.loop)
-    course = [values.tolist() for values in (loop.time, loop.pressure, loop.volume)]
-    return settings_version(config.geometry, config.fibres, config.loop, course, config.mechanics)
+    prescribed = (loop.time, loop.pressure, loop.volume, loop.tension)
+    course = [None if values is None else values.tolist() for values in prescribed]
+    # The seed enters by the disarray of the fibres alone.
+    seed = config.seed if config.fibres.disarray_deg else None
+    anatomy = (config.geometry.settled(), fingerprint(config.geometry), config.fibres, seed, config.pathology)
+    return settings_version(*anatomy, config.loop, course, config.mechanics)

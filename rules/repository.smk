@@ -10,7 +10,7 @@ onstart:
 
 # Every record by name: one that a failed job lost is asked for even where what was made from it is there.
 RECORDS = [
-    *(record("mechanics", case) for case in CASES),
+    *(record(stage, case) for stage in GATES for case in CASES),
     *(record(stage, case, view) for stage in VIEW_STAGES for case in CASES for view in CONFIG.views),
 ]
 

@@ -195,6 +195,12 @@ def test_changed_probe_reruns_imaging_and_not_mechanics(made):
     assert "mechanics" not in jobs
 
 
+def test_changed_bound_solves_no_heart_again(made):
+    jobs = planned(made, CONFIG + "physiology: {twist_max_deg: 50}\n")
+    assert (jobs["physiology"], jobs["imaging"], jobs["tracking"]) == (2, 4, 4)
+    assert "mechanics" not in jobs
+
+
 def test_changed_mechanics_reruns_everything(made):
     jobs = planned(made, CONFIG + "mechanics: {base: fixed}\n")
     assert (jobs["mechanics"], jobs["imaging"], jobs["tracking"]) == (2, 4, 4)

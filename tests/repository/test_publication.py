@@ -11,11 +11,11 @@ import yaml
 import zarr
 
 from echotruth.cases import expand, table
-from echotruth.config import Bmode, Config, Geometry, Loop, Tracker, Tracking, View
+from echotruth.config import Bmode, Config, Geometry, Loop, Physiology, Tracker, Tracking, View
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
-from echotruth.repository.job import Job
+from echotruth.repository.job import GATES, Job
 from echotruth.repository.publication import VIEW_STAGES, Damaged, publish
 from echotruth.repository.store import Store, schema_of
 from echotruth.tracking import grid
@@ -30,8 +30,9 @@ CONFIG = Config(
     cases={"seed": [1, 2]},
 )
 CASES = expand(CONFIG)
-GROUPS = {"mechanics": ("geometry", "fibres", "mechanics", "kinematics"), "phantom": ("phantom",), "rf": ()}
-GROUPS |= {stage: (f"{stage}/64", f"{stage}/32") for stage in schema.SIZED}
+GROUPS = {stage: schema.written_by(stage, CONFIG) for stage in (*GATES, *VIEW_STAGES)}
+JOBS = [*((stage, None) for stage in GATES), *((stage, view) for stage in VIEW_STAGES for view in CONFIG.views)]
+LENGTHENS = "the mean longitudinal strain at end-systole is 0.04 and must be at most 0."
 
 
 def blank(store: Store, group: str) -> dict:
@@ -53,7 +54,7 @@ def folder(tmp_path, monkeypatch) -> Path:
     groups = schema.groups(CONFIG) | {"cases": schema.parameters(columns)}
     Store(folder / "small.zarr").lay_out(groups, layout.sizes(left_ventricle(CONFIG.geometry)), labels | columns)
     for case in CASES:
-        for stage, view in [("mechanics", None), *((stage, view) for stage in VIEW_STAGES for view in CONFIG.views)]:
+        for stage, view in JOBS:
             job = Job(folder, stage, case.id, view)
             job.commit({group: blank(job.store, group) for group in GROUPS[stage]}, 1.0)
     return folder
@@ -61,10 +62,10 @@ def folder(tmp_path, monkeypatch) -> Path:
 
 def test_whole_repository_is_verified_and_opens(folder):
     summary = publish(folder)
-    assert (summary["complete"], summary["failed"]) == (2, 0)
+    assert (summary["complete"], summary["implausible"], summary["failed"]) == (2, 0, 0)
     tree = xr.open_datatree(folder / "small.zarr")
     assert list(tree["cases/status"].values) == ["complete", "complete"]
-    assert set(tree.attrs["code"]) == {"mechanics", *VIEW_STAGES}
+    assert set(tree.attrs["code"]) == {*GATES, *VIEW_STAGES}
 
 
 def test_every_file_that_a_job_wrote_is_verified(folder):
@@ -106,13 +107,61 @@ def test_damaged_file_and_its_record_are_named(folder, group, row, harm):
 
 
 def test_heart_without_a_solution_is_told_with_its_reason(folder):
-    for stage, view in [("mechanics", None), *((stage, view) for stage in VIEW_STAGES for view in CONFIG.views)]:
-        status = "failed" if view is None else "skipped"
-        Job(folder, stage, CASES[1].id, view).give_up(status, "no equilibrium at frame 3")
+    for stage, view in JOBS:
+        job = Job(folder, stage, CASES[1].id, view)
+        job.give_up("failed" if stage == "mechanics" else "skipped", job.left_out() or "no equilibrium at frame 3")
     assert publish(folder)["failed"] == 1
     cases = xr.open_datatree(folder / "small.zarr")["cases"]
     assert list(cases["status"].values) == ["complete", "failed"]
     assert list(cases["reason"].values) == ["", "no equilibrium at frame 3"]
+
+
+def doubt(folder):
+    """The second heart measured again, and found out of bounds."""
+    job = Job(folder, "physiology", CASES[1].id)
+    job.mark("implausible", LENGTHENS)
+    job.commit({"physiology": blank(job.store, "physiology")}, 1.0)
+
+
+def test_heart_out_of_bounds_keeps_its_arrays_and_is_marked(folder):
+    doubt(folder)
+    summary = publish(folder)
+    assert (summary["complete"], summary["implausible"], summary["failed"]) == (1, 1, 0)
+    tree = xr.open_datatree(folder / "small.zarr")
+    assert list(tree["cases/status"].values) == ["complete", "implausible"]
+    assert list(tree["cases/reason"].values) == ["", LENGTHENS]
+    assert (tree["mechanics/displacement"].isel(case=1) == 1).all()
+    assert (tree["physiology/longitudinal_strain"] == 1).all()
+
+
+@pytest.mark.parametrize("stage, view", [("phantom", "mid"), ("evaluation", "long_axis")])
+def test_heart_out_of_bounds_is_imaged_only_where_the_configuration_says_so(folder, stage, view):
+    doubt(folder)
+    assert Job(folder, stage, CASES[0].id, view).left_out() == ""
+    assert Job(folder, stage, CASES[1].id, view).left_out() == LENGTHENS
+    assert Job(folder, "physiology", CASES[1].id).left_out() == ""
+    kept = CONFIG.model_copy(update={"physiology": Physiology(exclude=False)})
+    (folder / "config.yaml").write_text(yaml.safe_dump(kept.model_dump(mode="json")))
+    assert Job(folder, stage, CASES[1].id, view).left_out() == ""
+    assert publish(folder)["implausible"] == 1
+
+
+@pytest.mark.parametrize("exclude", [True, False])
+def test_heart_without_a_solution_is_never_measured_nor_imaged(folder, exclude):
+    kept = CONFIG.model_copy(update={"physiology": Physiology(exclude=exclude)})
+    (folder / "config.yaml").write_text(yaml.safe_dump(kept.model_dump(mode="json")))
+    Job(folder, "mechanics", CASES[1].id).give_up("failed", "no equilibrium")
+    for stage, view in JOBS[1:]:
+        assert Job(folder, stage, CASES[1].id, view).left_out() == "no equilibrium"
+
+
+@pytest.mark.parametrize("stage, view", [("bmode", "mid"), ("mechanics", None)])
+def test_what_is_skipped_leaves_nothing_of_an_earlier_run(folder, stage, view):
+    other, job = (Job(folder, stage, case.id, view) for case in CASES)
+    job.give_up("skipped", LENGTHENS)
+    for group in GROUPS[stage]:
+        assert not job.store.files(group, *job.place)
+        assert other.store.files(group, *other.place)
 
 
 def test_case_no_longer_asked_for_is_retired(folder):

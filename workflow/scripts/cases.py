@@ -10,7 +10,7 @@ import yaml
 from echotruth.cases import expand, table
 from echotruth.config.loading import ConfigError, validate
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.geometry import GeometryError, left_ventricle
 from echotruth.mechanics.loop import read_loop
 from echotruth.repository import layout, ledger, schema
 from echotruth.repository.store import Store
@@ -24,7 +24,8 @@ arguments = parser.parse_args()
 try:
     config = validate(yaml.safe_load(arguments.config) or {}, arguments.config.name)
     cases = {case.id: case for case in expand(config, arguments.config.name)}
-except ConfigError as error:
+    mesh = left_ventricle(config.geometry)
+except (ConfigError, GeometryError) as error:
     sys.exit(str(error))
 
 arguments.repository.mkdir(parents=True, exist_ok=True)
@@ -35,7 +36,7 @@ for id, case in cases.items():
     times[rows[id]] = loops[case.config.loop].time
 frame = table(list(cases.values()))
 columns = layout.columns(frame, list(rows))
-sizes = layout.sizes(left_ventricle(config.geometry))
+sizes = layout.sizes(mesh)
 labels = layout.labels(config, list(rows), times) | layout.positions(config, pixel_centres, grid) | columns
 arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
 Store(arguments.repository / f"{config.name}.zarr").lay_out(arrays, sizes, labels)

@@ -1,16 +1,18 @@
 """FE update: geometry, fibres, mechanics and kinematics of one heart through its loop."""
 
 from echotruth.mechanics.beat import beat
+from echotruth.mechanics.fibres import FibreError
 from echotruth.mechanics.geometry import GeometryError
 from echotruth.mechanics.loop import LoopError
+from echotruth.mechanics.pathology import PathologyError
 from echotruth.mechanics.solver import Diverged
 from echotruth.repository.job import CannotBeMade, Job, Result, main
 
 
 def work(job: Job) -> Result:
     try:
-        return beat(job.case.config)
-    except (Diverged, GeometryError, LoopError) as error:
+        return beat(job.case.config, job.unfinished)
+    except (Diverged, FibreError, GeometryError, LoopError, PathologyError) as error:
         raise CannotBeMade(str(error)) from error
 
 

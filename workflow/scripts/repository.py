@@ -15,4 +15,5 @@ try:
 except Damaged as error:
     sys.exit(str(error))
 ledger.commit(folder / "ledger/repository.json", summary)
-print(f"repository: {summary['complete']} complete, {summary['failed']} failed, {summary['files']} files verified")
+files = summary.pop("files")
+print("repository:", ", ".join(f"{number} {status}" for status, number in summary.items()), f"({files} files verified)")

@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat, model_validator
 
 from echotruth.section import Positive, Section, impossible
 
+Drive = Literal["pressure_volume", "pressure", "volume"]
+
 
 class Loop(Section):
-    """The pressure-volume loop that drives the heart."""
+    """The cycle that drives the heart: what is prescribed, and its course in time."""
 
+    drive: Drive = "pressure_volume"
+    """What is prescribed: `pressure_volume` (the active tension is solved); `volume` with active tension, none where
+    the file has none (the pressure is solved); or `pressure` with active tension (the volume follows, and is not the
+    only one that would while the heart ejects)."""
     file: str = "mouse"
-    """A shipped loop (`mouse`) or a CSV with columns time_ms, pressure_mmHg, volume_uL."""
+    """A shipped cycle (`mouse`, `rat`, `human`; `twitch` for the drive `volume`) or a CSV with a column of time and
+    those of the drive, each named with its unit: time_ms or _s; pressure_mmHg, _kPa or _Pa; volume_uL, _mL or _m3;
+    tension_kPa or _Pa."""
     heart_rate_per_min: Annotated[FiniteFloat, Field(gt=0)] | None = None
-    """Heart rate; the loop's time is scaled to it. Default: as in the file."""
+    """Heart rate; the cycle's time is scaled to it. Default: as in the file."""
     edv_uL: Positive | None = None
-    """End-diastolic volume; the loop's volumes are mapped linearly to it. Default: as in the file."""
+    """End-diastolic volume; the cycle's volumes are mapped linearly to it. Default: as in the file."""
     esv_uL: Positive | None = None
     """End-systolic volume, likewise."""
+    edp_mmHg: Positive | None = None
+    """End-diastolic pressure; pressures up to it are scaled, those above mapped linearly. Default: as in the file."""
+    esp_mmHg: Positive | None = None
+    """End-systolic pressure, likewise."""
     frames: Annotated[int, Field(ge=2, le=1000)] = 40
     """Frames of one cycle; frame 0 is end-diastole."""
 
@@ -27,4 +39,14 @@ class Loop(Section):
     def _ejects(self) -> Loop:
         if self.edv_uL is not None and self.esv_uL is not None and self.esv_uL >= self.edv_uL:
             raise impossible("esv_uL", self.esv_uL, f"must be smaller than edv_uL = {self.edv_uL}")
+        if self.edp_mmHg is not None and self.esp_mmHg is not None and self.esp_mmHg <= self.edp_mmHg:
+            raise impossible("esp_mmHg", self.esp_mmHg, f"must be greater than edp_mmHg = {self.edp_mmHg}")
+        return self
+
+    @model_validator(mode="after")
+    def _maps_what_it_prescribes(self) -> Loop:
+        for key in ("edv_uL", "esv_uL", "edp_mmHg", "esp_mmHg"):
+            missing = "volume" if key.endswith("uL") else "pressure"
+            if self.drive == {"volume": "pressure", "pressure": "volume"}[missing] and getattr(self, key) is not None:
+                raise impossible(key, getattr(self, key), f"the drive {self.drive} prescribes no {missing}: leave it out")
         return self

@@ -33,6 +33,8 @@ class Figures:
         self.config, self.folder = config, folder
         status = self.tree["cases/status"].values
         self.complete = np.flatnonzero(status == "complete")
+        if not len(self.complete) and not config.physiology.exclude:
+            self.complete = np.flatnonzero(status == "implausible")
         if not len(self.complete):
             raise ValueError(f"{store}: no case is complete: see the reasons in cases/reason")
         self.sizes = config.bmode.sizes

@@ -7,7 +7,9 @@ import logging
 import sys
 import time
 from collections.abc import Callable
+from itertools import takewhile
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 
 import numpy as np
@@ -17,11 +19,15 @@ from echotruth.config import View
 from echotruth.config.loading import load
 from echotruth.heart import Heart
 from echotruth.provenance import code_version
-from echotruth.repository import ledger
+from echotruth.repository import ledger, schema
 from echotruth.repository.store import NotWritten, Store, Values
 
 Result = dict[str, Values]
 log = logging.getLogger("echotruth")
+
+
+GATES = ("mechanics", "physiology")
+"""Stages whose verdict on a heart keeps the later ones from it."""
 
 
 class CannotBeMade(ValueError):
@@ -47,6 +53,7 @@ class Job:
         self.folder, self.stage = folder, stage
         self.case: Case = find(load(folder / "config.yaml"), case)
         self.view_name = view
+        self.verdict = {"status": "complete"}
         self.store = Store(folder / f"{self.case.config.name}.zarr")
         self.row = ledger.rows(folder / "registry.txt")[case]
 
@@ -72,6 +79,11 @@ class Job:
         return self.folder / "scratch" / self.case.id / str(self.view_name)
 
     @property
+    def unfinished(self) -> Path:
+        """Folder for what a stopped run of this stage leaves to the next, until it is committed."""
+        return self.folder / "scratch" / self.case.id / f"{self.stage}-{code_version(sys.argv[0])}"
+
+    @property
     def record(self) -> Path:
         """Where this job's record stands."""
         return record_path(self.folder, self.stage, self.case.id, self.view_name)
@@ -83,8 +95,8 @@ class Job:
     @property
     def heart(self) -> Heart:
         """The heart of this case, as the mechanics left it."""
-        geometry, fibres, mechanics = (
-            self.store.read(group, self.row) for group in ("geometry", "fibres", "mechanics")
+        geometry, fibres, pathology, mechanics = (
+            self.store.read(group, self.row) for group in ("geometry", "fibres", "pathology", "mechanics")
         )
         return Heart(
             nodes=geometry["node_position"],
@@ -94,6 +106,7 @@ class Job:
             endo=geometry["endo"],
             layers=self.case.config.fibres.layers,
             es=int(mechanics["es_frame"]),
+            region=pathology["region"],
         )
 
     def hand_on(self, **arrays: Any) -> None:
@@ -109,10 +122,19 @@ class Job:
         with np.load(path) as file:
             return dict(file)
 
-    def heart_failed(self) -> str | None:
-        """Why this heart has no motion, or None where it has."""
-        path = record_path(self.folder, "mechanics", self.case.id)
-        return ledger.read(path).get("reason") if path.exists() else None
+    def left_out(self) -> str:
+        """Why this stage is not for this heart; empty where it is."""
+        for gate in takewhile(lambda stage: stage != self.stage, GATES):
+            path = record_path(self.folder, gate, self.case.id)
+            record = ledger.read(path) if path.exists() else {"status": "complete"}
+            passes = ("complete",) if self.case.config.physiology.exclude else ("complete", "implausible")
+            if record["status"] not in passes:
+                return record["reason"]
+        return ""
+
+    def mark(self, status: str, reason: str) -> None:
+        """Let the record say, beside what is written, what is wrong with it."""
+        self.verdict = {"status": status, "reason": reason}
 
     def commit(self, result: Result, seconds: float) -> None:
         """Write the results and then the record that says so."""
@@ -120,15 +142,20 @@ class Job:
         for group, values in result.items():
             self.store.write(group, values, *self.place)
             files += self.store.files(group, *self.place)
-        self._record(status="complete", seconds=round(seconds, 3), sha256=ledger.checksums(files, self.store.path))
+        sha256 = ledger.checksums(files, self.store.path)
+        self._record(**self.verdict, seconds=round(seconds, 3), sha256=sha256)
 
     def give_up(self, status: str, reason: str) -> None:
-        """Record that there is no result, and why."""
+        """Record that there is no result, and why; one of an earlier run goes."""
+        for group in schema.written_by(self.stage, self.case.config):
+            for file in self.store.files(group, *self.place):
+                file.unlink()
         self._record(status=status, reason=reason)
 
     def _record(self, **entries: Any) -> None:
         named = {"stage": self.stage, "case": self.case.id, "view": self.view_name, "seed": self.case.config.seed}
         ledger.commit(self.record, named | {"code": code_version(sys.argv[0])} | entries)
+        rmtree(self.unfinished, ignore_errors=True)
 
 
 def record_path(folder: Path, stage: str, case: str, view: str | None = None) -> Path:
@@ -142,7 +169,8 @@ def main(stage: str, work: Callable[[Job], Result], description: str | None, per
     arguments = _parser(stage, description, per_view).parse_args()
     job = _open(stage, arguments)
     _prepare(job, arguments.threads)
-    if stage != "mechanics" and (reason := job.heart_failed()):
+    if reason := job.left_out():
+        log.warning("skipped: %s", reason)
         job.give_up("skipped", reason)
         return
     start = time.perf_counter()

@@ -11,7 +11,7 @@ from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.provenance import packages
 from echotruth.repository import ledger
-from echotruth.repository.job import record_path
+from echotruth.repository.job import GATES, record_path
 from echotruth.repository.store import Store
 
 VIEW_STAGES = ("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
@@ -33,7 +33,7 @@ def publish(folder: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        Number of complete and of failed cases, and of verified files.
+        Number of complete, implausible and failed cases, and of verified files.
 
     Raises
     ------
@@ -45,18 +45,24 @@ def publish(folder: Path) -> dict[str, Any]:
     rows = ledger.rows(folder / "registry.txt")
     records = {case.id: _records(folder, config, case.id) for case in expand(config)}
     files = sum(_verify(store.path, path, ledger.read(path)) for paths in records.values() for path in paths)
-    verdicts = {case: ledger.read(paths[0]) for case, paths in records.items()}
+    verdicts = {case: _verdict(paths) for case, paths in records.items()}
     retired = {"status": "retired", "reason": "not a case of this configuration"}
     for column in ("status", "reason"):
         store.write_column(column, [verdicts.get(case, retired).get(column, "") for case in rows])
     store.describe(_attributes(config, records))
-    complete = sum(verdict["status"] == "complete" for verdict in verdicts.values())
-    return {"complete": complete, "failed": len(verdicts) - complete, "files": files}
+    statuses = [verdict["status"] for verdict in verdicts.values()]
+    return {status: statuses.count(status) for status in ("complete", "implausible", "failed")} | {"files": files}
+
+
+def _verdict(paths: list[Path]) -> dict[str, Any]:
+    """The record of the first gate that did not let the heart pass, or of the last."""
+    gates = [ledger.read(path) for path in paths[: len(GATES)]]
+    return next((record for record in gates if record["status"] != "complete"), gates[-1])
 
 
 def _records(folder: Path, config: Config, case: str) -> list[Path]:
     of_views = [record_path(folder, stage, case, view) for stage in VIEW_STAGES for view in config.views]
-    return [record_path(folder, "mechanics", case), *of_views]
+    return [*(record_path(folder, stage, case) for stage in GATES), *of_views]
 
 
 def _verify(root: Path, path: Path, record: dict[str, Any]) -> int:

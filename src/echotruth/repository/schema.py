@@ -62,8 +62,18 @@ FIBRES = (
     _array("fibre", "case cell xyz", "float64", "1", "unit vector along the fibres at cell centroids, unloaded"),
     _array("sheet", "case cell xyz", "float64", "1", "unit vector along the sheets at cell centroids, unloaded"),
     _array("helix_angle", "case cell", "float64", "rad", "helix angle at cell centroids, read back from the fibres"),
+    _array("transverse_angle", "case cell", "float64", "rad", "transverse angle, likewise"),
+    _array("sheet_angle", "case cell", "float64", "rad", "sheet angle, likewise"),
     _array("layer", "case cell", "uint8", "1", "transmural layer of the cell centroid, 1 at the endocardium"),
     _array("segment", "case cell", "uint8", "1", "AHA segment of the cell centroid"),
+)
+
+_REGION = "0 healthy (or none), 1 infarct, 2 border zone, 3 late activation"
+PATHOLOGY = (
+    _array("region", "case cell", "uint8", "1", f"region of disease: {_REGION}"),
+    _array("stiffness_scale", "case cell", "float64", "1", "passive stiffness over that of healthy tissue"),
+    _array("tension_scale", "case cell", "float64", "1", "active tension over that of healthy tissue"),
+    _array("activation_delay", "case cell", "float64", "s", "delay of the active tension"),
 )
 
 MECHANICS = (
@@ -75,6 +85,9 @@ MECHANICS = (
     _array("displacement", "case frame node xyz", "float64", "m", "displacement of the nodes from unloaded"),
     _array("stiffness", "case", "float64", "Pa", "stiffness C of the wall"),
     _array("es_frame", "case", "int32", "1", "frame of end-systole"),
+    _array(
+        "phase", "case frame", "uint8", "1", "0 filling, 1 isovolumic contraction, 2 ejection, 3 isovolumic relaxation"
+    ),
     _array("newton_steps", "case frame", "int32", "1", "Newton steps taken to reach the frame"),
 )
 
@@ -93,6 +106,17 @@ KINEMATICS = (
     _array("volume_ratio_mean", "case frame", "float64", "1", "wall mean of det F"),
 )
 
+PHYSIOLOGY = (
+    _array("twist", "case frame", "float64", "rad", "turn of apex against base since ED, counter-clockwise from apex"),
+    _array("longitudinal_strain", "case", "float64", "1", "wall mean of the longitudinal strain from ED at ES"),
+    _array("circumferential_strain", "case", "float64", "1", "wall mean of the circumferential strain from ED at ES"),
+    _array("ejection_fraction", "case", "float64", "1", "ejection fraction"),
+    _array("volume_ratio_min", "case", "float64", "1", "smallest det F of all quadrature points and frames"),
+    _array("loop_error", "case", "float64", "1", "largest relative error of the pressure or volume asked for"),
+    _array("tension_min", "case", "float64", "Pa", "smallest active tension of all frames"),
+    _array("tension_es", "case", "float64", "Pa", "active tension at ES"),
+)
+
 PHANTOM = (
     _array("scatterers", "case view", "int32", "1", "number of scatterers"),
     _array("origin", "case view xyz", "float64", "m", "centre of the array in the heart frame"),
@@ -107,6 +131,7 @@ TRUTH = (
     _array("mask", _PIXEL, "bool", "1", "whether the pixel centre is in the wall"),
     _array("layer", _PIXEL, "uint8", "1", "transmural layer, 1 at the endocardium, 0 outside"),
     _array("segment", _PIXEL, "uint8", "1", "AHA segment, 0 outside"),
+    _array("region", _PIXEL, "uint8", "1", f"region of disease: {_REGION}"),
     _array("wall_depth", _PIXEL, "float32", "1", "wall depth, 0 at the endocardium and 1 at the epicardium"),
 )
 
@@ -170,8 +195,10 @@ LABELS: dict[str, tuple[str, ...]] = {
 STAGES = {
     "geometry": GEOMETRY,
     "fibres": FIBRES,
+    "pathology": PATHOLOGY,
     "mechanics": MECHANICS,
     "kinematics": KINEMATICS,
+    "physiology": PHYSIOLOGY,
     "phantom": PHANTOM,
 }
 """Stages whose arrays stand once."""
@@ -181,7 +208,10 @@ SIZED = {"truth": TRUTH, "bmode": BMODE, "tracking": TRACKING, "evaluation": EVA
 
 
 CASES = (
-    _array("status", "case", "string", "1", "complete, failed (no solution), or retired (not of this configuration)"),
+    _array(
+        *("status", "case", "string", "1"),
+        "complete, implausible (out of the bounds of physiology), failed (no solution), or retired (not of the config)",
+    ),
     _array("reason", "case", "string", "1", "why a case is not complete"),
 )
 """Beside these the group `cases` holds one array for every key that a case could vary, in the key's unit."""
@@ -215,6 +245,14 @@ def groups(config: Config) -> dict[str, tuple[Array, ...]]:
     """Path of every group below the root to its arrays, coordinates left out."""
     sized = {f"{stage}/{size}": arrays for stage, arrays in SIZED.items() for size in config.bmode.sizes}
     return {"cases": CASES} | STAGES | sized
+
+
+def written_by(stage: str, config: Config) -> list[str]:
+    """Groups that the jobs of a stage write; the job that solves a heart writes all but the measures of the solved."""
+    if stage == "mechanics":
+        return [group for group, arrays in STAGES.items() if arrays[0].leading == 1 and group != "physiology"]
+    whole = [stage] if stage in STAGES else []
+    return [f"{stage}/{size}" for size in config.bmode.sizes] if stage in SIZED else whole
 
 
 def coordinates(arrays: tuple[Array, ...]) -> tuple[Array, ...]:

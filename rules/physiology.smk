@@ -1,0 +1,15 @@
+"""One job a heart: its measures, and whether they are those of a heart; a changed bound solves nothing again."""
+
+
+rule physiology:
+    input:
+        record("mechanics"),
+    output:
+        record("physiology"),
+    params:
+        code=code("physiology"),
+        settings=lambda wildcards: settings_version(CASES[wildcards.case].config.physiology),
+    log:
+        FOLDER / "logs/physiology/{case}.log",
+    shell:
+        "{RUN}/physiology.py {FOLDER} {wildcards.case} 2>&1 | tee {log}"

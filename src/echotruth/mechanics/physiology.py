@@ -1,0 +1,155 @@
+"""Whether a solved heart behaves like one: its measures, and the verdict on them."""
+
+from __future__ import annotations
+
+from math import degrees
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from echotruth.config.physiology import Physiology
+
+Floats = NDArray[np.float64]
+Arrays = dict[str, NDArray]
+
+BASE, APEX = 0.2, 0.8
+"""Slices whose rotation makes the twist: share of the way from the base plane to the endocardial apex."""
+_HALF_SLICE = 0.1
+
+CC, LL = 1, 2
+"""Places of the circumferential and the longitudinal among the components of strain."""
+
+
+class Bound(NamedTuple):
+    """A bound and what it is said about.
+
+    Attributes
+    ----------
+    key : str
+        Of the section `physiology`; it ends with what it is, `min` or `max`, and its unit.
+    measure : str
+        Array of the group `physiology`; the value that is furthest out counts.
+    words : str
+    factor : float
+        Measure in SI units to the unit of the key.
+    """
+
+    key: str
+    measure: str
+    words: str
+    factor: float = 1.0
+
+
+BOUNDS = (
+    Bound("loop_error_max", "loop_error", "the largest relative error of pressure or volume"),
+    Bound("volume_ratio_min", "volume_ratio_min", "the smallest det F of all points and frames"),
+    Bound("longitudinal_strain_max", "longitudinal_strain", "the mean longitudinal strain at end-systole"),
+    Bound("twist_max_deg", "twist", "the largest twist (deg)", degrees(1)),
+    Bound("ejection_fraction_min", "ejection_fraction", "the ejection fraction"),
+    Bound("ejection_fraction_max", "ejection_fraction", "the ejection fraction"),
+    Bound("tension_min_kPa", "tension_min", "the smallest active tension (kPa)", 1e-3),
+    Bound("tension_es_min_kPa", "tension_es", "the active tension at end-systole (kPa)", 1e-3),
+    Bound("tension_es_max_kPa", "tension_es", "the active tension at end-systole (kPa)", 1e-3),
+)
+"""In the order in which they are looked at: first whether there is a solution, then whether it is a heart."""
+
+
+def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays) -> Arrays:
+    """What is looked at in a solved heart.
+
+    Parameters
+    ----------
+    geometry, mechanics, kinematics : dict of ndarray
+        Arrays of these groups, as docs/schema.md lists them.
+
+    Returns
+    -------
+    dict of ndarray
+        The group `physiology`: `twist` (frame,) in rad, and numbers: strains at end-systole, ejection fraction,
+        smallest det F, largest relative error of the prescribed course, tensions in Pa.
+    """
+    es, volume = int(mechanics["es_frame"]), mechanics["volume"]
+    strain, tension = kinematics["strain_mean"][es], mechanics["active_tension"]
+    positions = geometry["node_position"] + mechanics["displacement"]
+    return {
+        "twist": twist(geometry["node_position"], geometry["endo"], positions),
+        "longitudinal_strain": strain[LL],
+        "circumferential_strain": strain[CC],
+        "ejection_fraction": np.asarray(1 - volume.min() / volume[0]),
+        "volume_ratio_min": kinematics["volume_ratio_min"].min(),
+        "loop_error": np.asarray(max(_error(mechanics, quantity) for quantity in ("pressure", "volume"))),
+        "tension_min": tension.min(),
+        "tension_es": tension[es],
+    }
+
+
+def twist(unloaded: Floats, endo: NDArray[np.integer], positions: Floats) -> Floats:
+    """Rotation of the apex less that of the base since end-diastole.
+
+    Parameters
+    ----------
+    unloaded : ndarray of shape (n_nodes, 3), m
+    endo : ndarray of shape (n_facets, 6)
+        Nodes of the endocardial triangles.
+    positions : ndarray of shape (n_frames, n_nodes, 3), m
+
+    Returns
+    -------
+    ndarray of shape (n_frames,), rad
+        Positive where the apex turns counter-clockwise seen from the apex, as it does in health
+        (Young & Cowan 2012); between frames it may turn by less than half a turn.
+    """
+    place = unloaded[:, 2] / unloaded[endo, 2].min()
+    apex, base = (rotation(positions[:, np.abs(place - slice) <= _HALF_SLICE, :2]) for slice in (APEX, BASE))
+    return base - apex  # the long axis points to the base: seen from the apex, turning about it is clockwise
+
+
+def rotation(points: Floats) -> Floats:
+    """Turn of a slice about its centre since the first frame, the one that fits its points best.
+
+    Parameters
+    ----------
+    points : ndarray of shape (n_frames, n_points, 2), m
+
+    Returns
+    -------
+    ndarray of shape (n_frames,), rad
+        Counter-clockwise, and going on beyond half a turn.
+    """
+    arms = points - points.mean(axis=1, keepdims=True)
+    first = arms[0]
+    along = np.sum(first * arms, axis=(1, 2))
+    across = np.sum(first[:, 0] * arms[..., 1] - first[:, 1] * arms[..., 0], axis=1)
+    return np.unwrap(np.arctan2(across, along))
+
+
+def verdict(found: dict[str, ArrayLike], bounds: Physiology) -> str:
+    """Why a heart is out of bounds, in one sentence; empty where it is within them.
+
+    Parameters
+    ----------
+    found : dict of ndarray
+        As given by `measures`.
+    bounds : Physiology
+    """
+    for bound in BOUNDS:
+        limit, values = getattr(bounds, bound.key), bound.factor * np.atleast_1d(found[bound.measure])
+        if limit is None:
+            continue
+        if "_max" in bound.key:
+            value = np.max(np.abs(values)) if bound.measure == "twist" else np.max(values)
+            beyond, rule = not value <= limit, "at most"
+        else:
+            value = np.min(values)
+            beyond, rule = not value >= limit, "at least"
+        if beyond:
+            return f"{bound.words} is {value:.3g} and must be {rule} {limit:g} (physiology.{bound.key})."
+    return ""
+
+
+def _error(mechanics: Arrays, quantity: str) -> float:
+    """Largest relative difference of what was met from what was asked for; 0 where nothing was."""
+    met, asked = mechanics[quantity], mechanics[f"{quantity}_asked"]
+    given = np.isfinite(asked)
+    return float(np.max(np.abs(met[given] / asked[given] - 1), initial=0.0))

@@ -1,0 +1,20 @@
+"""Measure a solved heart, and mark it where it is out of bounds."""
+
+import logging
+
+from echotruth.mechanics.physiology import measures, verdict
+from echotruth.repository.job import Job, Result, main
+
+
+def work(job: Job) -> Result:
+    geometry = job.read("geometry", "node_position", "endo")
+    kinematics = job.read("kinematics", "strain_mean", "volume_ratio_min")
+    found = measures(geometry, job.read("mechanics"), kinematics)
+    if reason := verdict(found, job.case.config.physiology):
+        job.mark("implausible", reason)
+        logging.getLogger("echotruth").warning("implausible: %s", reason)
+    return {"physiology": found}
+
+
+if __name__ == "__main__":
+    main("physiology", work, __doc__, per_view=False)
