@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from hashlib import sha256
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,6 +60,9 @@ def expand(config: Config, source: str = "configuration") -> list[Case]:
         raise ConfigError(f"{source}: cases holds a value twice under one key: list each value once")
     for loop in {case.config.loop for case in cases}:
         _check_loop(loop, source)
+    for file in {case.config.geometry.file for case in cases} - {None}:
+        if not Path(file).is_file():
+            raise ConfigError(f"{source}: geometry.file = {file!r}: there is no such file: give its path from here")
     return cases
 
 
@@ -115,6 +119,8 @@ def _check(config: Config, key: str, source: str) -> None:
         section = getattr(section, part)
     if isinstance(section, Section | dict):
         raise ConfigError(f"{source}: cases.{key}: {key} is a section: sweep one of its keys")
+    if key == "geometry.file" and not config.geometry.remesh:
+        raise ConfigError(f"{source}: cases.{key}: meshes of different sizes share no arrays: set geometry.remesh: true")
     if key.startswith(SHAPES) or key.endswith("_elements"):
         raise ConfigError(f"{source}: cases.{key}: {key} cannot be swept, it is common to a repository: set it once")
 
@@ -131,12 +137,14 @@ def _check_loop(loop: Loop, source: str) -> None:
 def _flat(section: Section, prefix: str = "") -> dict[str, Any]:
     """Dotted key to value of all keys that may be swept."""
     flat: dict[str, Any] = {}
+    section = section.settled()
     for key in type(section).model_fields:
         dotted, value = f"{prefix}{key}", getattr(section, key)
         if isinstance(value, Section):
             flat |= _flat(value, f"{dotted}.")
-        elif not (dotted.startswith((*SHAPES, "seed")) or dotted.endswith("_elements")):
-            flat[dotted] = value
+        elif not (isinstance(value, dict) or dotted.startswith((*SHAPES, "seed")) or dotted.endswith("_elements")):
+            # A list is one entry of the table.
+            flat[dotted] = " ".join(map(str, value)) if isinstance(value, list) else value
     return flat
 
 

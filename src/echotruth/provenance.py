@@ -12,7 +12,7 @@ from typing import Any
 
 import echotruth
 
-PACKAGES = ("numpy", "scipy", "numba", "scikit-image", "pypardiso", "mkl", "xarray", "zarr")
+PACKAGES = ("numpy", "scipy", "numba", "scikit-image", "pypardiso", "mkl", "meshio", "vtk", "xarray", "zarr")
 """Packages whose version may show in the numbers."""
 
 _APART = ("echotruth.config", "echotruth.cases", "echotruth.provenance", "echotruth.repository")

@@ -17,7 +17,7 @@ from pydantic_core import PydanticUndefined
 
 from echotruth.config import Config
 from echotruth.repository import schema
-from echotruth.section import UNITS, Section, unit_of
+from echotruth.section import UNITS, Section, kinds, unit_of
 
 _HEAD = """# Configuration
 
@@ -81,20 +81,24 @@ def _arrays(arrays: tuple[schema.Array, ...]) -> list[str]:
     return ["| array | dimensions | type | units | what |", "|---|---|---|---|---|", *rows, ""]
 
 
-def _section(model: type[BaseModel], prefix: str, title: str) -> list[str]:
+def _section(model: type[BaseModel], prefix: str, title: str, meaning: str = "") -> list[str]:
     lines = [f"## {title}\n"]
     if prefix:
-        lines += [f"{model.__doc__}\n"]
+        lines += [f"{meaning or ' '.join((model.__doc__ or '').split())}\n"]
     lines += ["| key | unit | default | meaning |", "|---|---|---|---|"]
     inner: list[str] = []
     for key, field in model.model_fields.items():
+        for kind, each in kinds(field.annotation).items():
+            inner += _section(each, f"{prefix}{key}.", f"{prefix}{key}, law {kind}")
+        if kinds(field.annotation):
+            continue
         section = _inner(field)
         mapping = section is not None and "dict" in str(field.annotation)
         if section is None or mapping:
             lines.append(f"| `{prefix}{key}` | {_unit(key)} | {_default(field)} | {_meaning(field)} |")
         if section is not None:
             path = f"{prefix}{key}.NAME." if mapping else f"{prefix}{key}."
-            inner += _section(section, path, path.removesuffix("."))
+            inner += _section(section, path, path.removesuffix("."), "" if mapping else _meaning(field))
     return [*lines, "", *inner]
 
 

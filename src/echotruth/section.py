@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from math import pi
 from types import SimpleNamespace
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints, Tag
 from pydantic_core import PydanticCustomError
 
 UNITS: dict[str, float] = {
@@ -17,10 +17,16 @@ UNITS: dict[str, float] = {
     "mm": 1e-3,
     "per_mm3": 1e9,
     "uL": 1e-9,
+    "mL": 1e-6,
+    "m3": 1.0,
     "ms": 1e-3,
+    "s": 1.0,
     "per_min": 1 / 60,
     "mmHg": 133.322387415,
     "kPa": 1e3,
+    "Pa": 1.0,
+    "kPa_per_mm": 1e6,
+    "Pa_s": 1.0,
     "MHz": 1e6,
     "m_per_s": 1.0,
     "deg": pi / 180,
@@ -39,7 +45,13 @@ def impossible(key: str, value: object, remedy: str) -> PydanticCustomError:
 
 def unit_of(key: str) -> str:
     """Unit suffix of a configuration key, or an empty string."""
-    return next((unit for unit in UNITS if key.endswith(f"_{unit}")), "")
+    return max((unit for unit in UNITS if key.endswith(f"_{unit}")), key=len, default="")
+
+
+def kinds(annotation: Any) -> dict[str, type[Section]]:
+    """Name to section of the kinds of which a key takes one, as the laws of a material; empty for any other key."""
+    choices = [choice for choice in get_args(annotation) if hasattr(choice, "__metadata__")]
+    return {note.tag: each.__origin__ for each in choices for note in each.__metadata__ if isinstance(note, Tag)}
 
 
 class Section(BaseModel):
@@ -55,6 +67,14 @@ class Section(BaseModel):
             if isinstance(value, Section):
                 value = value.si()
             elif value is not None and unit:
-                value *= UNITS[unit]
+                value = _scaled(value, UNITS[unit])
             values[key.removesuffix(f"_{unit}")] = value
         return SimpleNamespace(**values)
+
+    def settled(self) -> Section:
+        """The same with every value written out that another key of the section decides."""
+        return self
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    return {key: each * factor for key, each in value.items()} if isinstance(value, dict) else value * factor

@@ -4,13 +4,20 @@ from pathlib import Path
 
 import pytest
 
-from echotruth.config import Config
-from echotruth.config.loading import ConfigError, load
+from echotruth.config import Config, Mechanics
+from echotruth.config.loading import ConfigError, load, resolved
+from echotruth.mechanics.materials import LAWS
 
 ROOT = Path(__file__).parents[2]
 
 BAD = {
-    "geometry: {epi_radius_mm: 1.2}": "geometry.epi_radius_mm = 1.2: must be greater than endo_radius_mm = 1.45",
+    "geometry: {base_mm: 6}": "geometry.base_mm = 6.0: must lie within +-endo_length_mm = 5.4",
+    "geometry: {remesh: true}": "geometry.remesh = True: belongs to a wall read from a file: give geometry.file",
+    "geometry: {file: a.vtu, wall_mm: 1}": "geometry.wall_mm = 1.0: belongs to the ellipsoid: leave it out",
+    "geometry: {file: a.vtu, dilation: 2}": "geometry.dilation = 2.0: needs remesh: true",
+    "geometry: {file: a.vtu, sheet: s}": "geometry.sheet = 's': needs the fibre directions too",
+    "geometry: {file: a.vtu, keep: {values: [1]}}": "geometry.keep.array = ",
+    "geometry: {file: a.vtu, unit: inch}": "geometry.unit = 'inch': should be 'm', 'cm', 'mm' or 'um'",
     "loop: {esv_uL: 60, edv_uL: 50}": "loop.esv_uL = 60.0: must be smaller than edv_uL = 50.0",
     "fibres: {endo_deg: 95}": "fibres.endo_deg = 95: should be less than or equal to 90",
     "fibres: {endo_deg: .nan}": "fibres.endo_deg = nan: should be a finite number",
@@ -24,6 +31,13 @@ BAD = {
     "tracking: {trackers: {wide: {window_px: 256}}}": "window_px = 256: must not exceed the smallest image, 128 px",
     "tracking: {trackers: {both: {window_mm: 1.0}}}": "give either window_px or window_mm",
     "rf: {focus_mm: 12}": "rf.focus_mm = 12.0: must be smaller than bmode.field_of_view_mm = 12",
+    "mechanics: {material: {law: fungi}}": "mechanics.material.law = 'fungi': should be 'fung', 'guccione', ",
+    "mechanics: {material: {law: null}}": "mechanics.material.law = None: should be 'fung', 'guccione', ",
+    "mechanics: {material: {fiber: 9}}": "fiber is not a key of the law fung (others: guccione, holzapfel_ogden, "
+    "neo_hooke): did you mean mechanics.material.fibre?",
+    "mechanics: {material: {law: neo_hooke, fibre: 9.0}}": "is not a key of the law neo_hooke (others: fung, ",
+    "mechanics: {material: fung}": "mechanics.material = 'fung': must be a mapping of keys to values",
+    "mechanics: {material: {shear: -1.0}}": "mechanics.material.shear = -1.0: should be greater than 0",
     "name: a/b": "name = 'a/b': use letters, digits",
     "a: [": "line 1: expected the node content",
     "seed: 1\nseed: 2": "key 'seed' stands twice",
@@ -55,7 +69,7 @@ def test_missing_file_is_named(tmp_path):
         load(tmp_path / "nowhere.yaml")
 
 
-@pytest.mark.parametrize("name", ["demo", "paper", "sweep"])
+@pytest.mark.parametrize("name", ["demo", "paper", "rodero", "sweep"])
 def test_shipped_configurations_are_accepted(name):
     assert load(ROOT / f"config/{name}.yaml").name == name
 
@@ -67,3 +81,10 @@ def test_dumped_configuration_reads_back_the_same(tmp_path):
     file = tmp_path / "again.yaml"
     file.write_text(yaml.safe_dump(config.model_dump(mode="json")))
     assert load(file) == config
+
+
+def test_law_that_is_swept_takes_its_own_moduli_and_keeps_the_stiffness():
+    config = Config(mechanics=Mechanics(material=LAWS["fung"].Law(stiffness_kPa=2.0, fibre=12.0)))
+    changes = {"mechanics.material.fibre": 7.0, "mechanics.material.law": "guccione"}
+    material = resolved(config, changes).mechanics.material
+    assert material == LAWS["guccione"].Law(stiffness_kPa=2.0, fibre=7.0)

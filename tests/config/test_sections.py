@@ -4,7 +4,7 @@ from math import pi
 
 import pytest
 
-from echotruth.config import Fibres, Loop, Material, Probe
+from echotruth.config import Fibres, Loop, Mechanics, Probe
 
 
 def test_values_become_si_and_lose_the_unit_in_their_name():
@@ -14,8 +14,9 @@ def test_values_become_si_and_lose_the_unit_in_their_name():
     assert probe.sound_speed == 1540
     assert Fibres().si().endo == pytest.approx(84 * pi / 180)
     assert Loop(edv_uL=50.0).si().edv == pytest.approx(50e-9)
-    assert Material(stiffness_kPa=1.1).si().stiffness == pytest.approx(1100)
+    assert Mechanics(bulk_modulus_kPa=2e3).si().bulk_modulus == pytest.approx(2e6)
+    assert Mechanics(epicardial_spring_kPa_per_mm=1.0).si().epicardial_spring == pytest.approx(1e6)
 
 
 def test_a_value_left_open_stays_open():
-    assert Material().si().stiffness is None
+    assert Loop().si().edv is None

@@ -5,17 +5,26 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.mechanics import element, material
+from echotruth.mechanics import element
 from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.materials import LAWS, compiled
 from echotruth.tetrahedra import Mesh
-
-LAW = element.Law(material.moduli(9.2, 2.0, 3.7), 1.4, 2e6)
-SCALE = np.array([1.1e3, 4e4])
 
 
 @pytest.fixture(scope="module")
 def mesh() -> Mesh:
     return left_ventricle(Geometry(circumferential_elements=6, longitudinal_elements=4, transmural_elements=2))
+
+
+def law(name="fung", power=2.0):
+    return element.Law(compiled(name), LAWS[name].Law().constants(), np.array([1.4, power]), 2e6, local_bulk=20.0)
+
+
+def load(mesh, pressure=0.0, stiffness=1.1e3, tension=4e4, viscosity=0.0):
+    parts = (values * np.ones(len(mesh.cells)) for values in (stiffness, tension, pressure, viscosity))
+    before = np.empty((len(mesh.cells), 14, 6))
+    element.stretch(1.05 * mesh.nodes, body(mesh), before)
+    return element.Load(*parts, before)
 
 
 def body(mesh, frame=None):
@@ -24,14 +33,14 @@ def body(mesh, frame=None):
     return element.elements(mesh, fibres, frame)
 
 
-def respond(mesh, nodes, pressure, scale=SCALE, frame=None):
+def respond(mesh, nodes, scale, frame=None, laws=None):
     out = element.blocks(len(mesh.cells), with_tangent=True)
-    element.respond(nodes, body(mesh, frame), LAW, scale, pressure, out)
+    element.respond(nodes, body(mesh, frame), laws or law(), scale, out)
     return out
 
 
-def whole(out, scale, pressure):
-    return scale[0] * out.force[:, 0] + scale[1] * out.force[:, 1] + pressure[:, None] * out.force[:, 2]
+def whole(out, scale):
+    return np.einsum("pc,cpr->cr", scale[:4], out.force)
 
 
 def summed(mesh, forces):
@@ -42,9 +51,9 @@ def summed(mesh, forces):
 
 def test_homogeneous_deformation_leaves_the_inside_in_balance(mesh):
     gradient = np.array([[1.1, 0.2, 0.0], [-0.1, 0.95, 0.1], [0.05, 0.0, 1.02]])
-    pressure = np.full(len(mesh.cells), 1e4)
-    out = respond(mesh, mesh.nodes @ gradient.T, pressure)
-    total = summed(mesh, whole(out, SCALE, pressure))
+    scale = load(mesh, pressure=1e4)
+    out = respond(mesh, mesh.nodes @ gradient.T, scale)
+    total = summed(mesh, whole(out, scale))
     inside = np.setdiff1d(mesh.cells, np.concatenate([side.ravel() for side in (mesh.endo, mesh.epi, mesh.base)]))
     assert len(inside) > 50
     assert np.abs(total[inside]).max() < 1e-10 * np.abs(total).max()
@@ -52,29 +61,31 @@ def test_homogeneous_deformation_leaves_the_inside_in_balance(mesh):
     np.testing.assert_allclose(out.volume, np.linalg.det(gradient) * unloaded, rtol=1e-12)
 
 
-def test_rigid_rotation_needs_no_passive_force(mesh):
+@pytest.mark.parametrize("name", LAWS)
+def test_rigid_rotation_needs_no_passive_force(mesh, name):
     turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    out = respond(mesh, mesh.nodes @ turn.T + 1e-3, np.zeros(len(mesh.cells)))
-    stretched = respond(mesh, 1.01 * mesh.nodes * [1, 1, 0.9], np.zeros(len(mesh.cells)))
+    out = respond(mesh, mesh.nodes @ turn.T + 1e-3, load(mesh), laws=law(name))
+    stretched = respond(mesh, 1.01 * mesh.nodes * [1, 1, 0.9], load(mesh), laws=law(name))
     assert np.abs(out.force[:, 0]).max() < 1e-10 * np.abs(stretched.force[:, 0]).max()
 
 
 def test_cell_that_is_inside_out_has_no_volume(mesh):
-    assert np.all(np.isnan(respond(mesh, mesh.nodes * [1, 1, -1], np.zeros(len(mesh.cells))).volume))
+    assert np.all(np.isnan(respond(mesh, mesh.nodes * [1, 1, -1], load(mesh)).volume))
 
 
-def test_tangent_is_the_derivative_of_the_condensed_force(mesh):
-    rng = np.random.default_rng(5)
+@pytest.mark.parametrize(("name", "power"), [*((name, 2.0) for name in LAWS), ("fung", 0.0)])
+def test_tangent_is_the_derivative_of_the_condensed_force(mesh, name, power):
+    rng, laws = np.random.default_rng(5), law(name, power)
     frame = np.linalg.qr(rng.normal(size=(len(mesh.nodes), 3, 3)))[0]
     frame[::2] = np.eye(3)
     nodes, change = mesh.nodes + 1e-5 * rng.normal(size=mesh.nodes.shape), rng.normal(size=mesh.nodes.shape)
-    pressure, step = 1e4 * rng.normal(size=len(mesh.cells)), 1e-9
-    here = respond(mesh, nodes, pressure, frame=frame)
-    ends = [respond(mesh, nodes + side * step * change, pressure, frame=frame) for side in (1, -1)]
-    forces = [whole(out, SCALE, pressure) for out in ends]
+    scale, step = load(mesh, pressure=1e4 * rng.normal(size=len(mesh.cells)), viscosity=1e3), 1e-9
+    here = respond(mesh, nodes, scale, frame, laws)
+    ends = [respond(mesh, nodes + side * step * change, scale, frame, laws) for side in (1, -1)]
+    forces = [whole(out, scale) for out in ends]
     growth = (ends[0].volume - ends[1].volume) / np.sum(body(mesh).weight, axis=1)
-    slope = (forces[0] - forces[1] + LAW.bulk_modulus * growth[:, None] * here.force[:, 2]) / (2 * step)
+    slope = (forces[0] - forces[1] + laws.bulk_modulus * growth[:, None] * here.force[:, 2]) / (2 * step)
     tangent = np.zeros((len(mesh.cells), 30, 30))
     tangent[:, *np.triu_indices(30)] = here.tangent
     tangent += np.triu(tangent, 1).swapaxes(1, 2)
@@ -83,11 +94,27 @@ def test_tangent_is_the_derivative_of_the_condensed_force(mesh):
     assert np.abs(predicted - slope).max() < 1e-6 * np.abs(slope).max()
 
 
+def test_each_cell_bears_its_own_stiffness_tension_pressure_and_viscosity(mesh):
+    nodes, share = mesh.nodes * [1.1, 1.05, 0.95], np.random.default_rng(7).uniform(0.5, 2, size=(4, len(mesh.cells)))
+    same = load(mesh, pressure=1e4, viscosity=1e3)
+    scale = element.Load(*(values * part for values, part in zip(same[:4], share, strict=True)), same.before)
+    one, each = respond(mesh, nodes, load(mesh, 1.0, 1.0, 1.0, 1.0)), respond(mesh, nodes, scale)
+    np.testing.assert_array_equal(each.force, one.force)
+    assert not np.allclose(each.tangent, respond(mesh, nodes, same).tangent)
+
+
+def test_viscous_force_does_the_work_of_the_growth_of_strain(mesh):
+    """A wall that swells from 1.05 to 1.1 times its size: S is the growth of E, and its work by the way on 3 S l dl."""
+    out, wall = respond(mesh, 1.1 * mesh.nodes, load(mesh, viscosity=1.0)), np.sum(body(mesh).weight)
+    work = np.sum(summed(mesh, out.force[:, 3]) * mesh.nodes)
+    assert work == pytest.approx(3 * (1.1**2 - 1.05**2) / 2 * 1.1 * wall, rel=1e-12)
+
+
 def test_bytes_do_not_depend_on_the_number_of_threads(mesh):
     nodes = mesh.nodes + 1e-5 * np.random.default_rng(6).normal(size=mesh.nodes.shape)
     before, results = numba.get_num_threads(), []
     for threads in {1, before}:
         numba.set_num_threads(threads)
-        results.append(respond(mesh, nodes, np.full(len(mesh.cells), 1e3)))
+        results.append(respond(mesh, nodes, load(mesh, pressure=1e3)))
     numba.set_num_threads(before)
     assert all(a.tobytes() == b.tobytes() for a, b in zip(results[0], results[-1], strict=True))

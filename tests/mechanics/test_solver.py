@@ -7,12 +7,14 @@ import pytest
 from scipy.integrate import quad
 
 from echotruth.config import Config, Fibres, Geometry, Loop
-from echotruth.mechanics import element, fibres, material
+from echotruth.mechanics import element, fibres
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.equilibrium import Equilibrium, Load
 from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.materials import LAWS, compiled
 from echotruth.mechanics.quadrature import tetrahedron
 from echotruth.mechanics.solver import Diverged, Walk
+from echotruth.mechanics.support import of_base
 
 INNER, OUTER, B, C = 2e-3, 3e-3, 3.0, 1.5e3
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 2}
@@ -39,10 +41,12 @@ def sphere_pressure(inner):
 
 @pytest.fixture(scope="module")
 def hemisphere():
-    size = {"endo_radius_mm": 2.0, "endo_length_mm": 2.0, "epi_radius_mm": 3.0, "epi_length_mm": 3.0, "base_mm": 0.0}
+    size = {"endo_radius_mm": 2.0, "endo_length_mm": 2.0, "wall_mm": 1.0, "apex_wall_mm": 1.0, "base_mm": 0.0}
     mesh = left_ventricle(Geometry(**size, **COARSE))
     frames = fibres.fibre_frames(mesh, fibres.wall_depth(mesh), Fibres(), tetrahedron()[0])
-    heart = Equilibrium(mesh, frames, element.Law(material.moduli(B, B, B), 0.0, 1e8), "radial_free")
+    constants = LAWS["fung"].Law(fibre=B, transverse=B, shear=B).constants()
+    law = element.Law(compiled("fung"), constants, np.array([0.0, 2.0]), 1e8)
+    heart = Equilibrium(mesh, frames, law, of_base(mesh, "radial_free"))
     yield heart
     heart.close()
 

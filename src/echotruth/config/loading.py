@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args
@@ -11,6 +12,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from echotruth.config.sections import Config
+from echotruth.mechanics.materials import Material
+from echotruth.section import kinds
 
 
 class ConfigError(ValueError):
@@ -60,11 +63,15 @@ def validate(values: dict[str, Any], source: str) -> Config:
 def resolved(config: Config, changes: dict[str, Any], source: str = "cases") -> Config:
     """The configuration with the values of some dotted keys (as `fibres.endo_deg`) replaced."""
     values = config.model_dump()
-    for dotted, value in changes.items():
+    # The law first: it settles which other keys there are.
+    for dotted, value in sorted(changes.items(), key=lambda change: not change[0].endswith(".law")):
         *parents, leaf = dotted.split(".")
         section = values
         for parent in parents:
             section = section[parent]
+        if leaf == "law" and value != section[leaf]:
+            for own in set(section) - set(Material.model_fields):
+                del section[own]
         section[leaf] = value
     return validate(values, source)
 
@@ -99,12 +106,15 @@ def _tuples(values: Any) -> Any:
 
 def _sentence(error: ErrorDetails) -> str:
     context = error.get("ctx", {})
-    place = [part for part in error["loc"] if part != "[key]"]
+    place, model, others = _walked([part for part in error["loc"] if part != "[key]"])
     if error["type"] == "impossible":
         place.append(context["key"])
+    if error["type"] in _NO_SUCH_LAW:
+        return f"{'.'.join(place)}.law = {error['input']['law']!r}: should be {_either(others)}"
     key = ".".join(str(part) for part in place)
     if error["type"] == "extra_forbidden":
-        return f"{key} is not a key{_nearest(place)}"
+        law = f" of the law {model.model_fields['law'].default} (others: {', '.join(others)})" if others else ""
+        return f"{key} is not a key{law}{_nearest(place, list(model.model_fields))}"
     value = context["value"] if error["type"] == "impossible" else error["input"]
     text = "null" if value is None else repr(value)
     return f"{key} = {text[:80]}: {_remedy(error, context)}"
@@ -127,21 +137,38 @@ _PLAIN = {
 """Words for what pydantic says in the terms of Python."""
 
 
-def _nearest(place: list[Any]) -> str:
-    keys = _keys_at(place[:-1])
+_NO_SUCH_LAW = ("union_tag_invalid", "union_tag_not_found")
+
+
+def _nearest(place: list[Any], keys: list[str]) -> str:
     close = get_close_matches(str(place[-1]), keys, n=1, cutoff=0.5)
     if close:
         return f": did you mean {'.'.join(map(str, [*place[:-1], close[0]]))}?"
     return f": the keys here are {', '.join(keys)}"
 
 
-def _keys_at(place: list[Any]) -> list[str]:
-    model: Any = Config
+def _either(names: Iterable[str]) -> str:
+    *first, last = map(repr, names)
+    return f"{', '.join(first)} or {last}"
+
+
+def _walked(place: list[Any]) -> tuple[list[Any], type[BaseModel], list[str]]:
+    """The place as the user writes it, the section it lies in, and the names of the other laws beside that section.
+
+    Pydantic puts the name of the law in the place, between `material` and its key.
+    """
+    model, written, choices, others = Config, [], {}, []
     for part in place:
+        if part in choices:
+            model, others = choices[part], [name for name in choices if name != part]
+            continue
+        written.append(part)
         # The name of a view or tracker is the user's own: its section is that of the mapping.
         if part in model.model_fields:
-            model = _section_of(model.model_fields[part].annotation)
-    return list(model.model_fields)
+            annotation = model.model_fields[part].annotation
+            choices, others = kinds(annotation), list(kinds(annotation)) or others
+            model = _section_of(annotation) or model
+    return written, model, others
 
 
 def _section_of(annotation: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The wall and its support."""
+"""The wall, its tension and its support."""
 
 from __future__ import annotations
 
@@ -6,31 +6,34 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
-from echotruth.section import Positive, Section
+from echotruth.mechanics.materials import DEFAULT, LAWS, AnyLaw
+from echotruth.section import Section
 
 
-class Material(Section):
-    """W = C/2 (exp Q - 1), Q = fibre E_ff^2 + transverse (E_ss^2 + E_nn^2 + 2 E_sn^2) + 2 shear (E_fs^2 + E_fn^2)."""
+class Active(Section):
+    """Tension of the fibres, T_a = T_Ca [1 + beta (lambda - 1)]."""
 
-    stiffness_kPa: Positive | None = None
-    """C. Default: solved, so that the heart has its end-diastolic volume at its end-diastolic pressure.
-    When given, the loop's volumes are scaled to the volume the heart then has at end-diastolic pressure."""
-    fibre: Positive = 9.2
-    """b_f (Omens 1993)."""
-    transverse: Positive = 2.0
-    """b_t."""
-    shear: Positive = 3.7
-    """b_fs."""
-    bulk_modulus_kPa: Annotated[FiniteFloat, Field(ge=100)] = 2000.0
-    """Penalty on volume change; below 2000 kPa it shifts pressures by per cents."""
     length_dependence: Annotated[FiniteFloat, Field(ge=0, le=5)] = 1.4
-    """beta in T_a = T_Ca [1 + beta (lambda - 1)]."""
+    """beta."""
+    stress: Literal["cauchy", "second_piola_kirchhoff"] = "cauchy"
+    """What T_a is: the paper's tension per deformed area (S_ff = T_a / lambda^2), or S_ff itself."""
 
 
 class Mechanics(Section):
     """Finite-element heart driven through its loop."""
 
-    material: Material = Material()
-    """The wall."""
+    material: AnyLaw = LAWS[DEFAULT].Law()
+    """Passive law of the wall."""
+    active: Active = Active()
+    """Active stress of the wall."""
+    bulk_modulus_kPa: Annotated[FiniteFloat, Field(ge=100)] = 2000.0
+    """Penalty on volume change; below 2000 kPa it shifts pressures by per cents."""
+    local_bulk: Annotated[FiniteFloat, Field(ge=0, le=1000)] = 20.0
+    """Penalty on volume change point by point within an element, over C: keeps det F even where elements are large."""
+    viscosity_Pa_s: Annotated[FiniteFloat, Field(ge=0)] = 1.0
+    """Viscous stress over the rate of Green-Lagrange strain. Where a fibre that weakens as it shortens leaves no
+    neighbouring equilibrium, it sets the pace of the snap to the next one; otherwise it is a fraction of a per cent."""
     base: Literal["radial_free", "fixed"] = "radial_free"
     """Support of the base: free to widen in its plane, or held."""
+    epicardial_spring_kPa_per_mm: Annotated[FiniteFloat, Field(ge=0)] = 0.0
+    """Stiffness per area with which the surroundings resist the outward or inward motion of the epicardium."""

@@ -11,6 +11,8 @@ from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import Bmode, Phantom, Probe, Rf, View, standard_views
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
+from echotruth.config.pathology import Pathology
+from echotruth.config.physiology import Physiology
 from echotruth.config.tracking import Tracking
 from echotruth.section import Name, Section, impossible
 
@@ -24,8 +26,10 @@ class Config(Section):
     """Start of all random draws."""
     geometry: Geometry = Geometry()
     fibres: Fibres = Fibres()
+    pathology: Pathology = Pathology()
     loop: Loop = Loop()
     mechanics: Mechanics = Mechanics()
+    physiology: Physiology = Physiology()
     views: Annotated[dict[Name, View], Field(min_length=1)] = Field(default_factory=standard_views)
     """Name to imaging plane."""
     phantom: Phantom = Phantom()
@@ -53,4 +57,25 @@ class Config(Section):
             )
         if self.rf.focus_mm >= view:
             raise impossible("rf.focus_mm", self.rf.focus_mm, f"must be smaller than bmode.field_of_view_mm = {view:g}")
+        return self
+
+    @model_validator(mode="after")
+    def _fibres_known(self) -> Config:
+        if self.fibres.source == "file" and self.geometry.fibre is None:
+            remedy = "name the array of the mesh file that holds them in geometry.fibre, or set it to rule"
+            raise impossible("fibres.source", self.fibres.source, remedy)
+        return self
+
+    @model_validator(mode="after")
+    def _stiffness_known(self) -> Config:
+        key, stiffness = "mechanics.material.stiffness_kPa", self.mechanics.material.stiffness_kPa
+        drive, imaged = self.loop.drive, self.geometry.state == "end_diastole"
+        if drive != "pressure_volume" and stiffness is None:
+            raise impossible(key, None, f"must be given, for loop.drive = {drive} leaves open from what to solve it")
+        if imaged and stiffness is None:
+            remedy = "must be given where geometry.state is end_diastole, for the unloaded volume is not known"
+            raise impossible(key, None, remedy)
+        if imaged and drive == "volume":
+            remedy = "needs geometry.state = unloaded, for there is no pressure to unload from"
+            raise impossible("loop.drive", drive, remedy)
         return self

@@ -6,33 +6,15 @@ whatever the number of threads.
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from echotruth.mechanics.support import Support
 from echotruth.tetrahedra import Floats, Integers, Mesh
 
-
-def base_frames(mesh: Mesh) -> Floats:
-    """Directions in which the displacement of each node is counted.
-
-    Parameters
-    ----------
-    mesh : Mesh
-
-    Returns
-    -------
-    ndarray of shape (n_nodes, 3, 3)
-        Rows radial, circumferential and z at the nodes of the base, x, y, z elsewhere.
-    """
-    frames = np.tile(np.eye(3), (len(mesh.nodes), 1, 1))
-    base = np.unique(mesh.base)
-    x, y, _ = (mesh.nodes[base] / np.linalg.norm(mesh.nodes[base, :2], axis=1, keepdims=True)).T
-    frames[base, 0, :2] = np.column_stack([x, y])
-    frames[base, 1, :2] = np.column_stack([-y, x])
-    return frames
+CELLS, ENDO, EPI = 0, 1, 2
+"""Groups of nodes that share an equation."""
 
 
 class Assembly:
@@ -45,14 +27,13 @@ class Assembly:
         Number of the equation of each displacement, -1 where it is held.
     """
 
-    def __init__(self, mesh: Mesh, base: Literal["radial_free", "fixed"]) -> None:
-        self.frames = base_frames(mesh)
-        free = np.ones((len(mesh.nodes), 3), dtype=bool)
-        free[mesh.base] = [base == "radial_free", False, False]
-        self.n_equations = int(free.sum())
-        self.equation = np.full(free.shape, -1, dtype=np.int64)
-        self.equation[free] = np.arange(self.n_equations)
-        self._groups = [self.equation[group].reshape(len(group), -1) for group in (mesh.cells, mesh.endo)]
+    def __init__(self, mesh: Mesh, support: Support) -> None:
+        self.frames = support.frames
+        self.n_equations = int(support.free.sum())
+        self.equation = np.full(support.free.shape, -1, dtype=np.int64)
+        self.equation[support.free] = np.arange(self.n_equations)
+        groups = (mesh.cells, mesh.endo, mesh.epi) if support.spring else (mesh.cells, mesh.endo)
+        self._groups = [self.equation[group].reshape(len(group), -1) for group in groups]
         self._pattern(self._groups)
 
     def _pattern(self, groups: list[NDArray[np.int64]]) -> None:
@@ -68,13 +49,14 @@ class Assembly:
         self._indices = column.astype(np.int32)
         self._indptr = np.searchsorted(row, np.arange(n + 1)).astype(np.int32)
 
-    def vector(self, blocks: Floats, group: int = 0) -> Floats:
+    def vector(self, blocks: Floats, group: int = CELLS) -> Floats:
         """Sum of block vectors.
 
         Parameters
         ----------
-        blocks : ndarray of shape (n_cells, 30), or (n_facets, 18) for group 1
+        blocks : ndarray of shape (n_cells, 30), or (n_facets, 18) for a group of facets
             In the directions of `frames`.
+        group : CELLS, ENDO or EPI
 
         Returns
         -------
@@ -83,21 +65,21 @@ class Assembly:
         equations = self._groups[group].ravel() + 1
         return np.bincount(equations, blocks.ravel(), self.n_equations + 1)[1:]
 
-    def matrix(self, cells: Floats, facets: Floats) -> csr_matrix:
+    def matrix(self, *blocks: Floats) -> csr_matrix:
         """Sum of packed block matrices.
 
         Parameters
         ----------
-        cells : ndarray of shape (n_cells, 465)
-        facets : ndarray of shape (n_facets, 171)
-            Upper triangles, row by row, in the directions of `frames`.
+        *blocks : ndarray of shape (n_cells, 465) or (n_facets, 171)
+            Upper triangles, row by row, in the directions of `frames`: cells, endocardium and,
+            where there are springs, epicardium.
 
         Returns
         -------
         csr_matrix of shape (n_equations, n_equations)
             Its upper triangle.
         """
-        entries = np.concatenate([cells.ravel(), facets.ravel()])
+        entries = np.concatenate([block.ravel() for block in blocks])
         data = np.bincount(self._place, entries, self._nnz + 1)[:-1]
         return csr_matrix((data, self._indices, self._indptr), (self.n_equations, self.n_equations))
 
@@ -110,10 +92,14 @@ class Assembly:
         """Displacements (n_cells, 30) of the cells, in the directions of `frames`."""
         return np.append(solution, 0.0)[self._groups[0]]
 
-    def turn(self, facets: Integers, gradient: Floats, hessian: Floats) -> tuple[Floats, Floats]:
-        """Gradients (facet, 6, 3) and Hessians (facet, 18, 18) in the directions of `frames`, the latter packed."""
+    def turn(self, facets: Integers, gradient: Floats) -> Floats:
+        """Vectors (facet, 6, 3) in the directions of `frames`."""
+        return np.einsum("faik,fak->fai", self.frames[facets], gradient)
+
+    def pack(self, facets: Integers, hessian: Floats) -> Floats:
+        """Matrices (facet, 18, 18) in the directions of `frames`, packed to (facet, 171)."""
         frame = self.frames[facets]
         turned = hessian.reshape(len(facets), 6, 3, 6, 3)
         turned = np.einsum("faik,fakbl->faibl", frame, turned)
         turned = np.einsum("fbjl,faibl->faibj", frame, turned).reshape(hessian.shape)
-        return np.einsum("faik,fak->fai", frame, gradient), turned[:, *np.triu_indices(18)]
+        return turned[:, *np.triu_indices(18)]

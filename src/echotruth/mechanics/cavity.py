@@ -64,65 +64,79 @@ def cavity_volume(nodes: NDArray[np.float64], endo: Integers) -> float:
     return -float(np.sum(np.einsum("fq,q->f", flux, _WEIGHT))) / 3
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def load(nodes: Floats, endo: Integers, gradient: Floats, hessian: Floats) -> None:
-    """First and second derivatives of the volume of the cavity, facet by facet.
+def load(nodes: Floats, endo: Integers) -> Floats:
+    """First derivatives of the volume of the cavity, facet by facet: the force of a unit pressure.
 
     Parameters
     ----------
     nodes : ndarray of shape (n_nodes, 3), m
     endo : ndarray of shape (n_facets, 6)
-    gradient : ndarray of shape (n_facets, 6, 3), m^2
-        Filled.
+
+    Returns
+    -------
+    ndarray of shape (n_facets, 6, 3), m^2
+    """
+    x = nodes[endo]
+    position = np.einsum("qa,fai->fqi", _VALUE, x)
+    first, second = (np.einsum("qa,fai->fqi", _SLOPE[..., k], x) for k in (0, 1))
+    slots = (np.cross(first, second), np.cross(second, position), np.cross(position, first))
+    factors = (_VALUE, _SLOPE[..., 0], _SLOPE[..., 1])
+    parts = (
+        np.einsum("qa,fqi->fai", -_WEIGHT[:, None] / 3 * factor, slot)
+        for factor, slot in zip(factors, slots, strict=True)
+    )
+    return sum(parts)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def stiffness(nodes: Floats, endo: Integers, hessian: Floats) -> None:
+    """Second derivatives of the volume of the cavity, facet by facet.
+
+    Parameters
+    ----------
+    nodes : ndarray of shape (n_nodes, 3), m
+    endo : ndarray of shape (n_facets, 6)
     hessian : ndarray of shape (n_facets, 18, 18), m
         Filled. Rows and columns run over node and axis.
     """
     for f in prange(endo.shape[0]):
-        _facet(nodes, endo[f], gradient[f], hessian[f])
+        _facet(nodes, endo[f], hessian[f])
 
 
 @njit(cache=True, error_model="numpy")
-def _facet(nodes: Floats, facet: Integers, gradient: Floats, hessian: Floats) -> None:
-    gradient[:] = 0.0
+def _facet(nodes: Floats, facet: Integers, hessian: Floats) -> None:
+    """Sum over the points of the second derivatives of weight * det(position, first, second)."""
     hessian[:] = 0.0
-    slots, factors = np.empty((3, 3)), np.empty((6, 3))
+    slots, factors, axis = np.empty((3, 3)), np.empty((6, 3)), np.empty(3)
     for q in range(_WEIGHT.shape[0]):
         factors[:, 0], factors[:, 1:] = _VALUE[q], _SLOPE[q]
         slots[:] = 0.0
         for a in range(6):
             for s in range(3):
-                slots[s] += factors[a, s] * nodes[facet[a]]
-        _add_point(factors, slots, -_WEIGHT[q] / 3, gradient, hessian)
-
-
-@njit(cache=True, error_model="numpy")
-def _add_point(factors: Floats, slots: Floats, weight: float, gradient: Floats, hessian: Floats) -> None:
-    """Add the derivatives of weight * det(position, first, second), the slots, at one point."""
-    for s in range(3):
-        normal = weight * _cross(slots[(s + 1) % 3], slots[(s + 2) % 3])
+                for i in range(3):
+                    slots[s, i] += factors[a, s] * nodes[facet[a], i]
         for a in range(6):
-            gradient[a] += factors[a, s] * normal
-    for a in range(6):
-        for b in range(6):
-            if a != b:
-                _add_pair(factors[a], factors[b], slots, weight, hessian[3 * a : 3 * a + 3, 3 * b : 3 * b + 3])
+            for b in range(6):
+                _axis(factors[a], factors[b], slots, -_WEIGHT[q] / 3, axis)
+                _add_cross(axis, hessian[3 * a : 3 * a + 3, 3 * b : 3 * b + 3])
 
 
 @njit(cache=True, error_model="numpy")
-def _add_pair(a: Floats, b: Floats, slots: Floats, weight: float, block: Floats) -> None:
-    """Add the second derivatives of det(position, first, second) by two nodes: a matrix u, v -> det(u, v, axis)."""
-    axis = np.zeros(3)
+def _axis(a: Floats, b: Floats, slots: Floats, weight: float, axis: Floats) -> None:
+    """Fill the vector (3,) of the second derivatives by two nodes, which are u, v -> det(u, v, axis)."""
+    axis[:] = 0.0
     for s in range(3):
         p, q = (s + 1) % 3, (s + 2) % 3
-        axis += weight * (a[p] * b[q] - a[q] * b[p]) * slots[s]
+        factor = weight * (a[p] * b[q] - a[q] * b[p])
+        for i in range(3):
+            axis[i] += factor * slots[s, i]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_cross(axis: Floats, block: Floats) -> None:
     block[0, 1] += axis[2]
     block[1, 0] -= axis[2]
     block[1, 2] += axis[0]
     block[2, 1] -= axis[0]
     block[2, 0] += axis[1]
     block[0, 2] -= axis[1]
-
-
-@njit(cache=True, error_model="numpy")
-def _cross(a: Floats, b: Floats) -> NDArray[np.float64]:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

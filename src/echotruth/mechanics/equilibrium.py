@@ -1,8 +1,8 @@
 """Equilibrium of the heart under a cavity pressure, and its Newton corrections.
 
 The unknowns are the displacements, the pressure of each cell and, if asked for, one
-number more - the active tension or the stiffness - with the cavity volume as its
-equation. That last pair borders the tangent: one factorization serves both
+number more - the active tension, the stiffness or the cavity pressure - with the cavity
+volume as its equation. That last pair borders the tangent: one factorization serves both
 right-hand sides.
 """
 
@@ -14,13 +14,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.mechanics import cavity, element
-from echotruth.mechanics.assembly import Assembly
+from echotruth.mechanics import cavity, element, point
+from echotruth.mechanics.assembly import CELLS, ENDO, EPI, Assembly
 from echotruth.mechanics.sparse import factorization
+from echotruth.mechanics.support import Support, springs
 from echotruth.tetrahedra import Mesh
 
 Floats = NDArray[np.float64]
-Unknown = Literal["stiffness", "tension"] | None
+Unknown = Literal["stiffness", "tension", "cavity_pressure"] | None
 
 
 @dataclass(frozen=True)
@@ -32,25 +33,26 @@ class State:
     solution : ndarray of shape (n_equations,), m
     pressure : ndarray of shape (n_cells,), Pa
         Of the cells, positive in tension.
-    stiffness, tension : float, Pa
-        C and T_Ca.
+    stiffness, tension, cavity_pressure : float, Pa
+        C, T_Ca and the pressure of the blood.
     """
 
     solution: Floats
     pressure: Floats
     stiffness: float
-    tension: float
+    tension: float = 0.0
+    cavity_pressure: float = 0.0
 
     def moved(self, step: Correction, share: float, unknown: Unknown) -> State:
         """The state with a share of a correction added."""
         solution, pressure = self.solution + share * step.solution, self.pressure + share * step.pressure
-        state = State(solution, pressure, self.stiffness, self.tension)
+        state = replace(self, solution=solution, pressure=pressure)
         return replace(state, **{unknown: getattr(self, unknown) + share * step.scalar}) if unknown else state
 
 
 @dataclass(frozen=True)
 class Correction:
-    """Changes of the unknowns, in the units of `State`; the scalar is that of the stiffness or tension."""
+    """Changes of the unknowns, in the units of `State`; the scalar is that of the one number more."""
 
     solution: Floats
     pressure: Floats
@@ -58,21 +60,60 @@ class Correction:
 
     @property
     def size(self) -> float:
-        """Root mean square of the change of the displacements, m."""
-        return float(np.sqrt(np.mean(self.solution**2)))
+        """Norm of the change of the displacements, m."""
+        return norm(self.solution)
+
+    def along(self, other: Correction) -> float:
+        """Part of another that lies in this one, by the displacements."""
+        return float(np.sum(self.solution * other.solution) / np.sum(other.solution**2))
+
+    def plus(self, factor: float, other: Correction) -> Correction:
+        """This and a multiple of another."""
+        changes = (getattr(self, name) + factor * getattr(other, name) for name in ("solution", "pressure", "scalar"))
+        return Correction(*changes)
 
 
 @dataclass(frozen=True)
 class Load:
-    """What the heart must meet: cavity pressure (Pa), and volume (m^3) where a scalar is unknown."""
+    """What the heart must meet.
+
+    Attributes
+    ----------
+    pressure : float, Pa
+        In the cavity; of no account where it is solved.
+    volume : float, m^3
+        Of the cavity; of no account where no number more is solved.
+    share : ndarray of shape (n_cells,), or 1
+        Part of the state's tension that each cell bears.
+    tension : ndarray of shape (n_cells,), or float, Pa
+        Tension of each cell beside that.
+    moved : float
+        Part of the displacement that the support imposes.
+    time : float, s
+        When: the wall is viscous between two times.
+    """
 
     pressure: float
     volume: float
+    share: Floats | float = 1.0
+    tension: Floats | float = 0.0
+    moved: float = 0.0
+    time: float = 0.0
 
     def toward(self, other: Load, share: float) -> Load:
         """The load at a share of the way to another."""
-        pressure = self.pressure + share * (other.pressure - self.pressure)
-        return Load(pressure, self.volume + share * (other.volume - self.volume))
+        names = ("pressure", "volume", "share", "tension", "moved", "time")
+        pairs = ((getattr(self, name), getattr(other, name)) for name in names)
+        return Load(*(first + share * (last - first) for first, last in pairs))
+
+
+@dataclass(frozen=True)
+class Past:
+    """The state before, against which the wall is viscous, and the time since, s."""
+
+    state: State
+    time: float
+    moved: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -87,7 +128,7 @@ class Imbalance:
     volume : float, m^3
         Cavity volume less the one asked for.
     force_error, volume_error, growth_error : float
-        Relative norms of the three: to the load of the blood, to the volume asked for and to one.
+        Relative norms of the three: to the forces on the nodes, to the volume asked for and to one.
     """
 
     force: Floats
@@ -104,16 +145,47 @@ class Imbalance:
 
 
 class Equilibrium:
-    """The equations of one heart."""
+    """The equations of one heart.
 
-    def __init__(self, mesh: Mesh, fibre_frames: Floats, law: element.Law, base: Literal["radial_free", "fixed"]):
-        self.mesh, self.law = mesh, law
-        self.assembly = Assembly(mesh, base)
-        self.body = element.elements(mesh, fibre_frames, self.assembly.frames)
+    Parameters
+    ----------
+    mesh : Mesh
+        Unloaded.
+    fibre_frames : ndarray of shape (n_cells, n_points, 3, 3)
+        Rows f, s, n at the points of `quadrature.tetrahedron`.
+    law : element.Law
+    support : Support
+    stiffness_scale : ndarray of shape (n_cells,), optional
+        Factor of the stiffness of each cell.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        fibre_frames: Floats,
+        law: element.Law,
+        support: Support,
+        stiffness_scale: Floats | None = None,
+    ):
+        self.mesh, self.law, self.support = mesh, law, support
+        self.assembly = Assembly(mesh, support)
+        self.body = element.elements(mesh, fibre_frames, support.frames)
         self.unloaded = np.sum(self.body.weight, axis=1)
+        self.stiffness_scale = np.ones(len(mesh.cells)) if stiffness_scale is None else stiffness_scale
         self._cells = element.blocks(len(mesh.cells), with_tangent=True)
-        self._facets = np.empty((len(mesh.endo), 6, 3)), np.empty((len(mesh.endo), 18, 18))
+        self._facets = np.empty((len(mesh.endo), 18, 18))
+        self._springs = springs(mesh, support.spring) if support.spring else None
         self._solver = factorization()
+        self.past: Past | None = None
+        self._rate, self._before = np.zeros(len(mesh.cells)), np.zeros((*self.body.weight.shape, 6))
+
+    def remember(self, past: Past) -> None:
+        """Be viscous against a past state; without time since, the wall is elastic."""
+        self.past = past
+        elastic = past.time <= 0 or self.law.viscosity == 0
+        self._rate[:] = 0.0 if elastic else self.law.viscosity / past.time
+        if not elastic:
+            element.stretch(self.positions(past.state, past.moved), self.body, self._before)
 
     def close(self) -> None:
         """Give the memory of the factors back."""
@@ -121,15 +193,20 @@ class Equilibrium:
 
     def rest(self, stiffness: float) -> State:
         """The unloaded state."""
-        return State(np.zeros(self.assembly.n_equations), np.zeros(len(self.mesh.cells)), stiffness, 0.0)
+        return State(np.zeros(self.assembly.n_equations), np.zeros(len(self.mesh.cells)), stiffness)
 
-    def positions(self, state: State) -> Floats:
-        """Deformed nodes, shape (n_nodes, 3), m."""
-        return self.mesh.nodes + self.assembly.spread(state.solution)
+    def positions(self, state: State, moved: float = 0.0) -> Floats:
+        """Deformed nodes, shape (n_nodes, 3), m, with a part of the displacement that the support imposes."""
+        nodes = self.mesh.nodes + self.assembly.spread(state.solution)
+        return nodes if self.support.moved is None else nodes + moved * self.support.moved
 
     def volume(self, state: State) -> float:
         """Volume of the cavity, m^3."""
         return cavity.cavity_volume(self.positions(state), self.mesh.endo)
+
+    def tension(self, state: State, load: Load) -> Floats:
+        """T_Ca of each cell, shape (n_cells,), Pa."""
+        return np.zeros(len(self.mesh.cells)) + state.tension * load.share + load.tension
 
     def imbalance(self, state: State, load: Load, unknown: Unknown) -> Imbalance:
         """Residuals of a state under a load."""
@@ -138,42 +215,65 @@ class Equilibrium:
     # Far from a solution the exponential may overflow; the line search then goes back.
     @np.errstate(over="ignore", invalid="ignore")
     def _imbalance(self, state: State, load: Load, unknown: Unknown, out: element.Blocks) -> Imbalance:
-        nodes = self.positions(state)
-        scale = np.array([state.stiffness, state.tension])
-        element.respond(nodes, self.body, self.law, scale, state.pressure, out)
-        cavity.load(nodes, self.mesh.endo, *self._facets)
-        self._gradient, self._hessian = self.assembly.turn(self.mesh.endo, *self._facets)
-        blood = load.pressure * self.assembly.vector(self._gradient, group=1)
-        whole = scale[0] * out.force[:, 0] + scale[1] * out.force[:, 1] + state.pressure[:, None] * out.force[:, 2]
-        force = self.assembly.vector(whole) - blood
+        nodes = self.positions(state, load.moved)
+        stiffness, tension = state.stiffness * self.stiffness_scale, self.tension(state, load)
+        scale = element.Load(stiffness, tension, state.pressure, self._rate, self._before)
+        element.respond(nodes, self.body, self.law, scale, out)
+        load_of_facets = self.assembly.turn(self.mesh.endo, cavity.load(nodes, self.mesh.endo))
+        self._gradient = self.assembly.vector(load_of_facets, ENDO)
+        inside = self.assembly.vector(np.einsum("pc,cpr->cr", scale[:4], out.force)) + self._spring_force(nodes)
+        blood = (state.cavity_pressure if unknown == "cavity_pressure" else load.pressure) * self._gradient
         growth = out.volume / self.unloaded - 1 - state.pressure / self.law.bulk_modulus
         volume = cavity.cavity_volume(nodes, self.mesh.endo) - load.volume if unknown else 0.0
-        errors = norm(force) / norm(blood), abs(volume) / load.volume if unknown else 0.0
-        return Imbalance(force, growth, volume, *errors, norm(growth) / np.sqrt(len(growth)))
+        errors = norm(inside - blood) / self._size(out, scale, blood), abs(volume) / load.volume if unknown else 0.0
+        return Imbalance(inside - blood, growth, volume, *errors, norm(growth) / np.sqrt(len(growth)))
+
+    def _size(self, out: element.Blocks, scale: element.Load, blood: Floats) -> float:
+        """Norm of the forces that balance at the nodes: of the blood, and of the wall where there is none."""
+        wall = self.assembly.vector(np.abs(scale.pressure[:, None] * out.force[:, point.VOLUMETRIC]))
+        return max(norm(blood), 1e-3 * norm(wall)) or 1.0
+
+    def _spring_force(self, nodes: Floats) -> Floats | float:
+        if self._springs is None:
+            return 0.0
+        moved = (nodes - self.mesh.nodes)[self.mesh.epi].reshape(-1, 18)
+        force = np.einsum("frs,fs->fr", self._springs, moved).reshape(-1, 6, 3)
+        return self.assembly.vector(self.assembly.turn(self.mesh.epi, force), EPI)
 
     def linearize(self, state: State, load: Load, unknown: Unknown) -> Tangent:
         """Factor the tangent at a state."""
         self._imbalance(state, load, unknown, self._cells)
-        matrix = self.assembly.matrix(self._cells.tangent, -load.pressure * self._hessian)
-        self._solver.factor(matrix)
-        return Tangent(self, unknown)
+        pressure = state.cavity_pressure if unknown == "cavity_pressure" else load.pressure
+        cavity.stiffness(self.positions(state, load.moved), self.mesh.endo, self._facets)
+        facets = self.assembly.pack(self.mesh.endo, -pressure * self._facets)
+        around = [] if self._springs is None else [self.assembly.pack(self.mesh.epi, self._springs)]
+        self._solver.factor(self.assembly.matrix(self._cells.tangent, facets, *around))
+        return Tangent(self, unknown, load, state)
 
     def solve(self, right: Floats) -> Floats:
         """Solution for a right-hand side (n_equations,) with the factors of the last tangent."""
         return self._solver.solve(right[:, None])[:, 0]
 
+    def response(self, unknown: Unknown, load: Load) -> Floats:
+        """Force (n_equations,) on the nodes for a change of the one number more, at the state evaluated last."""
+        if unknown == "cavity_pressure":
+            return self._gradient
+        part, scale = point.PASSIVE, -self.stiffness_scale
+        if unknown == "tension":
+            part, scale = point.ACTIVE, -load.share * np.ones(len(self.mesh.cells))
+        return self.assembly.vector(scale[:, None] * self._cells.force[:, part], CELLS)
+
 
 class Tangent:
     """The factored tangent at one state, from which corrections of this and later states are had."""
 
-    def __init__(self, equations: Equilibrium, unknown: Unknown) -> None:
-        self._equations, self._bordered = equations, unknown is not None
-        force = equations._cells.force
-        self._growth = force[:, element.VOLUMETRIC].copy()
-        if self._bordered:
-            self._gradient = equations.assembly.vector(equations._gradient, group=1)
-            part = element.PASSIVE if unknown == "stiffness" else element.ACTIVE
-            self._response = equations.solve(-equations.assembly.vector(force[:, part]))
+    def __init__(self, equations: Equilibrium, unknown: Unknown, load: Load, state: State) -> None:
+        self._equations, self.unknown, self.load, self.state = equations, unknown, load, state
+        self.past = equations.past
+        self._growth = equations._cells.force[:, point.VOLUMETRIC].copy()
+        if unknown:
+            self._gradient = equations._gradient
+            self._response = equations.solve(equations.response(unknown, load))
             self._compliance = float(np.sum(self._gradient * self._response))
 
     def correction(self, imbalance: Imbalance) -> Correction:
@@ -182,7 +282,7 @@ class Tangent:
         bulk = heart.law.bulk_modulus
         condensed = heart.assembly.vector(bulk * imbalance.growth[:, None] * self._growth)
         solution, scalar = heart.solve(-imbalance.force - condensed), 0.0
-        if self._bordered:
+        if self.unknown:
             scalar = -(imbalance.volume + float(np.sum(self._gradient * solution))) / self._compliance
             solution += scalar * self._response
         growth = np.sum(self._growth * heart.assembly.of_cells(solution), axis=1) / heart.unloaded

@@ -1,16 +1,13 @@
-"""Passive and active stress of the wall, in the axes of the fibre.
+"""Stress of the wall from its passive law, its active tension and its pressure.
 
-All tensors are in the order ff, ss, nn, fs, fn, sn; strains (and C) carry their
-tensor components, tangents act on strains with doubled shear. The numba functions
-fill arrays given to them, for one point at a time.
-
-The compiled copy of `element.respond` holds these functions within it, and Numba's
-cache does not see when they change: touch element.py (or remove __pycache__) after an edit here.
+All tensors are in the axes of the fibre and in the order ff, ss, nn, fs, fn, sn; strains (and C)
+carry their tensor components, tangents act on strains with doubled shear. The numba
+functions fill arrays given to them, for one point at a time.
 """
 
 from __future__ import annotations
 
-from math import exp, sqrt
+from math import sqrt
 
 import numpy as np
 from numba import njit
@@ -21,25 +18,8 @@ Floats = NDArray[np.float64]
 PAIRS = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)])
 """Axes of each component."""
 
-_SHEAR = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+SHEAR = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 """How often a component stands in a double contraction."""
-
-
-def moduli(fibre: float, transverse: float, shear: float) -> Floats:
-    """Factor of the square of each strain component in Q.
-
-    Parameters
-    ----------
-    fibre, transverse, shear : float
-        b_f, b_t and b_fs.
-
-    Returns
-    -------
-    ndarray of shape (6,)
-        Q = b_f E_ff^2 + b_t (E_ss^2 + E_nn^2 + 2 E_sn^2) + 2 b_fs (E_fs^2 + E_fn^2);
-        Guccione et al., J Biomech Eng 113 (1991) 42.
-    """
-    return np.array([fibre, transverse, transverse, shear, shear, transverse])
 
 
 @njit(cache=True, error_model="numpy")
@@ -58,61 +38,49 @@ def invert(c: Floats, inverse: Floats) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def passive(c: Floats, inverse: Floats, j: float, b: Floats, stress: Floats, tangent: Floats) -> float:
-    """Isochoric stress of the exponential law for a stiffness of one.
-
-    W = (exp Q - 1) / 2 of the isochoric strain (J^(-2/3) C - I) / 2. The split and its tangent:
-    Holzapfel, Nonlinear Solid Mechanics, eqs. 6.90 and 6.168.
-
-    Parameters
-    ----------
-    c, inverse : ndarray of shape (6,)
-        Right Cauchy-Green tensor and its inverse.
-    j : float
-        Square root of its determinant.
-    b : ndarray of shape (6,)
-        As given by `moduli`.
-    stress, tangent : ndarray of shape (6,) and (6, 6)
-        Filled: second Piola-Kirchhoff stress over C, and its derivative by the Green-Lagrange strain.
-        W over C is returned.
-    """
+def isochoric_strain(c: Floats, j: float, strain: Floats) -> float:
+    """Fill (J^(-2/3) C - I) / 2 for C of shape (6,); returns J^(-2/3)."""
     scale = j ** (-2.0 / 3.0)
-    be = np.empty(6)
-    q = 0.0
     for i in range(6):
-        strain = (scale * c[i] - (1.0 if i < 3 else 0.0)) / 2
-        be[i] = b[i] * strain
-        q += _SHEAR[i] * be[i] * strain
-    growth = exp(q)
-    trace = 0.0
-    for i in range(6):
-        stress[i] = growth * be[i]
-        trace += _SHEAR[i] * stress[i] * c[i]
-    _isochoric_moduli(c, inverse, growth, b, be, tangent)
-    for i in range(6):
-        stress[i] = scale * (stress[i] - trace * inverse[i] / 3)
-    for i in range(6):
-        for k in range(6):
-            fourth = product(inverse, i, k) - inverse[i] * inverse[k] / 3
-            change = scale * trace * fourth - inverse[i] * stress[k] - stress[i] * inverse[k]
-            tangent[i, k] = scale * scale * tangent[i, k] + 2.0 / 3.0 * change
-    return (growth - 1) / 2
+        strain[i] = (scale * c[i] - (1.0 if i < 3 else 0.0)) / 2
+    return scale
 
 
 @njit(cache=True, error_model="numpy")
-def _isochoric_moduli(c: Floats, inverse: Floats, growth: float, b: Floats, be: Floats, moduli: Floats) -> None:
-    """Fill the derivative of exp(Q) b E by E, projected by I - C^-1 x C / 3 on both sides."""
+def isochoric_stress(c: Floats, inverse: Floats, scale: float, stress: Floats) -> float:
+    """Turn the derivative of W by the isochoric strain into the second Piola-Kirchhoff stress.
+
+    J^(-2/3) Dev(dW/dE), with Dev(A) = A - (A : C) C^-1 / 3; Holzapfel, Nonlinear Solid Mechanics, eq. 6.90.
+    `stress`, shape (6,), is changed in its place; J^(-2/3) dW/dE : C is returned.
+    """
+    trace = 0.0
+    for i in range(6):
+        trace += SHEAR[i] * stress[i] * c[i]
+    for i in range(6):
+        stress[i] = scale * (stress[i] - trace * inverse[i] / 3)
+    return scale * trace
+
+
+@njit(cache=True, error_model="numpy")
+def isochoric_tangent(c: Floats, inverse: Floats, scale: float, trace: float, stress: Floats, tangent: Floats) -> None:
+    """Turn the second derivative of W by the isochoric strain into that of the stress by the strain.
+
+    Holzapfel, eq. 6.168. `stress` and `trace` are those of `isochoric_stress`; `tangent`, shape (6, 6), is
+    changed in its place, its upper triangle alone.
+    """
     along, total = np.empty(6), 0.0
     for i in range(6):
-        along[i] = growth * b[i] * c[i]
+        along[i] = 0.0
         for k in range(6):
-            along[i] += 2 * growth * be[i] * be[k] * _SHEAR[k] * c[k]
-        total += _SHEAR[i] * along[i] * c[i]
+            along[i] += tangent[i, k] * SHEAR[k] * c[k]
+        total += SHEAR[i] * along[i] * c[i]
+    square = scale * scale
     for i in range(6):
-        for k in range(6):
-            value = 2 * growth * be[i] * be[k] - (along[i] * inverse[k] + inverse[i] * along[k]) / 3
-            moduli[i, k] = value + total * inverse[i] * inverse[k] / 9
-        moduli[i, i] += growth * b[i] / _SHEAR[i]
+        for k in range(i, 6):
+            value = tangent[i, k] - (along[i] * inverse[k] + inverse[i] * along[k]) / 3
+            value = square * (value + total * inverse[i] * inverse[k] / 9)
+            fourth = trace * (product(inverse, i, k) - inverse[i] * inverse[k] / 3)
+            tangent[i, k] = value + 2.0 / 3.0 * (fourth - inverse[i] * stress[k] - stress[i] * inverse[k])
 
 
 @njit(cache=True, error_model="numpy")
@@ -124,29 +92,32 @@ def product(a: Floats, i: int, k: int) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def volumetric(inverse: Floats, j: float, pressure: float, stress: Floats, tangent: Floats) -> None:
-    """Stress of a pressure (Pa, positive in tension): p J C^-1.
+def add_volumetric(inverse: Floats, j: float, pressure: float, bulk: float, tangent: Floats) -> None:
+    """Add the tangent of the stress p J C^-1 of a pressure (Pa, positive in tension) that itself grows by bulk per J.
 
-    Fills `stress`, shape (6,), for a pressure of one; adds the derivative for the given pressure to `tangent`.
+    The upper triangle of `tangent`, shape (6, 6).
     """
     for i in range(6):
-        stress[i] = j * inverse[i]
-        for k in range(6):
-            tangent[i, k] += pressure * j * (inverse[i] * inverse[k] - 2 * product(inverse, i, k))
+        for k in range(i, 6):
+            outer = inverse[i] * inverse[k]
+            tangent[i, k] += pressure * j * (outer - 2 * product(inverse, i, k)) + bulk * j * j * outer
 
 
 @njit(cache=True, error_model="numpy")
-def active(c_ff: float, beta: float) -> tuple[float, float]:
-    """Active fibre stress for T_Ca = 1: S_ff = [1 + beta (lambda - 1)] / lambda^2 with lambda^2 = C_ff = 2 E_f + 1.
+def active(c_ff: float, beta: float, power: float) -> tuple[float, float]:
+    """Active fibre stress for T_Ca = 1: S_ff = [1 + beta (lambda - 1)] / lambda^power with lambda^2 = C_ff = 2 E_f + 1.
+
+    Power 2 is the tension per deformed area of the paper's equations 2 and 3; power 0 the tension as second
+    Piola-Kirchhoff stress, as in Land et al. 2015.
 
     Returns
     -------
     stress, tangent : float
-        S_ff and its derivative by E_f; equations 2 and 3 of the paper.
+        S_ff and its derivative by E_f.
     """
     stretch = sqrt(c_ff)
-    stress = (1 + beta * (stretch - 1)) / c_ff
-    return stress, -2 * (1 - beta) / c_ff**2 - beta / (c_ff * stretch)
+    stress = (1 + beta * (stretch - 1)) * stretch**-power
+    return stress, (beta * stretch ** (-power) - power * stress / stretch) / stretch
 
 
 @njit(cache=True, error_model="numpy")

@@ -18,6 +18,10 @@ Floats = NDArray[np.float64]
 _SYMMETRIC_INDEFINITE = -2
 _ANALYSE, _FACTOR, _SOLVE = 11, 22, 33
 
+_PARAMETERS = {1: 1, 2: 2, 8: 0, 10: 8, 21: 1}
+"""Pardiso's iparm: own values, nested dissection, no iterative refinement (Newton's method does that),
+pivots raised to 1e-8, Bunch-Kaufman pivoting."""
+
 
 class SingularMatrix(ArithmeticError):
     """A matrix that could not be factored."""
@@ -57,6 +61,8 @@ class Pardiso:
         from pypardiso import PyPardisoSolver
 
         self._solver = PyPardisoSolver(mtype=_SYMMETRIC_INDEFINITE)
+        for place, value in _PARAMETERS.items():
+            self._solver.set_iparm(place, value)
         self._upper: csr_matrix | None = None
 
     def factor(self, upper: csr_matrix) -> None:

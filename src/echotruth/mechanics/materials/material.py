@@ -1,0 +1,19 @@
+"""What every passive law has in common."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echotruth.section import Positive, Section
+
+
+class Material(Section):
+    """A passive law: its energy is the stiffness C times a function of the isochoric strain."""
+
+    stiffness_kPa: Positive | None = None
+    """C. Default: solved, so that the heart has its end-diastolic volume at its end-diastolic pressure.
+    When given, the loop's volumes are scaled to the volume the heart then has at end-diastolic pressure."""
+
+    def constants(self) -> np.ndarray:
+        """Numbers of the law, C left out, in the order in which its `energy` takes them."""
+        raise NotImplementedError

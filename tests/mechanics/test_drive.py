@@ -1,0 +1,97 @@
+"""Hearts driven three ways, stopped and taken up, ill and well."""
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from echotruth.config import Config, Geometry, Loop, Mechanics, Pathology
+from echotruth.mechanics import drive
+from echotruth.mechanics.activation import Activation
+from echotruth.mechanics.beat import beat
+from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.loop import read_loop
+from echotruth.mechanics.progress import Progress
+from echotruth.mechanics.wall import equilibrium, wall
+
+COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
+CONFIG = Config(geometry=COARSE, loop=Loop(frames=12), mechanics=Mechanics(viscosity_Pa_s=0.0))
+
+
+def solved(cycle, config=CONFIG, stiffness=None, progress=None):
+    heart = wall(config, left_ventricle(config.geometry))
+    activation = Activation(heart.tissue.tension_scale, heart.tissue.activation_delay, cycle.period / len(cycle.time))
+    equations = equilibrium(config, heart)
+    try:
+        return drive.solve(equations, cycle, activation, stiffness, progress)
+    finally:
+        equations.close()
+
+
+@pytest.fixture(scope="module")
+def cycle():
+    return read_loop(CONFIG.loop)
+
+
+@pytest.fixture(scope="module")
+def driven(cycle):
+    return solved(cycle)
+
+
+def test_volume_and_tension_give_back_the_pressure(cycle, driven):
+    other = replace(cycle, drive="volume", pressure=None, tension=driven.tension)
+    back = solved(other, stiffness=driven.stiffness)
+    np.testing.assert_allclose(back.pressure, cycle.pressure, rtol=1e-4)
+    assert np.all(np.isnan(back.pressure_asked))
+    apart = np.abs(back.displacement - driven.displacement).max()
+    assert apart < 1e-4 * np.abs(driven.displacement).max()
+
+
+def test_pressure_alone_fills_the_passive_heart_as_its_volume_does(cycle, driven):
+    """Without tension the volume that bears a pressure is the only one."""
+    nothing, pressure = np.zeros(4), cycle.pressure[0] * np.array([1.0, 1.5, 1.2, 0.5])
+    slack = replace(cycle, time=cycle.time[:4], tension=nothing)
+    filled = solved(replace(slack, drive="pressure", pressure=pressure, volume=None), stiffness=driven.stiffness)
+    assert filled.volume[0] == pytest.approx(driven.volume[0], rel=1e-7)
+    back = solved(replace(slack, drive="volume", pressure=None, volume=filled.volume), stiffness=driven.stiffness)
+    np.testing.assert_allclose(back.pressure, pressure, rtol=1e-6)
+
+
+def test_stopped_beat_goes_on_and_ends_in_the_same_bytes(cycle, driven, tmp_path, caplog):
+    whole = solved(cycle, progress=Progress(tmp_path))
+    for late in sorted(tmp_path.glob("*.frame"))[5:]:
+        late.unlink()
+    with caplog.at_level(logging.INFO, "echotruth.mechanics"):
+        resumed = solved(cycle, progress=Progress(tmp_path))
+    assert "goes on after 5 of 12 frames" in caplog.text
+    for name in vars(driven):
+        assert np.asarray(getattr(driven, name)).tobytes() == np.asarray(getattr(whole, name)).tobytes(), name
+        assert np.asarray(getattr(driven, name)).tobytes() == np.asarray(getattr(resumed, name)).tobytes(), name
+
+
+def test_viscosity_lets_a_wall_that_weakens_as_it_shortens_go_on(cycle):
+    """With a tension that does not fall with length (beta = 0) no equilibrium neighbours that of early ejection."""
+    constant = Mechanics(active={"length_dependence": 0.0})  # and the viscosity that stands by default
+    config = CONFIG.model_copy(update={"mechanics": constant, "loop": Loop()})
+    found = solved(read_loop(config.loop), config)
+    np.testing.assert_allclose(found.volume, found.volume_asked, rtol=1e-7)
+
+
+def test_infarct_stretches_where_healthy_wall_shortens():
+    ill = CONFIG.model_copy(update={"pathology": Pathology(infarct={"segments": [7, 12], "stiffness_scale": 2.0})})
+    arrays = beat(ill)
+    es = int(arrays["mechanics"]["es_frame"])
+    fibre = arrays["kinematics"]["fibre_strain"][es, :, 0]
+    region = arrays["pathology"]["region"]
+    assert fibre[region == 1].mean() > 0
+    assert fibre[region == 0].mean() < -0.08
+
+
+def test_late_wall_is_stretched_first():
+    late = CONFIG.model_copy(update={"pathology": Pathology(late_activation={"preset": "lbbb"}), "loop": Loop()})
+    arrays = beat(late)
+    delay, fibre = arrays["pathology"]["activation_delay"], arrays["kinematics"]["fibre_strain"][..., 0]
+    early = fibre[2]
+    assert early[delay == delay.max()].mean() > 0.02
+    assert early[delay == 0].mean() < 0
