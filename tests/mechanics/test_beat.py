@@ -22,7 +22,7 @@ SHAPES = {
     "pathology": {"region", "stiffness_scale", "tension_scale", "activation_delay"},
     "mechanics": {
         *("time", "pressure", "volume", "pressure_asked", "volume_asked", "active_tension"),
-        *("displacement", "stiffness", "es_frame", "phase", "newton_steps"),
+        *("displacement", "stiffness", "es_frame", "phase", "newton_steps", "residual"),
     },
     "kinematics": {
         *("deformation_gradient", "strain_unloaded", "strain", "fibre_strain_unloaded", "fibre_strain"),

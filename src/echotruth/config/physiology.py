@@ -25,7 +25,7 @@ class Physiology(Section):
     (Young & Cowan 2012, doi 10.1186/1532-429X-14-49); with the wrong fibres it is 60 to 90 deg."""
     volume_ratio_min: Share | None = 0.2
     """Smallest det F of any point at any frame: what is nearer to collapse says nothing about a wall, which hardly
-    changes its volume; 0.32 at the apex of the default heart."""
+    changes its volume; 0.45 at the apex of the default heart."""
     loop_error_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.005
     """Largest relative difference between what was prescribed and what was met, pressure or volume, at any frame."""
     tension_min_kPa: FiniteFloat | None = -1.0

@@ -122,6 +122,7 @@ def _course(solved: drive.Beat, cycle: Cycle) -> Arrays:
         "es_frame": np.array(phases.es_frame(solved.pressure, solved.volume)),
         "phase": phases.phases(solved.pressure, solved.volume),
         "newton_steps": solved.newton_steps,
+        "residual": solved.residual,
     }
 
 

@@ -44,6 +44,8 @@ class Beat:
         T_Ca of the healthy, undelayed wall.
     newton_steps : ndarray of shape (n_frames,)
         Factorizations.
+    residual : ndarray of shape (n_frames,)
+        Relative imbalance of force, volume and growth that is left.
     stiffness : float, Pa
     """
 
@@ -54,6 +56,7 @@ class Beat:
     volume_asked: Floats
     tension: Floats
     newton_steps: NDArray[np.int64]
+    residual: Floats
     stiffness: float
 
 
@@ -184,5 +187,6 @@ def _beat(heart: Equilibrium, cycle: Cycle, frames: list[Frame]) -> Beat:
         volume_asked=nothing if cycle.volume is None else cycle.volume,
         tension=np.array([frame.state.tension for frame in frames]),
         newton_steps=np.diff([frame.steps for frame in frames], prepend=0),
+        residual=np.array([frame.residual for frame in frames]),
         stiffness=frames[0].state.stiffness,
     )

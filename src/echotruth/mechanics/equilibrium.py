@@ -143,6 +143,11 @@ class Imbalance:
         """Sum of the relative norms."""
         return self.force_error + self.volume_error + self.growth_error
 
+    @property
+    def worst(self) -> float:
+        """Largest of the relative norms."""
+        return max(self.force_error, self.volume_error, self.growth_error)
+
 
 class Equilibrium:
     """The equations of one heart.

@@ -31,12 +31,15 @@ class Frame:
         Met by it.
     steps : int
         Factorizations up to it.
+    residual : float
+        Relative imbalance of force, volume and growth that is left.
     factored : Factored, optional
     """
 
     state: State
     load: Load
     steps: int
+    residual: float
     factored: Factored | None
 
 

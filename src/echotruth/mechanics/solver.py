@@ -49,6 +49,7 @@ class Walk:
     def __init__(self, heart: Equilibrium, stiffness: float) -> None:
         self.heart, self.state, self.steps = heart, heart.rest(stiffness), 0
         self.load = Load(0.0, heart.volume(self.state))
+        self.residual = 0.0
         self._tangent: Tangent | None = None
 
     def to(self, load: Load, unknown: Unknown, guesses: tuple[State, ...] = ()) -> State:
@@ -89,7 +90,7 @@ class Walk:
         """The last solved state, with all that the next one depends on."""
         tangent = self._tangent
         factored = Factored(tangent.state, tangent.load, tangent.unknown, tangent.past) if tangent else None
-        return Frame(self.state, self.load, self.steps, factored)
+        return Frame(self.state, self.load, self.steps, self.residual, factored)
 
     def resume(self, frame: Frame) -> None:
         """Go on from a solved state."""
@@ -110,6 +111,7 @@ class Walk:
             self._tangent = None
         for _ in range(_MOST_STEPS):
             if _solved(imbalance):
+                self.residual = imbalance.worst
                 return state
             state, imbalance = self._newton(state, imbalance, load, unknown)
         self._tangent = None
@@ -176,7 +178,7 @@ def combined(states: Sequence[State], weights: Sequence[float]) -> State:
 
 
 def _solved(imbalance: Imbalance) -> bool:
-    return max(imbalance.force_error, imbalance.volume_error, imbalance.growth_error) < TOLERANCE
+    return imbalance.worst < TOLERANCE
 
 
 def _learned(correction: Correction, steps: list[Correction]) -> Correction:

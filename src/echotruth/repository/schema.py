@@ -83,12 +83,13 @@ MECHANICS = (
     _array("volume_asked", "case frame", "float64", "m3", "cavity volume asked for"),
     _array("active_tension", "case frame", "float64", "Pa", "active tension T_Ca, solved"),
     _array("displacement", "case frame node xyz", "float64", "m", "displacement of the nodes from unloaded"),
-    _array("stiffness", "case", "float64", "Pa", "stiffness C of the wall"),
+    _array("stiffness", "case", "float64", "Pa", "stiffness C of the healthy wall"),
     _array("es_frame", "case", "int32", "1", "frame of end-systole"),
     _array(
         "phase", "case frame", "uint8", "1", "0 filling, 1 isovolumic contraction, 2 ejection, 3 isovolumic relaxation"
     ),
-    _array("newton_steps", "case frame", "int32", "1", "Newton steps taken to reach the frame"),
+    _array("newton_steps", "case frame", "int32", "1", "tangents factored to reach the frame"),
+    _array("residual", "case frame", "float64", "1", "relative imbalance of force, volume and growth left"),
 )
 
 _STRAIN = "case frame cell strain_component"
