@@ -13,7 +13,7 @@ from snakemake.exceptions import WorkflowError
 
 from echotruth.cases import expand as expand_cases
 from echotruth.config.loading import ConfigError, validate
-from echotruth.mechanics.body import fingerprint
+from echotruth.mechanics.geometry.body import fingerprint
 from echotruth.mechanics.loop import read_loop
 from echotruth.provenance import code_version, settings_version
 from echotruth.repository.job import GATES, record_path

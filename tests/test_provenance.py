@@ -31,6 +31,7 @@ def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_
         return _closure((str(ROOT / f"workflow/scripts/{stage}.py"),))
 
     assert "echotruth.mechanics.solver" in closure("mechanics")
+    assert "echotruth.mechanics.materials.neo_hooke" in closure("mechanics"), "found in its folder, not by an import"
     assert "echotruth.mechanics.solver" not in closure("tracking")
     assert "echotruth.tracking.phase_correlation" not in closure("mechanics") | closure("rf")
 

@@ -72,7 +72,14 @@ def _imports(tree: ast.Module, importer: str) -> list[str]:
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+            names |= _discovered(importer) if node.module == "pkgutil" else set()
     return sorted(name for name in names if name.startswith("echotruth.") and name != importer and _path(name))
+
+
+def _discovered(package: str) -> set[str]:
+    """Modules of a package that imports whatever stands in its folder."""
+    path = _path(package)
+    return {f"{package}.{file.stem}" for file in path.parent.glob("*.py")} - {f"{package}.__init__"} if path else set()
 
 
 @cache

@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from echotruth.mechanics.equilibrium import Equilibrium, Load, State
+from echotruth.mechanics.geometry.soundness import jacobians
 from echotruth.mechanics.solver import Diverged, Walk
-from echotruth.mechanics.soundness import jacobians
 from echotruth.tetrahedra import Floats, Mesh
 
 logger = logging.getLogger("echotruth.mechanics")

@@ -8,8 +8,8 @@ import numpy as np
 
 from echotruth import anatomy
 from echotruth.config import Geometry
-from echotruth.mechanics.soundness import check_cavity, check_turned
-from echotruth.mechanics.template import course, laid_through
+from echotruth.mechanics.geometry.soundness import check_cavity, check_turned
+from echotruth.mechanics.geometry.template import course, laid_through
 from echotruth.section import UNITS
 from echotruth.tetrahedra import Floats, Mesh
 

@@ -7,15 +7,15 @@ import logging
 import numpy as np
 
 from echotruth.config import Geometry
-from echotruth.mechanics import body as reading
-from echotruth.mechanics.body import METRES, Body
-from echotruth.mechanics.facets import beside, boundary, edges_of, pieces
-from echotruth.mechanics.fitted import refilled
-from echotruth.mechanics.heart_frame import Frame, frame_of
-from echotruth.mechanics.muscle import carried
-from echotruth.mechanics.sides import NAMES, Skin, with_sides
-from echotruth.mechanics.soundness import GeometryError, check_cavity, check_flat, check_turned
-from echotruth.mechanics.tissue import marked, wall_of
+from echotruth.mechanics.geometry import body as reading
+from echotruth.mechanics.geometry.body import METRES, Body
+from echotruth.mechanics.geometry.cut import marked, wall_of
+from echotruth.mechanics.geometry.facets import beside, boundary, edges_of, pieces
+from echotruth.mechanics.geometry.fitted import refilled
+from echotruth.mechanics.geometry.frame import Frame, frame_of
+from echotruth.mechanics.geometry.muscle import carried
+from echotruth.mechanics.geometry.sides import NAMES, Skin, with_sides
+from echotruth.mechanics.geometry.soundness import GeometryError, check_cavity, check_flat, check_turned
 from echotruth.tetrahedra import EDGES, Floats, Integers, Mesh
 
 logger = logging.getLogger("echotruth.mechanics")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from echotruth.config import Geometry
-from echotruth.mechanics.ellipsoid import ellipsoid
+from echotruth.mechanics.geometry.ellipsoid import ellipsoid
+from echotruth.mechanics.geometry.soundness import GeometryError, jacobians
 from echotruth.mechanics.quadrature import tetrahedron
-from echotruth.mechanics.soundness import GeometryError, jacobians
 from echotruth.tetrahedra import Floats, Mesh
 
 __all__ = ["GeometryError", "cell_volumes", "left_ventricle"]
@@ -33,7 +33,7 @@ def left_ventricle(geometry: Geometry) -> Mesh:
     """
     if geometry.file is None:
         return ellipsoid(geometry)
-    from echotruth.mechanics.heart_file import heart_of
+    from echotruth.mechanics.geometry.file import heart_of
 
     return heart_of(geometry)
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.config.geometry import Labels
-from echotruth.mechanics.body import Body
-from echotruth.mechanics.facets import boundary, crowded_faces, edges_of, neighbours, pieces
-from echotruth.mechanics.soundness import GeometryError
+from echotruth.mechanics.geometry.body import Body
+from echotruth.mechanics.geometry.facets import boundary, crowded_faces, edges_of, neighbours, pieces
+from echotruth.mechanics.geometry.soundness import GeometryError
 from echotruth.tetrahedra import Floats, Integers
 
 logger = logging.getLogger("echotruth.mechanics")

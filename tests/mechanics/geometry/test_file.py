@@ -10,15 +10,14 @@ import pyvista
 from echotruth.config import Geometry
 from echotruth.config.geometry import Labels
 from echotruth.config.loading import load
-from echotruth.mechanics import soundness
-from echotruth.mechanics.body import read
 from echotruth.mechanics.cavity import cavity_volume
-from echotruth.mechanics.facets import boundary
-from echotruth.mechanics.geometry import GeometryError, cell_volumes, left_ventricle
-from echotruth.mechanics.heart_file import quadratic
-from echotruth.mechanics.sides import BASE, ENDO, EPI, with_sides
-from echotruth.mechanics.soundness import scaled_jacobian
-from echotruth.mechanics.tissue import wall_of
+from echotruth.mechanics.geometry import GeometryError, cell_volumes, left_ventricle, soundness
+from echotruth.mechanics.geometry.body import read
+from echotruth.mechanics.geometry.cut import wall_of
+from echotruth.mechanics.geometry.facets import boundary
+from echotruth.mechanics.geometry.file import quadratic
+from echotruth.mechanics.geometry.sides import BASE, ENDO, EPI, with_sides
+from echotruth.mechanics.geometry.soundness import scaled_jacobian
 
 EXAMPLE = Path(__file__).parents[2] / "config/rodero.yaml"
 

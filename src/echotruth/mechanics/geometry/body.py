@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.config import Geometry
-from echotruth.mechanics.soundness import GeometryError
+from echotruth.mechanics.geometry.soundness import GeometryError
 from echotruth.tetrahedra import Floats, Integers
 
 Arrays = dict[str, NDArray]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from echotruth.mechanics.facets import (
+from echotruth.mechanics.geometry.facets import (
     area_vectors,
     beside,
     boundary,

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echotruth.mechanics.facets import area_vectors
-from echotruth.mechanics.sides import BASE, ENDO, Skin
+from echotruth.mechanics.geometry.facets import area_vectors
+from echotruth.mechanics.geometry.sides import BASE, ENDO, Skin
 from echotruth.tetrahedra import Floats
 
 LEVEL = 0.01

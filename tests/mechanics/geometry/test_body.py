@@ -8,8 +8,8 @@ import pytest
 import pyvista
 
 from echotruth.config import Geometry
-from echotruth.mechanics.body import fingerprint, read
-from echotruth.mechanics.soundness import GeometryError
+from echotruth.mechanics.geometry.body import fingerprint, read
+from echotruth.mechanics.geometry.soundness import GeometryError
 
 
 def test_linear_tetrahedra_and_their_arrays(lying, written):

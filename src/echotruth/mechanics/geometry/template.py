@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from echotruth.config import Geometry
-from echotruth.mechanics.facets import boundary
+from echotruth.mechanics.geometry.facets import boundary
 from echotruth.tetrahedra import EDGES, Floats, Integers, Mesh
 
 Wall = Callable[[Floats, Floats, Floats], Floats]

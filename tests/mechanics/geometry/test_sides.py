@@ -6,11 +6,11 @@ import pyvista
 
 from echotruth.config import Geometry
 from echotruth.config.geometry import Sides
-from echotruth.mechanics.body import Body
-from echotruth.mechanics.facets import boundary
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.sides import with_sides
-from echotruth.mechanics.soundness import GeometryError
+from echotruth.mechanics.geometry.body import Body
+from echotruth.mechanics.geometry.facets import boundary
+from echotruth.mechanics.geometry.sides import with_sides
+from echotruth.mechanics.geometry.soundness import GeometryError
 
 NAMES = ("endo", "epi", "base")
 

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from echotruth.config.geometry import Sides
-from echotruth.mechanics.body import Body
-from echotruth.mechanics.facets import area_vectors, beside, largest, pieces
-from echotruth.mechanics.rays import Rays, all_round
-from echotruth.mechanics.soundness import GeometryError
-from echotruth.mechanics.tissue import array_of, numbers
+from echotruth.mechanics.geometry.body import Body
+from echotruth.mechanics.geometry.cut import array_of, numbers
+from echotruth.mechanics.geometry.facets import area_vectors, beside, largest, pieces
+from echotruth.mechanics.geometry.rays import Rays, all_round
+from echotruth.mechanics.geometry.soundness import GeometryError
 from echotruth.tetrahedra import Floats, Integers
 
 logger = logging.getLogger("echotruth.mechanics")

@@ -5,10 +5,10 @@ import pytest
 
 from echotruth.config import Geometry
 from echotruth.config.geometry import Labels
-from echotruth.mechanics.body import Body, read
-from echotruth.mechanics.facets import boundary, edges_of, neighbours
-from echotruth.mechanics.soundness import GeometryError
-from echotruth.mechanics.tissue import marked, volumes, wall_of
+from echotruth.mechanics.geometry.body import Body, read
+from echotruth.mechanics.geometry.cut import marked, volumes, wall_of
+from echotruth.mechanics.geometry.facets import boundary, edges_of, neighbours
+from echotruth.mechanics.geometry.soundness import GeometryError
 
 
 def body_of(nodes, cells, **arrays):

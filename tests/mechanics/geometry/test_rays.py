@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.mechanics.rays import Rays, all_round
+from echotruth.mechanics.geometry.rays import Rays, all_round
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from echotruth.config import Geometry
-from echotruth.mechanics.body import Body
-from echotruth.mechanics.heart_frame import Frame
-from echotruth.mechanics.soundness import GeometryError
-from echotruth.mechanics.tissue import array_of
+from echotruth.mechanics.geometry.body import Body
+from echotruth.mechanics.geometry.cut import array_of
+from echotruth.mechanics.geometry.frame import Frame
+from echotruth.mechanics.geometry.soundness import GeometryError
 from echotruth.tetrahedra import Floats, Mesh
 
 ONE_WAY = 0.999

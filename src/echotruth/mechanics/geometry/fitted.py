@@ -16,11 +16,11 @@ import numpy as np
 from scipy.special import eval_jacobi
 
 from echotruth.config import Geometry
-from echotruth.mechanics.heart_frame import Frame, apex_of, axes_about, normal_of_base, rim_centroid
-from echotruth.mechanics.rays import Rays
-from echotruth.mechanics.sides import BASE, ENDO, EPI, Skin
-from echotruth.mechanics.soundness import GeometryError
-from echotruth.mechanics.template import course, laid_through
+from echotruth.mechanics.geometry.frame import Frame, apex_of, axes_about, normal_of_base, rim_centroid
+from echotruth.mechanics.geometry.rays import Rays
+from echotruth.mechanics.geometry.sides import BASE, ENDO, EPI, Skin
+from echotruth.mechanics.geometry.soundness import GeometryError
+from echotruth.mechanics.geometry.template import course, laid_through
 from echotruth.tetrahedra import Floats, Mesh
 
 logger = logging.getLogger("echotruth.mechanics")

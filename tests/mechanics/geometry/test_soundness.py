@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echotruth.mechanics.soundness import GeometryError, check_cavity, check_flat, check_turned, scaled_jacobian
+from echotruth.mechanics.geometry.soundness import (
+    GeometryError,
+    check_cavity,
+    check_flat,
+    check_turned,
+    scaled_jacobian,
+)
 
 REGULAR = np.array([[1.0, 1, 1], [-1, 1, -1], [1, -1, -1], [-1, -1, 1]])
 

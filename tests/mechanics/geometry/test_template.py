@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.mechanics.template import course, laid_through
+from echotruth.mechanics.geometry.template import course, laid_through
 
 
 def tube(depth, r, azimuth):

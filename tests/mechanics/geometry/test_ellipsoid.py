@@ -5,10 +5,10 @@ import pytest
 
 from echotruth.config import Geometry
 from echotruth.mechanics.cavity import cavity_volume, triangle_shape
-from echotruth.mechanics.ellipsoid import ellipsoid, shells
 from echotruth.mechanics.geometry import cell_volumes
+from echotruth.mechanics.geometry.ellipsoid import ellipsoid, shells
+from echotruth.mechanics.geometry.soundness import GeometryError
 from echotruth.mechanics.quadrature import triangle
-from echotruth.mechanics.soundness import GeometryError
 
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
 
