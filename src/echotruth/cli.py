@@ -1,4 +1,4 @@
-"""The command line: `echotruth check`, `echotruth cases`, `echotruth run`."""
+"""The command line: `echotruth check`, `echotruth cases`, `echotruth run`, `echotruth validate`."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ def main() -> None:
     arguments, options = _parser().parse_known_args()
     if options and arguments.command != "run":
         sys.exit(f"echotruth {arguments.command}: {options[0]} is not an option: see echotruth --help")
+    if arguments.command == "validate":
+        sys.exit(validate(Path(arguments.folder), arguments.quick))
     try:
         config = load(arguments.config)
         cases = expand(config, arguments.config)
@@ -65,6 +67,23 @@ def run(path: str, config: Config, options: list[str]) -> int:
     return status
 
 
+def validate(folder: Path, quick: bool) -> int:
+    """Check the heart against what is known and write the page; 1 if a number is off, otherwise 0.
+
+    Parameters
+    ----------
+    folder : Path
+        Where validation.md is put, its pictures in the folder validation beside it.
+    quick : bool
+        Coarse meshes: a few minutes in place of half an hour.
+    """
+    from echotruth.validation.page import write
+
+    met = write(folder, quick, lambda said: print(said, flush=True))
+    print(f"\nPage: {folder / 'validation.md'}")
+    return 0 if met else 1
+
+
 def _quietly(command: list[str]) -> int:
     """Run a command whose words matter only when it fails."""
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
@@ -103,4 +122,8 @@ def _parser() -> argparse.ArgumentParser:
     ):
         command = commands.add_parser(name, help=text, description=text)
         command.add_argument("config", help="YAML file, as config/demo.yaml")
+    text = "check the heart against exact solutions, published problems and conservation laws, and write the page"
+    command = commands.add_parser("validate", help=text, description=text)
+    command.add_argument("--quick", action="store_true", help="coarse meshes, a few minutes")
+    command.add_argument("--folder", default="docs", help="where validation.md is written (default: docs)")
     return parser

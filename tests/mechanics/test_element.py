@@ -8,6 +8,7 @@ from echotruth.config import Geometry
 from echotruth.mechanics import element
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.materials import LAWS, compiled
+from echotruth.mechanics.point import WHOLE
 from echotruth.tetrahedra import Mesh
 
 
@@ -39,10 +40,6 @@ def respond(mesh, nodes, scale, frame=None, laws=None):
     return out
 
 
-def whole(out, scale):
-    return np.einsum("pc,cpr->cr", scale[:4], out.force)
-
-
 def summed(mesh, forces):
     total = np.zeros((len(mesh.nodes), 3))
     np.add.at(total, mesh.cells, forces.reshape(-1, 10, 3))
@@ -53,7 +50,7 @@ def test_homogeneous_deformation_leaves_the_inside_in_balance(mesh):
     gradient = np.array([[1.1, 0.2, 0.0], [-0.1, 0.95, 0.1], [0.05, 0.0, 1.02]])
     scale = load(mesh, pressure=1e4)
     out = respond(mesh, mesh.nodes @ gradient.T, scale)
-    total = summed(mesh, whole(out, scale))
+    total = summed(mesh, out.force[:, WHOLE])
     inside = np.setdiff1d(mesh.cells, np.concatenate([side.ravel() for side in (mesh.endo, mesh.epi, mesh.base)]))
     assert len(inside) > 50
     assert np.abs(total[inside]).max() < 1e-10 * np.abs(total).max()
@@ -83,7 +80,7 @@ def test_tangent_is_the_derivative_of_the_condensed_force(mesh, name, power):
     scale, step = load(mesh, pressure=1e4 * rng.normal(size=len(mesh.cells)), viscosity=1e3), 1e-9
     here = respond(mesh, nodes, scale, frame, laws)
     ends = [respond(mesh, nodes + side * step * change, scale, frame, laws) for side in (1, -1)]
-    forces = [whole(out, scale) for out in ends]
+    forces = [out.force[:, WHOLE] for out in ends]
     growth = (ends[0].volume - ends[1].volume) / np.sum(body(mesh).weight, axis=1)
     slope = (forces[0] - forces[1] + laws.bulk_modulus * growth[:, None] * here.force[:, 2]) / (2 * step)
     tangent = np.zeros((len(mesh.cells), 30, 30))
@@ -99,14 +96,20 @@ def test_each_cell_bears_its_own_stiffness_tension_pressure_and_viscosity(mesh):
     same = load(mesh, pressure=1e4, viscosity=1e3)
     scale = element.Load(*(values * part for values, part in zip(same[:4], share, strict=True)), same.before)
     one, each = respond(mesh, nodes, load(mesh, 1.0, 1.0, 1.0, 1.0)), respond(mesh, nodes, scale)
-    np.testing.assert_array_equal(each.force, one.force)
+    np.testing.assert_array_equal(each.force[:, :WHOLE], one.force[:, :WHOLE])
+    parts = np.einsum("pc,cpr->cr", scale[:3], each.force[:, :WHOLE])
+    still = respond(mesh, nodes, scale._replace(viscosity=0 * scale.viscosity)).force[:, WHOLE]
+    np.testing.assert_allclose(still, parts, atol=1e-10 * np.abs(parts).max())
+    viscous = respond(mesh, nodes, load(mesh, 0.0, 0.0, 0.0, 1.0)).force[:, WHOLE]
+    expected = parts + scale.viscosity[:, None] * viscous
+    np.testing.assert_allclose(each.force[:, WHOLE], expected, atol=1e-10 * np.abs(parts).max())
     assert not np.allclose(each.tangent, respond(mesh, nodes, same).tangent)
 
 
 def test_viscous_force_does_the_work_of_the_growth_of_strain(mesh):
     """A wall that swells from 1.05 to 1.1 times its size: S is the growth of E, and its work by the way on 3 S l dl."""
-    out, wall = respond(mesh, 1.1 * mesh.nodes, load(mesh, viscosity=1.0)), np.sum(body(mesh).weight)
-    work = np.sum(summed(mesh, out.force[:, 3]) * mesh.nodes)
+    scale, wall = load(mesh, 0.0, 0.0, 0.0, viscosity=1.0), np.sum(body(mesh).weight)
+    work = np.sum(summed(mesh, respond(mesh, 1.1 * mesh.nodes, scale).force[:, WHOLE]) * mesh.nodes)
     assert work == pytest.approx(3 * (1.1**2 - 1.05**2) / 2 * 1.1 * wall, rel=1e-12)
 
 

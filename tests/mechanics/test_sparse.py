@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, triu
 
-from echotruth.mechanics.sparse import SuperLU, factorization
+from echotruth.mechanics.sparse import ENOUGH, Pardiso, SuperLU, factorization
 
 
 @pytest.mark.parametrize("make", [factorization, SuperLU])
@@ -17,4 +17,17 @@ def test_indefinite_systems_of_one_pattern_are_solved(make):
         right = rng.normal(size=(40, 2))
         solver.factor(csr_matrix(triu(matrix)))
         np.testing.assert_allclose(matrix @ solver.solve(right), right, atol=1e-9)
+    solver.close()
+
+
+def test_factors_of_single_precision_leave_a_small_residual_or_give_way_to_double():
+    pytest.importorskip("pypardiso")
+    rng = np.random.default_rng(1)
+    turn = np.linalg.qr(rng.normal(size=(60, 60)))[0]
+    right, solver = rng.normal(size=(60, 1)), Pardiso(single=True)
+    for spread, bound in ((4, ENOUGH), (10, 1e-4)):
+        matrix = turn * np.logspace(0, spread, 60) @ turn.T
+        solver.factor(csr_matrix(triu((matrix + matrix.T) / 2)))
+        left = matrix @ solver.solve(right) - right
+        assert np.linalg.norm(left) <= bound * np.linalg.norm(right), f"condition 1e{spread}"
     solver.close()

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from echotruth.mechanics import point
 from echotruth.mechanics.fibres import gradients
-from echotruth.mechanics.point import FAST, VISCOUS, VOLUMETRIC
+from echotruth.mechanics.point import FAST, PASSIVE, VOLUMETRIC, WHOLE
 from echotruth.mechanics.quadrature import tetrahedron
 from echotruth.tetrahedra import Mesh
 
@@ -28,6 +28,9 @@ Floats = NDArray[np.float64]
 
 DOFS = 30
 """Displacements of a cell, node by node."""
+
+WIDTH = 32
+"""Length of a row of its tangent, filled up for vector units."""
 
 PACKED = DOFS * (DOFS + 1) // 2
 """Entries of the upper triangle of its tangent, row by row."""
@@ -108,7 +111,8 @@ class Blocks(NamedTuple):
     Attributes
     ----------
     force : ndarray of shape (n_cells, 4, 30), m^2
-        Passive, active, volumetric and viscous force for a stiffness, tension, pressure and viscosity of one.
+        Passive, active and volumetric force for a stiffness, tension and pressure of one, which are left out
+        without a tangent, and the whole (N).
     volume : ndarray of shape (n_cells,), m^3
         Deformed volume; not a number where the cell is inside out.
     tangent : ndarray of shape (n_cells, 465) or (0, 465), N/m
@@ -180,7 +184,7 @@ def _cell(cell, nodes, body, law, load, out):
     nodes_of, force, with_tangent = body.cells[cell], out.force[cell], out.tangent.shape[0] > 0
     scale = load.stiffness[cell], load.tension[cell], load.pressure[cell], load.viscosity[cell]
     stress, tangent, c = np.empty((4, 6)), np.empty((6, 6)), np.empty((3, 6))
-    f, x, ke, volume = np.empty((3, 3)), np.empty((10, 3)), np.zeros((DOFS, DOFS)), 0.0
+    f, x, ke, volume = np.empty((3, 3)), np.empty((10, 3)), np.zeros((DOFS, WIDTH)), 0.0
     for a in range(10):
         x[a] = nodes[nodes_of[a]]
     force[:] = 0.0
@@ -188,10 +192,10 @@ def _cell(cell, nodes, body, law, load, out):
         slope, weight = body.slope[cell, q], body.weight[cell, q]
         j = point.deform(x, slope, f, c[0])
         point.elastic(c, j, law, scale, stress, tangent, with_tangent)
-        point.add_viscous(c[0], load.before[cell, q], scale[3], stress[VISCOUS], tangent)
-        _add_force(f, slope, stress, weight, force)
+        point.add_up(c[0], load.before[cell, q], scale, stress, tangent)
+        _add_force(f, slope, stress, weight, force, PASSIVE if with_tangent else WHOLE)
         if with_tangent:
-            _add_tangent(f, slope, scale, stress, tangent, weight, ke)
+            _add_tangent(f, slope, stress[WHOLE], tangent, weight, ke)
         volume += weight * j if j > 0 else np.nan
     out.volume[cell] = volume
     if with_tangent:
@@ -212,9 +216,10 @@ def _add_condensed(growth, factor, ke):
 
 
 @njit(**FAST)
-def _add_force(f, slope, stress, weight, force):
+def _add_force(f, slope, stress, weight, force, start):
+    """Add the parts of the force from `start` on."""
     first = np.empty((3, 3))
-    for part in range(4):
+    for part in range(start, 4):
         point.first_stress(f, stress[part], weight, first)
         for a in range(10):
             for i in range(3):
@@ -224,13 +229,13 @@ def _add_force(f, slope, stress, weight, force):
 
 
 @njit(**FAST)
-def _add_tangent(f, slope, scale, stress, tangent, weight, ke):
-    """Add the second derivatives of the energy by the displacements to the upper triangle.
+def _add_tangent(f, slope, stress, tangent, weight, ke):
+    """Add the second derivatives of the energy by the displacements to all entries.
 
     dP/dF, a matrix over pairs (axis, material axis), stands between the gradients of the shape functions.
     """
-    modulus, along = np.empty((9, 9)), np.empty((9, DOFS))
-    point.moduli(f, scale, stress, tangent, weight, modulus)
+    modulus, along = np.empty((9, 9)), np.zeros((9, WIDTH))
+    point.moduli(f, stress, tangent, weight, modulus)
     for r in range(9):
         for a in range(10):
             for i in range(3):
@@ -240,13 +245,11 @@ def _add_tangent(f, slope, scale, stress, tangent, weight, ke):
                     + modulus[r, 3 * i + 2] * slope[a, 2]
                 )
     for a in range(10):
+        x, y, z = slope[a, 0], slope[a, 1], slope[a, 2]
         for i in range(3):
-            for s in range(3 * a, DOFS):
-                ke[3 * a + i, s] += (
-                    slope[a, 0] * along[3 * i, s]
-                    + slope[a, 1] * along[3 * i + 1, s]
-                    + slope[a, 2] * along[3 * i + 2, s]
-                )
+            row, first, second, third = ke[3 * a + i], along[3 * i], along[3 * i + 1], along[3 * i + 2]
+            for s in range(WIDTH):  # all of the row, of a length known beforehand: that is what vector units like
+                row[s] += x * first[s] + y * second[s] + z * third[s]
 
 
 @njit(**FAST)
@@ -255,9 +258,9 @@ def _turn(a, frame, force, ke):
     for r in range(DOFS):
         for s in range(r):
             ke[r, s] = ke[s, r]
-    rows = frame @ np.ascontiguousarray(ke[3 * a : 3 * a + 3])
+    rows = frame @ np.ascontiguousarray(ke[3 * a : 3 * a + 3, :DOFS])
     rows[:, 3 * a : 3 * a + 3] = np.ascontiguousarray(rows[:, 3 * a : 3 * a + 3]) @ frame.T
-    ke[3 * a : 3 * a + 3] = rows
+    ke[3 * a : 3 * a + 3, :DOFS] = rows
     ke[:, 3 * a : 3 * a + 3] = rows.T
     force[:, 3 * a : 3 * a + 3] = np.ascontiguousarray(force[:, 3 * a : 3 * a + 3]) @ frame.T
 

@@ -180,7 +180,7 @@ class Equilibrium:
         self._cells = element.blocks(len(mesh.cells), with_tangent=True)
         self._facets = np.empty((len(mesh.endo), 18, 18))
         self._springs = springs(mesh, support.spring) if support.spring else None
-        self._solver = factorization()
+        self._solver = factorization(single=True)
         self.past: Past | None = None
         self._rate, self._before = np.zeros(len(mesh.cells)), np.zeros((*self.body.weight.shape, 6))
 
@@ -226,17 +226,16 @@ class Equilibrium:
         element.respond(nodes, self.body, self.law, scale, out)
         load_of_facets = self.assembly.turn(self.mesh.endo, cavity.load(nodes, self.mesh.endo))
         self._gradient = self.assembly.vector(load_of_facets, ENDO)
-        inside = self.assembly.vector(np.einsum("pc,cpr->cr", scale[:4], out.force)) + self._spring_force(nodes)
+        inside = self.assembly.vector(out.force[:, point.WHOLE]) + self._spring_force(nodes)
         blood = (state.cavity_pressure if unknown == "cavity_pressure" else load.pressure) * self._gradient
         growth = out.volume / self.unloaded - 1 - state.pressure / self.law.bulk_modulus
         volume = cavity.cavity_volume(nodes, self.mesh.endo) - load.volume if unknown else 0.0
-        errors = norm(inside - blood) / self._size(out, scale, blood), abs(volume) / load.volume if unknown else 0.0
+        errors = norm(inside - blood) / self._size(blood, out), abs(volume) / load.volume if unknown else 0.0
         return Imbalance(inside - blood, growth, volume, *errors, norm(growth) / np.sqrt(len(growth)))
 
-    def _size(self, out: element.Blocks, scale: element.Load, blood: Floats) -> float:
-        """Norm of the forces that balance at the nodes: of the blood, and of the wall where there is none."""
-        wall = self.assembly.vector(np.abs(scale.pressure[:, None] * out.force[:, point.VOLUMETRIC]))
-        return max(norm(blood), 1e-3 * norm(wall)) or 1.0
+    def _size(self, blood: Floats, out: element.Blocks) -> float:
+        """Norm of the forces that balance at the nodes: of the blood, and of the cells where there is none."""
+        return norm(blood) or norm(out.force[:, point.WHOLE]) or 1.0
 
     def _spring_force(self, nodes: Floats) -> Floats | float:
         if self._springs is None:

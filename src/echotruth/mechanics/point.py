@@ -1,7 +1,7 @@
 """Stress at one point of the wall, and its derivative by the deformation.
 
-Parts of the stress stand in the order `PASSIVE`, `ACTIVE`, `VOLUMETRIC`, `VISCOUS`, each for a
-factor of one; `scale` holds the factors.
+Parts of the stress stand in the order `PASSIVE`, `ACTIVE`, `VOLUMETRIC`, each for a factor of one, and
+after them `WHOLE`, with the viscous stress; `scale` holds the factors.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from numba import njit
 
 from echotruth.mechanics import material
 
-PASSIVE, ACTIVE, VOLUMETRIC, VISCOUS = range(4)
-"""Parts: for a stiffness, an active tension, a pressure and a viscosity over time of one."""
+PASSIVE, ACTIVE, VOLUMETRIC, WHOLE = range(4)
+"""Parts: for a stiffness, an active tension and a pressure of one, and the whole."""
 
 FAST = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}}
 """How the functions of an element are compiled."""
@@ -69,11 +69,12 @@ def elastic(strain, j, law, scale, stress, tangent, with_tangent):
 
 
 @njit(**FAST)
-def add_viscous(c, before, viscosity, stress, tangent):
-    """Fill the stress (6,) for a viscosity of one: the growth of strain, and add its tangent (Kelvin-Voigt)."""
+def add_up(c, before, scale, stress, tangent):
+    """Fill the whole of the stress (4, 6), what resists the growth of strain (Kelvin-Voigt) and its tangent added."""
     for k in range(6):
-        stress[k] = (c[k] - before[k]) / 2
-        tangent[k, k] += viscosity / material.SHEAR[k]
+        viscous = scale[3] * (c[k] - before[k]) / 2
+        stress[WHOLE, k] = scale[0] * stress[0, k] + scale[1] * stress[1, k] + scale[2] * stress[2, k] + viscous
+        tangent[k, k] += scale[3] / material.SHEAR[k]
 
 
 @njit(**FAST)
@@ -89,14 +90,12 @@ def first_stress(f, stress, weight, first):
 
 
 @njit(**FAST)
-def moduli(f, scale, stress, tangent, weight, modulus):
-    """Fill dP/dF (9, 9), times a weight: F D F and the stress itself (Holzapfel, section 6.6)."""
+def moduli(f, stress, tangent, weight, modulus):
+    """Fill dP/dF (9, 9), times a weight: F D F and the whole stress (6,) itself (Holzapfel, section 6.6)."""
     _material_moduli(f, tangent, weight, modulus)
     for k in range(3):
         for m in range(3):
-            n, whole = _COMPONENT[k, m], 0.0
-            for part in range(4):
-                whole += weight * scale[part] * stress[part, n]
+            whole = weight * stress[_COMPONENT[k, m]]
             for i in range(3):
                 modulus[3 * i + k, 3 * i + m] += whole
 
