@@ -120,7 +120,7 @@ def _check(config: Config, key: str, source: str) -> None:
     if isinstance(section, Section | dict):
         raise ConfigError(f"{source}: cases.{key}: {key} is a section: sweep one of its keys")
     if key == "geometry.file" and not config.geometry.remesh:
-        raise ConfigError(f"{source}: cases.{key}: meshes of different sizes share no arrays: set geometry.remesh: true")
+        raise ConfigError(f"{source}: cases.{key}: meshes of two sizes share no arrays: set geometry.remesh: true")
     if key.startswith(SHAPES) or key.endswith("_elements"):
         raise ConfigError(f"{source}: cases.{key}: {key} cannot be swept, it is common to a repository: set it once")
 

@@ -47,6 +47,7 @@ class Loop(Section):
     def _maps_what_it_prescribes(self) -> Loop:
         for key in ("edv_uL", "esv_uL", "edp_mmHg", "esp_mmHg"):
             missing = "volume" if key.endswith("uL") else "pressure"
-            if self.drive == {"volume": "pressure", "pressure": "volume"}[missing] and getattr(self, key) is not None:
-                raise impossible(key, getattr(self, key), f"the drive {self.drive} prescribes no {missing}: leave it out")
+            value, drive = getattr(self, key), {"volume": "pressure", "pressure": "volume"}[missing]
+            if self.drive == drive and value is not None:
+                raise impossible(key, value, f"the drive {drive} prescribes no {missing}: leave it out")
         return self
