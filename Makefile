@@ -4,7 +4,7 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test reference lock clean
+.PHONY: demo test reference validation lock clean
 
 demo: .venv/ready
 	$(BIN)/echotruth run config/demo.yaml
@@ -24,6 +24,9 @@ test: .venv/ready
 
 reference: .venv/ready  ## generated pages: schema and tables
 	$(BIN)/python -m echotruth.reference
+
+validation: .venv/ready  ## docs/validation.md, half an hour on one core
+	$(BIN)/echotruth validate
 
 lock:  ## needs uv
 	uv pip compile pyproject.toml --extra test --extra build --universal --python-version 3.11 \

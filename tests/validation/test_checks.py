@@ -1,0 +1,24 @@
+"""Every check of the page, on coarse meshes, within the tolerances of the page."""
+
+import numpy as np
+import pytest
+
+from echotruth.validation.page import CHECKS
+
+SLOW = {"ventricle"}
+
+
+def named(check):
+    name = check.__name__.rsplit(".", 1)[-1]
+    return pytest.param(check, id=name, marks=[pytest.mark.slow] if name in SLOW else [])
+
+
+@pytest.mark.parametrize("check", [named(check) for check in CHECKS])
+def test_numbers_are_within_their_tolerances(check):
+    numbers = check.measure(quick=True)
+    missed = {row.quantity: row.found for row in check.report(numbers).rows if not row.met}
+    assert not missed
+    if hasattr(check, "draw"):
+        sheet = check.draw(numbers)
+        sheet.canvas.draw()
+        assert np.asarray(sheet.canvas.buffer_rgba())[..., :3].min() < 128
