@@ -174,8 +174,8 @@ def test_default_heart_has_the_strains_computed_independently():
     case = beat(Config())
     es, mechanics = int(case["mechanics"]["es_frame"]), case["mechanics"]
     mean, sd = (case["kinematics"][name][es] for name in ("strain_mean", "strain_sd"))
-    np.testing.assert_allclose(mean[:3], [0.54, -0.170, -0.095], atol=[0.02, 0.005, 0.005])
-    np.testing.assert_allclose(sd[:3], [0.24, 0.052, 0.021], atol=[0.03, 0.005, 0.005])
+    assert np.all(np.abs(mean[:3] - [0.54, -0.170, -0.095]) < [0.02, 0.005, 0.005])
+    assert np.all(np.abs(sd[:3] - [0.24, 0.052, 0.021]) < [0.03, 0.005, 0.005])
     assert mechanics["stiffness"] == pytest.approx(1100, rel=0.03)
     assert mechanics["active_tension"][es] == pytest.approx(43e3, rel=0.03)
     np.testing.assert_allclose(mechanics["volume"], mechanics["volume_asked"], rtol=1e-6)

@@ -30,7 +30,7 @@ LOADS = 12
 """Equal steps of the pressure."""
 
 TIP = 4.18e-3
-"""Height, m, of the tip in the consensus of the participants, 4.17 to 4.19 mm."""
+"""Height, m, of the tip: the participants agree on about 4.17 to 4.19 mm."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def _newton(beam: Underside) -> State:
 
 def report(numbers: Numbers) -> Report:
     """Rows of the page."""
-    source = "Land et al. 2015, consensus of the participants, 4.17 to 4.19 mm; allowed 0.5 %"
+    source = "Land et al. 2015, about 4.17 to 4.19 mm; allowed 0.5 %, by which the participants differ"
     rows, finest = [], numbers.cells[-1]
     for cells, tip in zip(numbers.cells, numbers.tip, strict=True):
         allowed = 0.005 * TIP * 1e3 if cells == finest else None

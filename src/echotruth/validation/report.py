@@ -15,7 +15,7 @@ class Row:
         What it is, with its unit.
     found : float
     expected : float or None
-        None where the number itself is the error.
+        None where the number itself is the error, or is shown and not judged.
     tolerance : float or None
         Largest difference allowed; None for a number that is shown and not judged.
     source : str
@@ -38,8 +38,9 @@ class Row:
 
     def line(self) -> str:
         """Row of the table."""
-        expected = "0" if self.expected is None else format(self.expected, self.form)
-        allowed = "shown" if self.tolerance is None else f"{self.tolerance:.2g}"
+        nothing = "" if self.tolerance is None else "0"
+        expected = nothing if self.expected is None else format(self.expected, self.form)
+        allowed = "" if self.tolerance is None else f"{self.tolerance:.2g}"
         mark = "" if self.met else " **missed**"
         return f"| {self.quantity} | {self.found:{self.form}}{mark} | {expected} | {allowed} | {self.source} |"
 

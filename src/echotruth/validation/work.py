@@ -146,7 +146,7 @@ def report(numbers: Numbers) -> Report:
         Row("of it, work of the fibres (uJ)", -active, None, None, "", ".2f"),
         Row("lost to viscosity (uJ)", viscous, None, None, "", ".2f"),
         Row("left in the passive wall (uJ)", passive, None, 0.03 * allowed, exact, ".2f"),
-        Row("left in the change of volume (uJ)", volumetric, None, 0.01 * allowed, exact, ".2f"),
+        Row("left in the change of volume (uJ)", volumetric, None, 0.01 * allowed, exact, "z.2f"),
     )
     text = (
         "At every frame the motion from the frame before to the frame after is taken as a virtual one: the cavity "
@@ -171,5 +171,5 @@ def draw(numbers: Numbers) -> Figure:
         low, high = low + np.minimum(part, 0), high + np.maximum(part, 0)
     axes.plot(numbers.time * 1e3, numbers.blood * 1e6, color=style.MET, label="blood")
     axes.set(xlabel="time (ms)", ylabel="work (uJ)")
-    axes.legend(ncols=5, loc="upper center")
+    axes.legend(loc="lower right")
     return sheet
