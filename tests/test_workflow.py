@@ -237,7 +237,8 @@ def killed(made, tmp_path_factory):
 def test_killed_run_taken_up_again_gives_the_bytes_of_an_unbroken_run_on_more_cores(made, killed):
     checkout, _, unfinished = killed
     assert unfinished < 4
-    assert made.bytes == checkout.bytes
+    first, second = made.bytes, checkout.bytes
+    assert not [path for path in sorted({*first, *second}) if first.get(path) != second.get(path)]
 
 
 def test_killed_run_keeps_the_mechanics_it_had(killed):

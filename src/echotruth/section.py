@@ -5,7 +5,7 @@ Keys carry their unit; :meth:`Section.si` gives the values in SI units.
 
 from __future__ import annotations
 
-from math import pi
+from math import log, pi
 from types import SimpleNamespace
 from typing import Annotated, Any, get_args
 
@@ -16,6 +16,7 @@ UNITS: dict[str, float] = {
     "um": 1e-6,
     "mm": 1e-3,
     "per_mm3": 1e9,
+    "dB_per_cm_MHz": log(10) / 20 / 1e-2 / 1e6,  # nepers per metre and hertz
     "uL": 1e-9,
     "mL": 1e-6,
     "m3": 1.0,
@@ -31,7 +32,7 @@ UNITS: dict[str, float] = {
     "m_per_s": 1.0,
     "deg": pi / 180,
 }
-"""Suffix of a key to the factor that makes its value SI (mmHg: NIST SP 811, appendix B.8)."""
+"""Suffix of a key to the factor that makes its value SI (mmHg: NIST SP 811, appendix B.8; dB: to nepers)."""
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 Angle = Annotated[FiniteFloat, Field(ge=-90, le=90)]

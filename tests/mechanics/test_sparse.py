@@ -31,3 +31,20 @@ def test_factors_of_single_precision_leave_a_small_residual_or_give_way_to_doubl
         left = matrix @ solver.solve(right) - right
         assert np.linalg.norm(left) <= bound * np.linalg.norm(right), f"condition 1e{spread}"
     solver.close()
+
+
+@pytest.mark.parametrize("single", [True, False])
+def test_solution_does_not_depend_on_where_in_memory_its_input_begins(single):
+    pytest.importorskip("pypardiso")
+    rng = np.random.default_rng(2)
+    matrix = rng.normal(size=(300, 300))
+    upper, right = triu(matrix + matrix.T, format="csr"), rng.normal(size=(300, 2))
+    solver, found = Pardiso(single), set()
+    for shift in range(0, 64, 8):
+        memory = np.empty(upper.nnz + 16)
+        values = memory[shift // 8 : shift // 8 + upper.nnz]
+        values[:] = upper.data
+        solver.factor(csr_matrix((values, upper.indices, upper.indptr)))
+        found.add(solver.solve(right).tobytes())
+    solver.close()
+    assert len(found) == 1

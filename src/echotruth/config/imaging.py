@@ -49,6 +49,8 @@ class Probe(Section):
     """Focus of the lens in elevation."""
     sound_speed_m_per_s: Annotated[FiniteFloat, Field(ge=300, le=6000)] = 1540.0
     """Speed of sound."""
+    attenuation_dB_per_cm_MHz: Annotated[FiniteFloat, Field(ge=0, le=3)] = 0.0
+    """Loss of the tissue on each way, proportional to frequency; 0.5 is common for muscle."""
     sampling_MHz: Positive = 100.0
     """Sampling frequency of the RF."""
 
@@ -77,6 +79,8 @@ class Rf(Section):
     """Opening angle of the sector."""
     apodization: Literal["hann", "none"] = "hann"
     """Weights over the aperture, on transmit and receive."""
+    accuracy: Annotated[FiniteFloat, Field(ge=2e-5, le=1e-3)] = 2e-5
+    """Error of the RF in the plane of the image that is allowed against the exact sum, relative (L2); 1e-3 is faster."""
 
 
 class Bmode(Section):

@@ -38,6 +38,8 @@ class FullMatrix:
         Frequencies of the pulse band on the grid of the record, Hz.
     first : int
         Bin of the first of them.
+    sampling : float
+        Sampling frequency of the record, Hz.
     samples : int
         Length of the record; it starts at time 0 and ends with the latest echo plus room for delays and pulse.
     """
@@ -50,6 +52,7 @@ class FullMatrix:
         self.samples = fft.next_fast_len(int((last + 2 * latest) * p.sampling) + deposit.TAPS + 1, real=True)
         if self.samples >= 1 << (31 - deposit.FRACTION_BITS):
             raise ValueError(f"A record of {self.samples} samples is too long: image less deep or sample slower.")
+        self.sampling = p.sampling
         self.centres = element_centres(probe)
         self.pairs = np.stack(np.triu_indices(probe.elements), axis=1)
         self._samples_per_metre = p.sampling / p.sound_speed
