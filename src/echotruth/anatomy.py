@@ -54,3 +54,10 @@ def lengths(geometry: Geometry) -> Lengths:
         # To the picometre: the table of cases should say 0.56 mm, not 0.5599999999999999.
         found["apex_wall_mm"] = round(found["apex_wall_mm"] * found["wall_mm"] / preset["wall_mm"], 9)
     return found
+
+
+def radius_mm(geometry: Geometry) -> float:
+    """Outer radius of the unloaded ellipsoid at its equator, mm."""
+    size = lengths(geometry)
+    wall = size["wall_mm"] * geometry.hypertrophy
+    return round(geometry.scale * (size["endo_radius_mm"] * geometry.dilation + wall), 9)

@@ -59,7 +59,7 @@ def test_refused_in_one_sentence(tmp_path, text):
 
 def test_frequency_above_nyquist_is_refused_with_the_rate_it_needs(tmp_path):
     file = tmp_path / "bad.yaml"
-    file.write_text("probe: {frequency_MHz: 60}")
+    file.write_text("probe: {frequency_MHz: 60, sampling_MHz: 100}")
     with pytest.raises(ConfigError, match=r"above the Nyquist frequency of sampling_MHz = 100.*180 MHz"):
         load(file)
 

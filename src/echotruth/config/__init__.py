@@ -2,11 +2,12 @@
 
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
-from echotruth.config.imaging import Bmode, Phantom, Probe, Rf, View
+from echotruth.config.imaging import Bmode, Phantom, Rf, View
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Active, Mechanics
 from echotruth.config.pathology import Pathology
 from echotruth.config.physiology import Physiology
+from echotruth.config.probe import Probe
 from echotruth.config.sections import Config
 from echotruth.config.tracking import Tracker, Tracking
 from echotruth.section import Section

@@ -1,4 +1,4 @@
-"""Views, phantom, probe and images."""
+"""Views, phantom, lines and images."""
 
 from __future__ import annotations
 
@@ -25,58 +25,21 @@ class Phantom(Section):
 
     density_per_mm3: Positive = 5000.0
     """Scatterers per cubic millimetre of unloaded wall; the default is some thirty a resolution cell, enough
-    for fully developed speckle from normally distributed amplitudes, which count for a third."""
+    for fully developed speckle from normally distributed amplitudes, which count for a third. Default: as suits
+    `probe.preset`."""
     in_plane_only: bool = False
     """Scatterers lie in the imaging plane and move within it, as the paper's phantom is printed."""
-
-
-class Probe(Section):
-    """A phased array."""
-
-    elements: Annotated[int, Field(ge=2, le=512)] = 64
-    """Number of elements."""
-    frequency_MHz: Positive = 25.0
-    """Centre frequency."""
-    bandwidth: Annotated[FiniteFloat, Field(gt=0.05, lt=1.5)] = 0.5
-    """Two-way -6 dB bandwidth of burst and array over centre frequency: 55 um of axial resolution."""
-    pitch_um: Positive = 46.0
-    """Distance of element centres."""
-    width_um: Positive = 41.0
-    """Width of an element."""
-    height_mm: Positive = 1.0
-    """Height of the elements (elevation)."""
-    elevation_focus_mm: Positive = 6.5
-    """Focus of the lens in elevation."""
-    sound_speed_m_per_s: Annotated[FiniteFloat, Field(ge=300, le=6000)] = 1540.0
-    """Speed of sound."""
-    attenuation_dB_per_cm_MHz: Annotated[FiniteFloat, Field(ge=0, le=3)] = 0.0
-    """Loss of the tissue on each way, proportional to frequency; 0.5 is common for muscle."""
-    sampling_MHz: Positive = 100.0
-    """Sampling frequency of the RF."""
-
-    @model_validator(mode="after")
-    def _can_be_sampled(self) -> Probe:
-        top = self.frequency_MHz * (1 + self.bandwidth)
-        if self.sampling_MHz < 2 * top:
-            remedy = (
-                f"its band reaches {top:g} MHz, above the Nyquist frequency of sampling_MHz = {self.sampling_MHz:g}: "
-                f"lower it, or sample at {2 * top:g} MHz or more"
-            )
-            raise impossible("frequency_MHz", self.frequency_MHz, remedy)
-        if self.width_um > self.pitch_um:
-            raise impossible("width_um", self.width_um, f"must not exceed pitch_um = {self.pitch_um}")
-        return self
 
 
 class Rf(Section):
     """Focused lines of a sector scan."""
 
     focus_mm: Positive = 6.5
-    """Transmit focus."""
+    """Transmit focus, where the heart stands. Default: as suits `probe.preset`."""
     lines: Annotated[int, Field(ge=16, le=2048)] = 256
     """Lines of the sector."""
     sector_deg: Annotated[FiniteFloat, Field(gt=5, le=120)] = 64.0
-    """Opening angle of the sector."""
+    """Opening angle of the sector. Default: as suits `probe.preset`."""
     apodization: Literal["hann", "none"] = "hann"
     """Weights over the aperture, on transmit and receive."""
     accuracy: Annotated[FiniteFloat, Field(ge=2e-5, le=1e-3)] = 2e-5
@@ -87,7 +50,7 @@ class Bmode(Section):
     """From RF to 8-bit images."""
 
     field_of_view_mm: Positive = 12.0
-    """Side of the square image; the array stands in the middle of its upper edge."""
+    """Side of the square image; the array stands in the middle of its upper edge. Default: as suits `probe.preset`."""
     size_px: Annotated[int, Field(ge=32, le=4096)] = 512
     """Pixels along a side of the full image."""
     downsampling: Annotated[tuple[Annotated[int, Field(ge=1, le=64)], ...], Field(min_length=1)] = (1, 2, 4)

@@ -6,13 +6,16 @@ from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints, model_validator
 
+from echotruth import anatomy
+from echotruth.config.defaults import suited
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
-from echotruth.config.imaging import Bmode, Phantom, Probe, Rf, View, standard_views
+from echotruth.config.imaging import Bmode, Phantom, Rf, View, standard_views
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
 from echotruth.config.pathology import Pathology
 from echotruth.config.physiology import Physiology
+from echotruth.config.probe import Probe
 from echotruth.config.tracking import Tracking
 from echotruth.section import Name, Section, impossible
 
@@ -40,6 +43,11 @@ class Config(Section):
     cases: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
     """Sweep: key (as `fibres.endo_deg`) to its values; the cases are all combinations."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _suits_heart_and_array(cls, values: Any) -> Any:
+        return suited(values) if isinstance(values, dict) else values
+
     @model_validator(mode="after")
     def _fits_together(self) -> Config:
         smallest, view = self.bmode.sizes[-1], self.bmode.field_of_view_mm
@@ -57,6 +65,14 @@ class Config(Section):
             )
         if self.rf.focus_mm >= view:
             raise impossible("rf.focus_mm", self.rf.focus_mm, f"must be smaller than bmode.field_of_view_mm = {view:g}")
+        return self
+
+    @model_validator(mode="after")
+    def _heart_before_the_array(self) -> Config:
+        radius = 0.0 if self.geometry.file else anatomy.radius_mm(self.geometry)
+        if self.rf.focus_mm <= radius:
+            remedy = f"must exceed {radius:g}, the radius of the heart, which stands at the focus"
+            raise impossible("rf.focus_mm", self.rf.focus_mm, remedy)
         return self
 
     @model_validator(mode="after")

@@ -1,0 +1,72 @@
+"""Who names a heart gets an array, a scan and a loop that suit it."""
+
+from math import log, pi
+
+import pytest
+
+from echotruth import anatomy
+from echotruth.config import Bmode, Config, Geometry, Probe, Rf
+from echotruth.config.defaults import ARRAYS
+from echotruth.config.loading import ConfigError, validate
+from echotruth.transducers import PRESETS
+
+
+def configured(**sections):
+    return validate(sections, "a.yaml")
+
+
+@pytest.mark.parametrize("species", anatomy.PRESETS)
+def test_heart_stands_within_the_field_of_view_and_the_sector(species):
+    """The ellipsoid a fifth larger, as at end-diastole, in the short axis and along its axis."""
+    config = configured(geometry={"preset": species})
+    size = anatomy.lengths(config.geometry)
+    across = 1.2 * (size["endo_radius_mm"] + size["wall_mm"])
+    along = 1.2 * ((size["endo_length_mm"] + size["base_mm"]) / 2 + size["apex_wall_mm"])
+    focus, side = config.rf.focus_mm, config.bmode.field_of_view_mm
+    assert max(across, along) < focus < side - max(across, along)
+    assert across < focus * config.rf.si().sector / 2
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_scan_of_a_preset_has_ten_scatterers_in_its_resolution_cell(name):
+    """-6 dB widths of two ways: 4 ln 2 / (pi B) c / 2 in depth, 1.38 wavelengths F# of two Hann apertures, 0.64 in
+    elevation (sinc^2)."""
+    config = configured(probe={"preset": name})
+    probe, focus = config.probe.si(), config.rf.si().focus
+    wavelength = probe.sound_speed / probe.frequency
+    axial = 4 * log(2) / (pi * probe.bandwidth * probe.frequency) * probe.sound_speed / 2
+    lateral = 1.38 * wavelength * focus / (probe.elements * probe.pitch)
+    elevation = 0.64 * wavelength * probe.elevation_focus / probe.height
+    assert config.phantom.si().density * axial * lateral * elevation > 10
+
+
+def test_default_is_the_mouse():
+    config = configured()
+    assert config == Config() == Config(probe=Probe(), rf=Rf(), bmode=Bmode())
+    assert (config.probe.preset, config.rf.focus_mm, config.bmode.field_of_view_mm) == ("mouse_25MHz", 6.5, 12)
+
+
+def test_what_is_given_stands():
+    config = configured(geometry={"preset": "human"}, rf={"focus_mm": 80.0}, loop={"file": "rat"})
+    assert (config.probe.preset, config.rf.focus_mm, config.rf.sector_deg) == ("human_2_7MHz", 80, 75)
+    assert config.loop.file == "rat"
+    assert configured(geometry={"preset": "human"}).loop.file == "human"
+
+
+def test_scans_there_are_for_all_arrays():
+    assert set(ARRAYS) == set(PRESETS)
+
+
+@pytest.mark.parametrize("sections", [{"probe": {"preset": "mouse_25MHz"}}, {"rf": {"focus_mm": 31.0}}])
+def test_array_inside_of_the_heart_is_refused(sections):
+    with pytest.raises(ConfigError, match=r"rf\.focus_mm = \S+: must exceed 31\.55, the radius of the heart"):
+        configured(geometry={"preset": "human"}, **sections)
+
+
+def test_radius_of_the_heart_is_that_of_its_mesh():
+    from echotruth.mechanics.geometry import left_ventricle
+
+    few = {"circumferential_elements": 12, "longitudinal_elements": 4, "transmural_elements": 1}
+    geometry = Geometry(preset="rat", dilation=1.3, hypertrophy=1.5, scale=0.9, **few)
+    nodes = left_ventricle(geometry).nodes[:, :2]
+    assert (nodes**2).sum(axis=1).max() ** 0.5 == pytest.approx(1e-3 * anatomy.radius_mm(geometry), rel=0.01)
