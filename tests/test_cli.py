@@ -27,7 +27,7 @@ def refused(status, said, complaint):
     return status != 0 and not said and complaint.count("\n") == 1 and "Traceback" not in complaint
 
 
-@pytest.mark.parametrize("name, cases", [("demo", 1), ("sweep", 108)])
+@pytest.mark.parametrize("name, cases", [("demo", 1), ("sweep", 108), ("human", 1)])
 def test_check_accepts_a_shipped_configuration(name, cases):
     status, said, complaint = echotruth_("check", f"config/{name}.yaml")
     assert (status, complaint) == (0, "")
