@@ -1,0 +1,221 @@
+"""RF against PyMUST and eSDIva, in one run: `python benchmarks/acoustics.py --peers PYTHON`.
+
+Where two are compared they take turns in one process on one thread, and medians of CPU time are reported.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import acoustics_report as report
+from worker import Worker
+
+HERE = Path(__file__).parent
+Result = dict[str, Any]
+
+MOUSE, HUMAN = "mouse, 25 MHz", "human, 2.72 MHz"
+
+SPEED = {
+    "ours": 20000,
+    "ours, 1e-3": 20000,
+    "PyMUST": 2000,
+    "PyMUST, -40 dB": 2000,
+    "PyMUST, elevation": 300,
+    "eSDIva": 2000,
+    "eSDIva, elevation": 1000,
+    "eSDIva, matrix": 200,
+}
+"""Party to the scatterers of a turn."""
+THICK = ("PyMUST, elevation", "eSDIva, elevation")
+"""Those that take scatterers out of the plane; ours does so always, and is timed with both."""
+
+TRANSMITS = (1, 8, 128)
+FRAME = 10000
+"""Scatterers of a frame for which transmits are counted."""
+
+GROWTH = {
+    "ours": (1000, 10000, 100000, 1000000),
+    "ours, 1e-3": (1000, 10000, 100000, 1000000),
+    "PyMUST": (100, 1000, 10000),
+    "PyMUST, elevation": (100, 1000),
+    "eSDIva": (100, 1000, 10000),
+    "eSDIva, matrix": (100, 1000),
+}
+"""Party to numbers of scatterers, as far as it gets in half a minute."""
+ELEMENTS = (16, 32, 64, 128)
+OF_ELEMENTS = {"ours": 20000, "PyMUST": 1000, "eSDIva": 1000, "eSDIva, matrix": 100}
+"""Party to the scatterers with which the number of elements is varied."""
+
+LINES, IMAGED = 128, 100000
+"""Lines and scatterers of the frame that is imaged."""
+ACCURACIES = (2e-5, 1e-3)
+
+
+@dataclass
+class Bench:
+    """What the parts of the benchmark share.
+
+    Attributes
+    ----------
+    python : str
+        Interpreter that has echotruth, PyMUST and eSDIva.
+    repeats : int
+        Turns of each party.
+    """
+
+    python: str
+    repeats: int
+
+    @contextmanager
+    def side(self, threads: int = 1) -> Iterator[Worker]:
+        """A process that has all parties."""
+        worker = Worker(self.python, HERE / "acoustics_side.py", {"NUMBA_NUM_THREADS": str(threads)})
+        try:
+            yield worker
+        finally:
+            worker.close()
+
+
+def speed(bench: Bench) -> Result:
+    """Seconds of a turn of every party before both arrays."""
+    answer = {}
+    with bench.side() as side:
+        for array in (MOUSE, HUMAN):
+            turns = {name: (name, name in THICK) for name in SPEED} | {"ours, slab": ("ours", True)}
+            spent: dict[str, list[Result]] = {name: [] for name in turns}
+            for _ in range(bench.repeats):
+                for name, (party, thick) in turns.items():
+                    given = {"party": party, "array": array, "scatterers": SPEED[party], "thick": thick}
+                    spent[name].append(side("turn", **given))
+            rows = {name: _medians(taken) | {"scatterers": SPEED[turns[name][0]]} for name, taken in spent.items()}
+            answer[array] = rows
+            _tell(f"{array}: " + ", ".join(f"{n} {1e6 * r['cpu'] / r['scatterers']:.2f} us" for n, r in rows.items()))
+    return answer
+
+
+def _medians(turns: list[Result]) -> Result:
+    return {kind: median(turn[kind] for turn in turns) for kind in ("wall", "cpu")}
+
+
+def transmits(bench: Bench) -> Result:
+    """Seconds of a frame of several transmits: ours from one matrix, the peers' one by one."""
+    answer: Result = {"scatterers": FRAME}
+    with bench.side() as side:
+        for array in (MOUSE, HUMAN):
+            given = {"array": array, "scatterers": FRAME}
+            ours = {
+                str(number): side("transmits", number=number, accuracy=ACCURACIES[0], repeats=bench.repeats, **given)
+                for number in TRANSMITS
+            }
+            peers = {name: side("turn", party=name, **given) for name in ("PyMUST", "eSDIva")}
+            answer[array] = {"ours": ours, "peers": peers}
+            _tell(f"{array}: {answer[array]}")
+    return answer
+
+
+def growth(bench: Bench) -> Result:
+    """Seconds against scatterers, and against elements, before the mouse's array."""
+    answer: Result = {"scatterers": {}, "elements": {}}
+    with bench.side() as side:
+        for party, numbers in GROWTH.items():
+            turns = [side("turn", party=party, array=MOUSE, scatterers=number) for number in numbers]
+            answer["scatterers"][party] = [[n, turn["cpu"]] for n, turn in zip(numbers, turns, strict=True)]
+            _tell(f"{party}: {answer['scatterers'][party]}")
+        for party, number in OF_ELEMENTS.items():
+            given = {"party": party, "array": MOUSE, "scatterers": number}
+            turns = [side("turn", elements=elements, **given) for elements in ELEMENTS]
+            answer["elements"][party] = [[e, t["cpu"] / number] for e, t in zip(ELEMENTS, turns, strict=True)]
+    return answer
+
+
+def memory(bench: Bench) -> Result:
+    """Greatest resident memory of a process of its own for each turn, MiB, and before the turn."""
+    rows = []
+    for party, numbers in GROWTH.items():
+        for number in numbers[1:]:
+            with bench.side() as side:
+                idle = side("peak")
+                side("turn", party=party, array=MOUSE, scatterers=number)
+                rows.append({"party": party, "scatterers": number, "idle": idle, "peak": side("peak")})
+            _tell(f"{party}, {number}: {rows[-1]['peak']:.0f} MiB")
+    return {"rows": rows}
+
+
+def frame(bench: Bench) -> Result:
+    """Seconds of the parts of a frame of focused lines, from scatterers to uint8, on one and two threads."""
+    rows = []
+    for threads in (1, 2):
+        with bench.side(threads) as side:
+            for array in (MOUSE, HUMAN):
+                for accuracy in ACCURACIES:
+                    given = {"array": array, "scatterers": IMAGED, "lines": LINES, "accuracy": accuracy}
+                    rows.append(given | side("frame", repeats=bench.repeats, **given))
+    return {"rows": rows}
+
+
+def floor(bench: Bench) -> Result:
+    """What the machine allows, beside what a pair takes."""
+    with bench.side() as side:
+        rates = side("floor")
+        pairs = {str(accuracy): side("pair", array=MOUSE, accuracy=accuracy) for accuracy in ACCURACIES}
+    return {"rates": rates, "pairs": pairs}
+
+
+def agreement(bench: Bench) -> Result:
+    """Likeness to the peers, setting by setting."""
+    with bench.side() as side:
+        return {array: side("agreement", array=array) for array in (MOUSE, HUMAN)}
+
+
+def exactness(bench: Bench) -> Result:
+    """Relative L2 error against the exact sum."""
+    with bench.side() as side:
+        return {array: side("exactness", array=array) for array in (MOUSE, HUMAN)}
+
+
+PARTS: dict[str, Callable[[Bench], Result]] = {
+    part.__name__: part for part in (speed, transmits, frame, growth, memory, floor, agreement, exactness)
+}
+
+
+def machine(bench: Bench) -> Result:
+    """What the figures were taken on."""
+    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
+    model = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+    with bench.side() as side:
+        return {"processor": model, "python": platform.python_version()} | side("versions")
+
+
+def _tell(line: str) -> None:
+    print(line, flush=True)
+
+
+def main() -> None:
+    """Run parts of the benchmark, and bring the report up to date."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--peers", default=sys.executable, help="Python interpreter that has echotruth[peers]")
+    parser.add_argument("--parts", nargs="+", choices=list(PARTS), default=list(PARTS))
+    parser.add_argument("--repeats", type=int, default=5, help="turns of each party")
+    parser.add_argument("--results", type=Path, default=HERE / "results")
+    given = parser.parse_args()
+    given.results.mkdir(parents=True, exist_ok=True)
+    file, bench = given.results / "acoustics.json", Bench(given.peers, given.repeats)
+    for part in given.parts:
+        _tell(f"-- {part}")
+        found = PARTS[part](bench)
+        kept = json.loads(file.read_text()) if file.exists() else {}
+        file.write_text(json.dumps(kept | {"machine": machine(bench), part: found}, indent=1) + "\n")
+    report.write(json.loads(file.read_text()), given.results)
+
+
+if __name__ == "__main__":
+    main()

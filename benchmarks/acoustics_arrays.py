@@ -1,0 +1,75 @@
+"""Two arrays, a mouse's and a human's, and scatterers before them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.config import Probe
+
+Floats = NDArray[np.float64]
+
+SECTOR = np.deg2rad(64)
+"""Opening angle of the sector that is imaged."""
+
+THIN = 0.1
+"""Height over wavelength of an element that is a point in elevation: both the lens and the beam are then without
+effect, and the spreading is 1/r, which a simulator in two dimensions has not."""
+
+
+@dataclass(frozen=True)
+class Array:
+    """An array and where its scatterers are.
+
+    Attributes
+    ----------
+    preset : str
+        Of the probe.
+    near, far : float, m
+        Ranges between which the scatterers lie.
+    slab : float, m
+        Half the thickness, in elevation, of the volume they fill.
+    """
+
+    preset: str
+    near: float
+    far: float
+    slab: float
+
+    def probe(self, **changes: Any) -> Probe:
+        """The probe, with other values of some keys."""
+        return Probe(preset=self.preset, **changes)
+
+    def thin(self, **changes: Any) -> Probe:
+        """The probe with elements that are points in elevation."""
+        p = self.probe().si()
+        return self.probe(height_mm=1e3 * THIN * p.sound_speed / p.frequency, **changes)
+
+    def scatterers(self, number: int, *, thick: bool = False, seed: int = 0) -> tuple[Floats, Floats]:
+        """Positions (number, 3; lateral, axial, elevation; m) and amplitudes (number,) of scatterers in the sector.
+
+        They are evenly distributed over its area, in the plane of the image or through the slab.
+        """
+        random = np.random.default_rng([2026, seed])
+        angle = random.uniform(-SECTOR / 2, SECTOR / 2, number)
+        reach = np.sqrt(random.uniform(self.near**2, self.far**2, number))
+        elevation = random.uniform(-self.slab, self.slab, number) if thick else np.zeros(number)
+        position = np.stack([reach * np.sin(angle), reach * np.cos(angle), elevation], axis=1)
+        return position, random.standard_normal(number)
+
+
+ARRAYS = {
+    "mouse, 25 MHz": Array("mouse_25MHz", 3e-3, 11e-3, 0.3e-3),
+    "human, 2.72 MHz": Array("human_2_7MHz", 20e-3, 120e-3, 3e-3),
+}
+
+
+def delays(probe: Probe, focus: tuple[float, float]) -> Floats:
+    """Delays that focus at lateral and axial coordinates (m), not negative, shape (elements,), s."""
+    p = probe.si()
+    centre = (np.arange(p.elements) - (p.elements - 1) / 2) * p.pitch
+    flight = np.hypot(focus[0] - centre, focus[1]) / p.sound_speed
+    return flight.max() - flight

@@ -1,0 +1,81 @@
+"""Whole frames of ours: transmits made from the matrix, and from scatterers to an 8-bit image."""
+
+from __future__ import annotations
+
+from statistics import median
+from typing import Any
+
+import numba
+import numpy as np
+from acoustics_arrays import ARRAYS, SECTOR, Array
+from worker import Clock
+
+from echotruth.config import Bmode, Rf
+from echotruth.imaging.bmode import clip
+from echotruth.imaging.scanner import Scanner, imaging_depth
+from echotruth.imaging.synthesis import Synthesis
+from echotruth.imaging.transmit import KINDS
+from echotruth.transducers import SCANS
+
+Seconds = dict[str, dict[str, float]]
+
+
+def scan(array: Array, **changes: Any) -> tuple[Rf, Bmode]:
+    """Lines and image that suit an array."""
+    suited = SCANS[array.preset]
+    rf = Rf(focus_mm=suited["rf.focus_mm"], sector_deg=np.rad2deg(SECTOR), **changes)
+    return rf, Bmode(field_of_view_mm=suited["bmode.field_of_view_mm"])
+
+
+def _channels(array: Array, rf: Rf, scanner: Scanner) -> Synthesis:
+    probe = array.probe()
+    return Synthesis(scanner.matrix, probe.si().frequency, KINDS[rf.transmit](probe, rf, scanner.scan))
+
+
+def frame(array: str, scatterers: int, lines: int, accuracy: float, repeats: int) -> dict[str, Any]:
+    """Seconds of the parts of a frame of focused lines, from scatterers to uint8; medians."""
+    given = ARRAYS[array]
+    rf, bmode = scan(given, lines=lines, accuracy=accuracy)
+    scanner = Scanner(given.probe(), rf, imaging_depth(rf, bmode))
+    phantom = given.scatterers(scatterers, thick=True)
+    channels = _channels(given, rf, scanner)
+    turns = [_parts(scanner, channels, phantom, bmode).seconds for _ in range(repeats + 1)][1:]
+    return {"seconds": _medians(turns), "threads": numba.get_num_threads(), "size_px": bmode.size_px}
+
+
+def _parts(scanner: Scanner, channels: Synthesis, phantom: tuple[np.ndarray, np.ndarray], bmode: Bmode) -> Clock:
+    """One frame; the channels are made twice, once alone, as beamforming takes them block by block."""
+    clock = Clock()
+    with clock("matrix"):
+        matrix = scanner.matrix(*phantom)
+    with clock("channels"):
+        for _ in channels(matrix):
+            pass
+    with clock("channels and receive focus"):
+        lines = scanner.beamform(matrix)
+    with clock("image"):
+        images = clip(lines[None], scanner.scan, scanner.range, bmode)
+    if images[bmode.size_px].dtype != np.uint8:
+        raise TypeError("The image must have eight bits.")
+    return clock
+
+
+def transmits(array: str, scatterers: int, number: int, accuracy: float, repeats: int) -> Seconds:
+    """Seconds of the matrix and of the channel data of a number of diverging waves made from it; medians."""
+    given = ARRAYS[array]
+    rf, bmode = scan(given, transmit="diverging", transmits=number, accuracy=accuracy)
+    scanner = Scanner(given.probe(), rf, imaging_depth(rf, bmode))
+    phantom, channels, turns = given.scatterers(scatterers), _channels(given, rf, scanner), []
+    for _ in range(repeats + 1):
+        clock = Clock()
+        with clock("matrix"):
+            matrix = scanner.matrix(*phantom)
+        with clock("channels"):
+            for _ in channels(matrix):
+                pass
+        turns.append(clock.seconds)
+    return _medians(turns[1:])
+
+
+def _medians(turns: list[Seconds]) -> Seconds:
+    return {part: {kind: median(turn[part][kind] for turn in turns) for kind in ("wall", "cpu")} for part in turns[0]}

@@ -1,0 +1,169 @@
+"""Tables and charts of the benchmark of the acoustics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import acoustics_chart
+from report import table
+
+Result = dict[str, Any]
+Lines = list[str]
+
+SLAB = {"PyMUST, elevation": "ours, slab", "eSDIva, elevation": "ours, slab"}
+"""Parties whose scatterers fill a slab, and ours with the same."""
+MATRIX = ("ours", "ours, slab", "ours, 1e-3", "eSDIva, matrix")
+"""Parties that give all elements to all elements; the others give one transmit."""
+
+
+def write(results: Result, folder: Path) -> None:
+    """Write `acoustics.md` and the charts for the parts that were run."""
+    sections = {
+        "speed": speed,
+        "transmits": transmits,
+        "frame": frame,
+        "growth": growth,
+        "memory": memory,
+        "floor": floor,
+        "agreement": agreement,
+        "exactness": exactness,
+    }
+    machine = ", ".join(f"{name} {value}" for name, value in results["machine"].items())
+    text = ["# RF against PyMUST and eSDIva", "", f"{machine}. Seconds are of CPU, medians, on one thread.", ""]
+    for name, section in sections.items():
+        if name in results:
+            text += [*section(results[name]), ""]
+    (folder / "acoustics.md").write_text("\n".join(text))
+    if "growth" in results:
+        acoustics_chart.growth(results["growth"], folder / "acoustics.png")
+
+
+def speed(found: Result) -> Lines:
+    """Microseconds a scatterer."""
+    text = ["## A scatterer, 64 elements", ""]
+    for array, rows in found.items():
+        cost = {name: 1e6 * row["cpu"] / row["scatterers"] for name, row in rows.items()}
+        cells = []
+        for name, row in rows.items():
+            ours = cost[SLAB.get(name, "ours")]
+            ratio = "" if name.startswith("ours") else f"{cost[name] / ours:.0f}"
+            gives = "64 x 64" if name in MATRIX else "1 x 64"
+            cells.append([name, gives, row["scatterers"], f"{cost[name]:.2f}", ratio])
+        head = [array, "transmits x channels", "scatterers", "us a scatterer", "times ours"]
+        text += [*table(head, cells), ""]
+    return text[:-1]
+
+
+def transmits(found: Result) -> Lines:
+    """Frames of several transmits."""
+    text = [f"## A frame of {found['scatterers']} scatterers against its transmits", ""]
+    for array, sides in ((name, found[name]) for name in found if name != "scatterers"):
+        peers = {name: row["cpu"] for name, row in sides["peers"].items()}
+        cells = []
+        for number, parts in sides["ours"].items():
+            ours = sum(part["cpu"] for part in parts.values())
+            theirs = {name: int(number) * cost for name, cost in peers.items()}
+            # eSDIva too can make any transmit of its matrix, which is 64 of them; its making is not counted.
+            theirs["eSDIva"] = min(theirs["eSDIva"], 64 * peers["eSDIva"])
+            ratios = [f"{cost:.1f} ({cost / ours:.0f} x)" for cost in theirs.values()]
+            split = f"{ours:.3f} ({parts['matrix']['cpu']:.3f} + {parts['channels']['cpu']:.3f})"
+            cells.append([number, split, *ratios])
+        text += [*table([f"{array}: transmits", "ours (matrix + channels), s", *peers], cells), ""]
+    return [*text, "One transmit of the peers was timed, and taken as often as there are transmits."]
+
+
+def frame(found: Result) -> Lines:
+    """Whole frames of ours."""
+    one = found["rows"][0]
+    cells = []
+    for row in found["rows"]:
+        spent = {part: seconds["wall"] for part, seconds in row["seconds"].items()}
+        receive = spent["channels and receive focus"] - spent["channels"]
+        total = spent["matrix"] + spent["channels and receive focus"] + spent["image"]
+        parts = (spent["matrix"], spent["channels"], receive, spent["image"], total)
+        cells.append([row["array"], row["accuracy"], row["threads"], *(f"{part:.2f}" for part in parts)])
+    head = ["array", "accuracy", "threads", "matrix", "channels", "receive focus", "image", "frame"]
+    size = f"{one['size_px']} x {one['size_px']} px"
+    title = f"## {one['scatterers']} scatterers to an image: {one['lines']} focused lines, {size}, wall seconds"
+    return [title, "", *table(head, cells)]
+
+
+def growth(found: Result) -> Lines:
+    """Against scatterers and elements."""
+    numbers = sorted({number for rows in found["scatterers"].values() for number, _ in rows})
+    by_number = [[party, *_row(rows, numbers, 1)] for party, rows in found["scatterers"].items()]
+    elements = [number for number, _ in next(iter(found["elements"].values()))]
+    by_element = [[party, *_row(rows, elements, 1e6)] for party, rows in found["elements"].items()]
+    return [
+        "## Growth, mouse's array",
+        "",
+        *table(["seconds, scatterers:", *numbers], by_number),
+        "",
+        *table(["us a scatterer, elements:", *elements], by_element),
+        "",
+        "![seconds against scatterers and elements](acoustics.png)",
+    ]
+
+
+def _row(pairs: list[list[float]], numbers: list[int], scale: float) -> Lines:
+    known = {number: f"{scale * value:.3g}" for number, value in pairs}
+    return [known.get(number, "") for number in numbers]
+
+
+def memory(found: Result) -> Lines:
+    """Peaks."""
+    cells = [
+        [row["party"], row["scatterers"], f"{row['peak']:.0f}", f"{row['peak'] - row['idle']:.0f}"]
+        for row in found["rows"]
+    ]
+    head = ["", "scatterers", "peak resident MiB", "over that of the imported packages"]
+    return ["## Memory, a process each", "", *table(head, cells)]
+
+
+def floor(found: Result) -> Lines:
+    """What the machine allows."""
+    cells = []
+    for accuracy, pair in found["pairs"].items():
+        counts = pair["counts"]
+        bytes_ = {kind: count["bytes"] / 32 * found["rates"][kind]["vector"] for kind, count in counts.items()}
+        issued = {kind: count["instructions"] * found["rates"][kind]["instruction"] for kind, count in counts.items()}
+        least = [f"{max(bound.values()):.2f} ({max(bound, key=bound.get)})" for bound in (bytes_, issued)]
+        tally = ", ".join(f"{count['instructions']} x {kind} ({count['bytes']} B)" for kind, count in counts.items())
+        cells.append([accuracy, tally, *least, f"{pair['ns']:.2f}", f"{pair['ns'] / max(issued.values()):.1f}"])
+    rates = found["rates"].items()
+    head = [
+        "accuracy",
+        "of a pair and scatterer",
+        "least by bytes, ns",
+        "by instructions, ns",
+        "taken, ns",
+        "over least",
+    ]
+    measured = ", ".join(f"{kind} {rate['vector']:.3f} ({rate['instruction']:.3f})" for kind, rate in rates)
+    return [
+        "## What the machine allows",
+        "",
+        f"Measured in the nearest cache, ns for 32 bytes (for an instruction): {measured}.",
+        "",
+        *table(head, cells),
+    ]
+
+
+def agreement(found: Result) -> Lines:
+    """Likeness to the peers."""
+    text = ["## Likeness to the peers", ""]
+    for array, rows in found.items():
+        cells = [
+            [name, f"{1 - row['correlation']:.1e}", f"{row['error']:.1e}", f"{row['factor']:.4g}"]
+            for name, row in rows.items()
+        ]
+        text += [*table([array, "1 - correlation", "relative L2", "ours / theirs"], cells), ""]
+    return text[:-1]
+
+
+def exactness(found: Result) -> Lines:
+    """Errors against the exact sum."""
+    cells = [[array, *row[:-1], f"{row[-1]:.1e}"] for array, rows in found.items() for row in rows]
+    head = ["array", "accuracy", "attenuation, dB/cm/MHz", "scatterers", "relative L2"]
+    return ["## Against the exact sum", "", *table(head, cells)]

@@ -1,0 +1,132 @@
+"""The process in which echotruth and its peers take turns; everything that touches any of them starts here."""
+
+from __future__ import annotations
+
+import resource
+import sys
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import version
+from statistics import median
+from typing import Any
+
+import acoustics_agreement
+import acoustics_floor
+import acoustics_frame
+from acoustics_arrays import ARRAYS, Array, Floats, delays
+from acoustics_peers import Esdiva, Pymust
+from worker import Clock, serve
+
+from echotruth.imaging.rf import FullMatrix
+
+Run = Callable[[Floats, Floats], Any]
+
+PATCHES = 8
+"""Parts in elevation of an element of eSDIva with its lens."""
+
+ELEMENTS = 64
+PAIRED, TURNS = (20000, 60000), 5
+"""Scatterers of the turns whose difference gives the cost of a pair."""
+
+WARMING = 250
+"""Scatterers of the turn that is not counted, for what is compiled or set up once; eSDIva bins from 200 on."""
+
+
+def matrix(array: Array, elements: int, accuracy: float) -> Run:
+    """Ours: all elements to all elements."""
+    return FullMatrix(array.probe(elements=elements), array.far, accuracy=accuracy)
+
+
+def pymust(array: Array, elements: int, elevation: bool = False, **options: Any) -> Run:
+    """One focused transmit of PyMUST."""
+    probe = array.probe(elements=elements)
+    side, delay = Pymust(probe, elevation=elevation, **options), _focused(array, elements)
+    return lambda position, amplitude: side(position, amplitude, delay)
+
+
+def esdiva(array: Array, elements: int, patches: int = 1) -> Run:
+    """One focused transmit of eSDIva."""
+    side, delay = _esdiva(array, elements, patches), _focused(array, elements)
+    return lambda position, amplitude: side(position, amplitude, delay)
+
+
+def esdiva_matrix(array: Array, elements: int) -> Run:
+    """All elements to all elements, one transmit after the other."""
+    return _esdiva(array, elements, 1).matrix
+
+
+def _esdiva(array: Array, elements: int, patches: int) -> Esdiva:
+    probe = array.probe(elements=elements)
+    return Esdiva(probe, probe.si().sampling, patches)
+
+
+def _focused(array: Array, elements: int) -> Floats:
+    probe = array.probe(elements=elements)
+    return delays(probe, (0.0, probe.si().elevation_focus))
+
+
+PARTIES: dict[str, tuple[Callable[..., Run], dict[str, Any]]] = {
+    "ours": (matrix, {"accuracy": 2e-5}),
+    "ours, 1e-3": (matrix, {"accuracy": 1e-3}),
+    "PyMUST": (pymust, {}),
+    "PyMUST, -40 dB": (pymust, {"dBThresh": -40}),
+    "PyMUST, elevation": (pymust, {"elevation": True}),
+    "eSDIva": (esdiva, {}),
+    "eSDIva, elevation": (esdiva, {"patches": PATCHES}),
+    "eSDIva, matrix": (esdiva_matrix, {}),
+}
+"""Who takes turns: what makes it, and its options."""
+
+
+@cache
+def ready(party: str, array: str, elements: int, thick: bool) -> Run:
+    """A party that has taken a turn."""
+    make, options = PARTIES[party]
+    run = make(ARRAYS[array], elements, **options)
+    run(*ARRAYS[array].scatterers(WARMING, thick=thick))
+    return run
+
+
+def turn(party: str, array: str, scatterers: int, elements: int = ELEMENTS, thick: bool = False) -> dict[str, float]:
+    """Wall and CPU seconds of a turn."""
+    run, clock = ready(party, array, elements, thick), Clock()
+    given = ARRAYS[array].scatterers(scatterers, thick=thick)
+    with clock("turn"):
+        run(*given)
+    return clock.seconds["turn"]
+
+
+def pair(array: str, accuracy: float) -> dict[str, Any]:
+    """Nanoseconds of CPU of a pair of elements and a scatterer: what more scatterers add to a matrix."""
+    party = next(name for name, (_, options) in PARTIES.items() if options.get("accuracy") == accuracy)
+    spent = [[turn(party, array, number)["cpu"] for number in PAIRED] for _ in range(TURNS)]
+    few, many = (median(turns) for turns in zip(*spent, strict=True))
+    pairs = ELEMENTS * (ELEMENTS + 1) / 2
+    return {"ns": 1e9 * (many - few) / (PAIRED[1] - PAIRED[0]) / pairs, "counts": acoustics_floor.COUNTS}
+
+
+def peak() -> float:
+    """Greatest resident memory of this process so far, MiB."""
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**20
+
+
+def versions() -> dict[str, str]:
+    """Of everything that takes part."""
+    return {name: version(name) for name in ("echotruth", "PyMUST", "esdiva", "numba", "numpy", "scipy")}
+
+
+if __name__ == "__main__":
+    serve(
+        {
+            "turn": turn,
+            "pair": pair,
+            "peak": peak,
+            "versions": versions,
+            "agreement": acoustics_agreement.agreement,
+            "exactness": acoustics_agreement.exactness,
+            "frame": acoustics_frame.frame,
+            "transmits": acoustics_frame.transmits,
+            "floor": acoustics_floor.rates,
+        }
+    )
