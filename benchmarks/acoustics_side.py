@@ -11,6 +11,7 @@ from statistics import median
 from typing import Any
 
 import acoustics_agreement
+import acoustics_exact
 import acoustics_floor
 import acoustics_frame
 from acoustics_arrays import ARRAYS, Array, Floats, delays
@@ -124,7 +125,7 @@ if __name__ == "__main__":
             "peak": peak,
             "versions": versions,
             "agreement": acoustics_agreement.agreement,
-            "exactness": acoustics_agreement.exactness,
+            "exactness": acoustics_exact.exactness,
             "frame": acoustics_frame.frame,
             "transmits": acoustics_frame.transmits,
             "floor": acoustics_floor.rates,
