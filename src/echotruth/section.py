@@ -31,6 +31,7 @@ UNITS: dict[str, float] = {
     "MHz": 1e6,
     "m_per_s": 1.0,
     "deg": pi / 180,
+    "dB": 1.0,
 }
 """Suffix of a key to the factor that makes its value SI (mmHg: NIST SP 811, appendix B.8; dB: to nepers)."""
 

@@ -8,6 +8,7 @@ from echotruth.config.mechanics import Active, Mechanics
 from echotruth.config.pathology import Pathology
 from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
+from echotruth.config.realism import Realism
 from echotruth.config.sections import Config
 from echotruth.config.tracking import Tracker, Tracking
 from echotruth.section import Section
@@ -24,6 +25,7 @@ __all__ = [
     "Phantom",
     "Physiology",
     "Probe",
+    "Realism",
     "Rf",
     "Section",
     "Tracker",

@@ -16,6 +16,7 @@ from echotruth.config.mechanics import Mechanics
 from echotruth.config.pathology import Pathology
 from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
+from echotruth.config.realism import Realism
 from echotruth.config.tracking import Tracking
 from echotruth.section import Name, Section, impossible
 
@@ -38,6 +39,7 @@ class Config(Section):
     phantom: Phantom = Phantom()
     probe: Probe = Probe()
     rf: Rf = Rf()
+    realism: Realism = Realism()
     bmode: Bmode = Bmode()
     tracking: Tracking = Tracking()
     cases: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
@@ -73,6 +75,22 @@ class Config(Section):
         if self.rf.focus_mm <= radius:
             remedy = f"must exceed {radius:g}, the radius of the heart, which stands at the focus"
             raise impossible("rf.focus_mm", self.rf.focus_mm, remedy)
+        return self
+
+    @model_validator(mode="after")
+    def _in_space(self) -> Config:
+        beyond = {"blood": self.realism.blood, "surroundings": self.realism.surroundings}
+        for name, tissue in beyond.items():
+            if self.phantom.in_plane_only and tissue.level_dB is not None:
+                remedy = "must be null where phantom.in_plane_only is true, for it fills a space and no plane"
+                raise impossible(f"realism.{name}.level_dB", tissue.level_dB, remedy)
+        return self
+
+    @model_validator(mode="after")
+    def _lines_leave_the_array(self) -> Config:
+        length, width = self.probe.elements * self.probe.pitch_um / 1e3, self.rf.width_mm
+        if self.rf.scan == "linear" and width is not None and width > length:
+            raise impossible("rf.width_mm", width, f"must not exceed {length:g}, the length of the array")
         return self
 
     @model_validator(mode="after")

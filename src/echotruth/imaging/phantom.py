@@ -77,10 +77,10 @@ def seed(phantom: Phantom, nodes: Floats, cells: NDArray[np.int32], random: np.r
     Scatterers
         Their number is Poisson distributed about density times volume, as in a uniform random medium.
     """
-    bound = _largest_ratio(nodes, cells)
+    bound = largest_ratio(nodes, cells)
     tried = random.poisson(phantom.si().density * bound.sum() / 6)
     cell = random.choice(len(cells), size=tried, p=bound / bound.sum()).astype(np.int32)
-    points = MaterialPoints(cell, _in_tetrahedron(random.random((tried, 3))))
+    points = MaterialPoints(cell, in_tetrahedron(random.random((tried, 3))))
     # Elements are curved: thinning by the local volume leaves the density even within each.
     kept = random.random(tried) * bound[cell] < np.linalg.det(jacobian(nodes, cells, points))
     points = MaterialPoints(points.cell[kept], points.xi[kept])
@@ -116,12 +116,12 @@ def seed_plane(config: Config, heart: Heart, plane: Plane, random: np.random.Gen
     return Scatterers(points, random.standard_normal(len(points)), in_plane_only=True)
 
 
-def _in_tetrahedron(cube: Floats) -> Floats:
+def in_tetrahedron(cube: Floats) -> Floats:
     """Fold the unit cube onto the unit tetrahedron, evenly: sorted coordinates have even gaps."""
     return np.diff(np.sort(cube, axis=1), prepend=0.0, axis=1)
 
 
-def _largest_ratio(nodes: Floats, cells: NDArray[np.int32]) -> Floats:
+def largest_ratio(nodes: Floats, cells: NDArray[np.int32]) -> Floats:
     """A bound on the volume of tissue per volume of local coordinates in each cell, m^3."""
     corners = np.vstack([np.zeros(3), np.eye(3)])
     places = np.vstack([corners, corners[EDGES].mean(axis=1)])

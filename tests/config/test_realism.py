@@ -1,0 +1,36 @@
+"""Realism: off by default, refused where it cannot be, levels whatever the density."""
+
+import pytest
+
+from echotruth.config import Config
+from echotruth.config.loading import ConfigError, load
+
+
+def test_nothing_is_on_by_default():
+    realism = Config().realism
+    assert realism.blood.level_dB is realism.surroundings.level_dB is realism.haze.level_dB is None
+    assert realism.decorrelation.time_ms is realism.noise.snr_dB is None
+    assert realism.shadow.side == "none"
+
+
+@pytest.mark.parametrize("tissue", ["blood", "surroundings"])
+def test_what_fills_a_space_is_refused_beside_a_phantom_in_a_plane(tissue, tmp_path):
+    file = tmp_path / "flat.yaml"
+    file.write_text(f"phantom: {{in_plane_only: true}}\nrealism: {{{tissue}: {{level_dB: -20}}}}\n")
+    with pytest.raises(ConfigError, match=f"realism.{tissue}.level_dB.*must be null where phantom.in_plane_only"):
+        load(file)
+
+
+@pytest.mark.parametrize("density", [0.1, 1.0])
+def test_the_power_in_a_volume_does_not_depend_on_the_density(density):
+    blood = Config.model_validate({"realism": {"blood": {"level_dB": -20.0, "density": density}}}).realism.blood
+    assert blood.strength**2 * density == pytest.approx(0.01)
+
+
+def test_the_realistic_preset_is_the_demo_with_all_of_it_on():
+    preset = load("config/realistic.yaml")
+    demo = load("config/demo.yaml")
+    off = Config().realism
+    assert all(getattr(preset.realism, name) != getattr(off, name) for name in type(off).model_fields)
+    same = {"realism": off, "name": demo.name}
+    assert preset.model_copy(update=same) == demo

@@ -1,0 +1,95 @@
+"""Blood: it fills the cavity, evenly, in every frame, and never enters the wall."""
+
+import numpy as np
+import pytest
+
+from echotruth.config import Config
+from echotruth.imaging.blood import Cavity, fill
+from echotruth.imaging.course import wandering
+from echotruth.location import locate
+from echotruth.mechanics.cavity import cavity_volume
+from echotruth.mechanics.geometry import cell_volumes
+from echotruth.tetrahedra import Mesh
+
+CONFIG = Config.model_validate({"realism": {"blood": {"level_dB": -20.0, "density": 0.3}}})
+TIME = np.array([0, 3e-3])
+
+
+def random(name):
+    return np.random.default_rng(list(name.encode()))
+
+
+def still(blood):
+    return lambda frame: np.zeros((len(blood.points), 3))
+
+
+@pytest.fixture(scope="module")
+def blood(twisting_heart):
+    return fill(CONFIG, twisting_heart, np.random.default_rng(4))
+
+
+@pytest.mark.parametrize("frame", [0, 1])
+def test_the_cells_of_the_cavity_have_its_volume(twisting_heart, frame):
+    cavity, nodes = Cavity(twisting_heart.endo), twisting_heart.positions(frame)
+    none = np.zeros((0, 6), np.int32)
+    cells = cell_volumes(Mesh(cavity.positions(nodes), cavity.cells, none, none, none))
+    lid = nodes[cavity.rim].mean(axis=0)
+    assert cells.min() > 0
+    assert cells.sum() == pytest.approx(cavity_volume(nodes - lid, twisting_heart.endo), rel=1e-12)
+
+
+@pytest.mark.parametrize("frame", [0, 1])
+def test_blood_is_as_dense_in_every_frame(blood, twisting_heart, frame):
+    position, _ = blood.at(frame, twisting_heart, still(blood))
+    nodes = twisting_heart.positions(frame)
+    lid = nodes[Cavity(twisting_heart.endo).rim].mean(axis=0)
+    expected = 0.3 * 5000e9 * cavity_volume(nodes - lid, twisting_heart.endo)
+    assert abs(len(position) - expected) < 4 * np.sqrt(expected)
+
+
+def test_blood_is_even_over_the_cavity(blood, twisting_heart):
+    # The endocardium is an ellipsoid of semi-axes 1.45 and 5.4 mm, cut 1.4 mm above its equator.
+    position, _ = blood.at(0, twisting_heart, still(blood))
+    height = np.linspace(-6.8e-3, 0, 30001)
+    area = 1 - ((height + 1.4e-3) / 5.4e-3) ** 2
+    mean = (height * area).sum() / area.sum()
+    spread = np.sqrt(((height - mean) ** 2 * area).sum() / area.sum())
+    error = spread / np.sqrt(len(position))
+    assert abs(position[:, 2].mean() - mean) < 4 * error
+    assert np.all(np.abs(position[:, :2].mean(axis=0)) < 4 * error)
+
+
+def test_blood_follows_an_affine_motion_of_the_wall(blood, twisting_heart, affine):
+    matrix, shift = affine
+    (before, _), (after, _) = (blood.at(frame, twisting_heart, still(blood)) for frame in (0, 1))
+    # Who is left in the smaller cavity was in the larger one, in the same order.
+    expected = before @ matrix.T + shift
+    found = np.searchsorted(expected[:, 0], after[:, 0], sorter=(order := np.argsort(expected[:, 0])))
+    near = order[np.clip(found, 0, len(order) - 1)], order[np.clip(found - 1, 0, len(order) - 1)]
+    error = np.minimum(*(np.abs(expected[k] - after).max(axis=1) for k in near))
+    assert error.max() < 1e-15
+    assert len(after) == pytest.approx(len(before) * np.linalg.det(matrix), rel=0.02)
+
+
+@pytest.mark.parametrize("frame", [0, 1])
+def test_blood_that_flows_wildly_stays_out_of_the_wall_and_below_the_base(blood, twisting_heart, frame):
+    flow = wandering(len(blood.points), TIME, 0.5e-3, 200e-6, random)
+    position, _ = blood.at(frame, twisting_heart, flow)
+    carried, _ = blood.at(frame, twisting_heart, still(blood))
+    nodes = twisting_heart.positions(frame)
+    assert (np.abs(position - carried).max() > 1e-4) == (frame == 1)
+    assert (locate(nodes, twisting_heart.cells, position).cell < 0).all()
+    assert position[:, 2].max() <= nodes[:, 2].max() + 1e-12
+
+
+def test_its_power_in_a_volume_is_that_of_muscle_times_the_level(blood, twisting_heart):
+    _, amplitude = blood.at(0, twisting_heart, still(blood))
+    power = (amplitude**2).sum() / cavity_volume(twisting_heart.positions(0), twisting_heart.endo)
+    assert 10 * np.log10(power / 5000e9) == pytest.approx(-20, abs=0.1)
+
+
+def test_no_flow_changes_what_is_handed_on(blood, twisting_heart):
+    before = blood.amplitude.copy(), blood.points.xi.copy()
+    blood.at(1, twisting_heart, wandering(len(blood.points), TIME, 1e-3, 60e-6, random))
+    assert np.array_equal(before[0], blood.amplitude)
+    assert np.array_equal(before[1], blood.points.xi)
