@@ -27,6 +27,7 @@ MOUSE, HUMAN = "mouse, 25 MHz", "human, 2.72 MHz"
 SPEED = {
     "ours": 20000,
     "ours, 1e-3": 20000,
+    "ours, elevation": 20000,
     "PyMUST": 2000,
     "PyMUST, -40 dB": 2000,
     "PyMUST, elevation": 300,
@@ -35,8 +36,10 @@ SPEED = {
     "eSDIva, matrix": 200,
 }
 """Party to the scatterers of a turn."""
-THICK = ("PyMUST, elevation", "eSDIva, elevation")
-"""Those that take scatterers out of the plane; ours does so always, and is timed with both."""
+THICK = ("ours, elevation", "PyMUST, elevation", "eSDIva, elevation")
+"""Those whose scatterers fill a slab; those of the others lie in the plane of the image."""
+
+IN_PLANE = ("ours", "ours, 1e-3")
 
 TRANSMITS = (1, 8, 128)
 FRAME = 10000
@@ -45,6 +48,7 @@ FRAME = 10000
 GROWTH = {
     "ours": (1000, 10000, 100000, 1000000),
     "ours, 1e-3": (1000, 10000, 100000, 1000000),
+    "ours, elevation": (1000, 10000, 100000, 1000000),
     "PyMUST": (100, 1000, 10000),
     "PyMUST, elevation": (100, 1000),
     "eSDIva": (100, 1000, 10000),
@@ -55,9 +59,11 @@ ELEMENTS = (16, 32, 64, 128)
 OF_ELEMENTS = {"ours": 20000, "PyMUST": 1000, "eSDIva": 1000, "eSDIva, matrix": 100}
 """Party to the scatterers with which the number of elements is varied."""
 
+FEW = 3
+"""Turns of which growth is the median."""
+
 LINES, IMAGED = 128, 100000
 """Lines and scatterers of the frame that is imaged."""
-ACCURACIES = (2e-5, 1e-3)
 
 
 @dataclass
@@ -90,16 +96,20 @@ def speed(bench: Bench) -> Result:
     answer = {}
     with bench.side() as side:
         for array in (MOUSE, HUMAN):
-            turns = {name: (name, name in THICK) for name in SPEED} | {"ours, slab": ("ours", True)}
-            spent: dict[str, list[Result]] = {name: [] for name in turns}
+            spent: dict[str, list[Result]] = {party: [] for party in SPEED}
             for _ in range(bench.repeats):
-                for name, (party, thick) in turns.items():
-                    given = {"party": party, "array": array, "scatterers": SPEED[party], "thick": thick}
-                    spent[name].append(side("turn", **given))
-            rows = {name: _medians(taken) | {"scatterers": SPEED[turns[name][0]]} for name, taken in spent.items()}
+                for party, scatterers in SPEED.items():
+                    given = {"array": array, "scatterers": scatterers, "thick": party in THICK}
+                    spent[party].append(side("turn", party=party, **given))
+            rows = {party: _medians(taken) | {"scatterers": SPEED[party]} for party, taken in spent.items()}
             answer[array] = rows
             _tell(f"{array}: " + ", ".join(f"{n} {1e6 * r['cpu'] / r['scatterers']:.2f} us" for n, r in rows.items()))
     return answer
+
+
+def _often(side: Worker, **given: Any) -> Result:
+    """Median of a few turns of one party."""
+    return _medians([side("turn", **given) for _ in range(FEW)])
 
 
 def _medians(turns: list[Result]) -> Result:
@@ -113,10 +123,9 @@ def transmits(bench: Bench) -> Result:
         for array in (MOUSE, HUMAN):
             given = {"array": array, "scatterers": FRAME}
             ours = {
-                str(number): side("transmits", number=number, accuracy=ACCURACIES[0], repeats=bench.repeats, **given)
-                for number in TRANSMITS
+                str(number): side("transmits", number=number, repeats=bench.repeats, **given) for number in TRANSMITS
             }
-            peers = {name: side("turn", party=name, **given) for name in ("PyMUST", "eSDIva")}
+            peers = {name: _often(side, party=name, **given) for name in ("PyMUST", "eSDIva")}
             answer[array] = {"ours": ours, "peers": peers}
             _tell(f"{array}: {answer[array]}")
     return answer
@@ -127,12 +136,14 @@ def growth(bench: Bench) -> Result:
     answer: Result = {"scatterers": {}, "elements": {}}
     with bench.side() as side:
         for party, numbers in GROWTH.items():
-            turns = [side("turn", party=party, array=MOUSE, scatterers=number) for number in numbers]
+            turns = [
+                _often(side, party=party, array=MOUSE, scatterers=number, thick=party in THICK) for number in numbers
+            ]
             answer["scatterers"][party] = [[n, turn["cpu"]] for n, turn in zip(numbers, turns, strict=True)]
             _tell(f"{party}: {answer['scatterers'][party]}")
         for party, number in OF_ELEMENTS.items():
             given = {"party": party, "array": MOUSE, "scatterers": number}
-            turns = [side("turn", elements=elements, **given) for elements in ELEMENTS]
+            turns = [_often(side, elements=elements, **given) for elements in ELEMENTS]
             answer["elements"][party] = [[e, t["cpu"] / number] for e, t in zip(ELEMENTS, turns, strict=True)]
     return answer
 
@@ -144,7 +155,7 @@ def memory(bench: Bench) -> Result:
         for number in numbers[1:]:
             with bench.side() as side:
                 idle = side("peak")
-                side("turn", party=party, array=MOUSE, scatterers=number)
+                side("turn", party=party, array=MOUSE, scatterers=number, thick=party in THICK)
                 rows.append({"party": party, "scatterers": number, "idle": idle, "peak": side("peak")})
             _tell(f"{party}, {number}: {rows[-1]['peak']:.0f} MiB")
     return {"rows": rows}
@@ -156,9 +167,8 @@ def frame(bench: Bench) -> Result:
     for threads in (1, 2):
         with bench.side(threads) as side:
             for array in (MOUSE, HUMAN):
-                for accuracy in ACCURACIES:
-                    given = {"array": array, "scatterers": IMAGED, "lines": LINES, "accuracy": accuracy}
-                    rows.append(given | side("frame", repeats=bench.repeats, **given))
+                given = {"array": array, "scatterers": IMAGED, "lines": LINES}
+                rows.append(given | side("frame", repeats=bench.repeats, **given))
     return {"rows": rows}
 
 
@@ -166,7 +176,7 @@ def floor(bench: Bench) -> Result:
     """What the machine allows, beside what a pair takes."""
     with bench.side() as side:
         rates = side("floor")
-        pairs = {str(accuracy): side("pair", array=MOUSE, accuracy=accuracy) for accuracy in ACCURACIES}
+        pairs = {party: side("pair", party=party, array=MOUSE) for party in IN_PLANE}
     return {"rates": rates, "pairs": pairs}
 
 

@@ -19,7 +19,8 @@ from echotruth.imaging.rf import FullMatrix
 
 Spectra = NDArray[np.complexfloating[Any, Any]]
 
-SCATTERERS = 300
+SCATTERERS, FEW = 100, 20
+"""For PyMUST, and for the matrix of eSDIva."""
 STEERED = np.deg2rad(15)
 FINE = {"FullFrequencyDirectivity": True, "ElementSplitting": 1}
 """Options of PyMUST that make its directivity ours: of every frequency, of the element as one piece."""
@@ -40,6 +41,7 @@ PYMUST: dict[str, dict[str, Any]] = {
 
 def likeness(ours: Spectra, theirs: Spectra) -> dict[str, float]:
     """Normalised correlation, relative L2 after the best common factor, and that factor on theirs."""
+    ours = ours.astype(np.complex128)
     product = np.vdot(theirs, ours).real
     factor = product / np.vdot(theirs, theirs).real
     return {
@@ -62,7 +64,7 @@ def to_pymust(
     """Likeness of one transmit."""
     probe = (array.probe if lens else array.thin)(attenuation_dB_per_cm_MHz=attenuation)
     position, amplitude = array.scatterers(SCATTERERS, thick=lens)
-    matrix, focus = FullMatrix(probe, array.far), probe.si().elevation_focus
+    matrix, focus = FullMatrix(probe, array.far, elevation=lens), probe.si().elevation_focus
     delay = delays(probe, (focus * np.sin(STEERED), focus * np.cos(STEERED)))
     phase = np.exp(-2j * np.pi * np.outer(matrix.frequency, delay))
     ours = np.einsum("fij,fi->fj", matrix(position, amplitude), phase)
@@ -74,7 +76,7 @@ def to_pymust(
 def to_esdiva(array: Array) -> dict[str, float]:
     """Likeness of the whole matrix."""
     probe = array.thin()
-    position, amplitude = array.scatterers(SCATTERERS)
-    matrix = FullMatrix(probe, array.far)
+    position, amplitude = array.scatterers(FEW)
+    matrix = FullMatrix(probe, array.far, elevation=False)
     theirs = Esdiva(probe, matrix.sampling).spectra(position, amplitude, matrix.frequency)
     return likeness(matrix(position, amplitude), theirs * pulse_spectrum(probe, matrix.frequency)[:, None, None])

@@ -32,12 +32,15 @@ class Array:
         Ranges between which the scatterers lie.
     slab : float, m
         Half the thickness, in elevation, of the volume they fill.
+    focus : float, m
+        Range at which lines are focused.
     """
 
     preset: str
     near: float
     far: float
     slab: float
+    focus: float
 
     def probe(self, **changes: Any) -> Probe:
         """The probe, with other values of some keys."""
@@ -62,8 +65,8 @@ class Array:
 
 
 ARRAYS = {
-    "mouse, 25 MHz": Array("mouse_25MHz", 3e-3, 11e-3, 0.3e-3),
-    "human, 2.72 MHz": Array("human_2_7MHz", 20e-3, 120e-3, 3e-3),
+    "mouse, 25 MHz": Array("mouse_25MHz", 3e-3, 11e-3, 0.3e-3, 6.5e-3),
+    "human, 2.72 MHz": Array("human_2_7MHz", 20e-3, 120e-3, 3e-3, 70e-3),
 }
 
 

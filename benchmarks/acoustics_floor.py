@@ -13,15 +13,10 @@ from typing import Any
 import numba
 import numpy as np
 
+from echotruth.imaging import deposit, rf
+
 VECTOR = 8
 """Numbers in 32 bytes."""
-COUNTS = {
-    "load": {"bytes": 3 * 32 + 4 * 4, "instructions": 3 + 4},
-    "store": {"bytes": 32, "instructions": 1},
-    "multiply": {"bytes": 2 * 32, "instructions": 2},
-}
-"""What the deposit of an echo takes at least: loads of trace, kernel and slope, and of two times and two weights; a
-store of the trace; a multiply-add for the slope and one for the weight."""
 LENGTH = 2048
 """Numbers in each of two arrays: 8 KiB."""
 CACHE_LINE = 16
@@ -65,8 +60,25 @@ def multiply(one, other, repeats):
     return other[0]
 
 
+TERMS = {"ours": rf.FINE, "ours, 1e-3": rf.FAST}
+"""Party to the terms of its tables."""
+
 LOOPS = {"load": (load, 2), "store": (store, 2), "multiply": (multiply, HORNER)}
 """Name to loop and how often it does that to every number."""
+
+
+def counts(terms: int) -> dict[str, dict[str, int]]:
+    """Bytes and instructions of the deposit of an echo, a vector of eight at a time.
+
+    Loads of every row of its table, of the trace, and of time, weight and colour at the receiver; a store of the trace;
+    as many multiply-adds as the table has rows.
+    """
+    rows = sum(deposit.ROWS[terms])
+    return {
+        "load": {"bytes": (rows + 1) * 32 + 3 * 4, "instructions": rows + 1 + 3},
+        "store": {"bytes": 32, "instructions": 1},
+        "multiply": {"bytes": rows * 32, "instructions": rows},
+    }
 
 
 def rates() -> dict[str, dict[str, float]]:

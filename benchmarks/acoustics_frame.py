@@ -12,33 +12,30 @@ from worker import Clock
 
 from echotruth.config import Bmode, Rf
 from echotruth.imaging.bmode import clip
+from echotruth.imaging.rf import FullMatrix
+from echotruth.imaging.scan import scan_lines
 from echotruth.imaging.scanner import Scanner, imaging_depth
 from echotruth.imaging.synthesis import Synthesis
 from echotruth.imaging.transmit import KINDS
-from echotruth.transducers import SCANS
 
 Seconds = dict[str, dict[str, float]]
 
 
 def scan(array: Array, **changes: Any) -> tuple[Rf, Bmode]:
     """Lines and image that suit an array."""
-    suited = SCANS[array.preset]
-    rf = Rf(focus_mm=suited["rf.focus_mm"], sector_deg=np.rad2deg(SECTOR), **changes)
-    return rf, Bmode(field_of_view_mm=suited["bmode.field_of_view_mm"])
+    rf = Rf(focus_mm=1e3 * array.focus, sector_deg=np.rad2deg(SECTOR), **changes)
+    return rf, Bmode(field_of_view_mm=1e3 * array.far)
 
 
-def _channels(array: Array, rf: Rf, scanner: Scanner) -> Synthesis:
-    probe = array.probe()
-    return Synthesis(scanner.matrix, probe.si().frequency, KINDS[rf.transmit](probe, rf, scanner.scan))
-
-
-def frame(array: str, scatterers: int, lines: int, accuracy: float, repeats: int) -> dict[str, Any]:
+def frame(array: str, scatterers: int, lines: int, repeats: int) -> dict[str, Any]:
     """Seconds of the parts of a frame of focused lines, from scatterers to uint8; medians."""
     given = ARRAYS[array]
-    rf, bmode = scan(given, lines=lines, accuracy=accuracy)
+    rf, bmode = scan(given, lines=lines)
     scanner = Scanner(given.probe(), rf, imaging_depth(rf, bmode))
+    channels = Synthesis(
+        scanner.matrix, given.probe().si().frequency, KINDS[rf.transmit](given.probe(), rf, scanner.scan)
+    )
     phantom = given.scatterers(scatterers, thick=True)
-    channels = _channels(given, rf, scanner)
     turns = [_parts(scanner, channels, phantom, bmode).seconds for _ in range(repeats + 1)][1:]
     return {"seconds": _medians(turns), "threads": numba.get_num_threads(), "size_px": bmode.size_px}
 
@@ -60,16 +57,17 @@ def _parts(scanner: Scanner, channels: Synthesis, phantom: tuple[np.ndarray, np.
     return clock
 
 
-def transmits(array: str, scatterers: int, number: int, accuracy: float, repeats: int) -> Seconds:
+def transmits(array: str, scatterers: int, number: int, repeats: int) -> Seconds:
     """Seconds of the matrix and of the channel data of a number of diverging waves made from it; medians."""
     given = ARRAYS[array]
-    rf, bmode = scan(given, transmit="diverging", transmits=number, accuracy=accuracy)
-    scanner = Scanner(given.probe(), rf, imaging_depth(rf, bmode))
-    phantom, channels, turns = given.scatterers(scatterers), _channels(given, rf, scanner), []
+    probe, rf = given.probe(), scan(given, transmit="diverging", transmits=number)[0]
+    waves = KINDS[rf.transmit](probe, rf, scan_lines(probe, rf))
+    full = FullMatrix(probe, given.far, np.abs(waves.delay).max(), elevation=False)
+    phantom, channels, turns = given.scatterers(scatterers), Synthesis(full, probe.si().frequency, waves), []
     for _ in range(repeats + 1):
         clock = Clock()
         with clock("matrix"):
-            matrix = scanner.matrix(*phantom)
+            matrix = full(*phantom)
         with clock("channels"):
             for _ in channels(matrix):
                 pass

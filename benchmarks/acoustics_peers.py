@@ -24,6 +24,9 @@ IN_PLANE = 1e-8
 NEPER_DB = 8.69
 """Decibels in a neper as PyMUST rounds them; there are 20 / ln 10 = 8.6859."""
 
+WIDEST = 190.0
+"""Bandwidth, %, of PyMUST's pulse where that is divided out: frequencies at which it is faint are not computed."""
+
 TRUNCATION = 5.0
 """Half the length of eSDIva's sampled pulse, in standard deviations of its envelope."""
 
@@ -97,6 +100,7 @@ class Pymust:
         over area, m^2 (3-D) or over distance (2-D).
         """
         param = self.param
+        param.bandwidth = WIDEST
         middle = round(param.fc / step)
         param.fc = middle * step
         # PyMUST's own step, and how finely it divides ours; a hair more, as it rounds the number of bins up.
@@ -178,7 +182,9 @@ class Esdiva:
 
         Echoes of a pulse whose spectrum is 1, in the unit of amplitude over area, m^2.
         """
-        rf, axis = self.matrix(position, amplitude)
+        # A silent scatterer far away, since the record ends before the pulse of the last echo does.
+        far = 1.2 * np.linalg.norm(position, axis=1).max()
+        rf, axis = self.matrix(np.append(position, [[0.0, far, 0.0]], axis=0), np.append(amplitude, 0.0))
         time = axis["t0"] + axis["dt"] * np.arange(rf.shape[2])
         wave = self._pulse @ np.exp(-2j * np.pi * np.outer(self._time, frequency))
         spectra = rf @ np.exp(-2j * np.pi * np.outer(time, frequency)) / wave

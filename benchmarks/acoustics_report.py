@@ -11,9 +11,7 @@ from report import table
 Result = dict[str, Any]
 Lines = list[str]
 
-SLAB = {"PyMUST, elevation": "ours, slab", "eSDIva, elevation": "ours, slab"}
-"""Parties whose scatterers fill a slab, and ours with the same."""
-MATRIX = ("ours", "ours, slab", "ours, 1e-3", "eSDIva, matrix")
+MATRIX = ("ours", "ours, 1e-3", "ours, elevation", "eSDIva, matrix")
 """Parties that give all elements to all elements; the others give one transmit."""
 
 
@@ -46,7 +44,7 @@ def speed(found: Result) -> Lines:
         cost = {name: 1e6 * row["cpu"] / row["scatterers"] for name, row in rows.items()}
         cells = []
         for name, row in rows.items():
-            ours = cost[SLAB.get(name, "ours")]
+            ours = cost["ours, elevation" if name.endswith("elevation") else "ours"]
             ratio = "" if name.startswith("ours") else f"{cost[name] / ours:.0f}"
             gives = "64 x 64" if name in MATRIX else "1 x 64"
             cells.append([name, gives, row["scatterers"], f"{cost[name]:.2f}", ratio])
@@ -66,7 +64,7 @@ def transmits(found: Result) -> Lines:
             theirs = {name: int(number) * cost for name, cost in peers.items()}
             # eSDIva too can make any transmit of its matrix, which is 64 of them; its making is not counted.
             theirs["eSDIva"] = min(theirs["eSDIva"], 64 * peers["eSDIva"])
-            ratios = [f"{cost:.1f} ({cost / ours:.0f} x)" for cost in theirs.values()]
+            ratios = [f"{cost:.3g} ({cost / ours:.0f} x)" for cost in theirs.values()]
             split = f"{ours:.3f} ({parts['matrix']['cpu']:.3f} + {parts['channels']['cpu']:.3f})"
             cells.append([number, split, *ratios])
         text += [*table([f"{array}: transmits", "ours (matrix + channels), s", *peers], cells), ""]
@@ -75,17 +73,17 @@ def transmits(found: Result) -> Lines:
 
 def frame(found: Result) -> Lines:
     """Whole frames of ours."""
-    one = found["rows"][0]
-    cells = []
+    one, cells = found["rows"][0], []
     for row in found["rows"]:
-        spent = {part: seconds["wall"] for part, seconds in row["seconds"].items()}
-        receive = spent["channels and receive focus"] - spent["channels"]
-        total = spent["matrix"] + spent["channels and receive focus"] + spent["image"]
-        parts = (spent["matrix"], spent["channels"], receive, spent["image"], total)
-        cells.append([row["array"], row["accuracy"], row["threads"], *(f"{part:.2f}" for part in parts)])
-    head = ["array", "accuracy", "threads", "matrix", "channels", "receive focus", "image", "frame"]
+        spent = row["seconds"]
+        both, made = (spent[part] for part in ("channels and receive focus", "channels"))
+        spent = spent | {"receive focus": {kind: both[kind] - made[kind] for kind in both}}
+        parts = [spent[part] for part in ("matrix", "channels", "receive focus", "image")]
+        total = {kind: sum(part[kind] for part in parts) for kind in both}
+        cells.append([row["array"], row["threads"], *(f"{p['cpu']:.2f} ({p['wall']:.2f})" for p in (*parts, total))])
+    head = ["array", "threads", "matrix", "channels", "receive focus", "image", "frame"]
     size = f"{one['size_px']} x {one['size_px']} px"
-    title = f"## {one['scatterers']} scatterers to an image: {one['lines']} focused lines, {size}, wall seconds"
+    title = f"## {one['scatterers']} scatterers to an image: {one['lines']} focused lines, {size}, CPU (wall) seconds"
     return [title, "", *table(head, cells)]
 
 
@@ -124,16 +122,16 @@ def memory(found: Result) -> Lines:
 def floor(found: Result) -> Lines:
     """What the machine allows."""
     cells = []
-    for accuracy, pair in found["pairs"].items():
+    for party, pair in found["pairs"].items():
         counts = pair["counts"]
         bytes_ = {kind: count["bytes"] / 32 * found["rates"][kind]["vector"] for kind, count in counts.items()}
         issued = {kind: count["instructions"] * found["rates"][kind]["instruction"] for kind, count in counts.items()}
         least = [f"{max(bound.values()):.2f} ({max(bound, key=bound.get)})" for bound in (bytes_, issued)]
         tally = ", ".join(f"{count['instructions']} x {kind} ({count['bytes']} B)" for kind, count in counts.items())
-        cells.append([accuracy, tally, *least, f"{pair['ns']:.2f}", f"{pair['ns'] / max(issued.values()):.1f}"])
+        cells.append([party, tally, *least, f"{pair['ns']:.2f}", f"{pair['ns'] / max(issued.values()):.1f}"])
     rates = found["rates"].items()
     head = [
-        "accuracy",
+        "",
         "of a pair and scatterer",
         "least by bytes, ns",
         "by instructions, ns",

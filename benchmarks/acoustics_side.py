@@ -33,9 +33,9 @@ WARMING = 250
 """Scatterers of the turn that is not counted, for what is compiled or set up once; eSDIva bins from 200 on."""
 
 
-def matrix(array: Array, elements: int, accuracy: float) -> Run:
+def matrix(array: Array, elements: int, **options: Any) -> Run:
     """Ours: all elements to all elements."""
-    return FullMatrix(array.probe(elements=elements), array.far, accuracy=accuracy)
+    return FullMatrix(array.probe(elements=elements), array.far, **options)
 
 
 def pymust(array: Array, elements: int, elevation: bool = False, **options: Any) -> Run:
@@ -67,8 +67,9 @@ def _focused(array: Array, elements: int) -> Floats:
 
 
 PARTIES: dict[str, tuple[Callable[..., Run], dict[str, Any]]] = {
-    "ours": (matrix, {"accuracy": 2e-5}),
-    "ours, 1e-3": (matrix, {"accuracy": 1e-3}),
+    "ours": (matrix, {"accuracy": 2e-5, "elevation": False}),
+    "ours, 1e-3": (matrix, {"accuracy": 1e-3, "elevation": False}),
+    "ours, elevation": (matrix, {"elevation": True}),
     "PyMUST": (pymust, {}),
     "PyMUST, -40 dB": (pymust, {"dBThresh": -40}),
     "PyMUST, elevation": (pymust, {"elevation": True}),
@@ -97,13 +98,12 @@ def turn(party: str, array: str, scatterers: int, elements: int = ELEMENTS, thic
     return clock.seconds["turn"]
 
 
-def pair(array: str, accuracy: float) -> dict[str, Any]:
-    """Nanoseconds of CPU of a pair of elements and a scatterer: what more scatterers add to a matrix."""
-    party = next(name for name, (_, options) in PARTIES.items() if options.get("accuracy") == accuracy)
+def pair(party: str, array: str) -> dict[str, Any]:
+    """Nanoseconds of CPU of a pair of elements and a scatterer (what more scatterers add), and what it must do."""
     spent = [[turn(party, array, number)["cpu"] for number in PAIRED] for _ in range(TURNS)]
     few, many = (median(turns) for turns in zip(*spent, strict=True))
-    pairs = ELEMENTS * (ELEMENTS + 1) / 2
-    return {"ns": 1e9 * (many - few) / (PAIRED[1] - PAIRED[0]) / pairs, "counts": acoustics_floor.COUNTS}
+    taken = 1e9 * (many - few) / (PAIRED[1] - PAIRED[0]) / (ELEMENTS * (ELEMENTS + 1) / 2)
+    return {"ns": taken, "counts": acoustics_floor.counts(acoustics_floor.TERMS[party])}
 
 
 def peak() -> float:

@@ -1,0 +1,42 @@
+"""The RF against other simulators, where they are installed: `pip install -e .[peers]`."""
+
+from pathlib import Path
+
+import pytest
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+ARRAYS = ["mouse, 25 MHz", "human, 2.72 MHz"]
+
+
+@pytest.fixture
+def agreement(monkeypatch):
+    monkeypatch.syspath_prepend(BENCHMARKS)
+    import acoustics_agreement
+
+    return acoustics_agreement
+
+
+@pytest.mark.parametrize("array", ARRAYS)
+@pytest.mark.parametrize("setting", ["the same settings", "the same, with attenuation"])
+def test_one_transmit_of_the_matrix_is_that_of_pymust(agreement, array, setting):
+    pytest.importorskip("pymust")
+    found = agreement.to_pymust(agreement.ARRAYS[array], **agreement.PYMUST[setting])
+    assert found["correlation"] > 0.9999999
+    assert found["error"] < 2e-4
+    assert found["factor"] == pytest.approx(1, rel=1e-3)
+
+
+@pytest.mark.parametrize("setting", ["rigid baffle", "directivity of the centre frequency"])
+def test_settings_of_pymust_that_are_not_ours_show(agreement, setting):
+    pytest.importorskip("pymust")
+    found = agreement.to_pymust(agreement.ARRAYS["mouse, 25 MHz"], **agreement.PYMUST[setting])
+    assert found["error"] > 5e-3
+
+
+@pytest.mark.parametrize("array", ARRAYS)
+def test_the_matrix_is_that_of_esdiva(agreement, array):
+    pytest.importorskip("esdiva")
+    found = agreement.to_esdiva(agreement.ARRAYS[array])
+    assert found["correlation"] > 0.9999999
+    assert found["error"] < 2e-4
+    assert found["factor"] == pytest.approx(1, rel=1e-3)
