@@ -19,7 +19,7 @@ from echotruth.imaging.rf import FullMatrix
 
 Spectra = NDArray[np.complexfloating[Any, Any]]
 
-SCATTERERS, FEW = 100, 20
+SCATTERERS, FEW = 300, 20
 """For PyMUST, and for the matrix of eSDIva."""
 STEERED = np.deg2rad(15)
 FINE = {"FullFrequencyDirectivity": True, "ElementSplitting": 1}
@@ -61,7 +61,7 @@ def agreement(array: str) -> dict[str, dict[str, float]]:
 def to_pymust(
     array: Array, *, elevation: bool = False, lens: bool = False, attenuation: float = 0.0, **options: Any
 ) -> dict[str, float]:
-    """Likeness of one transmit."""
+    """Likeness of one transmit, PyMUST in three dimensions (`elevation`), with points for elements or with a `lens`."""
     probe = (array.probe if lens else array.thin)(attenuation_dB_per_cm_MHz=attenuation)
     position, amplitude = array.scatterers(SCATTERERS, thick=lens)
     matrix, focus = FullMatrix(probe, array.far, elevation=lens), probe.si().elevation_focus
