@@ -26,7 +26,7 @@ def growth(found: Result, file: Path) -> None:
     matplotlib.use("agg")
     import matplotlib.pyplot as plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.2), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.6), layout="constrained")
     for axes, rows, scale in ((left, found["scatterers"], 1.0), (right, found["elements"], 1e6)):
         for party, pairs in rows.items():
             style, colour, label = STYLES[party]
@@ -37,6 +37,6 @@ def growth(found: Result, file: Path) -> None:
     elements = [x for x, _ in next(iter(found["elements"].values()))]
     right.set_xticks(elements, elements)
     right.minorticks_off()
-    left.legend(fontsize="small")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize="small")
     figure.savefig(file, dpi=150)
     plt.close(figure)
