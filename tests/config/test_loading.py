@@ -31,6 +31,9 @@ BAD = {
     "tracking: {trackers: {wide: {window_px: 256}}}": "window_px = 256: must not exceed the smallest image, 128 px",
     "tracking: {trackers: {both: {window_mm: 1.0}}}": "give either window_px or window_mm",
     "rf: {focus_mm: 12}": "rf.focus_mm = 12.0: must be smaller than bmode.field_of_view_mm = 12",
+    "rf: {scan: linear, width_mm: 3.0}": "rf.width_mm = 3.0: must not exceed 2.944, the length of the array",
+    "rf: {f_number: -1}": "rf.f_number = -1",
+    "rf: {lines: 4}": "rf.lines = 4",
     "mechanics: {material: {law: fungi}}": "mechanics.material.law = 'fungi': should be 'fung', 'guccione', ",
     "mechanics: {material: {law: null}}": "mechanics.material.law = None: should be 'fung', 'guccione', ",
     "mechanics: {material: {fiber: 9}}": "fiber is not a key of the law fung (others: guccione, holzapfel_ogden, "

@@ -3,12 +3,23 @@
 import numpy as np
 import pytest
 
-from echotruth.config import Bmode
-from echotruth.imaging.bmode import clip, downsample, envelope, log_compress, pixel_centres, scan_convert
+from echotruth.config import Bmode, Probe
+from echotruth.imaging.bmode import (
+    ScanConversion,
+    clip,
+    downsample,
+    envelope,
+    envelopes,
+    log_compress,
+    pixel_centres,
+    time_gain,
+)
+from echotruth.imaging.scan import Linear, Sector
 
 BMODE = Bmode(size_px=128, downsampling=(1, 2, 4))
 ANGLE = np.radians(np.linspace(-32, 32, 129))
 RANGE = np.linspace(7.7e-6, 13.5e-3, 900)
+SECTOR = Sector(ANGLE)
 
 
 def test_envelope_is_the_magnitude():
@@ -47,13 +58,39 @@ def test_small_pixels_share_centres_with_their_blocks():
         assert np.allclose(fine.reshape(128, 4).mean(axis=1), coarse)
 
 
+@pytest.mark.parametrize("decibels", [None, 0.7])
+def test_gain_undoes_what_attenuation_takes_both_ways(decibels):
+    """0.5 dB/cm/MHz at 25 MHz over 1 cm and back is 25 dB; with 0.7 given, 35 dB."""
+    probe = Probe(attenuation_dB_per_cm_MHz=0.5)
+    gain = time_gain(probe, Bmode(tgc_dB_per_cm_MHz=decibels), np.array([0, 1e-2]))
+    assert np.allclose(20 * np.log10(gain), [0, 25 if decibels is None else 35], atol=1e-4)
+    assert np.allclose(envelope(np.array([3 + 4j, 3 + 4j], np.complex64), gain), 5 * gain)
+
+
+def test_without_attenuation_there_is_no_gain():
+    assert (time_gain(Probe(), Bmode(), RANGE) == 1).all()
+
+
+def test_a_gain_beyond_all_numbers_is_refused():
+    probe = Probe(preset="mouse_40MHz", attenuation_dB_per_cm_MHz=3.0)
+    reach = np.linspace(1e-3, 0.1, len(RANGE))
+    lines = np.ones((1, len(ANGLE), len(RANGE)), np.complex64)
+    with pytest.raises(ValueError, match="no echo"):
+        clip(lines, SECTOR, reach, BMODE, time_gain(probe, BMODE, reach))
+
+
+def pixel_grid(size):
+    axial, lateral = pixel_centres(BMODE, size)
+    return axial[:, None], lateral
+
+
 def test_scan_conversion_puts_a_smooth_field_on_its_place():
     def field(lateral, axial):
         return 2 + np.sin(900 * lateral) * np.cos(700 * axial)
 
     polar = field(RANGE * np.sin(ANGLE)[:, None], RANGE * np.cos(ANGLE)[:, None])
-    image = scan_convert(polar[None], ANGLE, RANGE, BMODE)[0]
-    axial, lateral = (grid[:, None] if k == 0 else grid for k, grid in enumerate(pixel_centres(BMODE, 128)))
+    image = ScanConversion(SECTOR, RANGE, BMODE)(polar)
+    axial, lateral = pixel_grid(128)
     angle, reach = np.abs(np.arctan2(lateral, axial)), np.hypot(lateral, axial)
     # Splines feel the edge of the sector for a few lines and samples.
     inside = (angle < np.radians(29)) & (reach > 0.3e-3) & (reach < 13.2e-3)
@@ -61,19 +98,30 @@ def test_scan_conversion_puts_a_smooth_field_on_its_place():
     assert (image[angle > np.radians(32)] == 0).all()
 
 
+def test_parallel_lines_are_put_on_their_place():
+    foot = np.linspace(-3e-3, 3e-3, 129)
+    image = ScanConversion(Linear(foot), RANGE, BMODE)(2 + np.outer(np.sin(900 * foot), np.cos(700 * RANGE)))
+    axial, lateral = pixel_grid(128)
+    expected = 2 + np.sin(900 * lateral) * np.cos(700 * axial)
+    inside = (np.abs(lateral) < 2.7e-3) & (axial > 0.3e-3)
+    assert np.abs(image - expected)[inside].max() < 1e-4
+    assert (image[:, np.abs(lateral) > 3e-3] == 0).all()
+
+
 def test_scan_conversion_turns_the_smallest_angle_to_the_first_columns():
-    polar = np.zeros((1, len(ANGLE), len(RANGE)), np.float32)
-    polar[0, :20] = 1
-    image = scan_convert(polar, ANGLE, RANGE, BMODE)[0]
+    polar = np.zeros((len(ANGLE), len(RANGE)), np.float32)
+    polar[:20] = 1
+    image = ScanConversion(SECTOR, RANGE, BMODE)(polar)
     assert image[:, :64].sum() > 0
     assert image[:, 64:].max() < 1e-3
 
 
 def test_scan_converted_envelope_is_never_negative():
-    polar = np.zeros((2, len(ANGLE), len(RANGE)), np.float32)
-    polar[:, 60:64, 400:410] = 1
-    images = scan_convert(polar, ANGLE, RANGE, BMODE)
+    lines = np.zeros((2, len(ANGLE), len(RANGE)), np.complex64)
+    lines[:, 60:64, 400:410] = 1j
+    images = envelopes(lines, SECTOR, RANGE, BMODE)
     assert images.shape == (2, 128, 128)
+    assert images.dtype == np.float32
     assert images.min() == 0
 
 
@@ -96,7 +144,7 @@ def test_clip_holds_every_size():
     random = np.random.default_rng(1)
     shape = (2, len(ANGLE), len(RANGE))
     lines = (random.standard_normal(shape) + 1j * random.standard_normal(shape)).astype(np.complex64)
-    images = clip(lines, ANGLE, RANGE, BMODE)
+    images = clip(lines, SECTOR, RANGE, BMODE)
     assert {size: frames.shape for size, frames in images.items()} == {n: (2, n, n) for n in (128, 64, 32)}
     assert all(frames.dtype == np.uint8 for frames in images.values())
     assert images[128].max() == 255

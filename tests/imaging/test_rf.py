@@ -4,9 +4,8 @@ import numba
 import numpy as np
 import pytest
 
-from echotruth.config import Probe, Rf
+from echotruth.config import Probe
 from echotruth.imaging.rf import FullMatrix
-from echotruth.imaging.transmit import FocusedTransmits, line_angles, transmit_delays
 
 SPEED, CENTRE = 1540.0, 25e6
 DEVIATION = 12.5e6 / np.sqrt(8 * np.log(2))
@@ -105,40 +104,6 @@ def test_bytes_do_not_depend_on_threads():
     assert results[0] == results[1]
 
 
-def test_line_angles_span_the_sector_evenly():
-    angle = line_angles(Rf(lines=17, sector_deg=64))
-    assert np.allclose(np.degrees(angle), np.linspace(-32, 32, 17))
-
-
-def test_delays_bring_all_elements_to_the_focus_at_once():
-    rf = Rf(lines=16)
-    angle = line_angles(rf)
-    focus = 6.5e-3 * np.stack([np.sin(angle), np.cos(angle)], axis=1)
-    element = np.stack([(np.arange(64) - 31.5) * 46e-6, np.zeros(64)], axis=1)
-    flight = np.linalg.norm(focus[:, None] - element, axis=2) / SPEED
-    assert np.allclose(transmit_delays(Probe(), rf) + flight, 6.5e-3 / SPEED, atol=1e-15)
-
-
-def test_channel_data_are_the_exact_delayed_sum_over_transmitters():
-    probe, rf = Probe(), Rf(lines=16)
-    transmits = FocusedTransmits(probe, rf, DEPTH)
-    position, amplitude = random_scatterers(10, seed=4)
-    lines, channels = next(iter(transmits(position, amplitude)))
-    frequency, samples = transmits.matrix.frequency, transmits.matrix.samples
-    weights = np.cos(np.pi * (np.arange(64) - 31.5) / 64) ** 2
-    phase = np.exp(-2j * np.pi * frequency[:, None] * transmit_delays(probe, rf)[3])
-    spectrum = 2 * np.einsum("fij,fj->fi", exact_spectra(position, amplitude, frequency), phase * weights)
-    time = np.arange(0, samples, 7) / 100e6
-    wave = np.exp(2j * np.pi * np.outer(time, frequency - transmits.frequency))
-    assert lines == slice(0, 16)
-    assert relative(channels[3][:, ::7], (wave @ spectrum).T / samples) < 1e-3
-
-
 def test_a_record_beyond_the_clock_is_refused():
     with pytest.raises(ValueError, match="too long"):
         FullMatrix(Probe(), 0.4)
-
-
-def test_a_focus_behind_the_array_is_refused():
-    with pytest.raises(ValueError, match="focus_mm"):
-        Rf(focus_mm=0)

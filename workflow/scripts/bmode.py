@@ -1,12 +1,14 @@
-"""Envelope, log compression, scan conversion and downsampling of one clip."""
+"""Envelope, gain, log compression, scan conversion and downsampling of one clip."""
 
-from echotruth.imaging.bmode import clip
+from echotruth.imaging.bmode import clip, time_gain
+from echotruth.imaging.scan import scan_lines
 from echotruth.repository.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
-    rf = job.take("rf")
-    images = clip(rf["lines"], rf["angle"], rf["range"], job.case.config.bmode)
+    rf, config = job.take("rf"), job.case.config
+    gain = time_gain(config.probe, config.bmode, rf["range"])
+    images = clip(rf["lines"], scan_lines(config.probe, config.rf), rf["range"], config.bmode, gain)
     return {f"bmode/{size}": {"image": image} for size, image in images.items()}
 
 

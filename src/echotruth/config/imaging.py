@@ -32,18 +32,43 @@ class Phantom(Section):
 
 
 class Rf(Section):
-    """Focused lines of a sector scan."""
+    """Transmits, and lines focused on receive."""
 
     focus_mm: Positive = 6.5
     """Transmit focus, where the heart stands. Default: as suits `probe.preset`."""
+    scan: Literal["sector", "linear"] = "sector"
+    """Lines that fan out from the centre of the array, or parallel ones straight ahead."""
     lines: Annotated[int, Field(ge=16, le=2048)] = 256
-    """Lines of the sector."""
+    """Scan lines."""
     sector_deg: Annotated[FiniteFloat, Field(gt=5, le=120)] = 64.0
-    """Opening angle of the sector. Default: as suits `probe.preset`."""
+    """Sector: opening angle. Default: as suits `probe.preset`."""
+    width_mm: Positive | None = None
+    """Linear: distance of the outermost lines. Default: the length of the array."""
+    transmit: Literal["focused", "plane", "diverging", "synthetic_aperture"] = "focused"
+    """What is sent: a focused beam for every line; or plane waves, diverging waves or every element in its turn, from
+    all of which all lines are made (coherent compounding)."""
+    transmits: Annotated[int, Field(ge=1, le=512)] = 11
+    """Plane, diverging: number of waves."""
+    tilt_deg: Annotated[FiniteFloat, Field(ge=0, le=120)] = 40.0
+    """Plane, diverging: angle between the first and the last wave; a single one goes straight ahead."""
+    source_mm: Positive | None = None
+    """Diverging: distance of the virtual sources behind the centre of the array. Default: that from which the array is
+    seen under the angle of the sector."""
     apodization: Literal["hann", "none"] = "hann"
-    """Weights over the aperture, on transmit and receive."""
+    """Weights over the aperture, on receive and, where focused or synthetic, on transmit."""
+    f_number: Annotated[FiniteFloat, Field(ge=0, le=20)] = 0.0
+    """Least range over aperture, on receive and focused transmit; 0 takes the whole array at every range."""
     accuracy: Annotated[FiniteFloat, Field(ge=2e-5, le=1e-3)] = 2e-5
     """Error of the RF in the plane of the image that is allowed against the exact sum, relative (L2); 1e-3 is faster."""
+    keep: list[Literal["lines", "channels"]] = Field(default=[])
+    """What of the RF stays in the repository: `lines`, demodulated, and `channels`, the echoes of each element sending
+    alone in all elements, from which any transmit can be made."""
+
+    @model_validator(mode="after")
+    def _kept_once(self) -> Rf:
+        if len(set(self.keep)) < len(self.keep):
+            raise impossible("keep", self.keep, "name each once")
+        return self
 
 
 class Bmode(Section):
@@ -57,6 +82,9 @@ class Bmode(Section):
     """Sizes kept, as divisors of the full size."""
     dynamic_range_dB: Annotated[FiniteFloat, Field(gt=10, le=120)] = 55.0
     """Range of the log compression below the brightest echo of the clip."""
+    tgc_dB_per_cm_MHz: Annotated[FiniteFloat, Field(ge=0, le=3)] | None = None
+    """Time gain compensation: what the gain makes good for on each way, at the centre frequency. Default: the
+    attenuation of the probe's tissue."""
 
     @property
     def sizes(self) -> tuple[int, ...]:

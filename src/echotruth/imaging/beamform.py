@@ -5,87 +5,149 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-PHASES = 4096
-"""Entries of the table of phase factors; the rounding to them is noise 65 dB and more below the signal."""
+from echotruth.imaging.aperture import Aperture, window
+from echotruth.imaging.interpolation import LANES, PHASE_BITS, TAPS, add_taps, table
 
-
-def phase_table() -> np.ndarray:
-    """exp(2 pi i n / PHASES), shape (PHASES,), complex64."""
-    return np.exp(2j * np.pi * np.arange(PHASES) / PHASES).astype(np.complex64)
+RANGES = 64
+"""Samples of a line that are summed over all elements at a time, to stay in the nearest memory."""
 
 
 @numba.njit(cache=True)
-def add_element(line, channel, centre, sine, ranges, scales, table):
-    """Add one weighted channel (samples,) to a line (ranges,): cubic interpolation and phase of the demodulation."""
-    samples_per_metre, turns_per_metre = scales
-    last = len(channel) - 3
-    for n in range(len(ranges)):
-        r = ranges[n]
-        distance = np.sqrt(r * r - np.float32(2) * r * centre * sine + centre * centre)
-        at = (r + distance) * samples_per_metre
-        k = min(np.int64(at), last)
-        u = at - np.float32(k)
-        # Lagrange's cubic through the samples k - 1 to k + 2.
-        a, b, c = u + np.float32(1), u - np.float32(1), u - np.float32(2)
-        third = np.float32(1 / 6)
-        value = (
-            (a * u * b * third) * channel[k + 2]
-            - (a * u * c * np.float32(0.5)) * channel[k + 1]
-            + (a * b * c * np.float32(0.5)) * channel[k]
-            - (u * b * c * third) * channel[k - 1]
-        )
-        turn = (distance - r) * turns_per_metre
-        line[n] += value * table[np.int64(np.floor(turn * PHASES + np.float32(0.5))) & (PHASES - 1)]
-
-
-@numba.njit(parallel=True, cache=True)
-def add_channels(lines, channels, centres, weights, sine, ranges, scales, table):
-    """Add all channels (lines, elements, samples) to their lines (lines, ranges); one thread makes a line."""
-    for line in numba.prange(len(channels)):
-        for element in range(len(centres)):
-            channel = channels[line, element] * weights[element]
-            add_element(lines[line], channel, centres[element], sine[line], ranges, scales, table)
-
-
-class ReceiveFocus:
-    """Dynamic focusing on receive along straight lines through the centre of the array.
-
-    A point at range r was reached by the transmitted wave at r / c; its echo comes to an element after the distance
-    between them, over c. The element data are delayed by both and summed with weights.
+def echo_times(path, geometry, part, centre, rate, last, tapered, times):
+    """Where the echoes of points to an element stand in its channel.
 
     Parameters
     ----------
-    centres, weights
-        Lateral coordinates (m) and weights (1) of the elements, shape (elements,).
-    ranges
-        Shape (ranges,), m; the first at least one sample from the array.
-    sampling, frequency
-        Of the channel data, and to which they are demodulated, Hz.
+    path
+        Of the wave to the points of a line, shape (ranges,), m.
+    geometry
+        Of the line, shape (4, ranges), see :func:`focus`.
+    part
+        First of the points and the one after the last.
+    centre
+        Of the element, m.
+    rate
+        Samples per metre of path.
+    last
+        Number of samples at which an interpolator may begin; where it does not, the weight is 0.
+    tapered
+        Whether the aperture is.
+    times
+        Written from 0 on: sample, phase of the table, rest of the phase and weight, each of shape (RANGES,).
+    """
+    sample, phase, rest, weight = times
+    first, stop = part
+    for n in range(stop - first):
+        across, axial = geometry[0, first + n] - centre, geometry[1, first + n]
+        at = (path[first + n] + np.sqrt(across * across + axial * axial)) * rate
+        inside = (at >= 0) & (at < last)
+        at = at if inside else 0.0
+        whole = np.int32(at)
+        # In double precision, as a fraction of nearly 1 must not become the phase of the next sample.
+        fine = (at - whole) * (1 << PHASE_BITS)
+        sample[n], phase[n] = whole, np.int32(fine)
+        rest[n] = np.float32(fine - np.int32(fine))
+        share = window(np.float32((centre - geometry[2, first + n]) * geometry[3, first + n]), tapered)
+        weight[n] = share if inside else np.float32(0)
+
+
+@numba.njit(cache=True)
+def collect(sums, line):
+    """Add the sums over taps (ranges * LANES,) to a line (ranges,), complex64."""
+    half = LANES // 2
+    for n in range(len(line)):
+        real, imaginary, first = np.float32(0), np.float32(0), n * LANES
+        for k in range(first, first + half, 2):
+            real += sums[k] - sums[k + half + 1]
+            imaginary += sums[k + 1] + sums[k + half]
+        line[n] += np.complex64(complex(real, imaginary))
+
+
+@numba.njit(parallel=True, cache=True)
+def focus(lines, first, channels, which, path, geometry, array, table):
+    """Add the echoes of the points of some lines to them; one thread makes a line.
+
+    Parameters
+    ----------
+    lines
+        Shape (lines, ranges), complex64; added to.
+    first
+        The first of these lines.
+    channels
+        Shape (transmits, elements, 2 samples), float32: real and imaginary parts in turn.
+    which
+        Transmit taken for each of these lines, shape (n,).
+    path
+        Of the wave to the points of these lines, shape (n, ranges), m.
+    geometry
+        Of all lines, shape (lines, 4, ranges), m: lateral and axial coordinates of the points, and middle (m)
+        and 1 / width (1/m) of their apertures.
+    array
+        Centres of the elements (elements,), m, samples per metre of path, and whether apertures are
+        tapered.
+    table
+        Of interpolators, as :func:`echotruth.imaging.interpolation.table` makes it.
+    """
+    centres, rate, tapered = array
+    elements, numbers = channels.shape[1:]
+    last = numbers // 2 - TAPS
+    for n in numba.prange(len(which)):
+        line, flat = first + n, channels[which[n]].reshape(elements * numbers)
+        sums = np.empty(RANGES * LANES, np.float32)
+        sample, phase = np.empty(RANGES, np.int32), np.empty(RANGES, np.int32)
+        rest, weight = np.empty(RANGES, np.float32), np.empty(RANGES, np.float32)
+        for start in range(0, path.shape[1], RANGES):
+            part = start, min(start + RANGES, path.shape[1])
+            sums[:] = 0
+            for element in range(elements):
+                times = sample, phase, rest, weight
+                echo_times(path[n], geometry[line], part, centres[element], rate, last, tapered, times)
+                for k in range(part[1] - start):
+                    at, row = element * numbers + 2 * sample[k], phase[k] * 2 * LANES
+                    add_taps(sums, k * LANES, flat, at, table, row, (rest[k], weight[k]))
+            collect(sums, lines[line, start : part[1]])
+
+
+class ReceiveFocus:
+    """Dynamic focusing on receive at points along scan lines.
+
+    The transmitted wave reaches a point after its path, over c; the echo comes to an element after the distance
+    between them, over c. The element data are delayed by both and summed with the weights of the aperture.
+
+    Parameters
+    ----------
+    aperture
+        Elements and their weights.
+    foot, range_
+        Of the lines (lines,) and of their samples (ranges,), m.
+    points
+        Lateral and axial coordinates, each of shape (lines, ranges), m.
+    frequency, sampling
+        Carrier of the channel data and their sampling frequency, Hz.
     sound_speed
         m/s.
     """
 
-    def __init__(self, centres, weights, ranges, *, sampling, frequency, sound_speed):
-        self._centres, self._weights, self._ranges = (np.asarray(a, np.float32) for a in (centres, weights, ranges))
-        # Samples and turns of the phase per metre of path.
-        self._scales = np.float32(sampling / sound_speed), np.float32(frequency / sound_speed)
-        self._table = phase_table()
+    def __init__(self, aperture: Aperture, foot, range_, points, *, frequency, sampling, sound_speed):
+        middle, width = aperture.bounds(foot[:, None], range_)
+        self._geometry = np.stack([*points, middle, 1 / width], axis=1)
+        self._array = aperture.centres, sampling / sound_speed, aperture.tapered
+        self._table = table(frequency / sampling)
 
-    def __call__(self, channels: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """Focus demodulated channel data.
+    def __call__(self, lines: np.ndarray, first: int, channels: np.ndarray, which: np.ndarray, path: np.ndarray):
+        """Add echoes to some lines.
 
         Parameters
         ----------
+        lines
+            Shape (lines, ranges), complex64: the analytic signal at the points; added to.
+        first
+            The first of the lines that are added to.
         channels
-            Shape (lines, elements, samples), complex64, from time 0 on, demodulated by exp(-2 pi i frequency time).
-        angle
-            Of the lines, shape (lines,), rad.
-
-        Returns
-        -------
-        Shape (lines, ranges), complex64, demodulated by exp(-2 pi i frequency 2 range / c).
+            Shape (transmits, elements, samples), complex64, of :class:`~echotruth.imaging.synthesis.Synthesis`.
+        which
+            Transmit whose echoes each of these lines takes, shape (n,).
+        path
+            From time 0 to the points of these lines, shape (n, ranges), m.
         """
-        lines = np.zeros((len(channels), len(self._ranges)), np.complex64)
-        sine = np.sin(angle).astype(np.float32)
-        add_channels(lines, channels, self._centres, self._weights, sine, self._ranges, self._scales, self._table)
-        return lines
+        focus(lines, first, channels.view(np.float32), which, path, self._geometry, self._array, self._table)

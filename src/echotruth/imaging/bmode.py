@@ -8,12 +8,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from echotruth.config import Bmode
+from echotruth.config import Bmode, Probe
+from echotruth.imaging import spline
+from echotruth.imaging.scan import Scan
 
 
-def envelope(lines: np.ndarray) -> np.ndarray:
-    """Envelope of demodulated or analytic lines (any shape, complex64): same shape, float32."""
-    return np.abs(lines)
+def time_gain(probe: Probe, bmode: Bmode, range_: np.ndarray) -> np.ndarray:
+    """Gain over range, shape (ranges,), 1, float32: what attenuation takes on both ways at the centre frequency.
+
+    Parameters
+    ----------
+    probe, bmode
+        The tissue's attenuation, and the one that is made good for in its place if `bmode` names it.
+    range_
+        Shape (ranges,), m.
+    """
+    p, gain = probe.si(), bmode.si().tgc
+    loss = p.attenuation if gain is None else gain
+    with np.errstate(over="ignore"):
+        return np.exp(2 * loss * p.frequency * range_).astype(np.float32)
+
+
+def envelope(lines: np.ndarray, gain: np.ndarray | float = 1.0) -> np.ndarray:
+    """Envelope of demodulated or analytic lines (..., ranges), complex64, times a gain (ranges,); float32."""
+    return np.abs(lines) * np.asarray(gain, np.float32)
 
 
 def pixel_centres(bmode: Bmode, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -27,54 +45,35 @@ def pixel_centres(bmode: Bmode, size: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 class ScanConversion:
-    """Interpolation from lines to pixels by cubic splines in angle and range, worked out once for a clip.
+    """Interpolation from lines to pixels by cubic splines over line and range, worked out once for a clip.
 
     Parameters
     ----------
-    angle
-        Of the lines, shape (lines,), rad, evenly spaced.
+    scan
+        The lines.
     range_
         Of the samples, shape (ranges,), m, evenly spaced.
     bmode
         Field of view and size of the image.
     """
 
-    def __init__(self, angle: np.ndarray, range_: np.ndarray, bmode: Bmode):
+    def __init__(self, scan: Scan, range_: np.ndarray, bmode: Bmode):
         self._shape = (bmode.size_px, bmode.size_px)
         axial, lateral = np.meshgrid(*pixel_centres(bmode, bmode.size_px), indexing="ij")
-        line = (np.arctan2(lateral, axial) - angle[0]) / (angle[1] - angle[0])
-        sample = (np.hypot(lateral, axial) - range_[0]) / (range_[1] - range_[0])
-        self._inside = (line >= 0) & (line <= len(angle) - 1) & (sample >= 0) & (sample <= len(range_) - 1)
-        self._coordinates = np.stack([line[self._inside], sample[self._inside]])
+        line, reach = scan.place(lateral, axial)
+        sample = (reach - range_[0]) / (range_[1] - range_[0])
+        inside = (line >= 0) & (line <= len(scan.angle) - 1) & (sample >= 0) & (sample <= len(range_) - 1)
+        self._inside = np.flatnonzero(inside)
+        self._line, self._sample = line[inside].astype(np.float32), sample[inside].astype(np.float32)
 
-    def __call__(self, polar: np.ndarray) -> np.ndarray:
-        """Image (axial, lateral) of one frame (lines, ranges), float32; 0 outside of the sector, never negative."""
-        from scipy.ndimage import map_coordinates
-
-        image = np.zeros(self._shape, np.float32)
+    def __call__(self, samples: np.ndarray) -> np.ndarray:
+        """Image (axial, lateral) of an envelope (lines, ranges), float32; 0 outside of the scan, never negative."""
+        image, values = np.zeros(self._shape, np.float32), np.empty(len(self._inside), np.float32)
+        padded = spline.coefficients(np.ascontiguousarray(samples, np.float32))
+        spline.at_points(padded, self._line, self._sample, values)
         # The spline may swing below zero beside an edge; an envelope does not.
-        image[self._inside] = np.maximum(map_coordinates(polar, self._coordinates, order=3, mode="mirror"), 0)
+        image.ravel()[self._inside] = np.maximum(values, 0)
         return image
-
-
-def scan_convert(polar: np.ndarray, angle: np.ndarray, range_: np.ndarray, bmode: Bmode) -> np.ndarray:
-    """Envelope on the pixels of the field of view.
-
-    Parameters
-    ----------
-    polar
-        Envelope, shape (frames, lines, ranges).
-    angle, range_
-        Of lines (rad) and samples (m), evenly spaced.
-    bmode
-        Field of view and size of the image.
-
-    Returns
-    -------
-    Shape (frames, axial, lateral), float32; 0 outside of the sector.
-    """
-    convert = ScanConversion(angle, range_, bmode)
-    return np.stack([convert(frame) for frame in polar])
 
 
 def log_compress(images: np.ndarray, dynamic_range_dB: float) -> np.ndarray:
@@ -122,23 +121,34 @@ def downsample(images: np.ndarray, divisor: int) -> np.ndarray:
     return np.rint(means).astype(np.uint8)
 
 
-def clip(lines: np.ndarray, angle: np.ndarray, range_: np.ndarray, bmode: Bmode) -> dict[int, np.ndarray]:
-    """B-mode clips of all sizes kept.
+def envelopes(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, gain=1.0) -> np.ndarray:
+    """Envelope of a clip on the pixels of the field of view, before it is compressed.
 
     Parameters
     ----------
     lines
         Shape (frames, lines, ranges), complex64.
-    angle, range_
-        Of lines (rad) and samples (m), evenly spaced.
+    scan, range_
+        The lines, and their samples (ranges,), m, evenly spaced.
     bmode
-        Field of view, sizes and dynamic range.
+        Field of view and size of the image.
+    gain
+        Over range, shape (ranges,), 1; see :func:`time_gain`.
+
+    Returns
+    -------
+    Shape (frames, axial, lateral), float32; 0 outside of the scan.
+    """
+    convert = ScanConversion(scan, range_, bmode)
+    return np.stack([convert(envelope(frame, gain)) for frame in lines])
+
+
+def clip(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, gain=1.0) -> dict[int, np.ndarray]:
+    """B-mode clips of all sizes kept; parameters as of :func:`envelopes`.
 
     Returns
     -------
     Size in pixels to clip, shape (frames, size, size), uint8.
     """
-    convert = ScanConversion(angle, range_, bmode)
-    images = np.stack([convert(envelope(frame)) for frame in lines])
-    full = log_compress(images, bmode.dynamic_range_dB)
+    full = log_compress(envelopes(lines, scan, range_, bmode, gain), bmode.dynamic_range_dB)
     return {size: downsample(full, bmode.size_px // size) for size in bmode.sizes}

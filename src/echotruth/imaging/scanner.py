@@ -1,44 +1,42 @@
-"""The scanner: from scatterers to the focused lines of a frame."""
+"""The scanner: from scatterers to the lines of a frame."""
 
 from __future__ import annotations
 
-from math import hypot
-
 import numpy as np
 
-from echotruth.config import Bmode, Probe, Rf
+from echotruth.config import Probe, Rf
+from echotruth.imaging.aperture import Aperture
 from echotruth.imaging.beamform import ReceiveFocus
-from echotruth.imaging.probe import apodization, element_centres
-from echotruth.imaging.transmit import FocusedTransmits, line_angles
+from echotruth.imaging.rf import FullMatrix
+from echotruth.imaging.scan import imaging_depth, points, scan_lines
+from echotruth.imaging.synthesis import Synthesis
+from echotruth.imaging.transmit import KINDS
 
-
-def imaging_depth(rf: Rf, bmode: Bmode) -> float:
-    """Greatest range within both the sector and the square field of view, m."""
-    side, half_angle = bmode.si().field_of_view, rf.si().sector / 2
-    corner = np.arctan2(side / 2, side)
-    return side / np.cos(half_angle) if half_angle < corner else hypot(side, side / 2)
+__all__ = ["Scanner", "checked", "imaging_depth"]
 
 
 class Scanner:
-    """A probe that scans a sector line by line; delays and phases are worked out once for all frames.
+    """A probe that scans a frame; delays and phases are worked out once for all frames.
 
-    The whole frame is taken of scatterers at rest. There is no attenuation, no multiple scattering and no noise.
+    The whole frame is taken of scatterers at rest. There is no multiple scattering.
 
     Parameters
     ----------
     probe, rf
-        The array, and its lines and transmit focus.
+        The array, and its lines and transmits.
     depth
         Greatest range, m; see :func:`imaging_depth`.
 
     Attributes
     ----------
-    angle : ndarray (lines,)
-        Of the lines from the axial axis, rad; the smallest lateral coordinate first.
+    scan : Scan
+        The lines.
     range : ndarray (ranges,)
-        Of the samples on a line from the centre of the array, m; a step is half a wave path of one RF sample.
+        Of the samples on a line from its foot, m; a step is half a wave path of one RF sample.
     frequency : float
         Frequency to which the lines are demodulated, Hz.
+    matrix : FullMatrix
+        The echoes between all pairs.
     """
 
     def __init__(self, probe: Probe, rf: Rf, depth: float):
@@ -46,18 +44,29 @@ class Scanner:
         if not np.isfinite(depth) or depth < 20 * p.sound_speed / p.frequency:
             raise ValueError(f"The depth is {depth:g} m; it must be at least twenty wavelengths.")
         step = p.sound_speed / (2 * p.sampling)
-        self.angle = line_angles(rf)
+        self.scan = scan_lines(probe, rf)
         self.range = step * np.arange(1, int(depth / step) + 2)
-        self._transmits = FocusedTransmits(probe, rf, self.range[-1])
-        self.frequency = self._transmits.frequency
+        self._transmits = KINDS[rf.transmit](probe, rf, self.scan)
+        self._points = points(self.scan, self.range)
+        reach, latest = np.hypot(*self._points).max(), np.abs(self._transmits.delay).max()
+        self.matrix = FullMatrix(probe, reach, latest, accuracy=rf.accuracy)
+        self._channels = Synthesis(self.matrix, p.frequency, self._transmits)
+        self.frequency = self._channels.frequency
+        self._carrier = np.exp(-4j * np.pi * self.frequency / p.sound_speed * self.range).astype(np.complex64)
         self._receive = ReceiveFocus(
-            element_centres(probe),
-            apodization(probe, rf.apodization),
+            Aperture(probe, rf),
+            self.scan.foot,
             self.range,
-            sampling=p.sampling,
+            self._points,
             frequency=self.frequency,
+            sampling=self._channels.sampling,
             sound_speed=p.sound_speed,
         )
+
+    @property
+    def angle(self) -> np.ndarray:
+        """Of the lines from the axial axis, shape (lines,), rad; the smallest lateral coordinate first."""
+        return self.scan.angle
 
     def lines(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
         """Lines of one frame.
@@ -74,10 +83,21 @@ class Scanner:
         Shape (lines, ranges), complex64, demodulated by exp(-2 pi i frequency 2 range / c): a scatterer that moves
         away by d turns the phase by -4 pi frequency d / c.
         """
-        position, amplitude = checked(position, amplitude)
-        lines = np.empty((len(self.angle), len(self.range)), np.complex64)
-        for part, channels in self._transmits(position, amplitude):
-            lines[part] = self._receive(channels, self.angle[part])
+        return self.beamform(self.matrix(*checked(position, amplitude)))
+
+    def beamform(self, matrix: np.ndarray) -> np.ndarray:
+        """Lines (lines, ranges) of one frame, as :meth:`lines`, of its full matrix (bins, elements, elements)."""
+        lines = np.zeros((len(self.scan.angle), len(self.range)), np.complex64)
+        for part, channels in self._channels(matrix):
+            if self._transmits.focused:
+                path = np.tile(self.range, (len(channels), 1))
+                self._receive(lines, part.start, channels, np.arange(len(channels)), path)
+                continue
+            for number in range(part.start, part.stop):
+                path = self._transmits.path(number, *self._points)
+                which = np.full(len(lines), number - part.start)
+                self._receive(lines, 0, channels, which, path)
+        lines *= self._carrier
         return lines
 
 

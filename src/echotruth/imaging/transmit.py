@@ -1,148 +1,110 @@
-"""Focused transmits: channel data of the lines of a sector, made from the full matrix.
+"""Transmits: when and how strongly each element sends, and when the wave comes to a point.
 
-A focused transmit is the sum of the single ones, delayed and weighted; at each frequency that is a matrix product.
+A wave passes the centre of the array (a focused one the foot of its line) at time 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import dataclass
 
-import numba
 import numpy as np
-from scipy import fft
 
 from echotruth.config import Probe, Rf
-from echotruth.imaging.probe import apodization, element_centres
-from echotruth.imaging.rf import FullMatrix
-
-LINES = 16
-"""Transmits synthesised at a time, to bound memory."""
-TILE = 16
-"""Frequencies that one thread takes at a time: two cache lines of a spectrum."""
+from echotruth.imaging.aperture import Aperture
+from echotruth.imaging.probe import element_centres
+from echotruth.imaging.scan import Scan
 
 
-def line_angles(rf: Rf) -> np.ndarray:
-    """Angles of the lines from the axial axis, shape (lines,), rad, from the smallest lateral coordinate on."""
-    sector = rf.si().sector
-    return np.linspace(-sector / 2, sector / 2, rf.lines)
-
-
-def transmit_delays(probe: Probe, rf: Rf) -> np.ndarray:
-    """Delays that focus each line, shape (lines, elements), s.
-
-    The wave reaches the focus at (focus distance) / (speed of sound), as if it came from the centre of the array.
-    """
-    focus, angle = rf.si().focus, line_angles(rf)
-    lateral = focus * np.sin(angle)[:, None] - element_centres(probe)
-    return (focus - np.hypot(lateral, focus * np.cos(angle)[:, None])) / probe.si().sound_speed
-
-
-def transmit_weights(delay: np.ndarray, weight: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Phases and weights of the elements in each transmit; doubled, for the analytic signal.
-
-    Parameters
-    ----------
-    delay
-        Shape (lines, elements), s.
-    weight
-        Shape (elements,), 1.
-    frequency
-        Shape (bins,), Hz.
-
-    Returns
-    -------
-    Shape (bins, 2, elements, lines), float32: real and imaginary part of 2 weight exp(-2 pi i frequency delay).
-    """
-    phase = 2 * np.pi * np.multiply.outer(frequency, np.ascontiguousarray(delay.T))
-    return (2 * weight[:, None] * np.stack([np.cos(phase), -np.sin(phase)], axis=1)).astype(np.float32, order="C")
-
-
-@numba.njit(cache=True, fastmath={"contract"})
-def add_products(real, imaginary, matrix, weights):
-    """Add a matrix (elements, elements) times weights (2, elements, lines) to its real and imaginary part."""
-    for i in range(matrix.shape[0]):
-        for j in range(matrix.shape[1]):
-            a, b = matrix[i, j].real, matrix[i, j].imag
-            for line in range(weights.shape[2]):
-                real[i, line] += a * weights[0, j, line] - b * weights[1, j, line]
-                imaginary[i, line] += a * weights[1, j, line] + b * weights[0, j, line]
-
-
-@numba.njit(parallel=True, cache=True)
-def transmit(matrix, weights, bins, spectra):
-    """Channel spectra of focused transmits.
-
-    Parameters
-    ----------
-    matrix
-        Shape (bins, elements, elements), complex64.
-    weights
-        Shape (bins, 2, elements, lines), float32.
-    bins
-        Where the frequencies go in the spectra, shape (bins,).
-    spectra
-        Written at `bins`: shape (lines, elements, samples), complex64.
-    """
-    elements, lines = weights.shape[2:]
-    for tile in numba.prange((len(bins) + TILE - 1) // TILE):
-        start = tile * TILE
-        count = min(TILE, len(bins) - start)
-        real = np.zeros((count, elements, lines), np.float32)
-        imaginary = np.zeros((count, elements, lines), np.float32)
-        for k in range(count):
-            add_products(real[k], imaginary[k], matrix[start + k], weights[start + k])
-        for line in range(lines):
-            for element in range(elements):
-                for k in range(count):
-                    value = np.complex64(complex(real[k, element, line], imaginary[k, element, line]))
-                    spectra[line, element, bins[start + k]] = value
-
-
-class FocusedTransmits:
-    """Channel data of the focused lines of a sector.
-
-    Parameters
-    ----------
-    probe, rf
-        The array and its lines.
-    depth
-        Greatest range of interest, m.
+@dataclass(frozen=True)
+class Transmits:
+    """Waves sent in one frame.
 
     Attributes
     ----------
-    matrix : FullMatrix
-        The echoes between all pairs.
-    frequency : float
-        Frequency to which the channel data are demodulated, Hz: the bin nearest the centre frequency.
+    delay, weight : ndarray (transmits, elements)
+        After time 0, s; and strength, 1.
+    origin : ndarray (transmits, 2)
+        Lateral and axial coordinate of the point from which a wave seems to come, m; of a plane one, its direction.
+    lead : ndarray (transmits,)
+        Distance from the origin at which a wave is at time 0, m.
+    plane : bool
+        Waves are plane.
+    focused : bool
+        A wave serves the line of its own number alone; else it serves all lines, and their sum is taken.
     """
 
-    def __init__(self, probe: Probe, rf: Rf, depth: float):
-        delay = transmit_delays(probe, rf)
-        weight = apodization(probe, rf.apodization)
-        self.matrix = FullMatrix(probe, depth, np.abs(delay).max())
-        frequency = self.matrix.frequency
-        nearest = int(np.argmin(np.abs(frequency - probe.si().frequency)))
-        self.frequency = float(frequency[nearest])
-        self._bins = (np.arange(len(frequency)) - nearest) % self.matrix.samples
-        starts = range(0, rf.lines, LINES)
-        self._weights = [transmit_weights(delay[start : start + LINES], weight, frequency) for start in starts]
+    delay: np.ndarray
+    weight: np.ndarray
+    origin: np.ndarray
+    lead: np.ndarray
+    plane: bool = False
+    focused: bool = False
 
-    def __call__(self, position: np.ndarray, amplitude: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
-        """Channel data of a frame, some lines at a time.
+    def path(self, number: int, lateral: np.ndarray, axial: np.ndarray) -> np.ndarray:
+        """How far a wave has come since time 0 when it reaches points, any shape, m; less than 0 before time 0."""
+        x, z = self.origin[number]
+        if self.plane:
+            return x * lateral + z * axial
+        return np.hypot(lateral - x, axial - z) - self.lead[number]
 
-        Yields
-        ------
-        The lines as a slice, and their data, shape (lines, elements, samples), complex64: the analytic signal
-        (positive frequencies, twice the RF) from time 0 on, demodulated by exp(-2 pi i frequency time). The data
-        hold until the next are asked for.
-        """
-        matrix = self.matrix(position, amplitude)
-        elements, start = matrix.shape[1], 0
-        # Fresh memory for every block would cost more than the transform.
-        memory = np.empty((LINES, elements, self.matrix.samples), np.complex64)
-        for weights in self._weights:
-            spectra = memory[: weights.shape[3]]
-            spectra[:] = 0
-            transmit(matrix, weights, self._bins, spectra)
-            yield slice(start, start + len(spectra)), fft.ifft(spectra, axis=2, overwrite_x=True)
-            start += len(spectra)
+
+def focused(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
+    """One transmit a line, focused at `rf.focus_mm` on it, with the aperture of that point.
+
+    The wave reaches the focus at (focus distance) / (speed of sound), as if it came from the foot of the line.
+    """
+    aperture, focus = Aperture(probe, rf), rf.si().focus
+    lateral = (scan.foot + focus * np.sin(scan.angle))[:, None] - aperture.centres
+    delay = (focus - np.hypot(lateral, focus * np.cos(scan.angle)[:, None])) / probe.si().sound_speed
+    origin = np.stack([scan.foot, np.zeros(len(scan.foot))], axis=1)
+    weight = aperture.weights(scan.foot, focus)
+    return Transmits(delay, weight, origin, np.zeros(len(origin)), focused=True)
+
+
+def plane(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
+    """Plane waves of evenly spaced tilts, from all elements alike (Montaldo 2009, IEEE Trans UFFC 56:489)."""
+    direction = _directions(rf)
+    delay = direction[:, :1] * element_centres(probe) / probe.si().sound_speed
+    return Transmits(delay, np.ones(delay.shape), direction, np.zeros(len(delay)), plane=True)
+
+
+def diverging(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
+    """Circular waves of evenly spaced tilts from sources behind the array, all elements alike.
+
+    A source stands `rf.source_mm` from the centre of the array (Papadacci 2014, IEEE Trans UFFC 61:288), or where the
+    array is seen under the angle of the sector.
+    """
+    distance = source_distance(probe, rf)
+    origin = -distance * _directions(rf)
+    delay = np.hypot(element_centres(probe) - origin[:, :1], origin[:, 1:]) - distance
+    return Transmits(delay / probe.si().sound_speed, np.ones(delay.shape), origin, np.full(len(delay), distance))
+
+
+def synthetic_aperture(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
+    """Every element in its turn, weighted as over the whole aperture (Jensen 2006, Ultrasonics 44:e5)."""
+    aperture = Aperture(probe, rf.model_copy(update={"f_number": 0.0}))
+    weight = np.diag(aperture.weights(np.zeros(1), 1.0)[0])
+    origin = np.stack([aperture.centres, np.zeros(len(weight))], axis=1)
+    return Transmits(np.zeros(weight.shape), weight, origin, np.zeros(len(weight)))
+
+
+KINDS = {
+    "focused": focused,
+    "plane": plane,
+    "diverging": diverging,
+    "synthetic_aperture": synthetic_aperture,
+}
+"""Value of `rf.transmit` to the transmits of a frame."""
+
+
+def source_distance(probe: Probe, rf: Rf) -> float:
+    """Distance of the sources of diverging waves from the centre of the array, m."""
+    length = probe.elements * probe.si().pitch
+    return rf.si().source or length / 2 / np.tan(rf.si().sector / 2)
+
+
+def _directions(rf: Rf) -> np.ndarray:
+    """Lateral and axial components of the directions in which waves are sent, shape (transmits, 2), 1."""
+    half = rf.si().tilt / 2
+    tilt = np.linspace(-half, half, rf.transmits) if rf.transmits > 1 else np.zeros(1)
+    return np.stack([np.sin(tilt), np.cos(tilt)], axis=1)

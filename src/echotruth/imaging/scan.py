@@ -1,0 +1,93 @@
+"""Scan lines: the straight lines along which a frame is focused.
+
+Frame of the probe: origin at the centre of the array, coordinates in the order lateral, axial.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+
+from echotruth.config import Bmode, Probe, Rf
+
+
+@dataclass(frozen=True)
+class Sector:
+    """Lines that fan out from the centre of the array.
+
+    Attributes
+    ----------
+    angle : ndarray (lines,)
+        From the axial axis, rad, evenly spaced; the smallest lateral coordinate first.
+    """
+
+    angle: np.ndarray
+
+    @property
+    def foot(self) -> np.ndarray:
+        """Lateral coordinate at which each line leaves the array, shape (lines,), m."""
+        return np.zeros(len(self.angle))
+
+    def place(self, lateral: np.ndarray, axial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Number of the line (a fraction between two) and range (m) of points, each as the coordinates (m)."""
+        line = (np.arctan2(lateral, axial) - self.angle[0]) / (self.angle[1] - self.angle[0])
+        return line, np.hypot(lateral, axial)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Parallel lines, straight ahead.
+
+    Attributes
+    ----------
+    foot : ndarray (lines,)
+        Lateral coordinate at which each line leaves the array, m, evenly spaced; the smallest first.
+    """
+
+    foot: np.ndarray
+
+    @property
+    def angle(self) -> np.ndarray:
+        """Of the lines from the axial axis, shape (lines,), rad: all 0."""
+        return np.zeros(len(self.foot))
+
+    def place(self, lateral: np.ndarray, axial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Number of the line (a fraction between two) and range (m) of points, each as the coordinates (m)."""
+        line = (lateral - self.foot[0]) / (self.foot[1] - self.foot[0])
+        return np.broadcast_arrays(line, axial)
+
+
+Scan = Sector | Linear
+
+
+def scan_lines(probe: Probe, rf: Rf) -> Scan:
+    """Lines of a frame; those of a linear scan reach over the whole array unless `rf.width_mm` says how far."""
+    half = (rf.si().sector if rf.scan == "sector" else scan_width(probe, rf)) / 2
+    place = np.linspace(-half, half, rf.lines)
+    return Sector(place) if rf.scan == "sector" else Linear(place)
+
+
+def scan_width(probe: Probe, rf: Rf) -> float:
+    """Distance of the outermost lines of a linear scan, m."""
+    length = probe.elements * probe.si().pitch
+    width = rf.si().width or length
+    if width > length * (1 + 1e-9):
+        raise ValueError(f"Lines over {1e3 * width:g} mm need a longer array: this one measures {1e3 * length:g} mm.")
+    return width
+
+
+def points(scan: Scan, range_: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lateral and axial coordinates (lines, ranges) of the samples of all lines, m; range_ (ranges,) in m."""
+    lateral = scan.foot[:, None] + np.sin(scan.angle)[:, None] * range_
+    return lateral, np.cos(scan.angle)[:, None] * range_
+
+
+def imaging_depth(rf: Rf, bmode: Bmode) -> float:
+    """Greatest range of a line within both the scan and the square field of view, m."""
+    side, half_angle = bmode.si().field_of_view, rf.si().sector / 2
+    if rf.scan == "linear":
+        return side
+    corner = np.arctan2(side / 2, side)
+    return side / np.cos(half_angle) if half_angle < corner else hypot(side, side / 2)

@@ -1,0 +1,210 @@
+"""Images of points: where they land, how wide they are, and how they move, against the exact sum over all pairs."""
+
+import numpy as np
+import pytest
+
+from echotruth.config import Probe, Rf
+from echotruth.imaging.scanner import Scanner
+
+SPEED, CENTRE = 1540.0, 25e6
+WAVELENGTH = SPEED / CENTRE
+DEVIATION = 12.5e6 / np.sqrt(8 * np.log(2))
+LENGTH = 64 * 46e-6
+X = (np.arange(64) - 31.5) * 46e-6
+# An array so low that its beam in elevation is even: what is seen is that of the plane.
+FLAT = Probe(height_mm=0.05)
+
+
+@pytest.fixture(scope="module")
+def narrow():
+    return Scanner(FLAT, Rf(lines=61, sector_deg=24), 9e-3)
+
+
+@pytest.fixture(scope="module")
+def wide():
+    return Scanner(FLAT, Rf(lines=129), 9e-3)
+
+
+def at(depth, angle=0.0):
+    return np.array([[depth * np.sin(angle), depth * np.cos(angle), 0.0]])
+
+
+def place_of_peak(place, profile):
+    """By the parabola through the largest value and its neighbours."""
+    k = profile.argmax()
+    below, top, above = profile[k - 1 : k + 2]
+    return place[k] + (place[1] - place[0]) * (below - above) / (2 * (below - 2 * top + above))
+
+
+def full_width(place, profile):
+    """Full width at half of the maximum, by linear interpolation."""
+    peak, half = profile.argmax(), profile.max() / 2
+    left = np.interp(half, profile[: peak + 1], place[: peak + 1])
+    return np.interp(-half, -profile[peak:], place[peak:]) - left
+
+
+def exact(point, angle, ranges):
+    """Focused line of a point (lateral, axial), float64: the sum over all pairs and frequencies, to the faintest one.
+
+    Strip elements in a soft baffle, spherical spreading, Gaussian pulse cut at -40 dB, Hann weights.
+    """
+    frequency = CENTRE + DEVIATION * np.sqrt(2 * np.log(100)) * np.linspace(-1, 1, 1201)
+    weight = np.cos(np.pi * X / LENGTH) ** 2
+    distance = np.hypot(point[0] - X, point[1])
+    turn = -2j * np.pi * frequency[:, None] / SPEED
+    size = np.sinc(41e-6 * frequency[:, None] / SPEED * (point[0] - X) / distance) * point[1] / distance**2
+    wave = size * weight * np.exp(turn * distance)
+    focus = 6.5e-3 - np.hypot(6.5e-3 * np.sin(angle) - X, 6.5e-3 * np.cos(angle))
+    pulse = np.exp(-((frequency - CENTRE) ** 2) / (2 * DEVIATION**2)) * (wave * np.exp(turn * focus)).sum(axis=1)
+    line = np.empty(len(ranges), complex)
+    for k, reach in enumerate(ranges):
+        back = reach + np.hypot(reach * np.sin(angle) - X, reach * np.cos(angle))
+        line[k] = pulse @ (wave * np.exp(-turn * back)).sum(axis=1)
+    return line
+
+
+@pytest.mark.parametrize("depth", [4e-3, 6.5e-3, 8.5e-3])
+def test_lateral_and_axial_width_are_those_of_the_exact_sum(narrow, depth):
+    image = np.abs(narrow.lines(at(depth), np.ones(1)))
+    across, nearest = depth * np.sin(narrow.angle), np.abs(narrow.range - depth).argmin()
+    lateral = [np.abs(exact((0, depth), angle, narrow.range[[nearest]]))[0] for angle in narrow.angle]
+    assert full_width(across, image[:, nearest]) == pytest.approx(full_width(across, np.array(lateral)), rel=0.02)
+    near = slice(nearest - 20, nearest + 21)
+    axial = np.abs(exact((0, depth), 0.0, narrow.range[near]))
+    found = full_width(narrow.range[near], image[30, near])
+    assert found == pytest.approx(full_width(narrow.range[near], axial), rel=0.02)
+
+
+def test_in_focus_the_widths_are_those_of_aperture_and_pulse(narrow):
+    """Lateral: the square of the transform of the Hann aperture. Axial: 4 ln 2 / (pi B) in time (both within 5 %)."""
+    image = np.abs(narrow.lines(at(6.5e-3), np.ones(1)))
+    sine = np.linspace(-0.05, 0.05, 2001)
+    beam = np.abs(np.exp(2j * np.pi * np.outer(sine, X) / WAVELENGTH) @ np.cos(np.pi * X / LENGTH) ** 2) ** 2
+    lateral = full_width(6.5e-3 * np.sin(narrow.angle), image[:, np.abs(narrow.range - 6.5e-3).argmin()])
+    assert lateral == pytest.approx(full_width(6.5e-3 * sine, beam), rel=0.05)
+    assert full_width(narrow.range, image[30]) == pytest.approx(4 * np.log(2) / (np.pi * 12.5e6) * SPEED / 2, rel=0.05)
+
+
+@pytest.mark.parametrize("depth", [4e-3, 6.5e-3, 8.5e-3])
+@pytest.mark.parametrize("degrees", [-20, 0, 11])
+def test_a_point_lands_where_it_is(wide, depth, degrees):
+    line = np.abs(wide.angle - np.radians(degrees)).argmin()
+    image = np.abs(wide.lines(at(depth, wide.angle[line]), np.ones(1)))
+    assert np.unravel_index(image.argmax(), image.shape)[0] == line
+    assert place_of_peak(wide.range, image[line]) == pytest.approx(depth, abs=WAVELENGTH / 20)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"transmit": "plane"},
+        {"transmit": "diverging", "transmits": 5},
+        {"transmit": "synthetic_aperture"},
+        {"f_number": 2.0},
+    ],
+    ids=lambda keys: str(next(iter(keys.values()))),
+)
+def test_every_transmit_puts_a_point_where_it_is(keys):
+    """By the peak along line and range, and across the lines, to a twentieth of a wavelength and of a line's step."""
+    scanner = Scanner(FLAT, Rf(lines=91, sector_deg=30, **keys), 8e-3)
+    angle = scanner.angle[60] + 0.001
+    image = np.abs(scanner.lines(at(5e-3, angle), np.ones(1)))
+    line, sample = np.unravel_index(image.argmax(), image.shape)
+    assert line == 60
+    assert place_of_peak(scanner.range, image[line]) == pytest.approx(5e-3, abs=WAVELENGTH / 20)
+    assert place_of_peak(scanner.angle, image[:, sample]) == pytest.approx(angle, abs=WAVELENGTH / 20 / 5e-3)
+
+
+@pytest.mark.parametrize("transmit", ["focused", "plane", "synthetic_aperture"])
+def test_a_linear_scan_puts_a_point_where_it_is(transmit):
+    probe = Probe(height_mm=0.05, elements=128)
+    rf = Rf(lines=91, scan="linear", f_number=2.0, transmit=transmit, focus_mm=4.0, tilt_deg=16.0)
+    scanner = Scanner(probe, rf, 5e-3)
+    lateral = scanner.scan.foot[60] + 5e-6
+    image = np.abs(scanner.lines(np.array([[lateral, 4e-3, 0]]), np.ones(1)))
+    line, sample = np.unravel_index(image.argmax(), image.shape)
+    assert line == 60
+    assert place_of_peak(scanner.range, image[line]) == pytest.approx(4e-3, abs=WAVELENGTH / 20)
+    assert place_of_peak(scanner.scan.foot, image[:, sample]) == pytest.approx(lateral, abs=WAVELENGTH / 20)
+
+
+def test_a_synthetic_aperture_is_in_focus_everywhere():
+    """Two ways in focus at every depth: the width grows with the depth, where a focused beam is widest off focus."""
+    widths = []
+    scanner = Scanner(FLAT, Rf(lines=61, sector_deg=24, transmit="synthetic_aperture"), 9e-3)
+    for depth in (4e-3, 6.5e-3, 8.5e-3):
+        image = np.abs(scanner.lines(at(depth), np.ones(1)))
+        widths.append(full_width(np.sin(scanner.angle), image[:, np.abs(scanner.range - depth).argmin()]))
+    assert np.allclose(widths, np.mean(widths), rtol=0.02)
+
+
+def slab(seed, number):
+    """Scatterers in a part of the image plane about the focus, as strong as each other and of either sign."""
+    random = np.random.default_rng(seed)
+    position = random.uniform([-1.9e-3, 5.4e-3, 0], [1.9e-3, 7.6e-3, 0], (number, 3))
+    return position, random.choice([-1.0, 1.0], number)
+
+
+@pytest.mark.parametrize("shift", [1e-6, -3e-6, 5e-6])
+def test_the_phase_of_the_rf_recovers_an_axial_shift_of_a_point(narrow, shift):
+    lines = [narrow.lines(at(6.5e-3 + s), np.ones(1))[30] for s in (0, shift)]
+    found = -np.angle(np.vdot(*lines)) * SPEED / (4 * np.pi * narrow.frequency)
+    assert found == pytest.approx(shift, abs=WAVELENGTH / 500)
+
+
+@pytest.mark.parametrize("shift", [1e-6, -3e-6])
+def test_the_phase_of_the_rf_recovers_an_axial_shift_of_speckle(narrow, shift):
+    position, amplitude = slab(0, 4000)
+    part = slice(20, 41), slice(*np.searchsorted(narrow.range, [5.7e-3, 7.3e-3]))
+    still, moved = (narrow.lines(position + [0, s, 0], amplitude)[part] for s in (0, shift))
+    # On lines aside of the axis a shift in depth is less along the line.
+    cosine = np.average(np.cos(narrow.angle[part[0]]), weights=np.linalg.norm(still, axis=1) ** 2)
+    found = -np.angle(np.vdot(still, moved)) * SPEED / (4 * np.pi * narrow.frequency) / cosine
+    assert found == pytest.approx(shift, abs=WAVELENGTH / 500)
+
+
+def test_a_shift_of_the_phantom_shifts_the_speckle(narrow):
+    position, amplitude = slab(3, 4000)
+    step = narrow.range[1] - narrow.range[0]
+    still, moved = (narrow.lines(position + [0, s, 0], amplitude)[20:41, 740:950] for s in (0, 3 * step))
+    match = [
+        np.corrcoef(np.abs(still[:, 5:-5]).ravel(), np.abs(moved[:, 5 + k : 205 + k]).ravel())[0, 1] for k in range(6)
+    ]
+    assert np.argmax(match) == 3
+    assert match[3] > 0.99
+
+
+@pytest.mark.parametrize("transmit", ["focused", "plane"])
+def test_mirrored_scatterers_give_mirrored_lines(transmit):
+    scanner = Scanner(FLAT, Rf(lines=31, sector_deg=24, transmit=transmit, transmits=3), 8e-3)
+    position, amplitude = slab(5, 1000)
+    lines = scanner.lines(position, amplitude)
+    mirrored = scanner.lines(position * [-1, 1, 1], amplitude)[::-1]
+    assert np.linalg.norm(lines - mirrored) < 1e-3 * np.linalg.norm(lines)
+
+
+@pytest.mark.parametrize(
+    ("position", "amplitude", "complaint"),
+    [
+        (np.empty((0, 3)), np.empty(0), "no scatterers"),
+        ([[0, np.nan, 0]], [1], "finite"),
+        ([[0, 5e-3, 0]], [np.inf], "finite"),
+        ([[0, -5e-3, 0]], [1], "in front"),
+        ([[0, 5e-3]], [1], r"\(n, 3\)"),
+        ([[0, 5e-3, 0]], [1, 2], r"\(n, 3\)"),
+    ],
+)
+def test_bad_scatterers_are_refused(narrow, position, amplitude, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        narrow.lines(position, amplitude)
+
+
+@pytest.mark.parametrize("depth", [0, -1e-3, np.nan])
+def test_bad_depth_is_refused(depth):
+    with pytest.raises(ValueError, match="depth"):
+        Scanner(Probe(), Rf(), depth)
+
+
+def test_a_sampling_below_the_band_is_refused():
+    with pytest.raises(ValueError, match="sampling_MHz = 40"):
+        Probe(sampling_MHz=40.0)

@@ -1,0 +1,80 @@
+"""Transmits: when the elements send and when the wave is where."""
+
+import numpy as np
+import pytest
+
+from echotruth.config import Probe, Rf
+from echotruth.imaging.scan import scan_lines
+from echotruth.imaging.transmit import KINDS, source_distance
+
+SPEED, LENGTH = 1540.0, 64 * 46e-6
+X = (np.arange(64) - 31.5) * 46e-6
+
+
+def sent(**keys):
+    rf = Rf(lines=17, **keys)
+    return KINDS[rf.transmit](Probe(), rf, scan_lines(Probe(), rf))
+
+
+@pytest.mark.parametrize("scan", ["sector", "linear"])
+def test_focused_delays_bring_all_elements_to_the_focus_at_once(scan):
+    rf = Rf(lines=17, scan=scan)
+    lines = scan_lines(Probe(), rf)
+    lateral, axial = lines.foot + 6.5e-3 * np.sin(lines.angle), 6.5e-3 * np.cos(lines.angle)
+    flight = np.hypot(lateral[:, None] - X, axial[:, None]) / SPEED
+    transmits = KINDS["focused"](Probe(), rf, lines)
+    assert np.allclose(transmits.delay + flight, 6.5e-3 / SPEED, atol=1e-15)
+    assert np.allclose([transmits.path(k, lateral[k], axial[k]) for k in range(17)], 6.5e-3)
+
+
+@pytest.mark.parametrize("keys", [{"transmit": "plane"}, {"transmit": "diverging"}])
+def test_a_wave_is_at_each_element_when_that_sends(keys):
+    transmits = sent(**keys)
+    assert transmits.delay.shape == (11, 64)
+    for number, delay in enumerate(transmits.delay):
+        assert np.allclose(transmits.path(number, X, 0.0), SPEED * delay, atol=1e-15)
+        assert transmits.path(number, 0.0, 0.0) == pytest.approx(0, abs=1e-15)
+    assert (transmits.weight == 1).all()
+
+
+def test_plane_waves_are_tilted_evenly_about_straight_ahead():
+    transmits = sent(transmit="plane", transmits=5, tilt_deg=40.0)
+    slope = SPEED * (transmits.delay[:, -1] - transmits.delay[:, 0]) / (X[-1] - X[0])
+    assert np.allclose(np.degrees(np.arcsin(slope)), [-20, -10, 0, 10, 20])
+
+
+def test_a_single_wave_goes_straight_ahead():
+    assert not sent(transmit="plane", transmits=1).delay.any()
+
+
+def test_a_diverging_wave_is_on_a_circle_about_its_source():
+    transmits = sent(transmit="diverging", transmits=3, tilt_deg=60.0, source_mm=3.0)
+    source = -3e-3 * np.array([np.sin(np.radians(30)), np.cos(np.radians(30))])
+    around = np.linspace(-0.5, 0.5, 7)
+    circle = source[:, None] + 8e-3 * np.stack([np.sin(around), np.cos(around)])
+    assert np.allclose(transmits.path(2, *circle), 5e-3)
+
+
+def test_sources_stand_where_the_array_is_seen_under_the_angle_of_the_sector():
+    assert np.arctan2(LENGTH / 2, source_distance(Probe(), Rf(sector_deg=70.0))) == pytest.approx(np.radians(35))
+
+
+def test_in_a_synthetic_aperture_each_element_sends_alone():
+    transmits = sent(transmit="synthetic_aperture")
+    assert np.allclose(transmits.weight, np.diag(np.cos(np.pi * X / LENGTH) ** 2))
+    assert not transmits.delay.any()
+    assert transmits.path(5, X[5], 3e-3) == pytest.approx(3e-3)
+
+
+def test_a_least_f_number_narrows_the_aperture_that_focuses():
+    transmits = sent(f_number=4.0, apodization="none")
+    assert (transmits.weight == (np.abs(X) <= 6.5e-3 / 4 / 2)).all()
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [{"focus_mm": 0.0}, {"f_number": -1.0}, {"lines": 4}, {"transmits": 0}, {"source_mm": 0.0}, {"width_mm": -1.0}],
+)
+def test_impossible_transmits_are_refused(keys):
+    with pytest.raises(ValueError, match=next(iter(keys))):
+        Rf(**keys)
