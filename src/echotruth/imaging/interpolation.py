@@ -21,8 +21,8 @@ OVERSAMPLING = 1.25
 """Least sampling frequency over the band of the data."""
 SHARPNESS = 14.0
 """beta of the interpolator."""
-PHASE_BITS = 8
-"""Interpolators are tabulated for 2^8 fractions of a sample, with a slope between them."""
+PHASE_BITS = 9
+"""Interpolators are tabulated for 2^9 fractions of a sample, with a slope between them."""
 LANES = 4 * TAPS
 """Numbers of a tabulated interpolator: its real part at every tap, twice, then its imaginary part likewise."""
 

@@ -1,0 +1,46 @@
+"""A record of which the spectra are exact sums, in place of the engine where it is not what is tested."""
+
+import numpy as np
+import pytest
+
+from echotruth.imaging import scanner
+
+SPEED = 1540.0
+
+
+class ExactRecord:
+    """Full matrix of points that send and listen alike on all sides: the float64 sum over scatterers.
+
+    As `FullMatrix`; the record is so long that it does for all transmits.
+    """
+
+    def __init__(self, probe, depth, latest, accuracy):
+        p = probe.si()
+        self.samples, self.sampling = 2160, p.sampling
+        self.centres = (np.arange(p.elements) - (p.elements - 1) / 2) * p.pitch
+        half_band = 1.289 * p.bandwidth * p.frequency
+        bins = np.arange(self.samples // 2) / self.samples * p.sampling
+        bins = np.flatnonzero(np.abs(bins - p.frequency) < half_band)
+        self.first, self.frequency = int(bins[0]), bins / self.samples * p.sampling
+        width = p.bandwidth * p.frequency / np.sqrt(8 * np.log(2))
+        self.pulse = np.exp(-((self.frequency - p.frequency) ** 2) / (2 * width**2))
+
+    def __call__(self, position, amplitude):
+        distance = np.hypot(position[:, 0] - self.centres[:, None], position[:, 1])
+        matrix = np.empty((len(self.frequency), len(self.centres), len(self.centres)), np.complex64)
+        for k, frequency in enumerate(self.frequency):
+            wave = np.exp(-2j * np.pi * frequency * distance / SPEED) / distance
+            matrix[k] = self.pulse[k] * (wave * amplitude) @ wave.T
+        return matrix
+
+
+@pytest.fixture(scope="session")
+def record():
+    """The class of exact records."""
+    return ExactRecord
+
+
+@pytest.fixture
+def exact_record(monkeypatch, record):
+    """Scanners made in the test work on exact records."""
+    monkeypatch.setattr(scanner, "FullMatrix", record)
