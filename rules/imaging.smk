@@ -31,5 +31,5 @@ rule imaging:
 
 def imaging_settings(config, view):
     place = list(config.views).index(view)
-    stages = (config.phantom, config.probe.settled(), config.rf, config.bmode)
+    stages = (config.phantom, config.probe.settled(), config.rf, config.realism, config.bmode)
     return settings_version(config.seed, config.views[view], place, *stages)

@@ -1,6 +1,9 @@
 """Scatterer seeding: place the probe, and scatterers in the wall."""
 
-from echotruth.imaging.phantom import scatter
+from functools import partial
+
+from echotruth.cases import generator
+from echotruth.imaging.medium import seed
 from echotruth.imaging.truth import cavity_centre
 from echotruth.imaging.view import plane
 from echotruth.repository.job import Job, Result, main
@@ -9,10 +12,10 @@ from echotruth.repository.job import Job, Result, main
 def work(job: Job) -> Result:
     heart, config = job.heart, job.case.config
     where = plane(job.view, config.rf, heart.positions(0)[heart.endo.ravel()])
-    scatterers = scatter(config, heart, where, job.random)
-    job.hand_on(cell=scatterers.points.cell, xi=scatterers.points.xi, amplitude=scatterers.amplitude)
+    seeded = seed(config, heart, where, partial(generator, job.case, job.view_name))
+    job.hand_on(**seeded)
     centre = cavity_centre(heart, where)
-    phantom = {"scatterers": len(scatterers.points), "origin": where.origin, "axes": where.axes, "centre": centre}
+    phantom = {"scatterers": len(seeded["amplitude"]), "origin": where.origin, "axes": where.axes, "centre": centre}
     return {"phantom": phantom}
 
 

@@ -47,6 +47,6 @@ def reverberation(haze: Haze, probe: Probe, depth: float, random: np.random.Gene
 
 
 def response(echoes: np.ndarray, frequency: np.ndarray, sound_speed: float) -> np.ndarray:
-    """Spectrum of the later echoes (echoes, 2), without the first, at frequencies (bins,), Hz: shape (bins,), complex."""
+    """Spectrum of later echoes (echoes, 2), without the first, at frequencies (bins,), Hz: shape (bins,), complex."""
     turns = np.multiply.outer(frequency, 2 * echoes[:, 0] / sound_speed)
     return (np.exp(-2j * pi * turns) * echoes[:, 1]).sum(axis=1)

@@ -1,0 +1,111 @@
+"""The medium: all that echoes in the frames of one view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.config import Config
+from echotruth.heart import Heart
+from echotruth.imaging.blood import Blood, fill
+from echotruth.imaging.course import Random, fading, wandering
+from echotruth.imaging.phantom import Scatterers, scatter
+from echotruth.imaging.surroundings import Following, outside, surround
+from echotruth.imaging.view import Plane
+from echotruth.location import locate
+from echotruth.tetrahedra import Floats, MaterialPoints
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def seed(config: Config, heart: Heart, plane: Plane, random: Random) -> Arrays:
+    """Everything that echoes in a view, as arrays that can be handed on.
+
+    Parameters
+    ----------
+    config : Config
+    heart : Heart
+    plane : Plane
+    random : Random
+        Of each kind of scatterer.
+
+    Returns
+    -------
+    dict of ndarray
+        cell, xi and amplitude of the scatterers in the wall; blood_* and around_* where there are such.
+    """
+    wall = scatter(config, heart, plane, random("phantom"))
+    arrays: Arrays = {"cell": wall.points.cell, "xi": wall.points.xi, "amplitude": wall.amplitude}
+    if config.realism.blood.level_dB is not None:
+        blood = fill(config, heart, random("blood"))
+        arrays |= {"blood_cell": blood.points.cell, "blood_xi": blood.points.xi}
+        arrays |= {"blood_room": blood.room, "blood_amplitude": blood.amplitude}
+    if config.realism.surroundings.level_dB is not None:
+        around = surround(config, heart, plane, random("surroundings"))
+        arrays |= {"around_position": around.position, "around_amplitude": around.amplitude}
+    return arrays
+
+
+class Medium:
+    """All that echoes, frame by frame.
+
+    Parameters
+    ----------
+    config : Config
+    heart : Heart
+    plane : Plane
+    time : ndarray of shape (frame,), s
+    seeded : dict of ndarray
+        As :func:`seed` leaves it.
+    random : Random
+        Of what changes from frame to frame.
+    """
+
+    def __init__(
+        self, config: Config, heart: Heart, plane: Plane, *, time: Floats, seeded: Arrays, random: Random
+    ) -> None:
+        self._config, self._heart, self._plane = config, heart, plane
+        points = MaterialPoints(seeded["cell"], seeded["xi"])
+        self._wall = Scatterers(points, seeded["amplitude"], config.phantom.in_plane_only)
+        self._strength = self._speckle(seeded["amplitude"], time, "wall", random)
+        self._blood = self._around = None
+        if "blood_cell" in seeded:
+            points = MaterialPoints(seeded["blood_cell"], seeded["blood_xi"])
+            self._blood = Blood(points, seeded["blood_room"], seeded["blood_amplitude"])
+            wavelength = config.probe.si().sound_speed / config.probe.si().frequency
+            constant = config.realism.blood.si().time
+            self._flow = wandering(len(points), time, constant, wavelength, random)
+        if "around_position" in seeded:
+            self._around = Following(heart, seeded["around_position"], config.realism.surroundings.si().follow)
+            self._around_strength = self._speckle(seeded["around_amplitude"], time, "surroundings", random)
+
+    def _speckle(self, amplitude: Floats, time: Floats, name: str, random: Random) -> Callable[[int], Floats]:
+        constant = self._config.realism.decorrelation.si().time
+        return (lambda frame: amplitude) if constant is None else fading(amplitude, time, constant, name, random)
+
+    def wall(self, frame: int) -> tuple[Floats, Floats]:
+        """The scatterers of the wall alone: positions in the image (n, 3), m, and amplitudes (n,)."""
+        return self._wall.image(self._heart.positions(frame), self._heart.cells, self._plane), self._strength(frame)
+
+    def in_wall(self, frame: int, lateral: Floats, axial: Floats) -> NDArray[np.bool_]:
+        """Whether places in the image, each as the coordinates (any shape), m, lie in the wall in a frame."""
+        places = np.stack([lateral, axial, np.zeros_like(lateral)], axis=-1).reshape(-1, 3)
+        found = locate(self._heart.positions(frame), self._heart.cells, self._plane.heart(places))
+        return (found.cell >= 0).reshape(lateral.shape)
+
+    def __call__(self, frame: int) -> tuple[Floats, Floats]:
+        """Positions in the image (n, 3), m, and amplitudes (n,) of all scatterers in a frame."""
+        parts = [self.wall(frame)]
+        if self._blood is not None:
+            position, amplitude = self._blood.at(frame, self._heart, self._flow)
+            parts.append((self._plane.image(position), amplitude))
+        if self._around is not None:
+            position, amplitude = self._around(frame), self._around_strength(frame)
+            there = outside(self._heart, frame, position)
+            there &= self._plane.image(position)[:, 1] > 0
+            parts.append((self._plane.image(position[there]), amplitude[there]))
+        positions, amplitudes = zip(*parts, strict=True)
+        return np.concatenate(positions), np.concatenate(amplitudes)

@@ -1,0 +1,170 @@
+"""Shadow, haze and noise in the record of all pairs, against what each should do to it."""
+
+import numpy as np
+import pytest
+
+from echotruth.config import Config
+from echotruth.imaging.acquisition import Acquisition
+from echotruth.imaging.haze import response, reverberation
+from echotruth.imaging.medium import Medium, seed
+from echotruth.imaging.scan import imaging_depth, points
+from echotruth.imaging.scanner import Scanner
+from echotruth.imaging.shadow import Rib
+from echotruth.imaging.view import plane
+
+SMALL = {"probe": {"elements": 16, "pitch_um": 90.0}, "rf": {"lines": 16}, "phantom": {"density_per_mm3": 300.0}}
+ALL = {
+    "blood": {"level_dB": -20.0},
+    "surroundings": {"level_dB": -12.0},
+    "decorrelation": {"time_ms": 50.0},
+    "noise": {"snr_dB": 25.0},
+    "haze": {"level_dB": -20.0},
+    "shadow": {"side": "right"},
+}
+TIME = np.array([0, 4e-3])
+
+
+def random(name):
+    return np.random.default_rng(list(name.encode()))
+
+
+@pytest.fixture(scope="module")
+def scanner():
+    config = Config.model_validate(SMALL)
+    return Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+
+
+@pytest.fixture(scope="module")
+def acquire(twisting_heart, scanner):
+    """A view of the heart with what is asked for."""
+
+    def made(**realism):
+        config = Config.model_validate(SMALL | {"realism": realism})
+        where = plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+        seeded = seed(config, twisting_heart, where, random)
+        medium = Medium(config, twisting_heart, where, time=TIME, seeded=seeded, random=random)
+        return Acquisition(config, scanner, medium, random), medium
+
+    return made
+
+
+def test_nothing_asked_for_leaves_the_bytes_as_they_were(acquire, scanner, twisting_heart):
+    from echotruth.imaging.phantom import scatter
+
+    acquisition, _ = acquire()
+    config = Config.model_validate(SMALL)
+    where = plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+    bare = scatter(config, twisting_heart, where, random("phantom"))
+    places = bare.image(twisting_heart.positions(1), twisting_heart.cells, where)
+    assert acquisition(1).tobytes() == scanner.matrix(places, bare.amplitude).tobytes()
+
+
+def test_frames_come_out_the_same_in_any_order_and_again(acquire):
+    first, second = acquire(**ALL)[0], acquire(**ALL)[0]
+    forwards = [first(frame).tobytes() for frame in (0, 1)]
+    backwards = [second(frame).tobytes() for frame in (1, 0)]
+    assert forwards == backwards[::-1]
+
+
+def test_the_scatterers_of_the_wall_are_the_same_whatever_is_around_them(acquire):
+    bare, full = acquire()[1], acquire(**(ALL | {"decorrelation": {}}))[1]
+    for alone, together in zip(bare(1), full(1), strict=True):
+        assert np.array_equal(alone, together[: len(alone)])
+        assert len(together) > 2 * len(alone)
+
+
+@pytest.mark.parametrize("snr", [10.0, 30.0])
+def test_the_lines_have_the_ratio_of_signal_to_noise_asked_for(acquire, scanner, snr):
+    acquisition, medium = acquire(noise={"snr_dB": snr})
+    muscle = medium.in_wall(0, *points(scanner.scan, scanner.range))
+    echo = scanner.lines(*medium.wall(0))
+    noise = scanner.beamform(np.float32(acquisition.noise) * acquisition.unit_noise(1))
+    ratio = np.linalg.norm(echo[muscle]) / np.linalg.norm(noise[muscle])
+    assert 20 * np.log10(ratio) == pytest.approx(snr, abs=0.3)
+
+
+def test_noise_is_what_is_added_to_the_record(acquire):
+    noisy, quiet = acquire(noise={"snr_dB": 10.0})[0], acquire()[0]
+    added = (noisy(1) - quiet(1)) / noisy.noise
+    assert np.abs(added - noisy.unit_noise(1)).max() < 1e-3
+
+
+def test_noise_is_white_over_pairs_and_band_and_new_in_every_frame(acquire):
+    acquisition = acquire()[0]
+    now, then = (acquisition.unit_noise(frame).reshape(-1, 256) for frame in (0, 1))
+    error = 1 / np.sqrt(len(now))
+    covariance = now.conj().T @ now / len(now)
+    assert np.abs(covariance - np.eye(256)).max() < 7 * error
+    assert np.abs(np.vdot(now, then)) / now.size < 4 / np.sqrt(now.size)
+    assert np.abs((now**2).mean()) < 4 / np.sqrt(now.size)
+    power = (np.abs(now) ** 2).mean(axis=1)
+    assert np.abs(power - 1).max() < 5 / np.sqrt(256)
+
+
+def test_a_later_echo_is_the_first_one_shifted(scanner):
+    # Its wavefront stays that of the near place, so that it is out of focus where it is drawn.
+    matrix, samples = scanner.matrix, 300
+    deeper = samples / matrix.sampling * 1540 / 2
+    echo = matrix(np.array([[0.4e-3, 3e-3, 0.0]]), np.ones(1))
+    later = response(np.array([[deeper, 0.25]]), matrix.frequency, 1540.0)[:, None, None] * echo
+    traces = []
+    for spectra in (echo, later):
+        whole = np.zeros((matrix.samples // 2 + 1, 16, 16), complex)
+        whole[matrix.first : matrix.first + len(matrix.frequency)] = spectra
+        traces.append(np.fft.irfft(whole, matrix.samples, axis=0))
+    assert np.abs(traces[1] - 0.25 * np.roll(traces[0], samples, axis=0)).max() < 1e-6 * np.abs(traces[0]).max()
+
+
+def test_only_what_is_near_comes_again(acquire):
+    hazy, clear = (acquire(**what)[0] for what in ({"haze": {"level_dB": -10.0, "near_mm": 3.0}}, {}))
+    near, far = np.array([[0.2e-3, 2.5e-3, 0.0]]), np.array([[0.2e-3, 3.5e-3, 0.0]])
+    one = np.ones(1)
+    assert np.array_equal(hazy.echoes(far, one), clear.echoes(far, one))
+    assert np.linalg.norm(hazy.echoes(near, one) - clear.echoes(near, one)) > 0.1 * np.linalg.norm(
+        clear.echoes(near, one)
+    )
+
+
+def test_later_echoes_have_the_level_asked_for():
+    config = Config.model_validate({"realism": {"haze": {"level_dB": -15.0, "length_mm": 1.0}}})
+    draws = [reverberation(config.realism.haze, config.probe, 1.0, np.random.default_rng(k)) for k in range(300)]
+    power = np.mean([(draw[:, 1] ** 2).sum() for draw in draws])
+    assert 10 * np.log10(power) == pytest.approx(-15, abs=0.1)
+    assert np.mean([draw[:, 0].mean() for draw in draws]) == pytest.approx(1e-3, rel=0.02)
+
+
+def test_no_later_echo_seems_to_lie_beyond_the_image():
+    config = Config.model_validate({"realism": {"haze": {"level_dB": -15.0, "length_mm": 5.0, "near_mm": 4.0}}})
+    echoes = reverberation(config.realism.haze, config.probe, 12e-3, np.random.default_rng(0))
+    assert echoes[:, 0].max() < 8e-3
+    assert len(echoes) > 100
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_an_element_hears_what_its_ray_does_not_cross_the_rib_to_reach(acquire, scanner, side):
+    config = {"side": side, "edge_deg": 8.0, "depth_mm": 1.5, "softness_mm": 0.4, "level_dB": -30.0}
+    acquisition, _ = acquire(shadow=config)
+    draw = np.random.default_rng(7)
+    place, amplitude = draw.uniform([-3e-3, 3e-3, 0], [3e-3, 9e-3, 0], (60, 3)), draw.standard_normal(60)
+    exact = np.zeros((len(scanner.matrix.frequency), 16, 16), complex)
+    sign = 1 if side == "right" else -1
+    for k in range(60):
+        x, z = sign * place[k, 0], place[k, 1]
+        rib = 1.5e-3 * np.tan(np.radians(8))
+        # The line from the scatterer through the rib's edge meets the array here.
+        horizon = x + (rib - x) * z / (z - 1.5e-3)
+        ramp = np.clip((horizon - sign * scanner.matrix.centres) / 0.4e-3 + 0.5, 0, 1)
+        passes = 10**-1.5 + (1 - 10**-1.5) * np.sin(np.pi / 2 * ramp) ** 2
+        exact += passes[:, None] * passes * scanner.matrix(place[k : k + 1], amplitude[k : k + 1])
+    found = acquisition.direct(place, amplitude)
+    assert np.linalg.norm(found - exact) < 0.03 * np.linalg.norm(exact)
+
+
+def test_what_lies_before_the_rib_is_not_shaded_and_what_lies_deep_behind_it_is(acquire, scanner):
+    rib = Rib(Config.model_validate({"realism": {"shadow": {"side": "right"}}}).realism.shadow, np.zeros(1))
+    before, behind = np.array([[2e-3, 1.4e-3, 0]]), np.array([[5e-3, 6e-3, 0]])
+    acquisition, _ = acquire(shadow={"side": "right", "level_dB": -40.0})
+    one = np.ones(1)
+    assert np.isinf(rib.horizon(before)).all()
+    assert np.allclose(acquisition.direct(before, one), scanner.matrix(before, one), rtol=1e-6)
+    assert np.allclose(acquisition.direct(behind, one), 1e-4 * scanner.matrix(behind, one), rtol=1e-4, atol=1e-12)
