@@ -20,10 +20,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SHAPES = (
-    *("name", "cases", "views", "tracking", "fibres.layers", "loop.frames"),
+    *("name", "cases", "views", "tracking", "fibres.layers", "loop.frames", "rf.keep"),
     *("bmode.field_of_view_mm", "bmode.size_px", "bmode.downsampling"),
 )
 """Keys that may not be swept, nor `geometry.*_elements`: they shape the arrays that all cases share."""
+
+FREE_OF_RF = ("probe.width_um", "probe.height_mm", "probe.elevation_focus_mm", "probe.attenuation_dB_per_cm_MHz")
+"""Keys of the array that may be swept where its RF is kept: they change neither its length nor where a line is."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +126,8 @@ def _check(config: Config, key: str, source: str) -> None:
         raise ConfigError(f"{source}: cases.{key}: meshes of two sizes share no arrays: set geometry.remesh: true")
     if key.startswith(SHAPES) or key.endswith("_elements"):
         raise ConfigError(f"{source}: cases.{key}: {key} cannot be swept, it is common to a repository: set it once")
+    if config.rf.keep and key.startswith(("probe.", "rf.")) and key not in FREE_OF_RF:
+        raise ConfigError(f"{source}: cases.{key}: {key} cannot be swept where RF is kept: leave rf.keep empty")
 
 
 def _check_loop(loop: Loop, source: str) -> None:

@@ -1,4 +1,4 @@
-"""The command line: `echotruth check`, `echotruth cases`, `echotruth run`, `echotruth validate`."""
+"""The command line: `echotruth check`, `cases`, `run`, `validate` and `export`."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ def main() -> None:
         sys.exit(f"echotruth {arguments.command}: {options[0]} is not an option: see echotruth --help")
     if arguments.command == "validate":
         sys.exit(validate(Path(arguments.folder), arguments.quick))
+    if arguments.command == "export":
+        sys.exit(export(arguments))
     try:
         config = load(arguments.config)
         cases = expand(config, arguments.config)
@@ -84,6 +86,19 @@ def validate(folder: Path, quick: bool) -> int:
     return 0 if met else 1
 
 
+def export(arguments: argparse.Namespace) -> int:
+    """Write the RF of one case and view in the file format of others; 0, or 2 where there is none."""
+    from echotruth.repository.export import CannotExport
+    from echotruth.repository.export import export as write
+
+    try:
+        file = write(arguments.repository, arguments.format, arguments.case, arguments.view, arguments.out)
+    except CannotExport as error:
+        return _complain(str(error))
+    print(file)
+    return 0
+
+
 def _quietly(command: list[str]) -> int:
     """Run a command whose words matter only when it fails."""
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
@@ -126,4 +141,11 @@ def _parser() -> argparse.ArgumentParser:
     command = commands.add_parser("validate", help=text, description=text)
     command.add_argument("--quick", action="store_true", help="coarse meshes, a few minutes")
     command.add_argument("--folder", default="docs", help="where validation.md is written (default: docs)")
+    text = "write the RF that a repository keeps as a file of USTB (uff) or zea"
+    command = commands.add_parser("export", help=text, description=text)
+    command.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
+    command.add_argument("--format", choices=("uff", "zea"), required=True, help="of the file, both HDF5")
+    command.add_argument("--case", required=True, help="case id, as in cases.csv")
+    command.add_argument("--view", required=True, help="name of the view")
+    command.add_argument("--out", type=Path, help="file to write (default: CASE_VIEW in the folder export)")
     return parser

@@ -47,6 +47,13 @@ This page is generated from `src/echotruth/repository/schema.py` by `make refere
 
 """
 
+_RF = """The group is there where `rf.keep` asks for it, and holds `lines`, `channels` or both. Its attributes are, in
+SI units, sampling_frequency (of the channels), demodulation_frequency (of the lines), sound_speed, centre_frequency,
+bandwidth, element_width, element_height, elevation_focus, attenuation (nepers per metre and hertz); transmit, scan,
+apodization and f_number, as in the section `rf`; and how far the RF may be off the exact sum, relative: accuracy (in
+the plane of the image) and elevation_accuracy (beside it).
+"""
+
 
 def table() -> str:
     """The page of keys: unit, default and meaning of each."""
@@ -57,9 +64,11 @@ def tree() -> str:
     """The page of arrays: group by group."""
     parts = [_TREE]
     cases = "One more array for every key of the configuration that a case could vary, named and measured as the key.\n"
-    groups = {"cases": schema.CASES} | schema.STAGES | {f"{name}/SIZE": each for name, each in schema.SIZED.items()}
+    sized = {f"{name}/SIZE": arrays for name, arrays in schema.SIZED.items()}
+    groups = {"cases": schema.CASES} | schema.STAGES | schema.ASKED | sized
+    notes = {"cases": cases, "rf": _RF}
     for path, arrays in groups.items():
-        parts += [f"## {path}\n", *_arrays(arrays), cases if path == "cases" else ""]
+        parts += [f"## {path}\n", *_arrays(arrays), notes.get(path, "")]
     return "\n".join([*parts, "## Coordinates\n", *_arrays(schema.COORDINATES)])
 
 

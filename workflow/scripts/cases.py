@@ -10,6 +10,8 @@ import yaml
 from echotruth.cases import expand, table
 from echotruth.config.loading import ConfigError, validate
 from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.channels import described
+from echotruth.imaging.scanner import Scanner, imaging_depth
 from echotruth.mechanics.geometry import GeometryError, left_ventricle
 from echotruth.mechanics.loop import read_loop
 from echotruth.repository import layout, ledger, schema
@@ -36,9 +38,12 @@ for id, case in cases.items():
     times[rows[id]] = loops[case.config.loop].time
 frame = table(list(cases.values()))
 columns = layout.columns(frame, list(rows))
-sizes = layout.sizes(mesh)
+scanner = config.rf.keep and Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+values, lengths, settings = described(config, scanner) if scanner else ({}, {}, {})
+sizes = layout.sizes(mesh) | lengths
 labels = layout.labels(config, list(rows), times) | layout.positions(config, pixel_centres, grid) | columns
+labels |= {f"rf:{name}": value for name, value in values.items()}
 arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
-Store(arguments.repository / f"{config.name}.zarr").lay_out(arrays, sizes, labels)
+Store(arguments.repository / f"{config.name}.zarr").lay_out(arrays, sizes, labels, {"rf": settings})
 frame.to_csv(arguments.repository / "cases.csv", index=False)
 (arguments.repository / "config.yaml").write_text(yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False))

@@ -138,6 +138,24 @@ TRUTH = (
 
 BMODE = (_array("image", _PIXEL, "uint8", "1", "B-mode grey level"),)
 
+_FRAME = "case view frame"
+LINES = (_array("lines", f"{_FRAME} line range", "complex64", "1", "lines, demodulated by exp(-4 pi i f range / c)"),)
+CHANNELS = (
+    _array(
+        *("channels", f"{_FRAME} transmitter receiver sample", "int16", "1"),
+        "RF of every element after each has sent alone, in steps of channels_step",
+    ),
+    _array("channels_step", _FRAME, "float64", "1", "value of one step of channels"),
+)
+TRANSMITS = (
+    _array("transmit_delay", "transmit element", "float64", "s", "delay of an element"),
+    _array("transmit_weight", "transmit element", "float64", "1", "weight of an element"),
+    _array("transmit_origin", "transmit plane", "float64", "m", "where a wave comes from; of plane ones the direction"),
+    _array("transmit_lead", "transmit", "float64", "m", "distance of a wave from its origin at time 0"),
+)
+"""How the waves were sent of which the lines are made: they stand wherever RF is kept."""
+RF = (*LINES, *CHANNELS, *TRANSMITS)
+
 TRACKING = (
     _array(
         "displacement", "case view tracker frame axial lateral plane", "float32", "m", "tracked displacement from ED"
@@ -178,6 +196,13 @@ COORDINATES = (
     _array("layer", "layer", "int32", "1", "transmural layer, 1 at the endocardium"),
     _array("region", "region", "int32", "1", "transmural layer, 0 for the whole wall"),
     _array("aha", "aha", "int32", "1", "AHA segment"),
+    _array("line_angle", "line", "float64", "rad", "angle of a line from the axial axis"),
+    _array("line_foot", "line", "float64", "m", "lateral position at which a line leaves the array"),
+    _array("range", "range", "float64", "m", "distance along a line from its foot"),
+    _array("sample", "sample", "float64", "s", "time since the element sent"),
+    _array("element", "element", "float64", "m", "lateral position of the element"),
+    _array("transmitter", "transmitter", "float64", "m", "lateral position of the element that sends"),
+    _array("receiver", "receiver", "float64", "m", "lateral position of the element that receives"),
     _array("polar", "polar", "string", "1", "radial, tangential (long axis: transverse, longitudinal)"),
     _array("measure", "measure", "string", "1", "polar component, or the vector as a whole"),
 )
@@ -206,6 +231,11 @@ STAGES = {
 
 SIZED = {"truth": TRUTH, "bmode": BMODE, "tracking": TRACKING, "evaluation": EVALUATION}
 """Stages whose arrays stand once for every image size, in a group named by it."""
+
+ASKED = {"rf": RF}
+"""Stages whose arrays stand only where `rf.keep` asks for them."""
+
+ALL = STAGES | ASKED | SIZED
 
 
 CASES = (
@@ -245,14 +275,20 @@ _UNITS = {
 def groups(config: Config) -> dict[str, tuple[Array, ...]]:
     """Path of every group below the root to its arrays, coordinates left out."""
     sized = {f"{stage}/{size}": arrays for stage, arrays in SIZED.items() for size in config.bmode.sizes}
-    return {"cases": CASES} | STAGES | sized
+    return {"cases": CASES} | STAGES | sized | ({"rf": kept(config)} if config.rf.keep else {})
+
+
+def kept(config: Config) -> tuple[Array, ...]:
+    """Arrays of the group `rf`: what is kept of the RF, and how it was sent."""
+    lines, channels = (name in config.rf.keep for name in ("lines", "channels"))
+    return (LINES if lines else ()) + (CHANNELS if channels else ()) + TRANSMITS
 
 
 def written_by(stage: str, config: Config) -> list[str]:
     """Groups that the jobs of a stage write; the job that solves a heart writes all but the measures of the solved."""
     if stage == "mechanics":
         return [group for group, arrays in STAGES.items() if arrays[0].leading == 1 and group != "physiology"]
-    whole = [stage] if stage in STAGES else []
+    whole = [stage] if stage in STAGES or (stage == "rf" and config.rf.keep) else []
     return [f"{stage}/{size}" for size in config.bmode.sizes] if stage in SIZED else whole
 
 

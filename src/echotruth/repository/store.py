@@ -43,7 +43,13 @@ class Store:
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
 
-    def lay_out(self, arrays: dict[str, tuple[Array, ...]], sizes: dict[str, int], labels: Values) -> None:
+    def lay_out(
+        self,
+        arrays: dict[str, tuple[Array, ...]],
+        sizes: dict[str, int],
+        labels: Values,
+        attributes: dict[str, dict[str, Any]] | None = None,
+    ) -> None:
         """Make or grow all arrays; those already as they should be are left untouched.
 
         Parameters
@@ -54,6 +60,8 @@ class Store:
             Length of every dimension without labels.
         labels : dict
             Values of every coordinate; `group:name` goes before `name`.
+        attributes : dict, optional
+            Path of a group to its attributes.
         """
         root = zarr.open_group(self.path, mode="a", zarr_format=3, use_consolidated=False)
         for gone in set(_groups(root)) - set(arrays):
@@ -64,6 +72,9 @@ class Store:
             lengths = sizes | {name: len(values) for name, values in own.items() if values.ndim == 1}
             coordinates = schema.coordinates(members)
             columns = [array for array in members if f"{path}:{array.name}" in labels]
+            for gone in set(group.array_keys()) - {array.name for array in (*members, *coordinates)}:
+                del group[gone]
+            group.attrs.put((attributes or {}).get(path, {}))
             for array in members:
                 if array not in columns:
                     _require(group, array, lengths, coordinates)
@@ -90,7 +101,7 @@ class Store:
     def read(self, group: str, *row: int, names: tuple[str, ...] | None = None) -> dict[str, NDArray[Any]]:
         """Arrays of a group for one case (and view); a missing or damaged shard is an error."""
         arrays = self._open(group, "r")
-        wanted = [array_of(group, name) for name in names] if names else schema_of(group)
+        wanted = [array_of(group, name) for name in names] if names else _held(arrays, group)
         for array in wanted:
             self._require_written(group, array, row[: array.leading])
         return {array.name: np.asarray(arrays[array.name][row[: array.leading]]) for array in wanted}
@@ -134,12 +145,17 @@ class Store:
 def schema_of(group: str) -> tuple[Array, ...]:
     """Arrays of a group, as "bmode/512"."""
     stage = group.partition("/")[0]
-    return (schema.STAGES | schema.SIZED)[stage]
+    return schema.ALL[stage]
 
 
 def array_of(group: str, name: str) -> Array:
     """One array of a group."""
     return next(array for array in schema_of(group) if array.name == name)
+
+
+def _held(group: zarr.Group, path: str) -> tuple[Array, ...]:
+    """Arrays of a group that are in it: of RF only what is asked for is kept."""
+    return tuple(array for array in schema_of(path) if array.name in group)
 
 
 def _groups(root: zarr.Group) -> list[str]:

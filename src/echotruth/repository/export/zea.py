@@ -1,0 +1,96 @@
+"""The HDF5 layout of zea, a toolbox for cognitive ultrasound imaging (https://zea.readthedocs.io, data format 0.1).
+
+A track holds the data (frames first) and the scan, that is the transmits, all in 32 bits; the array stands beside it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from echotruth.repository.export.values import echoes, places
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+VERSION = "0.1.8"
+"""Of zea, whose layout is written."""
+BEHIND = 1e-6
+"""Distance of the source of a wave behind its element, m: 0 would stand for a plane wave."""
+
+
+def write(file: Any, rf: xr.Dataset) -> None:
+    """Write channels as `raw_data` and lines as `beamformed_data`, whichever is kept.
+
+    Parameters
+    ----------
+    file : h5py.File
+    rf : Dataset
+        The group `rf` of one case and view.
+    """
+    file.attrs.update({"zea_version": VERSION, "us_machine": "echotruth", "description": "Simulated echocardiogram"})
+    _probe(file.create_group("probe"), rf)
+    track = file.create_group("tracks/track_0")
+    data = track.create_group("data")
+    if "channels" in rf:
+        _raw(data, rf)
+        _scan(track.create_group("scan"), rf)
+    if "lines" in rf:
+        _beamformed(data.create_group("beamformed_data"), rf)
+
+
+def _probe(group: Any, rf: xr.Dataset) -> None:
+    element = rf.element.values
+    group["type"] = "phased"
+    values = {
+        "probe_center_frequency": rf.attrs["centre_frequency"],
+        "probe_bandwidth_percent": 100 * rf.attrs["bandwidth"],
+        "probe_geometry": np.column_stack([element, np.zeros((len(element), 2))]),
+        "element_width": rf.attrs["element_width"],
+        "element_height": rf.attrs["element_height"],
+    }
+    _put(group, values)
+
+
+def _raw(group: Any, rf: xr.Dataset) -> None:
+    frames, *_, samples = (rf.sizes[dim] for dim in ("frame", "transmitter", "receiver", "sample"))
+    elements = rf.sizes["element"]
+    raw = group.create_dataset("raw_data", (frames, elements, samples, elements, 1), np.float32)
+    for frame, channels in enumerate(echoes(rf)):
+        raw[frame] = channels.transpose(0, 2, 1)[..., None]
+
+
+def _scan(group: Any, rf: xr.Dataset) -> None:
+    """Every element in its turn."""
+    element = rf.element.values
+    one_each = np.ones(len(element))
+    values = {
+        "sampling_frequency": rf.attrs["sampling_frequency"],
+        "center_frequency": rf.attrs["centre_frequency"],
+        "demodulation_frequency": rf.attrs["centre_frequency"],
+        "sound_speed": rf.attrs["sound_speed"],
+        "initial_times": float(rf["sample"][0]) * one_each,
+        "t0_delays": np.zeros((len(element), len(element))),
+        "tx_apodizations": np.eye(len(element)),
+        "focus_distances": -BEHIND * one_each,
+        "transmit_origins": np.column_stack([element, np.zeros((len(element), 2))]),
+        "polar_angles": 0 * one_each,
+        "azimuth_angles": 0 * one_each,
+    }
+    _put(group, values)
+
+
+def _beamformed(group: Any, rf: xr.Dataset) -> None:
+    lateral, axial = (place.T for place in places(rf))
+    values = group.create_dataset("values", (rf.sizes["frame"], *axial.shape, 2), np.float32)
+    for frame, lines in enumerate(rf.lines):
+        values[frame] = np.stack([lines.values.real.T, lines.values.imag.T], axis=-1)
+    _put(group, {"coordinates": np.stack([lateral, np.zeros(axial.shape), axial], axis=-1)})
+    group["labels"] = ["I", "Q"]
+
+
+def _put(group: Any, values: dict[str, ArrayLike]) -> None:
+    for name, value in values.items():
+        group[name] = np.asarray(value, np.float32)

@@ -1,0 +1,210 @@
+"""Files of other toolboxes: read back by them, and laid out as they print it."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from echotruth.repository.export import FORMATS, CannotExport, export
+
+ELEMENTS, FRAMES, SPEED = 24, 2, 1540.0
+
+
+@pytest.fixture(scope="module")
+def folder(rf_repository):
+    return rf_repository()
+
+
+@pytest.fixture(scope="module")
+def rf(folder):
+    with xr.open_zarr(folder / "small.zarr", group="rf", consolidated=False) as group:
+        return group.sel(case="heart", view="mid").load()
+
+
+def written(folder, name):
+    pytest.importorskip("h5py")
+    return export(folder, name, "heart", "mid")
+
+
+def echoes(rf):
+    """Frame, transmitter, receiver, sample."""
+    return rf.channels.values * rf.channels_step.values[:, None, None, None]
+
+
+def brightest(rf):
+    """Line of the brightest sample of the first frame, and its range, m."""
+    line, sample = np.unravel_index(np.abs(rf.lines[0].values).argmax(), rf.lines[0].shape)
+    return line, rf.range.values[sample]
+
+
+def compounded(channels, element, source, delay, place):
+    """Delay and sum at a point (lateral, axial) of channels (samples, receivers, waves), as the toolbox counts time."""
+    spectra = np.fft.rfft(channels, axis=0)[1:-1] * 2 / len(channels)
+    cycles = np.fft.rfftfreq(len(channels))[1:-1]
+    out = np.hypot(place[0] - source[:, 0], place[1] - source[:, 1]) + np.linalg.norm(source, axis=1)
+    back = np.hypot(place[0] - element, place[1])
+    time = (out / SPEED - delay)[None, :] + (back / SPEED)[:, None]
+    return abs((spectra * np.exp(2j * np.pi * cycles[:, None, None] * 100e6 * time)).sum())
+
+
+def test_uff_is_read_by_its_own_library(folder, rf):
+    pyuff = pytest.importorskip("pyuff_ustb")
+    data = pyuff.Uff(str(written(folder, "uff"))).read("channel_data")
+    assert (data.N_elements, data.N_waves, data.N_frames) == (ELEMENTS, ELEMENTS, FRAMES)
+    assert (float(data.sound_speed), float(data.initial_time), float(data.modulation_frequency)) == (SPEED, 0, 0)
+    assert float(data.sampling_frequency) == rf.attrs["sampling_frequency"]
+    assert data.wavelength == pytest.approx(SPEED / 25e6)
+    np.testing.assert_allclose(data.probe.x, rf.element)
+    np.testing.assert_allclose(data.probe.width, 41e-6)
+    found = np.transpose(data.data, (3, 2, 1, 0))  # samples, receivers, waves, frames
+    np.testing.assert_allclose(found, echoes(rf), rtol=1e-5, atol=1e-5 * np.abs(found).max())
+    for wave, lateral in zip(data.sequence, rf.element.values, strict=True):
+        assert (wave.source.x, wave.source.z) == (pytest.approx(lateral), pytest.approx(0, abs=1e-12))
+        assert wave.wavefront == pyuff.Wavefront.spherical
+
+
+def test_waves_of_the_uff_focus_where_the_lines_do(folder, rf):
+    """The brightest sample of the lines is as bright when the toolbox's rule of time focuses the file."""
+    pyuff = pytest.importorskip("pyuff_ustb")
+    data = pyuff.Uff(str(written(folder, "uff"))).read("channel_data")
+    source = np.array([[wave.source.x, wave.source.z] for wave in data.sequence])
+    delay = np.array([wave.delay for wave in data.sequence])
+    line, along = brightest(rf)
+    at = [(along + off) * np.array([np.sin(rf.line_angle[line]), np.cos(rf.line_angle[line])]) for off in OFFSETS]
+    levels = [compounded(data.data[..., 0], data.probe.x, source, delay, place) for place in at]
+    assert abs(OFFSETS[int(np.argmax(levels))]) < 20e-6
+
+
+OFFSETS = np.arange(-300, 301, 5) * 1e-6
+"""Ranges about the brightest sample, m: some three lengths of the pulse on each side."""
+
+
+def test_lines_of_the_uff_are_those_of_the_repository_at_their_places(folder, rf):
+    pyuff = pytest.importorskip("pyuff_ustb")
+    data = pyuff.Uff(str(written(folder, "uff"))).read("beamformed_data")
+    found = data.data.reshape(FRAMES, rf.sizes["line"], rf.sizes["range"])
+    np.testing.assert_array_equal(found, rf.lines)
+    line, along = brightest(rf)
+    pixel = np.abs(data.data[0]).argmax()
+    assert np.hypot(data.scan.x, data.scan.z)[pixel] == pytest.approx(along)
+    assert np.arctan2(data.scan.x, data.scan.z)[pixel] == pytest.approx(float(rf.line_angle[line]))
+    np.testing.assert_allclose(data.scan.depth_axis, rf.range)
+    np.testing.assert_allclose(data.scan.azimuth_axis, rf.line_angle)
+
+
+def test_zea_is_read_by_its_own_library(folder, rf, monkeypatch):
+    monkeypatch.setenv("KERAS_BACKEND", "jax")
+    zea = pytest.importorskip("zea")
+    with zea.File(written(folder, "zea")) as file:
+        file.validate()
+        np.testing.assert_allclose(file.data.raw_data[0, :, :, :, 0], echoes(rf)[0].transpose(0, 2, 1), rtol=1e-5)
+        parameters = file.load_parameters()
+    assert (parameters.n_tx, parameters.n_el) == (ELEMENTS, ELEMENTS)
+    assert float(parameters.sound_speed) == SPEED
+    np.testing.assert_allclose(parameters.probe_geometry[:, 0], rf.element, rtol=1e-6)
+
+
+SHAPES = {
+    "raw_data": (FRAMES, ELEMENTS, None, ELEMENTS, 1),
+    "t0_delays": (ELEMENTS, ELEMENTS),
+    "tx_apodizations": (ELEMENTS, ELEMENTS),
+    "initial_times": (ELEMENTS,),
+    "focus_distances": (ELEMENTS,),
+    "polar_angles": (ELEMENTS,),
+    "transmit_origins": (ELEMENTS, 3),
+    "sampling_frequency": (),
+    "center_frequency": (),
+    "demodulation_frequency": (),
+    "sound_speed": (),
+}
+"""Of zea's documented format, version 0.1."""
+
+
+def test_zea_is_laid_out_as_documented(folder, rf):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(written(folder, "zea")) as file:
+        assert file.attrs["zea_version"].startswith("0.1.")
+        track = file["tracks/track_0"]
+        for name, shape in SHAPES.items():
+            dataset = track["data" if name == "raw_data" else "scan"][name]
+            assert dataset.dtype == np.float32
+            assert tuple(dataset.shape) == tuple(rf.sizes["sample"] if size is None else size for size in shape)
+        assert file["probe/probe_geometry"].shape == (ELEMENTS, 3)
+        np.testing.assert_array_equal(track["scan/tx_apodizations"], np.eye(ELEMENTS))
+        beamformed = track["data/beamformed_data"]
+        found = beamformed["values"][..., 0] + 1j * beamformed["values"][..., 1]
+        np.testing.assert_array_equal(found, rf.lines.transpose("frame", "range", "line"))
+        distance = np.linalg.norm(beamformed["coordinates"], axis=-1)
+        np.testing.assert_allclose(distance, np.broadcast_to(rf.range.values[:, None], distance.shape), rtol=1e-6)
+
+
+def test_uff_is_laid_out_as_the_toolbox_writes_it(folder, rf):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(written(folder, "uff")) as file:
+        data = file["channel_data"]
+        assert (data.attrs["class"], data["probe"].attrs["class"]) == ("uff.channel_data", "uff.linear_array")
+        assert data["data"].shape == (FRAMES, ELEMENTS, ELEMENTS, rf.sizes["sample"])
+        assert list(data["sequence"].attrs["size"]) == [1, ELEMENTS]
+        assert len(data["sequence"]) == ELEMENTS and data["sequence/sequence_0001"].attrs["class"] == "uff.wave"
+        assert data["probe/geometry"].shape == (7, ELEMENTS)
+        assert sorted(file["beamformed_data/data"]) == ["imag", "real"]
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize(
+    "keep, there, absent", [("lines", "beamformed_data", "a"), ("channels", "a", "beamformed_data")]
+)
+def test_only_what_is_kept_is_written(rf_repository, tmp_path, name, keep, there, absent):
+    h5py = pytest.importorskip("h5py")
+    found = []
+    with h5py.File(export(rf_repository([keep]), name, "heart", "mid", tmp_path / "a.h5")) as file:
+        file.visit(found.append)
+    leaves = {path.rpartition("/")[2] for path in found}
+    assert ("beamformed_data" in leaves) == (keep == "lines")
+    assert bool({"raw_data", "channel_data"} & leaves) == (keep == "channels")
+
+
+REFUSED = {
+    ("nowhere", "heart", "mid"): "is not a repository",
+    ("small", "hart", "mid"): "hart is not a case of .*: use heart",
+    ("small", "heart", "middle"): "middle is not a view of .*: use mid, apex",
+    ("small", "heart", "apex"): "heart has no RF of apex",
+}
+
+
+@pytest.mark.parametrize("asked", REFUSED, ids="-".join)
+def test_what_is_not_there_is_said_in_one_sentence(folder, tmp_path, asked):
+    pytest.importorskip("h5py")
+    place, case, view = asked
+    with pytest.raises(CannotExport, match=REFUSED[asked]):
+        export(folder if place == "small" else tmp_path, "uff", case, view)
+
+
+def test_repository_without_rf_is_said_so(rf_repository, rf_layout):
+    from echotruth.repository.store import Store
+
+    pytest.importorskip("h5py")
+    folder = rf_repository(["lines"])
+    rf_layout(Store(folder / "small.zarr"), [])
+    with pytest.raises(CannotExport, match=r"keeps no RF: set rf\.keep to \[lines, channels\]"):
+        export(folder, "zea", "heart", "mid")
+
+
+def test_missing_h5py_is_said_in_one_line(folder):
+    code = "import sys; sys.modules['h5py'] = None; from echotruth.cli import main; main()"
+    command = ["export", str(folder), "--format", "uff", "--case", "heart", "--view", "mid"]
+    done = subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "echotruth: needs the package h5py: install echotruth[export]\n"
+
+
+def test_command_writes_the_file_and_says_where(folder, tmp_path):
+    pytest.importorskip("h5py")
+    file = tmp_path / "new/a.uff"
+    command = ["export", folder, "--format", "uff", "--case", "heart", "--view", "mid", "--out", file]
+    code = "from echotruth.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", code, *map(str, command)], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{file}\n", "")
+    assert list(file.parent.iterdir()) == [file]
