@@ -95,7 +95,7 @@ def test_a_point_of_a_line_is_the_exact_delayed_sum_over_all_pairs(matrix, keys)
     lines, chosen = scanner.beamform(matrix), np.arange(260, 1200, 131)
     for line in (2, 9):
         exact = exact_line(scanner, matrix.astype(complex), rf, line, scanner.range[chosen])
-        assert np.linalg.norm(lines[line, chosen] - exact) < 1.5e-5 * np.linalg.norm(exact)
+        assert np.linalg.norm(lines[line, chosen] - exact) < 3e-5 * np.linalg.norm(exact)
 
 
 @pytest.mark.parametrize("preset", ["human_2_7MHz", "mouse_40MHz"])

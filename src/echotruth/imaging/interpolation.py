@@ -2,7 +2,7 @@
 
 The exponential of a semicircle (Barnett, Magland, af Klinteberg 2019, SIAM J Sci Comput 41:C479), turning with the
 carrier, so that data sampled below the carrier are taken as they are. With the spectrum of the data divided by that
-of the interpolator, the error is 1e-5 or less.
+of the interpolator, the error is 1e-5 or less of a strong echo.
 """
 
 from __future__ import annotations
