@@ -66,14 +66,18 @@ def test_uff_is_read_by_its_own_library(folder, rf):
 
 
 def test_waves_of_the_uff_focus_where_the_lines_do(folder, rf):
-    """The brightest sample of the lines is as bright when the toolbox's rule of time focuses the file."""
-    pyuff = pytest.importorskip("pyuff_ustb")
-    data = pyuff.Uff(str(written(folder, "uff"))).read("channel_data")
-    source = np.array([[wave.source.x, wave.source.z] for wave in data.sequence])
-    delay = np.array([wave.delay for wave in data.sequence])
+    """The brightest sample of the lines is the brightest near it when the toolbox's rule of time focuses the file."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(written(folder, "uff")) as file:
+        data = file["channel_data"]
+        waves = data["sequence"].values()
+        distance, azimuth = (np.array([wave[f"source/{key}"][()] for wave in waves]) for key in ("distance", "azimuth"))
+        delay = np.array([wave["delay"][()] for wave in waves])
+        channels, element = data["data"][0].T, data["probe/geometry"][0]
+    source = np.column_stack([distance * np.sin(azimuth), distance * np.cos(azimuth)])
     line, along = brightest(rf)
     at = [(along + off) * np.array([np.sin(rf.line_angle[line]), np.cos(rf.line_angle[line])]) for off in OFFSETS]
-    levels = [compounded(data.data[..., 0], data.probe.x, source, delay, place) for place in at]
+    levels = [compounded(channels, element, source, delay, place) for place in at]
     assert abs(OFFSETS[int(np.argmax(levels))]) < 20e-6
 
 
