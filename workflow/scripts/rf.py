@@ -1,30 +1,35 @@
 """RF simulation: the beamformed lines of every frame of one view."""
 
 import logging
+from functools import partial
 
 import numpy as np
 
-from echotruth.imaging.phantom import Scatterers
+from echotruth.cases import generator
+from echotruth.imaging.acquisition import Acquisition
+from echotruth.imaging.channels import Kept
+from echotruth.imaging.medium import Medium
 from echotruth.imaging.scanner import Scanner, imaging_depth
 from echotruth.imaging.view import Plane
+from echotruth.mechanics.loop import read_loop
 from echotruth.repository.job import Job, Result, main
-from echotruth.tetrahedra import MaterialPoints
 
 
 def work(job: Job) -> Result:
     heart, config = job.heart, job.case.config
     plane = Plane(**job.read("phantom", "origin", "axes"))
-    seeded = job.take("phantom")
-    points = MaterialPoints(seeded["cell"], seeded["xi"])
-    scatterers = Scatterers(points, seeded["amplitude"], config.phantom.in_plane_only)
+    random, time = partial(generator, job.case, job.view_name), read_loop(config.loop).time
+    medium = Medium(config, heart, plane, time=time, seeded=job.take("phantom"), random=random)
     scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
-    lines = []
+    acquire = Acquisition(config, scanner, medium, random)
+    lines, kept = [], Kept(config.rf.keep, scanner.matrix, len(heart.displacement))
     for frame in range(len(heart.displacement)):
-        places = scatterers.image(heart.positions(frame), heart.cells, plane)
-        lines.append(scanner.lines(places, scatterers.amplitude))
+        matrix = acquire(frame)
+        kept.add(frame, matrix)
+        lines.append(scanner.beamform(matrix))
         logging.getLogger("echotruth").info("frame %d of %d", frame + 1, len(heart.displacement))
     job.hand_on(lines=np.stack(lines), angle=scanner.angle, range=scanner.range)
-    return {}
+    return {"rf": kept.finish(np.stack(lines))} if config.rf.keep else {}
 
 
 if __name__ == "__main__":
