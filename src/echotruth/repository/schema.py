@@ -263,12 +263,14 @@ _UNITS = {
     "mm": "mm",
     "per_mm3": "mm-3",
     "uL": "uL",
+    "ms": "ms",
     "per_min": "min-1",
     "mmHg": "mmHg",
     "kPa": "kPa",
     "MHz": "MHz",
     "m_per_s": "m s-1",
     "deg": "degree",
+    "dB": "dB",
 }
 
 
