@@ -12,11 +12,6 @@ LOW, HIGH = np.array([-1.9e-3, 5.4e-3]), np.array([1.9e-3, 7.6e-3])
 
 
 @pytest.fixture(scope="module")
-def scanner():
-    return Scanner(Probe(), Rf(lines=25, sector_deg=24), 8e-3)
-
-
-@pytest.fixture(scope="module")
 def fine():
     return Scanner(Probe(), Rf(lines=61, sector_deg=24), 8e-3)
 
@@ -29,17 +24,27 @@ def sheet(seed, density):
     return position, random.choice([-1.0, 1.0], number)
 
 
-def test_dense_speckle_is_fully_developed(scanner):
+def fan(seed, number):
+    """Scatterers evenly spread over a part of a sector in the image plane, of either sign."""
+    random = np.random.default_rng(seed)
+    reach = np.sqrt(random.uniform(4.7e-3**2, 8.3e-3**2, number))
+    angle = np.radians(random.uniform(-38, 38, number))
+    position = np.column_stack([reach * np.sin(angle), reach * np.cos(angle), np.zeros(number)])
+    return position, random.choice([-1.0, 1.0], number)
+
+
+def test_dense_speckle_is_fully_developed():
     """Envelope Rayleigh: mean over standard deviation sqrt(pi / (4 - pi)) = 1.91 (Wagner 1983).
 
-    Twenty-five scatterers a resolution cell; every fourth line and tenth sample are independent, two widths apart.
+    Sixteen elements have a beam 0.8 mm wide: twenty-five scatterers a resolution cell. Every fifth line and fifteenth
+    sample are independent, two widths apart.
     """
-    depth = np.flatnonzero((scanner.range > 5.7e-3) & (scanner.range < 7.3e-3))
-    speckle = np.stack([np.abs(scanner.lines(*sheet(seed, 2.3e9)))[:, depth] for seed in range(30)])
-    power = (speckle**2).mean(axis=0)
-    speckle /= np.sqrt(np.outer(power.mean(axis=1), power.mean(axis=0)) / power.mean())
-    sample = speckle[:, ::4, ::10].ravel()
-    assert len(sample) == 30 * 7 * 21
+    scanner = Scanner(Probe(elements=16), Rf(lines=21, sector_deg=56), 9e-3)
+    depth = np.flatnonzero((scanner.range > 5e-3) & (scanner.range < 8e-3))[::15]
+    sample = np.stack([np.abs(scanner.lines(*fan(seed, 18000)))[::5, depth] for seed in range(40)])
+    power = (sample**2).mean(axis=0)
+    sample = (sample / np.sqrt(np.outer(power.mean(axis=1), power.mean(axis=0)) / power.mean())).ravel()
+    assert len(sample) == 40 * 5 * 26
     assert sample.mean() / sample.std() == pytest.approx(np.sqrt(np.pi / (4 - np.pi)), abs=0.03)
     assert kstest(sample, "rayleigh", args=(0, 1 / np.sqrt(2))).pvalue > 0.05
 
@@ -50,7 +55,7 @@ def test_sparse_speckle_has_the_kurtosis_of_its_density(fine):
     point = np.abs(fine.lines(np.array([[0.0, 6.5e-3, 0]]), np.ones(1))) ** 2
     area = point.sum() ** 2 / (point**2).sum() * 6.5e-3 * np.radians(0.4) * (fine.range[1] - fine.range[0])
     density = 2 / area
-    intensity = np.stack([np.abs(fine.lines(*sheet(seed, density)))[:, depth] ** 2 for seed in range(40)])
+    intensity = np.stack([np.abs(fine.lines(*sheet(seed, density)))[:, depth] ** 2 for seed in range(30)])
     mean = intensity.mean(axis=(0, 2), keepdims=True)
     found = ((intensity / mean) ** 2).mean()
     assert found == pytest.approx(2.5, rel=0.06)
