@@ -1,9 +1,9 @@
 """Echoes deposited on the fast-time grids of all transmit-receive pairs.
 
-An echo at any time is put on the grid by a short smooth kernel, the exponential of a semicircle
-(Barnett, Magland, af Klinteberg 2019, SIAM J Sci Comput 41:C479); what the kernel does to the spectrum is divided
-out afterwards. A pair of elements is one row, and one thread writes a row, so the sums do not depend on the number
-of threads.
+A pair of elements is one row, and one thread writes a row in the order of the scatterers, so the sums do not depend
+on the number of threads. Kernels come from tables: polynomials in the fraction of a sample, added with factors in which
+a pair differs from others, its colour and its bend, each a sum over the two elements. Two polynomials stand side by
+side in a row, so that one wide vector carries both; the second of them is multiplied by the colour.
 """
 
 from __future__ import annotations
@@ -12,79 +12,119 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core.cgutils import get_or_insert_function
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-from echotruth.imaging.probe import directivity
+from echotruth.imaging.directivity import SLOPE, VALUE, WIDEST, polynomial
+from echotruth.imaging.kernel import PHASE_BITS, PHASES, TAPS
 
-TAPS = 8
-"""Grid points an echo is spread over."""
-LEAD = TAPS // 2 - 1
-"""Grid points of an echo before its time; rows begin this much before time 0."""
-SHARPNESS = 13.5
-"""beta of the kernel; the least error for a 70 % pulse at a quarter of the sampling frequency (4e-5)."""
-FRACTION_BITS = 16
-"""Times are integers in units of 2^-16 samples, so that the sum over both ways is exact."""
-PHASE_BITS = 6
-"""Kernels are tabulated for 2^6 fractions of a sample, with a slope between them."""
+FRACTION_BITS = 18
+"""Times are integers in units of 2^-18 samples, so that the sum over both ways is exact."""
+LEAD = 32
+"""Samples of a row before time 0: room for what of a kernel comes before its echo."""
 
-
-def kernel(offset: np.ndarray) -> np.ndarray:
-    """The deposited kernel exp(beta (sqrt(1 - (2 u / TAPS)^2) - 1)) at offsets u (any shape, samples)."""
-    inside = np.clip(1 - (2 * np.asarray(offset, float) / TAPS) ** 2, 0, None)
-    return np.exp(SHARPNESS * (np.sqrt(inside) - 1))
-
-
-def kernel_spectrum(frequency: np.ndarray) -> np.ndarray:
-    """Fourier integral of the kernel at frequencies (n,), cycles per sample; real, shape (n,)."""
-    node, share = np.polynomial.legendre.leggauss(128)
-    offset = node * TAPS / 2
-    return (np.cos(2 * np.pi * np.multiply.outer(frequency, offset)) * share * TAPS / 2 * kernel(offset)).sum(axis=1)
+ROWS = {1: (2, 1, 2), 2: (2, 1, 0), 3: (3, 2, 1)}
+"""Rows of a table for every phase, by the number of a scheme: so many for a pair of polynomials, then for one that is
+multiplied by the square of the colour, and for one that is multiplied by the bend.
+There are as many rows as a polynomial has coefficients, the highest power first."""
+PAIR = 2 * TAPS
+LARGEST = 0.3
+"""Greatest change, logarithm of the amplitude or radians, that an element makes of what its lens hears."""
+SHARES = 32
+"""Parts in which threads share the transmitters; few, since each reads all tables."""
 
 
-def kernel_table() -> np.ndarray:
-    """Kernels and their slopes per sample for all phases, shape (2^PHASE_BITS * 2 * TAPS,), float32."""
-    phases = 2**PHASE_BITS
-    fraction = np.arange(phases + 1) / phases
-    value = kernel(np.arange(TAPS) - LEAD - fraction[:, None])
-    slope = np.diff(value, axis=0) * phases
-    return np.concatenate([value[:-1], slope], axis=1).astype(np.float32).ravel()
+def aligned(*shape: int) -> np.ndarray:
+    """Memory for tables, float32, of which no row lies across two lines of the cache (twice as fast)."""
+    line, size = 64, 4 * int(np.prod(shape))
+    memory = np.empty(size + line, np.uint8)
+    start = -memory.ctypes.data % line
+    return memory[start : start + size].view(np.float32).reshape(shape)
+
+
+class _Vectors:
+    """Vectors of single-precision numbers in LLVM's language."""
+
+    def __init__(self, context, builder):
+        self._context, self._builder = context, builder
+
+    def address(self, kind, array, index, width):
+        data = self._context.make_array(kind)(self._context, self._builder, array).data
+        return self._builder.bitcast(self._builder.gep(data, [index]), _vector(width).as_pointer())
+
+    def load(self, address, place=0):
+        return self._builder.load(self._builder.gep(address, [ir.Constant(ir.IntType(64), place)]), align=4)
+
+    def spread(self, scalar, width):
+        nothing = ir.Constant(_vector(width), ir.Undefined)
+        one = self._builder.insert_element(nothing, scalar, ir.Constant(ir.IntType(32), 0))
+        return self._builder.shuffle_vector(one, nothing, _lanes([0] * width))
+
+    def part(self, vector, start):
+        """TAPS numbers of a vector of PAIR."""
+        nothing = ir.Constant(_vector(PAIR), ir.Undefined)
+        return self._builder.shuffle_vector(vector, nothing, _lanes(range(start, start + TAPS)))
+
+    def fused(self, a, b, c):
+        """a b + c, rounded once: what comes out must not hang on how a compiler joins sums and products."""
+        kind = a.type
+        function = ir.FunctionType(kind, [kind] * 3)
+        fused = get_or_insert_function(self._builder.module, function, f"llvm.fma.v{kind.count}f32")
+        return self._builder.call(fused, [a, b, c])
+
+    def polynomial(self, address, first, count, variable):
+        value = self.load(address, first)
+        for power in range(1, count):
+            value = self.fused(value, variable, self.load(address, first + power))
+        return value
+
+
+def _vector(width):
+    return ir.VectorType(ir.FloatType(), width)
+
+
+def _lanes(places):
+    return ir.Constant(ir.VectorType(ir.IntType(32), len(places)), list(places))
 
 
 @intrinsic
-def add_kernel(typing_context, traces, start, table, row, step, weight):
-    """traces[start:start + 8] += weight * (table[row:row + 8] + step * table[row + 8:row + 16]), as one vector."""
+def add_kernel(typing_context, traces, start, table, row, scheme, weight, fraction, colour, bend):  # noqa: PLR0913, PLR0917
+    """traces[start:start + TAPS] += weight * kernel, as vectors, the kernel from the rows of a table at `row`.
+
+    `scheme` is a tuple whose length is that of :data:`ROWS`: it is known when this is compiled, and the sums are
+    unrolled.
+    """
     single = types.Array(types.float32, 1, "C")
     if traces != single or table != single:
         raise TypingError("traces and table must be contiguous float32 vectors")
-    signature = types.void(traces, types.intp, table, types.intp, types.float32, types.float32)
+    signature = types.void(traces, types.intp, table, types.intp, scheme, *[types.float32] * 4)
 
     def generate(context, builder, signature, arguments):
-        traces, start, table, row, step, weight = arguments
-        vector = ir.VectorType(ir.FloatType(), TAPS)
-        lane = ir.VectorType(ir.IntType(32), TAPS)
-
-        def address(kind, array, index):
-            data = context.make_array(kind)(context, builder, array).data
-            return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
-
-        def spread(scalar):
-            one = builder.insert_element(ir.Constant(vector, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
-            return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), ir.Constant(lane, None))
-
-        target = address(signature.args[0], traces, start)
-        value = builder.load(address(signature.args[2], table, row), align=4)
-        slope = builder.load(address(signature.args[2], table, builder.add(row, ir.Constant(row.type, TAPS))), align=4)
-        echo = builder.fmul(spread(weight), builder.fadd(value, builder.fmul(spread(step), slope)))
-        builder.store(builder.fadd(builder.load(target, align=4), echo), target, align=4)
+        traces, start, table, row, _, weight, fraction, colour, bend = arguments
+        vectors = _Vectors(context, builder)
+        rows = vectors.address(signature.args[2], table, row, PAIR)
+        fraction = vectors.spread(fraction, PAIR)
+        first, *others = ROWS[len(scheme)]
+        value, place = vectors.polynomial(rows, 0, first, fraction), first
+        square = builder.fmul(colour, colour)
+        for count, factor in zip(others, (square, bend), strict=True):
+            if count:
+                both = vectors.polynomial(rows, place, count, fraction)
+                value = vectors.fused(both, vectors.spread(factor, PAIR), value)
+                place += count
+        kernel = vectors.fused(vectors.part(value, TAPS), vectors.spread(colour, TAPS), vectors.part(value, 0))
+        target = vectors.address(signature.args[0], traces, start, TAPS)
+        total = vectors.fused(vectors.spread(weight, TAPS), kernel, vectors.load(target))
+        builder.store(total, target, align=4)
         return context.get_dummy_value()
 
     return signature, generate
 
 
 @numba.njit(parallel=True, cache=True)
-def one_way(position, centres, samples_per_metre, width, time, weight):
-    """Travel time and amplitude between every element and every scatterer.
+def one_way(position, centres, scales, tilts, lean, time, weight, colour, bend):  # noqa: PLR0913, PLR0917
+    """Travel time, amplitude and colour between every scatterer and every element.
 
     Parameters
     ----------
@@ -92,64 +132,172 @@ def one_way(position, centres, samples_per_metre, width, time, weight):
         Shape (scatterers, 3), m.
     centres
         Shape (elements,), m.
-    samples_per_metre
-        Sampling frequency over the speed of sound, 1/m.
-    width
-        Width of the elements in wavelengths.
-    time, weight
-        Written: shape (elements, scatterers), int32 in 2^-16 samples and float32 in 1/m. The weight is the
-        directivity over the distance (spherical spreading, 1/r on each way).
+    scales
+        Sampling frequency over the speed of sound, 1/m; square of pi times the width of an element in wavelengths;
+        attenuation at the centre frequency, 1/m; wavelengths at the centre frequency per m.
+    tilts
+        Shape (scatterers,): b of the kind of pulse of each (see :mod:`~echotruth.imaging.directivity`).
+    lean
+        Of a lens, shape (scatterers, 4): 1/range from the centre of the array, 1/m, delay on each way, m, and growth
+        of amplitude and phase with 1/range, m (see :mod:`~echotruth.imaging.elevation`); or shape (0, 4).
+    time, weight, colour, bend
+        Written: shape (scatterers, elements), int32 in 2^-18 samples, float32 in 1/m and float32. The weight is the
+        directivity and the loss over the distance (spherical spreading, 1/r on each way). The bend is 1/range beyond
+        that from the centre, 1/m, under a lens, and else twice the square of the colour.
     """
-    for element in numba.prange(len(centres)):
-        for k in range(len(position)):
-            lateral = position[k, 0] - centres[element]
-            axial = position[k, 1]
-            distance = np.sqrt(lateral * lateral + axial * axial + position[k, 2] ** 2)
-            time[element, k] = np.int32(distance * samples_per_metre * (1 << FRACTION_BITS) + 0.5)
-            weight[element, k] = directivity(lateral / distance, axial / distance, width) / distance
+    samples, square, loss, waves = scales
+    unit = samples * (1 << FRACTION_BITS)
+    for k in numba.prange(len(position)):
+        axial = position[k, 1] * position[k, 1]
+        beside = position[k, 2] * position[k, 2]
+        for element in range(len(centres)):
+            lateral = (position[k, 0] - centres[element]) ** 2
+            square_distance = lateral + axial + beside
+            distance = np.sqrt(square_distance)
+            wide = square * lateral / square_distance
+            strength = polynomial(VALUE, wide) * position[k, 1] / square_distance
+            wide = min(wide, WIDEST)
+            hue = 2 * wide * polynomial(SLOPE, wide) / polynomial(VALUE, wide) - tilts[k]
+            colour[k, element] = hue
+            if len(lean):
+                away = 1 / np.sqrt(lateral + axial) - lean[k, 0]
+                bend[k, element] = away
+                # To first order; beyond that, beside the beam, it would grow without bounds.
+                distance += lean[k, 1] - min(max(lean[k, 3] * away, -LARGEST), LARGEST) / (2 * np.pi * waves)
+                strength *= np.exp(min(max(lean[k, 2] * away, -LARGEST), LARGEST))
+            else:
+                bend[k, element] = 2 * hue * hue
+            time[k, element] = np.int32(distance * unit + 0.5)
+            weight[k, element] = strength * np.exp(-loss * distance)
 
 
 @numba.njit(parallel=True, cache=True)
-def add_echoes(traces, pairs, time, weight, echo, table):
+def add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, size, lens, scheme):  # noqa: PLR0913, PLR0917
     """Add the echoes of a block of scatterers to the traces of all pairs.
 
     Parameters
     ----------
     traces
-        Shape (pairs, samples), float32; added to. Sample LEAD is time 0.
-    pairs
-        Elements of each pair, shape (pairs, 2).
-    time, weight
-        As :func:`one_way` writes them, shape (elements, scatterers).
-    echo
-        Weight times the amplitude of the scatterer, shape (elements, scatterers), float32.
-    table
-        As :func:`kernel_table` makes it.
+        Shape (pairs, samples), float32; added to. Sample LEAD is time 0. Pairs (i, j), i <= j, in the order of
+        `numpy.triu_indices`.
+    time, weight, colour, bend
+        As :func:`one_way` writes them, shape (scatterers, elements).
+    amplitude
+        Shape (scatterers,), float32.
+    entries
+        Blocks of samples to add, shape (entries, 3): scatterer, place of its table, first sample from the echo.
+    tables
+        Of kernels, flat, float32.
+    size
+        Numbers in the rows of a phase.
+    lens
+        Whether the bend is that of a lens; else the square of the colour is taken off it, which leaves the contrast.
+    scheme
+        Tuple of the length by which the rows are listed in :data:`ROWS`.
     """
-    samples = traces.shape[1]
+    elements, samples = time.shape[1], traces.shape[1]
     flat = traces.reshape(traces.size)
     rest_bits = FRACTION_BITS - PHASE_BITS
     rest = (1 << rest_bits) - 1
     unit = np.float32(1 / (1 << FRACTION_BITS))
-    for pair in numba.prange(len(pairs)):
-        i, j = pairs[pair]
-        base = pair * samples
-        for k in range(time.shape[1]):
-            at = np.int64(time[i, k]) + np.int64(time[j, k])
-            row = ((at >> rest_bits) & ((1 << PHASE_BITS) - 1)) * (2 * TAPS)
-            step = np.float32(at & rest) * unit
-            add_kernel(flat, base + (at >> FRACTION_BITS), table, row, step, echo[i, k] * weight[j, k])
+    own = np.float32(lens == 0)
+    for number in numba.prange(SHARES):
+        for entry in range(len(entries)):
+            k, base, shift = entries[entry]
+            for start in range(0, elements, SHARES):
+                # Up in one round and down in the next: as many pairs for every thread.
+                i = start + (np.int64(number) if start // SHARES % 2 == 0 else SHARES - 1 - np.int64(number))
+                if i >= elements:
+                    continue
+                loud, late = weight[k, i] * amplitude[k], np.int64(time[k, i])
+                hue, bent = colour[k, i], bend[k, i]
+                row = (i * elements - i * (i + 1) // 2) * samples + LEAD + shift
+                for j in range(i, elements):
+                    at = late + time[k, j]
+                    phase = base + ((at >> rest_bits) & (PHASES - 1)) * size
+                    fraction = np.float32(at & rest) * unit
+                    place = row + j * samples + (at >> FRACTION_BITS)
+                    both = hue + colour[k, j]
+                    between = bent + bend[k, j] - own * both * both
+                    add_kernel(flat, place, tables, phase, scheme, loud * weight[k, j], fraction, both, between)
 
 
 @numba.njit(parallel=True, cache=True)
-def unfold(spectra, pairs, matrix):
+def mould(places, kinds, spectra, shapes, linear, constant, entries, tables):
+    """Make the tables of echoes that a lens has shaped.
+
+    Parameters
+    ----------
+    places
+        Row and column of every scatterer in the tables of the lens, shape (scatterers, 2).
+    kinds
+        Angle from the centre of the array of each, shape (scatterers,).
+    spectra
+        Of the lens and their change, two of shape (curvatures, slopes, nodes), complex64.
+    shapes
+        For all angles, shape (KINDS, 4, nodes), float32.
+    linear, constant
+        Maps from spectra to polynomials of that degree, float32, shape (blocks, 2 nodes, PHASES 2 TAPS) and (blocks,
+        2 nodes, PHASES TAPS).
+    entries
+        Blocks to make, shape (entries, 2): scatterer and block.
+    tables
+        Written: shape (entries, PHASES, 5, 2, TAPS), float32.
+    """
+    nodes = spectra[0].shape[2]
+    for entry in numba.prange(len(entries)):
+        k, block = entries[entry]
+        weights = np.empty((6, 2 * nodes), np.float32)
+        for node in range(nodes):
+            pulse, change = between(spectra[0], places[k], node), between(spectra[1], places[k], node)
+            for half in range(2):
+                shape, square = shapes[kinds[k], half, node], shapes[kinds[k], 2 + half, node]
+                for part in range(2):
+                    straight, bent = (pulse.imag, change.imag) if part else (pulse.real, change.real)
+                    weights[half, part * nodes + node] = straight * shape
+                    weights[2 + half, part * nodes + node] = bent * shape
+                    weights[4 + half, part * nodes + node] = straight * square
+        table = tables[entry]
+        for half in range(2):
+            table[:, :2, half] = combined(weights[half], linear[block]).reshape(PHASES, 2, TAPS)
+            table[:, 2, half] = combined(weights[4 + half], constant[block]).reshape(PHASES, TAPS)
+            table[:, 3:, half] = combined(weights[2 + half], linear[block]).reshape(PHASES, 2, TAPS)
+
+
+@numba.njit(cache=True)
+def between(table, place, node):
+    """Bilinear interpolation of a table (rows, columns, nodes) at a place (row, column)."""
+    row, column = np.int64(place[0]), np.int64(place[1])
+    down, right = place[0] - row, place[1] - column
+    near = (1 - right) * table[row, column, node] + right * table[row, column + 1, node]
+    far = (1 - right) * table[row + 1, column, node] + right * table[row + 1, column + 1, node]
+    return (1 - down) * near + down * far
+
+
+@numba.njit(cache=True)
+def combined(weights, rows):
+    """Sum of rows (a multiple of 4, n) times weights: shape (n,), float32."""
+    total = np.zeros(rows.shape[1], np.float32)
+    for m in range(0, len(rows), 4):
+        # Four at a time, so that the total is seldom stored.
+        a, b, c, d = weights[m], weights[m + 1], weights[m + 2], weights[m + 3]
+        for n in range(len(total)):
+            total[n] += a * rows[m, n] + b * rows[m + 1, n] + (c * rows[m + 2, n] + d * rows[m + 3, n])
+    return total
+
+
+@numba.njit(parallel=True, cache=True)
+def unfold(spectra, matrix):
     """Write spectra (pairs, bins) into the symmetric matrix (bins, elements, elements)."""
     tile = 16
+    elements = matrix.shape[1]
     tiles = (matrix.shape[0] + tile - 1) // tile
     for number in numba.prange(tiles):
         stop = min((number + 1) * tile, matrix.shape[0])
-        for pair in range(len(pairs)):
-            i, j = pairs[pair]
-            for f in range(number * tile, stop):
-                matrix[f, i, j] = spectra[pair, f]
-                matrix[f, j, i] = spectra[pair, f]
+        pair = 0
+        for i in range(elements):
+            for j in range(i, elements):
+                for f in range(number * tile, stop):
+                    matrix[f, i, j] = spectra[pair, f]
+                    matrix[f, j, i] = spectra[pair, f]
+                pair += 1

@@ -1,23 +1,36 @@
 """Radio-frequency data: the echoes of a phantom between all pairs of elements.
 
-The echo of a scatterer between two elements is its amplitude times the two directivities, the spreading 1/r on each
-way and the two-way amplitude in elevation, delayed by the two ways and shaped by the pulse. By reciprocity only the
-pairs i <= j are computed.
+The echo of a scatterer between two elements is its amplitude times their directivities, the spreading 1/r and the loss
+on each way and the beam in elevation, delayed by the two ways and shaped by the pulse. Echoes are put on a grid in time
+by short kernels (:mod:`~echotruth.imaging.kernel`) and then filtered together. By reciprocity only the pairs i <= j
+are computed.
+
+With n elements the memory is 2 n (n + 1) bytes a sample of the record, 8 n^2 bytes a frequency of the matrix, half of
+that again while it is made, and a few MB for tables: 50 MB for the default array, however many scatterers there are.
 """
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 from scipy import fft
 
 from echotruth.config import Probe
-from echotruth.imaging import deposit
-from echotruth.imaging.probe import ElevationProfile, element_centres, pulse_band, pulse_spectrum, spectral_width
+from echotruth.imaging import deposit, directivity
+from echotruth.imaging.attenuation import separated
+from echotruth.imaging.elevation import MOST_BLOCKS, Lens
+from echotruth.imaging.kernel import NODES, TAPS, Band, Grid, fits, offsets, stacked
+from echotruth.imaging.probe import element_centres, pulse_band, pulse_spectrum, spectral_width
 
-FAINT = 1e-3
-"""Scatterers whose two-way amplitude in elevation is below this are left out; it is 1 in the elevation focus."""
-BLOCK = 2048
+BLOCK = 96
 """Scatterers deposited at a time."""
+FINE, FAST, LENS = 3, 2, 1
+"""Schemes of the kernels' tables (see :data:`~echotruth.imaging.deposit.ROWS`) for an error of 2e-5 and of 1e-3 in the
+plane, and under a lens."""
+DENSEST, SHARPNESS = {FINE: 0.32, FAST: 0.41, LENS: 0.41}, {FINE: 20.0, FAST: 15.0, LENS: 15.0}
+"""Greatest frequency of the pulse over that of the grid, and sharpness of the window."""
+FINEST = 1e-4
+"""Accuracy below which the tables are `FINE`."""
 
 
 class FullMatrix:
@@ -25,94 +38,190 @@ class FullMatrix:
 
     Parameters
     ----------
-    probe
+    probe : Probe
         The array.
-    depth
+    depth : float
         Greatest range of interest, m. Scatterers farther than this and half a pulse are left out.
-    latest
+    latest : float
         Greatest delay, early or late, that will be added to the echoes, s.
+    accuracy : float
+        Relative error (L2) that is allowed against the exact sum without the lens: 2e-5 or 1e-3.
+    elevation : bool
+        Whether the lens is there; without it, echoes are those of strips without end, and positions still in space.
+        Under the lens the error is 1.5 % beyond two apertures, most of it in what is far beside the plane, and 6 %
+        between one aperture and one and a half.
 
     Attributes
     ----------
-    frequency : ndarray (bins,)
-        Frequencies of the pulse band on the grid of the record, Hz.
+    frequency : ndarray of shape (bins,), Hz
+        Frequencies of the pulse band on the grid of the record.
     first : int
         Bin of the first of them.
-    sampling : float
-        Sampling frequency of the record, Hz.
+    sampling : float, Hz
+        Sampling frequency of the record.
     samples : int
         Length of the record; it starts at time 0 and ends with the latest echo plus room for delays and pulse.
+    centres : ndarray of shape (elements,), m
+        Of the elements.
     """
 
-    def __init__(self, probe: Probe, depth: float, latest: float = 0.0):
+    def __init__(
+        self, probe: Probe, depth: float, latest: float = 0.0, accuracy: float = 2e-5, elevation: bool = True
+    ) -> None:
         p = probe.si()
+        low, high = pulse_band(probe)
+        self._scheme = LENS if elevation else FINE if accuracy < FINEST else FAST
+        grid = Grid(max(p.sampling, high / DENSEST[self._scheme]), SHARPNESS[self._scheme])
+        self.sampling = grid.sampling
         half_pulse = 4.5 / (2 * np.pi * spectral_width(probe))
         self.reach = depth + p.sound_speed * half_pulse / 2
         last = 2 * self.reach / p.sound_speed + p.elements * p.pitch / p.sound_speed + half_pulse
-        self.samples = fft.next_fast_len(int((last + 2 * latest) * p.sampling) + deposit.TAPS + 1, real=True)
+        room = 2 * deposit.LEAD + MOST_BLOCKS * TAPS
+        self.samples = fft.next_fast_len(int((last + 2 * latest) * self.sampling) + room, real=True)
         if self.samples >= 1 << (31 - deposit.FRACTION_BITS):
             raise ValueError(f"A record of {self.samples} samples is too long: image less deep or sample slower.")
-        self.sampling = p.sampling
         self.centres = element_centres(probe)
-        self.pairs = np.stack(np.triu_indices(probe.elements), axis=1)
-        self._samples_per_metre = p.sampling / p.sound_speed
-        self._width = p.width * p.frequency / p.sound_speed
-        self._profile = ElevationProfile.of(probe, self.reach)
-        self._table = deposit.kernel_table()
-        low, high = pulse_band(probe)
+        self._speed, self._width = p.sound_speed, p.width * p.frequency / p.sound_speed
+        loss = p.attenuation * p.frequency
+        self._scales = (self.sampling / p.sound_speed, (np.pi * self._width) ** 2, loss, p.frequency / p.sound_speed)
+        self._filter(probe, grid, low, high)
+        band = _band(probe, grid, low, high)
+        self._lens = Lens(probe, self.reach, band) if elevation else None
+        self._tabulate(band, band.frequency / p.frequency)
+
+    def _filter(self, probe: Probe, grid: Grid, low: float, high: float) -> None:
+        """What turns the deposited traces into echoes: courses in time and responses in the band."""
+        p = probe.si()
         cycles = np.arange(self.samples // 2 + 1) / self.samples
-        inside = np.flatnonzero((cycles * p.sampling >= low) & (cycles * p.sampling <= high))
+        inside = np.flatnonzero((cycles * self.sampling >= low) & (cycles * self.sampling <= high))
         self.first = int(inside[0])
-        self.frequency = cycles[inside] * p.sampling
-        response = pulse_spectrum(probe, self.frequency) / deposit.kernel_spectrum(cycles[inside])
-        # Rows begin LEAD samples before time 0.
-        self._response = (response * np.exp(2j * np.pi * cycles[inside] * deposit.LEAD)).astype(np.complex64)
+        self.frequency = cycles[inside] * self.sampling
+        rate = _loss(p, self.frequency)
+        time = (np.arange(self.samples) - deposit.LEAD) / self.sampling
+        courses, filters = separated(rate, time)
+        response = pulse_spectrum(probe, self.frequency) / grid.window_spectrum(grid.cycles(self.frequency, rate))
+        lead = np.exp(2j * np.pi * cycles[inside] * deposit.LEAD)  # rows begin LEAD samples before time 0
+        self._courses = courses.astype(np.float32)
+        self._responses = (filters * response * lead).astype(np.complex64)
+
+    def _tabulate(self, band: Band, ratio: np.ndarray) -> None:
+        """Tables of kernels in the plane, or what makes those under the lens."""
+        rows = deposit.ROWS[self._scheme]
+        self._size = sum(rows) * deposit.PAIR
+        self._tilts, shapes = directivity.shapes(self._width, ratio, 2 * sum(count > 0 for count in rows))
+        if self._lens:
+            self._shapes = np.ascontiguousarray(shapes[:, :4], np.float32)
+            self._maps = [_maps(band, degree) for degree in (1, 0)]
+            return
+        spectra = stacked(shapes + 0j).reshape(len(shapes), -1, 2, 2 * NODES)
+        polynomials = [fits(band, 1, count - 1)[0] for count in rows if count]
+        found = [np.einsum("pdtf,khf->kpdht", fit, spectra[:, n]) for n, fit in enumerate(polynomials)]
+        whole = np.concatenate(found, axis=2).ravel()
+        self._tables = deposit.aligned(len(whole))
+        self._tables[:] = whole
 
     def heard(self, position: np.ndarray, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Scatterers within the record and the beam: positions (m, 3) and amplitudes with the elevation weight (m,).
+        """Scatterers within the record and the beam, the nearest first: positions (m, 3), m, and amplitudes (m,).
 
-        They come in an arbitrary but fixed order, since neighbours in space make neighbouring memory busy.
+        Sorted, since neighbours in range share the part of the traces that is at hand.
         """
-        within = np.flatnonzero(np.linalg.norm(position, axis=1) <= self.reach)
-        reach = np.hypot(position[within, 0], position[within, 1])
-        weight = self._profile(position[within, 2], reach)
-        kept = np.flatnonzero(weight >= FAINT)
-        kept = np.random.default_rng(0).permutation(kept)
-        return position[within[kept]], amplitude[within[kept]] * weight[kept]
+        reach = np.linalg.norm(position, axis=1)
+        order = np.argsort(reach, kind="stable")
+        order = order[: np.searchsorted(reach[order], self.reach, side="right")]
+        if self._lens:
+            order = order[self._lens.blocks_of(position[order]) > 0]
+        return position[order], amplitude[order]
 
     def traces(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
-        """Deposited echoes before kernel and pulse are accounted for, shape (pairs, samples), float32."""
+        """Deposited echoes before window and pulse are accounted for, shape (pairs, samples), float32."""
         position, amplitude = self.heard(position, amplitude)
-        traces = np.zeros((len(self.pairs), self.samples), np.float32)
+        elements = len(self.centres)
+        traces = np.zeros((elements * (elements + 1) // 2, self.samples), np.float32)
         for start in range(0, len(position), BLOCK):
-            block = position[start : start + BLOCK]
-            time = np.empty((len(self.centres), len(block)), np.int32)
-            weight = np.empty(time.shape, np.float32)
-            deposit.one_way(block, self.centres, self._samples_per_metre, self._width, time, weight)
-            echo = weight * amplitude[start : start + BLOCK].astype(np.float32)
-            deposit.add_echoes(traces, self.pairs, time, weight, echo, self._table)
+            part = slice(start, start + BLOCK)
+            self._add(traces, position[part], amplitude[part].astype(np.float32))
         return traces
+
+    def _add(self, traces: np.ndarray, position: np.ndarray, amplitude: np.ndarray) -> None:
+        shape = (len(position), len(self.centres))
+        time = np.empty(shape, np.int32)
+        weight, colour, bend = np.empty((3, *shape), np.float32)
+        kinds = self._kind(position)
+        lean, entries, tables = self._under_lens(position, kinds) if self._lens else self._in_plane(kinds)
+        deposit.one_way(position, self.centres, self._scales, self._tilts[kinds], lean, time, weight, colour, bend)
+        scheme, lens = (0,) * self._scheme, self._lens is not None
+        deposit.add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, self._size, lens, scheme)
+
+    def _kind(self, position: np.ndarray) -> np.ndarray:
+        """Which of the angles from the centre of the array is nearest, shape (n,)."""
+        sine = np.abs(position[:, 0]) / np.linalg.norm(position, axis=1)
+        return np.rint(sine * (directivity.KINDS - 1)).astype(np.int64)
+
+    def _in_plane(self, kinds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        first = np.full(len(kinds), offsets(1)[0])
+        entries = np.stack([np.arange(len(kinds)), kinds * self._size * deposit.PHASES, first], axis=1)
+        return np.empty((0, 4)), entries, self._tables
+
+    def _under_lens(self, position: np.ndarray, kinds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        lens = self._lens
+        places = lens.places(position)
+        owner, block, first = _entries(lens.blocks_of(position))
+        tables = deposit.aligned(len(owner), deposit.PHASES, 5, 2, TAPS)
+        made = np.stack([owner, block], axis=1)
+        deposit.mould(places, kinds, (lens.spectrum, lens.change), self._shapes, *self._maps, made, tables)
+        entries = np.stack([owner, np.arange(len(owner)) * self._size * deposit.PHASES, first], axis=1)
+        return lens.lean(position, places, self._speed), entries, tables.ravel()
 
     def __call__(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
         """Spectra of the echoes of all pairs at `frequency`.
 
         Parameters
         ----------
-        position
-            Shape (scatterers, 3), m.
-        amplitude
-            Shape (scatterers,), 1.
+        position : ndarray of shape (scatterers, 3), m
+        amplitude : ndarray of shape (scatterers,)
 
         Returns
         -------
-        Shape (bins, elements, elements), complex64, symmetric in the elements. Units: amplitude / m^2 / sample.
+        ndarray of shape (bins, elements, elements), complex64
+            Symmetric in the elements. Units: amplitude / m^2 / sample.
         """
         traces = self.traces(position, amplitude)
-        stop = self.first + len(self.frequency)
         spectra = np.empty((len(traces), len(self.frequency)), np.complex64)
         for start in range(0, len(traces), 64):
-            part = slice(start, start + 64)
-            spectra[part] = fft.rfft(traces[part], axis=1)[:, self.first : stop] * self._response
+            spectra[start : start + 64] = self._filtered(traces[start : start + 64])
         matrix = np.empty((len(self.frequency), len(self.centres), len(self.centres)), np.complex64)
-        deposit.unfold(spectra, self.pairs, matrix)
+        deposit.unfold(spectra, matrix)
         return matrix
+
+    def _filtered(self, traces: np.ndarray) -> np.ndarray:
+        band, threads = slice(self.first, self.first + len(self.frequency)), numba.get_num_threads()
+        found = np.zeros((len(traces), len(self.frequency)), np.complex64)
+        for course, response in zip(self._courses, self._responses, strict=True):
+            found += fft.rfft(traces * course, axis=1, workers=threads)[:, band] * response
+        return found
+
+
+def _loss(p, frequency: np.ndarray) -> np.ndarray:
+    """Rate at which an echo at these frequencies fades faster than at the centre frequency, 1/s."""
+    return p.attenuation * (frequency - p.frequency) * p.sound_speed
+
+
+def _band(probe: Probe, grid: Grid, low: float, high: float) -> Band:
+    node, share = np.polynomial.legendre.leggauss(NODES)
+    frequency = (low + high) / 2 + node * (high - low) / 2
+    energy = share * pulse_spectrum(probe, frequency) ** 2
+    return Band(frequency, energy / energy.sum(), grid, _loss(probe.si(), frequency))
+
+
+def _maps(band: Band, degree: int) -> np.ndarray:
+    """Maps to the polynomials of all blocks, shape (blocks, 2 NODES, PHASES (degree + 1) TAPS), float32."""
+    maps = np.concatenate([fits(band, blocks, degree) for blocks in range(1, MOST_BLOCKS + 1)])
+    return np.ascontiguousarray(np.moveaxis(maps, -1, 1).reshape(len(maps), 2 * NODES, -1), np.float32)
+
+
+def _entries(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Scatterer, map and first sample of every block of samples, each (entries,)."""
+    owner = np.repeat(np.arange(len(blocks)), blocks)
+    within = np.arange(len(owner)) - np.repeat(np.cumsum(blocks) - blocks, blocks)
+    count = blocks[owner].astype(np.int64)
+    return owner, count * (count - 1) // 2 + within, within * TAPS - (count * TAPS // 2 - 1)

@@ -49,7 +49,7 @@ class Scanner:
         self._transmits = KINDS[rf.transmit](probe, rf, self.scan)
         self._points = points(self.scan, self.range)
         reach, latest = np.hypot(*self._points).max(), np.abs(self._transmits.delay).max()
-        self.matrix = FullMatrix(probe, reach, latest, accuracy=rf.accuracy)
+        self.matrix = FullMatrix(probe, reach, latest, rf.accuracy, rf.elevation)
         self._channels = Synthesis(self.matrix, p.frequency, self._transmits)
         self.frequency = self._channels.frequency
         self._carrier = np.exp(-4j * np.pi * self.frequency / p.sound_speed * self.range).astype(np.complex64)

@@ -24,7 +24,7 @@ TILE = 16
 multiplication, so that those of the first alone are kept."""
 
 
-@numba.njit(cache=True, fastmath={"contract"})
+@numba.njit(cache=True)
 def add_products(real, imaginary, matrix, weights):
     """Add a matrix (elements, elements) times weights (2, elements, transmits) to its real and imaginary part."""
     for i in range(matrix.shape[0]):

@@ -1,0 +1,78 @@
+"""The beam in elevation against its integral and its closed forms."""
+
+import numpy as np
+import pytest
+from imaging.exact import fresnel
+from scipy.optimize import brentq
+
+from echotruth.config import Probe
+from echotruth.imaging.elevation import FAINT, Lens
+from echotruth.imaging.kernel import Band, Grid
+
+WAVELENGTH = 1540 / 25e6
+
+
+@pytest.fixture(scope="module")
+def band():
+    node, share = np.polynomial.legendre.leggauss(16)
+    frequency = 25e6 + 16e6 * node
+    energy = share * np.exp(-(((frequency - 25e6) / 5.3e6) ** 2))
+    return Band(frequency, energy / energy.sum(), Grid(100e6, 15.0), np.zeros(16))
+
+
+@pytest.fixture(scope="module")
+def lens(band):
+    return Lens(Probe(), 13e-3, band)
+
+
+def at(beside, depth):
+    return np.stack([np.zeros_like(beside), np.full_like(beside, depth), beside], axis=1)
+
+
+@pytest.mark.parametrize("depth", [1.1e-3, 3.7e-3, 6.5e-3, 12e-3])
+def test_table_holds_the_square_of_the_integral_once_its_delay_is_put_back(lens, band, depth):
+    row = np.abs(lens.curvature - 1 / depth).argmin()
+    columns = np.arange(0, 60, 7)
+    position = at(lens.slope[columns] / lens.curvature[row], 1 / lens.curvature[row])
+    for k, frequency in enumerate(band.frequency):
+        exact = fresnel(Probe(elements=3), position, frequency)[1] ** 2
+        delay = np.exp(-2j * np.pi * frequency * lens.delay[row, columns])
+        np.testing.assert_allclose(lens.spectrum[row, columns, k] * delay, exact, atol=2e-6)
+
+
+def test_width_in_the_focus_is_that_of_a_squared_sinc():
+    """The square falls to half where sinc(y H / (wavelength F)) is 1 / sqrt(2), at 0.443."""
+
+    def excess(y):
+        return abs(fresnel(Probe(elements=3), at(np.array([y]), 6.5e-3), 25e6)[1, 0]) ** 2 - 0.5
+
+    assert 2 * brentq(excess, 0, 0.3e-3) == pytest.approx(0.8859 * WAVELENGTH * 6.5, rel=1e-3)
+
+
+def test_integral_agrees_with_plain_summation_over_the_height():
+    height = (np.arange(20000) + 0.5) / 20000 * 1e-3 - 0.5e-3
+    reach, y = 4e-3, 0.23e-3
+    path = (y - height) ** 2 / (2 * reach) - y**2 / (2 * reach) - height**2 / (2 * 6.5e-3)
+    summed = np.exp(-2j * np.pi * path / WAVELENGTH).mean()
+    assert fresnel(Probe(elements=3), at(np.array([y]), reach), 25e6)[1, 0] == pytest.approx(summed, abs=1e-6)
+
+
+def test_growth_is_the_change_of_the_integral_with_range(lens, band):
+    """Of a thin pulse, whose mean over the band is its value at the centre."""
+    thin = Band(np.linspace(24.9e6, 25.1e6, 16), np.full(16, 1 / 16), band.grid, band.loss)
+    lens = Lens(Probe(), 13e-3, thin)
+    row, column, step = 60, 12, 0.05
+    curvature, y = lens.curvature[row], lens.slope[12] / lens.curvature[60]
+    low, high = (fresnel(Probe(elements=3), at(np.array([y]), 1 / (curvature + s)), 25e6)[1, 0] for s in (-step, step))
+    assert lens.growth[row, column] == pytest.approx(np.log(high / low) / (2 * step), rel=1e-3)
+
+
+def test_scatterers_far_beside_the_plane_are_left_out_and_those_in_it_take_one_block(lens):
+    blocks = lens.blocks_of(at(np.array([0.0, 6e-3, -7e-3]), 6.5e-3))
+    assert blocks.tolist() == [1, 0, 0]
+    assert FAINT <= 1e-3
+
+
+def test_either_side_of_the_plane_is_alike(lens):
+    beside = np.linspace(0, 1e-3, 50)
+    np.testing.assert_array_equal(lens.places(at(beside, 5e-3)), lens.places(at(-beside, 5e-3)))
