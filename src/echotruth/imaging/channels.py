@@ -18,8 +18,8 @@ from echotruth.imaging.rf import FullMatrix
 from echotruth.imaging.scanner import Scanner
 from echotruth.imaging.transmit import KINDS
 
-ELEVATION_ACCURACY = 0.015
-"""Relative error of the RF of scatterers beside the plane of the image."""
+LENS_ACCURACY = 0.015
+"""Relative error (L2) of the RF under a lens, beyond five and a half of its heights; see docs/conventions.md."""
 
 PER_PERIOD = 2.1
 """Samples kept per period of the highest frequency, at least; a record that is finer is thinned."""
@@ -142,6 +142,5 @@ def _settings(config: Config) -> dict[str, Any]:
         "scan": rf.scan,
         "apodization": rf.apodization,
         "f_number": rf.f_number,
-        "accuracy": rf.accuracy,
-        "elevation_accuracy": ELEVATION_ACCURACY,
+        "accuracy": LENS_ACCURACY if rf.elevation else rf.accuracy,
     }
