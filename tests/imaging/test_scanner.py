@@ -1,5 +1,9 @@
 """Images of points: where they land, how wide they are, and how they move, against the exact sum over all pairs."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -211,3 +215,25 @@ def test_bad_depth_is_refused(depth):
 def test_a_sampling_below_the_band_is_refused():
     with pytest.raises(ValueError, match="sampling_MHz = 40"):
         Probe(sampling_MHz=40.0)
+
+
+FRAME = """
+import numpy as np
+from hashlib import sha256
+from echotruth.config import Bmode, Probe, Rf
+from echotruth.imaging.bmode import clip
+from echotruth.imaging.scanner import Scanner
+random = np.random.default_rng(0)
+scanner = Scanner(Probe(elements=12), Rf(lines=24), 9e-3)
+position = random.uniform([-3e-3, 3e-3, -3e-4], [3e-3, 9e-3, 3e-4], (400, 3))
+lines = scanner.lines(position, random.standard_normal(400))
+images = clip(lines[None], scanner.scan, scanner.range, Bmode(size_px=64, downsampling=(1,)))
+print(sha256(lines.tobytes() + images[64].tobytes()).hexdigest())
+"""
+
+
+def test_code_compiled_anew_and_code_from_the_cache_give_the_same_bytes(tmp_path):
+    surroundings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", FRAME]
+    anew, cached = (subprocess.run(command, env=surroundings, capture_output=True, text=True, check=True) for _ in "ab")
+    assert anew.stdout == cached.stdout != ""
