@@ -25,7 +25,7 @@ views:
   long_axis: {plane: long_axis}
 phantom: {density_per_mm3: 200}
 probe: {elements: 16}
-rf: {lines: 64}
+rf: {lines: 64, keep: [lines, channels]}
 bmode: {size_px: 128, downsampling: [1, 2]}
 tracking:
   trackers:
