@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.imaging.kernel import PHASES, Band, Grid, fit, fits, offsets, stacked
+from echotruth.imaging.kernel import PHASES, Band, Grid, fit, fits, offsets, stacked, window_spectrum
 
 
 @pytest.fixture(scope="module", params=[0.0, 2e5])
@@ -18,7 +18,7 @@ def reached(band, taps, blocks, fraction):
     """Spectrum of samples, relative to that of the window at the time of the echo."""
     cycles = band.grid.cycles(band.frequency, band.loss)
     late = np.exp(-np.outer(cycles, offsets(blocks) - fraction)) @ taps
-    return late / band.grid.window_spectrum(cycles)
+    return late / window_spectrum(cycles, band.grid.sharpness)
 
 
 @pytest.mark.parametrize("fraction", [0.0, 0.37, 0.99])

@@ -13,32 +13,23 @@ from numba import types
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-TAPS = 8
-"""Samples that a value is made of."""
+from echotruth.imaging.kernel import TAPS, window, window_spectrum
+
 LEAD = TAPS // 2 - 1
 """Samples of them before its time; channels begin this much before time 0."""
 OVERSAMPLING = 1.25
 """Least sampling frequency over the band of the data."""
 SHARPNESS = 14.0
-"""beta of the interpolator."""
+"""Of the window that interpolates."""
 PHASE_BITS = 9
 """Interpolators are tabulated for 2^9 fractions of a sample, with a slope between them."""
 LANES = 4 * TAPS
 """Numbers of a tabulated interpolator: its real part at every tap, twice, then its imaginary part likewise."""
 
 
-def interpolator(offset: np.ndarray) -> np.ndarray:
-    """exp(beta (sqrt(1 - (2 u / TAPS)^2) - 1)) at offsets u (any shape, samples)."""
-    inside = np.clip(1 - (2 * np.asarray(offset, float) / TAPS) ** 2, 0, None)
-    return np.exp(SHARPNESS * (np.sqrt(inside) - 1))
-
-
 def spectrum(frequency: np.ndarray) -> np.ndarray:
     """Fourier integral of the interpolator at frequencies (n,), cycles per sample; real, shape (n,)."""
-    node, share = np.polynomial.legendre.leggauss(128)
-    offset = node * TAPS / 2
-    wave = np.cos(2 * np.pi * np.multiply.outer(frequency, offset))
-    return (wave * share * TAPS / 2 * interpolator(offset)).sum(axis=1)
+    return window_spectrum(2j * np.pi * frequency, SHARPNESS).real
 
 
 def table(carrier: float) -> np.ndarray:
@@ -50,7 +41,7 @@ def table(carrier: float) -> np.ndarray:
     """
     fraction = np.arange(2**PHASE_BITS + 1) / 2**PHASE_BITS
     offset = fraction[:, None] - (np.arange(TAPS) - LEAD)
-    turning = interpolator(offset) * np.exp(2j * np.pi * carrier * offset)
+    turning = window(offset, SHARPNESS) * np.exp(2j * np.pi * carrier * offset)
     lanes = np.concatenate([np.repeat(turning.real, 2, axis=1), np.repeat(turning.imag, 2, axis=1)], axis=1)
     return np.concatenate([lanes[:-1], np.diff(lanes, axis=0)], axis=1).astype(np.float32).ravel()
 

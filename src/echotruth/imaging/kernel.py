@@ -24,6 +24,21 @@ NODES = 24
 """Frequencies at which spectra are sampled."""
 
 
+_NODE, _SHARE = np.polynomial.legendre.leggauss(128)
+
+
+def window(offset: Floats, sharpness: float) -> Floats:
+    """exp(sharpness (sqrt(1 - (2 u / TAPS)^2) - 1)) at offsets u (any shape), samples."""
+    inside = np.clip(1 - (2 * np.asarray(offset, float) / TAPS) ** 2, 0, None)
+    return np.exp(sharpness * (np.sqrt(inside) - 1))
+
+
+def window_spectrum(cycles: NDArray[np.complex128], sharpness: float) -> NDArray[np.complex128]:
+    """Integral of window(u) exp(-cycles u) over u in samples, for `cycles` (n,), radians a sample: shape (n,)."""
+    offset = _NODE * TAPS / 2
+    return np.exp(-np.multiply.outer(cycles, offset)) @ (_SHARE * TAPS / 2 * window(offset, sharpness))
+
+
 @dataclass(frozen=True)
 class Grid:
     """A fast-time grid and the window that is spread over it.
@@ -32,8 +47,8 @@ class Grid:
     ----------
     sampling : float, Hz
     sharpness : float
-        beta of the window exp(beta (sqrt(1 - (2 u / TAPS)^2) - 1)), u in samples, of Barnett, Magland, af Klinteberg
-        2019, SIAM J Sci Comput 41:C479. A sharp window leaves room for long echoes, but needs a fine grid.
+        Of the :func:`window`, that of Barnett, Magland, af Klinteberg 2019, SIAM J Sci Comput 41:C479. A sharp one
+        leaves room for long echoes, but needs a fine grid.
     """
 
     sampling: float
@@ -42,12 +57,6 @@ class Grid:
     def cycles(self, frequency: Floats, loss: Floats) -> NDArray[np.complex128]:
         """Radians per sample (n,) at frequencies (n,), Hz, of a grid whose samples are damped at rates (n,), 1/s."""
         return (loss + 2j * np.pi * frequency) / self.sampling
-
-    def window_spectrum(self, cycles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Integral of window(u) exp(-cycles u) over u in samples, for `cycles` (n,): shape (n,)."""
-        node, share = np.polynomial.legendre.leggauss(128)
-        window = np.exp(self.sharpness * (np.sqrt(1 - node**2) - 1))
-        return np.exp(-np.multiply.outer(cycles, node * TAPS / 2)) @ (share * TAPS / 2 * window)
 
 
 @dataclass(frozen=True)
@@ -97,7 +106,7 @@ def fit(band: Band, blocks: int, fraction: float) -> tuple[Floats, Floats]:
     """
     cycles = band.grid.cycles(band.frequency, band.loss)
     late = np.exp(-np.multiply.outer(cycles, offsets(blocks) - fraction))
-    late /= band.grid.window_spectrum(cycles)[:, None]
+    late /= window_spectrum(cycles, band.grid.sharpness)[:, None]
     root = np.sqrt(band.weight)
     # What is reached, and what is asked for, as real numbers.
     reached = stacked((root[:, None] * late).T).T

@@ -19,7 +19,7 @@ from echotruth.config import Probe
 from echotruth.imaging import deposit, directivity
 from echotruth.imaging.attenuation import separated
 from echotruth.imaging.elevation import MOST_BLOCKS, Lens
-from echotruth.imaging.kernel import NODES, TAPS, Band, Grid, fits, offsets, stacked
+from echotruth.imaging.kernel import NODES, TAPS, Band, Grid, fits, offsets, stacked, window_spectrum
 from echotruth.imaging.probe import element_centres, pulse_band, pulse_spectrum, spectral_width
 
 BLOCK = 96
@@ -99,7 +99,8 @@ class FullMatrix:
         rate = _loss(p, self.frequency)
         time = (np.arange(self.samples) - deposit.LEAD) / self.sampling
         courses, filters = separated(rate, time)
-        response = pulse_spectrum(probe, self.frequency) / grid.window_spectrum(grid.cycles(self.frequency, rate))
+        window = window_spectrum(grid.cycles(self.frequency, rate), grid.sharpness)
+        response = pulse_spectrum(probe, self.frequency) / window
         lead = np.exp(2j * np.pi * cycles[inside] * deposit.LEAD)  # rows begin LEAD samples before time 0
         self._courses = courses.astype(np.float32)
         self._responses = (filters * response * lead).astype(np.complex64)
