@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import acoustics_chart
-from report import table
+from report import page, table
 
 Result = dict[str, Any]
 Lines = list[str]
@@ -27,12 +27,8 @@ def write(results: Result, folder: Path) -> None:
         "agreement": agreement,
         "exactness": exactness,
     }
-    machine = ", ".join(f"{name} {value}" for name, value in results["machine"].items())
-    text = ["# RF against PyMUST and eSDIva", "", f"{machine}. Seconds are of CPU, medians, on one thread.", ""]
-    for name, section in sections.items():
-        if name in results:
-            text += [*section(results[name]), ""]
-    (folder / "acoustics.md").write_text("\n".join(text))
+    remark = "Seconds are of CPU, medians, on one thread."
+    (folder / "acoustics.md").write_text(page("RF against PyMUST and eSDIva", remark, sections, results))
     if "growth" in results:
         acoustics_chart.growth(results["growth"], folder / "acoustics.png")
 

@@ -13,14 +13,20 @@ PARTS = ("tangent", "residual", "factor", "solve", "step")
 def write(results: Result, folder: Path) -> None:
     """Write `mechanics.md` and `scaling.png` for the parts that were run."""
     sections = {"steps": steps, "secant": cycles, "brentq": cycles, "scaling": scaling, "land": land}
+    text = page("Mechanics against fenicsx-pulse", "Seconds are medians, CPU (wall).", sections, results)
+    (folder / "mechanics.md").write_text(text)
+    if "scaling" in results:
+        chart(results["scaling"]["rows"], folder / "scaling.png")
+
+
+def page(title: str, remark: str, sections: dict[str, Any], results: Result) -> str:
+    """Markdown of the parts that were run, each by the function of its name."""
     machine = ", ".join(f"{name} {value}" for name, value in results["machine"].items())
-    text = ["# Mechanics against fenicsx-pulse", "", f"{machine}. Seconds are medians, CPU (wall).", ""]
+    text = [f"# {title}", "", f"{machine}. {remark}", ""]
     for name, section in sections.items():
         if name in results:
             text += [*section(results[name]), ""]
-    (folder / "mechanics.md").write_text("\n".join(text))
-    if "scaling" in results:
-        chart(results["scaling"]["rows"], folder / "scaling.png")
+    return "\n".join(text)
 
 
 def table(head: list[str], rows: list[list[Any]]) -> list[str]:
