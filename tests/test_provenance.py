@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from echotruth.config import Bmode, Tracker
+from echotruth.config import Bmode, PhaseCorrelation
 from echotruth.provenance import _closure, _tree, code_version, settings_version
 
 ROOT = Path(__file__).parents[1]
@@ -38,4 +38,4 @@ def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_
 
 def test_settings_version_depends_on_values_alone():
     assert settings_version(Bmode(), 1) == settings_version(Bmode(), 1)
-    assert settings_version(Tracker()) != settings_version(Tracker(taper="hann"))
+    assert settings_version(PhaseCorrelation()) != settings_version(PhaseCorrelation(taper="hann"))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -17,7 +17,7 @@ from pydantic_core import PydanticUndefined
 
 from echotruth.config import Config
 from echotruth.repository import schema
-from echotruth.section import UNITS, Section, kinds, unit_of
+from echotruth.section import UNITS, Section, chooser, kinds, unit_of
 
 _HEAD = """# Configuration
 
@@ -96,12 +96,14 @@ def _section(model: type[BaseModel], prefix: str, title: str, meaning: str = "")
     lines += ["| key | unit | default | meaning |", "|---|---|---|---|"]
     inner: list[str] = []
     for key, field in model.model_fields.items():
-        for kind, each in kinds(field.annotation).items():
-            inner += _section(each, f"{prefix}{key}.", f"{prefix}{key}, law {kind}")
-        if kinds(field.annotation):
+        mapping = get_origin(field.annotation) is dict
+        choices = kinds(field.annotation)
+        for kind, each in choices.items():
+            path = f"{prefix}{key}.NAME." if mapping else f"{prefix}{key}."
+            inner += _section(each, path, f"{path.removesuffix('.')}, {chooser(choices)} {kind}")
+        if choices and not mapping:
             continue
-        section = _inner(field)
-        mapping = section is not None and "dict" in str(field.annotation)
+        section = None if choices else _inner(field)
         if section is None or mapping:
             lines.append(f"| `{prefix}{key}` | {_unit(key)} | {_default(field)} | {_meaning(field)} |")
         if section is not None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import log, pi
 from types import SimpleNamespace
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints, Tag
 from pydantic_core import PydanticCustomError
@@ -51,9 +51,20 @@ def unit_of(key: str) -> str:
 
 
 def kinds(annotation: Any) -> dict[str, type[Section]]:
-    """Name to section of the kinds of which a key takes one, as the laws of a material; empty for any other key."""
+    """Name to section of the kinds of which a key takes one, as the laws of a material, or each entry of a mapping,
+    as the methods of trackers; empty for any other key."""
+    if get_origin(annotation) is dict:
+        return kinds(get_args(annotation)[1])
+    if get_origin(annotation) is Annotated:
+        return kinds(annotation.__origin__)
     choices = [choice for choice in get_args(annotation) if hasattr(choice, "__metadata__")]
     return {note.tag: each.__origin__ for each in choices for note in each.__metadata__ if isinstance(note, Tag)}
+
+
+def chooser(choices: dict[str, type[Section]]) -> str:
+    """The key that names the kind, as `law` or `method`: in every kind its default is the name of that kind."""
+    name, section = next(iter(choices.items()))
+    return next(key for key, field in section.model_fields.items() if field.default == name)
 
 
 class Section(BaseModel):

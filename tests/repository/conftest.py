@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from echotruth.config import Bmode, Config, Geometry, Loop, Probe, Rf, Tracker, Tracking, View
+from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Probe, Rf, Tracking, View
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.channels import Kept, described
 from echotruth.imaging.scanner import Scanner, imaging_depth
@@ -27,7 +27,7 @@ def configured(keep, **rf):
         probe=Probe(elements=24),
         rf=Rf(lines=16, sector_deg=40.0, keep=keep, **rf),
         bmode=Bmode(size_px=64, downsampling=(1,)),
-        tracking=Tracking(trackers={"one": Tracker(window_px=16)}),
+        tracking=Tracking(trackers={"one": PhaseCorrelation(window_px=16)}),
     )
 
 

@@ -11,7 +11,7 @@ import yaml
 import zarr
 
 from echotruth.cases import expand, table
-from echotruth.config import Bmode, Config, Geometry, Loop, Physiology, Tracker, Tracking, View
+from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Physiology, Tracking, View
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
@@ -26,7 +26,7 @@ CONFIG = Config(
     loop=Loop(frames=4),
     views={"mid": View(), "long_axis": View(plane="long_axis")},
     bmode=Bmode(size_px=64, downsampling=(1, 2)),
-    tracking=Tracking(trackers={"one": Tracker(window_px=16)}),
+    tracking=Tracking(trackers={"one": PhaseCorrelation(window_px=16)}),
     cases={"seed": [1, 2]},
 )
 CASES = expand(CONFIG)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.config import Bmode, Config
+from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking
 from echotruth.repository import schema
 
 ALL = [*schema.CASES, *schema.COORDINATES]
@@ -47,6 +47,4 @@ def test_columns_of_cases_carry_the_unit_of_their_key():
 
 
 def _tracking():
-    from echotruth.config import Tracker, Tracking
-
-    return Tracking(trackers={"one": Tracker(window_px=32)})
+    return Tracking(trackers={"one": PhaseCorrelation(window_px=32)})

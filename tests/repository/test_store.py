@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from echotruth.cases import expand, table
-from echotruth.config import Bmode, Config, Geometry, Loop, Tracker, Tracking, View
+from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tracking, View
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.loop import read_loop
@@ -20,7 +20,7 @@ SMALL = {
     "loop": Loop(frames=4),
     "views": {"mid": View(), "long_axis": View(plane="long_axis")},
     "bmode": Bmode(size_px=64, downsampling=(1, 2)),
-    "tracking": Tracking(trackers={"one": Tracker(window_px=16)}),
+    "tracking": Tracking(trackers={"one": PhaseCorrelation(window_px=16)}),
 }
 MESH = left_ventricle(SMALL["geometry"])
 GROUPS = ("geometry", "mechanics", "kinematics", "phantom", "truth/64", "bmode/32", "tracking/32", "evaluation/64")

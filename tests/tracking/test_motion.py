@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
-
-from echotruth.config import Tracker
-from echotruth.tracking import grid, track
 from echotruth.tracking.motion import window_side
 
-ED = Tracker()
-STEPS = Tracker(taper="hann", reference="previous")
+from echotruth.config import PhaseCorrelation
+from echotruth.tracking import grid, track
+
+ED = PhaseCorrelation()
+STEPS = PhaseCorrelation(taper="hann", reference="previous")
 SPACING = 25e-6
 
 
@@ -32,7 +32,7 @@ def test_rotation_is_followed_along_the_path(clip):
     frames = clip(turn, 9)
     angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     points = centre + 45 * np.stack([np.cos(angle), np.sin(angle)], -1)
-    tracker = Tracker(window_px=32, taper="hann", reference="previous")
+    tracker = PhaseCorrelation(window_px=32, taper="hann", reference="previous")
     moved, _ = track(frames, points, tracker, SPACING)
     truth = (turn(points, 8) - points) * SPACING
     assert np.linalg.norm(truth, axis=1).min() > 14 * SPACING
@@ -43,12 +43,12 @@ def test_path_and_place_of_rest_differ(clip):
     """Where motion varies in space, a step is read where the point is and not where it was at end-diastole."""
     frames = clip(lambda place, t: place * [1 + 0.02 * t, 1], 7)
     points = np.array([[100.0, 80.0]])
-    moved, _ = track(frames, points, Tracker(window_px=32, taper="hann", reference="previous"), SPACING)
+    moved, _ = track(frames, points, PhaseCorrelation(window_px=32, taper="hann", reference="previous"), SPACING)
     assert moved[-1, 0, 0] / SPACING == pytest.approx(12, abs=0.8)
 
 
 def test_window_in_tissue_keeps_its_size():
-    tracker = Tracker(window_px=None, window_mm=1.5)
+    tracker = PhaseCorrelation(window_px=None, window_mm=1.5)
     assert [window_side(tracker, 12e-3 / n) for n in (512, 256, 128)] == [64, 32, 16]
     assert window_side(tracker, 1e-3) == 8
     assert window_side(ED, 1.0) == 64

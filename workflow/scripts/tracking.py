@@ -1,26 +1,33 @@
 """Track the clips of one view, at every image size, with every tracker."""
 
+import logging
+
 import numpy as np
 
 from echotruth.repository.job import Job, Result, main
-from echotruth.tracking import grid, track
+from echotruth.tracking.clip import Clip, clips
+from echotruth.tracking.tracker import TrackerFailed, track
 
 
 def work(job: Job) -> Result:
-    config = job.case.config
     result: Result = {}
-    for size in config.bmode.sizes:
-        frames = job.read(f"bmode/{size}")["image"]
-        points = grid((size, size), config.tracking.grid_px)
-        spacing = config.bmode.si().field_of_view / size
-        trackers = config.tracking.trackers.values()
-        clips = [track(frames, points.reshape(-1, 2), tracker, spacing) for tracker in trackers]
-        shape = (len(clips), len(frames), *points.shape[:2])
-        result[f"tracking/{size}"] = {
-            "displacement": np.stack([displacement for displacement, _ in clips]).reshape(*shape, 2),
-            "quality": np.stack([quality for _, quality in clips]).reshape(shape),
-        }
+    for size, clip in clips(job).items():
+        answers = {name: _answer(job, name, clip) for name in job.case.config.tracking.trackers}
+        displacement, quality = zip(*answers.values(), strict=True)
+        result[f"tracking/{size}"] = {"displacement": np.stack(displacement), "quality": np.stack(quality)}
+        logging.getLogger("echotruth").info("%d px", size)
     return result
+
+
+def _answer(job: Job, name: str, clip: Clip) -> tuple[np.ndarray, np.ndarray]:
+    """What one tracker finds; nothing, and a word in the record, where it fails."""
+    try:
+        return clip.on_grid(*track(*clip.given, job.case.config.tracking.trackers[name]))
+    except TrackerFailed as error:
+        logging.getLogger("echotruth").warning("%s at %d px: %s", name, clip.size, error)
+        job.verdict.setdefault("failures", {})[f"{name}/{clip.size}"] = str(error)
+        nothing = np.full((len(clip.frames), len(clip.points), 3), np.nan)
+        return clip.on_grid(nothing[..., :2], nothing[..., 2])
 
 
 if __name__ == "__main__":

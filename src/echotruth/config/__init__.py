@@ -10,7 +10,7 @@ from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
 from echotruth.config.realism import Realism
 from echotruth.config.sections import Config
-from echotruth.config.tracking import Tracker, Tracking
+from echotruth.config.tracking import PhaseCorrelation, Tracking
 from echotruth.section import Section
 
 __all__ = [
@@ -23,12 +23,12 @@ __all__ = [
     "Mechanics",
     "Pathology",
     "Phantom",
+    "PhaseCorrelation",
     "Physiology",
     "Probe",
     "Realism",
     "Rf",
     "Section",
-    "Tracker",
     "Tracking",
     "View",
 ]

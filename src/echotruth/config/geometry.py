@@ -35,8 +35,11 @@ class Sides(Section):
 
 
 class Geometry(Section):
-    """Left ventricle: a truncated thick ellipsoid, or the wall in a file."""
+    """Left ventricle: a truncated thick ellipsoid, or the wall in a file; for prescribed motions also a tube."""
 
+    shape: Literal["ellipsoid", "tube"] = "ellipsoid"
+    """`tube`: open at both ends, about the long axis, as long as the cavity of the ellipsoid (`endo_length_mm` +
+    `base_mm`) and as wide as both are at the equator. It holds no blood and cannot beat: see `motion`."""
     preset: Literal["mouse", "rat", "human"] = "mouse"
     """Ellipsoid whose lengths stand wherever a key below is not given."""
     endo_radius_mm: Positive | None = None
@@ -104,6 +107,8 @@ class Geometry(Section):
     def _one_heart(self) -> Geometry:
         if self.file is None:
             self._refuse_given(_OF_A_FILE, "belongs to a wall read from a file: give geometry.file, or leave it out")
+            if self.shape == "tube":
+                self._refuse_given(("apex_wall_mm",), "belongs to the ellipsoid, for a tube has no apex: leave it out")
             return self
         self._refuse_given(_OF_THE_ELLIPSOID, "belongs to the ellipsoid: leave it out where geometry.file is given")
         if not self.remesh:
@@ -120,6 +125,6 @@ class Geometry(Section):
                 raise impossible(key, value.model_dump() if isinstance(value, Section) else value, remedy)
 
 
-_OF_THE_ELLIPSOID = ("preset", "endo_radius_mm", "endo_length_mm", "wall_mm", "apex_wall_mm", "base_mm")
+_OF_THE_ELLIPSOID = ("shape", "preset", "endo_radius_mm", "endo_length_mm", "wall_mm", "apex_wall_mm", "base_mm")
 _OF_NEW_ELEMENTS = ("elongation", "dilation", "hypertrophy", "cut_mm")
 _OF_A_FILE = ("unit", "keep", "sides", "septum", "septum_point", "remesh", "cut_mm", "fibre", "sheet")

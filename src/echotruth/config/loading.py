@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 
 from echotruth.config.sections import Config
 from echotruth.mechanics.materials import Material
-from echotruth.section import kinds
+from echotruth.section import Section, chooser, kinds
 
 
 class ConfigError(ValueError):
@@ -106,18 +106,27 @@ def _tuples(values: Any) -> Any:
 
 def _sentence(error: ErrorDetails) -> str:
     context = error.get("ctx", {})
-    place, model, others = _walked([part for part in error["loc"] if part != "[key]"])
+    place, model, choices = _walked([part for part in error["loc"] if part != "[key]"])
     if error["type"] == "impossible":
         place.append(context["key"])
-    if error["type"] in _NO_SUCH_LAW:
-        return f"{'.'.join(place)}.law = {error['input']['law']!r}: should be {_either(others)}"
+    if error["type"] in _NO_SUCH_KIND:
+        by = chooser(choices)
+        return f"{'.'.join(place)}.{by} = {error['input'][by]!r}: should be {_either(choices)}"
     key = ".".join(str(part) for part in place)
     if error["type"] == "extra_forbidden":
-        law = f" of the law {model.model_fields['law'].default} (others: {', '.join(others)})" if others else ""
-        return f"{key} is not a key{law}{_nearest(place, list(model.model_fields))}"
+        return f"{key} is not a key{_of_kind(model, choices)}{_nearest(place, list(model.model_fields))}"
     value = context["value"] if error["type"] == "impossible" else error["input"]
     text = "null" if value is None else repr(value)
     return f"{key} = {text[:80]}: {_remedy(error, context)}"
+
+
+def _of_kind(model: type[BaseModel], choices: dict[str, type[Section]]) -> str:
+    """Which kind a section is of, and which others there are; empty where there is but one."""
+    if not choices:
+        return ""
+    by = chooser(choices)
+    mine = model.model_fields[by].default
+    return f" of the {by} {mine} (others: {', '.join(name for name in choices if name != mine)})"
 
 
 def _remedy(error: ErrorDetails, context: dict[str, Any]) -> str:
@@ -137,7 +146,7 @@ _PLAIN = {
 """Words for what pydantic says in the terms of Python."""
 
 
-_NO_SUCH_LAW = ("union_tag_invalid", "union_tag_not_found")
+_NO_SUCH_KIND = ("union_tag_invalid", "union_tag_not_found")
 
 
 def _nearest(place: list[Any], keys: list[str]) -> str:
@@ -152,23 +161,25 @@ def _either(names: Iterable[str]) -> str:
     return f"{', '.join(first)} or {last}"
 
 
-def _walked(place: list[Any]) -> tuple[list[Any], type[BaseModel], list[str]]:
-    """The place as the user writes it, the section it lies in, and the names of the other laws beside that section.
+def _walked(place: list[Any]) -> tuple[list[Any], type[BaseModel], dict[str, type[Section]]]:
+    """The place as the user writes it, the section it lies in, and the kinds of section that could stand there.
 
-    Pydantic puts the name of the law in the place, between `material` and its key.
+    Pydantic puts the name of the kind in the place, between `material` and its key, or after the name of a tracker.
     """
-    model, written, choices, others = Config, [], {}, []
-    for part in place:
-        if part in choices:
-            model, others = choices[part], [name for name in choices if name != part]
-            continue
+    model, written, choices = Config, [], {}
+    parts = iter(place)
+    for part in parts:
         written.append(part)
+        if part not in model.model_fields:
+            continue
+        annotation = model.model_fields[part].annotation
+        choices, model = kinds(annotation), _section_of(annotation) or model
         # The name of a view or tracker is the user's own: its section is that of the mapping.
-        if part in model.model_fields:
-            annotation = model.model_fields[part].annotation
-            choices, others = kinds(annotation), list(kinds(annotation)) or others
-            model = _section_of(annotation) or model
-    return written, model, others
+        if get_origin(annotation) is dict and (name := next(parts, None)) is not None:
+            written.append(name)
+        if choices and (kind := next(parts, None)) is not None:
+            model = choices[kind]
+    return written, model, choices
 
 
 def _section_of(annotation: Any) -> Any:

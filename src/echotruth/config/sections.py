@@ -17,7 +17,7 @@ from echotruth.config.pathology import Pathology
 from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
 from echotruth.config.realism import Realism
-from echotruth.config.tracking import Tracking
+from echotruth.config.tracking import PhaseCorrelation, Tracking
 from echotruth.section import Name, Section, impossible
 
 
@@ -52,22 +52,25 @@ class Config(Section):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Config:
-        smallest, view = self.bmode.sizes[-1], self.bmode.field_of_view_mm
+        view = self.bmode.field_of_view_mm
         for name, tracker in self.tracking.trackers.items():
-            place = f"tracking.trackers.{name}"
-            if tracker.window_px is not None and tracker.window_px > smallest:
-                remedy = f"must not exceed the smallest image, {smallest} px"
-                raise impossible(f"{place}.window_px", tracker.window_px, remedy)
-            if tracker.window_mm is not None and tracker.window_mm > view:
-                remedy = f"must not exceed bmode.field_of_view_mm = {view:g}"
-                raise impossible(f"{place}.window_mm", tracker.window_mm, remedy)
-        if self.tracking.grid_px > smallest:
-            raise impossible(
-                "tracking.grid_px", self.tracking.grid_px, f"must not exceed the smallest image, {smallest} px"
-            )
+            if isinstance(tracker, PhaseCorrelation):
+                self._window_fits(f"tracking.trackers.{name}", tracker)
+        if self.tracking.grid_px > self.bmode.size_px:
+            remedy = f"must not exceed the largest image, {self.bmode.size_px} px"
+            raise impossible("tracking.grid_px", self.tracking.grid_px, remedy)
         if self.rf.focus_mm >= view:
             raise impossible("rf.focus_mm", self.rf.focus_mm, f"must be smaller than bmode.field_of_view_mm = {view:g}")
         return self
+
+    def _window_fits(self, place: str, tracker: PhaseCorrelation) -> None:
+        smallest, view = self.bmode.sizes[-1], self.bmode.field_of_view_mm
+        if tracker.window_px is not None and tracker.window_px > smallest:
+            remedy = f"must not exceed the smallest image, {smallest} px"
+            raise impossible(f"{place}.window_px", tracker.window_px, remedy)
+        if tracker.window_mm is not None and tracker.window_mm > view:
+            remedy = f"must not exceed bmode.field_of_view_mm = {view:g}"
+            raise impossible(f"{place}.window_mm", tracker.window_mm, remedy)
 
     @model_validator(mode="after")
     def _heart_before_the_array(self) -> Config:

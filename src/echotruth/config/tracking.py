@@ -1,19 +1,22 @@
-"""Trackers."""
+"""Trackers: one section a method, the method's name being that of its module in `tracking`."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, Union
 
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Discriminator, Field, FiniteFloat, Tag, model_validator
 
 from echotruth.section import Name, Positive, Section, impossible
 
+Reference = Literal["ED", "previous"]
+"""Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
 
-class Tracker(Section):
-    """A way to find the motion in a clip."""
+
+class PhaseCorrelation(Section):
+    """Phase-only correlation of windows, the paper's."""
 
     method: Literal["phase_correlation"] = "phase_correlation"
-    """Phase-only correlation of windows, the paper's."""
+    """Name of the method."""
     window_px: Annotated[int, Field(ge=8, le=512)] | None = 64
     """Side of a window at every image size; or null, and `window_mm` holds."""
     window_mm: Positive | None = None
@@ -22,11 +25,11 @@ class Tracker(Section):
     """Step between windows over the side of a window."""
     taper: Literal["none", "hann"] = "none"
     """Weights over a window before its transform."""
-    reference: Literal["ED", "previous"] = "ED"
+    reference: Reference = "ED"
     """Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
 
     @model_validator(mode="after")
-    def _one_window(self) -> Tracker:
+    def _one_window(self) -> PhaseCorrelation:
         if (self.window_px is None) == (self.window_mm is None):
             raise impossible(
                 "window_mm", self.window_mm, "give either window_px or window_mm and set the other to null"
@@ -34,15 +37,115 @@ class Tracker(Section):
         return self
 
 
-def standard_trackers() -> dict[str, Tracker]:
-    """The paper's as printed, and as corrected."""
-    return {"faithful": Tracker(), "corrected": Tracker(taper="hann", reference="previous")}
+class WindowDeformation(Section):
+    """Normalised cross-correlation of windows that shrink from pass to pass and deform with the field found so far."""
+
+    method: Literal["window_deformation"] = "window_deformation"
+    """Name of the method."""
+    windows_mm: Annotated[list[Positive], Field(min_length=1, max_length=6)] = Field(default=[1.5, 0.75, 0.375])
+    """Sides of the windows, one a pass."""
+    reference: Reference = "previous"
+    """Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
+
+
+class AffineDic(Section):
+    """Digital image correlation of one subset about every point, affine, by inverse compositional Gauss-Newton."""
+
+    method: Literal["affine_dic"] = "affine_dic"
+    """Name of the method."""
+    subset_mm: Positive = 0.7
+    """Side of a subset."""
+    reference: Reference = "previous"
+    """Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
+
+
+class BsplineDic(Section):
+    """Digital image correlation of the whole wall at once, its motion a B-spline."""
+
+    method: Literal["bspline_dic"] = "bspline_dic"
+    """Name of the method."""
+    knots_mm: Positive = 0.4
+    """Distance of the knots."""
+
+
+class Dis(Section):
+    """Dense inverse search of OpenCV as it is."""
+
+    method: Literal["dis"] = "dis"
+    """Name of the method."""
+    preset: Literal["ultrafast", "fast", "medium"] = "medium"
+    """Preset of OpenCV."""
+
+
+class Ilk(Section):
+    """Iterative Lucas-Kanade of scikit-image as it is."""
+
+    method: Literal["ilk"] = "ilk"
+    """Name of the method."""
+    radius_px: Annotated[int, Field(ge=1, le=64)] = 7
+    """Radius of the window about a pixel."""
+
+
+class Guest(Section):
+    """A tracker from elsewhere: a Python callable, an entry point, or a program."""
+
+    method: Literal["guest"] = "guest"
+    """Name of the method."""
+    track: str | None = None
+    """A callable as `package.module:function`, or the name of an entry point in the group `echotruth.trackers`."""
+    command: Annotated[list[str], Field(min_length=1)] | None = None
+    """A program and its arguments, in which {input} and {output} stand for the .npz files it reads and writes."""
+    options: dict[str, Any] = Field(default={})
+    """Keyword arguments of the callable, or entries of the program's .npz."""
+
+    @model_validator(mode="after")
+    def _one_way_in(self) -> Guest:
+        if (self.track is None) == (self.command is None):
+            raise impossible("track", self.track, "give either track or command")
+        return self
+
+
+METHODS: tuple[type[Section], ...] = (PhaseCorrelation, WindowDeformation, AffineDic, BsplineDic, Dis, Ilk, Guest)
+"""Sections of all methods."""
+
+DEFAULT = "phase_correlation"
+"""The method where none is named."""
+
+
+def name_of(method: type[Section]) -> str:
+    """What `method` says in a section of that kind."""
+    return method.model_fields["method"].default
+
+
+def _named(values: Any) -> Any:
+    return values.get("method", DEFAULT) if isinstance(values, dict) else getattr(values, "method", DEFAULT)
+
+
+Tracker = Annotated[
+    Union[tuple(Annotated[method, Tag(name_of(method))] for method in METHODS)],  # noqa: UP007
+    Discriminator(_named),
+]
+"""Section of any of the methods."""
+
+
+def standard_trackers() -> dict[str, Any]:
+    """The paper's as printed and as corrected, stronger ones, and two from libraries."""
+    return {
+        "faithful": PhaseCorrelation(),
+        "corrected": PhaseCorrelation(taper="hann", reference="previous"),
+        "window_deformation": WindowDeformation(),
+        "affine_dic": AffineDic(),
+        "dis": Dis(),
+        "ilk": Ilk(),
+        "bspline_dic": BsplineDic(),
+    }
 
 
 class Tracking(Section):
     """Trackers and the grid they report on."""
 
-    grid_px: Annotated[int, Field(ge=1, le=128)] = 10
-    """Spacing of the points at which displacement is reported."""
+    grid_px: Annotated[int, Field(ge=1, le=128)] = 5
+    """Spacing of the points at which displacement is reported, in pixels of the largest image; the points are the same
+    at all sizes, and lie in the wall at end-diastole."""
     trackers: Annotated[dict[Name, Tracker], Field(min_length=1)] = Field(default_factory=standard_trackers)
     """Name to settings: `faithful` is the paper as printed, `corrected` tapers and goes frame to frame."""

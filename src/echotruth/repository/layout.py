@@ -56,16 +56,15 @@ def positions(
         `group:axial` and `group:lateral`, m.
     """
     places: dict[str, ArrayLike] = {}
-    for size in config.bmode.sizes:
-        axial, lateral = map(np.asarray, pixel_centres(config.bmode, size))
-        points = np.asarray(grid((size, size), config.tracking.grid_px)).astype(int)
+    centres = {size: tuple(map(np.asarray, pixel_centres(config.bmode, size))) for size in config.bmode.sizes}
+    largest = config.bmode.sizes[0]
+    points = np.asarray(grid((largest, largest), config.tracking.grid_px)).astype(int)
+    for size, (axial, lateral) in centres.items():
         for stage in ("truth", "bmode"):
             places |= {f"{stage}/{size}:axial": axial, f"{stage}/{size}:lateral": lateral}
         for stage in ("tracking", "evaluation"):
-            places |= {
-                f"{stage}/{size}:axial": axial[points[:, 0, 1]],
-                f"{stage}/{size}:lateral": lateral[points[0, :, 0]],
-            }
+            places[f"{stage}/{size}:axial"] = centres[largest][0][points[:, 0, 1]]
+            places[f"{stage}/{size}:lateral"] = centres[largest][1][points[0, :, 0]]
     return places
 
 

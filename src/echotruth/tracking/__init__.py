@@ -4,7 +4,7 @@ Points and in-plane vectors are in the order lateral, axial throughout; images a
 """
 
 from echotruth.tracking.evaluation import Wall, evaluate
-from echotruth.tracking.motion import track
+from echotruth.tracking.tracker import TrackerFailed, track
 from echotruth.tracking.windows import grid
 
-__all__ = ["Wall", "evaluate", "grid", "track"]
+__all__ = ["TrackerFailed", "Wall", "evaluate", "grid", "track"]

@@ -7,13 +7,85 @@ positive from the first image to the second.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import fft
 
-from echotruth.tracking.windows import Windows
+from echotruth.config.tracking import PhaseCorrelation
+from echotruth.tracking.accumulation import accumulate
+from echotruth.tracking.windows import SMALLEST, Windows, arrange
 
 FAINTEST = 1 / 255
 """Standard deviation of a window over the range of the clip below which it counts as without texture: a grey level."""
+
+
+def track(
+    frames: np.ndarray,
+    points: np.ndarray,
+    mask: np.ndarray,
+    spacing: float,
+    frame_time: np.ndarray,
+    seed: int,
+    settings: PhaseCorrelation,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
+
+    The quality is the height of the correlation peak. Windows cover the image whatever the mask.
+    """
+    windows = arrange(frames.shape[1:], window_side(settings, spacing), settings.stride)
+    finite = frames[np.isfinite(frames)] if frames.dtype.kind == "f" else frames
+    contrast = float(finite.max()) - float(finite.min()) if finite.size else 0.0
+    return accumulate(PhasePairs(windows, settings.taper, contrast), frames, points, settings.reference)
+
+
+def window_side(settings: PhaseCorrelation, spacing: float) -> int:
+    """Side of a window at one image size.
+
+    Parameters
+    ----------
+    settings : PhaseCorrelation
+        The window in pixels or in millimetres of tissue.
+    spacing : float
+        Distance of pixel centres, m.
+
+    Returns
+    -------
+    int
+        px; a window in millimetres is rounded to an even number, 8 at least.
+    """
+    if settings.window_px is not None:
+        return settings.window_px
+    return max(SMALLEST, 2 * round(settings.si().window / spacing / 2))
+
+
+@dataclass(frozen=True)
+class PhasePairs:
+    """Phase correlation of two images, as :class:`echotruth.tracking.accumulation.Pairs`.
+
+    Attributes
+    ----------
+    windows : Windows
+        Where to look.
+    taper : {"none", "hann"}
+        Weights over a window.
+    contrast : float
+        Range of grey values in the clip.
+    """
+
+    windows: Windows
+    taper: str
+    contrast: float
+
+    def prepare(self, image: np.ndarray) -> np.ndarray:
+        """:func:`phases` of an image."""
+        return phases(image, self.windows, self.taper, self.contrast)
+
+    def match(self, first: np.ndarray, second: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Step (n, 2) in px and quality (n,) of points, linear between the windows."""
+        moved, peak = displacement(first, second, self.windows.side)
+        step = self.windows.interpolate(np.concatenate([moved, peak[..., None]], -1), points)
+        return step[:, :2], step[:, 2]
 
 
 def phases(image: np.ndarray, windows: Windows, taper: str, contrast: float) -> np.ndarray:
