@@ -1,0 +1,45 @@
+"""Iterative Lucas-Kanade of scikit-image as it is (Le Besnerais and Champagnat 2005, ICIP, 1:137)."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from skimage.registration import optical_flow_ilk
+
+from echotruth.config.tracking import Ilk
+from echotruth.tracking.flow import follow
+
+
+def track(
+    frames: np.ndarray,
+    points: np.ndarray,
+    mask: np.ndarray,
+    spacing: float,
+    frame_time: np.ndarray,
+    seed: int,
+    settings: Ilk,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
+
+    The library says nothing of quality; :mod:`echotruth.tracking.flow` does.
+    """
+    return follow(partial(flow, radius=settings.radius_px), frames, points, spacing)
+
+
+def flow(first: np.ndarray, second: np.ndarray, radius: int = 7) -> np.ndarray:
+    """Motion of every pixel from one image to another.
+
+    Parameters
+    ----------
+    first, second : ndarray of shape (axial, lateral)
+        Grey values from 0 to 1, all finite.
+    radius : int
+        Of the window about a pixel, px.
+
+    Returns
+    -------
+    ndarray of shape (axial, lateral, 2), float32
+        Lateral, axial, px.
+    """
+    return np.stack(optical_flow_ilk(first, second, radius=radius)[::-1], -1)
