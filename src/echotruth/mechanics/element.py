@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from echotruth.mechanics import point
 from echotruth.mechanics.fibres import gradients
-from echotruth.mechanics.point import FAST, PASSIVE, VOLUMETRIC, WHOLE
+from echotruth.mechanics.point import COMPILED, PASSIVE, VOLUMETRIC, WHOLE
 from echotruth.mechanics.quadrature import tetrahedron
 from echotruth.tetrahedra import Mesh
 
@@ -179,7 +179,7 @@ def stretch(nodes: Floats, body: Elements, c: Floats) -> None:
             point.deform(x, body.slope[cell, q], f, c[cell, q])
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def _cell(cell, nodes, body, law, load, out):
     nodes_of, force, with_tangent = body.cells[cell], out.force[cell], out.tangent.shape[0] > 0
     scale = load.stiffness[cell], load.tension[cell], load.pressure[cell], load.viscosity[cell]
@@ -207,7 +207,7 @@ def _cell(cell, nodes, body, law, load, out):
         _pack(ke, out.tangent[cell])
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def _add_condensed(growth, factor, ke):
     """Add what the eliminated pressure leaves: the growth of the volume, squared."""
     for r in range(DOFS):
@@ -215,7 +215,7 @@ def _add_condensed(growth, factor, ke):
             ke[r, s] += factor * growth[r] * growth[s]
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def _add_force(f, slope, stress, weight, force, start):
     """Add the parts of the force from `start` on."""
     first = np.empty((3, 3))
@@ -228,7 +228,7 @@ def _add_force(f, slope, stress, weight, force, start):
                 )
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def _add_tangent(f, slope, stress, tangent, weight, ke):
     """Add the second derivatives of the energy by the displacements to all entries.
 
@@ -252,7 +252,7 @@ def _add_tangent(f, slope, stress, tangent, weight, ke):
                 row[s] += x * first[s] + y * second[s] + z * third[s]
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def _turn(a, frame, force, ke):
     """Turn the forces and the tangent of node a to its own directions."""
     for r in range(DOFS):
@@ -265,7 +265,7 @@ def _turn(a, frame, force, ke):
     force[:, 3 * a : 3 * a + 3] = np.ascontiguousarray(force[:, 3 * a : 3 * a + 3]) @ frame.T
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def _pack(ke, packed):
     n = 0
     for r in range(DOFS):

@@ -14,14 +14,14 @@ from echotruth.mechanics import material
 PASSIVE, ACTIVE, VOLUMETRIC, WHOLE = range(4)
 """Parts: for a stiffness, an active tension and a pressure of one, and the whole."""
 
-FAST = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}}
-"""How the functions of an element are compiled."""
+COMPILED = {"cache": True, "error_model": "numpy"}
+"""How the functions of an element are compiled: nothing contracted, for code out of the cache is contracted otherwise."""
 
 _COMPONENT = np.array([(0, 3, 4), (3, 1, 5), (4, 5, 2)])
 """Component of each pair of axes."""
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def deform(x, slope, f, c):
     """Fill the deformation gradient (3, 3) and C (6,); returns det F, which is negative inside out."""
     for i in range(3):
@@ -40,7 +40,7 @@ def deform(x, slope, f, c):
     )
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def elastic(strain, j, law, scale, stress, tangent, with_tangent):
     """Fill the elastic parts of the stress (3, 6), each for a factor of one, and the tangent (6, 6).
 
@@ -68,7 +68,7 @@ def elastic(strain, j, law, scale, stress, tangent, with_tangent):
         stress[0, k] += law.local_bulk * (j - 1) * stress[2, k]
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def add_up(c, before, scale, stress, tangent):
     """Fill the whole of the stress (4, 6), what resists the growth of strain (Kelvin-Voigt) and its tangent added."""
     for k in range(6):
@@ -77,7 +77,7 @@ def add_up(c, before, scale, stress, tangent):
         tangent[k, k] += scale[3] / material.SHEAR[k]
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def first_stress(f, stress, weight, first):
     """Fill the first Piola-Kirchhoff stress, times a weight."""
     for i in range(3):
@@ -89,7 +89,7 @@ def first_stress(f, stress, weight, first):
             )
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def moduli(f, stress, tangent, weight, modulus):
     """Fill dP/dF (9, 9), times a weight: F D F and the whole stress (6,) itself (Holzapfel, section 6.6)."""
     _material_moduli(f, tangent, weight, modulus)
@@ -100,7 +100,7 @@ def moduli(f, stress, tangent, weight, modulus):
                 modulus[3 * i + k, 3 * i + m] += whole
 
 
-@njit(**FAST)
+@njit(**COMPILED)
 def _material_moduli(f, tangent, weight, modulus):
     half = np.empty((9, 6))
     for r in range(9):
