@@ -15,7 +15,7 @@ PASSIVE, ACTIVE, VOLUMETRIC, WHOLE = range(4)
 """Parts: for a stiffness, an active tension and a pressure of one, and the whole."""
 
 COMPILED = {"cache": True, "error_model": "numpy"}
-"""How the functions of an element are compiled: nothing contracted, for code out of the cache is contracted otherwise."""
+"""How the functions of an element are compiled. Nothing is contracted: code from the cache would be so otherwise."""
 
 _COMPONENT = np.array([(0, 3, 4), (3, 1, 5), (4, 5, 2)])
 """Component of each pair of axes."""
