@@ -44,6 +44,8 @@ class WindowDeformation(Section):
     """Name of the method."""
     windows_mm: Annotated[list[Positive], Field(min_length=1, max_length=6)] = Field(default=[1.5, 0.75, 0.375])
     """Sides of the windows, one a pass."""
+    sweeps: Annotated[int, Field(ge=1, le=20)] = 3
+    """Passes at the last size."""
     reference: Reference = "previous"
     """Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
 
@@ -86,6 +88,10 @@ class Ilk(Section):
     """Radius of the window about a pixel."""
 
 
+GIVEN = ("frames", "points", "mask", "spacing", "frame_time", "seed")
+"""Names of what every tracker is given, in their order."""
+
+
 class Guest(Section):
     """A tracker from elsewhere: a Python callable, an entry point, or a program."""
 
@@ -95,6 +101,8 @@ class Guest(Section):
     """A callable as `package.module:function`, or the name of an entry point in the group `echotruth.trackers`."""
     command: Annotated[list[str], Field(min_length=1)] | None = None
     """A program and its arguments, in which {input} and {output} stand for the .npz files it reads and writes."""
+    timeout_s: Positive = 3600.0
+    """Longest time a program may take over one clip; a callable is not timed."""
     options: dict[str, Any] = Field(default={})
     """Keyword arguments of the callable, or entries of the program's .npz."""
 
@@ -102,7 +110,26 @@ class Guest(Section):
     def _one_way_in(self) -> Guest:
         if (self.track is None) == (self.command is None):
             raise impossible("track", self.track, "give either track or command")
+        for place in ("{input}", "{output}") if self.command else ():
+            if not any(place in part for part in self.command or ()):
+                raise impossible("command", self.command, f"must say where the path of the {place[1:-1]} goes: {place}")
         return self
+
+    @model_validator(mode="after")
+    def _options_fit(self) -> Guest:
+        for key, value in self.options.items():
+            if key in GIVEN:
+                raise impossible(f"options.{key}", value, f"must have another name, for every tracker is given {key}")
+            if self.command and not _is_array(value):
+                remedy = "must be a number, a text or a list of one kind, for it is an array in the program's .npz"
+                raise impossible(f"options.{key}", value, remedy)
+        return self
+
+
+def _is_array(value: Any) -> bool:
+    """Whether a value of YAML is an array without being made an object."""
+    values = value if isinstance(value, list) else [value]
+    return all(isinstance(each, int | float) for each in values) or all(isinstance(each, str) for each in values)
 
 
 METHODS: tuple[type[Section], ...] = (PhaseCorrelation, WindowDeformation, AffineDic, BsplineDic, Dis, Ilk, Guest)
