@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SHAPES = (
-    *("name", "cases", "views", "tracking", "fibres.layers", "loop.frames", "rf.keep"),
+    *("name", "cases", "views", "tracking", "geometry.shape", "fibres.layers", "loop.frames", "rf.keep"),
     *("bmode.field_of_view_mm", "bmode.size_px", "bmode.downsampling"),
 )
 """Keys that may not be swept, nor `geometry.*_elements`: they shape the arrays that all cases share."""

@@ -11,6 +11,9 @@ from echotruth.config import Rf, View
 
 Floats = NDArray[np.float64]
 
+SHORT_AXIS = np.array([[-1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
+"""Rows: lateral, axial and elevation axis of all short-axis views, in the heart frame."""
+
 
 @dataclass(frozen=True)
 class Plane:
@@ -55,7 +58,7 @@ def plane(view: View, rf: Rf, endo_ed: Floats) -> Plane:
     apex = endo_ed[:, 2].min()
     depth = rf.si().focus
     if view.plane == "short_axis":
-        axes = np.array([[-1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
+        axes = SHORT_AXIS
         middle = np.array([0, 0, view.position * apex])
     else:
         turn = view.si().rotation

@@ -8,21 +8,17 @@ from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from echotruth.aha import segment
-from echotruth.config import Config, Fibres
-from echotruth.mechanics import angles, drive, fibres, kinematics, phases
+from echotruth.config import Config
+from echotruth.mechanics import drive, phases
 from echotruth.mechanics.activation import Activation
 from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.history import Arrays, history
 from echotruth.mechanics.loop import Cycle, read_loop
 from echotruth.mechanics.progress import Progress
-from echotruth.mechanics.quadrature import tetrahedron
 from echotruth.mechanics.unloaded import unloaded
 from echotruth.mechanics.wall import Wall, equilibrium, wall
-from echotruth.tetrahedra import Floats, Mesh, shape
 
-Arrays = dict[str, NDArray]
 logger = logging.getLogger("echotruth.mechanics")
 
 
@@ -50,19 +46,7 @@ def beat(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
     """
     cycle = read_loop(config.loop)
     heart = unloaded_wall(config, cycle)
-    mesh, depth = heart.mesh, heart.depth
-    solved = _solved(config, heart, cycle, scratch)
-    return {
-        "geometry": {
-            "node_position": mesh.nodes,
-            "cell_node": mesh.cells,
-            **{side: getattr(mesh, side) for side in ("endo", "epi", "base")},
-        },
-        "fibres": _architecture(mesh, depth, config.fibres, config.seed),
-        "pathology": dict(vars(heart.tissue)),
-        "mechanics": _course(solved, cycle),
-        "kinematics": _kinematics(mesh, solved.displacement, depth, config),
-    }
+    return history(config, heart, _course(_solved(config, heart, cycle, scratch), cycle))
 
 
 def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
@@ -92,23 +76,6 @@ def _fingerprint(config: Config, heart: Wall, cycle: Cycle) -> str:
     return sha256(pickle.dumps((settings, heart, cycle))).hexdigest()[:16]
 
 
-def _architecture(mesh: Mesh, depth: Floats, section: Fibres, seed: int) -> Arrays:
-    axes = fibres.wall_axes(mesh, depth, fibres.CENTROID)[:, 0]
-    frames = fibres.fibre_frames(mesh, depth, section, fibres.CENTROID, seed)[:, 0]
-    helix, transverse, sheet = angles.read(frames, axes)
-    centre = shape(fibres.CENTROID)[0] @ mesh.nodes[mesh.cells]
-    return {
-        "wall_depth": depth,
-        "fibre": frames[:, 0],
-        "sheet": frames[:, 1],
-        "helix_angle": helix,
-        "transverse_angle": transverse,
-        "sheet_angle": sheet,
-        "layer": fibres.layer(fibres.at_points(mesh, depth, fibres.CENTROID)[:, 0], section.layers).astype(np.uint8),
-        "segment": segment(centre, mesh.nodes[mesh.endo, 2].min()),
-    }
-
-
 def _course(solved: drive.Beat, cycle: Cycle) -> Arrays:
     return {
         "time": cycle.time,
@@ -124,35 +91,3 @@ def _course(solved: drive.Beat, cycle: Cycle) -> Arrays:
         "newton_steps": solved.newton_steps,
         "residual": solved.residual,
     }
-
-
-def _kinematics(mesh: Mesh, displacement: Floats, depth: Floats, config: Config) -> Arrays:
-    axes = fibres.wall_axes(mesh, depth, fibres.CENTROID)[:, 0]
-    frames = fibres.fibre_frames(mesh, depth, config.fibres, fibres.CENTROID, config.seed)[:, 0]
-    motion = kinematics.motion(mesh, displacement, axes, frames)
-    smallest, ratio = kinematics.volume_ratios(mesh, displacement)
-    return {
-        **{name: values.astype(np.float32) for name, values in motion.items()},
-        **_wall_strain(mesh, displacement, depth, config.fibres.layers),
-        "volume_ratio_min": smallest,
-        "volume_ratio_mean": ratio,
-    }
-
-
-def _wall_strain(mesh: Mesh, displacement: Floats, depth: Floats, layers: int) -> Arrays:
-    """Statistics over the quadrature points: a layer may be thinner than a cell and hold no centroid."""
-    xi, weight = tetrahedron()
-    volume = (fibres.gradients(mesh, xi)[1] * weight).ravel()
-    axes = fibres.wall_axes(mesh, depth, xi)
-    at_ed = kinematics.deformation_gradient(mesh, displacement[0], xi)
-    carried, back = kinematics.carried_axes(axes, at_ed), np.linalg.inv(at_ed)
-    strains = np.stack(
-        [
-            kinematics.strain(kinematics.deformation_gradient(mesh, moved, xi) @ back, carried, kinematics.RCL)
-            for moved in displacement
-        ]
-    ).reshape(len(displacement), -1, len(kinematics.RCL))
-    mean, sd = kinematics.weighted(strains, volume)
-    layer = fibres.layer(fibres.at_points(mesh, depth, xi), layers).ravel()
-    by_layer = kinematics.layer_strain(strains, volume, layer, layers)
-    return {"strain_mean": mean, "strain_sd": sd, "layer_strain": by_layer}

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
 
 from echotruth.mechanics.fibres import gradients
-from echotruth.mechanics.geometry.facets import boundary
+from echotruth.mechanics.geometry.lattice import Counts, Place, lattice, tubular
 from echotruth.mechanics.quadrature import tetrahedron
-from echotruth.tetrahedra import EDGES, Floats, Integers, Mesh, shape
-
-Counts = tuple[int, int, int]
+from echotruth.tetrahedra import Floats, Integers, Mesh, shape
 
 
 @dataclass(frozen=True)
@@ -51,23 +48,9 @@ class Body:
         return float(np.sqrt(np.divide(*squares)))
 
 
-def body(counts: Counts, place: Callable[[Floats], Floats], around: bool = False) -> Body:
-    """A lattice of boxes, each cut into six tetrahedra (Kuhn, 1960).
-
-    Parameters
-    ----------
-    counts : tuple of int
-        Boxes along each parameter.
-    place : callable
-        Parameters (n_nodes, 3), from 0 to 1, to positions (n_nodes, 3), m; right-handed.
-    around : bool
-        Whether the second parameter closes upon itself.
-    """
-    cells, parameters = _lattice(counts, around)
-    facets, _ = boundary(cells)
-    at = parameters[facets]
-    sides = [np.all(at[..., axis] == value, axis=1) for axis, value in ((0, 0.0), (0, 1.0), (2, 1.0))]
-    return Body(Mesh(place(parameters), cells, *(facets[side] for side in sides)), parameters)
+def body(counts: Counts, place: Place, around: bool = False) -> Body:
+    """A lattice laid through a body; the arguments are those of `lattice`."""
+    return Body(*lattice(counts, place, around))
 
 
 def bar(counts: Counts, lengths: tuple[float, float, float]) -> Body:
@@ -77,12 +60,7 @@ def bar(counts: Counts, lengths: tuple[float, float, float]) -> Body:
 
 def tube(counts: Counts, inner: float, outer: float, length: float) -> Body:
     """A tube about z of given radii, m, from z = -length to 0; boxes through the wall, around it and along it."""
-
-    def place(parameters: Floats) -> Floats:
-        radius, turn = inner + (outer - inner) * parameters[:, 0], 2 * np.pi * parameters[:, 1]
-        return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), length * (parameters[:, 2] - 1)])
-
-    return body(counts, place, around=True)
+    return body(counts, tubular(inner, outer, length), around=True)
 
 
 def sphere_piece(counts: Counts, inner: float, outer: float) -> Body:
@@ -94,21 +72,3 @@ def sphere_piece(counts: Counts, inner: float, outer: float) -> Body:
         return radius * along / np.linalg.norm(along, axis=1, keepdims=True)
 
     return body(counts, place)
-
-
-def _lattice(counts: Counts, around: bool) -> tuple[Integers, Floats]:
-    """Cells (n_cells, 10) and parameters (n_nodes, 3): all corners, and all points halfway between corners."""
-    halves = 2 * np.array(counts)
-    points = halves + [1, 0 if around else 1, 1]
-    corner = 2 * np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    cells = []
-    for order in permutations(range(3)):
-        steps = np.cumsum([np.zeros(3, int), *np.eye(3, dtype=int)[list(order)]], axis=0)
-        if round(np.linalg.det(np.eye(3)[list(order)])) < 0:
-            steps[[1, 2]] = steps[[2, 1]]
-        vertices = corner + 2 * steps
-        middles = (vertices[:, EDGES[:, 0]] + vertices[:, EDGES[:, 1]]) // 2
-        cells.append(np.concatenate([vertices, middles], axis=1) % (points if around else points + 1))
-    numbers = np.arange(np.prod(points)).reshape(points)
-    indices = np.stack(np.unravel_index(numbers.ravel(), points), axis=-1)
-    return numbers[tuple(np.moveaxis(np.concatenate(cells), -1, 0))].astype(np.int32), indices / halves

@@ -1,4 +1,4 @@
-"""The left ventricle to be solved: an ellipsoid, or the wall in a file."""
+"""The left ventricle: an ellipsoid, the wall in a file, or a tube in its place."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 from echotruth.config import Geometry
 from echotruth.mechanics.geometry.ellipsoid import ellipsoid
 from echotruth.mechanics.geometry.soundness import GeometryError, jacobians
+from echotruth.mechanics.geometry.tube import tube
 from echotruth.mechanics.quadrature import tetrahedron
 from echotruth.tetrahedra import Floats, Mesh
 
@@ -32,7 +33,7 @@ def left_ventricle(geometry: Geometry) -> Mesh:
         If there is no such ventricle, in one sentence with the remedy.
     """
     if geometry.file is None:
-        return ellipsoid(geometry)
+        return tube(geometry) if geometry.shape == "tube" else ellipsoid(geometry)
     from echotruth.mechanics.geometry.file import heart_of
 
     return heart_of(geometry)
