@@ -21,4 +21,7 @@ def mechanics_settings(config):
     # The seed enters by the disarray of the fibres alone.
     seed = config.seed if config.fibres.disarray_deg else None
     anatomy = (config.geometry.settled(), fingerprint(config.geometry), config.fibres, seed, config.pathology)
-    return settings_version(*anatomy, config.loop, course, config.mechanics)
+    if config.motion.kind == "beat":
+        return settings_version(*anatomy, config.loop, course, config.mechanics)
+    formula = getattr(config.motion, config.motion.kind)
+    return settings_version(*anatomy, loop.time.tolist(), config.motion.course, formula, config.rf.focus_mm)

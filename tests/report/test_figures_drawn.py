@@ -22,6 +22,13 @@ def test_loop(tmp_path):
     seen(loop.draw(tmp_path / "loop.png", TIME, 5, 4e4 * WAVE, 1.01 * asked, asked))
 
 
+def test_without_pressures_there_are_words_in_place_of_the_loop(tmp_path):
+    nothing = np.full((2, 10), np.nan)
+    picture = np.asarray(Image.open(loop.draw(tmp_path / "loop.png", TIME, 5, nothing[0], nothing, nothing)))
+    rows = np.flatnonzero((picture[..., :3] < 200).any(axis=(1, 2)))
+    assert len(rows) and np.ptp(rows) < 0.05 * len(picture), "one line of text, no axes"
+
+
 @pytest.mark.parametrize("layers", [1, 6, 10])
 def test_strain(tmp_path, layers):
     mean = WAVE[:, None] * [0.5, -0.18, -0.1, 0, 0, 0]

@@ -1,18 +1,20 @@
-"""FE update: geometry, fibres, mechanics and kinematics of one heart through its loop."""
+"""FE update: geometry, fibres, mechanics and kinematics of one heart through its loop, or by its formula."""
 
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.fibres import FibreError
 from echotruth.mechanics.geometry import GeometryError
 from echotruth.mechanics.loop import LoopError
 from echotruth.mechanics.pathology import PathologyError
+from echotruth.mechanics.prescribed import MotionError, prescribed
 from echotruth.mechanics.solver import Diverged
 from echotruth.repository.job import CannotBeMade, Job, Result, main
 
 
 def work(job: Job) -> Result:
+    config = job.case.config
     try:
-        return beat(job.case.config, job.unfinished)
-    except (Diverged, FibreError, GeometryError, LoopError, PathologyError) as error:
+        return beat(config, job.unfinished) if config.motion.kind == "beat" else prescribed(config)
+    except (Diverged, FibreError, GeometryError, LoopError, MotionError, PathologyError) as error:
         raise CannotBeMade(str(error)) from error
 
 

@@ -5,6 +5,7 @@ from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import Bmode, Phantom, Rf, View
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Active, Mechanics
+from echotruth.config.motion import Motion
 from echotruth.config.pathology import Pathology
 from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
@@ -21,6 +22,7 @@ __all__ = [
     "Geometry",
     "Loop",
     "Mechanics",
+    "Motion",
     "Pathology",
     "Phantom",
     "PhaseCorrelation",

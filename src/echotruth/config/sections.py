@@ -13,6 +13,7 @@ from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import Bmode, Phantom, Rf, View, standard_views
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
+from echotruth.config.motion import Motion
 from echotruth.config.pathology import Pathology
 from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
@@ -33,6 +34,7 @@ class Config(Section):
     pathology: Pathology = Pathology()
     loop: Loop = Loop()
     mechanics: Mechanics = Mechanics()
+    motion: Motion = Motion()
     physiology: Physiology = Physiology()
     views: Annotated[dict[Name, View], Field(min_length=1)] = Field(default_factory=standard_views)
     """Name to imaging plane."""
@@ -81,12 +83,26 @@ class Config(Section):
         return self
 
     @model_validator(mode="after")
+    def _shape_suits_motion(self) -> Config:
+        kind, shape = self.motion.kind, self.geometry.shape
+        if kind == "cylinder" and shape != "tube":
+            raise impossible("motion.kind", kind, "needs geometry.shape = tube")
+        if shape == "tube" and kind == "beat":
+            remedy = "is open and holds no pressure, so set motion.kind to rigid, affine or cylinder"
+            raise impossible("geometry.shape", shape, remedy)
+        return self
+
+    @model_validator(mode="after")
     def _in_space(self) -> Config:
         beyond = {"blood": self.realism.blood, "surroundings": self.realism.surroundings}
         for name, tissue in beyond.items():
-            if self.phantom.in_plane_only and tissue.level_dB is not None:
+            key, level = f"realism.{name}.level_dB", tissue.level_dB
+            if self.phantom.in_plane_only and level is not None:
                 remedy = "must be null where phantom.in_plane_only is true, for it fills a space and no plane"
-                raise impossible(f"realism.{name}.level_dB", tissue.level_dB, remedy)
+                raise impossible(key, level, remedy)
+            if self.geometry.shape == "tube" and level is not None:
+                remedy = "must be null where geometry.shape is tube, for an open one parts no inside from an outside"
+                raise impossible(key, level, remedy)
         return self
 
     @model_validator(mode="after")
@@ -107,6 +123,8 @@ class Config(Section):
     def _stiffness_known(self) -> Config:
         key, stiffness = "mechanics.material.stiffness_kPa", self.mechanics.material.stiffness_kPa
         drive, imaged = self.loop.drive, self.geometry.state == "end_diastole"
+        if self.motion.kind != "beat":
+            return self
         if drive != "pressure_volume" and stiffness is None:
             raise impossible(key, None, f"must be given, for loop.drive = {drive} leaves open from what to solve it")
         if imaged and stiffness is None:

@@ -67,7 +67,8 @@ def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays) -> Arrays:
     -------
     dict of ndarray
         The group `physiology`: `twist` (frame,) in rad, and numbers: strains at end-systole, ejection fraction,
-        smallest det F, largest relative error of the prescribed course, tensions in Pa.
+        smallest det F, largest relative error of the prescribed course, tensions in Pa. Of a heart that moves by a
+        formula ejection fraction and tensions are not a number, and there is no error.
     """
     es, volume = int(mechanics["es_frame"]), mechanics["volume"]
     strain, tension = kinematics["strain_mean"][es], mechanics["active_tension"]

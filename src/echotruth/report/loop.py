@@ -15,7 +15,7 @@ UL = 1e-9
 
 @style.styled
 def draw(path: str | Path, time: np.ndarray, es: int, tension: np.ndarray, met: np.ndarray, asked: np.ndarray) -> Path:
-    """Draw the loop and its course in time.
+    """Draw the loop and its course in time, or say that there is none.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def draw(path: str | Path, time: np.ndarray, es: int, tension: np.ndarray, met: 
     tension : ndarray of shape (frame,)
         Active tension T_Ca, Pa.
     met, asked : ndarray of shape (2, frame)
-        Cavity pressure, Pa, and volume, m^3.
+        Cavity pressure, Pa, and volume, m^3; not a number where the heart moves by a formula.
 
     Returns
     -------
@@ -36,6 +36,10 @@ def draw(path: str | Path, time: np.ndarray, es: int, tension: np.ndarray, met: 
         The picture.
     """
     sheet = style.figure(8.4, 4.2)
+    if not np.isfinite(met).any():
+        words = "No pressure-volume loop: this heart moves by a formula (motion.kind), and nothing drives it."
+        sheet.text(0.5, 0.5, words, ha="center", va="center", color="#555555")
+        return style.save(sheet, path)
     left, right = sheet.subfigures(1, 2, width_ratios=(1.1, 1))
     _loop(left.subplots(), es, met, asked)
     axes = right.subplots(3, 1, sharex=True)

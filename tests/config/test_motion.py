@@ -1,0 +1,58 @@
+"""Which motions a configuration may prescribe; the others are refused in one sentence."""
+
+import pytest
+
+from echotruth.cases import expand
+from echotruth.config import Config
+from echotruth.config.loading import ConfigError, load, validate
+
+TUBE = "geometry: {shape: tube}\n"
+
+BAD = {
+    "motion: {kind: cylinder}": "motion.kind = 'cylinder': needs geometry.shape = tube",
+    "motion: {kind: still}": "motion.kind = 'still': should be 'beat', 'rigid', 'affine' or 'cylinder'",
+    "motion: {kind: rigid, rigid: {lateral_mm: 1}}": "motion.rigid.lateral_mm is not a key: did you mean "
+    "motion.rigid.lateral_um?",
+    TUBE: "geometry.shape = 'tube': is open and holds no pressure, so set motion.kind to rigid, affine or cylinder",
+    TUBE + "motion: {kind: cylinder, cylinder: {contraction: 1}}": "motion.cylinder.contraction = 1: should be less "
+    "than 1",
+    TUBE
+    + "motion: {kind: cylinder, cylinder: {shortening: 1}}": "motion.cylinder.shortening = 1: should be less than 1",
+    TUBE + "motion: {kind: rigid}\nrealism: {blood: {level_dB: -20}}": "realism.blood.level_dB = -20.0: must be null "
+    "where geometry.shape is tube",
+    TUBE + "motion: {kind: rigid}\nrealism: {surroundings: {level_dB: 0}}": "realism.surroundings.level_dB = 0.0: must "
+    "be null where geometry.shape is tube",
+    "geometry: {shape: tube, apex_wall_mm: 1}\nmotion: {kind: rigid}": "geometry.apex_wall_mm = 1.0: belongs to the "
+    "ellipsoid, for a tube has no apex: leave it out",
+    "geometry: {shape: tube, file: a.vtu}\nmotion: {kind: rigid}": "geometry.shape = 'tube': belongs to the ellipsoid",
+    "motion: {kind: affine, affine: {gradient: [[1, 0, 0], [0, 1, 0]]}}": "motion.affine.gradient = ",
+    # A mirror image, what is flat, and half a turn, which is a reflection halfway.
+    "motion: {affine: {gradient: [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]}}": "has the eigenvalue -1 and would flatten",
+    "motion: {affine: {gradient: [[1, 1, 0], [1, 1, 0], [0, 0, 1]]}}": "has the eigenvalue 0 and would flatten",
+    "motion: {affine: {gradient: [[-1, 0, 0], [0, -1, 0], [0, 0, 1]]}}": "has the eigenvalue -1 and would flatten",
+}
+
+
+@pytest.mark.parametrize("text", BAD, ids=lambda text: text.replace(" ", ""))
+def test_refused_in_one_sentence(tmp_path, text):
+    file = tmp_path / "bad.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load(file)
+    assert BAD[text] in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_prescribed_motion_needs_no_stiffness_where_a_beat_does():
+    values = {"geometry": {"state": "end_diastole"}}
+    with pytest.raises(ConfigError, match="stiffness_kPa"):
+        validate(values, "test")
+    assert validate(values | {"motion": {"kind": "rigid"}}, "test").motion.kind == "rigid"
+
+
+def test_kinds_can_be_swept_and_shapes_cannot():
+    config = Config(geometry={"shape": "tube"}, motion={"kind": "rigid"}, cases={"motion.kind": ["rigid", "cylinder"]})
+    assert [case.config.motion.kind for case in expand(config)] == ["rigid", "cylinder"]
+    shapes = Config(motion={"kind": "rigid"}, cases={"geometry.shape": ["ellipsoid", "tube"]})
+    with pytest.raises(ConfigError, match=r"geometry.shape cannot be swept"):
+        expand(shapes)
