@@ -85,7 +85,7 @@ def test_the_wall_in_the_image_has_the_area_of_the_wall_in_the_plane(twisting_he
 def test_tracked_points_are_followed_from_where_they_were_at_end_diastole(twisting_heart, mid, affine):
     matrix, shift = affine
     places = np.stack(np.meshgrid(AXIS[::8] - 6e-3, AXIS[::8]), axis=-1)
-    motion = follow(twisting_heart, mid, places)
+    motion = follow(twisting_heart, mid, places, "short_axis")
     inside = motion["layer"] > 0
     start = mid.heart(np.column_stack([places[inside], np.zeros(inside.sum())]))
     expected = (start @ (matrix - np.eye(3)).T + shift) @ mid.axes.T

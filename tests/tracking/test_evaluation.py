@@ -49,8 +49,9 @@ def test_rotation_is_tangential_and_scaling_radial():
     turned = 0.1 * np.stack([arm[:, 1], -arm[:, 0]], -1)
     found = evaluate(clip(-0.2 * arm), clip(turned), wall, 1)
     radius = np.hypot(*arm.T)
-    np.testing.assert_allclose(found["true_polar"][1], np.stack([0 * radius, 0.1 * radius], -1), atol=1e-12)
-    np.testing.assert_allclose(found["tracked_polar"][1], np.stack([-0.2 * radius, 0 * radius], -1), atol=1e-12)
+    for moved, along in ((turned, (0 * radius, 0.1 * radius)), (-0.2 * arm, (-0.2 * radius, 0 * radius))):
+        polar = resolve(moved, wall.position, ORIGIN, "short_axis")
+        np.testing.assert_allclose(polar, np.stack(along, -1), atol=1e-12)
     np.testing.assert_allclose(found["rms_error"][1] / 1.65e-3, [0.2, 0.1, np.sqrt(0.05)])
     np.testing.assert_allclose(found["nrmse"][1, 1:], [1, np.sqrt(5)])
 

@@ -10,10 +10,13 @@ from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
 from echotruth.location import locate
 from echotruth.mechanics import kinematics
-from echotruth.mechanics.fibres import axes_about, layer
+from echotruth.mechanics.fibres import axes_about, layer, unit
 from echotruth.tetrahedra import MaterialPoints, gradient, interpolate
 
 Floats = NDArray[np.float64]
+
+TANGENT = {"short_axis": 1, "long_axis": 2}
+"""Which of R, C, L is tangential in an image."""
 
 
 def truth(heart: Heart, frame: int, plane: Plane, axial: Floats, lateral: Floats) -> dict[str, NDArray[np.generic]]:
@@ -46,7 +49,7 @@ def truth(heart: Heart, frame: int, plane: Plane, axial: Floats, lateral: Floats
     return {name: _on_pixels(value, inside, (len(axial), len(lateral))) for name, value in values.items()}
 
 
-def follow(heart: Heart, plane: Plane, places: Floats) -> dict[str, NDArray[np.generic]]:
+def follow(heart: Heart, plane: Plane, places: Floats, kind: str) -> dict[str, NDArray[np.generic]]:
     """The true motion of the tissue that is at given places of the image at end-diastole.
 
     Parameters
@@ -55,27 +58,60 @@ def follow(heart: Heart, plane: Plane, places: Floats) -> dict[str, NDArray[np.g
     plane : Plane
     places : ndarray of shape (n_axial, n_lateral, 2), m
         Lateral, axial.
+    kind : {"short_axis", "long_axis"}
+        Of the plane: tangential is circumferential or longitudinal in it.
 
     Returns
     -------
     dict of ndarray
         true_displacement (frame, n_axial, n_lateral, 2; lateral, axial; m) and through_plane
-        (frame, n_axial, n_lateral; m) since end-diastole; layer and segment (n_axial, n_lateral) at end-diastole.
-        Outside the wall: NaN or 0.
+        (frame, n_axial, n_lateral; m) since end-diastole; wall_axes (n_axial, n_lateral, 2, 2), rows radial and
+        tangential in the image at end-diastole; heart_strain and plane_strain (frame, n_axial, n_lateral, 3: radial,
+        tangential, shear) since end-diastole, along the wall's axes in space and, of the part of F in the plane, along
+        those in the image; layer and segment (n_axial, n_lateral) at end-diastole. Outside the wall: NaN or 0.
     """
     shape = places.shape[:2]
     flat = np.column_stack([places.reshape(-1, 2), np.zeros(shape[0] * shape[1])])
     points = locate(heart.positions(0), heart.cells, plane.heart(flat))
     inside = points.cell >= 0
     wall = MaterialPoints(points.cell[inside], points.xi[inside])
-    moved = [displacement(heart, frame, wall) @ plane.axes.T for frame in range(len(heart.displacement))]
-    motion = np.stack([_on_pixels(each, inside, shape) for each in moved])
+    frames = range(len(heart.displacement))
+    motion = np.stack([displacement(heart, frame, wall) @ plane.axes.T for frame in frames])
     at_ed = labels(heart, wall)
-    return {
+    values = {
         "true_displacement": motion[..., :2],
         "through_plane": motion[..., 2],
-        "layer": _on_pixels(at_ed["layer"], inside, shape),
-        "segment": _on_pixels(at_ed["segment"], inside, shape),
+        **_strains(heart, plane, wall, kind),
+    }
+    images = {name: np.stack([_on_pixels(each, inside, shape) for each in value]) for name, value in values.items()}
+    images["wall_axes"] = _on_pixels(wall_axes(heart, plane, wall, kind), inside, shape)
+    return images | {name: _on_pixels(at_ed[name], inside, shape) for name in ("layer", "segment")}
+
+
+def wall_axes(heart: Heart, plane: Plane, points: MaterialPoints, kind: str) -> Floats:
+    """The wall's own axes in the image at end-diastole, (n, 2, 2).
+
+    Rows are radial, the part of R in the plane, and tangential, orthogonal to it on the side of C (short axis) or L
+    (long axis); columns lateral, axial.
+    """
+    normal = gradient(heart.wall_depth, heart.positions(0), heart.cells, points)
+    radial, tangent = (axes_about(normal)[:, axis] @ plane.axes.T for axis in (0, TANGENT[kind]))
+    radial = unit(radial[:, :2])
+    across = np.stack([-radial[:, 1], radial[:, 0]], axis=-1)
+    side = np.where(np.sum(across * tangent[:, :2], axis=1) < 0, -1.0, 1.0)
+    return np.stack([radial, across * side[:, None]], axis=1)
+
+
+def _strains(heart: Heart, plane: Plane, points: MaterialPoints, kind: str) -> dict[str, Floats]:
+    at_ed, tangent, frames = heart.positions(0), TANGENT[kind], range(len(heart.displacement))
+    components = ((0, 0), (tangent, tangent), (0, tangent))
+    normal = gradient(heart.wall_depth, at_ed, heart.cells, points)
+    in_space, in_plane = axes_about(normal), wall_axes(heart, plane, points, kind)
+    deformation = np.stack([gradient(heart.positions(frame), at_ed, heart.cells, points) for frame in frames])
+    seen = np.einsum("ai,...ij,bj->...ab", plane.axes[:2], deformation, plane.axes[:2])
+    return {
+        "heart_strain": kinematics.strain(deformation, in_space, components),
+        "plane_strain": kinematics.strain(seen, in_plane, ((0, 0), (1, 1), (0, 1))),
     }
 
 

@@ -77,7 +77,7 @@ def strain(gradient: Floats, axes: Floats, components: tuple[tuple[int, int], ..
 
     Parameters
     ----------
-    gradient, axes : ndarray of shape (..., 3, 3)
+    gradient, axes : ndarray of shape (..., 3, 3), or (..., 2, 2) in a plane
         F, and rows of the axes.
     components : pairs of axes
 
@@ -86,7 +86,7 @@ def strain(gradient: Floats, axes: Floats, components: tuple[tuple[int, int], ..
     ndarray of shape (..., len(components))
     """
     along = np.einsum("...ij,...kj->...ik", gradient, axes)
-    whole = (np.einsum("...ki,...kj->...ij", along, along) - np.eye(3)) / 2
+    whole = (np.einsum("...ki,...kj->...ij", along, along) - np.eye(axes.shape[-1])) / 2
     return np.stack([whole[..., i, j] for i, j in components], axis=-1)
 
 
