@@ -68,6 +68,18 @@ class BsplineDic(Section):
     """Name of the method."""
     knots_mm: Positive = 0.4
     """Distance of the knots."""
+    margin_um: Annotated[FiniteFloat, Field(ge=0)] = 250.0
+    """How far around the wall pixels count; its edge shows how it thickens."""
+    blur_px: Annotated[FiniteFloat, Field(ge=0)] = 0.5
+    """Standard deviation of the Gaussian that blurs the images; the larger of this and `blur_um` holds."""
+    blur_um: Annotated[FiniteFloat, Field(ge=0)] = 20.0
+    """The same in the tissue."""
+    smoothness: Positive = 0.1
+    """Weight of the roughness of a step, second differences of neighbouring knots, over that of the images."""
+    tolerance: Positive = 3.0
+    """Difference of grey values at which a pixel has a quarter of its weight, over their standard deviation."""
+    renewal: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.75
+    """Correlation of image and template below which the frame before becomes the template."""
 
 
 class Dis(Section):

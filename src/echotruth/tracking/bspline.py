@@ -1,0 +1,194 @@
+"""Cubic B-splines in the plane, with knots only where they reach the wall.
+
+A field is the sum of coefficients times products of cubic B-splines, one along each axis, on a square lattice of knots.
+A point lies in one cell of the lattice and sees the 4 x 4 knots around it. One thread takes all sums, in one order, so
+the bytes are the same wherever they are made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Points sorted by the cell of the lattice they lie in.
+
+    Attributes
+    ----------
+    knots : ndarray of shape (cell, 16)
+        Numbers of the knots that a cell sees, lateral fastest; -1 where there is none.
+    first : ndarray of shape (cell + 1,)
+        First point of every cell; the last entry is the number of points.
+    across, down : ndarray of shape (point, 4), float64
+        Shares of the four columns and rows of knots at every point.
+    """
+
+    knots: np.ndarray
+    first: np.ndarray
+    across: np.ndarray
+    down: np.ndarray
+
+    def evaluate(self, coefficients: np.ndarray) -> np.ndarray:
+        """Fields at the points: coefficients (knot, field) to values (point, field); absent knots count as 0."""
+        values = np.zeros((len(self.across), coefficients.shape[1]))
+        _evaluate(self.knots, self.first, self.across, self.down, np.ascontiguousarray(coefficients), values)
+        return values
+
+    def gather(self, values: np.ndarray, size: int) -> np.ndarray:
+        """Sums over the points weighted by the splines: values (point, field) to sums (knot, field) of all knots."""
+        sums = np.zeros((size, values.shape[1]))
+        _gather(self.knots, self.first, self.across, self.down, np.ascontiguousarray(values), sums)
+        return sums
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Knots of a field.
+
+    Attributes
+    ----------
+    step : float
+        Distance of the knots, px.
+    number : ndarray of shape (rows, columns)
+        Number of every knot, counted along the shorter side; -1 where the knot is not wanted.
+    origin : ndarray of shape (2,)
+        Place of the first knot: lateral, axial, px.
+    """
+
+    step: float
+    number: np.ndarray
+    origin: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number of wanted knots."""
+        return int(self.number.max()) + 1
+
+    def corners(self, points: np.ndarray) -> np.ndarray:
+        """Column and row of the knot before each of the points (n, 2); the outermost cell beyond the lattice."""
+        cell = np.floor((points - self.origin) / self.step)
+        return np.clip(cell, 1, np.array(self.number.shape[::-1]) - 3).astype(int)
+
+    def cells(self, points: np.ndarray) -> tuple[Cells, np.ndarray]:
+        """Points by the cell they lie in.
+
+        Parameters
+        ----------
+        points : ndarray of shape (n, 2)
+            Lateral, axial, px.
+
+        Returns
+        -------
+        Cells
+            Of the points in their new order.
+        order : ndarray of shape (n,)
+            Which point comes where.
+        """
+        corner = self.corners(points)
+        cell = corner[:, 1] * self.number.shape[1] + corner[:, 0]
+        order = np.argsort(cell, kind="stable")
+        every, first = np.unique(cell[order], return_index=True)
+        row, column = np.divmod(every, self.number.shape[1])
+        around = np.arange(-1, 3)
+        knots = self.number[row[:, None, None] + around[:, None], column[:, None, None] + around]
+        fraction = ((points - self.origin) / self.step - corner)[order]
+        across, down = (cubic(fraction[:, axis]) for axis in (0, 1))
+        return Cells(knots.reshape(-1, 16), np.append(first, len(points)), across, down), order
+
+    def at(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Fields at points.
+
+        Parameters
+        ----------
+        coefficients : ndarray of shape (knot, field)
+            Of any unit.
+        points : ndarray of shape (n, 2)
+            Lateral, axial, px.
+
+        Returns
+        -------
+        ndarray of shape (n, field)
+            NaN where the fields do not reach: a knot that the point sees is not there, or NaN.
+        """
+        inside = (np.abs(self._middle - points) <= self._half).all(1)
+        cells, order = self.cells(np.where(inside[:, None], points, self._middle))
+        known = np.repeat((cells.knots >= 0).all(1), np.diff(cells.first)) & inside[order]
+        result = np.full((len(points), coefficients.shape[1]), np.nan)
+        result[order[known]] = cells.evaluate(coefficients)[known]
+        return result
+
+    @property
+    def _half(self) -> np.ndarray:
+        return (np.array(self.number.shape[::-1]) - 3) * self.step / 2 + 1e-9
+
+    @property
+    def _middle(self) -> np.ndarray:
+        return self.origin + (np.array(self.number.shape[::-1]) - 1) * self.step / 2
+
+    def neighbours(self, offsets: list[tuple[int, int]]) -> np.ndarray:
+        """Numbers of all sets of knots that lie as the offsets (rows, columns, not negative) say; (set, knot)."""
+        rows, columns = np.array(self.number.shape) - np.max(offsets, axis=0)
+        sets = np.stack([self.number[i : i + rows, j : j + columns].ravel() for i, j in offsets], -1)
+        return sets[(sets >= 0).all(1)]
+
+
+def lattice(mask: np.ndarray, step: float) -> Lattice:
+    """Knots whose splines reach a mask, centred on it.
+
+    Parameters
+    ----------
+    mask : ndarray of shape (axial, lateral), bool
+        True somewhere.
+    step : float
+        Distance of the knots, px.
+
+    Returns
+    -------
+    Lattice
+    """
+    places = np.argwhere(mask)[:, ::-1]
+    low, high = places.min(0), places.max(0)
+    spans = np.maximum(np.ceil((high - low) / step).astype(int), 1)
+    shape = tuple(spans[::-1] + 3)
+    every = Lattice(step, np.zeros(shape, int), (low + high) / 2 - (spans / 2 + 1) * step)
+    corner = every.corners(places)
+    wanted = np.zeros(shape, bool)
+    for i, j in np.ndindex(4, 4):
+        wanted[corner[:, 1] + i - 1, corner[:, 0] + j - 1] = True
+    # Counted along the shorter side, so that knots which see each other have numbers close together.
+    number = np.where(wanted, np.cumsum(wanted).reshape(shape), 0) - 1
+    if shape[0] < shape[1]:
+        number = np.where(wanted, np.cumsum(wanted.T).reshape(shape[::-1]).T, 0) - 1
+    return Lattice(step, number, every.origin)
+
+
+def cubic(u: np.ndarray) -> np.ndarray:
+    """Shares of four neighbouring knots at a fraction `u` of the way between the middle two; (..., 4)."""
+    v = 1 - u
+    return np.stack([v**3 / 6, 2 / 3 - u**2 * (1 - u / 2), 2 / 3 - v**2 * (1 - v / 2), u**3 / 6], -1)
+
+
+@numba.njit(cache=True, nogil=True)
+def _evaluate(knots, first, across, down, coefficients, values):
+    for cell in range(len(knots)):
+        for point in range(first[cell], first[cell + 1]):
+            for k in range(16):
+                if knots[cell, k] >= 0:
+                    share = down[point, k // 4] * across[point, k % 4]
+                    for field in range(values.shape[1]):
+                        values[point, field] += share * coefficients[knots[cell, k], field]
+
+
+@numba.njit(cache=True, nogil=True)
+def _gather(knots, first, across, down, values, sums):
+    for cell in range(len(knots)):
+        for point in range(first[cell], first[cell + 1]):
+            for k in range(16):
+                if knots[cell, k] >= 0:
+                    share = down[point, k // 4] * across[point, k % 4]
+                    for field in range(values.shape[1]):
+                        sums[knots[cell, k], field] += share * values[point, field]
