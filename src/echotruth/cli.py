@@ -1,4 +1,4 @@
-"""The command line: `echotruth check`, `cases`, `run`, `validate` and `export`."""
+"""The command line: `echotruth check`, `cases`, `run`, `validate`, `export` and `evaluate`."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ def main() -> None:
         sys.exit(validate(Path(arguments.folder), arguments.quick))
     if arguments.command == "export":
         sys.exit(export(arguments))
+    if arguments.command == "evaluate":
+        sys.exit(evaluate(arguments))
     try:
         config = load(arguments.config)
         cases = expand(config, arguments.config)
@@ -60,7 +62,7 @@ def run(path: str, config: Config, options: list[str]) -> int:
         _quietly([*snakemake, "--unlock"])
         status = subprocess.call([*snakemake, *options])
         planned_only = {"-n", "--dry-run", "--dryrun"} & set(options)
-        if status or planned_only or not (folder / "figures/scores.csv").is_file():
+        if status or planned_only or not (folder / "figures/leaderboard.csv").is_file():
             return status
         report = folder / "report.html"
         status = _quietly([*snakemake, "--report", str(report)])
@@ -97,6 +99,25 @@ def export(arguments: argparse.Namespace) -> int:
         return _complain(str(error))
     print(file)
     return 0
+
+
+def evaluate(arguments: argparse.Namespace) -> int:
+    """Try a tracker on a repository; 0, or 1 if it failed on every clip, or 2 where it cannot be tried."""
+    from echotruth.tracking import trial
+
+    rows = []
+    try:
+        name, settings = trial.entrant(arguments.tracker, arguments.program, arguments.option)
+        tried = trial.trial(arguments.repository, arguments.name or name, settings)
+        places, sizes = tried.places(arguments.case, arguments.view), tried.sizes(arguments.size)
+        for row in tried.rows(places, sizes, arguments.jobs):
+            print(trial.told(row), flush=True)
+            rows.append(row)
+    except (trial.CannotTry, ConfigError) as error:
+        return _complain(str(error))
+    table = tried.write(rows)
+    print(f"\n{trial.summary(table)}\n\nScores: {tried.file}")
+    return 0 if any(not row["failure"] for row in rows) else 1
 
 
 def _quietly(command: list[str]) -> int:
@@ -148,4 +169,24 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--case", required=True, help="case id, as in cases.csv")
     command.add_argument("--view", required=True, help="name of the view")
     command.add_argument("--out", type=Path, help="file to write (default: CASE_VIEW in the folder export)")
+    _add_evaluate(commands)
     return parser
+
+
+def _add_evaluate(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    text = "try a tracker on every clip of a repository, score it as the repository's own and write the scores"
+    command = commands.add_parser("evaluate", help=text, description=text)
+    command.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
+    which = command.add_mutually_exclusive_group(required=True)
+    which.add_argument("--tracker", help="package.module:function, an entry point, or a method of config/README.md")
+    # `command` is taken by the name of the command itself.
+    which.add_argument("--command", dest="program", help='a program, as "track {input} {output}"')
+    command.add_argument("--name", help="under which the scores stand (default: made of the tracker's)")
+    for option, kind, text in (
+        ("option", str, "key=value for the tracker; may be given again, as those below"),
+        ("case", str, "case id, as in cases.csv (default: all)"),
+        ("view", str, "name of the view (default: all)"),
+        ("size", int, "image size, px (default: all)"),
+    ):
+        command.add_argument(f"--{option}", type=kind, action="append", default=[], help=text)
+    command.add_argument("--jobs", type=int, default=1, help="processes; the scores do not depend on it (default: 1)")

@@ -290,3 +290,14 @@ def test_callable_takes_options_that_are_no_arrays():
     options = {"weights": None, "layers": {"first": [1, "a"]}}
     config = validate({"tracking": {"trackers": {"mine": {"method": "guest", "track": "a:b", "options": options}}}}, "")
     assert config.tracking.trackers["mine"].options == options
+
+
+def test_what_a_guest_prints_does_not_mix_with_the_output(given, answering, tmp_path, capfd):
+    def guest(*_):
+        print("chatter")
+        return np.zeros((TIMES, POINTS, 2))
+
+    track(*given, answering(guest))
+    track(*given, program(tmp_path, f"print('prattle')\n{WRITES}"))
+    said, complaints = capfd.readouterr()
+    assert said == "" and "chatter" in complaints and "prattle" in complaints

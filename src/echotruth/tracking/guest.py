@@ -1,12 +1,13 @@
 """A tracker from elsewhere: called as it is, and its answer looked at before it is believed.
 
-It is given copies of the clip, the points and the mask, and nothing of the truth.
+It is given copies of the clip, the points and the mask, and nothing of the truth. What it prints goes to stderr.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from traceback import extract_tb
@@ -60,9 +61,11 @@ def track(
 
 def _called(track: str, given: tuple[Any, ...], options: dict[str, Any]) -> Any:
     """What a callable returns."""
-    function = _found(track)
     try:
-        return function(*given, **options)
+        with redirect_stdout(sys.stderr):
+            return _found(track)(*given, **options)
+    except TrackerFailed:
+        raise
     except (Exception, SystemExit) as error:
         # The first place is the call above: where there is no other, the call itself was refused.
         places = [f" ({Path(place.filename).name}, line {place.lineno})" for place in extract_tb(error.__traceback__)]

@@ -15,6 +15,9 @@ import numpy as np
 
 from echotruth.tracking.tracker import TrackerFailed
 
+STDERR = 2
+"""Where a program's output goes: that of a command is its own."""
+
 
 def run(command: list[str], entries: dict[str, Any], timeout: float) -> Any:
     """Run a program on a clip.
@@ -61,7 +64,9 @@ def _ended(command: list[str], said: Path, timeout: float) -> int:
     """Exit status of a program; its complaints go into a file, and whatever it has started ends with it."""
     try:
         with said.open("wb") as complaints:
-            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=complaints, start_new_session=True)
+            process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=STDERR, stderr=complaints, start_new_session=True
+            )
     except OSError as error:
         raise TrackerFailed(f"did not start: {command[0]}: {error.strerror}") from error
     try:
