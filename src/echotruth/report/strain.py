@@ -11,6 +11,9 @@ from echotruth.report import style
 DIRECTIONS = (("RR", style.RADIAL), ("CC", style.CIRCUMFERENTIAL), ("LL", style.LONGITUDINAL))
 """Normal strains in the order of the arrays."""
 
+LEAST = 0.1
+"""Strain that every axis reaches either way, %."""
+
 
 @style.styled
 def draw(path: str | Path, time: np.ndarray, es: int, mean: np.ndarray, sd: np.ndarray, layers: np.ndarray) -> Path:
@@ -62,4 +65,6 @@ def draw(path: str | Path, time: np.ndarray, es: int, mean: np.ndarray, sd: np.n
         panel.text(time[es] * 1e3, 0.99, " ES", color="#555555", va="top", transform=panel.get_xaxis_transform())
         panel.set_xlabel("Time since end-diastole (ms)")
         panel.margins(x=0.01)
+        low, high = panel.get_ylim()  # where nothing is strained, rounding is not worth an axis
+        panel.set_ylim(min(low, -LEAST), max(high, LEAST))
     return style.save(sheet, path)
