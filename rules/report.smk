@@ -13,6 +13,7 @@ def figure(name, category, title):
 rule report:
     input:
         rules.repository.output,
+        guests=sorted(FOLDER.glob("guests/*.csv")),
     output:
         heart=figure("heart.png", "1 Heart", "Heart at ED and ES"),
         loop=figure("loop.png", "1 Heart", "Pressure-volume loop and active tension"),
@@ -22,7 +23,8 @@ rule report:
         views=figure("views.png", "2 Images", "All views at ED and ES"),
         bullseye=figure("bullseye.png", "3 Tracking", "Bullseye, FE and tracked"),
         error=figure("error.png", "3 Tracking", "Error by layer and resolution"),
-        scores=figure("scores.csv", "3 Tracking", "Scores"),
+        leaderboard=figure("leaderboard.png", "3 Tracking", "Leaderboard"),
+        standings=figure("leaderboard.csv", "3 Tracking", "Leaderboard as a table"),
         movie=FIGURES / "clip.mp4",
     params:
         code=code("report"),

@@ -1,9 +1,11 @@
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from echotruth.report import bullseye, error, loop, resolutions, strain, views
+from echotruth.report import bullseye, error, leaderboard, loop, resolutions, strain, views
+from echotruth.tracking.leaderboard import best, standings
 
 TIME = np.arange(10) * 3e-3
 WAVE = np.sin(np.pi * np.arange(10) / 10) ** 2
@@ -55,9 +57,25 @@ def test_error(tmp_path):
     seen(error.draw(tmp_path / "error.png", {"mid": curves, "long_axis": curves}, ["long_axis"]))
 
 
+@pytest.mark.parametrize("hearts", [1, 5])
+def test_leaderboard(tmp_path, hearts):
+    random = np.random.default_rng(0)
+    places = [(f"h{k}", view, size, name) for k in range(hearts) for view in ("mid", "apex") for size in (64, 32)
+              for name in ("one", "two", "failing")]  # fmt: skip
+    table = pd.DataFrame(places, columns=["case", "view", "size_px", "tracker"])
+    for figure in ("nrmse_all_percent", "ecc_rms_points", "ell_rms_points", "err_rms_points"):
+        table[figure] = random.uniform(1, 30, len(table))
+    failing = table["tracker"] == "failing"
+    table.loc[failing, "nrmse_all_percent"] = 100.0
+    table.loc[failing, ["ecc_rms_points", "err_rms_points"]] = np.nan
+    ranked = standings(table.assign(failure=np.where(failing, "no motion", "")), 1)
+    assert best(ranked)[-1] == "failing"
+    seen(leaderboard.draw(tmp_path / "leaderboard.png", ranked, best(ranked)))
+
+
 def test_bullseye_without_data_is_hatched_throughout(tmp_path):
     nothing = np.full(17, np.nan)
-    seen(bullseye.draw(tmp_path / "bullseye.png", nothing, nothing))
+    seen(bullseye.draw(tmp_path / "bullseye.png", nothing, nothing, "none"))
 
 
 @pytest.mark.parametrize("number, place", [(1, (0, 0.85)), (2, (-0.74, 0.43)), (10, (0, -0.6)), (16, (0.38, 0.1))])

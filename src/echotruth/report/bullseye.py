@@ -22,7 +22,7 @@ COLOURS = colormaps["RdBu_r"]
 
 
 @style.styled
-def draw(path: str | Path, true: np.ndarray, tracked: np.ndarray, quantity: str = "Circumferential") -> Path:
+def draw(path: str | Path, true: np.ndarray, tracked: np.ndarray, tracker: str) -> Path:
     """Draw truth, estimate and their difference, the first two on one scale.
 
     Parameters
@@ -31,8 +31,8 @@ def draw(path: str | Path, true: np.ndarray, tracked: np.ndarray, quantity: str 
         Picture to write.
     true, tracked : ndarray of shape (17,)
         Displacement at end-systole since end-diastole of segments 1..17, m; NaN where there is none.
-    quantity : str
-        What the displacement is.
+    tracker : str
+        Name of the one that tracked.
 
     Returns
     -------
@@ -46,14 +46,14 @@ def draw(path: str | Path, true: np.ndarray, tracked: np.ndarray, quantity: str 
     for panel, values, name, scale in zip(
         panels,
         (true, tracked, difference),
-        ("Finite elements", "Speckle tracking", "Tracking minus FE"),
+        ("Finite elements", f"Tracked: {tracker}", "Tracking minus FE"),
         (common, common, _scale(difference)),
         strict=True,
     ):
         disc(panel, values / UM, scale)
         panel.set_title(name)
     sheet.colorbar(_bar(common), ax=panels[:2], shrink=0.7, aspect=50, orientation="horizontal", pad=0.06).set_label(
-        f"{quantity} displacement at ES (µm)"
+        "Circumferential displacement at ES (µm)"
     )
     sheet.colorbar(
         _bar(_scale(difference)), ax=panels[2], shrink=0.9, aspect=25, orientation="horizontal", pad=0.06

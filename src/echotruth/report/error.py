@@ -15,8 +15,8 @@ from echotruth.report import style
 SIZES = (("blue", "o"), ("red", "s"), ("#556b2f", "v"))
 """Colour and marker of the image sizes, the largest first, as in the paper."""
 
-TRACKERS = (("--", "none"), ("-", "full"), (":", "none"), ("-.", "full"))
-"""Line style and filling of the trackers, in the order of the configuration."""
+TRACKERS = (("--", "none"), ("-", "full"))
+"""Line style and filling of the trackers, in their order."""
 
 Errors = Mapping[str, Mapping[str, Mapping[int, np.ndarray]]]
 
@@ -30,7 +30,7 @@ def draw(path: str | Path, errors: Errors, longitudinal: Collection[str] = ()) -
     path : str or Path
         Picture to write.
     errors : mapping of view to mapping of tracker to mapping of image size to ndarray of shape (layer,)
-        RMS error of circumferential (long axis: longitudinal) displacement at end-systole, m,
+        Of one or two trackers: RMS error of circumferential (long axis: longitudinal) displacement at end-systole, m,
         the endocardium first; NaN where there is none.
     longitudinal : collection of str
         Long-axis views, in which the component is the longitudinal one.

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from echotruth.config import Config
-from echotruth.report import bullseye, clip, error, heart, loop, resolutions, strain, views
+from echotruth.report import bullseye, clip, error, heart, leaderboard, loop, resolutions, strain, views
+from echotruth.tracking.leaderboard import best, rows, standings
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ARROWS = 0.45e-3
 """Distance between the points whose motion is drawn on a clip, m."""
@@ -41,7 +46,7 @@ class Figures:
         self.view = next((name for name, view in config.views.items() if name == "mid"), next(iter(config.views)))
 
     def draw(self) -> None:
-        """Draw all figures and write the table of scores."""
+        """Draw all figures and write the leaderboard."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self.heart()
         self.loop()
@@ -51,7 +56,7 @@ class Figures:
         self.views()
         self.bullseye()
         self.error()
-        scores(self.tree, self.complete, self.config).to_csv(self.folder / "scores.csv", index=False)
+        self.leaderboard()
 
     def group(self, path: str) -> xr.Dataset:
         """A group for the heart that stands for all."""
@@ -121,16 +126,36 @@ class Figures:
         }
         views.draw(self.folder / "views.png", pictures, self.config.bmode.si().field_of_view)
 
+    @cached_property
+    def standings(self) -> pd.DataFrame:
+        """The leaderboard, guests among the trackers."""
+        return standings(rows(self.tree, self.config, self.complete, self.folder.parent), self.config.seed)
+
+    @property
+    def order(self) -> list[str]:
+        """The repository's own trackers, the best first."""
+        return [name for name in best(self.standings) if name in self.config.tracking.trackers]
+
+    def leaderboard(self) -> None:
+        """The order of the trackers, as a table and drawn."""
+        self.standings.round(4).to_csv(self.folder / "leaderboard.csv", index=False)
+        leaderboard.draw(self.folder / "leaderboard.png", self.standings, best(self.standings))
+
     def bullseye(self) -> None:
-        """Circumferential displacement of the segments in the short-axis views, true and as last tracked."""
+        """Circumferential displacement of the segments in the short-axis views, true and by the best tracker."""
         short = [name for name, view in self.config.views.items() if view.plane == "short_axis"]
-        data = self.group(f"evaluation/{self.sizes[0]}").isel(tracker=-1).sel(polar="tangential", view=short)
+        data = self.group(f"evaluation/{self.sizes[0]}").sel(tracker=self.order[0], polar="tangential", view=short)
         # A segment at a boundary may show in two planes; the mean of what each sees stands for it.
         true, tracked = (data[name].mean("view").values for name in ("true_segment", "tracked_segment"))
-        bullseye.draw(self.folder / "bullseye.png", true, tracked)
+        bullseye.draw(self.folder / "bullseye.png", true, tracked, self.order[0])
 
     def error(self) -> None:
-        """Error of the tangential displacement by layer, view, tracker and image size, mean over the hearts."""
+        """Error of the tangential displacement by layer, view and image size, mean over the hearts.
+
+        Shown are the first tracker of the configuration and the best.
+        """
+        first = next(iter(self.config.tracking.trackers))
+        shown = dict.fromkeys((first, self.order[0]))
         data = {size: self.tree[f"evaluation/{size}"].to_dataset().isel(case=self.complete) for size in self.sizes}
         curves = {
             size: each.rms_error.sel(measure="tangential").isel(region=slice(1, None)) for size, each in data.items()
@@ -140,36 +165,9 @@ class Figures:
                 tracker: {
                     size: curve.sel(view=view, tracker=tracker).mean("case").values for size, curve in curves.items()
                 }
-                for tracker in self.config.tracking.trackers
+                for tracker in shown
             }
             for view in self.config.views
         }
         long_axis = [name for name, view in self.config.views.items() if view.plane == "long_axis"]
         error.draw(self.folder / "error.png", errors, long_axis)
-
-
-def scores(tree: xr.DataTree, complete: np.ndarray, config: Config) -> pd.DataFrame:
-    """Scores of every tracker, view and image size, the mean over the hearts.
-
-    Returns
-    -------
-    DataFrame
-        RMS error (um) and NRMSE (%) of the whole displacement vector over the wall, change of the tangential
-        spread from endo- to epicardium, tracked and true (%), and coverage (%).
-    """
-    tables = []
-    for size in config.bmode.sizes:
-        data = tree[f"evaluation/{size}"].to_dataset().isel(case=complete).mean("case")
-        whole = data.sel(measure="total", region=0)
-        columns = {
-            "rms_error_um": whole.rms_error * 1e6,
-            "nrmse_percent": whole.nrmse * 100,
-            "tracked_spread_change_percent": data.tracked_spread_change,
-            "true_spread_change_percent": data.true_spread_change,
-            "coverage_percent": data.coverage * 100,
-        }
-        table = xr.Dataset(
-            {name: values.drop_vars(["measure", "region"], errors="ignore") for name, values in columns.items()}
-        )
-        tables.append(table.to_dataframe().reset_index().assign(size_px=size, hearts=len(complete)))
-    return pd.concat(tables).round(2)
