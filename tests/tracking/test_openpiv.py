@@ -25,7 +25,7 @@ def test_openpiv_follows_a_turn_and_a_shift_of_speckle_to_a_fifth_of_a_pixel(cli
     sys.modules.pop("openpiv_tracker", None)
     frames, along = clip(motion, 4), np.arange(40, 121, 10.0)
     points = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
-    given = (frames, points, np.ones(frames.shape[1:], bool), 2.3e-5, np.arange(4) * 1e-3, 1)
+    given = (frames, points, np.ones(frames.shape[1:], bool), 12e-3 / 512, np.arange(4) * 1e-3, 1)
     displacement, quality = track(*given, Guest(track="openpiv_tracker:track"))
     true = np.stack([motion(points, t) - points for t in range(4)])
     assert np.hypot(*true[-1].T).mean() > 4

@@ -1,0 +1,64 @@
+"""What docs/trackers.md says is so."""
+
+import inspect
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from echotruth.config import Config
+from echotruth.config.loading import validate
+from echotruth.config.tracking import GIVEN, Guest
+from echotruth.tracking import track
+from echotruth.tracking.guest import GROUP
+
+PAGE = (Path(__file__).parents[2] / "docs/trackers.md").read_text()
+TRACKER, PROGRAM = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+(PACKAGE,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+(CONFIGURATION,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+SHIFT = np.array([1.3, -0.6])
+"""Motion of the speckle from frame to frame: lateral, axial, px."""
+
+
+@pytest.fixture
+def speckle(clip, tmp_path, monkeypatch):
+    """What a tracker is given of speckle that moves so; the page's code lies in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    monkeypatch.delitem(sys.modules, "mypackage", raising=False)
+    Path("mypackage.py").write_text(TRACKER)
+    Path("network.py").write_text(PROGRAM)
+    frames, along = clip(lambda place, t: place + t * SHIFT, 5), np.arange(40, 121, 12.5)
+    points = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+    return frames, points, np.ones(frames.shape[1:], bool), 2.3e-5, np.arange(5) * 1e-3, 1
+
+
+@pytest.mark.parametrize("options", [{}, {"window_mm": 0.5}])
+def test_tracker_of_the_page_follows_shifted_speckle_to_a_tenth_of_a_pixel(speckle, options):
+    displacement, quality = track(*speckle, Guest(track="mypackage:track", options=options))
+    error = displacement - np.multiply.outer(np.arange(5), SHIFT)[:, None]
+    assert np.linalg.norm(error, axis=-1).max() < 0.1
+    assert (quality == 1).all()
+
+
+def test_program_of_the_page_runs(speckle):
+    displacement, _ = track(*speckle, Guest(command=[sys.executable, "network.py", "{input}", "{output}"]))
+    assert displacement.shape == (5, len(speckle[1]), 2) and not displacement.any()
+
+
+def test_order_on_the_page_is_that_of_the_arguments():
+    rows = re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE)
+    assert tuple(rows) == (*GIVEN, "displacement", "quality")
+    scope = {}
+    exec(TRACKER, scope)
+    assert tuple(inspect.signature(scope["track"]).parameters) == (*GIVEN, "window_mm")
+
+
+def test_configuration_and_entry_point_of_the_page_can_be():
+    config = validate(yaml.safe_load(CONFIGURATION), "docs/trackers.md")
+    assert isinstance(config, Config) and isinstance(config.tracking.trackers["network"], Guest)
+    assert list(tomllib.loads(PACKAGE)["project"]["entry-points"]) == [GROUP]
