@@ -94,6 +94,63 @@ def test_tracked_points_are_followed_from_where_they_were_at_end_diastole(twisti
     assert np.isnan(motion["true_displacement"][1][~inside]).all()
 
 
+@pytest.fixture(scope="module")
+def followed(twisting_heart, mid):
+    """Motion of points in the wall by name, and their places from the long axis, lateral, axial."""
+    places = np.stack(np.meshgrid(AXIS[::4] - 6e-3, AXIS[::4]), axis=-1)
+    motion = follow(twisting_heart, mid, places, "short_axis")
+    inside = motion["layer"] > 0
+    frames = {name: motion[name][1][inside] for name in ("heart_strain", "plane_strain")}
+    return frames | {"axes": motion["wall_axes"][inside], "arm": places[inside] - [0, 6.5e-3]}
+
+
+def test_axes_of_the_wall_in_a_short_axis_image_are_those_of_its_circle(followed):
+    radial = followed["arm"] / np.linalg.norm(followed["arm"], axis=1)[:, None]
+    # C runs counter-clockwise seen from the base, and the image is seen from the apex.
+    tangential = np.stack([-radial[:, 1], radial[:, 0]], -1)
+    expected = np.stack([radial, tangential], 1)
+    cosines = np.einsum("nai,nai->na", followed["axes"], expected)
+    assert cosines.min() > np.cos(np.radians(8))  # the coarse mesh has twelve sides
+    assert cosines.mean() > np.cos(np.radians(3))
+    np.testing.assert_allclose(
+        followed["axes"] @ np.swapaxes(followed["axes"], 1, 2), np.tile(np.eye(2), (len(radial), 1, 1)), atol=1e-6
+    )
+
+
+def test_strain_in_the_plane_of_an_affine_motion_is_the_formula(twisting_heart, mid):
+    sheared = np.array([[1.1, 0.2, 0.05], [-0.1, 0.8, 0.1], [0.02, -0.07, 0.95]])
+    moved = np.stack([0 * twisting_heart.nodes, twisting_heart.nodes @ (sheared - np.eye(3)).T])
+    places = np.stack(np.meshgrid(AXIS[::4] - 6e-3, AXIS[::4]), axis=-1)
+    motion = follow(replace(twisting_heart, displacement=moved), mid, places, "short_axis")
+    inside = motion["layer"] > 0
+    matrix, axes = (mid.axes @ sheared @ mid.axes.T)[:2, :2], motion["wall_axes"][inside]
+    green = (matrix.T @ matrix - np.eye(2)) / 2
+    for k, (a, b) in enumerate(((0, 0), (1, 1), (0, 1))):
+        expected = np.einsum("ni,ij,nj->n", axes[:, a], green, axes[:, b])
+        np.testing.assert_allclose(motion["plane_strain"][1][inside][:, k], expected, atol=1e-6)
+
+
+def test_strain_of_the_heart_at_followed_points_is_that_along_the_walls_axes_in_space(followed, affine):
+    # Squeezed alike in all directions across the axis: E_CC is the same at every point.
+    green = (affine[0].T @ affine[0] - np.eye(3)) / 2
+    np.testing.assert_allclose(followed["heart_strain"][:, 1], green[0, 0], atol=1e-6)
+    # The wall leans to the plane, so that its thickening there is not all of it.
+    assert np.abs(followed["heart_strain"][:, 0] - followed["plane_strain"][:, 0]).max() > 1e-4
+
+
+def test_along_the_long_axis_the_tangential_strain_is_the_longitudinal(twisting_heart, affine):
+    where = plane(CONFIG.views["long_axis"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+    places = np.stack(np.meshgrid(AXIS[::6] - 6e-3, AXIS[::6]), axis=-1)
+    motion = follow(twisting_heart, where, places, "long_axis")
+    inside = motion["layer"] > 0
+    space = motion["heart_strain"][1][inside]
+    # R, C and L are orthogonal: the trace of E, less the constant E_CC, is left for the other two.
+    green = (affine[0].T @ affine[0] - np.eye(3)) / 2
+    np.testing.assert_allclose(space[:, 0] + space[:, 1], np.trace(green) - green[0, 0], atol=1e-6)
+    upper = motion["wall_axes"][inside][:, 1, 1]
+    assert upper.min() > 0, "tangential runs from apex to base, which is down"
+
+
 def test_the_cavity_centre_is_on_the_axis_and_moves_with_a_shifted_heart(twisting_heart, mid):
     assert np.allclose(cavity_centre(twisting_heart, mid), [0, 6.5e-3], atol=1e-6)
     shifted = twisting_heart.__class__(**{**vars(twisting_heart), "nodes": twisting_heart.nodes + [0.3e-3, 0.2e-3, 0]})

@@ -42,9 +42,12 @@ def draw(path: str | Path, standings: pd.DataFrame, order: list[str]) -> Path:
     """
     sheet = style.figure(10.4, 1.7 + 0.52 * len(order))
     panels = sheet.subplots(1, len(PANELS), sharey=True)
+    sizes = sorted(standings["size_px"].unique(), reverse=True)[: len(SIZES)]
     for panel, (figure, title) in zip(panels, PANELS, strict=True):
-        for k, size in enumerate(sorted(standings["size_px"].unique(), reverse=True)[: len(SIZES)]):
-            _size(panel, standings[standings["size_px"] == size].set_index("tracker"), figure, order, k)
+        for k, size in enumerate(sizes):
+            table = standings[standings["size_px"] == size].set_index("tracker")
+            rows = pd.Series(np.arange(len(order)) + 0.26 * (k - (len(sizes) - 1) / 2), order)
+            _size(panel, table, figure, rows, SIZES[k])
         panel.set(xlabel=title, xlim=(0, None))
         panel.grid(axis="y", visible=False)
     panels[0].set_yticks(range(len(order)), [_name(standings, tracker) for tracker in order])
@@ -53,10 +56,9 @@ def draw(path: str | Path, standings: pd.DataFrame, order: list[str]) -> Path:
     return style.save(sheet, path)
 
 
-def _size(axes: Axes, table: pd.DataFrame, figure: str, order: list[str], k: int) -> None:
+def _size(axes: Axes, table: pd.DataFrame, figure: str, place: pd.Series, look: tuple[str, str]) -> None:
     """One image size: the views as small rings, their mean as a mark with its interval."""
-    colour, marker = SIZES[k]
-    place = {tracker: row + 0.26 * (k - 1) for row, tracker in enumerate(order)}
+    colour, marker = look
     views, mean = table[table["view"] != ALL], table[table["view"] == ALL]
     axes.plot(views[figure], views.index.map(place), "o", color=colour, markersize=3, fillstyle="none", alpha=0.5)
     axes.plot(mean[figure], mean.index.map(place), marker, color=colour, markersize=6)

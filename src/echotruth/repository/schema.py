@@ -160,7 +160,7 @@ TRACKING = (
     _array(
         "displacement", "case view tracker frame axial lateral plane", "float32", "m", "tracked displacement from ED"
     ),
-    _array("quality", "case view tracker frame axial lateral", "float32", "1", "height of the correlation peak"),
+    _array("quality", "case view tracker frame axial lateral", "float32", "1", "how sure the tracker is, 0 to 1"),
 )
 
 _POINT = "case view frame axial lateral"

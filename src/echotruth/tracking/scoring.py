@@ -147,6 +147,7 @@ def row(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
         `nrmse_cycle_percent` and `drift_um`.
     """
     tangential = {"short_axis": "ecc", "long_axis": "ell"}[plane]
+    tracked_change, true_change = (score[f"{name}_spread_change"] for name in ("tracked", "true"))
     strains = {"err": 0, "ecc": None, "ell": None, tangential: 1}
     figures = {
         "nrmse_percent": 100 * score["nrmse"][0, 2],
@@ -159,9 +160,9 @@ def row(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
         "epe_median_um": 1e6 * score["end_point_error"][0, 1],
         "epe_p95_um": 1e6 * score["end_point_error"][0, 2],
         "drift_um": 1e6 * score["drift"],
-        "spread_change_percent": score["tracked_spread_change"],
-        "true_spread_change_percent": score["true_spread_change"],
-        "spread_returned_percent": 100 * score["tracked_spread_change"] / score["true_spread_change"],
+        "spread_change_percent": tracked_change,
+        "true_spread_change_percent": true_change,
+        "spread_returned_percent": 100 * tracked_change / true_change if true_change else np.nan,
         "through_plane_correlation": score["through_plane_correlation"],
         "coverage_percent": 100 * score["coverage"],
     }
