@@ -76,6 +76,12 @@ def test_unknown_option_is_refused_in_one_line():
     assert refused(*echotruth_("check", "config/demo.yaml", "--cores", "2"))
 
 
+def test_evaluation_of_no_repository_is_refused_in_one_line(tmp_path):
+    status, said, complaint = echotruth_("evaluate", "out/demo", "--tracker", "mypackage:track", cwd=tmp_path)
+    assert refused(status, said, complaint) and "out/demo is not a repository" in complaint
+    assert not list(tmp_path.iterdir())
+
+
 def test_run_outside_a_checkout_is_refused_in_one_line(tmp_path):
     status, said, complaint = echotruth_("run", ROOT / "config/demo.yaml", cwd=tmp_path)
     assert refused(status, said, complaint) and "no Snakefile here" in complaint
@@ -85,7 +91,7 @@ def test_run_outside_a_checkout_is_refused_in_one_line(tmp_path):
 def test_help_names_every_command():
     status, said, _ = echotruth_("--help")
     assert status == 0
-    assert all(command in said for command in ("check", "cases", "run"))
+    assert all(command in said for command in ("check", "cases", "run", "validate", "export", "evaluate"))
 
 
 def test_version():

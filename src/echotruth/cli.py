@@ -107,7 +107,7 @@ def evaluate(arguments: argparse.Namespace) -> int:
 
     rows = []
     try:
-        name, settings = trial.entrant(arguments.tracker, arguments.program, arguments.option)
+        name, settings = trial.entrant(arguments.tracker, arguments.program, arguments.option, arguments.timeout)
         tried = trial.trial(arguments.repository, arguments.name or name, settings)
         places, sizes = tried.places(arguments.case, arguments.view), tried.sizes(arguments.size)
         for row in tried.rows(places, sizes, arguments.jobs):
@@ -181,6 +181,7 @@ def _add_evaluate(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     which.add_argument("--tracker", help="package.module:function, an entry point, or a method of config/README.md")
     # `command` is taken by the name of the command itself.
     which.add_argument("--command", dest="program", help='a program, as "track {input} {output}"')
+    command.add_argument("--timeout", type=float, help="longest time a program may take over a clip, s (default: 3600)")
     command.add_argument("--name", help="under which the scores stand (default: made of the tracker's)")
     for option, kind, text in (
         ("option", str, "key=value for the tracker; may be given again, as those below"),

@@ -1,5 +1,6 @@
 """`echotruth evaluate` scores anyone's tracker on a repository whose motion is an affine map."""
 
+import runpy
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import zarr
 from echotruth.cases import expand
 from echotruth.cli import main
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tracking, View
+from echotruth.config.tracking import Guest
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import truth
@@ -19,10 +21,11 @@ from echotruth.imaging.view import plane
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
-from echotruth.repository.job import record_path
+from echotruth.repository.job import Job, record_path
 from echotruth.repository.store import Store
-from echotruth.tracking import grid
+from echotruth.tracking import grid, scoring
 
+ROOT = Path(__file__).parents[2]
 COURSE = np.array([0, 0.4, 1, 0.3])
 """Share of the motion in each frame."""
 
@@ -32,7 +35,14 @@ CONFIG = Config(
     loop=Loop(frames=len(COURSE)),
     views={"mid": View(), "apex": View(position=0.7)},
     bmode=Bmode(size_px=128, downsampling=(1, 2)),
-    tracking=Tracking(grid_px=2, trackers={"ours": PhaseCorrelation(window_px=32)}),
+    tracking=Tracking(
+        grid_px=2,
+        trackers={
+            "ours": PhaseCorrelation(window_px=32),
+            "lot": Guest(track="guests:drawn"),
+            "poor": Guest(track="guests:small_only"),
+        },
+    ),
     cases={"seed": [1, 2]},
 )
 
@@ -232,6 +242,32 @@ def test_tracker_that_ends_its_process_is_told_in_one_sentence(made, evaluate):
     assert not (made / "guests/guests_crash.csv").exists()
 
 
+@pytest.fixture
+def worked(made, evaluate):
+    """Job and result of the workflow's own script on one view of the first heart."""
+    job = Job(made, "tracking", expand(CONFIG)[0].id, "mid")
+    return job, runpy.run_path(str(ROOT / "workflow/scripts/tracking.py"))["work"](job)
+
+
+def test_guest_of_the_configuration_gets_the_scores_it_gets_on_the_command_line(made, worked, evaluate):
+    job, result = worked
+    evaluate("--tracker", "guests:drawn", "--case", job.case.id, "--view", "mid")
+    truth = scoring.ground_truth(job)
+    for _, found in scores(made, "guests_drawn").iterrows():
+        tracked = result[f"tracking/{found['size_px']}"]["displacement"][1]
+        for name, value in scoring.row(scoring.score(tracked, truth), "short_axis").items():
+            np.testing.assert_allclose(found[name], value, rtol=1e-9, err_msg=name)
+
+
+def test_guest_of_the_configuration_that_fails_leaves_the_others_their_motion(worked):
+    job, result = worked
+    assert list(job.verdict["failures"]) == ["poor/128"] and "no room" in job.verdict["failures"]["poor/128"]
+    large, small = (result[f"tracking/{size}"]["displacement"] for size in (128, 64))
+    assert np.isnan(large[2]).all() and not np.nanmax(abs(small[2]))
+    for tracked in (large[0], large[1], small[0], small[1]):
+        assert np.nanmax(abs(tracked)) > 0
+
+
 REFUSED = {
     "ours": (["--tracker", "a:b", "--name", "ours"], "ours is a tracker of {made} already"),
     "name": (["--tracker", "a:b", "--name", "my tracker"], "use letters, digits and underscores only"),
@@ -247,6 +283,7 @@ REFUSED = {
     ),
     "quotes": (["--command", "'a {input} {output}"], "no closing quotation"),
     "places": (["--command", "a {input}"], "must say where the path of the output goes: {{output}}"),
+    "timeout": (["--command", "a {input} {output}", "--timeout", "0"], "timeout_s = 0.0: should be greater than 0"),
     "jobs": (["--tracker", "a:b", "--jobs", "0"], "--jobs 0: must be 1 or more"),
 }
 

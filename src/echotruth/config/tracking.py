@@ -109,7 +109,7 @@ class Guest(Section):
 
     method: Literal["guest"] = "guest"
     """Name of the method."""
-    track: str | None = None
+    track: Annotated[str, Field(min_length=1)] | None = None
     """A callable as `package.module:function`, or the name of an entry point in the group `echotruth.trackers`."""
     command: Annotated[list[str], Field(min_length=1)] | None = None
     """A program and its arguments, in which {input} and {output} stand for the .npz files it reads and writes."""

@@ -9,9 +9,10 @@ from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
+from numpy.lib.format import write_array
 
 from echotruth.tracking.tracker import TrackerFailed
 
@@ -43,7 +44,7 @@ def run(command: list[str], entries: dict[str, Any], timeout: float) -> Any:
     """
     with TemporaryDirectory(prefix="echotruth-") as folder:
         paths = {name: Path(folder, f"{name}.npz") for name in ("input", "output")}
-        np.savez(paths["input"], **entries)
+        _write(paths["input"], entries)
         for name, path in paths.items():
             command = [part.replace(f"{{{name}}}", str(path)) for part in command]
         said = Path(folder, "said")
@@ -86,6 +87,14 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 def _last_line(said: Path) -> str:
     lines = said.read_text(encoding="utf-8", errors="replace").split("\n")
     return next((in_one_line(line) for line in reversed(lines) if line.strip()), "it said nothing on stderr")
+
+
+def _write(path: Path, entries: dict[str, Any]) -> None:
+    """What `numpy.savez` does, whatever the names of the entries, and without objects of Python."""
+    with ZipFile(path, "w") as file:
+        for name, value in entries.items():
+            with file.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                write_array(entry, np.asarray(value), allow_pickle=False)
 
 
 def _read(path: Path) -> Any:

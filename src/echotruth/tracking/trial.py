@@ -154,7 +154,9 @@ class Trial:
         return all(path.is_file() and ledger.read(path)["status"] == "complete" for path in records)
 
 
-def entrant(tracker: str | None, command: str | None, options: list[str]) -> tuple[str, dict[str, Any]]:
+def entrant(
+    tracker: str | None, command: str | None, options: list[str], timeout: float | None = None
+) -> tuple[str, dict[str, Any]]:
     """What a tracker is called and its settings, from what stands on the command line.
 
     Parameters
@@ -165,6 +167,8 @@ def entrant(tracker: str | None, command: str | None, options: list[str]) -> tup
         Where there is no `tracker`: a program and its arguments, as a shell would split them.
     options : list of str
         As `key=value`, the value in YAML.
+    timeout : float, optional
+        How long the program may take over a clip, s.
 
     Raises
     ------
@@ -177,7 +181,8 @@ def entrant(tracker: str | None, command: str | None, options: list[str]) -> tup
             words = split(command or "")
         except ValueError as error:
             raise CannotTry(f"--command {command}: {str(error).lower()}: mend the quotes") from None
-        return (Path(words[0]).stem if words else ""), {"method": "guest", "command": words, "options": pairs}
+        limit = {} if timeout is None else {"timeout_s": timeout}
+        return (Path(words[0]).stem if words else ""), {"method": "guest", "command": words, "options": pairs, **limit}
     if tracker in OWN:
         return tracker, {"method": tracker, **pairs}
     name = re.sub(r"\W+", "_", tracker.removesuffix(":track"))
