@@ -108,3 +108,22 @@ def test_maps_stand_on_the_grid_and_nowhere_else(truth):
     arrays = truth.arrays
     assert arrays["true_strain"].shape == (3, 5, 45, 45, 3) and arrays["wall_axes"].shape == (45, 45, 2, 2)
     assert (arrays["layer"][truth.inside] > 0).all() and not arrays["layer"][~truth.inside].any()
+
+
+@pytest.mark.parametrize("count", [0, 1, 5])
+def test_a_grid_too_coarse_for_strain_still_has_an_error_of_displacement(truth, count):
+    kept = np.arange(len(truth.wall.layer)) < count
+    wall = replace(truth.wall, **{name: getattr(truth.wall, name)[kept] for name in ("position", "layer", "segment")})
+    few = Truth(
+        inside=truth.inside & (np.cumsum(truth.inside).reshape(truth.inside.shape) <= count),
+        wall=wall,
+        operator=Operator(wall.position, truth.operator.axes[kept], truth.operator.radius),
+        displacement=truth.displacement[:, kept],
+        through_plane=truth.through_plane[:, kept],
+        strain=truth.strain[:, :, kept],
+        es=truth.es,
+    )
+    found = row(score(tracked(few, 0.9 * few.displacement), few), "short_axis")
+    np.testing.assert_allclose(found["nrmse_percent"], 10 if count else np.nan)
+    assert np.isnan(found["ecc_rms_points"]) and np.isnan(found["global_err_bias_points"])
+    assert np.isnan(few.arrays["true_strain"]).sum() >= few.arrays["true_strain"].size - 3 * 5 * 3 * count

@@ -86,7 +86,7 @@ class Operator:
     def _neighbours(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Numbers of the points about each, their weights, and the terms of the polynomial there."""
         tree = cKDTree(self.position)
-        most = int(tree.query_ball_point(self.position, self.radius, return_length=True).max())
+        most = int(tree.query_ball_point(self.position, self.radius, return_length=True).max(initial=1))
         distance, near = tree.query(self.position, most, distance_upper_bound=self.radius)
         distance, near = (each.reshape(len(self.position), most) for each in (distance, near))
         # Where there are fewer, the tree fills up with a number past the last.
