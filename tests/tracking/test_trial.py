@@ -1,6 +1,7 @@
 """`echotruth evaluate` scores anyone's tracker on a repository whose motion is an affine map."""
 
 import runpy
+import shutil
 import sys
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from echotruth.repository import layout, ledger, schema
 from echotruth.repository.job import Job, record_path
 from echotruth.repository.store import Store
 from echotruth.tracking import grid, scoring
+from echotruth.tracking.trial import entrant
 
 ROOT = Path(__file__).parents[2]
 COURSE = np.array([0, 0.4, 1, 0.3])
@@ -242,6 +244,23 @@ def test_tracker_that_ends_its_process_is_told_in_one_sentence(made, evaluate):
     assert not (made / "guests/guests_crash.csv").exists()
 
 
+def test_repository_with_a_damaged_clip_is_refused_in_one_sentence(made, evaluate, tmp_path):
+    shutil.copytree(made, tmp_path / "damaged")
+    shard = tmp_path / "damaged/small.zarr/bmode/128/image/c/0/0/0/0/0"
+    content = bytearray(shard.read_bytes())
+    content[len(content) // 3] ^= 1
+    shard.write_bytes(content)
+    status, _, complaint = evaluate("--tracker", "guests:still", repository=tmp_path / "damaged")
+    assert (status, complaint.count("\n")) == (2, 1) and "cannot be read at" in complaint
+
+
+@pytest.mark.parametrize(
+    "tracker, name", [("a:track", "a"), ("a.b:track", "a_b"), ("a:other", "a_other"), ("a-b", "a_b"), ("dis", "dis")]
+)
+def test_scores_stand_under_a_name_made_of_that_of_the_tracker(tracker, name):
+    assert entrant(tracker, None, [])[0] == name
+
+
 @pytest.fixture
 def worked(made, evaluate):
     """Job and result of the workflow's own script on one view of the first heart."""
@@ -284,6 +303,7 @@ REFUSED = {
     "quotes": (["--command", "'a {input} {output}"], "no closing quotation"),
     "places": (["--command", "a {input}"], "must say where the path of the output goes: {{output}}"),
     "timeout": (["--command", "a {input} {output}", "--timeout", "0"], "timeout_s = 0.0: should be greater than 0"),
+    "untimed": (["--tracker", "a:b", "--timeout", "5"], "--timeout 5: a:b is not timed"),
     "jobs": (["--tracker", "a:b", "--jobs", "0"], "--jobs 0: must be 1 or more"),
 }
 

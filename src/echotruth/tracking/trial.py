@@ -26,7 +26,6 @@ from echotruth.config.loading import load, validate
 from echotruth.config.tracking import METHODS, Guest, name_of
 from echotruth.repository import ledger
 from echotruth.repository.job import Job, record_path
-from echotruth.repository.store import NotWritten
 from echotruth.section import Section
 from echotruth.tracking.clip import Clip, clips
 from echotruth.tracking.program import in_one_line
@@ -173,9 +172,11 @@ def entrant(
     Raises
     ------
     CannotTry
-        If an option or the command cannot be read.
+        If an option or the command cannot be read, or a limit of time is set for what is no program.
     """
     pairs = dict(map(_option, options))
+    if tracker is not None and timeout is not None:
+        raise CannotTry(f"--timeout {timeout:g}: {tracker} is not timed: leave it out, or give a program as --command")
     if tracker is None:
         try:
             words = split(command or "")
@@ -244,7 +245,7 @@ def _rows(trial: Trial, sizes: list[int], place: tuple[str, str]) -> list[Row]:
         job = Job(trial.folder, "tracking", *place)
         try:
             truth, found = ground_truth(job), clips(job)
-        except (NotWritten, KeyError, OSError) as error:
+        except (ValueError, KeyError, OSError) as error:
             remedy = f"run it again ({in_one_line(str(error))})"
             raise CannotTry(f"{trial.folder} cannot be read at {' '.join(place)}: {remedy}") from error
         return [_row(trial, place, clip, truth) for size, clip in found.items() if size in sizes]
