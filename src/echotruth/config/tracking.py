@@ -42,8 +42,8 @@ class WindowDeformation(Section):
 
     method: Literal["window_deformation"] = "window_deformation"
     """Name of the method."""
-    windows_mm: Annotated[list[Positive], Field(min_length=1, max_length=6)] = Field(default=[1.5, 0.75, 0.375])
-    """Sides of the windows, one a pass."""
+    windows_mm: Annotated[list[Positive], Field(min_length=1, max_length=6)] = Field(default=[1.5, 0.75])
+    """Sides of the windows, one a pass; 8 pixels at least."""
     sweeps: Annotated[int, Field(ge=1, le=20)] = 3
     """Passes at the last size."""
     reference: Reference = "previous"
@@ -55,8 +55,8 @@ class AffineDic(Section):
 
     method: Literal["affine_dic"] = "affine_dic"
     """Name of the method."""
-    subset_mm: Positive = 0.7
-    """Side of a subset."""
+    subset_mm: Positive = 1.0
+    """Side of a subset; 17 pixels at least."""
     reference: Reference = "previous"
     """Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
 
@@ -75,7 +75,9 @@ class BsplineDic(Section):
     blur_um: Annotated[FiniteFloat, Field(ge=0)] = 20.0
     """The same in the tissue."""
     smoothness: Positive = 0.1
-    """Weight of the roughness of a step, second differences of neighbouring knots, over that of the images."""
+    """Weight of the roughness of a step over that of the images."""
+    across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.5
+    """Length of a unit through the wall where roughness is measured; of one along it, 1."""
     tolerance: Positive = 3.0
     """Difference of grey values at which a pixel has a quarter of its weight, over their standard deviation."""
     renewal: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.75
