@@ -70,7 +70,9 @@ def test_leaderboard(tmp_path, hearts):
     table.loc[failing, ["ecc_rms_points", "err_rms_points"]] = np.nan
     ranked = standings(table.assign(failure=np.where(failing, "no motion", "")), 1)
     assert best(ranked)[-1] == "failing"
-    seen(leaderboard.draw(tmp_path / "leaderboard.png", ranked, best(ranked)))
+    whole = seen(leaderboard.draw(tmp_path / "leaderboard.png", ranked, best(ranked)))
+    without_radial = ranked.assign(err_rms_points=np.nan)
+    assert seen(leaderboard.draw(tmp_path / "two.png", without_radial, best(ranked))).shape[1] < whole.shape[1]
 
 
 def test_bullseye_without_data_is_hatched_throughout(tmp_path):

@@ -40,10 +40,12 @@ def draw(path: str | Path, standings: pd.DataFrame, order: list[str]) -> Path:
     Path
         The picture.
     """
-    sheet = style.figure(10.4, 1.7 + 0.52 * len(order))
-    panels = sheet.subplots(1, len(PANELS), sharey=True)
+    # A grid too coarse for strain, or no short-axis view, leaves a figure without numbers.
+    shown = [panel for panel in PANELS if standings[panel[0]].notna().any()] or PANELS[:1]
+    sheet = style.figure(2 + 2.8 * len(shown), 1.7 + 0.52 * len(order))
+    panels = sheet.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     sizes = sorted(standings["size_px"].unique(), reverse=True)[: len(SIZES)]
-    for panel, (figure, title) in zip(panels, PANELS, strict=True):
+    for panel, (figure, title) in zip(panels, shown, strict=True):
         for k, size in enumerate(sizes):
             table = standings[standings["size_px"] == size].set_index("tracker")
             rows = pd.Series(np.arange(len(order)) + 0.26 * (k - (len(sizes) - 1) / 2), order)

@@ -92,8 +92,10 @@ def standings(rows: pd.DataFrame, seed: int) -> pd.DataFrame:
             asked = len(views) if view == ALL else 1
             tables.append(_table(clips, cases, asked, draws).assign(size_px=size, view=view))
     table = pd.concat(tables, ignore_index=True)
-    first = ["size_px", "view", "rank", "rank_low", "rank_high", "tracker", "hearts", "failures"]
-    return table[first + [name for name in table if name not in first]]
+    figures = [name for name in rows if name not in (*PLACE, "failure", ORDER)]
+    first = ("size_px", "view", "tracker", "hearts", "failures")
+    ordered = [f"{name}{end}" for name in ("rank", ORDER, *figures) for end in ("", "_low", "_high")]
+    return table[[*first, *(name for name in ordered if name in table)]]
 
 
 def best(standings: pd.DataFrame) -> list[str]:
