@@ -54,7 +54,7 @@ def draw(path: str | Path, standings: pd.DataFrame, order: list[str]) -> Path:
         panel.grid(axis="y", visible=False)
     panels[0].set_yticks(range(len(order)), [_name(standings, tracker) for tracker in order])
     panels[0].set_ylim(len(order) - 0.5, -0.5)
-    _legend(sheet, standings)
+    _legend(sheet, standings, columns=2 * len(shown))
     return style.save(sheet, path)
 
 
@@ -79,7 +79,7 @@ def _name(standings: pd.DataFrame, tracker: str) -> str:
     return f"{ranked}\n{failed} clips failed" if failed else ranked
 
 
-def _legend(sheet: Figure, standings: pd.DataFrame) -> None:
+def _legend(sheet: Figure, standings: pd.DataFrame, columns: int) -> None:
     sizes = sorted(standings["size_px"].unique(), reverse=True)
     marks = [
         Line2D([], [], color=colour, marker=marker, ls="none", label=f"{size} × {size} px")
@@ -89,4 +89,4 @@ def _legend(sheet: Figure, standings: pd.DataFrame) -> None:
     hearts = int(np.nanmax(standings["hearts"]))
     many = "one heart: no interval" if hearts < 2 else f"mean of {hearts} hearts and its 95 % interval"
     line = Line2D([], [], color="#444444", ls="none" if hearts < 2 else "-", linewidth=1.2, label=many)
-    sheet.legend(handles=[*marks, ring, line], loc="outside lower center", ncols=len(marks) + 2)
+    sheet.legend(handles=[*marks, ring, line], loc="outside lower center", ncols=columns)
