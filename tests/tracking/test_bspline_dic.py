@@ -1,4 +1,6 @@
+import numba
 import numpy as np
+import pytest
 
 from echotruth.config.tracking import BsplineDic
 from echotruth.tracking.bspline_dic import track
@@ -51,3 +53,75 @@ def test_rotation_and_thickening_are_those_of_the_tissue_at_end_diastole(clip):
     displacement, _ = found(clip(motion, 6, SIZE), mask, points)
     assert np.linalg.norm(motion(points, 3) - points, axis=1).max() > 9
     assert worst(displacement, 6, points, motion) < 0.15
+
+
+@pytest.mark.parametrize("shift", [0.3, 0.5, 0.8])
+def test_sub_pixel_shifts_have_a_bias_below_a_hundredth_of_a_pixel(shifted, shift):
+    mask, points = ring()
+    displacement, _ = found(np.stack([shifted(SIZE, 0, 0), shifted(SIZE, shift, -shift)]), mask, points)
+    error = displacement[1] - [shift, -shift]
+    assert np.abs(error.mean(0)).max() < 0.01
+    assert error.std(0).max() < 0.03
+
+
+def test_a_step_of_nine_pixels_is_followed(shifted):
+    mask, points = ring()
+    displacement, _ = found(np.stack([shifted(SIZE, 0, 0), shifted(SIZE, 9, 0)]), mask, points)
+    assert np.abs(displacement[1] - [9, 0]).max() < 0.1
+
+
+def test_clip_without_texture_has_no_displacement():
+    mask, points = ring()
+    for value in (0, 200, 0.1, np.nan):
+        displacement, quality = found(np.full((3, SIZE, SIZE), value), mask, points)
+        assert np.isnan(displacement).all() and np.isnan(quality).all()
+
+
+def test_part_of_the_wall_without_texture_has_no_displacement_and_the_rest_has(clip):
+    frames = clip(lambda place, t: place + beat(t) * np.array([3, 0]), 4, SIZE)
+    frames[:, :, 80:] = 0
+    mask, points = ring()
+    displacement, _ = found(frames, mask, points)
+    dark, bright = points[:, 0] > 105, points[:, 0] < 60
+    assert dark.any() and np.isnan(displacement[:, dark]).all()
+    assert np.abs(displacement[3, bright] - beat(3) * np.array([3, 0])).max() < 0.1
+
+
+def test_one_black_frame_is_passed_over(clip):
+    frames = clip(lambda place, t: place + beat(t) * np.array([3, 1]), 6, SIZE)
+    frames[2] = 0
+    mask, points = ring()
+    displacement, _ = found(frames, mask, points)
+    assert np.isnan(displacement[2]).all()
+    assert np.abs(displacement[4] - beat(4) * np.array([3, 1])).max() < 0.1
+
+
+def test_points_beyond_the_wall_and_empty_masks_have_no_displacement(shifted):
+    frames = np.stack([shifted(SIZE, 0, 0), shifted(SIZE, 1, 0)])
+    mask, points = ring()
+    away = np.array([[2.0, 2.0], [300.0, -5.0], [np.nan, 60.0], MIDDLE])
+    displacement, quality = found(frames, mask, away)
+    assert np.isnan(displacement).all() and np.isnan(quality).all()
+    displacement, quality = found(frames, np.zeros_like(mask), points)
+    assert np.isnan(displacement).all() and np.isnan(quality).all()
+
+
+def test_images_need_not_be_square_nor_of_whole_numbers(shifted):
+    frames = np.stack([shifted(SIZE, 0, 0), shifted(SIZE, 2, -1)])[:, 20:110].astype(float) / 7
+    mask, points = ring()
+    points = points[(points[:, 1] > 25) & (points[:, 1] < 105)] - [0, 20]
+    displacement, _ = found(frames, mask[20:110], points)
+    assert np.abs(displacement[1] - [2, -1]).max() < 0.1
+
+
+def test_same_bytes_on_one_thread_and_on_two(clip):
+    frames = clip(lambda place, t: place + beat(t) * np.array([2, 1]), 4, SIZE)
+    mask, points = ring()
+    kept = numba.get_num_threads()
+    results = []
+    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
+        numba.set_num_threads(threads)
+        results.append(found(frames, mask, points))
+    numba.set_num_threads(kept)
+    for one, two in zip(*results, strict=True):
+        np.testing.assert_array_equal(one, two)

@@ -74,7 +74,7 @@ def add_matrix(knots, first, across, down, slope, weight, band):
         local[:] = 0
         for point in range(first[cell], first[cell + 1]):
             _add_point(across[point], down[point], slope[point], weight[point], local)
-        _add_cell(knots[cell], local, band)
+        add_cell(knots[cell], local, band)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -94,7 +94,8 @@ def _add_point(across, down, slope, weight, local):
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_cell(knots, local, band):
+def add_cell(knots, local, band):
+    """Add the matrices (3, 16, 16) of a cell that sees 16 knots to a band."""
     last = band.shape[1] - 1
     for k in range(16):
         for m in range(16):

@@ -129,20 +129,14 @@ class Lattice:
     def _middle(self) -> np.ndarray:
         return self.origin + (np.array(self.number.shape[::-1]) - 1) * self.step / 2
 
-    def neighbours(self, offsets: list[tuple[int, int]]) -> np.ndarray:
-        """Numbers of all sets of knots that lie as the offsets (rows, columns, not negative) say; (set, knot)."""
-        rows, columns = np.array(self.number.shape) - np.max(offsets, axis=0)
-        sets = np.stack([self.number[i : i + rows, j : j + columns].ravel() for i, j in offsets], -1)
-        return sets[(sets >= 0).all(1)]
 
-
-def lattice(mask: np.ndarray, step: float) -> Lattice:
-    """Knots whose splines reach a mask, centred on it.
+def lattice(places: np.ndarray, step: float) -> Lattice:
+    """Knots whose splines reach some places, centred on these.
 
     Parameters
     ----------
-    mask : ndarray of shape (axial, lateral), bool
-        True somewhere.
+    places : ndarray of shape (n, 2)
+        Lateral, axial, px; one at least.
     step : float
         Distance of the knots, px.
 
@@ -150,7 +144,6 @@ def lattice(mask: np.ndarray, step: float) -> Lattice:
     -------
     Lattice
     """
-    places = np.argwhere(mask)[:, ::-1]
     low, high = places.min(0), places.max(0)
     spans = np.maximum(np.ceil((high - low) / step).astype(int), 1)
     shape = tuple(spans[::-1] + 3)

@@ -9,8 +9,10 @@ from end-diastole both forwards and backwards, and the two are averaged by their
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import ndimage
@@ -20,7 +22,8 @@ from echotruth.imaging import spline
 from echotruth.tracking.alignment import grey_at
 from echotruth.tracking.dis import flow
 from echotruth.tracking.flow import sample
-from echotruth.tracking.grey import FAINTEST, levels
+from echotruth.tracking.grey import levels
+from echotruth.tracking.likeness import Likeness
 from echotruth.tracking.region import Region, region
 
 
@@ -62,11 +65,11 @@ def track(
     grey = np.nan_to_num(levels(frames))
     blur = max(values.blur / spacing, values.blur_px)
     images = [spline.coefficients(ndimage.gaussian_filter(frame, blur)) for frame in grey]
-    body = region(mask, values.knots / spacing, values.margin / spacing)
-    follower = Follower(body, grey, images, settings)
-    orders = np.arange(len(frames)), np.append(0, np.arange(len(frames) - 1, 0, -1))
+    body = region(mask, values.knots / spacing, values.margin / spacing, values.across)
+    likeness = Likeness(body.places, body.inside, points, 2 * values.knots / spacing)
+    follower = Follower(body, likeness, grey, images, settings)
     with ThreadPoolExecutor(2) as threads:
-        paths = list(threads.map(lambda order: follower.follow(order, points), orders))
+        paths = list(threads.map(follower.follow, (range(len(frames)), [0, *range(len(frames) - 1, 0, -1)])))
     return blend(body, points, *paths)
 
 
@@ -77,6 +80,8 @@ class Follower:
     Attributes
     ----------
     body : Region
+    likeness : Likeness
+        Of the pixels of the body, and about the points that are asked for.
     grey : ndarray of shape (frame, axial, lateral)
         Grey values from 0 to 1.
     images : list of ndarray
@@ -85,30 +90,39 @@ class Follower:
     """
 
     body: Region
+    likeness: Likeness
     grey: np.ndarray
     images: list[np.ndarray]
     settings: BsplineDic
 
-    def follow(self, order: np.ndarray, points: np.ndarray) -> Path:
+    def follow(self, order: Sequence[int]) -> Path:
         """The wall through the frames in an order that begins with end-diastole."""
-        count, size = len(order), self.body.lattice.size
-        coefficients, variance = np.zeros((count, size, 2)), np.zeros(count)
-        alike = np.ones((count, len(points)))
+        template = seen = grey_at(self.images[0], self.body.places)
+        coefficients, variance = np.zeros((len(order), self.body.lattice.size, 2)), np.zeros(len(order))
+        alike = [self.likeness.about_points(template[:, 0], template[:, 0])] * len(order)
         key = last = 0
-        template = grey = grey_at(self.images[0], self.body.places)
-        for i in range(1, count):
-            before, now = order[i - 1], order[i]
+        for before, now in pairwise(order):
             start = self._start(now, before, coefficients[before], template)
-            found, moved = self._align(now, template, start, coefficients[key])
-            if key != last and not likeness(template, moved, self.body.inside) > self.settings.renewal:
-                key, template = last, grey
-                found, moved = self._align(now, template, start, coefficients[key])
-            coefficients[now] = found
-            variance[now] = variance[key] + doubt(template, moved, self.body.inside)
-            alike[now] = self._alike(template, moved, points)
+            found, moved = self._align(now, template, start, coefficients[before])
+            if key != last and not self._overall(template, moved) > self.settings.renewal:
+                key, template = last, seen
+                found, moved = self._align(now, template, start, coefficients[before])
+            coefficients[now], variance[now] = found, variance[key] + self._doubt(template, moved)
+            alike[now] = self.likeness.about_points(template[:, 0], moved[:, 0])
             if np.isfinite(variance[now]):
-                last, grey = now, moved
-        return Path(coefficients, variance, alike)
+                last, seen = now, moved
+        return Path(coefficients, variance, np.array(alike))
+
+    def _overall(self, template: np.ndarray, moved: np.ndarray) -> float:
+        return self.likeness.overall(template[:, 0], moved[:, 0])
+
+    def _doubt(self, template: np.ndarray, moved: np.ndarray) -> float:
+        """Square of the shift that would explain what differs, px^2; the less alike the images, the more so."""
+        alike, inside = self._overall(template, moved), self.body.inside
+        if not alike > 0:
+            return np.inf
+        difference = np.mean((template[inside, 0] - moved[inside, 0]) ** 2)
+        return difference / np.mean(moved[inside, 1:] ** 2) / alike**2
 
     def _align(self, frame: int, template: np.ndarray, start: np.ndarray, anchor: np.ndarray):
         stiffness = self.settings.smoothness, self.settings.tolerance
@@ -118,37 +132,12 @@ class Follower:
         """Coefficients after a step as the dense flow has it, or before it if that is nearer to the template."""
         places = self.body.places + self.body.cells.evaluate(coefficients)
         step = sample(flow(self.grey[before], self.grey[now]), places)
-        moved = coefficients + self.body.fit(np.nan_to_num(step), self.settings.smoothness)
+        moved = coefficients + self.body.fit(np.nan_to_num(step))
         return min(coefficients, moved, key=lambda each: self._misfit(now, each, template))
 
     def _misfit(self, frame: int, coefficients: np.ndarray, template: np.ndarray) -> float:
         moved = grey_at(self.images[frame], self.body.places + self.body.cells.evaluate(coefficients))
         return float(np.abs(moved[:, 0] - template[:, 0]).mean())
-
-    def _alike(self, template: np.ndarray, moved: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Correlation about the points (n,), weighted by the splines; NaN where there is no texture."""
-        a, b, weight = template[:, 0], moved[:, 0], self.body.inside.astype(float)
-        moments = np.stack([np.ones_like(a), a, b, a * a, b * b, a * b], -1) * weight[:, None]
-        total, *sums = self.body.lattice.at(self.body.cells.gather(moments, self.body.lattice.size), points).T
-        a, b, aa, bb, ab = (np.divide(each, total, out=np.full(len(points), np.nan), where=total > 0) for each in sums)
-        textured = np.minimum(aa - a * a, bb - b * b) > FAINTEST**2
-        product = np.where(textured, (aa - a * a) * (bb - b * b), np.nan)
-        return np.clip((ab - a * b) / np.sqrt(product), 0, 1)
-
-
-def likeness(template: np.ndarray, moved: np.ndarray, inside: np.ndarray) -> float:
-    """Correlation of two sets of grey values (pixel, 3) over the pixels inside; NaN where one has no texture."""
-    a, b = (each[inside, 0] - each[inside, 0].mean() for each in (template, moved))
-    return np.mean(a * b) / (a.std() * b.std()) if min(a.std(), b.std()) > FAINTEST else np.nan
-
-
-def doubt(template: np.ndarray, moved: np.ndarray, inside: np.ndarray) -> float:
-    """Square of the shift that would explain what differs, px^2; the less alike the images, the more so."""
-    alike = likeness(template, moved, inside)
-    if not alike > 0:
-        return np.inf
-    difference = np.mean((template[inside, 0] - moved[inside, 0]) ** 2)
-    return difference / np.mean(moved[inside, 1:] ** 2) / alike**2
 
 
 def blend(body: Region, points: np.ndarray, forward: Path, backward: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -163,11 +152,10 @@ def blend(body: Region, points: np.ndarray, forward: Path, backward: Path) -> tu
     share = np.array([_share(*pair) for pair in zip(forward.variance, backward.variance, strict=True)])[:, None]
     coefficients = share[..., None] * forward.coefficients + (1 - share[..., None]) * backward.coefficients
     flat = coefficients.transpose(1, 0, 2).reshape(body.lattice.size, -1)
-    displacement = body.lattice.at(flat, points).reshape(len(points), -1, 2).transpose(1, 0, 2).copy()
-    ours, theirs = (np.where(np.isnan(path.alike), -1, path.alike) for path in (forward, backward))
-    both = (ours >= 0) & (theirs >= 0)
-    quality = np.where(both, share * ours + (1 - share) * theirs, np.maximum(ours, theirs))
-    quality[quality < 0] = np.nan
+    displacement = np.moveaxis(body.lattice.at(flat, points).reshape(len(points), -1, 2), 0, 1).copy()
+    quality = np.where(share > 0, share * np.maximum(forward.alike, 0), 0)
+    quality += np.where(share < 1, (1 - share) * np.maximum(backward.alike, 0), 0)
+    displacement[np.isnan(quality)] = np.nan
     return displacement, quality
 
 

@@ -9,11 +9,18 @@ from scipy import ndimage
 
 from echotruth.tracking.alignment import add_matrix, factorise, grey_at, product, solve
 from echotruth.tracking.bspline import Cells, Lattice, lattice
+from echotruth.tracking.roughness import metric, roughness
 
 STEPS = 15
 """Most iterations."""
-STILL = 0.01
+FAR = 0.2
+"""Change of a coefficient up to which the normal matrix stays, px."""
+STILL = 0.02
 """Largest change of a coefficient in the last iteration, px."""
+LOOSE = 0.1
+"""Weight of the roughness of a dense flow, which is smooth already."""
+FINE = 16
+"""Pixels between knots above which every other one will do."""
 DEVIATION = 1.4826
 """Standard deviation of a Gaussian over the median of its absolute value."""
 ANCHOR = 1e-6
@@ -34,7 +41,7 @@ class Region:
     inside : ndarray of shape (pixel,), bool
         Pixels of the wall itself.
     roughness : ndarray of shape (unknowns, width)
-        Band of the matrix of the summed squares of second differences of the coefficients.
+        Band of its matrix, see :mod:`echotruth.tracking.roughness`.
     """
 
     lattice: Lattice
@@ -46,7 +53,7 @@ class Region:
     def align(
         self, image: np.ndarray, template: np.ndarray, start: np.ndarray, anchor: np.ndarray, stiffness: tuple
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Field U that makes sum w (I(X + U) - T)^2 and the roughness of its change since the template smallest.
+        """Field U that makes sum w (I(X + U) - T)^2 and the roughness of its change smallest.
 
         Parameters
         ----------
@@ -55,10 +62,10 @@ class Region:
         template : ndarray of shape (pixel,)
             Grey values T.
         start, anchor : ndarray of shape (knot, 2)
-            Coefficients to begin with, and those of the template, px.
+            Coefficients to begin with, and those from which the change is counted, px.
         stiffness : (float, float)
-            Weight of the roughness over that of the image, and residual over its standard deviation
-            at which a pixel has a quarter of its weight.
+            Weight of the roughness over that of the image, and residual over its standard deviation at which a pixel
+            has a quarter of its weight.
 
         Returns
         -------
@@ -68,42 +75,48 @@ class Region:
             Image carried back, and its slopes per px.
         """
         smoothness, tolerance = stiffness
-        found = start
+        found, factor, change = start, None, np.inf
         for _ in range(STEPS):
             grey = grey_at(image, self.places + self.cells.evaluate(found))
             residual = grey[:, 0] - template
-            change = self._step(grey[:, 1:], residual, robust(residual, tolerance), (found - anchor, smoothness))
-            found = found + change
+            weight = robust(residual, tolerance)
+            if np.abs(change).max() > FAR:
+                factor, rough = self._factor(grey[:, 1:], weight, smoothness)
+            force = self.cells.gather((weight * residual)[:, None] * grey[:, 1:], self.lattice.size).ravel()
+            change = -force - rough * product(self.roughness, (found - anchor).ravel())
+            solve(factor, change)
+            found = found + change.reshape(-1, 2)
             if np.abs(change).max() < STILL:
                 break
         return found, grey_at(image, self.places + self.cells.evaluate(found))
 
-    def fit(self, flow: np.ndarray, smoothness: float) -> np.ndarray:
+    def fit(self, flow: np.ndarray) -> np.ndarray:
         """Coefficients (knot, 2) of the field that is like a flow (pixel, 2), px, without its outliers."""
         found = np.zeros((self.lattice.size, 2))
+        # Lateral and axial motion are taken from every other pixel, so that one matrix does for both.
+        slopes = np.eye(2)[np.arange(len(flow)) % 2]
         for _ in range(3):
             residual = self.cells.evaluate(found) - flow
             weight = robust(np.hypot(*residual.T), 2)
-            for component, slope in enumerate(np.eye(2)):
-                slopes = np.broadcast_to(slope, flow.shape)
-                change = self._step(slopes, residual[:, component], weight, (found * slope, smoothness))
-                found = found + change * slope
+            factor, rough = self._factor(slopes, weight, LOOSE)
+            force = self.cells.gather(
+                (weight * (residual * slopes).sum(1))[:, None] * slopes, self.lattice.size
+            ).ravel()
+            change = -force - rough * product(self.roughness, found.ravel())
+            solve(factor, change)
+            found = found + change.reshape(-1, 2)
         return found
 
-    def _step(self, slope: np.ndarray, residual: np.ndarray, weight: np.ndarray, rough: tuple) -> np.ndarray:
-        """Gauss-Newton step (knot, 2); roughness is that of some coefficients, times a weight."""
+    def _factor(self, slope: np.ndarray, weight: np.ndarray, smoothness: float) -> tuple[np.ndarray, float]:
+        """Cholesky factor of the normal matrix with its roughness, and the weight that the roughness has in it."""
         band = np.zeros(self.roughness.shape)
-        cells, slope = self.cells, np.ascontiguousarray(slope)
-        add_matrix(cells.knots, cells.first, cells.across, cells.down, slope, weight, band)
-        scale = band[:, -1].mean()
-        coefficients, smoothness = rough
-        right = -cells.gather((weight * residual)[:, None] * slope, self.lattice.size).ravel()
-        right -= scale * smoothness * product(self.roughness, coefficients.ravel())
+        cells = self.cells
+        add_matrix(cells.knots, cells.first, cells.across, cells.down, np.ascontiguousarray(slope), weight, band)
+        scale = band[:, -1].mean() or 1.0
         band += scale * smoothness * self.roughness
-        band[:, -1] += scale * ANCHOR or 1.0
+        band[:, -1] += scale * ANCHOR
         factorise(band)
-        solve(band, right)
-        return right.reshape(-1, 2)
+        return band, scale * smoothness
 
 
 def robust(residual: np.ndarray, tolerance: float) -> np.ndarray:
@@ -112,7 +125,7 @@ def robust(residual: np.ndarray, tolerance: float) -> np.ndarray:
     return 1 / (1 + (residual / (scale or 1.0)) ** 2) ** 2
 
 
-def region(mask: np.ndarray, knots: float, margin: float) -> Region:
+def region(mask: np.ndarray, knots: float, margin: float, across: float) -> Region:
     """The wall and what is around it.
 
     Parameters
@@ -123,33 +136,18 @@ def region(mask: np.ndarray, knots: float, margin: float) -> Region:
         Distance of the knots, px.
     margin : float
         How far around the wall pixels count, px.
+    across : float
+        Length of a unit through the wall where roughness is measured.
 
     Returns
     -------
     Region
     """
     wide = ndimage.distance_transform_edt(~mask) <= margin
+    if knots > FINE:
+        wide &= np.indices(mask.shape).sum(0) % 2 == 0
     places = np.argwhere(wide)[:, ::-1].astype(float)
-    net = lattice(wide, knots)
+    net = lattice(places, knots)
     cells, order = net.cells(places)
-    return Region(net, cells, places[order], mask[wide][order], roughness(net, cells))
-
-
-def roughness(net: Lattice, cells: Cells) -> np.ndarray:
-    """Band of the matrix of the summed squares of all second differences on a lattice, the mixed ones twice."""
-    seen = np.where(cells.knots < 0, cells.knots.max(), cells.knots)
-    band = np.zeros((2 * net.size, 2 * int((cells.knots.max(1) - seen.min(1)).max()) + 2))
-    last, mixed = band.shape[1] - 1, np.sqrt(2)
-    line = [1, -2, 1]
-    for weights, offsets in (
-        (line, [(0, 0), (0, 1), (0, 2)]),
-        (line, [(0, 0), (1, 0), (2, 0)]),
-        ([mixed, -mixed, -mixed, mixed], [(0, 0), (0, 1), (1, 0), (1, 1)]),
-    ):
-        sets = net.neighbours(offsets)
-        for i, j in np.ndindex(len(weights), len(weights)):
-            low = sets[:, j] <= sets[:, i]
-            row, back = 2 * sets[low, i], 2 * (sets[low, j] - sets[low, i])
-            for component in (0, 1):
-                np.add.at(band, (row + component, back + last), weights[i] * weights[j])
-    return band
+    rough = roughness(cells, metric(mask, wide, knots, across)[order], net.size)
+    return Region(net, cells, places[order], mask[wide][order], rough)
