@@ -21,6 +21,11 @@ from echotruth.tracking.window_deformation import WindowPairs, arranged
 
 SMALLEST_HALF = 8
 """Pixels of the smallest subset to either side of its middle: six unknowns ask for more texture than two."""
+BLUR = 0.8
+"""Standard deviation of a Gaussian on the images, px: it takes away what a spline cannot hold, and with it most of the
+bias between pixels (Pan 2013, Opt Lasers Eng 51:1161)."""
+REACH = 5
+"""Pixels to which blur and spline spread a pixel without a value."""
 START = WindowDeformation(sweeps=1)
 """Where the start comes from."""
 
@@ -64,10 +69,11 @@ class AffinePairs:
     start: WindowPairs
 
     def prepare(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The image, its spline, and where a subset holds a pixel without a value."""
+        """The image, the spline of its blur, and where a subset would reach a pixel without a value."""
         unknown = np.isnan(image)
-        near = ndimage.maximum_filter(unknown, 2 * self.half + 3)
-        return image, spline.coefficients(np.where(unknown, np.float32(0), image)), near
+        blurred = ndimage.gaussian_filter(np.where(unknown, np.float32(0), image), BLUR)
+        near = ndimage.maximum_filter(unknown, 2 * (self.half + REACH) + 1)
+        return image, spline.coefficients(blurred), near
 
     def match(self, first: tuple, second: tuple, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step (n, 2) in px and quality (n,) of points."""

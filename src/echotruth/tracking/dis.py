@@ -10,8 +10,8 @@ import numpy as np
 from echotruth.config.tracking import Dis
 from echotruth.tracking.flow import follow
 
-SMALLEST = 12
-"""Side of the smallest image with which OpenCV can do at any width, px."""
+SMALLEST = 32
+"""Least side of an image, px; on flat ones of 24 px OpenCV 5.0 reads beyond its memory."""
 PRESETS = {
     "ultrafast": cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST,
     "fast": cv2.DISOPTICAL_FLOW_PRESET_FAST,

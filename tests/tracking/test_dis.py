@@ -1,0 +1,48 @@
+import cv2
+import numpy as np
+import pytest
+
+from echotruth.config.tracking import Dis
+from echotruth.tracking import track
+from echotruth.tracking.dis import SMALLEST, flow
+
+SHIFT = np.array([3.0, -1.5])
+
+
+@pytest.fixture
+def pair(clip):
+    return clip(lambda place, t: place + t * SHIFT, 2)
+
+
+@pytest.mark.parametrize("preset", ["ultrafast", "fast", "medium"])
+def test_motion_at_whole_pixels_is_the_library_s_own(pair, preset):
+    points = np.array([[40.0, 60.0], [100.0, 31.0]])
+    moved, _ = track(pair, points, np.ones((160, 160), bool), 3e-5, np.arange(2.0), 0, Dis(preset=preset))
+    library = cv2.DISOpticalFlow_create(getattr(cv2, f"DISOPTICAL_FLOW_PRESET_{preset.upper()}"))
+    cv2.setNumThreads(1)
+    np.testing.assert_allclose(moved[1], library.calc(*pair, None)[[60, 31], [40, 100]], atol=1e-5)
+
+
+def test_shift_of_speckle_is_found(pair):
+    found = flow(*(pair / np.float32(255)))
+    assert found.shape == (160, 160, 2)
+    np.testing.assert_allclose(found[30:-30, 30:-30].mean((0, 1)), SHIFT, atol=0.05)
+
+
+def test_bytes_do_not_depend_on_the_threads_of_the_library(pair):
+    images = pair / np.float32(255)
+    answers = []
+    for threads in (1, 4):
+        cv2.setNumThreads(threads)
+        answers.append(flow(*images).tobytes())
+    assert answers[0] == answers[1]
+
+
+@pytest.mark.parametrize("shape", [(SMALLEST, SMALLEST), (SMALLEST, 300), (300, SMALLEST)])
+def test_smallest_image_is_taken(shape):
+    assert (flow(*np.zeros((2, *shape), np.float32)) == 0).all()
+
+
+def test_smaller_image_is_refused_in_a_sentence():
+    with pytest.raises(ValueError, match=r"32 px or more, not \(31, 40\)"):
+        flow(*np.zeros((2, 31, 40), np.float32))

@@ -1,0 +1,122 @@
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from echotruth.config.tracking import WindowDeformation
+from echotruth.tracking import track
+from echotruth.tracking.correlation import match, peaks
+from echotruth.tracking.field import dense, smooth, validated
+from echotruth.tracking.window_deformation import arranged, carry, sides
+from echotruth.tracking.windows import Windows, arrange
+
+SPACING = 3e-5
+
+
+def step(first, second, points, **settings):
+    """Motion of points from one image to another, px."""
+    frames = np.stack([first, second])
+    mask = np.ones(first.shape, bool)
+    return track(frames, points, mask, SPACING, np.arange(2.0), 0, WindowDeformation(**settings))[0][1]
+
+
+@pytest.fixture
+def inner():
+    lateral, axial = np.meshgrid(np.arange(45.0, 150, 9), np.arange(45.0, 150, 9))
+    return np.stack([lateral, axial], -1).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("shift", [0.1, 0.25, 0.5, 0.75, 2.3, 9.4])
+def test_bias_of_rigid_shifts_is_below_a_fiftieth_of_a_pixel(shifted, inner, shift):
+    error = step(shifted(192, 0, 0), shifted(192, shift, -shift), inner) - [shift, -shift]
+    assert np.abs(error.mean(0)).max() < 0.02
+    assert error.std() < 0.03
+
+
+def test_deformed_windows_find_a_turn_that_rigid_ones_blur(speckle, inner):
+    centre, turn = 95.5, np.array([[np.cos(0.1), np.sin(0.1)], [-np.sin(0.1), np.cos(0.1)]])
+
+    def turned(place):
+        return centre + (place - centre) @ turn
+
+    images = speckle(192, lambda place: place), speckle(192, turned)
+    truth = turned(inner) - inner
+    error = [np.sqrt(((step(*images, inner, sweeps=n) - truth) ** 2).mean()) for n in (1, 4)]
+    assert error[1] < 0.1 and error[1] < 0.6 * error[0]
+
+
+def test_correlation_of_a_window_at_a_lag_is_pearson_s():
+    noise = np.random.default_rng(4).normal(size=(2, 40, 50))
+    first = ndimage.gaussian_filter(noise[0], 1.5).astype(np.float32)
+    second = (np.roll(first, (1, 1), (0, 1)) + 0.02 * noise[1]).astype(np.float32)
+    windows = Windows(8, np.array([12]), np.array([20]))
+    shift, peak = match(first, second, windows, 3)
+    np.testing.assert_allclose(shift[0, 0], [1, 1], atol=0.5)
+    expected = np.corrcoef(first[12:20, 20:28].ravel(), second[13:21, 21:29].ravel())[0, 1]
+    assert peak[0, 0] == pytest.approx(expected, abs=1e-6)
+
+
+def test_place_of_a_gaussian_peak_is_exact():
+    lag = np.arange(-3, 4)
+    lateral, axial = np.meshgrid(lag - 0.37, lag + 1.21)
+    shift, peak = peaks(np.exp(-(lateral**2) / 3 - axial**2 / 5)[None, None])
+    np.testing.assert_allclose(shift[0, 0], [0.37, -1.21], atol=1e-12)
+    assert 0.9 < peak[0, 0] < 1
+
+
+def test_peak_at_the_border_or_beside_what_is_not_alike_is_none():
+    edge, lone, unknown = np.full((3, 5, 5), -0.2)
+    edge[2, 0], lone[2, 2] = 0.9, 0.9
+    unknown[:] = np.nan
+    shift, peak = peaks(np.stack([edge, lone, unknown])[None])
+    assert np.isnan(shift).all()
+    np.testing.assert_allclose(peak[0], [0.9, 0.9, np.nan])
+
+
+def test_outliers_become_the_median_of_their_neighbours_and_linear_motion_stays():
+    row, column = np.indices((7, 9), float)
+    field = np.stack([0.03 * column - 0.01 * row, 0.02 * row], -1)
+    spoilt = field.copy()
+    spoilt[3, 4], spoilt[1, 6, 1] = [9, -9], np.nan
+    np.testing.assert_allclose(validated(spoilt), field, atol=0.021)
+    np.testing.assert_array_equal(validated(field), field)
+
+
+def test_missing_vectors_are_the_nearest_there_are_and_none_are_none():
+    field = np.full((6, 6, 2), np.nan)
+    field[:, :2] = [1.5, -2]
+    np.testing.assert_array_equal(validated(field), np.broadcast_to([1.5, -2], field.shape))
+    assert (validated(np.full((6, 6, 2), np.nan)) == 0).all()
+
+
+def test_field_between_windows_is_a_cubic_spline_through_their_centres():
+    windows = arrange((96, 128), 16, 0.5)
+    field = np.random.default_rng(5).normal(size=(len(windows.top), len(windows.left), 2))
+    # Centres lie between pixels, so that sides are made odd to look at them.
+    windows = Windows(17, windows.top, windows.left)
+    every = dense(field, windows, (113, 145))
+    np.testing.assert_allclose(every[8 : 8 + 81 : 8, 8 : 8 + 113 : 8], field, atol=1e-5)
+
+
+def test_smoothing_keeps_linear_motion_and_removes_what_alternates():
+    row, column = np.indices((8, 8))
+    linear = np.stack([column, row], -1).astype(float)
+    ripple = np.where((row + column) % 2, 1.0, -1.0)[..., None]
+    np.testing.assert_allclose(smooth(linear + ripple)[2:-2, 2:-2], linear[2:-2, 2:-2], atol=1e-12)
+
+
+def test_image_carried_back_by_its_motion_is_the_first(shifted):
+    first, second = shifted(96, 0, 0), shifted(96, 2.5, -1.25)
+    back = carry(second.astype(np.float32), np.broadcast_to(np.float32([2.5, -1.25]), (96, 96, 2)))
+    # Dark seams of speckle, cut off at black, are no smooth function.
+    assert np.median(np.abs(back - first.astype(float))[5:-5, 5:-5]) < 1
+
+
+def test_windows_are_the_same_tissue_at_every_size_but_eight_pixels_at_least():
+    settings = WindowDeformation(windows_mm=[1.5, 0.75, 0.375], sweeps=2)
+    found = [sides(settings, 12e-3 / n) for n in (512, 256, 128)]
+    assert found == [[64, 32, 16, 16], [32, 16, 8, 8], [16, 8, 8, 8]]
+
+
+def test_image_without_room_for_two_windows_is_refused_in_a_sentence():
+    with pytest.raises(ValueError, match="60 x 200 px holds no two windows of 50 px"):
+        arranged(WindowDeformation(), (60, 200), SPACING)
