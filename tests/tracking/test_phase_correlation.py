@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from echotruth.tracking.phase_correlation import displacement, fraction, phases
+from echotruth.config import PhaseCorrelation
+from echotruth.tracking import grid, track
+from echotruth.tracking.phase_correlation import displacement, fraction, phases, window_side
 from echotruth.tracking.windows import arrange
 
 
@@ -44,3 +46,26 @@ def test_window_without_texture_has_no_displacement(shifted):
     image[:, 48:] = 0
     moved, peak = match(image, image, 32)
     assert np.isfinite(moved[:, 0]).all() and np.isnan(moved[:, -1]).all() and np.isnan(peak[:, -1]).all()
+
+
+def test_window_in_tissue_keeps_its_size():
+    tracker = PhaseCorrelation(window_px=None, window_mm=1.5)
+    assert [window_side(tracker, 12e-3 / n) for n in (512, 256, 128)] == [64, 32, 16]
+    assert window_side(tracker, 1e-3) == 8
+    assert window_side(PhaseCorrelation(), 1.0) == 64
+
+
+@pytest.mark.parametrize("options", [{}, {"taper": "hann", "reference": "previous"}])
+def test_rigid_shift_is_followed_to_half_a_pixel(clip, options):
+    frames = clip(lambda place, t: place + np.array([2 * t, -3 * t]), 5)
+    points = grid(frames.shape[1:], 20).reshape(-1, 2)
+    points = points[(np.abs(points - 79.5) < 50).all(1)]
+    moved, _ = track(frames, points, frames[0] >= 0, 25e-6, np.arange(5.0), 0, PhaseCorrelation(**options))
+    truth = np.arange(5)[:, None] * np.array([2, -3])
+    assert np.abs(moved - truth[:, None]).max() < 0.5
+
+
+def test_window_larger_than_the_image_is_refused_in_a_sentence():
+    frames = np.zeros((2, 40, 80))
+    with pytest.raises(ValueError, match="64 px is larger than the image of 40 x 80 px"):
+        track(frames, np.zeros((1, 2)), frames[0] == 0, 25e-6, np.arange(2.0), 0, PhaseCorrelation())

@@ -152,7 +152,7 @@ def blend(body: Region, points: np.ndarray, forward: Path, backward: Path) -> tu
     share = np.array([_share(*pair) for pair in zip(forward.variance, backward.variance, strict=True)])[:, None]
     coefficients = share[..., None] * forward.coefficients + (1 - share[..., None]) * backward.coefficients
     flat = coefficients.transpose(1, 0, 2).reshape(body.lattice.size, -1)
-    displacement = np.moveaxis(body.lattice.at(flat, points).reshape(len(points), -1, 2), 0, 1).copy()
+    displacement = np.moveaxis(body.lattice.at(flat, points).reshape(len(points), len(share), 2), 0, 1).copy()
     quality = np.where(share > 0, share * np.maximum(forward.alike, 0), 0)
     quality += np.where(share < 1, (1 - share) * np.maximum(backward.alike, 0), 0)
     displacement[np.isnan(quality)] = np.nan

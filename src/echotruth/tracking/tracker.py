@@ -49,7 +49,7 @@ def track(
     -------
     displacement : ndarray of shape (frame, n, 2)
         Since end-diastole of the tissue that was at the point then: lateral, axial, px, positive for motion of the
-        tissue; NaN where there is none.
+        tissue; NaN where there is none, as for points outside the image.
     quality : ndarray of shape (frame, n)
         How sure the tracker is, from 0 to 1; NaN where there is no displacement.
 
@@ -63,7 +63,9 @@ def track(
     clip = (np.asarray(frames), np.asarray(points, float), np.asarray(mask, bool), spacing, np.asarray(frame_time))
     _check(*clip)
     displacement, quality = _method(settings)(*clip, seed)
-    lost = ~np.isfinite(displacement).all(-1)
+    half = np.array(clip[2].shape[::-1]) / 2
+    inside = (np.abs(clip[1] + 0.5 - half) <= half).all(1)
+    lost = ~(np.isfinite(displacement).all(-1) & inside)
     displacement[lost], quality[lost] = np.nan, np.nan
     return displacement, quality
 
