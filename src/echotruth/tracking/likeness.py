@@ -25,7 +25,7 @@ class Likeness:
 
     def __init__(self, places: np.ndarray, inside: np.ndarray, points: np.ndarray, reach: float):
         self._inside, self._points = inside, points
-        self._net = lattice(places[inside], reach / 4)
+        self._net = lattice(places, reach / 4)
         self._cells, self._order = self._net.cells(places[inside])
 
     def about_points(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -13,17 +13,17 @@ from echotruth.tracking.roughness import metric, roughness
 
 STEPS = 15
 """Most iterations."""
-FAR = 0.2
-"""Change of a coefficient up to which the normal matrix stays, px."""
-STILL = 0.02
-"""Largest change of a coefficient in the last iteration, px."""
+FAR = 0.05
+"""Root mean square of a step up to which the normal matrix stays, px."""
+STILL = 0.005
+"""Root mean square of the last step, px."""
 LOOSE = 0.1
 """Weight of the roughness of a dense flow, which is smooth already."""
 FINE = 16
 """Pixels between knots above which every other one will do."""
 DEVIATION = 1.4826
 """Standard deviation of a Gaussian over the median of its absolute value."""
-ANCHOR = 1e-6
+ANCHOR = 1e-5
 """Stiffness of a knot on its own over the mean one, so that none is without an equation."""
 
 
@@ -75,20 +75,21 @@ class Region:
             Image carried back, and its slopes per px.
         """
         smoothness, tolerance = stiffness
-        found, factor, change = start, None, np.inf
+        found, place, moved = start, self.places + self.cells.evaluate(start), np.inf
         for _ in range(STEPS):
-            grey = grey_at(image, self.places + self.cells.evaluate(found))
+            grey = grey_at(image, place)
             residual = grey[:, 0] - template
             weight = robust(residual, tolerance)
-            if np.abs(change).max() > FAR:
+            if moved > FAR:
                 factor, rough = self._factor(grey[:, 1:], weight, smoothness)
             force = self.cells.gather((weight * residual)[:, None] * grey[:, 1:], self.lattice.size).ravel()
             change = -force - rough * product(self.roughness, (found - anchor).ravel())
             solve(factor, change)
-            found = found + change.reshape(-1, 2)
-            if np.abs(change).max() < STILL:
+            step = self.cells.evaluate(change.reshape(-1, 2))
+            found, place, moved = found + change.reshape(-1, 2), place + step, np.sqrt(np.mean(step**2))
+            if moved < STILL:
                 break
-        return found, grey_at(image, self.places + self.cells.evaluate(found))
+        return found, grey_at(image, place)
 
     def fit(self, flow: np.ndarray) -> np.ndarray:
         """Coefficients (knot, 2) of the field that is like a flow (pixel, 2), px, without its outliers."""
