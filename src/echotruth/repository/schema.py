@@ -2,52 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import NDArray
 
 from echotruth.config import Config
+from echotruth.repository.array import Array
+from echotruth.repository.array import array as _array
+from echotruth.repository.tracked import EVALUATION, TRACKING
 from echotruth.section import unit_of
-
-
-@dataclass(frozen=True)
-class Array:
-    """One array of the repository.
-
-    Attributes
-    ----------
-    name : str
-        Its name in its group.
-    dims : tuple of str
-        Names of its dimensions, in order.
-    dtype : str
-    units : str
-        SI, as UDUNITS writes them; "1" for numbers without one.
-    long_name : str
-        What it holds, for people and for plots.
-    """
-
-    name: str
-    dims: tuple[str, ...]
-    dtype: str
-    units: str
-    long_name: str
-
-    @property
-    def leading(self) -> int:
-        """Number of leading dimensions that name the job which owns a shard: case, or case and view."""
-        return sum(dim in ("case", "view") for dim in self.dims)
-
-    @property
-    def fill(self) -> float | int | str:
-        """Value where nothing was written."""
-        return {"f": float("nan"), "s": ""}.get(self.dtype[0], 0)
-
-
-def _array(name: str, dims: str, dtype: str, units: str, long_name: str) -> Array:
-    return Array(name, tuple(dims.split()), dtype, units, long_name)
-
 
 GEOMETRY = (
     _array("node_position", "case node xyz", "float64", "m", "position of the nodes, unloaded"),
@@ -155,82 +118,6 @@ TRANSMITS = (
 )
 """How the waves were sent of which the lines are made: they stand wherever RF is kept."""
 RF = (*LINES, *CHANNELS, *TRANSMITS)
-
-TRACKING = (
-    _array(
-        "displacement", "case view tracker frame axial lateral plane", "float32", "m", "tracked displacement from ED"
-    ),
-    _array("quality", "case view tracker frame axial lateral", "float32", "1", "how sure the tracker is, 0 to 1"),
-)
-
-_POINT = "case view frame axial lateral"
-_TRACKED = "case view tracker"
-EVALUATION = (
-    _array("true_displacement", f"{_POINT} plane", "float32", "m", "true displacement from ED"),
-    _array("through_plane", _POINT, "float32", "m", "true displacement out of the plane"),
-    _array(
-        *("true_strain", "case view reference frame axial lateral wall_component", "float32", "1"),
-        "strain from ED: of the heart, of what its plane shows, of the operator on the true displacement",
-    ),
-    _array("wall_axes", "case view axial lateral polar plane", "float32", "1", "the wall's axes in the image at ED"),
-    _array("layer", "case view axial lateral", "uint8", "1", "transmural layer of the point at ED, 0 outside"),
-    _array("segment", "case view axial lateral", "uint8", "1", "AHA segment of the point at ED, 0 outside"),
-    _array("through_plane_rms", "case view", "float64", "m", "RMS of the displacement out of the plane at ES"),
-    _array(
-        *("operator_bias", "case view reference region wall_component", "float64", "1"),
-        "mean of the operator's strain of the true displacement minus the reference at ES",
-    ),
-    _array("operator_rms", "case view reference region wall_component", "float64", "1", "RMS of the same"),
-    _array(
-        *("tracked_strain", f"{_TRACKED} frame axial lateral wall_component", "float32", "1"),
-        "strain from ED of the tracked displacement, by the operator",
-    ),
-    _array("rms_error", f"{_TRACKED} region measure", "float64", "m", "RMS error of displacement at ES"),
-    _array("nrmse", f"{_TRACKED} region measure", "float64", "1", "RMS error over RMS of the true displacement at ES"),
-    _array("nrmse_all", _TRACKED, "float64", "1", "the same of the whole wall, lost points counted as still"),
-    _array("nrmse_cycle", _TRACKED, "float64", "1", "the same of the whole wall and cycle"),
-    _array("segment_rms_error", f"{_TRACKED} aha measure", "float64", "m", "RMS error of displacement at ES"),
-    _array("segment_nrmse", f"{_TRACKED} aha measure", "float64", "1", "RMS error over RMS truth at ES"),
-    _array("frame_rms_error", f"{_TRACKED} frame measure", "float64", "m", "RMS error of displacement"),
-    _array("frame_nrmse", f"{_TRACKED} frame measure", "float64", "1", "RMS error over RMS truth of the frame"),
-    _array("end_point_error", f"{_TRACKED} region statistic", "float64", "m", "length of the error at ES"),
-    _array("drift", _TRACKED, "float64", "m", "RMS error of displacement in the last frame"),
-    _array("through_plane_correlation", _TRACKED, "float64", "1", "of the error's length with motion out of the plane"),
-    _array("tracked_spread", f"{_TRACKED} region polar", "float64", "m", "standard deviation of displacement at ES"),
-    _array("true_spread", f"{_TRACKED} region polar", "float64", "m", "the same of the true displacement"),
-    _array("tracked_spread_change", _TRACKED, "float64", "percent", "fall of tangential spread, endo- to epicardium"),
-    _array("true_spread_change", _TRACKED, "float64", "percent", "the same of the true displacement"),
-    _array("tracked_segment", f"{_TRACKED} aha polar", "float64", "m", "mean displacement of a segment at ES"),
-    _array("true_segment", f"{_TRACKED} aha polar", "float64", "m", "the same of the true displacement"),
-    _array("strain_bias", f"{_TRACKED} reference region wall_component", "float64", "1", "mean error of strain at ES"),
-    _array("strain_rms", f"{_TRACKED} reference region wall_component", "float64", "1", "RMS error of strain at ES"),
-    _array(
-        *("strain_correlation", f"{_TRACKED} reference region wall_component", "float64", "1"),
-        "correlation of tracked with true strain at ES",
-    ),
-    _array("frame_strain_rms", f"{_TRACKED} reference frame wall_component", "float64", "1", "RMS error of strain"),
-    _array("tracked_global_strain", f"{_TRACKED} frame wall_component", "float64", "1", "mean strain of the wall"),
-    _array(
-        *("true_global_strain", f"{_TRACKED} reference frame wall_component", "float64", "1"),
-        "the same of the references",
-    ),
-    _array(
-        "tracked_segment_strain", f"{_TRACKED} frame aha wall_component", "float64", "1", "mean strain of a segment"
-    ),
-    _array(
-        *("true_segment_strain", f"{_TRACKED} reference frame aha wall_component", "float64", "1"),
-        "the same of the references",
-    ),
-    _array(
-        *("segment_strain_error", f"{_TRACKED} reference wall_component", "float64", "1"),
-        "mean size of the error of a segment's strain at ES",
-    ),
-    _array(
-        *("segment_agreement", f"{_TRACKED} reference agreement wall_component", "float64", "1"),
-        "agreement of the strain of segments at ES",
-    ),
-    _array("coverage", _TRACKED, "float64", "1", "share of the wall's points with an estimate"),
-)
 
 COORDINATES = (
     _array("case", "case", "string", "1", "case id"),
