@@ -98,7 +98,7 @@ def test_one_black_frame_is_passed_over(clip):
 
 def test_points_beyond_the_wall_and_empty_masks_have_no_displacement(shifted):
     frames = np.stack([shifted(SIZE, 0, 0), shifted(SIZE, 1, 0)])
-    mask, points = ring()
+    mask, points = ring(inner=38, outer=56)
     away = np.array([[2.0, 2.0], [300.0, -5.0], [np.nan, 60.0], MIDDLE])
     displacement, quality = found(frames, mask, away)
     assert np.isnan(displacement).all() and np.isnan(quality).all()

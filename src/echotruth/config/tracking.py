@@ -74,9 +74,9 @@ class BsplineDic(Section):
     """Standard deviation of the Gaussian that blurs the images; the larger of this and `blur_um` holds."""
     blur_um: Annotated[FiniteFloat, Field(ge=0)] = 20.0
     """The same in the tissue."""
-    smoothness: Positive = 5.0
+    smoothness: Positive = 10.0
     """Weight of the roughness of a step from one frame to the next over that of the images."""
-    across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.3
+    across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2
     """Length of a unit through the wall where roughness is measured; of one along it, 1."""
     tolerance: Positive = 3.0
     """Difference of grey values at which a pixel has a quarter of its weight, over their standard deviation."""
