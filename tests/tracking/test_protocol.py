@@ -53,29 +53,19 @@ def test_shift_is_lateral_then_axial_and_positive_for_motion_of_the_tissue(tall,
     assert quality.min() >= 0 and quality.max() <= 1
 
 
-def test_rotation_turns_the_right_way_and_is_read_where_the_tissue_is(tall, tracker):
+def test_turn_and_stretch_are_found_and_read_where_the_tissue_is(tall, tracker):
     """Steps of a turn added up where a point was at first would lie along the tangent, and never lead inwards."""
 
-    def turn(place, t):
-        angle = 0.36 * beat(t, 10)
-        cosine, sine = np.cos(angle), np.sin(angle)
-        return CENTRE + (place - CENTRE) @ np.array([[cosine, sine], [-sine, cosine]])
+    def gradient(t):
+        angle, stretch = 0.36 * beat(t, 10), np.diag([1, 1 + 0.1 * beat(t, 10)])
+        return stretch @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
     arm = points() - CENTRE
     arm = arm[np.hypot(*arm.T) < 45]
-    moved, _ = found(tall(turn, 10), tracker, CENTRE + arm)
-    matrix = np.linalg.lstsq(arm, moved[5])[0]
-    assert (matrix[0, 1] - matrix[1, 0]) / 2 == pytest.approx(np.sin(0.36), rel=0.15)
-    # Windows as wide as those of the phase correlation see less of so fast a turn; its path is that of all pairs.
-    share = 0.4 if tracker.method == "phase_correlation" else 0.9
-    assert np.trace(matrix) / 2 < share * (np.cos(0.36) - 1)
-
-
-def test_stretch_is_found_in_full(tall, tracker):
-    if tracker.method == "phase_correlation":
-        pytest.skip("a tenth short of it at windows that hold enough speckle")
-    moved, _ = found(tall(lambda place, t: CENTRE + (place - CENTRE) * [1, 1 + 0.2 * beat(t, 8)], 8), tracker)
-    assert np.polyfit(points()[:, 1], moved[4, :, 1], 1)[0] == pytest.approx(0.2, rel=0.05)
+    moved, _ = found(tall(lambda place, t: CENTRE + (place - CENTRE) @ gradient(t), 10), tracker, CENTRE + arm)
+    # Windows that hold enough speckle for a phase correlation are too wide for more than the sense of so fast a turn.
+    tolerance = 0.15 if tracker.method == "phase_correlation" else 0.02
+    np.testing.assert_allclose(np.linalg.lstsq(arm, moved[5])[0], gradient(5) - np.eye(2), atol=tolerance)
 
 
 @pytest.mark.parametrize("value", [0, 200, np.nan])
