@@ -30,7 +30,7 @@ BAD = {
     "bmode: {downsampling: [1, 3]}": "bmode.downsampling = [1, 3]: every entry must divide size_px = 512",
     "tracking: {trackers: {wide: {window_px: 256}}}": "window_px = 256: must not exceed the smallest image, 128 px",
     "tracking: {trackers: {both: {window_mm: 1.0}}}": "give either window_px or window_mm",
-    "tracking: {trackers: {one: {method: diss}}}": "tracking.trackers.one.method = 'diss': should be 'phase_correlation'",
+    "tracking: {trackers: {one: {method: diss}}}": "trackers.one.method = 'diss': should be 'phase_correlation', '",
     "tracking: {trackers: {dis: {method: dis, presett: fast}}}": "tracking.trackers.dis.presett is not a key of the "
     "method dis (others: phase_correlation, ",
     "tracking: {trackers: {one: {method: guest}}}": "tracking.trackers.one.track = null: give either track or command",
