@@ -1,5 +1,6 @@
 """The whole workflow on coarse hearts: what it makes, what it reruns, and that a killed run ends in the same bytes."""
 
+import json
 import os
 import re
 import shutil
@@ -31,6 +32,8 @@ tracking:
   trackers:
     faithful: {window_px: 16}
     corrected: {window_px: 16, taper: hann, reference: previous}
+    wall: {method: bspline_dic}
+    absent: {method: guest, track: "absent:track"}
 cases:
   seed: [1, 2]
 """
@@ -164,7 +167,18 @@ def test_every_view_shows_wall_and_speckle_and_is_tracked(tree):
     for size in (128, 64):
         assert tree[f"truth/{size}/mask"].any(("axial", "lateral")).all()
         assert (tree[f"bmode/{size}/image"].std(("axial", "lateral")) > 5).all()
-        assert (tree[f"evaluation/{size}/coverage"] > 0.5).all()
+        assert (tree[f"evaluation/{size}/coverage"].sel(tracker=["faithful", "corrected", "wall"]) > 0.5).all()
+
+
+def test_a_tracker_that_fails_is_a_row_of_the_leaderboard_and_not_the_end_of_the_run(made, tree):
+    assert (tree["evaluation/128/coverage"].sel(tracker="absent") == 0).all()
+    record = json.loads(next((made.out / "ledger/tracking").glob("*/mid.json")).read_text())
+    assert set(record["failures"]) == {"absent/128", "absent/64"}
+    assert "cannot be imported" in record["failures"]["absent/64"]
+    board = pd.read_csv(made.out / "figures/leaderboard.csv").set_index(["size_px", "view", "tracker"])
+    assert board.loc[(128, "all", "absent"), "failures"] == 4
+    assert board.loc[(128, "all", "absent"), "nrmse_all_percent"] == pytest.approx(100)
+    assert board.loc[(128, "all", "wall"), "rank"] == 1
 
 
 def test_figures_stand_beside_the_repository_and_scratch_does_not(made):

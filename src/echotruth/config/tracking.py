@@ -170,14 +170,13 @@ Tracker = Annotated[
 
 
 def standard_trackers() -> dict[str, Any]:
-    """The paper's as printed and as corrected, stronger ones, and two from libraries."""
+    """The paper's as printed and as corrected, stronger ones, and one of a library."""
     return {
         "faithful": PhaseCorrelation(),
         "corrected": PhaseCorrelation(taper="hann", reference="previous"),
         "window_deformation": WindowDeformation(),
         "affine_dic": AffineDic(),
         "dis": Dis(),
-        "ilk": Ilk(),
         "bspline_dic": BsplineDic(),
     }
 

@@ -13,7 +13,7 @@ from echotruth.section import Section
 Track = Callable[..., tuple[np.ndarray, np.ndarray]]
 
 
-class TrackerFailed(RuntimeError):
+class TrackerFailed(ValueError):
     """A tracker that gave no answer, or none that can be used; the message says why in one sentence."""
 
 
@@ -58,11 +58,14 @@ def track(
     ValueError
         If there is no pair of frames, or points, mask, spacing or times make no sense.
     TrackerFailed
-        If the tracker of a guest raises, or what it returns is not of that shape.
+        If the method cannot do with such a clip, or a guest raises or does not answer as asked.
     """
     clip = (np.asarray(frames), np.asarray(points, float), np.asarray(mask, bool), spacing, np.asarray(frame_time))
     _check(*clip)
-    displacement, quality = _method(settings)(*clip, seed)
+    try:
+        displacement, quality = _method(settings)(*clip, seed)
+    except ValueError as error:
+        raise TrackerFailed(str(error)) from error
     half = np.array(clip[2].shape[::-1]) / 2
     inside = (np.abs(clip[1] + 0.5 - half) <= half).all(1)
     lost = ~(np.isfinite(displacement).all(-1) & inside)
