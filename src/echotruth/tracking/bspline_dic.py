@@ -155,6 +155,7 @@ def blend(body: Region, points: np.ndarray, forward: Path, backward: Path) -> tu
     displacement = np.moveaxis(body.lattice.at(flat, points).reshape(len(points), len(share), 2), 0, 1).copy()
     quality = np.where(share > 0, share * np.maximum(forward.alike, 0), 0)
     quality += np.where(share < 1, (1 - share) * np.maximum(backward.alike, 0), 0)
+    quality[0] += 1 - quality[0]
     displacement[np.isnan(quality)] = np.nan
     return displacement, quality
 

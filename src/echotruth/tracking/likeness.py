@@ -42,9 +42,8 @@ class Likeness:
             From -1 to 1; NaN where either has no texture, or there is no pixel.
         """
         values = np.stack([np.ones_like(first), first, second, first**2, second**2, first * second], -1)
-        total, *sums = self._net.at(
-            self._cells.gather(values[self._inside][self._order], self._net.size), self._points
-        ).T
+        moments = self._cells.gather(values[self._inside][self._order], self._net.size)
+        total, *sums = self._net.at(moments, self._points).T
         a, b, aa, bb, ab = (np.divide(each, total, out=np.full_like(total, np.nan), where=total > 0) for each in sums)
         variances = aa - a * a, bb - b * b
         product = np.where(np.minimum(*variances) > FAINTEST**2, variances[0] * variances[1], np.nan)

@@ -100,9 +100,7 @@ class Region:
             residual = self.cells.evaluate(found) - flow
             weight = robust(np.hypot(*residual.T), 2)
             factor, rough = self._factor(slopes, weight, LOOSE)
-            force = self.cells.gather(
-                (weight * (residual * slopes).sum(1))[:, None] * slopes, self.lattice.size
-            ).ravel()
+            force = self.cells.gather(weight[:, None] * residual * slopes, self.lattice.size).ravel()
             change = -force - rough * product(self.roughness, found.ravel())
             solve(factor, change)
             found = found + change.reshape(-1, 2)
@@ -145,8 +143,9 @@ def region(mask: np.ndarray, knots: float, margin: float, across: float) -> Regi
     Region
     """
     wide = ndimage.distance_transform_edt(~mask) <= margin
-    if knots > FINE:
-        wide &= np.indices(mask.shape).sum(0) % 2 == 0
+    thinned = wide & (np.indices(mask.shape).sum(0) % 2 == 0)
+    if knots > FINE and (thinned & mask).any():
+        wide = thinned
     places = np.argwhere(wide)[:, ::-1].astype(float)
     net = lattice(places, knots)
     cells, order = net.cells(places)

@@ -1,0 +1,137 @@
+"""The parts of the B-spline tracker against other libraries and closed forms."""
+
+import numpy as np
+import pytest
+from scipy import interpolate, linalg, ndimage
+
+from echotruth.imaging import spline
+from echotruth.tracking.alignment import add_matrix, factorise, grey_at, product, solve
+from echotruth.tracking.bspline import lattice
+from echotruth.tracking.likeness import Likeness
+from echotruth.tracking.region import region
+from echotruth.tracking.roughness import metric, roughness
+
+MASK = np.zeros((60, 80), bool)
+MASK[12:45, 15:70] = True
+STEP = 9.0
+
+
+@pytest.fixture
+def random():
+    return np.random.default_rng(5)
+
+
+def dense(band):
+    """Whole symmetric matrix of a band."""
+    n, width = band.shape
+    matrix = np.zeros((n, n))
+    for a in range(n):
+        for b in range(max(0, a - width + 1), a + 1):
+            matrix[a, b] = matrix[b, a] = band[a, b - a + width - 1]
+    return matrix
+
+
+def test_field_is_the_tensor_product_spline_of_scipy(random):
+    points = random.uniform([15, 12], [69, 44], (50, 2))
+    net = lattice(np.argwhere(MASK)[:, ::-1], STEP)
+    rows, columns = net.number.shape
+    table = random.normal(size=(rows, columns))
+    coefficients = np.zeros((net.size, 1))
+    coefficients[net.number[net.number >= 0], 0] = table[net.number >= 0]
+    axes = [net.origin[axis] + net.step * (np.arange(count + 4) - 2) for axis, count in ((0, columns), (1, rows))]
+    across, down = (interpolate.BSpline.design_matrix(points[:, axis], axes[axis], 3).toarray() for axis in (0, 1))
+    expected = np.einsum("pi,pj,ij->p", down, across, table)
+    np.testing.assert_allclose(net.at(coefficients, points)[:, 0], expected, atol=1e-12)
+
+
+def test_gathering_is_the_transpose_of_evaluating(random):
+    body = region(MASK, STEP, 3.0, 0.5)
+    values, coefficients = random.normal(size=(len(body.places), 2)), random.normal(size=(body.lattice.size, 2))
+    there = np.sum(values * body.cells.evaluate(coefficients))
+    back = np.sum(body.cells.gather(values, body.lattice.size) * coefficients)
+    assert there == pytest.approx(back, rel=1e-12)
+
+
+def test_knots_count_along_the_shorter_side():
+    tall = lattice(np.argwhere(MASK), STEP)
+    assert tall.number.shape[0] > tall.number.shape[1]
+    assert np.abs(np.diff(tall.number, axis=0)).max() == tall.number.shape[1]
+    assert np.abs(np.diff(lattice(np.argwhere(MASK)[:, ::-1], STEP).number, axis=1)).max() == tall.number.shape[1]
+
+
+def test_grey_values_and_slopes_are_those_of_the_cubic_spline(random):
+    image = random.normal(size=(30, 40)).astype(np.float32)
+    place = random.uniform([1, 1], [38, 28], (60, 2))
+    grey = grey_at(spline.coefficients(image), place)
+
+    def at(moved):
+        return ndimage.map_coordinates(image.astype(float), (place + moved)[:, ::-1].T, order=3, mode="mirror")
+
+    np.testing.assert_allclose(grey[:, 0], at([0, 0]), atol=1e-5)
+    for axis, step in enumerate(1e-4 * np.eye(2)):
+        np.testing.assert_allclose(grey[:, 1 + axis], (at(step) - at(-step)) / 2e-4, atol=1e-4)
+
+
+def test_normal_equations_are_those_of_the_dense_problem(random):
+    body = region(MASK, STEP, 0.0, 0.5)
+    count = len(body.places)
+    slope, weight = random.normal(size=(count, 2)), random.uniform(size=count)
+    design = np.zeros((count, 2 * body.lattice.size))
+    for k in range(body.lattice.size):
+        unit = np.zeros((body.lattice.size, 1))
+        unit[k] = 1
+        share = body.cells.evaluate(unit)[:, 0]
+        design[:, 2 * k], design[:, 2 * k + 1] = share * slope[:, 0], share * slope[:, 1]
+    expected = design.T @ (weight[:, None] * design)
+    band, cells = np.zeros(body.roughness.shape), body.cells
+    add_matrix(cells.knots, cells.first, cells.across, cells.down, slope, weight, band)
+    np.testing.assert_allclose(dense(band), expected, atol=1e-10)
+    x = random.normal(size=len(band))
+    np.testing.assert_allclose(product(band, x), expected @ x, atol=1e-9)
+    band[:, -1] += 1
+    right, factor = x.copy(), band.copy()
+    factorise(factor)
+    solve(factor, right)
+    np.testing.assert_allclose(right, linalg.solve(expected + np.eye(len(x)), x), atol=1e-10)
+
+
+@pytest.mark.parametrize("across", [1.0, 0.25])
+def test_roughness_of_a_parabola_is_its_thin_plate_energy_in_the_metric(across):
+    places = np.argwhere(MASK)[:, ::-1].astype(float)
+    net = lattice(places, STEP)
+    band = roughness(net.cells(places)[0], np.tile([1.0, 0.0, across], (len(places), 1)), net.size)
+    row, column = np.nonzero(net.number >= 0)
+
+    def rough(values):
+        coefficients = np.zeros((net.size, 2))
+        coefficients[net.number[row, column], 1] = values
+        return coefficients.ravel() @ product(band, coefficients.ravel())
+
+    along = rough(column**2)
+    assert rough(3 + 2 * column - row) == pytest.approx(0, abs=1e-9 * along)
+    # |M H M|^2 is 4 for x^2, 2 across^2 for x y and 4 across^4 for y^2.
+    assert rough(column * row) / along == pytest.approx(across**2 / 2)
+    assert rough(row**2) / along == pytest.approx(across**4)
+
+
+def test_metric_is_short_across_the_wall_and_one_along_it():
+    for turned in (False, True):
+        strip = np.zeros((60, 60), bool)
+        strip[20:35] = True
+        strip = strip.T if turned else strip
+        expected = [0.2, 0, 1] if turned else [1, 0, 0.2]
+        np.testing.assert_allclose(metric(strip, strip, 3.0, 0.2), np.tile(expected, (strip.sum(), 1)), atol=1e-9)
+
+
+def test_correlation_does_not_see_gain_and_offset_but_sees_noise(random):
+    places = np.argwhere(MASK)[:, ::-1].astype(float)
+    points = np.array([[40.0, 30.0], [20.0, 20.0], [5.0, 5.0]])
+    alike = Likeness(places, np.ones(len(places), bool), points, 16.0)
+    first, noise = random.normal(size=(2, len(places)))
+    np.testing.assert_allclose(alike.about_points(first, 3 * first + 2)[:2], 1, atol=1e-9)
+    np.testing.assert_allclose(alike.about_points(first, -first)[:2], -1, atol=1e-9)
+    assert np.isnan(alike.about_points(first, first)[2])
+    assert np.isnan(alike.about_points(first, 0 * first)).all()
+    noisy = first + noise
+    assert alike.overall(first, noisy) == pytest.approx(np.corrcoef(first, noisy)[0, 1], abs=1e-12)
+    np.testing.assert_allclose(alike.about_points(first, noisy)[:2], np.sqrt(0.5), atol=0.15)
