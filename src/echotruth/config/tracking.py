@@ -78,7 +78,7 @@ class BsplineDic(Section):
     """Weight of the roughness of a step from one frame to the next over that of the images."""
     across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2
     """Length of a unit through the wall where roughness is measured; of one along it, 1."""
-    tolerance: Positive = 3.0
+    tolerance: Positive = 4.0
     """Difference of grey values at which a pixel has a quarter of its weight, over their standard deviation."""
     renewal: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.75
     """Correlation of image and template below which the frame before becomes the template."""
