@@ -1,0 +1,182 @@
+"""Trackers on rigid sub-pixel shifts of simulated speckle, and the time that a pair of images takes them.
+
+    python benchmarks/tracking.py out/demo --guest examples.openpiv_tracker:track
+
+Shifts: scatterers in a block before the default array are moved by 0, 0.1, ... 1 px of the largest image, along both
+axes at once, and imaged by the RF engine; a tracker sees the unmoved and the moved image. Bias is the mean error over
+phantoms and points, noise the standard deviation about it; the largest over the shifts stands in the table. Time: the
+first frames of the view `mid` of a repository, all trackers in turns, one process with as many threads as cores, median
+of the turns. The guest's windows of 64, 32 and 16 px cover the image, as it has no mask; OpenPIV's needs the extra
+`openpiv`. The results are results/tracking.md, tracking.json and tracking.png.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+import report
+import xarray as xr
+from matplotlib.figure import Figure
+
+from echotruth.config import Config
+from echotruth.config.tracking import Guest, standard_trackers
+from echotruth.imaging.bmode import clip
+from echotruth.imaging.scanner import Scanner
+from echotruth.tracking import grid, track
+
+RESULTS = Path(__file__).parent / "results"
+LOW, HIGH = np.array([-1.8e-3, 5.2e-3, -0.4e-3]), np.array([1.8e-3, 8.2e-3, 0.4e-3])
+"""Corners of a block of scatterers (lateral, axial, elevation), m."""
+WALL = (-1.2e-3, 1.2e-3, 5.8e-3, 7.6e-3)
+"""What is tracked of it: lateral from and to, axial from and to, m; a window of the paper about each of its points
+holds speckle alone."""
+SHIFTS = np.arange(11) / 10
+"""Of the pixels of the largest image."""
+STEP = 10
+"""Between points, px of the largest image."""
+TURNS, PAIRS = 3, 5
+"""How often the time is taken, and of how many pairs of frames each time."""
+
+Clips = dict[int, np.ndarray]
+
+
+def blocks(config: Config, seed: int) -> Clips:
+    """A block of speckle at every shift: image size to frames (shift, size, size), uint8."""
+    random = np.random.default_rng(seed)
+    number = int(config.phantom.si().density * np.prod(HIGH - LOW))
+    position, amplitude = random.uniform(LOW, HIGH, (number, 3)), random.standard_normal(number)
+    scanner = Scanner(config.probe, config.rf, 11e-3)
+    pixel = config.bmode.si().field_of_view / config.bmode.sizes[0]
+    moved = [position + shift * pixel * np.array([1.0, 1.0, 0.0]) for shift in SHIFTS]
+    lines = np.stack([scanner.lines(each, amplitude) for each in moved])
+    return clip(lines, scanner.scan, scanner.range, config.bmode)
+
+
+def wall(config: Config, size: int) -> np.ndarray:
+    """Pixels (size, size) that are tracked."""
+    side = config.bmode.si().field_of_view
+    lateral, axial = (np.arange(size) + 0.5) * side / size - side / 2, (np.arange(size)[:, None] + 0.5) * side / size
+    left, right, near, far = WALL
+    return (lateral > left) & (lateral < right) & (axial > near) & (axial < far)
+
+
+def errors(config: Config, frames: np.ndarray, settings: Any) -> np.ndarray:
+    """Tracked less true shift of the points, (shift, n, 2), px of the images."""
+    size, largest = frames.shape[-1], config.bmode.sizes[0]
+    places = grid((largest, largest), STEP).reshape(-1, 2)
+    places = places[wall(config, largest)[tuple(places.astype(int).T[::-1])]]
+    scale = size / largest
+    points = (places + 0.5) * scale - 0.5
+    given = points, wall(config, size), config.bmode.si().field_of_view / size, np.array([0.0, 1e-3]), 1
+    found = [track(frames[[0, k]], *given, settings)[0][1] for k in range(len(frames))]
+    return np.stack(found) - SHIFTS[:, None, None] * scale
+
+
+def shifts(config: Config, trackers: dict[str, Any], phantoms: int) -> list[dict[str, Any]]:
+    """Bias and noise by tracker and size: lists over the shifts, of the lateral and the axial component, px."""
+    seen = [blocks(config, seed) for seed in range(phantoms)]
+    rows = []
+    for name, settings in trackers.items():
+        for size in config.bmode.sizes:
+            error = np.concatenate([errors(config, each[size], settings) for each in seen], axis=1)
+            bias, noise = np.nanmean(error, axis=1), np.nanstd(error, axis=1)
+            lost = float(np.isnan(error).any(-1).mean())
+            rows.append({"tracker": name, "size": size, "bias": bias.tolist(), "noise": noise.tolist(), "lost": lost})
+            print(name, size, np.abs(bias).max(), noise.max(), flush=True)
+    return rows
+
+
+def pace(folder: Path, trackers: dict[str, Any]) -> dict[str, list[float]]:
+    """Time of a pair of the largest images, s, of each tracker at every turn."""
+    tree = xr.open_datatree(next(folder.glob("*.zarr")), engine="zarr")
+    size = max(int(name) for name in tree["bmode"].children)
+    view = tree[f"bmode/{size}"].to_dataset().isel(case=0).sel(view="mid")
+    frames, times = view.image.values[: PAIRS + 1], view.time.values[: PAIRS + 1]
+    mask = tree[f"truth/{size}/mask"].isel(case=0, frame=0).sel(view="mid").values
+    spacing = float(view.lateral[1] - view.lateral[0])
+    points = grid(frames.shape[1:], 5).reshape(-1, 2)
+    points = points[mask[tuple(points.astype(int).T[::-1])]]
+    taken: dict[str, list[float]] = {name: [] for name in trackers}
+    for turn in range(TURNS + 1):
+        for name, settings in trackers.items():
+            start = time.perf_counter()
+            track(frames, points, mask, spacing, times, 1, settings)
+            if turn:  # the first compiles
+                taken[name].append((time.perf_counter() - start) / PAIRS)
+    return taken
+
+
+def page(found: dict[str, Any]) -> str:
+    """The results as a table."""
+    sizes = sorted({row["size"] for row in found["shifts"]}, reverse=True)
+    rows = {(row["tracker"], row["size"]): row for row in found["shifts"]}
+    paces = {name: 1e3 * median(taken) for name, taken in found["pace"].items()}
+    guest = paces.get(found["guest"], float("nan"))
+    head = ["tracker", *(f"{size}: bias, noise (px)" for size in sizes), "ms a pair", "guest's / this"]
+    body = [
+        [name, *(_greatest(rows[name, size]) for size in sizes), f"{pace:.0f}", f"{guest / pace:.2f}"]
+        for name, pace in paces.items()
+    ]
+    lines = [
+        "# Trackers on rigid shifts, and their pace",
+        "",
+        f"Shifts of 0 to 1 px of the largest image, {found['phantoms']} phantoms; the largest bias and noise over the",
+        "shifts and both axes, in pixels of each size. Time of a pair of the largest images.",
+        "",
+        *report.table(head, body),
+        "",
+        "![Bias of every tracker over the shift](tracking.png)",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _greatest(row: dict[str, Any]) -> str:
+    return f"{np.abs(row['bias']).max():.4f}, {np.max(row['noise']):.4f}"
+
+
+def chart(found: dict[str, Any]) -> None:
+    """Bias over the shift, a panel a size."""
+    sizes = sorted({row["size"] for row in found["shifts"]}, reverse=True)
+    sheet = Figure(figsize=(3.6 * len(sizes), 3.8), layout="constrained")
+    panels = sheet.subplots(1, len(sizes), sharey=True, squeeze=False)[0]
+    for panel, size in zip(panels, sizes, strict=True):
+        for row in (each for each in found["shifts"] if each["size"] == size):
+            panel.plot(SHIFTS * size / sizes[0], np.array(row["bias"])[:, 1], marker="o", ms=3, label=row["tracker"])
+        panel.set(title=f"{size} px", xlabel="Axial shift (px)")
+        panel.set_yscale("symlog", linthresh=0.01)
+        panel.axhspan(-0.01, 0.01, color="0.9")
+    panels[0].set_ylabel("Bias (px)")
+    panels[-1].legend(fontsize=7)
+    sheet.savefig(RESULTS / "tracking.png", dpi=150)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("repository", type=Path, help="folder of a repository with a view mid, as out/demo")
+    parser.add_argument("--guest", help="package.module:function of a tracker to measure against")
+    parser.add_argument("--phantoms", type=int, default=4)
+    arguments = parser.parse_args()
+    trackers, guest = standard_trackers(), ""
+    if arguments.guest:
+        guest = arguments.guest.partition(":")[0].rpartition(".")[2]
+        trackers[guest] = Guest(track=arguments.guest)
+    found = {
+        "phantoms": arguments.phantoms,
+        "guest": guest,
+        "pace": pace(arguments.repository, trackers),
+        "shifts": shifts(Config(), trackers, arguments.phantoms),
+    }
+    (RESULTS / "tracking.json").write_text(json.dumps(found, indent=1) + "\n")
+    (RESULTS / "tracking.md").write_text(page(found))
+    chart(found)
+
+
+if __name__ == "__main__":
+    main()
