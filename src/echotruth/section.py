@@ -90,4 +90,6 @@ class Section(BaseModel):
 
 
 def _scaled(value: Any, factor: float) -> Any:
-    return {key: each * factor for key, each in value.items()} if isinstance(value, dict) else value * factor
+    if isinstance(value, dict):
+        return {key: each * factor for key, each in value.items()}
+    return [each * factor for each in value] if isinstance(value, list) else value * factor

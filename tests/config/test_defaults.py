@@ -53,6 +53,20 @@ def test_what_is_given_stands():
     assert configured(geometry={"preset": "human"}).loop.file == "human"
 
 
+def test_lengths_of_trackers_follow_the_field_of_view():
+    trackers = configured(geometry={"preset": "human"}).tracking.trackers
+    assert set(trackers) == set(Config().tracking.trackers)
+    assert (trackers["bspline_dic"].knots_mm, trackers["affine_dic"].subset_mm) == (0.4 * 12.5, 12.5)
+    assert trackers["window_deformation"].windows_mm == [1.5 * 12.5, 0.75 * 12.5]
+    assert (trackers["corrected"].window_px, trackers["corrected"].reference) == (64, "previous")
+    given = configured(bmode={"field_of_view_mm": 24.0}, tracking={"trackers": {"one": {"method": "bspline_dic"}}})
+    assert given.tracking.trackers["one"].knots_mm == 0.8
+    fixed = {"one": {"method": "bspline_dic", "knots_mm": 0.3}}
+    assert (
+        configured(geometry={"preset": "human"}, tracking={"trackers": fixed}).tracking.trackers["one"].knots_mm == 0.3
+    )
+
+
 def test_scans_there_are_for_all_arrays():
     assert set(ARRAYS) == set(PRESETS)
 

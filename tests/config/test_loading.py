@@ -33,6 +33,7 @@ BAD = {
     "tracking: {trackers: {one: {method: diss}}}": "trackers.one.method = 'diss': should be 'phase_correlation', '",
     "tracking: {trackers: {dis: {method: dis, presett: fast}}}": "tracking.trackers.dis.presett is not a key of the "
     "method dis (others: phase_correlation, ",
+    "tracking: {trackers: {one: {method: affine_dic, subset_mm: 1000}}}": "subset_mm = 1000.0: must not exceed bmode",
     "tracking: {trackers: {one: {method: guest}}}": "tracking.trackers.one.track = null: give either track or command",
     "tracking: {grid_px: 100, }\nbmode: {size_px: 64, downsampling: [1]}": "grid_px = 100: must not exceed the largest",
     "rf: {focus_mm: 12}": "rf.focus_mm = 12.0: must be smaller than bmode.field_of_view_mm = 12",

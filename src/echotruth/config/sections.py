@@ -56,8 +56,7 @@ class Config(Section):
     def _fits_together(self) -> Config:
         view = self.bmode.field_of_view_mm
         for name, tracker in self.tracking.trackers.items():
-            if isinstance(tracker, PhaseCorrelation):
-                self._window_fits(f"tracking.trackers.{name}", tracker)
+            self._lengths_fit(f"tracking.trackers.{name}", tracker)
         if self.tracking.grid_px > self.bmode.size_px:
             remedy = f"must not exceed the largest image, {self.bmode.size_px} px"
             raise impossible("tracking.grid_px", self.tracking.grid_px, remedy)
@@ -65,14 +64,15 @@ class Config(Section):
             raise impossible("rf.focus_mm", self.rf.focus_mm, f"must be smaller than bmode.field_of_view_mm = {view:g}")
         return self
 
-    def _window_fits(self, place: str, tracker: PhaseCorrelation) -> None:
+    def _lengths_fit(self, place: str, tracker: Section) -> None:
         smallest, view = self.bmode.sizes[-1], self.bmode.field_of_view_mm
-        if tracker.window_px is not None and tracker.window_px > smallest:
+        if isinstance(tracker, PhaseCorrelation) and (tracker.window_px or 0) > smallest:
             remedy = f"must not exceed the smallest image, {smallest} px"
             raise impossible(f"{place}.window_px", tracker.window_px, remedy)
-        if tracker.window_mm is not None and tracker.window_mm > view:
-            remedy = f"must not exceed bmode.field_of_view_mm = {view:g}"
-            raise impossible(f"{place}.window_mm", tracker.window_mm, remedy)
+        for key in ("window_mm", "windows_mm", "subset_mm", "knots_mm"):
+            given = getattr(tracker, key, None)
+            if max(given if isinstance(given, list) else [given or 0]) > view:
+                raise impossible(f"{place}.{key}", given, f"must not exceed bmode.field_of_view_mm = {view:g}")
 
     @model_validator(mode="after")
     def _heart_before_the_array(self) -> Config:

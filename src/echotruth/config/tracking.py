@@ -43,7 +43,7 @@ class WindowDeformation(Section):
     method: Literal["window_deformation"] = "window_deformation"
     """Name of the method."""
     windows_mm: Annotated[list[Positive], Field(min_length=1, max_length=6)] = Field(default=[1.5, 0.75])
-    """Sides of the windows, one a pass; 8 pixels at least."""
+    """Sides of the windows, one a pass; 8 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
     sweeps: Annotated[int, Field(ge=1, le=20)] = 3
     """Passes at the last size."""
     reference: Reference = "previous"
@@ -56,7 +56,7 @@ class AffineDic(Section):
     method: Literal["affine_dic"] = "affine_dic"
     """Name of the method."""
     subset_mm: Positive = 1.0
-    """Side of a subset; 17 pixels at least."""
+    """Side of a subset; 17 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
     reference: Reference = "previous"
     """Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
 
@@ -67,13 +67,14 @@ class BsplineDic(Section):
     method: Literal["bspline_dic"] = "bspline_dic"
     """Name of the method."""
     knots_mm: Positive = 0.4
-    """Distance of the knots."""
+    """Distance of the knots, four pixels at least. Default: as suits `bmode.field_of_view_mm`."""
     margin_um: Annotated[FiniteFloat, Field(ge=0)] = 250.0
-    """How far around the wall pixels count; its edge shows how it thickens."""
+    """How far around the wall pixels count; its edge shows how it thickens. Default: as suits
+    `bmode.field_of_view_mm`."""
     blur_px: Annotated[FiniteFloat, Field(ge=0)] = 0.5
     """Standard deviation of the Gaussian that blurs the images; the larger of this and `blur_um` holds."""
     blur_um: Annotated[FiniteFloat, Field(ge=0)] = 20.0
-    """The same in the tissue."""
+    """The same in the tissue. Default: as suits `bmode.field_of_view_mm`."""
     smoothness: Positive = 10.0
     """Weight of the roughness of a step from one frame to the next over that of the images."""
     across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2

@@ -26,8 +26,8 @@ BLUR = 0.8
 bias between pixels (Pan 2013, Opt Lasers Eng 51:1161)."""
 REACH = 5
 """Pixels to which blur and spline spread a pixel without a value."""
-START = WindowDeformation(sweeps=1)
-"""Where the start comes from."""
+START = (1.5, 0.75)
+"""Windows from whose field the alignment starts, over the side of a subset."""
 
 
 def track(
@@ -49,7 +49,8 @@ def track(
         As :func:`echotruth.tracking.window_deformation.arranged`.
     """
     half = max(SMALLEST_HALF, round(settings.si().subset / spacing / 2))
-    start = WindowPairs(arranged(START, frames.shape[1:], spacing))
+    windows = WindowDeformation(windows_mm=[share * 2e3 * half * spacing for share in START], sweeps=1)
+    start = WindowPairs(arranged(windows, frames.shape[1:], spacing))
     return accumulate(AffinePairs(half, start), levels(frames), points, settings.reference)
 
 

@@ -26,6 +26,9 @@ from echotruth.tracking.grey import levels
 from echotruth.tracking.likeness import Likeness
 from echotruth.tracking.region import Region, region
 
+CLOSEST = 4.0
+"""Least distance of knots, px: between closer ones there is less to see than there are unknowns."""
+
 
 @dataclass(frozen=True)
 class Path:
@@ -65,8 +68,9 @@ def track(
     grey = np.nan_to_num(levels(frames))
     blur = max(values.blur / spacing, values.blur_px)
     images = [spline.coefficients(ndimage.gaussian_filter(frame, blur)) for frame in grey]
-    body = region(mask, values.knots / spacing, values.margin / spacing, values.across)
-    likeness = Likeness(body.places, body.inside, points, 2 * values.knots / spacing)
+    knots = max(values.knots / spacing, CLOSEST)
+    body = region(mask, knots, values.margin / spacing, values.across)
+    likeness = Likeness(body.places, body.inside, points, 2 * knots)
     follower = Follower(body, likeness, grey, images, settings)
     with ThreadPoolExecutor(2) as threads:
         paths = list(threads.map(follower.follow, (range(len(frames)), [0, *range(len(frames) - 1, 0, -1)])))

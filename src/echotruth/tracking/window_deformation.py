@@ -88,7 +88,7 @@ def sides(settings: WindowDeformation, spacing: float) -> list[int]:
     list of int
         px, even, 8 at least.
     """
-    every = [max(SMALLEST, 2 * round(side * 1e-3 / spacing / 2)) for side in settings.windows_mm]
+    every = [max(SMALLEST, 2 * round(side / spacing / 2)) for side in settings.si().windows]
     return every + every[-1:] * (settings.sweeps - 1)
 
 
