@@ -15,8 +15,8 @@ from echotruth.tetrahedra import MaterialPoints, gradient, interpolate
 
 Floats = NDArray[np.float64]
 
-TANGENT = {"short_axis": 1, "long_axis": 2}
-"""Which of R, C, L is tangential in an image."""
+ORDER = {"short_axis": (0, 1, 2), "long_axis": (0, 2, 1)}
+"""R, C, L in the order radial, tangential in an image, across it."""
 
 
 def truth(heart: Heart, frame: int, plane: Plane, axial: Floats, lateral: Floats) -> dict[str, NDArray[np.generic]]:
@@ -77,42 +77,41 @@ def follow(heart: Heart, plane: Plane, places: Floats, kind: str) -> dict[str, N
     wall = MaterialPoints(points.cell[inside], points.xi[inside])
     frames = range(len(heart.displacement))
     motion = np.stack([displacement(heart, frame, wall) @ plane.axes.T for frame in frames])
-    at_ed = labels(heart, wall)
+    deformation = np.stack([_deformation(heart, frame, wall) for frame in frames])
+    seen = np.einsum("ai,...ij,bj->...ab", plane.axes[:2], deformation, plane.axes[:2])
+    in_space, at_ed = _axes(heart, wall)[:, ORDER[kind]], labels(heart, wall)
+    in_plane = wall_axes(in_space, plane)
     values = {
         "true_displacement": motion[..., :2],
         "through_plane": motion[..., 2],
-        **_strains(heart, plane, wall, kind),
+        "heart_strain": kinematics.strain(deformation, in_space, kinematics.IMAGE),
+        "plane_strain": kinematics.strain(seen, in_plane, kinematics.IMAGE),
     }
     images = {name: np.stack([_on_pixels(each, inside, shape) for each in value]) for name, value in values.items()}
-    images["wall_axes"] = _on_pixels(wall_axes(heart, plane, wall, kind), inside, shape)
+    images["wall_axes"] = _on_pixels(in_plane, inside, shape)
     return images | {name: _on_pixels(at_ed[name], inside, shape) for name in ("layer", "segment")}
 
 
-def wall_axes(heart: Heart, plane: Plane, points: MaterialPoints, kind: str) -> Floats:
-    """The wall's own axes in the image at end-diastole, (n, 2, 2).
+def wall_axes(in_space: Floats, plane: Plane) -> Floats:
+    """The wall's own axes in the image.
 
-    Rows are radial, the part of R in the plane, and tangential, orthogonal to it on the side of C (short axis) or L
-    (long axis); columns lateral, axial.
+    Parameters
+    ----------
+    in_space : ndarray of shape (n, 3, 3)
+        Axes of the wall in the heart frame: radial, tangential, across; unit vectors.
+    plane : Plane
+
+    Returns
+    -------
+    ndarray of shape (n, 2, 2)
+        Rows are radial, the part of R in the plane, and tangential, orthogonal to it on the side of C (short axis) or
+        L (long axis); columns lateral, axial.
     """
-    normal = gradient(heart.wall_depth, heart.positions(0), heart.cells, points)
-    radial, tangent = (axes_about(normal)[:, axis] @ plane.axes.T for axis in (0, TANGENT[kind]))
+    radial, tangent = (in_space[:, axis] @ plane.axes.T for axis in (0, 1))
     radial = unit(radial[:, :2])
     across = np.stack([-radial[:, 1], radial[:, 0]], axis=-1)
     side = np.where(np.sum(across * tangent[:, :2], axis=1) < 0, -1.0, 1.0)
     return np.stack([radial, across * side[:, None]], axis=1)
-
-
-def _strains(heart: Heart, plane: Plane, points: MaterialPoints, kind: str) -> dict[str, Floats]:
-    at_ed, tangent, frames = heart.positions(0), TANGENT[kind], range(len(heart.displacement))
-    components = ((0, 0), (tangent, tangent), (0, tangent))
-    normal = gradient(heart.wall_depth, at_ed, heart.cells, points)
-    in_space, in_plane = axes_about(normal), wall_axes(heart, plane, points, kind)
-    deformation = np.stack([gradient(heart.positions(frame), at_ed, heart.cells, points) for frame in frames])
-    seen = np.einsum("ai,...ij,bj->...ab", plane.axes[:2], deformation, plane.axes[:2])
-    return {
-        "heart_strain": kinematics.strain(deformation, in_space, components),
-        "plane_strain": kinematics.strain(seen, in_plane, ((0, 0), (1, 1), (0, 1))),
-    }
 
 
 def displacement(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
@@ -122,10 +121,17 @@ def displacement(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
 
 def strain(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
     """Green-Lagrange strain of material points since end-diastole along the wall's axes there, (n, 6)."""
-    at_ed = heart.positions(0)
-    normal = gradient(heart.wall_depth, at_ed, heart.cells, points)
-    deformation = gradient(heart.positions(frame), at_ed, heart.cells, points)
-    return kinematics.strain(deformation, axes_about(normal), kinematics.RCL)
+    return kinematics.strain(_deformation(heart, frame, points), _axes(heart, points), kinematics.RCL)
+
+
+def _axes(heart: Heart, points: MaterialPoints) -> Floats:
+    """R, C, L at end-diastole, (n, 3, 3)."""
+    return axes_about(gradient(heart.wall_depth, heart.positions(0), heart.cells, points))
+
+
+def _deformation(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
+    """F since end-diastole, (n, 3, 3)."""
+    return gradient(heart.positions(frame), heart.positions(0), heart.cells, points)
 
 
 def labels(heart: Heart, points: MaterialPoints) -> dict[str, NDArray[np.generic]]:

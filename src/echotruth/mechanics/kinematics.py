@@ -19,6 +19,9 @@ RCL = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 FIBRE = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (2, 1))
 """Components ff, ss, nn, fs, fn, sn of axes in the order f, s, n."""
 
+IMAGE = ((0, 0), (1, 1), (0, 1))
+"""Components RR, TT, RT of axes in the order radial, tangential."""
+
 
 def deformation_gradient(mesh: Mesh, displacement: Floats, xi: Floats = CENTROID) -> Floats:
     """F from the unloaded state.

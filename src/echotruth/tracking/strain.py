@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from echotruth.mechanics.kinematics import strain
+from echotruth.mechanics.kinematics import IMAGE, strain
 
 RADIUS = 0.0375
 """Radius over the side of the image: 0.45 mm of the 12 mm in which a mouse heart is imaged."""
@@ -31,9 +31,6 @@ FEWEST = 10
 
 WORST = 1e-4
 """Smallest over largest eigenvalue of the normal equations: below it the points lie as good as on a line."""
-
-COMPONENTS = ((0, 0), (1, 1), (0, 1))
-"""Pairs of axes of the components: radial, tangential, shear."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +64,7 @@ class Operator:
         ndarray of shape (frame, point, 3)
             Radial, tangential, shear; NaN where there is no displacement, or too little about a point.
         """
-        return strain(np.eye(2) + self.gradient(np.asarray(displacement, float)), self.axes, COMPONENTS)
+        return strain(np.eye(2) + self.gradient(np.asarray(displacement, float)), self.axes, IMAGE)
 
     def gradient(self, displacement: np.ndarray) -> np.ndarray:
         """Slope of displacement by place: (frame, point, 2) in m to (frame, point, 2 of u, 2 of x)."""
