@@ -26,8 +26,7 @@ def _answer(job: Job, name: str, clip: Clip) -> tuple[np.ndarray, np.ndarray]:
     except TrackerFailed as error:
         logging.getLogger("echotruth").warning("%s at %d px: %s", name, clip.size, error)
         job.verdict.setdefault("failures", {})[f"{name}/{clip.size}"] = str(error)
-        nothing = np.full((len(clip.frames), len(clip.points), 3), np.nan)
-        return clip.on_grid(nothing[..., :2], nothing[..., 2])
+        return clip.on_grid(*clip.nothing)
 
 
 if __name__ == "__main__":

@@ -54,6 +54,12 @@ class Clip:
         """What a tracker gets, in the order of :func:`echotruth.tracking.tracker.track`."""
         return self.frames, self.points, self.mask, self.spacing, self.frame_time, self.seed
 
+    @property
+    def nothing(self) -> tuple[np.ndarray, np.ndarray]:
+        """The answer of a tracker that finds none: displacement (frame, n, 2) and quality (frame, n), all NaN."""
+        shape = len(self.frames), len(self.points)
+        return np.full((*shape, 2), np.nan), np.full(shape, np.nan)
+
     def on_grid(self, displacement: np.ndarray, quality: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Answer of a tracker on the whole grid.
 
