@@ -19,6 +19,9 @@ from echotruth.tracking.strain import RADIUS, Operator
 if TYPE_CHECKING:
     from echotruth.repository.job import Job
 
+ALIKE = 1e-9
+"""Standard deviation of distances that are alike, m: what rounding in single precision makes of 20 mm moved."""
+
 
 @dataclass(frozen=True)
 class Truth:
@@ -116,17 +119,19 @@ def score(tracked: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
     dict of ndarray
         What :func:`echotruth.tracking.evaluation.evaluate` and :func:`echotruth.tracking.agreement.compare` return,
         and tracked_strain (frame, grid rows, grid columns, 3: radial, tangential, shear) and
-        through_plane_correlation (): of the error's length with the distance moved out of the plane, at ES.
+        through_plane_correlation (): of the error's length with the distance moved out of the plane, at ES; NaN where
+        either is the same at all points.
     """
     moved = np.asarray(tracked, float)[:, truth.inside]
     strain, es = truth.operator.strain(moved), truth.es
     away = np.linalg.norm(moved[es] - truth.displacement[es], axis=-1)
     out = np.abs(truth.through_plane[es])
+    together = statistics.correlation(away[:, None], out[:, None], truth.wall.regions[:1], ALIKE)
     return {
         **evaluate(moved, truth.displacement, truth.wall, es),
         **compare(strain, truth.strain, truth.wall, es),
         "tracked_strain": truth.on_grid(strain, 1),
-        "through_plane_correlation": statistics.correlation(away[:, None], out[:, None], truth.wall.regions[:1])[0, 0],
+        "through_plane_correlation": together[0, 0],
     }
 
 

@@ -28,12 +28,27 @@ def deviation(value: np.ndarray, masks: np.ndarray) -> np.ndarray:
     return np.where(count > 1, spread, np.nan)
 
 
-def correlation(first: np.ndarray, second: np.ndarray, masks: np.ndarray) -> np.ndarray:
-    """Pearson correlation over the points of each mask at which both are known, from -1 to 1."""
+def correlation(first: np.ndarray, second: np.ndarray, masks: np.ndarray, alike: float) -> np.ndarray:
+    """Pearson correlation.
+
+    Parameters
+    ----------
+    first, second : ndarray of shape (..., point, k)
+        In one unit.
+    masks : ndarray of shape (mask, point), bool
+    alike : float
+        Standard deviation, in the unit of the values, up to which they are alike, for so much is rounding. That of
+        single precision, in which results are kept, is rounding in any case.
+
+    Returns
+    -------
+    ndarray of shape (..., mask, k)
+        Over the points of each mask at which both are known, from -1 to 1; NaN where either is alike at all points.
+    """
     both = np.isfinite(first) & np.isfinite(second)
     first, second = (np.where(both, value, np.nan) for value in (first, second))
-    product = np.sqrt(_variance(first, first, masks) * _variance(second, second, masks))
-    return ratio(_variance(first, second, masks), product)
+    spreads = (_spread(value, masks, alike) for value in (first, second))
+    return ratio(_variance(first, second, masks), np.prod(list(spreads), axis=0))
 
 
 def quantile(value: np.ndarray, masks: np.ndarray, share: float) -> np.ndarray:
@@ -46,6 +61,13 @@ def ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
     """Quotient, NaN where the divisor is zero or NaN."""
     whole = np.asarray(whole, float)
     return np.divide(part, whole, out=np.full(whole.shape, np.nan), where=whole > 0)
+
+
+def _spread(value: np.ndarray, masks: np.ndarray, alike: float) -> np.ndarray:
+    """Standard deviation, 0 where it is rounding."""
+    spread = np.sqrt(_variance(value, value, masks))
+    rounding = np.maximum(alike, np.finfo(np.float32).eps * rms(value, masks))
+    return np.where(spread <= rounding, 0, spread)
 
 
 def _variance(first: np.ndarray, second: np.ndarray, masks: np.ndarray) -> np.ndarray:
