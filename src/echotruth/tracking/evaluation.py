@@ -12,14 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from echotruth.tracking import statistics
-from echotruth.tracking.polar import COMPONENTS, resolve
+from echotruth.tracking.polar import resolve
 from echotruth.tracking.statistics import ratio
-
-ERRORS = (*COMPONENTS, "total")
-"""Order of the last axis of error arrays: the two components and the whole vector."""
-
-STATISTICS = ("mean", "median", "p95")
-"""Order of the last axis of `end_point_error`: mean, median and 95th percentile of its length."""
 
 SEGMENTS = 17
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-COMPONENTS = ("radial", "tangential")
-"""Short axis: radial and circumferential. Long axis: transverse and longitudinal."""
-
 
 def directions(position: np.ndarray, origin: np.ndarray, plane: str) -> np.ndarray:
     """Unit vectors at every point.
