@@ -4,10 +4,12 @@ import inspect
 import re
 import sys
 import time
+from datetime import date
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from echotruth.config.loading import ConfigError, validate
 from echotruth.config.tracking import GIVEN, Guest
@@ -115,6 +117,15 @@ def test_quality_left_out_is_one_where_there_is_a_displacement(given, answering)
     np.testing.assert_array_equal(quality, [[1, 1, 1, 1], *[[1, 1, np.nan, 1]] * 2])
 
 
+@pytest.mark.parametrize("nested", [False, True])
+def test_what_a_guest_masks_is_no_displacement(given, answering, nested):
+    moved = np.ma.array(np.full((TIMES, POINTS, 2), 0.5), mask=False)
+    moved[1:, 2] = np.ma.masked
+    displacement, quality = track(*given, answering(lambda *_: list(moved) if nested else moved))
+    assert np.isnan(displacement[1:, 2]).all() and np.isnan(displacement).sum() == 4
+    np.testing.assert_array_equal(np.isnan(quality), np.isnan(displacement).any(-1))
+
+
 def test_point_lost_by_a_guest_has_neither_displacement_nor_quality(given, answering):
     moved = np.zeros((TIMES, POINTS, 2))
     moved[1, 3, 1] = np.inf
@@ -183,7 +194,6 @@ def test_module_of_the_current_directory_is_found(given, module):
         ("numpy:no_such_function", "cannot be imported: AttributeError"),
         ("numpy:pi", "is a float, where a function is needed"),
         ("nobody", "not an entry point of the group echotruth.trackers .*write package.module:function"),
-        (":", "cannot be imported"),
     ],
 )
 def test_name_that_leads_nowhere_is_told_in_one_sentence(given, name, expected):
@@ -277,6 +287,18 @@ def test_program_that_takes_too_long_is_ended_with_all_it_started(given, tmp_pat
             {"command": ["p", "{input}", "{output}"], "options": {"a": [1, "b"]}},
             "options.a = [1, 'b']: must be a number",
         ),
+        (
+            {"track": "./own.py:track"},
+            "'./own.py:track': write package.module:function (dots, no path, no .py)",
+        ),
+        ({"track": "own.py"}, "track = 'own.py': write package.module:function"),
+        ({"track": "code/own:track"}, "track = 'code/own:track': write package.module:function"),
+        ({"track": "own:track()"}, "track = 'own:track()': write package.module:function"),
+        ({"track": ":"}, "track = ':': write package.module:function"),
+        ({"track": "a:b", "options": {"a": float("nan")}}, "options.a = nan: must be finite numbers, text"),
+        ({"track": "a:b", "options": {"a": [1, "1e999"]}}, "options.a = [1, inf]: must be finite numbers, text"),
+        ({"track": "a:b", "options": {"a": date(2026, 1, 1)}}, "options.a = datetime.date(2026, 1, 1): must be finite"),
+        ({"track": "a:b", "options": {"a": {1: 2}}}, "options.a = {1: 2}: must be finite numbers, text"),
         ({"track": "a:b", "timeout_s": 0}, "timeout_s = 0: should be greater than 0"),
     ],
 )
@@ -290,6 +312,22 @@ def test_callable_takes_options_that_are_no_arrays():
     options = {"weights": None, "layers": {"first": [1, "a"]}}
     config = validate({"tracking": {"trackers": {"mine": {"method": "guest", "track": "a:b", "options": options}}}}, "")
     assert config.tracking.trackers["mine"].options == options
+
+
+def test_option_without_a_dot_is_a_number_in_a_configuration_too():
+    options = yaml.safe_load("{rate: 1e-3, steps: [2e2, .5E+1], name: e-3, word: 0x1e5g}")
+    assert options["rate"] == "1e-3"
+    assert Guest(track="a:b", options=options).options == {
+        "rate": 0.001,
+        "steps": [200.0, 5.0],
+        "name": "e-3",
+        "word": "0x1e5g",
+    }
+
+
+@pytest.mark.parametrize("name", ["a.b.c:d.e", "lucas-kanade", "lab.flow_2"])
+def test_callable_and_entry_point_may_be_named_so(name):
+    assert Guest(track=name).track == name
 
 
 def test_what_a_guest_prints_does_not_mix_with_the_output(given, answering, tmp_path, capfd):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
+from math import isfinite
 from typing import Annotated, Any, Literal, Union
 
-from pydantic import Discriminator, Field, FiniteFloat, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, FiniteFloat, Tag, model_validator
 
 from echotruth.section import Name, Positive, Section, impossible
 
@@ -107,6 +109,16 @@ GIVEN = ("frames", "points", "mask", "spacing", "frame_time", "seed")
 """Names of what every tracker is given, in their order."""
 
 
+def numbers(value: Any) -> Any:
+    """The same with numbers where YAML took them for text: it wants dot and sign in 1.0e-3."""
+    if isinstance(value, dict):
+        return {key: numbers(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [numbers(each) for each in value]
+    written = isinstance(value, str) and re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+", value, re.ASCII)
+    return float(value) if written else value
+
+
 class Guest(Section):
     """A tracker from elsewhere: a Python callable, an entry point, or a program."""
 
@@ -118,13 +130,15 @@ class Guest(Section):
     """A program and its arguments, in which {input} and {output} stand for the .npz files it reads and writes."""
     timeout_s: Positive = 3600.0
     """Longest time a program may take over one clip; a callable is not timed."""
-    options: dict[str, Any] = Field(default={})
-    """Keyword arguments of the callable, or entries of the program's .npz."""
+    options: Annotated[dict[str, Any], BeforeValidator(numbers)] = Field(default={})
+    """Keyword arguments of the callable, or entries of the program's .npz; text such as 1e-3 is a number."""
 
     @model_validator(mode="after")
     def _one_way_in(self) -> Guest:
         if (self.track is None) == (self.command is None):
             raise impossible("track", self.track, "give either track or command")
+        if self.track is not None and not _is_name(self.track):
+            raise impossible("track", self.track, "write package.module:function (dots, no path, no .py)")
         for place in ("{input}", "{output}") if self.command else ():
             if not any(place in part for part in self.command or ()):
                 raise impossible("command", self.command, f"must say where the path of the {place[1:-1]} goes: {place}")
@@ -135,10 +149,32 @@ class Guest(Section):
         for key, value in self.options.items():
             if key in GIVEN:
                 raise impossible(f"options.{key}", value, f"must have another name, for every tracker is given {key}")
+            if not _is_plain(value):
+                remedy = "must be finite numbers, text, true, false, null, lists of them, or mappings with text as keys"
+                raise impossible(f"options.{key}", value, remedy)
             if self.command and not _is_array(value):
                 remedy = "must be a number, a text or a list of one kind, for it is an array in the program's .npz"
                 raise impossible(f"options.{key}", value, remedy)
         return self
+
+
+def _is_name(track: str) -> bool:
+    """Whether that may be `package.module:function` or the name of an entry point."""
+    module, colon, function = track.partition(":")
+    if module.endswith(".py"):
+        return False
+    if not colon:
+        return re.fullmatch(r"\w[\w.-]*", track) is not None
+    return all(part.isidentifier() for part in (*module.split("."), *function.split(".")))
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether JSON, as which the workflow hands a configuration on, can say it."""
+    if isinstance(value, dict):
+        return all(isinstance(key, str) and _is_plain(each) for key, each in value.items())
+    if isinstance(value, list):
+        return all(map(_is_plain, value))
+    return isfinite(value) if isinstance(value, float) else value is None or isinstance(value, int | str)
 
 
 def _is_array(value: Any) -> bool:

@@ -124,9 +124,9 @@ def _checked(answer: Any, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarra
 
 
 def _reals(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """An array of real numbers of that shape, or a word about what it is instead."""
+    """An array of real numbers of that shape, NaN where masked, or a word about what it is instead."""
     try:
-        array = np.asarray(values)
+        array = np.ma.asarray(values)
     except Exception as error:
         raise TrackerFailed(f"returned a {name} that is no array ({_named(error)}): {shape} is due") from error
     if array.dtype.kind not in "fiub":
@@ -134,4 +134,4 @@ def _reals(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
         raise TrackerFailed(f"returned a {name} of {what}, where real numbers of shape {shape} are due")
     if array.shape != shape:
         raise TrackerFailed(f"returned a {name} of shape {array.shape}, where {shape} is due")
-    return array.astype(float)
+    return array.astype(float).filled(np.nan)
