@@ -104,18 +104,20 @@ def export(arguments: argparse.Namespace) -> int:
 def evaluate(arguments: argparse.Namespace) -> int:
     """Try a tracker on a repository; 0, or 1 if it failed on every clip, or 2 where it cannot be tried."""
     from echotruth.tracking import trial
+    from echotruth.tracking.entrant import CannotTry, entrant
 
     rows = []
     try:
-        name, settings = trial.entrant(arguments.tracker, arguments.program, arguments.option, arguments.timeout)
+        name, settings = entrant(arguments.tracker, arguments.program, arguments.option, arguments.timeout)
         tried = trial.trial(arguments.repository, arguments.name or name, settings)
         places, sizes = tried.places(arguments.case, arguments.view), tried.sizes(arguments.size)
+        tried.make_room()
         for row in tried.rows(places, sizes, arguments.jobs):
             print(trial.told(row), flush=True)
             rows.append(row)
-    except (trial.CannotTry, ConfigError) as error:
+        table = tried.write(rows)
+    except (CannotTry, ConfigError) as error:
         return _complain(str(error))
-    table = tried.write(rows)
     print(f"\n{trial.summary(table)}\n\nScores: {tried.file}")
     return 0 if any(not row["failure"] for row in rows) else 1
 

@@ -25,7 +25,8 @@ from echotruth.repository import layout, ledger, schema
 from echotruth.repository.job import Job, record_path
 from echotruth.repository.store import Store
 from echotruth.tracking import grid, scoring
-from echotruth.tracking.trial import entrant
+from echotruth.tracking.digest import digest
+from echotruth.tracking.entrant import entrant
 
 ROOT = Path(__file__).parents[2]
 COURSE = np.array([0, 0.4, 1, 0.3])
@@ -103,7 +104,9 @@ def write_clip(folder, store, case, place, beating, view):
         store.write(f"truth/{size}", {"mask": np.broadcast_to(mask, (len(COURSE), size, size))}, *place)
         store.write(f"bmode/{size}", {"image": random.integers(0, 256, (len(COURSE), size, size))}, *place)
     for stage in ("truth", "bmode"):
-        ledger.commit(record_path(folder, stage, case, view), {"status": "complete"})
+        files = [file for size in CONFIG.bmode.sizes for file in store.files(f"{stage}/{size}", *place)]
+        record = {"status": "complete", "sha256": ledger.checksums(files, store.path)}
+        ledger.commit(record_path(folder, stage, case, view), record)
 
 
 @pytest.fixture(scope="module")
@@ -238,6 +241,27 @@ def test_later_trial_replaces_its_own_scores_and_no_others(made, evaluate):
     assert {name for name in {*before, *after} if before.get(name) != after.get(name)} == {"two.csv"}
 
 
+def test_scores_of_images_made_anew_are_of_another_clip(made, evaluate, tmp_path):
+    again = tmp_path / "again"
+    shutil.copytree(made, again, ignore=shutil.ignore_patterns("guests"))
+    evaluate("--tracker", "guests:still", "--view", "mid", "--size", "64", repository=again)
+    before = scores(again, "guests_still")
+    path = record_path(again, "bmode", before["case"][0], "mid")
+    record = ledger.read(path)
+    ledger.commit(path, record | {"seconds": 7})
+    assert list(before["clip"]) == [digest(again, case, "mid") for case in before["case"]]
+    ledger.commit(path, record | {"sha256": record["sha256"] | {sorted(record["sha256"])[0]: 64 * "0"}})
+    same = [clip == digest(again, case, "mid") for case, clip in zip(before["case"], before["clip"], strict=True)]
+    assert same == [False, True] and before["clip"].str.fullmatch("[0-9a-f]{12}").all()
+
+
+def test_scores_that_could_not_be_written_are_refused_before_the_first_clip(made, evaluate, tmp_path):
+    shutil.copytree(made, tmp_path / "taken", ignore=shutil.ignore_patterns("guests"))
+    (tmp_path / "taken/guests").write_text("")
+    status, said, complaint = evaluate("--tracker", "guests:still", repository=tmp_path / "taken")
+    assert (status, said, complaint.count("\n")) == (2, "", 1) and "taken/guests cannot hold the scores" in complaint
+
+
 def test_tracker_that_ends_its_process_is_told_in_one_sentence(made, evaluate):
     status, _, complaint = evaluate("--tracker", "guests:crash", "--view", "apex", "--jobs", "2")
     assert status == 2 and complaint.count("\n") == 1 and "--command" in complaint
@@ -259,6 +283,31 @@ def test_repository_with_a_damaged_clip_is_refused_in_one_sentence(made, evaluat
 )
 def test_scores_stand_under_a_name_made_of_that_of_the_tracker(tracker, name):
     assert entrant(tracker, None, [])[0] == name
+
+
+@pytest.mark.parametrize(
+    "command, name",
+    [
+        ("./my-tracker {input} {output}", "my_tracker"),
+        ("python3 code/network.py {input} {output}", "network"),
+        ("julia -t 4 --project=. flow.jl {input} {output}", "flow"),
+        ("Rscript warp.R {input} {output}", "warp"),
+        ("matlab -batch \"follow('{input}', '{output}')\"", "matlab"),
+        ("track --config settings.yaml {input} {output}", "track"),
+    ],
+)
+def test_scores_of_a_program_stand_under_the_name_of_its_script_or_its_own(command, name):
+    assert entrant(None, command, [])[0] == name
+
+
+@pytest.mark.parametrize(
+    "text, value",
+    [("1e-3", 0.001), ("-1.5E3", -1500.0), ("[1e-3, 2]", [0.001, 2]), ("{b: 1e2}", {"b": 100.0}), ("e3", "e3")],
+)
+@pytest.mark.parametrize("tracker", ["a:b", "dis"])
+def test_option_that_looks_like_a_number_is_one(tracker, text, value):
+    settings = entrant(tracker, None, [f"a={text}"])[1]
+    assert settings.get("options", settings)["a"] == value
 
 
 @pytest.fixture
@@ -289,7 +338,10 @@ def test_guest_of_the_configuration_that_fails_leaves_the_others_their_motion(wo
 
 REFUSED = {
     "ours": (["--tracker", "a:b", "--name", "ours"], "ours is a tracker of {made} already"),
-    "name": (["--tracker", "a:b", "--name", "my tracker"], "use letters, digits and underscores only"),
+    "name": (["--tracker", "a:b", "--name", "my tracker"], "'my tracker' cannot be the name of a tracker: use letters"),
+    "its own name": (["--command", "./2d {input} {output}"], "'2d' cannot be the name of a tracker: use letters"),
+    "path": (["--tracker", "code/own.py:track"], "write package.module:function (dots, no path, no .py)"),
+    "date": (["--tracker", "a:b", "--option", "a=2026-01-01"], "must be finite numbers, text"),
     "case": (["--tracker", "a:b", "--case", "seed9"], "seed9 is not a case of {made}: use seed1_"),
     "view": (["--tracker", "a:b", "--view", "base"], "base is not a view of {made}: use mid, apex"),
     "size": (["--tracker", "a:b", "--size", "512"], "512 is not a size of {made}: use 128, 64"),

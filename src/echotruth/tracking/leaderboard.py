@@ -1,13 +1,15 @@
 """Trackers in their order: means over the hearts of a repository, with what other hearts would have made of them.
 
 The order is that of `nrmse_all_percent`, in which a point without an estimate counts as one that stood still: a tracker
-gains nothing by leaving out what is hard, and one that fails has 100 %. Where nothing is lost it is the NRMSE.
+gains nothing by leaving out what is hard, and one that fails has 100 %. Where nothing is lost it is the NRMSE. Figures
+that a tracker lacks on one clip it lacks in the mean, for that of its other clips would be better than it is.
 Intervals are those of a bootstrap over hearts (Efron, Ann Stat 1979; 7:1): hearts are drawn with replacement, the same
 for all trackers, and the middle 95 % of the means (and ranks) are told. One heart has no interval.
 """
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +20,11 @@ from echotruth.config import Config
 from echotruth.repository import ledger
 from echotruth.repository.job import record_path
 from echotruth.repository.schema import EVALUATION
+from echotruth.tracking.digest import digest
+from echotruth.tracking.program import in_one_line
 from echotruth.tracking.scoring import row
+
+log = logging.getLogger("echotruth")
 
 PLACE = ("case", "view", "size_px", "tracker")
 """Columns that name a row of :func:`rows`."""
@@ -55,7 +61,7 @@ def rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path) 
     Raises
     ------
     ValueError
-        If a table of a guest lacks a column.
+        If a table of a guest cannot be read or lacks a column.
     """
     own = pd.DataFrame([row for size in config.bmode.sizes for row in _own(tree, config, complete, folder, size)])
     visitors = [_guest(file, own.columns) for file in sorted((folder / "guests").glob("*.csv"))]
@@ -79,8 +85,9 @@ def standings(rows: pd.DataFrame, seed: int) -> pd.DataFrame:
     DataFrame
         One row for every image size, view (`all`: the mean over the views of a heart) and tracker, the best first:
         `rank` (those alike share one; NaN for a tracker that was not tried on every heart and view), `hearts` and
-        `failures` (number of clips), the mean over the hearts of every figure, and `_low` and `_high` of the rank, of
-        `nrmse_all_percent` and of the strains' RMS: the bootstrap's interval, NaN with a single heart.
+        `failures` (number of clips), the mean over the hearts of every figure, NaN where the tracker failed on a clip
+        or lacks what another has there, and `_low` and `_high` of the rank, of `nrmse_all_percent` and of the strains'
+        RMS: the bootstrap's interval, NaN with a single heart and where there is no mean.
     """
     cases, views = (list(dict.fromkeys(rows[name])) for name in ("case", "view"))
     draws = np.random.default_rng(seed).integers(len(cases), size=(DRAWS, len(cases)))
@@ -141,10 +148,9 @@ def _middle(drawn: np.ndarray, hearts: int) -> tuple[np.ndarray, np.ndarray]:
 def _table(clips: pd.DataFrame, cases: list[str], asked: int, draws: np.ndarray) -> pd.DataFrame:
     """Rows of one image size and view; `asked` is the number of clips that a heart has."""
     figures = [name for name in clips if name not in (*PLACE, "failure")]
-    by_heart = clips.groupby(["tracker", "case"], sort=False)
-    tried = by_heart.size() == asked
+    tried = clips.groupby(["tracker", "case"], sort=False).size() == asked
     # A mean over views that are not all there would be one of other clips than those of the others.
-    means = by_heart[figures].mean()[tried]
+    means = _by_heart(clips, figures)[tried]
     trackers = list(dict.fromkeys(clips["tracker"]))
     table = pd.DataFrame({"tracker": trackers}).set_index("tracker")
     table["hearts"] = tried.groupby("tracker").sum()
@@ -155,8 +161,22 @@ def _table(clips: pd.DataFrame, cases: list[str], asked: int, draws: np.ndarray)
             table["rank"] = ranks(values.mean(0))
             table["rank_low"], table["rank_high"] = _middle(ranks(values[draws].mean(1)), len(cases))
         table[f"{name}_low"], table[f"{name}_high"] = interval(values, draws)
-    table = table.join(means.groupby("tracker", sort=False).mean())
+    by_tracker = means.groupby("tracker", sort=False)
+    whole = by_tracker.count().eq(by_tracker.size(), axis=0)
+    table = table.join(by_tracker.mean().where(whole))
     return table.sort_values("rank", kind="stable", na_position="last").reset_index()
+
+
+def _by_heart(clips: pd.DataFrame, figures: list[str]) -> pd.DataFrame:
+    """Means over the views of each heart, a row a tracker and case; NaN where a clip lacks what it could have.
+
+    Views that show a figure to no tracker, as those across the heart E_LL, are left out.
+    """
+    lacking, failed = clips[figures].isna(), (clips["failure"] != "").to_numpy()[:, None]
+    shown = (~lacking).groupby([clips["case"], clips["view"]]).transform("any")
+    heart = [clips["tracker"], clips["case"]]
+    lost = (lacking & (shown | failed)).groupby(heart, sort=False).any()
+    return clips[figures].groupby(heart, sort=False).mean().mask(lost)
 
 
 def _own(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path, size: int) -> list[dict]:
@@ -183,11 +203,29 @@ def _failures(folder: Path, case: str, view: str) -> dict[str, str]:
 
 
 def _guest(file: Path, columns: pd.Index) -> pd.DataFrame:
-    table = pd.read_csv(file, dtype={name: str for name in ("case", "view", "tracker", "failure")})
+    """Scores of a guest on the clips as they are today, under the name of its file."""
+    texts = ("case", "view", "tracker", "failure", "clip")
+    kinds = {name: str if name in texts else float for name in (*columns, "clip")} | {"size_px": int}
+    try:
+        # Only what is empty is missing: a view may well be called null.
+        numbers = {name: "" for name, kind in kinds.items() if kind is float}
+        table = pd.read_csv(file, dtype=kinds, keep_default_na=False, na_values=numbers)
+    except (ValueError, OSError) as error:
+        raise ValueError(f"{file}: cannot be read ({in_one_line(str(error))}): evaluate that tracker again") from error
     missing = [name for name in columns if name not in table]
     if missing:
         raise ValueError(f"{file}: has no column {missing[0]}: evaluate that tracker again")
-    return table[list(columns)].fillna({"failure": ""})
+    return _of_today(table.assign(tracker=file.stem), file)[list(columns)]
+
+
+def _of_today(table: pd.DataFrame, file: Path) -> pd.DataFrame:
+    """Rows of clips that are still what they were when they were scored."""
+    clips = zip(table["case"], table["view"], table.get("clip", [""] * len(table)), strict=True)
+    same = np.array([clip == digest(file.parents[1], case, view) for case, view, clip in clips], bool)
+    if not same.all():
+        older = f"{(~same).sum()} of {len(same)} rows are of older images"
+        log.warning("guests/%s: %s: evaluate that tracker again", file.name, older)
+    return table[same]
 
 
 def _of(table: pd.DataFrame, own: pd.DataFrame) -> np.ndarray:

@@ -6,28 +6,29 @@ Its scores stand in `guests/NAME.csv` in the folder of the repository, one row a
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from shlex import split
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import yaml
+from pydantic import TypeAdapter, ValidationError
 
 from echotruth.cases import expand
 from echotruth.config import Config
 from echotruth.config.loading import load, validate
-from echotruth.config.tracking import METHODS, Guest, name_of
 from echotruth.repository import ledger
 from echotruth.repository.job import Job, record_path
-from echotruth.section import Section
+from echotruth.section import Name, Section
 from echotruth.tracking.clip import Clip, clips
+from echotruth.tracking.digest import digest
+from echotruth.tracking.entrant import CannotTry
 from echotruth.tracking.program import in_one_line
 from echotruth.tracking.scoring import Truth, ground_truth, row, score
 from echotruth.tracking.tracker import TrackerFailed, track
@@ -36,15 +37,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Row = dict[str, Any]
-"""A clip's case, view, size_px and tracker, its measures, and why the tracker failed (empty where it did not)."""
-
-
-OWN = tuple(name_of(method) for method in METHODS if method is not Guest)
-"""Names of the methods of echotruth."""
-
-
-class CannotTry(ValueError):
-    """A trial that cannot be held; the message says why, and what to do."""
+"""A clip's case, view, size_px, tracker and digest (`clip`), its measures, and why the tracker failed (else empty)."""
 
 
 @dataclass(frozen=True)
@@ -130,16 +123,31 @@ class Trial:
             finally:
                 pool.shutdown(cancel_futures=True)
 
+    def make_room(self) -> None:
+        """Make the folder of the scores; CannotTry, before there are any, where they could not be written."""
+        with self._writing():
+            self.file.parent.mkdir(exist_ok=True)
+            with TemporaryFile(dir=self.file.parent):
+                pass
+
     def write(self, rows: list[Row]) -> pd.DataFrame:
         """Write the scores, whole or not at all, in place of those of an earlier trial of that name."""
         import pandas as pd
 
         table = pd.DataFrame(rows)
-        self.file.parent.mkdir(exist_ok=True)
         draft = self.file.with_name(f".{self.file.name}.{os.getpid()}")
-        table.to_csv(draft, index=False)
-        draft.replace(self.file)
+        with self._writing():
+            table.to_csv(draft, index=False)
+            draft.replace(self.file)
         return table
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            remedy = f"it must be a folder that you may write to ({error.strerror})"
+            raise CannotTry(f"{self.file.parent} cannot hold the scores: {remedy}") from error
 
     def _chosen(self, what: str, asked: list[Any], known: list[Any]) -> list[Any]:
         for each in asked:
@@ -151,53 +159,6 @@ class Trial:
     def _is_complete(self, case: str, view: str) -> bool:
         records = [record_path(self.folder, stage, case, view) for stage in ("truth", "bmode")]
         return all(path.is_file() and ledger.read(path)["status"] == "complete" for path in records)
-
-
-def entrant(
-    tracker: str | None, command: str | None, options: list[str], timeout: float | None = None
-) -> tuple[str, dict[str, Any]]:
-    """What a tracker is called and its settings, from what stands on the command line.
-
-    Parameters
-    ----------
-    tracker : str or None
-        A method of ours, `package.module:function`, or an entry point.
-    command : str or None
-        Where there is no `tracker`: a program and its arguments, as a shell would split them.
-    options : list of str
-        As `key=value`, the value in YAML.
-    timeout : float, optional
-        How long the program may take over a clip, s.
-
-    Raises
-    ------
-    CannotTry
-        If an option or the command cannot be read, or a limit of time is set for what is no program.
-    """
-    pairs = dict(map(_option, options))
-    if tracker is not None and timeout is not None:
-        raise CannotTry(f"--timeout {timeout:g}: {tracker} is not timed: leave it out, or give a program as --command")
-    if tracker is None:
-        try:
-            words = split(command or "")
-        except ValueError as error:
-            raise CannotTry(f"--command {command}: {str(error).lower()}: mend the quotes") from None
-        limit = {} if timeout is None else {"timeout_s": timeout}
-        return (Path(words[0]).stem if words else ""), {"method": "guest", "command": words, "options": pairs, **limit}
-    if tracker in OWN:
-        return tracker, {"method": tracker, **pairs}
-    name = re.sub(r"\W+", "_", tracker.removesuffix(":track"))
-    return name, {"method": "guest", "track": tracker, "options": pairs}
-
-
-def _option(text: str) -> tuple[str, Any]:
-    key, equals, value = text.partition("=")
-    if not equals:
-        raise CannotTry(f"--option {text}: has no value: write key=value")
-    try:
-        return key, yaml.safe_load(value)
-    except yaml.YAMLError:
-        raise CannotTry(f"--option {text}: the value is not YAML: quote it") from None
 
 
 def trial(repository: Path, name: str, values: dict[str, Any]) -> Trial:
@@ -215,14 +176,19 @@ def trial(repository: Path, name: str, values: dict[str, Any]) -> Trial:
     Raises
     ------
     CannotTry
-        If there is no such repository, or it has a tracker of that name.
+        If there is no such repository, or it has a tracker of that name, or the name cannot be.
     ConfigError
-        If the name or the settings cannot be.
+        If the settings cannot be.
     """
     folder = repository.parent if repository.suffix == ".zarr" else repository
     if not (folder / "config.yaml").is_file() or not (folder / "registry.txt").is_file():
         raise CannotTry(f"{repository} is not a repository: give the folder that a run made, as out/demo")
     config = load(folder / "config.yaml")
+    try:
+        TypeAdapter(Name).validate_python(name)
+    except ValidationError:
+        remedy = "use letters, digits and underscores only, a letter first and 40 at most, with --name"
+        raise CannotTry(f"{name!r} cannot be the name of a tracker: {remedy}") from None
     if name in config.tracking.trackers:
         raise CannotTry(f"{name} is a tracker of {folder} already: give this one another name with --name")
     tracking = {"grid_px": config.tracking.grid_px, "trackers": {name: values}}
@@ -258,6 +224,7 @@ def _row(trial: Trial, place: tuple[str, str], clip: Clip, truth: Truth) -> Row:
         nothing = np.full((len(clip.frames), len(clip.points), 3), np.nan)
         answer, failure = (nothing[..., :2], nothing[..., 2]), str(error)
     named = {"case": place[0], "view": place[1], "size_px": clip.size, "tracker": trial.name}
+    named["clip"] = digest(trial.folder, *place)
     measures = row(score(clip.on_grid(*answer)[0], truth), truth.wall.plane)
     return named | measures | {"failure": failure}
 

@@ -1,0 +1,30 @@
+"""What a clip was when it was scored, in a word."""
+
+from __future__ import annotations
+
+import json
+from hashlib import sha256
+from pathlib import Path
+
+from echotruth.repository import ledger
+from echotruth.repository.job import record_path
+
+
+def digest(folder: Path, case: str, view: str) -> str:
+    """Digest of the images and the truth of one view of one heart.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the repository.
+    case, view : str
+        Case id and name of the view.
+
+    Returns
+    -------
+    str
+        Twelve hexadecimal digits of the SHA-256 of what the ledger says of their files; empty where it says nothing.
+    """
+    records = [record_path(folder, stage, case, view) for stage in ("bmode", "truth")]
+    files = [ledger.read(path).get("sha256", {}) for path in records if path.is_file()]
+    return sha256(json.dumps(files, sort_keys=True).encode()).hexdigest()[:12] if any(files) else ""
