@@ -71,6 +71,35 @@ def test_a_tracker_not_tried_on_every_clip_has_no_rank():
     assert mid.loc["b", "rank"] == 1
 
 
+@pytest.mark.parametrize("failure", ["b: no motion found", ""])
+def test_losing_the_hard_clip_does_not_pay(failure):
+    """Of two trackers alike, one has no answer on the clip with the largest errors, and says so or not."""
+    whole = scores({"a": [5, 5], "b": [5, 5]}, views=("mid", "apex"))
+    hard = (whole["case"] == "heart1") & (whole["view"] == "apex")
+    whole = whole.assign(epe_um=np.where(hard, 40.0, 10.0), coverage_percent=100.0)
+    lost = hard & (whole["tracker"] == "b")
+    figures = ["epe_um", "ecc_rms_points", "ell_rms_points", "err_rms_points"]
+    whole.loc[lost, figures] = np.nan
+    whole.loc[lost, ["nrmse_all_percent", "coverage_percent", "failure"]] = 100.0, 0.0, failure
+    table = standings(whole, 1)
+    means = overall(table)
+    assert list(means["rank"]) == [1, 2] and list(means["nrmse_all_percent"]) == [5, 28.75]
+    assert means.loc["a", "epe_um"] == 17.5 and means.loc["b", "coverage_percent"] == 75
+    bounds = [f"{name}_{end}" for name in figures[1:] for end in ("low", "high")]
+    assert means.loc["a", [*figures, *bounds]].notna().all() and means.loc["b", [*figures, *bounds]].isna().all()
+    assert means["nrmse_all_percent_high"].notna().all() and means.loc["b", "failures"] == bool(failure)
+    mid, apex = (table[table["view"] == view].set_index("tracker") for view in ("mid", "apex"))
+    assert list(mid["epe_um"]) == [10, 10] and apex["epe_um"].isna().tolist() == [False, True]
+
+
+def test_views_that_show_a_strain_to_no_tracker_do_not_count_in_its_mean():
+    whole = scores({"a": [5, 6], "b": [7, 8]}, views=("mid", "long_axis"))
+    whole.loc[whole["view"] == "mid", "ell_rms_points"] = np.nan
+    table = standings(whole, 1)
+    assert (overall(table)[["ell_rms_points", "ell_rms_points_low", "ell_rms_points_high"]] == 1).all(axis=None)
+    assert table[table["view"] == "mid"]["ell_rms_points"].isna().all()
+
+
 def test_a_mean_over_views_is_one_of_hearts():
     table = scores({"a": [4, 8]}, views=("mid", "apex"))
     table.loc[table["view"] == "apex", "nrmse_all_percent"] *= 3

@@ -76,7 +76,7 @@ def _name(standings: pd.DataFrame, tracker: str) -> str:
     between = f" ({low:.0f}–{high:.0f})" if np.isfinite(low) else ""
     failed = int(of_it.loc[of_it["view"] == ALL, "failures"].sum())
     ranked = f"{tracker}   {rank:.0f}{between}" if np.isfinite(rank) else tracker
-    return f"{ranked}\n{failed} clips failed" if failed else ranked
+    return f"{ranked}\n{failed} clip{'s' * (failed > 1)} failed" if failed else ranked
 
 
 def _legend(sheet: Figure, standings: pd.DataFrame, columns: int) -> None:

@@ -170,7 +170,7 @@ def _table(clips: pd.DataFrame, cases: list[str], asked: int, draws: np.ndarray)
 def _by_heart(clips: pd.DataFrame, figures: list[str]) -> pd.DataFrame:
     """Means over the views of each heart, a row a tracker and case; NaN where a clip lacks what it could have.
 
-    Views that show a figure to no tracker, as those across the heart E_LL, are left out.
+    Views that show a figure to no tracker, as the short axis E_LL, are left out.
     """
     lacking, failed = clips[figures].isna(), (clips["failure"] != "").to_numpy()[:, None]
     shown = (~lacking).groupby([clips["case"], clips["view"]]).transform("any")
