@@ -291,6 +291,10 @@ def test_program_that_takes_too_long_is_ended_with_all_it_started(given, tmp_pat
             {"track": "./own.py:track"},
             "'./own.py:track': write package.module:function (dots, no path, no .py)",
         ),
+        (
+            {"command": ["p", "{input}", "{output}"], "options": {"a": 2**63}},
+            "options.a = 9223372036854775808: must be a number of 64 bits",
+        ),
         ({"track": "own.py"}, "track = 'own.py': write package.module:function"),
         ({"track": "code/own:track"}, "track = 'code/own:track': write package.module:function"),
         ({"track": "own:track()"}, "track = 'own:track()': write package.module:function"),

@@ -153,7 +153,9 @@ class Guest(Section):
                 remedy = "must be finite numbers, text, true, false, null, lists of them, or mappings with text as keys"
                 raise impossible(f"options.{key}", value, remedy)
             if self.command and not _is_array(value):
-                remedy = "must be a number, a text or a list of one kind, for it is an array in the program's .npz"
+                remedy = (
+                    "must be a number of 64 bits, a text or a list of one kind: it is an array in the program's .npz"
+                )
                 raise impossible(f"options.{key}", value, remedy)
         return self
 
@@ -180,7 +182,10 @@ def _is_plain(value: Any) -> bool:
 def _is_array(value: Any) -> bool:
     """Whether a value of YAML is an array without being made an object."""
     values = value if isinstance(value, list) else [value]
-    return all(isinstance(each, int | float) for each in values) or all(isinstance(each, str) for each in values)
+    if all(isinstance(each, str) for each in values):
+        return True
+    # An integer of more than 64 bits would be an object.
+    return all(isinstance(each, float) or (isinstance(each, int) and abs(each) < 2**63) for each in values)
 
 
 METHODS: tuple[type[Section], ...] = (PhaseCorrelation, WindowDeformation, AffineDic, BsplineDic, Dis, Ilk, Guest)
