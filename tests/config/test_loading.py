@@ -27,6 +27,7 @@ BAD = {
     "geometri: {}": "geometri is not a key: did you mean geometry?",
     "views: {mid: {positon: 0.5}}": "views.mid.positon is not a key: did you mean views.mid.position?",
     "views: {mid: {plane: sagittal}}": "views.mid.plane = 'sagittal': should be 'short_axis' or 'long_axis'",
+    "views: {all: {position: 0.4}}": "views = 'all': stands for all views in the leaderboard, so give the view another",
     "bmode: {downsampling: [1, 3]}": "bmode.downsampling = [1, 3]: every entry must divide size_px = 512",
     "tracking: {trackers: {wide: {window_px: 256}}}": "window_px = 256: must not exceed the smallest image, 128 px",
     "tracking: {trackers: {both: {window_mm: 1.0}}}": "give either window_px or window_mm",

@@ -28,6 +28,10 @@ class View(Section):
     """Long axis only: turn of the plane about the long axis; 0 cuts septum and lateral wall."""
 
 
+ALL = "all"
+"""Stands for all views of a heart where scores are told, and so is the name of none."""
+
+
 class Phantom(Section):
     """Scatterers in the wall."""
 

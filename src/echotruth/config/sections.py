@@ -10,7 +10,7 @@ from echotruth import anatomy
 from echotruth.config.defaults import suited
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
-from echotruth.config.imaging import Bmode, Phantom, Rf, View, standard_views
+from echotruth.config.imaging import ALL, Bmode, Phantom, Rf, View, standard_views
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
 from echotruth.config.motion import Motion
@@ -73,6 +73,12 @@ class Config(Section):
             given = getattr(tracker, key, None)
             if max(given if isinstance(given, list) else [given or 0]) > view:
                 raise impossible(f"{place}.{key}", given, f"must not exceed bmode.field_of_view_mm = {view:g}")
+
+    @model_validator(mode="after")
+    def _views_told_apart(self) -> Config:
+        if ALL in self.views:
+            raise impossible("views", ALL, "stands for all views in the leaderboard, so give the view another name")
+        return self
 
     @model_validator(mode="after")
     def _heart_before_the_array(self) -> Config:

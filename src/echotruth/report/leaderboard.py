@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from echotruth.config.imaging import ALL
 from echotruth.report import style
 from echotruth.report.error import SIZES
-from echotruth.tracking.leaderboard import ALL
 
 PANELS = (
     ("nrmse_all_percent", "NRMSE of displacement at ES (%)"),

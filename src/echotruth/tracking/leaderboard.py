@@ -17,6 +17,7 @@ import pandas as pd
 import xarray as xr
 
 from echotruth.config import Config
+from echotruth.config.imaging import ALL
 from echotruth.repository import ledger
 from echotruth.repository.job import record_path
 from echotruth.repository.schema import EVALUATION
@@ -31,9 +32,6 @@ PLACE = ("case", "view", "size_px", "tracker")
 
 ORDER = "nrmse_all_percent"
 """Figure by which trackers are ranked."""
-
-ALL = "all"
-"""Name of the mean over all views."""
 
 DRAWS = 2000
 
