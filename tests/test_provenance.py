@@ -1,9 +1,12 @@
 """Versions: code is known by what it does, settings by what they say."""
 
+import sys
+from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 
 from echotruth.config import Bmode, PhaseCorrelation
-from echotruth.provenance import _closure, _tree, code_version, settings_version
+from echotruth.provenance import _closure, _tree, code_version, packages, settings_version
 
 ROOT = Path(__file__).parents[1]
 
@@ -39,3 +42,17 @@ def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_
 def test_settings_version_depends_on_values_alone():
     assert settings_version(Bmode(), 1) == settings_version(Bmode(), 1)
     assert settings_version(PhaseCorrelation()) != settings_version(PhaseCorrelation(taper="hann"))
+
+
+def test_versions_of_packages_are_those_of_their_distributions():
+    found = packages()
+    for name in ("numpy", "scikit-image", "echotruth"):
+        assert found[name] == version(name)
+    assert "opencv" in found
+
+
+def test_opencv_is_told_under_whatever_name_it_is_installed_and_missed_where_it_is_not(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cv2", SimpleNamespace(__version__="4.10.0"))
+    assert packages()["opencv"] == "4.10.0"
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    assert "opencv" not in packages()

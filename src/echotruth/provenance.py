@@ -13,7 +13,7 @@ from typing import Any
 import echotruth
 
 PACKAGES = ("numpy", "scipy", "numba", "scikit-image", "pypardiso", "mkl", "meshio", "vtk", "xarray", "zarr")
-"""Packages whose version may show in the numbers."""
+"""Packages whose version may show in the numbers, beside OpenCV, which is installed under several names."""
 
 _APART = ("echotruth.config", "echotruth.cases", "echotruth.provenance", "echotruth.repository")
 """Modules that carry settings and results but make none: their change reruns nothing."""
@@ -50,7 +50,16 @@ def packages() -> dict[str, str]:
             found[name] = version(name)
         except PackageNotFoundError:
             continue
-    return found
+    return found | _opencv()
+
+
+def _opencv() -> dict[str, str]:
+    """OpenCV's own version: some packages of it leave no name to ask for."""
+    try:
+        import cv2
+    except ImportError:
+        return {}
+    return {"opencv": cv2.__version__}
 
 
 def _closure(modules: tuple[str, ...]) -> set[str]:
