@@ -17,7 +17,6 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from echotruth.cases import expand
@@ -221,8 +220,7 @@ def _row(trial: Trial, place: tuple[str, str], clip: Clip, truth: Truth) -> Row:
     try:
         answer, failure = track(*clip.given, trial.settings), ""
     except TrackerFailed as error:
-        nothing = np.full((len(clip.frames), len(clip.points), 3), np.nan)
-        answer, failure = (nothing[..., :2], nothing[..., 2]), str(error)
+        answer, failure = clip.nothing, str(error)
     named = {"case": place[0], "view": place[1], "size_px": clip.size, "tracker": trial.name}
     named["clip"] = digest(trial.folder, *place)
     measures = row(score(clip.on_grid(*answer)[0], truth), truth.wall.plane)
