@@ -9,6 +9,7 @@ logarithmic derivative with respect to 1/r.
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -73,23 +74,25 @@ class Lens:
 
     def places(self, position: Floats) -> Floats:
         """Rows and columns of scatterers (n, 3), m, in the tables: (n, 2), within them."""
-        reach = np.hypot(position[:, 0], position[:, 1])
-        row = (1 / reach - self.curvature[0]) / (self.curvature[1] - self.curvature[0])
-        column = np.abs(position[:, 2]) / reach / self.slope[1]
-        most = np.array(self.blocks.shape) - 1.001
-        return np.clip(np.stack([row, column], axis=1), 0, most)
+        return self.lean(position, 1.0)[0]
 
     def blocks_of(self, position: Floats) -> NDArray[np.int64]:
         """Blocks of samples that the echoes of scatterers (n, 3), m, need: (n,); 0 where they are too faint."""
-        row, column = np.rint(self.places(position)).astype(np.intp).T
         steep = np.abs(position[:, 2]) > STEEPEST * np.hypot(position[:, 0], position[:, 1])
-        return np.where(steep, 0, self.blocks[row, column]).astype(np.int64)
+        return np.where(steep, 0, self.blocks_at(self.places(position)))
 
-    def lean(self, position: Floats, places: Floats, sound_speed: float) -> Floats:
-        """What :func:`~echotruth.imaging.deposit.one_way` wants to know of scatterers, (n, 4)."""
-        growth, delay = _between(self.growth, places), _between(self.delay, places)
-        reach = np.hypot(position[:, 0], position[:, 1])
-        return np.stack([1 / reach, delay * sound_speed / 2, growth.real, growth.imag], axis=1)
+    def blocks_at(self, places: Floats) -> NDArray[np.int64]:
+        """The same at places (n, 2) in the tables."""
+        row, column = np.rint(places).astype(np.intp).T
+        return self.blocks[row, column].astype(np.int64)
+
+    def lean(self, position: Floats, sound_speed: float) -> tuple[Floats, Floats]:
+        """Places of scatterers (n, 3), m, in the tables, (n, 2), and what
+        :func:`~echotruth.imaging.deposit.one_way` wants to know of them, (n, 4)."""
+        places, told = np.empty((len(position), 2)), np.empty((len(position), 4))
+        grid = self.curvature[0], self.curvature[1] - self.curvature[0], self.slope[1]
+        _look_up(position, grid, self.growth, self.delay, sound_speed / 2, places, told)
+        return places, told
 
     def _integrals(self, probe: Probe, band: Band) -> tuple[NDArray, NDArray]:
         """E, and its derivative with respect to 1/range at a fixed elevation, (CURVATURES, slopes, NODES)."""
@@ -111,13 +114,36 @@ class Lens:
         return beam, change
 
 
-def _between(table: NDArray, places: Floats) -> NDArray:
-    """Bilinear interpolation of a table (rows, columns) at places (n, 2): (n,)."""
-    row, column = places.astype(np.intp).T
-    down, right = (places - np.floor(places)).T
-    near = (1 - right) * table[row, column] + right * table[row, column + 1]
-    far = (1 - right) * table[row + 1, column] + right * table[row + 1, column + 1]
-    return (1 - down) * near + down * far
+@numba.njit(parallel=True, cache=True)
+def _look_up(position, grid, growth, delay, half_speed, places, told):
+    """Fill the places in the tables, and what they say there by bilinear interpolation.
+
+    Parameters
+    ----------
+    position : ndarray of shape (n, 3), m
+    grid : (float, float, float)
+        First curvature and step of curvatures, 1/m, and step of slopes.
+    growth, delay : ndarray of shape (CURVATURES, slopes), m and s
+    half_speed : float
+        m/s.
+    places : ndarray of shape (n, 2)
+        Written: row and column.
+    told : ndarray of shape (n, 4)
+        Written: 1/range (1/m), delay as range (m), real and imaginary part of the growth (m).
+    """
+    rows, columns = growth.shape
+    for n in numba.prange(len(position)):
+        reach = np.sqrt(position[n, 0] ** 2 + position[n, 1] ** 2)
+        row = min(max((1 / reach - grid[0]) / grid[1], 0.0), rows - 1.001)
+        column = min(abs(position[n, 2]) / reach / grid[2], columns - 1.001)
+        i, j = int(row), int(column)
+        down, right = row - i, column - j
+        near, far = (1 - down) * (1 - right), down * (1 - right)
+        beside, across = (1 - down) * right, down * right
+        slope = near * growth[i, j] + far * growth[i + 1, j] + beside * growth[i, j + 1] + across * growth[i + 1, j + 1]
+        late = near * delay[i, j] + far * delay[i + 1, j] + beside * delay[i, j + 1] + across * delay[i + 1, j + 1]
+        places[n] = row, column
+        told[n] = 1 / reach, late * half_speed, slope.real, slope.imag
 
 
 def _growth(beam: NDArray, change: NDArray, band: Band, centre: float) -> NDArray:

@@ -165,13 +165,13 @@ class FullMatrix:
 
     def _under_lens(self, position: np.ndarray, kinds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         lens = self._lens
-        places = lens.places(position)
-        owner, block, first = _entries(lens.blocks_of(position))
+        places, lean = lens.lean(position, self._speed)
+        owner, block, first = _entries(lens.blocks_at(places))
         tables = deposit.aligned(len(owner), deposit.PHASES, 5, 2, TAPS)
         made = np.stack([owner, block], axis=1)
         deposit.mould(places, kinds, (lens.spectrum, lens.change), self._shapes, *self._maps, made, tables)
         entries = np.stack([owner, np.arange(len(owner)) * self._size * deposit.PHASES, first], axis=1)
-        return lens.lean(position, places, self._speed), entries, tables.ravel()
+        return lean, entries, tables.ravel()
 
     def __call__(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
         """Spectra of the echoes of all pairs at `frequency`.
