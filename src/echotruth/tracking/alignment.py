@@ -8,6 +8,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from echotruth.tracking.cubic import shares, slopes
+
 
 @numba.njit(cache=True, nogil=True)
 def grey_at(padded, place):
@@ -30,8 +32,8 @@ def grey_at(padded, place):
         x = min(max(place[k, 0], 0.0), columns - 1.0)
         y = min(max(place[k, 1], 0.0), rows - 1.0)
         j, i = min(int(x), columns - 2), min(int(y), rows - 2)
-        across, right = _shares(x - j)
-        down, below = _shares(y - i)
+        across, right = shares(x - j), slopes(x - j)
+        down, below = shares(y - i), slopes(y - i)
         for a in range(4):
             value, slope = 0.0, 0.0
             for b in range(4):
@@ -42,15 +44,6 @@ def grey_at(padded, place):
             result[k, 1] += down[a] * slope
             result[k, 2] += below[a] * value
     return result
-
-
-@numba.njit(cache=True, nogil=True)
-def _shares(u):
-    """Shares of four neighbouring coefficients at a fraction u between the middle two, and their derivatives."""
-    v = 1 - u
-    value = (v * v * v / 6, 2 / 3 - u * u * (1 - u / 2), 2 / 3 - v * v * (1 - v / 2), u * u * u / 6)
-    slope = (-v * v / 2, u * (1.5 * u - 2), v * (2 - 1.5 * v), u * u / 2)
-    return value, slope
 
 
 @numba.njit(cache=True, nogil=True)

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from echotruth.tracking import cubic
+
 
 @dataclass(frozen=True)
 class Cells:
@@ -23,12 +25,15 @@ class Cells:
         Numbers of the knots that a cell sees, lateral fastest; -1 where there is none.
     first : ndarray of shape (cell + 1,)
         First point of every cell; the last entry is the number of points.
+    fraction : ndarray of shape (point, 2)
+        Of the way through the cell: lateral, axial.
     across, down : ndarray of shape (point, 4), float64
         Shares of the four columns and rows of knots at every point.
     """
 
     knots: np.ndarray
     first: np.ndarray
+    fraction: np.ndarray
     across: np.ndarray
     down: np.ndarray
 
@@ -96,8 +101,8 @@ class Lattice:
         around = np.arange(-1, 3)
         knots = self.number[row[:, None, None] + around[:, None], column[:, None, None] + around]
         fraction = ((points - self.origin) / self.step - corner)[order]
-        across, down = (cubic(fraction[:, axis]) for axis in (0, 1))
-        return Cells(knots.reshape(-1, 16), np.append(first, len(points)), across, down), order
+        across, down = (np.stack(cubic.shares(each), -1) for each in fraction.T)
+        return Cells(knots.reshape(-1, 16), np.append(first, len(points)), fraction, across, down), order
 
     def at(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Fields at points.
@@ -157,12 +162,6 @@ def lattice(places: np.ndarray, step: float) -> Lattice:
     if shape[0] < shape[1]:
         number = np.where(wanted, np.cumsum(wanted.T).reshape(shape[::-1]).T, 0) - 1
     return Lattice(step, number, every.origin)
-
-
-def cubic(u: np.ndarray) -> np.ndarray:
-    """Shares of four neighbouring knots at a fraction `u` of the way between the middle two; (..., 4)."""
-    v = 1 - u
-    return np.stack([v**3 / 6, 2 / 3 - u**2 * (1 - u / 2), 2 / 3 - v**2 * (1 - v / 2), u**3 / 6], -1)
 
 
 @numba.njit(cache=True, nogil=True)

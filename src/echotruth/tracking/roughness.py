@@ -11,6 +11,7 @@ import numba
 import numpy as np
 from scipy import ndimage
 
+from echotruth.tracking import cubic
 from echotruth.tracking.alignment import add_cell
 from echotruth.tracking.bspline import Cells
 
@@ -34,7 +35,7 @@ def roughness(cells: Cells, metrics: np.ndarray, size: int) -> np.ndarray:
     """
     lowest = np.where(cells.knots < 0, size, cells.knots).min(1)
     band = np.zeros((2 * size, 2 * int((cells.knots.max(1) - lowest).max()) + 2))
-    _add(cells.knots, cells.first, *(derivatives(each) for each in (cells.across, cells.down)), metrics, band)
+    _add(cells.knots, cells.first, *map(derivatives, cells.fraction.T), metrics, band)
     return band / band[:, -1].mean()
 
 
@@ -63,14 +64,10 @@ def metric(mask: np.ndarray, wide: np.ndarray, width: float, across: float) -> n
     return np.stack([1 - less * xx / trace, -less * xy / trace, 1 - less * yy / trace], -1)
 
 
-def derivatives(shares: np.ndarray) -> np.ndarray:
-    """Shares (point, 4) of cubic B-splines with their first and second derivatives by the fraction; (point, 3, 4)."""
-    # The last share is u^3 / 6.
-    u = np.cbrt(6 * shares[:, 3])
-    v = 1 - u
-    first = np.stack([-(v**2) / 2, u * (1.5 * u - 2), v * (2 - 1.5 * v), u**2 / 2], -1)
-    second = np.stack([v, 3 * u - 2, 3 * v - 2, u], -1)
-    return np.stack([shares, first, second], 1)
+def derivatives(fraction: np.ndarray) -> np.ndarray:
+    """Shares of cubic B-splines with their first and second derivatives at fractions (point,); (point, 3, 4)."""
+    kinds = (cubic.shares, cubic.slopes, cubic.bends)
+    return np.stack([np.stack(kind(fraction), -1) for kind in kinds], 1)
 
 
 @numba.njit(cache=True, nogil=True)

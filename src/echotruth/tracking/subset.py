@@ -14,26 +14,14 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from echotruth.tracking.cubic import shares, slopes
+
 STEPS = 30
 """Most iterations."""
 STILL = 1e-3
 """Largest motion of a corner of the subset in the last iteration, px (Pan, Li and Tong 2013)."""
 STRAY = 0.25
 """Distance from its start at which a motion is given up, over half the side of a subset."""
-
-
-@numba.njit(cache=True)
-def shares(u):
-    """Shares of four neighbouring coefficients at a fraction u between the middle two: the cubic B-spline."""
-    v = 1 - u
-    return v * v * v / 6, 2 / 3 - u * u * (1 - u / 2), 2 / 3 - v * v * (1 - v / 2), u * u * u / 6
-
-
-@numba.njit(cache=True)
-def slopes(u):
-    """Derivatives of :func:`shares`."""
-    v = 1 - u
-    return -v * v / 2, u * (1.5 * u - 2), v * (2 - 1.5 * v), u * u / 2
 
 
 @numba.njit(cache=True)
