@@ -6,7 +6,7 @@ from imaging.exact import fresnel
 from scipy.optimize import brentq
 
 from echotruth.config import Probe
-from echotruth.imaging.elevation import FAINT, Lens
+from echotruth.imaging.elevation import FAINT, Lens, bounds
 from echotruth.imaging.kernel import Band, Grid
 
 WAVELENGTH = 1540 / 25e6
@@ -30,14 +30,14 @@ def at(beside, depth):
 
 
 @pytest.mark.parametrize("depth", [1.1e-3, 3.7e-3, 6.5e-3, 12e-3])
-def test_table_holds_the_square_of_the_integral_once_its_delay_is_put_back(lens, band, depth):
+def test_table_holds_the_integral_once_its_delay_is_put_back(lens, band, depth):
     row = np.abs(lens.curvature - 1 / depth).argmin()
     columns = np.arange(0, 60, 7)
     position = at(lens.slope[columns] / lens.curvature[row], 1 / lens.curvature[row])
     for k, frequency in enumerate(band.frequency):
-        exact = fresnel(Probe(elements=3), position, frequency)[1] ** 2
+        exact = fresnel(Probe(elements=3), position, frequency)[1]
         delay = np.exp(-2j * np.pi * frequency * lens.delay[row, columns])
-        np.testing.assert_allclose(lens.spectrum[row, columns, k] * delay, exact, atol=2e-6)
+        np.testing.assert_allclose(lens.beam[row, columns, k] * delay, exact, atol=2e-6)
 
 
 def test_width_in_the_focus_is_that_of_a_squared_sinc():
@@ -76,3 +76,18 @@ def test_scatterers_far_beside_the_plane_are_left_out_and_those_in_it_take_one_b
 def test_either_side_of_the_plane_is_alike(lens):
     beside = np.linspace(0, 1e-3, 50)
     np.testing.assert_array_equal(lens.places(at(beside, 5e-3)), lens.places(at(-beside, 5e-3)))
+
+
+def test_near_the_array_it_is_looked_up_from_its_parts(lens):
+    assert [lens.parts(reach) for reach in (3e-3, 6.5e-3)] == [2, 1]
+    position = at(np.linspace(0, 3e-4, 5), 3e-3)
+    _, told = lens.lean(position, 1540.0, 2)
+    quarter = 16 * Probe().si().pitch
+    np.testing.assert_allclose(told[..., 0], 1 / np.hypot(quarter, 3e-3), rtol=1e-9)
+
+
+def test_parts_of_an_array_share_all_its_elements():
+    assert bounds(64, 2).tolist() == [0, 32, 64]
+    for elements, parts in ((65, 2), (17, 3)):
+        part = np.arange(elements) * parts // elements
+        np.testing.assert_array_equal(np.searchsorted(part, np.arange(parts + 1)), bounds(elements, parts))

@@ -72,7 +72,8 @@ class Rf(Section):
     """Least range over aperture, on receive and focused transmit; 0 takes the whole array at every range."""
     accuracy: Annotated[FiniteFloat, BeforeValidator(_number), Field(ge=2e-5, le=1e-3)] = 2e-5
     """Error against the exact sum that the RF of a plane may have, relative (L2); 1e-3 is faster. Only without
-    `elevation`, whose own error is greater: 1.5 % beyond two apertures, some per cent nearer."""
+    `elevation`, whose own error is greater: 1.5 % beyond one aperture, or beyond two under the tall lens of
+    a human's array, and some per cent nearer or, with attenuation, far beside the plane."""
     elevation: bool = True
     """Whether scatterers beside the plane are heard through the lens; without it elements are strips without end."""
     keep: list[Literal["lines", "channels"]] = Field(default=[])

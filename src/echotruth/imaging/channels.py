@@ -19,7 +19,7 @@ from echotruth.imaging.scanner import Scanner
 from echotruth.imaging.transmit import KINDS
 
 LENS_ACCURACY = 0.015
-"""Relative error (L2) of the RF under a lens, beyond five and a half of its heights; see docs/conventions.md."""
+"""Relative error (L2) of the RF under a lens, near a tall one apart; see docs/conventions.md."""
 
 PER_PERIOD = 2.1
 """Samples kept per period of the highest frequency, at least; a record that is finer is thinned."""

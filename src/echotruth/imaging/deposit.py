@@ -24,10 +24,12 @@ FRACTION_BITS = 18
 LEAD = 32
 """Samples of a row before time 0: room for what of a kernel comes before its echo."""
 
-ROWS = {1: (2, 1, 2), 2: (2, 1, 0), 3: (3, 2, 1)}
+ROWS = {1: (2, 1, 2, 0), 2: (2, 1, 0, 0), 3: (3, 2, 1, 0), 4: (2, 1, 2, 1)}
 """Rows of a table for every phase, by the number of a scheme: so many for a pair of polynomials, then for one that is
-multiplied by the square of the colour, and for one that is multiplied by the bend.
+multiplied by the square of the colour, for one that is multiplied by the bend and for one by the skew.
 There are as many rows as a polynomial has coefficients, the highest power first."""
+APART = 4
+"""Scheme for echoes that parts of the array look up apart."""
 PAIR = 2 * TAPS
 LARGEST = 0.3
 """Greatest change, logarithm of the amplitude or radians, that an element makes of what its lens hears."""
@@ -89,7 +91,7 @@ def _lanes(places):
 
 
 @intrinsic
-def add_kernel(typing_context, traces, start, table, row, scheme, weight, fraction, colour, bend):  # noqa: PLR0913, PLR0917
+def add_kernel(typing_context, traces, start, table, row, scheme, weight, fraction, colour, bend, skew):  # noqa: PLR0913, PLR0917
     """traces[start:start + TAPS] += weight * kernel, as vectors, the kernel from the rows of a table at `row`.
 
     `scheme` is a tuple whose length is that of :data:`ROWS`: it is known when this is compiled, and the sums are
@@ -98,17 +100,17 @@ def add_kernel(typing_context, traces, start, table, row, scheme, weight, fracti
     single = types.Array(types.float32, 1, "C")
     if traces != single or table != single:
         raise TypingError("traces and table must be contiguous float32 vectors")
-    signature = types.void(traces, types.intp, table, types.intp, scheme, *[types.float32] * 4)
+    signature = types.void(traces, types.intp, table, types.intp, scheme, *[types.float32] * 5)
 
     def generate(context, builder, signature, arguments):
-        traces, start, table, row, _, weight, fraction, colour, bend = arguments
+        traces, start, table, row, _, weight, fraction, colour, bend, skew = arguments
         vectors = _Vectors(context, builder)
         rows = vectors.address(signature.args[2], table, row, PAIR)
         fraction = vectors.spread(fraction, PAIR)
         first, *others = ROWS[len(scheme)]
         value, place = vectors.polynomial(rows, 0, first, fraction), first
         square = builder.fmul(colour, colour)
-        for count, factor in zip(others, (square, bend), strict=True):
+        for count, factor in zip(others, (square, bend, skew), strict=True):
             if count:
                 both = vectors.polynomial(rows, place, count, fraction)
                 value = vectors.fused(both, vectors.spread(factor, PAIR), value)
@@ -138,41 +140,44 @@ def one_way(position, centres, scales, tilts, lean, time, weight, colour, bend):
     tilts
         Shape (scatterers,): b of the kind of pulse of each (see :mod:`~echotruth.imaging.directivity`).
     lean
-        Of a lens, shape (scatterers, 4): 1/range from the centre of the array, 1/m, delay on each way, m, and growth
-        of amplitude and phase with 1/range, m (see :mod:`~echotruth.imaging.elevation`); or shape (0, 4).
+        Of a lens, shape (scatterers, parts, 4): 1/range from the centre of each part of the array, 1/m, delay on each
+        way, m, and growth of amplitude and phase with 1/range, m (see :mod:`~echotruth.imaging.elevation`); or shape
+        (0, 1, 4).
     time, weight, colour, bend
         Written: shape (scatterers, elements), int32 in 2^-18 samples, float32 in 1/m and float32. The weight is the
         directivity and the loss over the distance (spherical spreading, 1/r on each way). The bend is 1/range beyond
-        that from the centre, 1/m, under a lens, and else twice the square of the colour.
+        that from the centre of its part, 1/m, under a lens, and else twice the square of the colour.
     """
     samples, square, loss, waves = scales
     unit = samples * (1 << FRACTION_BITS)
+    elements, parts = len(centres), lean.shape[1]
     for k in numba.prange(len(position)):
         axial = position[k, 1] * position[k, 1]
         beside = position[k, 2] * position[k, 2]
-        for element in range(len(centres)):
+        for element in range(elements):
             lateral = (position[k, 0] - centres[element]) ** 2
             square_distance = lateral + axial + beside
             distance = np.sqrt(square_distance)
             wide = square * lateral / square_distance
-            strength = polynomial(VALUE, wide) * position[k, 1] / square_distance
+            strength = polynomial(VALUE, wide) * position[k, 1] / square_distance * np.exp(-loss * distance)
             wide = min(wide, WIDEST)
             hue = 2 * wide * polynomial(SLOPE, wide) / polynomial(VALUE, wide) - tilts[k]
             colour[k, element] = hue
             if len(lean):
-                away = 1 / np.sqrt(lateral + axial) - lean[k, 0]
+                middle, delay, louder, later = lean[k, element * parts // elements]
+                away = 1 / np.sqrt(lateral + axial) - middle
                 bend[k, element] = away
                 # To first order; beyond that, beside the beam, it would grow without bounds.
-                distance += lean[k, 1] - min(max(lean[k, 3] * away, -LARGEST), LARGEST) / (2 * np.pi * waves)
-                strength *= np.exp(min(max(lean[k, 2] * away, -LARGEST), LARGEST))
+                distance += delay - min(max(later * away, -LARGEST), LARGEST) / (2 * np.pi * waves)
+                strength *= np.exp(min(max(louder * away, -LARGEST), LARGEST))
             else:
                 bend[k, element] = 2 * hue * hue
             time[k, element] = np.int32(distance * unit + 0.5)
-            weight[k, element] = strength * np.exp(-loss * distance)
+            weight[k, element] = strength
 
 
 @numba.njit(parallel=True, cache=True)
-def add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, size, lens, scheme):  # noqa: PLR0913, PLR0917
+def add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, size, bounds, lens, scheme):  # noqa: PLR0913, PLR0917
     """Add the echoes of a block of scatterers to the traces of all pairs.
 
     Parameters
@@ -185,11 +190,14 @@ def add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, s
     amplitude
         Shape (scatterers,), float32.
     entries
-        Blocks of samples to add, shape (entries, 3): scatterer, place of its table, first sample from the echo.
+        Blocks of samples to add, shape (entries, 5): scatterer, place of its table, first sample from the echo, and
+        the parts of the array whose elements send and listen, the former not after the latter.
     tables
         Of kernels, flat, float32.
     size
         Numbers in the rows of a phase.
+    bounds
+        First element of every part of the array, and their number: shape (parts + 1,).
     lens
         Whether the bend is that of a lens; else the square of the colour is taken off it, which leaves the contrast.
     scheme
@@ -203,87 +211,28 @@ def add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, s
     own = np.float32(lens == 0)
     for number in numba.prange(SHARES):
         for entry in range(len(entries)):
-            k, base, shift = entries[entry]
+            k, base, shift, sender, listener = entries[entry]
+            first, last, nearest, beyond = 0, elements, 0, elements
+            if len(scheme) == APART:  # known when this is compiled: that no index is negative is seen for the others
+                first, last = bounds[sender], bounds[sender + 1]
+                nearest, beyond = bounds[listener], bounds[listener + 1]
             for start in range(0, elements, SHARES):
                 # Up in one round and down in the next: as many pairs for every thread.
                 i = start + (np.int64(number) if start // SHARES % 2 == 0 else SHARES - 1 - np.int64(number))
-                if i >= elements:
+                if i < first or i >= last:
                     continue
                 loud, late = weight[k, i] * amplitude[k], np.int64(time[k, i])
                 hue, bent = colour[k, i], bend[k, i]
                 row = (i * elements - i * (i + 1) // 2) * samples + LEAD + shift
-                for j in range(i, elements):
+                for j in range(max(i, nearest), beyond):
                     at = late + time[k, j]
                     phase = base + ((at >> rest_bits) & (PHASES - 1)) * size
                     fraction = np.float32(at & rest) * unit
                     place = row + j * samples + (at >> FRACTION_BITS)
                     both = hue + colour[k, j]
                     between = bent + bend[k, j] - own * both * both
-                    add_kernel(flat, place, tables, phase, scheme, loud * weight[k, j], fraction, both, between)
-
-
-@numba.njit(parallel=True, cache=True)
-def mould(places, kinds, spectra, shapes, linear, constant, entries, tables):
-    """Make the tables of echoes that a lens has shaped.
-
-    Parameters
-    ----------
-    places
-        Row and column of every scatterer in the tables of the lens, shape (scatterers, 2).
-    kinds
-        Angle from the centre of the array of each, shape (scatterers,).
-    spectra
-        Of the lens and their change, two of shape (curvatures, slopes, nodes), complex64.
-    shapes
-        For all angles, shape (KINDS, 4, nodes), float32.
-    linear, constant
-        Maps from spectra to polynomials of that degree, float32, shape (blocks, 2 nodes, PHASES 2 TAPS) and (blocks,
-        2 nodes, PHASES TAPS).
-    entries
-        Blocks to make, shape (entries, 2): scatterer and block.
-    tables
-        Written: shape (entries, PHASES, 5, 2, TAPS), float32.
-    """
-    nodes = spectra[0].shape[2]
-    for entry in numba.prange(len(entries)):
-        k, block = entries[entry]
-        weights = np.empty((6, 2 * nodes), np.float32)
-        for node in range(nodes):
-            pulse, change = between(spectra[0], places[k], node), between(spectra[1], places[k], node)
-            for half in range(2):
-                shape, square = shapes[kinds[k], half, node], shapes[kinds[k], 2 + half, node]
-                for part in range(2):
-                    straight, bent = (pulse.imag, change.imag) if part else (pulse.real, change.real)
-                    weights[half, part * nodes + node] = straight * shape
-                    weights[2 + half, part * nodes + node] = bent * shape
-                    weights[4 + half, part * nodes + node] = straight * square
-        table = tables[entry]
-        for half in range(2):
-            table[:, :2, half] = combined(weights[half], linear[block]).reshape(PHASES, 2, TAPS)
-            table[:, 2, half] = combined(weights[4 + half], constant[block]).reshape(PHASES, TAPS)
-            table[:, 3:, half] = combined(weights[2 + half], linear[block]).reshape(PHASES, 2, TAPS)
-
-
-@numba.njit(cache=True)
-def between(table, place, node):
-    """Bilinear interpolation of a table (rows, columns, nodes) at a place (row, column)."""
-    row, column = np.int64(place[0]), np.int64(place[1])
-    down, right = place[0] - row, place[1] - column
-    near = (1 - right) * table[row, column, node] + right * table[row, column + 1, node]
-    far = (1 - right) * table[row + 1, column, node] + right * table[row + 1, column + 1, node]
-    return (1 - down) * near + down * far
-
-
-@numba.njit(cache=True)
-def combined(weights, rows):
-    """Sum of rows (a multiple of 4, n) times weights: shape (n,), float32."""
-    total = np.zeros(rows.shape[1], np.float32)
-    for m in range(0, len(rows), 4):
-        # Four at a time, so that the total is seldom stored.
-        a, b, c, d = weights[m], weights[m + 1], weights[m + 2], weights[m + 3]
-        for n in range(len(total)):
-            total[n] += a * rows[m, n] + b * rows[m + 1, n] + (c * rows[m + 2, n] + d * rows[m + 3, n])
-    return total
+                    skew, strong = bent - bend[k, j], loud * weight[k, j]
+                    add_kernel(flat, place, tables, phase, scheme, strong, fraction, both, between, skew)
 
 
 @numba.njit(parallel=True, cache=True)

@@ -2,9 +2,10 @@
 
 An element of height H with a lens of focus F hears a point at elevation y and range r in the plane through the
 Fresnel integral E(f) = 1/H int exp(-i k [h^2/2 (1/r - 1/F) - h y/r]) dh over its height, k = 2 pi f / c, relative to
-the straight path to its centre (Goodman, Introduction to Fourier Optics, section 4.2). A pair hears E_i E_j. That is
-taken as E^2 at the range from the centre of the array, its delay apart, and corrected for each element by the
-logarithmic derivative with respect to 1/r.
+the straight path to its centre (Goodman, Introduction to Fourier Optics, section 4.2). A pair hears E_i E_j. For each
+element E is taken at the range from the centre of the array, its delay apart, and corrected to first order in 1/r. Near
+the array, where its elements see a scatterer at ranges too different for that, it is taken at those from the centres of
+a few parts of the array.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ Floats = NDArray[np.float64]
 
 FAINT = 1e-3
 """Scatterers whose echo is fainter than this because of their elevation are left out; in the focus it is 1."""
-MOST_BLOCKS = 3
+MOST_BLOCKS = 4
 """Blocks of samples that the longest echoes get; what is longer is cut."""
 LEFT = 3e-5
 """Energy that a kernel may miss, over that of an echo from the plane at the same range."""
@@ -29,6 +30,11 @@ STEEPEST = 1.0
 """Greatest elevation over range."""
 ENOUGH = 24
 """Slopes tabulated per wavelength over height."""
+WIDEST_PART = 0.17
+"""Greatest product of the Fresnel number H^2 / (4 lambda r) of an element and the square of half the width of a part
+over the range r: what is left of E beyond the first order is then about 1 %."""
+MOST_PARTS = 2
+"""Of the array."""
 
 
 class Lens:
@@ -45,12 +51,12 @@ class Lens:
     ----------
     curvature : ndarray of shape (CURVATURES,), 1/m
     slope : ndarray of shape (slopes,)
-    spectrum : ndarray of shape (CURVATURES, slopes, NODES), complex64
-        E^2 at the frequencies of the band, without its delay.
+    beam : ndarray of shape (CURVATURES, slopes, NODES), complex64
+        E at the frequencies of the band, without its delay.
     delay : ndarray of shape (CURVATURES, slopes), s
         Taken out of it.
     change : ndarray of shape (CURVATURES, slopes, NODES), complex64, m
-        E R, likewise.
+        Derivative of E with respect to 1/range, less what the growth makes of E, likewise.
     growth : ndarray of shape (CURVATURES, slopes), m
         g: real part that of the amplitude, imaginary part that of the phase.
     blocks : ndarray of shape (CURVATURES, slopes), uint8
@@ -63,18 +69,22 @@ class Lens:
         self.slope = np.linspace(0, STEEPEST, slopes)
         self.curvature = np.linspace(min(1 / reach, 1 / p.height), 2 / p.height, CURVATURES)
         beam, change = self._integrals(probe, band)
+        turn = 2 * np.pi * p.frequency
         self.growth = _growth(beam, change, band, p.frequency)
-        self.delay = _delays(beam**2, band)
-        turned = beam * np.exp(2j * np.pi * np.multiply.outer(self.delay, band.frequency))
-        ratio = band.frequency / p.frequency
-        change -= (self.growth.real[..., None] + 1j * np.multiply.outer(self.growth.imag, ratio)) * beam
+        self.delay = _delays(beam**2, band) / 2
+        # Traces will be damped by their time, and the loss goes by the way: so much the lens must not be damped.
+        undamped = band.loss + 2j * np.pi * band.frequency
+        turned = np.exp(np.multiply.outer(self.delay, undamped))
+        change -= (self.growth.real[..., None] + np.multiply.outer(self.growth.imag, undamped / turn)) * beam
         self.change = (turned * change).astype(np.complex64)
-        self.spectrum = (turned * beam).astype(np.complex64)
-        self.blocks = _blocks(self.spectrum, band)
+        self.beam = (turned * beam).astype(np.complex64)
+        self.blocks = _blocks(self.beam**2, band)
+        self._elements, self._half = p.elements, p.elements * p.pitch / 2
+        self._number = p.height**2 * p.frequency / (4 * p.sound_speed)
 
     def places(self, position: Floats) -> Floats:
         """Rows and columns of scatterers (n, 3), m, in the tables: (n, 2), within them."""
-        return self.lean(position, 1.0)[0]
+        return self.lean(position, 1.0)[0][:, 0]
 
     def blocks_of(self, position: Floats) -> NDArray[np.int64]:
         """Blocks of samples that the echoes of scatterers (n, 3), m, need: (n,); 0 where they are too faint."""
@@ -82,16 +92,23 @@ class Lens:
         return np.where(steep, 0, self.blocks_at(self.places(position)))
 
     def blocks_at(self, places: Floats) -> NDArray[np.int64]:
-        """The same at places (n, 2) in the tables."""
-        row, column = np.rint(places).astype(np.intp).T
-        return self.blocks[row, column].astype(np.int64)
+        """The same at places (..., 2) in the tables: (...)."""
+        place = np.rint(places).astype(np.intp)
+        return self.blocks[place[..., 0], place[..., 1]].astype(np.int64)
 
-    def lean(self, position: Floats, sound_speed: float) -> tuple[Floats, Floats]:
-        """Places of scatterers (n, 3), m, in the tables, (n, 2), and what
-        :func:`~echotruth.imaging.deposit.one_way` wants to know of them, (n, 4)."""
-        places, told = np.empty((len(position), 2)), np.empty((len(position), 4))
+    def parts(self, reach: float) -> int:
+        """Parts of the array from which scatterers at a range, m, and beyond are looked up apart."""
+        needed = np.sqrt(self._number * self._half**2 / (WIDEST_PART * reach**3))
+        return int(np.clip(np.ceil(needed), 1, min(MOST_PARTS, self._elements)))
+
+    def lean(self, position: Floats, sound_speed: float, parts: int = 1) -> tuple[Floats, Floats]:
+        """Places of scatterers (n, 3), m, in the tables, (n, parts, 2), from the centre of each part of the array, and
+        what :func:`~echotruth.imaging.deposit.one_way` wants to know of them, (n, parts, 4)."""
+        places, told = np.empty((len(position), parts, 2)), np.empty((len(position), parts, 4))
         grid = self.curvature[0], self.curvature[1] - self.curvature[0], self.slope[1]
-        _look_up(position, grid, self.growth, self.delay, sound_speed / 2, places, told)
+        first = bounds(self._elements, parts)
+        middles = ((first[1:] + first[:-1]) / self._elements - 1) * self._half
+        _look_up(position, middles, grid, self.growth, self.delay, sound_speed, places, told)
         return places, told
 
     def _integrals(self, probe: Probe, band: Band) -> tuple[NDArray, NDArray]:
@@ -114,36 +131,45 @@ class Lens:
         return beam, change
 
 
+def bounds(elements: int, parts: int) -> NDArray[np.int64]:
+    """First element of every part of an array, and the number of elements, (parts + 1,): part e parts // elements."""
+    return -(-np.arange(parts + 1) * elements // parts)
+
+
 @numba.njit(parallel=True, cache=True)
-def _look_up(position, grid, growth, delay, half_speed, places, told):
+def _look_up(position, middles, grid, growth, delay, speed, places, told):
     """Fill the places in the tables, and what they say there by bilinear interpolation.
 
     Parameters
     ----------
     position : ndarray of shape (n, 3), m
+    middles : ndarray of shape (parts,), m
+        Lateral coordinates of the centres of the parts of the array.
     grid : (float, float, float)
         First curvature and step of curvatures, 1/m, and step of slopes.
     growth, delay : ndarray of shape (CURVATURES, slopes), m and s
-    half_speed : float
+    speed : float
         m/s.
-    places : ndarray of shape (n, 2)
+    places : ndarray of shape (n, parts, 2)
         Written: row and column.
-    told : ndarray of shape (n, 4)
+    told : ndarray of shape (n, parts, 4)
         Written: 1/range (1/m), delay as range (m), real and imaginary part of the growth (m).
     """
     rows, columns = growth.shape
     for n in numba.prange(len(position)):
-        reach = np.sqrt(position[n, 0] ** 2 + position[n, 1] ** 2)
-        row = min(max((1 / reach - grid[0]) / grid[1], 0.0), rows - 1.001)
-        column = min(abs(position[n, 2]) / reach / grid[2], columns - 1.001)
-        i, j = int(row), int(column)
-        down, right = row - i, column - j
-        near, far = (1 - down) * (1 - right), down * (1 - right)
-        beside, across = (1 - down) * right, down * right
-        slope = near * growth[i, j] + far * growth[i + 1, j] + beside * growth[i, j + 1] + across * growth[i + 1, j + 1]
-        late = near * delay[i, j] + far * delay[i + 1, j] + beside * delay[i, j + 1] + across * delay[i + 1, j + 1]
-        places[n] = row, column
-        told[n] = 1 / reach, late * half_speed, slope.real, slope.imag
+        for part in range(len(middles)):
+            reach = np.sqrt((position[n, 0] - middles[part]) ** 2 + position[n, 1] ** 2)
+            row = min(max((1 / reach - grid[0]) / grid[1], 0.0), rows - 1.001)
+            column = min(abs(position[n, 2]) / reach / grid[2], columns - 1.001)
+            i, j = int(row), int(column)
+            down, right = row - i, column - j
+            near, far = (1 - down) * (1 - right), down * (1 - right)
+            beside, across = (1 - down) * right, down * right
+            slope = near * growth[i, j] + far * growth[i + 1, j]
+            slope += beside * growth[i, j + 1] + across * growth[i + 1, j + 1]
+            late = near * delay[i, j] + far * delay[i + 1, j] + beside * delay[i, j + 1] + across * delay[i + 1, j + 1]
+            places[n, part] = row, column
+            told[n, part] = 1 / reach, late * speed, slope.real, slope.imag
 
 
 def _growth(beam: NDArray, change: NDArray, band: Band, centre: float) -> NDArray:

@@ -18,15 +18,16 @@ from scipy import fft
 from echotruth.config import Probe
 from echotruth.imaging import deposit, directivity
 from echotruth.imaging.attenuation import separated
-from echotruth.imaging.elevation import MOST_BLOCKS, Lens
+from echotruth.imaging.elevation import MOST_BLOCKS, Lens, bounds
 from echotruth.imaging.kernel import NODES, TAPS, Band, Grid, fits, offsets, stacked, window_spectrum
+from echotruth.imaging.mould import mould
 from echotruth.imaging.probe import element_centres, pulse_band, pulse_spectrum, spectral_width
 
 BLOCK = 96
 """Scatterers deposited at a time."""
-FINE, FAST, LENS = 3, 2, 1
+FINE, FAST, LENS, NEAR = 3, 2, 1, deposit.APART
 """Schemes of the kernels' tables (see :data:`~echotruth.imaging.deposit.ROWS`) for an error of 2e-5 and of 1e-3 in the
-plane, and under a lens."""
+plane, and under a lens, there also for scatterers that parts of the array look up apart."""
 DENSEST, SHARPNESS = {FINE: 0.32, FAST: 0.41, LENS: 0.41}, {FINE: 20.0, FAST: 15.0, LENS: 15.0}
 """Greatest frequency of the pulse over that of the grid, and sharpness of the window."""
 FINEST = 1e-4
@@ -48,8 +49,8 @@ class FullMatrix:
         Relative error (L2) that is allowed against the exact sum without the lens: 2e-5 or 1e-3.
     elevation : bool
         Whether the lens is there; without it, echoes are those of strips without end, and positions still in space.
-        Under the lens the error is 1.5 % beyond two apertures, most of it in what is far beside the plane, and 6 %
-        between one aperture and one and a half.
+        Under the lens the error is 1.5 % beyond one aperture, most of it in what is far beside the plane; before an
+        array as tall as a human's, where echoes are longer than a kernel, some per cent up to two apertures.
 
     Attributes
     ----------
@@ -108,7 +109,6 @@ class FullMatrix:
     def _tabulate(self, band: Band, ratio: np.ndarray) -> None:
         """Tables of kernels in the plane, or what makes those under the lens."""
         rows = deposit.ROWS[self._scheme]
-        self._size = sum(rows) * deposit.PAIR
         self._tilts, shapes = directivity.shapes(self._width, ratio, 2 * sum(count > 0 for count in rows))
         if self._lens:
             self._shapes = np.ascontiguousarray(shapes[:, :4], np.float32)
@@ -148,29 +148,40 @@ class FullMatrix:
         time = np.empty(shape, np.int32)
         weight, colour, bend = np.empty((3, *shape), np.float32)
         kinds = self._kind(position)
-        lean, entries, tables = self._under_lens(position, kinds) if self._lens else self._in_plane(kinds)
+        parts = self._lens.parts(float(np.linalg.norm(position[0]))) if self._lens else 1
+        scheme = NEAR if parts > 1 else self._scheme
+        size = sum(deposit.ROWS[scheme]) * deposit.PAIR
+        made = self._under_lens(position, kinds, parts, size) if self._lens else self._in_plane(kinds, size)
+        lean, entries, tables = made
         deposit.one_way(position, self.centres, self._scales, self._tilts[kinds], lean, time, weight, colour, bend)
-        scheme, lens = (0,) * self._scheme, self._lens is not None
-        deposit.add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, self._size, lens, scheme)
+        given, lens = (time, weight, colour, bend, amplitude, entries, tables), self._lens is not None
+        deposit.add_echoes(traces, *given, size, bounds(len(self.centres), parts), lens, (0,) * scheme)
 
     def _kind(self, position: np.ndarray) -> np.ndarray:
         """Which of the angles from the centre of the array is nearest, shape (n,)."""
         sine = np.abs(position[:, 0]) / np.linalg.norm(position, axis=1)
         return np.rint(sine * (directivity.KINDS - 1)).astype(np.int64)
 
-    def _in_plane(self, kinds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        first = np.full(len(kinds), offsets(1)[0])
-        entries = np.stack([np.arange(len(kinds)), kinds * self._size * deposit.PHASES, first], axis=1)
-        return np.empty((0, 4)), entries, self._tables
+    def _in_plane(self, kinds: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        entries = np.zeros((len(kinds), 5), int)
+        entries[:, 0], entries[:, 1] = np.arange(len(kinds)), kinds * size * deposit.PHASES
+        entries[:, 2] = offsets(1)[0]
+        return np.empty((0, 1, 4)), entries, self._tables
 
-    def _under_lens(self, position: np.ndarray, kinds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _under_lens(
+        self, position: np.ndarray, kinds: np.ndarray, parts: int, size: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         lens = self._lens
-        places, lean = lens.lean(position, self._speed)
-        owner, block, first = _entries(lens.blocks_at(places))
-        tables = deposit.aligned(len(owner), deposit.PHASES, 5, 2, TAPS)
-        made = np.stack([owner, block], axis=1)
-        deposit.mould(places, kinds, (lens.spectrum, lens.change), self._shapes, *self._maps, made, tables)
-        entries = np.stack([owner, np.arange(len(owner)) * self._size * deposit.PHASES, first], axis=1)
+        places, lean = lens.lean(position, self._speed, parts)
+        sender, listener = np.triu_indices(parts)
+        blocks = lens.blocks_at(places)
+        owner, block, first = _entries(np.maximum(blocks[:, sender], blocks[:, listener]).ravel())
+        owner, pair = np.divmod(owner, len(sender))
+        made = np.stack([owner, block, sender[pair], listener[pair]], axis=1)
+        tables = deposit.aligned(len(owner), deposit.PHASES, size // deposit.PAIR, 2, TAPS)
+        mould(places, kinds, (lens.beam, lens.change), self._shapes, *self._maps, made, tables)
+        place = np.arange(len(owner)) * size * deposit.PHASES
+        entries = np.stack([owner, place, first, sender[pair], listener[pair]], axis=1)
         return lean, entries, tables.ravel()
 
     def __call__(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
