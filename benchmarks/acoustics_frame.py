@@ -22,8 +22,8 @@ Seconds = dict[str, dict[str, float]]
 
 
 def scan(array: Array, **changes: Any) -> tuple[Rf, Bmode]:
-    """Lines and image that suit an array."""
-    rf = Rf(focus_mm=1e3 * array.focus, sector_deg=np.rad2deg(SECTOR), **changes)
+    """Lines of one focus and an image that suit an array."""
+    rf = Rf(focus_mm=1e3 * array.focus, zones=1, sector_deg=np.rad2deg(SECTOR), **changes)
     return rf, Bmode(field_of_view_mm=1e3 * array.far)
 
 

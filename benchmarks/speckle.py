@@ -28,8 +28,9 @@ REGION = (5.8e-3, 7.2e-3)
 DEPTHS = (4e-3, 6.5e-3, 8.5e-3)
 """Ranges of the points, m."""
 TRANSMITS = {
-    "focused": {},
-    "focused, f-number 3": {"f_number": 3.0},
+    "focused, five zones": {},
+    "focused, one zone": {"zones": 1},
+    "focused, one zone, f-number 3": {"zones": 1, "f_number": 3.0},
     "11 plane waves": {"transmit": "plane"},
     "11 diverging waves": {"transmit": "diverging"},
     "synthetic aperture": {"transmit": "synthetic_aperture"},

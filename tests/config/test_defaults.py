@@ -40,6 +40,14 @@ def test_scan_of_a_preset_has_ten_scatterers_in_its_resolution_cell(name):
     assert config.phantom.si().density * axial * lateral * elevation > 10
 
 
+@pytest.mark.parametrize("name", PRESETS)
+def test_focal_zones_of_a_preset_lie_within_each_others_depth_of_field(name):
+    config = configured(probe={"preset": name})
+    probe, rf = config.probe.si(), config.rf.si()
+    depth = 7 * probe.sound_speed / probe.frequency * (rf.focus / (probe.elements * probe.pitch)) ** 2
+    assert depth / 3 < rf.zone < depth
+
+
 def test_default_is_the_mouse():
     config = configured()
     assert config == Config() == Config(probe=Probe(), rf=Rf(), bmode=Bmode())

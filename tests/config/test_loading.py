@@ -38,6 +38,8 @@ BAD = {
     "tracking: {trackers: {one: {method: guest}}}": "tracking.trackers.one.track = null: give either track or command",
     "tracking: {grid_px: 100, }\nbmode: {size_px: 64, downsampling: [1]}": "grid_px = 100: must not exceed the largest",
     "rf: {focus_mm: 12}": "rf.focus_mm = 12.0: must be smaller than bmode.field_of_view_mm = 12",
+    "rf: {focus_mm: 10}": "rf.focus_mm = 10.0: must be smaller than 10, so that its zones = 5 foci, zone_mm = 1 apart",
+    "rf: {zone_mm: 4}": "rf.focus_mm = 6.5: must exceed 8, so that its zones = 5 foci, zone_mm = 4 apart, lie in front",
     "rf: {scan: linear, width_mm: 3.0}": "rf.width_mm = 3.0: must not exceed 2.944, the length of the array",
     "rf: {f_number: -1}": "rf.f_number = -1",
     "rf: {lines: 4}": "rf.lines = 4",
@@ -72,7 +74,7 @@ def test_missing_file_is_named(tmp_path):
         load(tmp_path / "nowhere.yaml")
 
 
-@pytest.mark.parametrize("name", ["demo", "paper", "rodero", "sweep"])
+@pytest.mark.parametrize("name", ["demo", "paper", "realistic", "rodero", "sweep"])
 def test_shipped_configurations_are_accepted(name):
     assert load(ROOT / f"config/{name}.yaml").name == name
 

@@ -38,23 +38,28 @@ def receive_weights(rf, foot, ranges):
 
 
 def waves(scanner, rf, line, place):
-    """Delays (s) and weights (transmits, elements) of the waves that serve a line; their paths to points (n, 2), m."""
+    """Delays (s) and weights (transmits, elements) of the waves that serve a line; their paths to points (n, 2), m, and
+    their shares there, each (transmits, n)."""
     direction = np.radians(rf.tilt_deg / 2) * np.linspace(-1, 1, rf.transmits)[:, None]
     direction = np.concatenate([np.sin(direction), np.cos(direction)], axis=1)
     if rf.transmit == "plane":
-        return direction[:, :1] * X / SPEED, np.ones((len(direction), 64)), direction @ place.T
+        return direction[:, :1] * X / SPEED, np.ones((len(direction), 64)), direction @ place.T, 1.0
     if rf.transmit == "diverging":
         away = LENGTH / 2 / np.tan(np.radians(32))
         delay = np.hypot(X + away * direction[:, :1], away * direction[:, 1:]) - away
         path = np.linalg.norm(place + away * direction[:, None], axis=2) - away
-        return delay / SPEED, np.ones(delay.shape), path
+        return delay / SPEED, np.ones(delay.shape), path, 1.0
     if rf.transmit == "synthetic_aperture":
         path = np.hypot(place[:, 0] - X[:, None], place[:, 1])
-        return np.zeros((64, 64)), np.diag(np.cos(np.pi * X / LENGTH) ** 2), path
+        return np.zeros((64, 64)), np.diag(np.cos(np.pi * X / LENGTH) ** 2), path, 1.0
     foot, angle = scanner.scan.foot[line], scanner.scan.angle[line]
-    focus = np.hypot(foot + 6.5e-3 * np.sin(angle) - X, 6.5e-3 * np.cos(angle))
-    weight = receive_weights(rf, foot, np.array([6.5e-3]))
-    return (6.5e-3 - focus[None]) / SPEED, weight, np.hypot(place[:, 0] - foot, place[:, 1])[None]
+    step = 1e-3 * rf.zone_mm
+    foci = 6.5e-3 + step * (np.arange(rf.zones)[:, None] - (rf.zones - 1) / 2)
+    way = np.hypot(foot + foci * np.sin(angle) - X, foci * np.cos(angle))
+    weight = receive_weights(rf, foot, foci[:, 0])
+    path = np.tile(np.hypot(place[:, 0] - foot, place[:, 1]), (rf.zones, 1))
+    share = np.maximum(0, 1 - np.abs(np.clip(path, foci[0], foci[-1]) - foci) / step)
+    return (foci - way) / SPEED, weight, path, share
 
 
 def exact_line(scanner, matrix, rf, line, ranges):
@@ -64,11 +69,12 @@ def exact_line(scanner, matrix, rf, line, ranges):
     frequency = scanner.matrix.frequency
     back = np.hypot(place[:, :1] - X, place[:, 1:])
     turn = np.exp(2j * np.pi / SPEED * np.multiply.outer(frequency, back)) * receive_weights(rf, foot, ranges)
-    delay, weight, path = waves(scanner, rf, line, place)
+    delay, weight, path, share = waves(scanner, rf, line, place)
+    share = np.broadcast_to(share, path.shape)
     heard = matrix @ (weight * np.exp(-2j * np.pi * frequency[:, None, None] * delay)).transpose(0, 2, 1)
     total = np.empty(len(ranges), complex)
     for k in range(len(ranges)):
-        sent = np.exp(2j * np.pi / SPEED * np.multiply.outer(frequency, path[:, k]))
+        sent = share[:, k] * np.exp(2j * np.pi / SPEED * np.multiply.outer(frequency, path[:, k]))
         total[k] = np.einsum("fit,fi,ft", heard, turn[:, k], sent, optimize=True)
     # Twice the positive frequencies, by the inverse transform of a record; then demodulated.
     return 2 * total / scanner.matrix.samples * np.exp(-4j * np.pi * scanner.frequency * ranges / SPEED)
@@ -78,6 +84,8 @@ def exact_line(scanner, matrix, rf, line, ranges):
     "keys",
     [
         {},
+        {"zones": 1},
+        {"zones": 2, "zone_mm": 3.0, "f_number": 2.5},
         {"apodization": "none"},
         {"f_number": 2.5},
         {"scan": "linear"},
@@ -103,7 +111,7 @@ def test_it_holds_for_other_arrays(preset):
     """The interpolation is as good at any band, also a narrow one that is sampled below its carrier."""
     probe = Probe(preset=preset, bandwidth=0.2)
     wavelength = SPEED / probe.si().frequency
-    rf = Rf(lines=16, focus_mm=6.5)
+    rf = Rf(lines=16, focus_mm=6.5, zones=1)
     scanner = Scanner(probe, rf, 160 * wavelength)
     random = np.random.default_rng(3)
     shape = (len(scanner.matrix.frequency), 64, 64)
@@ -131,6 +139,14 @@ def test_line_bytes_do_not_depend_on_threads(matrix, keys):
         results.append(scanner.beamform(matrix).tobytes())
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     assert results[0] == results[1]
+
+
+def test_a_line_of_two_zones_is_that_of_two_foci_faded_over(matrix):
+    both = Scanner(Probe(), Rf(lines=16, zones=2, zone_mm=2.0), 10e-3)
+    near, far = (Scanner(Probe(), Rf(lines=16, zones=1, focus_mm=mm), 10e-3).beamform(matrix) for mm in (5.5, 7.5))
+    share = np.clip((both.range - 5.5e-3) / 2e-3, 0, 1)
+    found = both.beamform(matrix)
+    assert np.abs(found - (near + share * (far - near))).max() < 2e-6 * np.abs(found).max()
 
 
 def test_times_just_before_a_sample_belong_to_the_sample_before():

@@ -9,6 +9,7 @@ from echotruth.imaging.transmit import KINDS, source_distance
 
 SPEED, LENGTH = 1540.0, 64 * 46e-6
 X = (np.arange(64) - 31.5) * 46e-6
+RANGE = np.arange(1, 1001) * 10e-6
 
 
 def sent(**keys):
@@ -18,13 +19,46 @@ def sent(**keys):
 
 @pytest.mark.parametrize("scan", ["sector", "linear"])
 def test_focused_delays_bring_all_elements_to_the_focus_at_once(scan):
-    rf = Rf(lines=17, scan=scan)
+    rf = Rf(lines=17, scan=scan, zones=1)
     lines = scan_lines(Probe(), rf)
     lateral, axial = lines.foot + 6.5e-3 * np.sin(lines.angle), 6.5e-3 * np.cos(lines.angle)
     flight = np.hypot(lateral[:, None] - X, axial[:, None]) / SPEED
     transmits = KINDS["focused"](Probe(), rf, lines)
     assert np.allclose(transmits.delay + flight, 6.5e-3 / SPEED, atol=1e-15)
     assert np.allclose([transmits.path(k, lateral[k], axial[k]) for k in range(17)], 6.5e-3)
+
+
+def test_foci_are_evenly_spaced_about_the_middle_one():
+    assert np.allclose(sent(zones=5, zone_mm=1.0).foci, [4.5e-3, 5.5e-3, 6.5e-3, 7.5e-3, 8.5e-3])
+    assert np.allclose(sent(zones=2, zone_mm=3.0).foci, [5e-3, 8e-3])
+    assert np.allclose(sent(zones=1).foci, [6.5e-3])
+    assert sent(transmit="plane").foci.size == 0
+
+
+def test_a_zone_has_the_waves_of_its_own_focus():
+    transmits = sent(zones=3, zone_mm=1.5, f_number=2.0)
+    for zone, focus in zip(transmits.zones(RANGE), (5.0, 6.5, 8.0), strict=True):
+        alone = sent(zones=1, focus_mm=focus, f_number=2.0)
+        assert np.allclose(zone.transmits.delay, alone.delay, atol=1e-18, rtol=0)
+        assert np.allclose(zone.transmits.weight, alone.weight, atol=1e-12)
+
+
+def test_zones_fade_into_one_another_between_their_foci_and_end_with_the_line():
+    zones, shares = sent(zones=3, zone_mm=1.0).zones(RANGE), np.zeros((3, len(RANGE)))
+    for zone, share in zip(zones, shares, strict=True):
+        share[zone.part] = zone.share
+    assert np.allclose(shares.sum(axis=0), 1)
+    assert np.allclose(shares[:, RANGE <= 5.5e-3], [[1], [0], [0]])
+    assert np.allclose(shares[:, np.abs(RANGE - 5.75e-3).argmin()], [0.75, 0.25, 0])
+    assert np.allclose(shares[:, np.abs(RANGE - 6.5e-3).argmin()], [0, 1, 0])
+    assert np.allclose(shares[:, RANGE >= 7.5e-3], [[0], [0], [1]])
+
+
+def test_zones_beyond_the_lines_are_left_out():
+    """Half of the lines end before the second focus, none reaches the third."""
+    zones = sent(zones=3, zone_mm=1.0).zones(RANGE[RANGE < 6e-3])
+    assert np.allclose([zone.transmits.foci for zone in zones], [[5.5e-3], [6.5e-3]])
+    assert sum(len(zone.share) for zone in sent(zones=5).zones(RANGE)) < 2 * len(RANGE)
 
 
 @pytest.mark.parametrize("keys", [{"transmit": "plane"}, {"transmit": "diverging"}])
@@ -67,14 +101,29 @@ def test_in_a_synthetic_aperture_each_element_sends_alone():
 
 
 def test_a_least_f_number_narrows_the_aperture_that_focuses():
-    transmits = sent(f_number=4.0, apodization="none")
+    transmits = sent(f_number=4.0, apodization="none", zones=1)
     assert (transmits.weight == (np.abs(X) <= 6.5e-3 / 4 / 2)).all()
 
 
 @pytest.mark.parametrize(
     "keys",
-    [{"focus_mm": 0.0}, {"f_number": -1.0}, {"lines": 4}, {"transmits": 0}, {"source_mm": 0.0}, {"width_mm": -1.0}],
+    [
+        {"focus_mm": 0.0},
+        {"f_number": -1.0},
+        {"lines": 4},
+        {"transmits": 0},
+        {"source_mm": 0.0},
+        {"width_mm": -1.0},
+        {"zones": 0},
+        {"zone_mm": 0.0},
+    ],
 )
 def test_impossible_transmits_are_refused(keys):
     with pytest.raises(ValueError, match=next(iter(keys))):
         Rf(**keys)
+
+
+def test_zones_that_reach_behind_the_array_are_refused_where_they_are_used():
+    with pytest.raises(ValueError, match="must exceed 2, so that its zones = 5 foci, zone_mm = 1 apart"):
+        Rf(focus_mm=2.0)
+    assert Rf(focus_mm=2.0, transmit="plane").focus_mm == Rf(focus_mm=2.0, zones=1).focus_mm == 2

@@ -49,11 +49,18 @@ def focused_again(rf, frame, line, along):
     back = np.hypot(lateral[:, None] - element, axial[:, None])
     weight = np.cos(np.pi * element / (len(element) * (element[1] - element[0]))) ** 2
     total = np.zeros(len(along), complex)
-    for wave in [line] if rf.attrs["transmit"] == "focused" else range(rf.sizes["transmit"]):
+    foci = np.array(rf.attrs["foci"])
+    for wave in range(rf.sizes["transmit"]):
+        share = 1.0
+        if len(foci):
+            zone, served = divmod(wave, rf.sizes["line"])
+            share = np.interp(along, foci, np.eye(len(foci))[zone]) * (served == line)
+        if not np.any(share):
+            continue
         delay, strength = rf.transmit_delay[wave].values, rf.transmit_weight[wave].values
         sent = np.einsum("tf,trf->rf", strength[:, None] * turn(rf, -delay, cycles), spectra)
         arrival = (way_out(rf, wave, lateral, axial)[:, None] + back) / speed
-        total += sum(weight[r] * (turn(rf, arrival[:, r], cycles) @ sent[r]) for r in range(len(element)))
+        total += share * sum(weight[r] * (turn(rf, arrival[:, r], cycles) @ sent[r]) for r in range(len(element)))
     return total * np.exp(-4j * np.pi * rf.attrs["demodulation_frequency"] * along / speed)
 
 

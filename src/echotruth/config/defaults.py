@@ -2,7 +2,8 @@
 trackers for what is scanned.
 
 The heart stands at the focus, all of it is in the field of view, and ten scatterers or more are in a volume of beam
-width, pulse length and thickness of the slice.
+width, pulse length and thickness of the slice. Focal zones are about half a depth of field apart, which is 7
+wavelengths times the square of focus over aperture; their foci reach over most of the heart.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ HEARTS = {
 }
 """`geometry.preset` to the keys that follow it."""
 
-_KEYS = ("phantom.density_per_mm3", "rf.focus_mm", "rf.sector_deg", "bmode.field_of_view_mm")
+_KEYS = ("phantom.density_per_mm3", "rf.focus_mm", "rf.zones", "rf.zone_mm", "rf.sector_deg", "bmode.field_of_view_mm")
 _SCANS = {
-    "mouse_25MHz": (5000.0, 6.5, 64.0, 12.0),
-    "mouse_30MHz": (9000.0, 6.5, 64.0, 12.0),
-    "mouse_40MHz": (17000.0, 6.5, 64.0, 12.0),
-    "rat_15MHz": (1100.0, 10.8, 64.0, 20.0),
-    "human_2_7MHz": (8.0, 70.0, 75.0, 150.0),
+    "mouse_25MHz": (5000.0, 6.5, 5, 1.0, 64.0, 12.0),
+    "mouse_30MHz": (9000.0, 6.5, 5, 1.0, 64.0, 12.0),
+    "mouse_40MHz": (17000.0, 6.5, 5, 1.0, 64.0, 12.0),
+    "rat_15MHz": (1100.0, 10.8, 5, 1.7, 64.0, 20.0),
+    "human_2_7MHz": (8.0, 70.0, 3, 25.0, 75.0, 150.0),
 }
 ARRAYS: dict[str, dict[str, float]] = {name: dict(zip(_KEYS, row, strict=True)) for name, row in _SCANS.items()}
 """`probe.preset` to the keys that follow it."""

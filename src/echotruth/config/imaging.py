@@ -48,6 +48,13 @@ class Rf(Section):
 
     focus_mm: Positive = 6.5
     """Transmit focus, where the heart stands. Default: as suits `probe.preset`."""
+    zones: Annotated[int, Field(ge=1, le=16)] = 5
+    """Focused: focal zones, each with its transmit for every line. Their foci lie about `focus_mm`; between two, a line
+    fades over from the one's echoes to the other's. 1: one focus, off which speckle lags behind tissue that turns.
+    Default: as suits `probe.preset`."""
+    zone_mm: Positive = 1.0
+    """Focused: distance between the foci of neighbouring zones. Default: half a depth of field, as suits
+    `probe.preset`."""
     scan: Literal["sector", "linear"] = "sector"
     """Lines that fan out from the centre of the array, or parallel ones straight ahead."""
     lines: Annotated[int, Field(ge=16, le=2048)] = 256
@@ -79,6 +86,19 @@ class Rf(Section):
     keep: list[Literal["lines", "channels"]] = Field(default=[])
     """What of the RF stays in the repository: `lines`, demodulated, and `channels`, the echoes of each element sending
     alone in all elements, from which any transmit can be made."""
+
+    @property
+    def zones_mm(self) -> float:
+        """Distance of the nearest and of the farthest transmit focus from `focus_mm`."""
+        return (self.zones - 1) / 2 * self.zone_mm if self.transmit == "focused" else 0.0
+
+    @model_validator(mode="after")
+    def _foci_before_the_array(self) -> Rf:
+        if self.focus_mm <= self.zones_mm:
+            foci = f"its zones = {self.zones} foci, zone_mm = {self.zone_mm:g} apart"
+            remedy = f"must exceed {self.zones_mm:g}, so that {foci}, lie in front of the array"
+            raise impossible("focus_mm", self.focus_mm, remedy)
+        return self
 
     @model_validator(mode="after")
     def _kept_once(self) -> Rf:

@@ -62,6 +62,10 @@ class Config(Section):
             raise impossible("tracking.grid_px", self.tracking.grid_px, remedy)
         if self.rf.focus_mm >= view:
             raise impossible("rf.focus_mm", self.rf.focus_mm, f"must be smaller than bmode.field_of_view_mm = {view:g}")
+        if self.rf.focus_mm + self.rf.zones_mm >= view:
+            foci = f"its zones = {self.rf.zones} foci, zone_mm = {self.rf.zone_mm:g} apart"
+            remedy = f"must be smaller than {view - self.rf.zones_mm:g}, so that {foci}, lie in the field of view"
+            raise impossible("rf.focus_mm", self.rf.focus_mm, remedy)
         return self
 
     def _lengths_fit(self, place: str, tracker: Section) -> None:

@@ -124,6 +124,7 @@ def described(config: Config, scanner: Scanner) -> tuple[Arrays, dict[str, int],
         | {
             "sampling_frequency": float(sampling),
             "demodulation_frequency": scanner.frequency,
+            "foci": waves.foci.tolist(),
         },
     )
 

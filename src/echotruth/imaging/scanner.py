@@ -10,7 +10,7 @@ from echotruth.imaging.beamform import ReceiveFocus
 from echotruth.imaging.rf import FullMatrix
 from echotruth.imaging.scan import imaging_depth, points, scan_lines
 from echotruth.imaging.synthesis import Synthesis
-from echotruth.imaging.transmit import KINDS
+from echotruth.imaging.transmit import KINDS, Zone
 
 __all__ = ["Scanner", "checked", "imaging_depth"]
 
@@ -19,6 +19,9 @@ class Scanner:
     """A probe that scans a frame; delays and phases are worked out once for all frames.
 
     The whole frame is taken of scatterers at rest. There is no multiple scattering.
+
+    What is kept for all frames are 48 bytes a sample of the lines, up to twice that with focal zones, and half a byte a
+    frequency, element and transmit: 60 MB for the default array. A frame takes another 30 MB beside its matrix.
 
     Parameters
     ----------
@@ -46,22 +49,13 @@ class Scanner:
         step = p.sound_speed / (2 * p.sampling)
         self.scan = scan_lines(probe, rf)
         self.range = step * np.arange(1, int(depth / step) + 2)
-        self._transmits = KINDS[rf.transmit](probe, rf, self.scan)
-        self._points = points(self.scan, self.range)
-        reach, latest = np.hypot(*self._points).max(), np.abs(self._transmits.delay).max()
+        zones = KINDS[rf.transmit](probe, rf, self.scan).zones(self.range)
+        latest = max(np.abs(zone.transmits.delay).max() for zone in zones)
+        reach = np.hypot(*points(self.scan, self.range)).max()
         self.matrix = FullMatrix(probe, reach, latest, rf.accuracy, rf.elevation)
-        self._channels = Synthesis(self.matrix, p.frequency, self._transmits)
-        self.frequency = self._channels.frequency
+        self._focus = [_ZoneFocus(probe, rf, self, zone) for zone in zones]
+        self.frequency = self._focus[0].channels.frequency
         self._carrier = np.exp(-4j * np.pi * self.frequency / p.sound_speed * self.range).astype(np.complex64)
-        self._receive = ReceiveFocus(
-            Aperture(probe, rf),
-            self.scan.foot,
-            self.range,
-            self._points,
-            frequency=self.frequency,
-            sampling=self._channels.sampling,
-            sound_speed=p.sound_speed,
-        )
 
     @property
     def angle(self) -> np.ndarray:
@@ -88,16 +82,54 @@ class Scanner:
     def beamform(self, matrix: np.ndarray) -> np.ndarray:
         """Lines (lines, ranges) of one frame, as :meth:`lines`, of its full matrix (bins, elements, elements)."""
         lines = np.zeros((len(self.scan.angle), len(self.range)), np.complex64)
-        for part, channels in self._channels(matrix):
-            if self._transmits.focused:
-                path = np.tile(self.range, (len(channels), 1))
+        for focus in self._focus:
+            lines[:, focus.zone.part] += focus(matrix)
+        lines *= self._carrier
+        return lines
+
+
+class _ZoneFocus:
+    """The part of the lines in a zone.
+
+    Parameters
+    ----------
+    probe, rf
+        As of the scanner.
+    scanner
+        Its scan, ranges and matrix.
+    zone
+        The waves, the samples of a line that they serve, and their share there.
+    """
+
+    def __init__(self, probe: Probe, rf: Rf, scanner: Scanner, zone: Zone):
+        p, scan = probe.si(), scanner.scan
+        self.zone, self._range = zone, scanner.range[zone.part]
+        self._points = points(scan, self._range)
+        self.channels = Synthesis(scanner.matrix, p.frequency, zone.transmits)
+        self._receive = ReceiveFocus(
+            Aperture(probe, rf),
+            scan.foot,
+            self._range,
+            self._points,
+            frequency=self.channels.frequency,
+            sampling=self.channels.sampling,
+            sound_speed=p.sound_speed,
+        )
+
+    def __call__(self, matrix: np.ndarray) -> np.ndarray:
+        """Before demodulation, (lines, ranges of the zone), complex64, of a full matrix (bins, elements, elements)."""
+        transmits = self.zone.transmits
+        lines = np.zeros(self._points[0].shape, np.complex64)
+        for part, channels in self.channels(matrix):
+            if len(transmits.foci):
+                path = np.tile(self._range, (len(channels), 1))
                 self._receive(lines, part.start, channels, np.arange(len(channels)), path)
                 continue
             for number in range(part.start, part.stop):
-                path = self._transmits.path(number, *self._points)
+                path = transmits.path(number, *self._points)
                 which = np.full(len(lines), number - part.start)
                 self._receive(lines, 0, channels, which, path)
-        lines *= self._carrier
+        lines *= self.zone.share
         return lines
 
 

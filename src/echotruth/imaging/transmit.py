@@ -5,7 +5,7 @@ A wave passes the centre of the array (a focused one the foot of its line) at ti
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,8 +29,9 @@ class Transmits:
         Distance from the origin at which a wave is at time 0, m.
     plane : bool
         Waves are plane.
-    focused : bool
-        A wave serves the line of its own number alone; else it serves all lines, and their sum is taken.
+    foci : ndarray (zones,)
+        Ranges of the foci of focused waves, m, the nearest first. Such a wave serves one line in one zone; those of the
+        first zone come first, line by line. Empty for others: they serve all lines, and their sum is taken.
     """
 
     delay: np.ndarray
@@ -38,7 +39,7 @@ class Transmits:
     origin: np.ndarray
     lead: np.ndarray
     plane: bool = False
-    focused: bool = False
+    foci: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     def path(self, number: int, lateral: np.ndarray, axial: np.ndarray) -> np.ndarray:
         """How far a wave has come since time 0 when it reaches points, any shape, m; less than 0 before time 0."""
@@ -47,18 +48,65 @@ class Transmits:
             return x * lateral + z * axial
         return np.hypot(lateral - x, axial - z) - self.lead[number]
 
+    def zones(self, range_: np.ndarray) -> list[Zone]:
+        """Zones that have a share in the samples of lines at ranges (n,), m.
+
+        Between two foci they fade over linearly from one zone to the next; the first and the last go on to the ends.
+        """
+        if not len(self.foci):
+            return [Zone(self, slice(0, len(range_)), np.ones(len(range_), np.float32))]
+        shares = [np.interp(range_, self.foci, one).astype(np.float32) for one in np.eye(len(self.foci))]
+        parts = [np.flatnonzero(share) for share in shares]
+        return [
+            Zone(self._zone(number), slice(part[0], part[-1] + 1), share[part[0] : part[-1] + 1])
+            for number, (part, share) in enumerate(zip(parts, shares, strict=True))
+            if len(part)
+        ]
+
+    def _zone(self, number: int) -> Transmits:
+        lines = len(self.delay) // len(self.foci)
+        own = slice(number * lines, (number + 1) * lines)
+        arrays = {name: getattr(self, name)[own] for name in ("delay", "weight", "origin", "lead")}
+        return replace(self, foci=self.foci[number : number + 1], **arrays)
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A part of all lines, and the waves that serve it.
+
+    Attributes
+    ----------
+    transmits : Transmits
+        The waves.
+    part : slice
+        The samples of a line.
+    share : ndarray (n,), float32
+        Of the zone in each of them, 1.
+    """
+
+    transmits: Transmits
+    part: slice
+    share: np.ndarray
+
 
 def focused(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
-    """One transmit a line, focused at `rf.focus_mm` on it, with the aperture of that point.
+    """One transmit a line and zone, focused on the line, with the aperture of the focus.
 
-    The wave reaches the focus at (focus distance) / (speed of sound), as if it came from the foot of the line.
+    The foci are `rf.zones`, `rf.zone_mm` apart, and `rf.focus_mm` is the middle of them. A wave reaches its focus at
+    (focus distance) / (speed of sound), as if it came from the foot of the line.
     """
-    aperture, focus = Aperture(probe, rf), rf.si().focus
-    lateral = (scan.foot + focus * np.sin(scan.angle))[:, None] - aperture.centres
-    delay = (focus - np.hypot(lateral, focus * np.cos(scan.angle)[:, None])) / probe.si().sound_speed
-    origin = np.stack([scan.foot, np.zeros(len(scan.foot))], axis=1)
-    weight = aperture.weights(scan.foot, focus)
-    return Transmits(delay, weight, origin, np.zeros(len(origin)), focused=True)
+    aperture, values = Aperture(probe, rf), rf.si()
+    foci = values.focus + (np.arange(rf.zones) - (rf.zones - 1) / 2) * values.zone
+    delay = np.concatenate([_delay(aperture.centres, scan, focus) for focus in foci]) / probe.si().sound_speed
+    weight = np.concatenate([aperture.weights(scan.foot, focus) for focus in foci])
+    origin = np.tile(np.stack([scan.foot, np.zeros(len(scan.foot))], axis=1), (len(foci), 1))
+    return Transmits(delay, weight, origin, np.zeros(len(origin)), foci=foci)
+
+
+def _delay(centres: np.ndarray, scan: Scan, focus: float) -> np.ndarray:
+    """By how much elements at `centres` are nearer to the focus on a line than its foot is, (lines, elements), m."""
+    lateral = (scan.foot + focus * np.sin(scan.angle))[:, None] - centres
+    return focus - np.hypot(lateral, focus * np.cos(scan.angle)[:, None])
 
 
 def plane(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
