@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echotruth.config import Config
+from echotruth.config import Config, Rf
 from echotruth.config.loading import load
 from echotruth.heart import Heart
 from echotruth.imaging.acquisition import Acquisition
@@ -190,7 +190,7 @@ def main() -> None:
     if given.clip:
         results["real, apical view"] = measure_real(given.clip)
     beating, time = heart(beat_of_default(given.beat))
-    for name, config in (("realistic", load(HERE.parent / "config/realistic.yaml")), ("as printed", Config())):
+    for name, config in (("realistic", load(HERE.parent / "config/realistic.yaml")), ("as printed", Config(rf=Rf(zones=1)))):
         keep = partial(np.save, given.pictures / f"{name}.npy") if given.pictures else lambda frames: None
         results[name] = measure_ours(config, beating, time, keep)
         print(name, results[name], flush=True)
