@@ -190,7 +190,8 @@ def main() -> None:
     if given.clip:
         results["real, apical view"] = measure_real(given.clip)
     beating, time = heart(beat_of_default(given.beat))
-    for name, config in (("realistic", load(HERE.parent / "config/realistic.yaml")), ("as printed", Config(rf=Rf(zones=1)))):
+    configs = {"realistic": load(HERE.parent / "config/realistic.yaml"), "as printed": Config(rf=Rf(zones=1))}
+    for name, config in configs.items():
         keep = partial(np.save, given.pictures / f"{name}.npy") if given.pictures else lambda frames: None
         results[name] = measure_ours(config, beating, time, keep)
         print(name, results[name], flush=True)
