@@ -9,7 +9,7 @@ from echotruth.tracking.alignment import add_matrix, factorise, grey_at, product
 from echotruth.tracking.bspline import lattice
 from echotruth.tracking.likeness import Likeness
 from echotruth.tracking.region import region
-from echotruth.tracking.roughness import metric, roughness
+from echotruth.tracking.roughness import frame, roughness
 
 MASK = np.zeros((60, 80), bool)
 MASK[12:45, 15:70] = True
@@ -99,7 +99,8 @@ def test_normal_equations_are_those_of_the_dense_problem(random):
 def test_roughness_of_a_parabola_is_its_thin_plate_energy_in_the_metric(across):
     places = np.argwhere(MASK)[:, ::-1].astype(float)
     net = lattice(places, STEP)
-    band = roughness(net.cells(places)[0], np.tile([1.0, 0.0, across], (len(places), 1)), net.size)
+    metrics, turns = np.tile([1.0, 0.0, across], (len(places), 1)), np.zeros((len(places), 5))
+    band = roughness(net.cells(places)[0], metrics, turns, net.size)
     row, column = np.nonzero(net.number >= 0)
 
     def rough(values):
@@ -114,13 +115,56 @@ def test_roughness_of_a_parabola_is_its_thin_plate_energy_in_the_metric(across):
     assert rough(row**2) / along == pytest.approx(across**4)
 
 
-def test_metric_is_short_across_the_wall_and_one_along_it():
+def ring(across):
+    """Pixels of an annulus, x, y and r from its centre in knots, and the frame of its wall in closed form."""
+    radius = np.hypot(*(np.indices((200, 200)) - 99.5))
+    mask = (radius > 55) & (radius < 90)
+    places = np.argwhere(mask)[:, ::-1].astype(float)
+    x, y = (places - 99.5).T / STEP
+    r = np.hypot(x, y)
+    less = 1 - across
+    metrics = np.stack([1 - less * x * x / r**2, -less * x * y / r**2, 1 - less * y * y / r**2], -1)
+    bend = 2 * x * y / r**4
+    turns = np.stack([-y / r**2, x / r**2, bend, (y * y - x * x) / r**4, -bend], -1)
+    return mask, places, (x, y, r), (metrics, turns)
+
+
+def test_roughness_of_a_ring_is_that_of_its_polar_components():
+    across = 0.5
+    _, places, (x, y, r), known = ring(across)
+    net = lattice(places, STEP)
+    cells, order = net.cells(places)
+    band = roughness(cells, *(each[order] for each in known), net.size)
+    shares = np.stack([cells.evaluate(unit[:, None])[:, 0] for unit in np.eye(net.size)], -1)
+
+    def rough(radial):
+        field = (radial[:, None] * np.stack([x, y], -1) / r[:, None])[order]
+        coefficients = np.linalg.lstsq(shares, field, rcond=None)[0].ravel()
+        return coefficients @ product(band, coefficients)
+
+    angle = np.arctan2(y, x)
+    thickening = rough(r**2) / np.sum(4 * across**4 + 0 * r)
+    assert rough(np.ones_like(r)) < 1e-3 * rough(r**2)
+    # D_s D_s = -9 cos(3 angle) / r^2 and D_n D_s = 3 sin(3 angle) / r^2.
+    wave = np.sum((81 * np.cos(3 * angle) ** 2 + across**2 * 9 * np.sin(3 * angle) ** 2) / r**4)
+    assert rough(np.cos(3 * angle)) / wave == pytest.approx(thickening, rel=0.02)
+
+
+def test_frame_of_a_straight_wall_is_short_across_it_and_does_not_turn():
     for turned in (False, True):
         strip = np.zeros((60, 60), bool)
         strip[20:35] = True
         strip = strip.T if turned else strip
         expected = [0.2, 0, 1] if turned else [1, 0, 0.2]
-        np.testing.assert_allclose(metric(strip, strip, 3.0, 0.2), np.tile(expected, (strip.sum(), 1)), atol=1e-9)
+        metrics, turns = frame(strip, strip, 3.0, 0.2)
+        np.testing.assert_allclose(metrics, np.tile(expected, (strip.sum(), 1)), atol=1e-9)
+        np.testing.assert_allclose(turns, 0, atol=1e-9)
+
+
+def test_frame_of_a_ring_turns_with_its_angle():
+    mask, _, _, known = ring(0.5)
+    for found, expected in zip(frame(mask, mask, STEP, 0.5), known, strict=True):
+        np.testing.assert_allclose(found, expected, atol=0.15 * np.abs(expected).max())
 
 
 def test_correlation_does_not_see_gain_and_offset_but_sees_noise(random):

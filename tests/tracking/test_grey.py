@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from echotruth.tracking.grey import FAINTEST, levels, similarity
+from echotruth.tracking.grey import FAINTEST, amplitudes, levels, similarity
 
 
 def test_similarity_is_pearson_s_correlation_of_the_two_squares():
@@ -41,3 +41,12 @@ def test_what_is_not_finite_is_unknown_and_does_not_set_the_range():
     frames = levels(np.array([[[0, 5.0, np.inf, np.nan]]]))
     np.testing.assert_array_equal(frames, [[[0, 1, np.nan, np.nan]]])
     assert np.isnan(levels(np.full((1, 2, 2), np.nan))).all() and (levels(np.full((1, 2, 2), 3.0)) == 0).all()
+
+
+def test_amplitudes_undo_the_logarithm():
+    echo = np.array([0.01, 0.1, 1.0])
+    shown = 1 + 20 * np.log10(echo) / 40
+    found = amplitudes(shown, 40.0)
+    np.testing.assert_allclose(np.diff(found) / np.diff(echo), np.diff(found)[0] / np.diff(echo)[0], rtol=1e-12)
+    assert amplitudes(np.array(1e-6), 40.0) == pytest.approx(1e-6, rel=1e-5)
+    np.testing.assert_array_equal(amplitudes(shown, 0.0), shown)

@@ -70,16 +70,19 @@ class BsplineDic(Section):
     """Name of the method."""
     knots_mm: Positive = 0.4
     """Distance of the knots, four pixels at least. Default: as suits `bmode.field_of_view_mm`."""
-    margin_um: Annotated[FiniteFloat, Field(ge=0)] = 250.0
+    margin_um: Annotated[FiniteFloat, Field(ge=0)] = 180.0
     """How far around the wall pixels count; its edge shows how it thickens. Default: as suits
     `bmode.field_of_view_mm`."""
+    range_dB: Annotated[FiniteFloat, Field(ge=0, le=120)] = 45.0
+    """Decibels from black to white, by which grey values are made amplitudes again: dark gaps between speckles change
+    more than the bright speckles do. 0 takes the grey values."""
     blur_px: Annotated[FiniteFloat, Field(ge=0)] = 0.5
     """Standard deviation of the Gaussian that blurs the images; the larger of this and `blur_um` holds."""
     blur_um: Annotated[FiniteFloat, Field(ge=0)] = 20.0
     """The same in the tissue. Default: as suits `bmode.field_of_view_mm`."""
-    smoothness: Positive = 10.0
+    smoothness: Positive = 8.0
     """Weight of the roughness of a step from one frame to the next over that of the images."""
-    across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2
+    across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.3
     """Length of a unit through the wall where roughness is measured; of one along it, 1."""
     tolerance: Positive = 4.0
     """Difference of grey values at which a pixel has a quarter of its weight, over their standard deviation."""

@@ -88,7 +88,7 @@ def _add_point(across, down, slope, weight, local):
 
 @numba.njit(cache=True, nogil=True)
 def add_cell(knots, local, band):
-    """Add the matrices (3, 16, 16) of a cell that sees 16 knots to a band."""
+    """Add the matrices xx, xy and yy (3, 16, 16) of a cell that sees 16 knots to a band."""
     last = band.shape[1] - 1
     for k in range(16):
         for m in range(16):
@@ -98,7 +98,7 @@ def add_cell(knots, local, band):
             d = last - 2 * (a - b)
             band[2 * a, d] += local[0, k, m]
             band[2 * a + 1, d] += local[2, k, m]
-            band[2 * a + 1, d - 1] += local[1, k, m]
+            band[2 * a + 1, d - 1] += local[1, m, k]
             if b < a:
                 band[2 * a, d + 1] += local[1, k, m]
 

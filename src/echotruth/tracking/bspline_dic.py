@@ -22,12 +22,15 @@ from echotruth.imaging import spline
 from echotruth.tracking.alignment import grey_at
 from echotruth.tracking.dis import flow
 from echotruth.tracking.flow import sample
-from echotruth.tracking.grey import levels
+from echotruth.tracking.grey import amplitudes, levels
 from echotruth.tracking.likeness import Likeness
 from echotruth.tracking.region import Region, region
 
 CLOSEST = 4.0
 """Least distance of knots, px: between closer ones there is less to see than there are unknowns."""
+RARER = 3
+"""Power of the correlation in the variance of a step. The noise about one match asks for 2; where images are unlike, a
+field may besides settle on what only looks like the template."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +68,13 @@ def track(
     if not mask.any():
         return np.full((len(frames), len(points), 2), np.nan), np.full((len(frames), len(points)), np.nan)
     values = settings.si()
-    grey = np.nan_to_num(levels(frames))
+    bright = amplitudes(np.nan_to_num(levels(frames)), values.range)
     blur = max(values.blur / spacing, values.blur_px)
-    images = [spline.coefficients(ndimage.gaussian_filter(frame, blur)) for frame in grey]
+    images = [spline.coefficients(ndimage.gaussian_filter(frame, blur)) for frame in bright]
     knots = max(values.knots / spacing, CLOSEST)
     body = region(mask, knots, values.margin / spacing, values.across)
     likeness = Likeness(body.places, body.inside, points, 2 * knots)
-    follower = Follower(body, likeness, grey, images, settings)
+    follower = Follower(body, likeness, bright / (bright.max() or 1), images, settings)
     with ThreadPoolExecutor(2) as threads:
         paths = list(threads.map(follower.follow, (range(len(frames)), [0, *range(len(frames) - 1, 0, -1)])))
     return blend(body, points, *paths)
@@ -86,16 +89,16 @@ class Follower:
     body : Region
     likeness : Likeness
         Of the pixels of the body, and about the points that are asked for.
-    grey : ndarray of shape (frame, axial, lateral)
-        Grey values from 0 to 1.
+    bright : ndarray of shape (frame, axial, lateral)
+        Amplitudes over the greatest.
     images : list of ndarray
-        Spline coefficients of the blurred frames.
+        Spline coefficients of the amplitudes, blurred.
     settings : BsplineDic
     """
 
     body: Region
     likeness: Likeness
-    grey: np.ndarray
+    bright: np.ndarray
     images: list[np.ndarray]
     settings: BsplineDic
 
@@ -107,10 +110,12 @@ class Follower:
         key = last = 0
         for before, now in pairwise(order):
             start = self._start(now, before, coefficients[before], template)
-            found, moved = self._align(now, template, start, coefficients[before])
+            # A shift of the whole wall is not rough, though its components along and across the wall are.
+            anchor = coefficients[before] + (start - coefficients[before]).mean(0)
+            found, moved = self._align(now, template, start, anchor)
             if key != last and not self._overall(template, moved) > self.settings.renewal:
                 key, template = last, seen
-                found, moved = self._align(now, template, start, coefficients[before])
+                found, moved = self._align(now, template, start, anchor)
             coefficients[now], variance[now] = found, variance[key] + self._doubt(template, moved)
             alike[now] = self.likeness.about_points(template[:, 0], moved[:, 0])
             if np.isfinite(variance[now]):
@@ -126,7 +131,7 @@ class Follower:
         if not alike > 0:
             return np.inf
         difference = np.mean((template[inside, 0] - moved[inside, 0]) ** 2)
-        return difference / np.mean(moved[inside, 1:] ** 2) / alike**2
+        return difference / np.mean(moved[inside, 1:] ** 2) / alike**RARER
 
     def _align(self, frame: int, template: np.ndarray, start: np.ndarray, anchor: np.ndarray):
         stiffness = self.settings.smoothness, self.settings.tolerance
@@ -135,7 +140,7 @@ class Follower:
     def _start(self, now: int, before: int, coefficients: np.ndarray, template: np.ndarray) -> np.ndarray:
         """Coefficients after a step as the dense flow has it, or before it if that is nearer to the template."""
         places = self.body.places + self.body.cells.evaluate(coefficients)
-        step = sample(flow(self.grey[before], self.grey[now]), places)
+        step = sample(flow(self.bright[before], self.bright[now]), places)
         moved = coefficients + self.body.fit(np.nan_to_num(step))
         return min(coefficients, moved, key=lambda each: self._misfit(now, each, template))
 

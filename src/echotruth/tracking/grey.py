@@ -30,6 +30,25 @@ def levels(frames: np.ndarray) -> np.ndarray:
     return ((values - low) / ((high - low) or 1.0)).astype(np.float32)
 
 
+def amplitudes(values: np.ndarray, decibels: float) -> np.ndarray:
+    """Amplitudes of the echoes whose logarithm an image shows.
+
+    Parameters
+    ----------
+    values : ndarray of any shape
+        Grey values from 0 to 1.
+    decibels : float
+        From black to white; 0 leaves the grey values as they are.
+
+    Returns
+    -------
+    ndarray of the same shape and type
+        Less that of black, in such a unit that the faintest are their grey values.
+    """
+    nepers = decibels * np.log(10) / 20
+    return np.expm1(nepers * values) / nepers if nepers else values
+
+
 def similarity(first: np.ndarray, second: np.ndarray, side: int) -> np.ndarray:
     """Zero-normalised cross-correlation of two images about every pixel.
 

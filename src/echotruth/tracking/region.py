@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from echotruth.tracking.alignment import add_matrix, factorise, grey_at, product, solve
 from echotruth.tracking.bspline import Cells, Lattice, lattice
-from echotruth.tracking.roughness import metric, roughness
+from echotruth.tracking.roughness import frame, roughness
 
 STEPS = 15
 """Most iterations."""
@@ -149,5 +149,5 @@ def region(mask: np.ndarray, knots: float, margin: float, across: float) -> Regi
     places = np.argwhere(wide)[:, ::-1].astype(float)
     net = lattice(places, knots)
     cells, order = net.cells(places)
-    rough = roughness(cells, metric(mask, wide, knots, across)[order], net.size)
+    rough = roughness(cells, *(each[order] for each in frame(mask, wide, knots, across)), net.size)
     return Region(net, cells, places[order], mask[wide][order], rough)
