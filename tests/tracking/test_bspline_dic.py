@@ -62,7 +62,7 @@ def test_uneven_contraction_of_a_ring_is_not_evened_out(clip):
         return place - 6 * beat(t) * (uneven / np.linalg.norm(arm, axis=1))[:, None] * arm
 
     mask, points = ring()
-    displacement, _ = found(clip(inward, 6, SIZE), mask, points)
+    displacement, _ = found(clip(inward, 6, SIZE), mask, points, knots_mm=1e3 * SPACING * 6)
     arm = points - MIDDLE
     radial = (displacement[3] * arm).sum(1) / np.linalg.norm(arm, axis=1)
     even, uneven = np.linalg.lstsq(

@@ -18,6 +18,9 @@ from echotruth.tracking import cubic
 from echotruth.tracking.alignment import add_cell
 from echotruth.tracking.bspline import Cells
 
+VAGUE = 0.3
+"""Share of the directions about a pixel that must agree for its own to be known; with less, it turns less."""
+
 
 def roughness(cells: Cells, metrics: np.ndarray, turns: np.ndarray, size: int) -> np.ndarray:
     """Band of the matrix of the roughness, its diagonal one in the mean.
@@ -72,7 +75,8 @@ def frame(mask: np.ndarray, wide: np.ndarray, width: float, across: float) -> tu
     # The direction has no sign, but twice its angle is known.
     cosine, sine = (xx - yy) / trace, 2 * xy / trace
     slopes = zip(np.gradient(cosine, 1 / width), np.gradient(sine, 1 / width), strict=True)
-    y, x = ((cosine * each - sine * other) / 2 for other, each in slopes)
+    known = 2 * np.maximum(cosine**2 + sine**2, VAGUE**2)
+    y, x = ((cosine * each - sine * other) / known for other, each in slopes)
     bends = [np.gradient(each, 1 / width) for each in (x, y)]
     turns = np.stack([x, y, bends[0][1], (bends[0][0] + bends[1][1]) / 2, bends[1][0]], -1)
     return metrics[wide], turns[wide]
