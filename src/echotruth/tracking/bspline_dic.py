@@ -110,12 +110,10 @@ class Follower:
         key = last = 0
         for before, now in pairwise(order):
             start = self._start(now, before, coefficients[before], template)
-            # A shift of the whole wall is not rough, though its components along and across the wall are.
-            anchor = coefficients[before] + (start - coefficients[before]).mean(0)
-            found, moved = self._align(now, template, start, anchor)
+            found, moved = self._align(now, template, start, coefficients[before])
             if key != last and not self._overall(template, moved) > self.settings.renewal:
                 key, template = last, seen
-                found, moved = self._align(now, template, start, anchor)
+                found, moved = self._align(now, template, start, coefficients[before])
             coefficients[now], variance[now] = found, variance[key] + self._doubt(template, moved)
             alike[now] = self.likeness.about_points(template[:, 0], moved[:, 0])
             if np.isfinite(variance[now]):

@@ -42,6 +42,8 @@ class Region:
         Pixels of the wall itself.
     roughness : ndarray of shape (unknowns, width)
         Band of its matrix, see :mod:`echotruth.tracking.roughness`.
+    shifts : ndarray of shape (unknowns, 2)
+        Its products with a lateral and an axial shift of all knots by 1.
     """
 
     lattice: Lattice
@@ -49,6 +51,7 @@ class Region:
     places: np.ndarray
     inside: np.ndarray
     roughness: np.ndarray
+    shifts: np.ndarray
 
     def align(
         self, image: np.ndarray, template: np.ndarray, start: np.ndarray, anchor: np.ndarray, stiffness: tuple
@@ -83,7 +86,7 @@ class Region:
             if moved > FAR:
                 factor, rough = self._factor(grey[:, 1:], weight, smoothness)
             force = self.cells.gather((weight * residual)[:, None] * grey[:, 1:], self.lattice.size).ravel()
-            change = -force - rough * product(self.roughness, (found - anchor).ravel())
+            change = -force - rough * self._bend(found - anchor)
             solve(factor, change)
             step = self.cells.evaluate(change.reshape(-1, 2))
             found, place, moved = found + change.reshape(-1, 2), place + step, np.sqrt(np.mean(step**2))
@@ -101,10 +104,20 @@ class Region:
             weight = robust(np.hypot(*residual.T), 2)
             factor, rough = self._factor(slopes, weight, LOOSE)
             force = self.cells.gather(weight[:, None] * residual * slopes, self.lattice.size).ravel()
-            change = -force - rough * product(self.roughness, found.ravel())
+            change = -force - rough * self._bend(found)
             solve(factor, change)
             found = found + change.reshape(-1, 2)
         return found
+
+    def _bend(self, change: np.ndarray) -> np.ndarray:
+        """Half the slope of the roughness of a change (knot, 2), shape (unknowns,).
+
+        That of the change less the shift of all knots that leaves the least of it: a wall that moves as a whole is not
+        rough, though its components along and across the wall are.
+        """
+        bend = product(self.roughness, change.ravel())
+        shift = np.linalg.pinv(self.shifts.reshape(-1, 2, 2).sum(0)) @ bend.reshape(-1, 2).sum(0)
+        return bend - self.shifts[:, 0] * shift[0] - self.shifts[:, 1] * shift[1]
 
     def _factor(self, slope: np.ndarray, weight: np.ndarray, smoothness: float) -> tuple[np.ndarray, float]:
         """Cholesky factor of the normal matrix with its roughness, and the weight that the roughness has in it."""
@@ -150,4 +163,5 @@ def region(mask: np.ndarray, knots: float, margin: float, across: float) -> Regi
     net = lattice(places, knots)
     cells, order = net.cells(places)
     rough = roughness(cells, *(each[order] for each in frame(mask, wide, knots, across)), net.size)
-    return Region(net, cells, places[order], mask[wide][order], rough)
+    shifts = np.stack([product(rough, np.tile(shift, net.size)) for shift in np.eye(2)], -1)
+    return Region(net, cells, places[order], mask[wide][order], rough, shifts)
