@@ -28,15 +28,16 @@ SPEED = {
     "ours": 20000,
     "ours, 1e-3": 20000,
     "ours, elevation": 20000,
-    "PyMUST": 2000,
-    "PyMUST, -40 dB": 2000,
-    "PyMUST, elevation": 300,
+    "PyMUST": 1000,
+    "PyMUST, elevation": 200,
+    "PyMUST as it comes": 2000,
+    "PyMUST as it comes, elevation": 300,
     "eSDIva": 2000,
     "eSDIva, elevation": 1000,
     "eSDIva, matrix": 200,
 }
 """Party to the scatterers of a turn."""
-THICK = ("ours, elevation", "PyMUST, elevation", "eSDIva, elevation")
+THICK = ("ours, elevation", "PyMUST, elevation", "PyMUST as it comes, elevation", "eSDIva, elevation")
 """Those whose scatterers fill a slab; those of the others lie in the plane of the image."""
 
 IN_PLANE = ("ours", "ours, 1e-3")
@@ -50,6 +51,7 @@ GROWTH = {
     "ours, 1e-3": (1000, 10000, 100000, 1000000),
     "ours, elevation": (1000, 10000, 100000, 1000000),
     "PyMUST": (100, 1000, 10000),
+    "PyMUST as it comes": (100, 1000, 10000),
     "PyMUST, elevation": (100, 1000),
     "eSDIva": (100, 1000, 10000),
     "eSDIva, matrix": (100, 1000),

@@ -13,6 +13,7 @@ STYLES = {
     "ours, elevation": ("o:", "tab:blue", "ours with elevation, 64 transmits"),
     "PyMUST": ("s-", "tab:orange", "PyMUST, 1 transmit"),
     "PyMUST, elevation": ("s--", "tab:orange", "PyMUST with elevation, 1 transmit"),
+    "PyMUST as it comes": ("s:", "tab:orange", "PyMUST as it comes, 1 transmit"),
     "eSDIva": ("^-", "tab:green", "eSDIva, 1 transmit"),
     "eSDIva, matrix": ("^--", "tab:green", "eSDIva, 64 transmits"),
 }
