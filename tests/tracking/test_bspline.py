@@ -1,14 +1,17 @@
 """The parts of the B-spline tracker against other libraries and closed forms."""
 
+import cv2
 import numpy as np
 import pytest
 from scipy import interpolate, linalg, ndimage
 
 from echotruth.imaging import spline
+from echotruth.tracking import region as region_module
 from echotruth.tracking.alignment import add_matrix, factorise, grey_at, product, solve
 from echotruth.tracking.bspline import lattice
+from echotruth.tracking.bspline_dic import coarsened
 from echotruth.tracking.likeness import Likeness
-from echotruth.tracking.region import region
+from echotruth.tracking.region import LOOSE, region
 from echotruth.tracking.roughness import frame, roughness
 
 MASK = np.zeros((60, 80), bool)
@@ -72,16 +75,17 @@ def test_grey_values_and_slopes_are_those_of_the_cubic_spline(random):
         np.testing.assert_allclose(grey[:, 1 + axis], (at(step) - at(-step)) / 2e-4, atol=1e-4)
 
 
+def forces(body, slope):
+    """Change of the grey values of all pixels with every unknown, shape (pixel, unknowns)."""
+    shares = body.cells.evaluate(np.eye(body.lattice.size))
+    return (shares[:, :, None] * slope[:, None]).reshape(len(slope), -1)
+
+
 def test_normal_equations_are_those_of_the_dense_problem(random):
     body = region(MASK, STEP, 0.0, 0.5)
     count = len(body.places)
     slope, weight = random.normal(size=(count, 2)), random.uniform(size=count)
-    design = np.zeros((count, 2 * body.lattice.size))
-    for k in range(body.lattice.size):
-        unit = np.zeros((body.lattice.size, 1))
-        unit[k] = 1
-        share = body.cells.evaluate(unit)[:, 0]
-        design[:, 2 * k], design[:, 2 * k + 1] = share * slope[:, 0], share * slope[:, 1]
+    design = forces(body, slope)
     expected = design.T @ (weight[:, None] * design)
     band, cells = np.zeros(body.roughness.shape), body.cells
     add_matrix(cells.knots, cells.first, cells.across, cells.down, slope, weight, band)
@@ -93,6 +97,51 @@ def test_normal_equations_are_those_of_the_dense_problem(random):
     factorise(factor)
     solve(factor, right)
     np.testing.assert_allclose(right, linalg.solve(expected + np.eye(len(x)), x), atol=1e-10)
+
+
+def test_fit_of_a_flow_becomes_that_by_least_squares_with_its_own_weights(random, monkeypatch):
+    monkeypatch.setattr(region_module, "FITS", 60)
+    body = region(MASK, STEP, 3.0, 0.5)
+    flow = 0.02 * (body.places - 40) + random.normal(size=body.places.shape) * 0.1
+    flow[::7] += 5
+    found = body.fit(flow)
+    residual = body.cells.evaluate(found) - flow
+    weight = region_module.robust(np.hypot(*residual.T), 2)
+    which = np.arange(len(flow)) % 2
+    design = forces(body, np.eye(2)[which])
+    gradient = design.T @ (weight / weight.mean() * residual[np.arange(len(flow)), which])
+    rough = LOOSE * np.diagonal(design.T @ design).mean() * dense(body.roughness)
+    shift = np.tile(np.eye(2), (body.lattice.size, 1))
+    rough -= rough @ shift @ np.linalg.solve(shift.T @ rough @ shift, shift.T @ rough)
+    np.testing.assert_allclose(gradient, -rough @ found.ravel(), atol=1e-6 * np.abs(gradient).max() + 1e-6)
+    assert weight[::7].max() < 0.01
+    monkeypatch.undo()
+    np.testing.assert_allclose(body.cells.evaluate(body.fit(flow)), body.cells.evaluate(found), atol=0.1)
+
+
+def test_alignment_with_a_matrix_held_ends_where_that_with_a_matrix_of_its_own_for_every_iteration_does(
+    shifted, monkeypatch
+):
+    body = region(MASK, STEP, 3.0, 0.5)
+    images = [
+        spline.coefficients(ndimage.gaussian_filter(shifted(80, *by)[:60] / 255, 1)) for by in ([0, 0], [2.7, 1.4])
+    ]
+    template, start = grey_at(images[0], body.places)[:, 0], np.zeros((body.lattice.size, 2))
+    held, fresh = (
+        monkeypatch.setattr(region_module, "HELD", count)
+        or body.cells.evaluate(body.align(images[1], template, start, start, (8.0, 4.0))[0])
+        for count in (region_module.HELD, 1)
+    )
+    assert np.abs(held - fresh).max() < 0.01
+    np.testing.assert_allclose(held.mean(0), [2.7, 1.4], atol=0.01)
+
+
+def test_coarse_image_has_the_means_of_areas(random):
+    image = random.uniform(size=(36, 48)).astype(np.float32)
+    for times in (1, 2, 3):
+        expected = cv2.resize(image, None, fx=1 / times, fy=1 / times, interpolation=cv2.INTER_AREA)
+        np.testing.assert_allclose(coarsened(image, times), expected, atol=1e-6)
+    np.testing.assert_array_equal(coarsened(image[:35, :47], 2), coarsened(image, 2)[:17, :23])
 
 
 @pytest.mark.parametrize("across", [1.0, 0.25])

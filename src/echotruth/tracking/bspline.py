@@ -38,8 +38,8 @@ class Cells:
     down: np.ndarray
 
     def evaluate(self, coefficients: np.ndarray) -> np.ndarray:
-        """Fields at the points: coefficients (knot, field) to values (point, field); absent knots count as 0."""
-        values = np.zeros((len(self.across), coefficients.shape[1]))
+        """Fields at the points: coefficients (knot, field) to values (point, field); all knots must be there."""
+        values = np.empty((len(self.across), coefficients.shape[1]))
         _evaluate(self.knots, self.first, self.across, self.down, np.ascontiguousarray(coefficients), values)
         return values
 
@@ -123,6 +123,7 @@ class Lattice:
         cells, order = self.cells(np.where(inside[:, None], points, self._middle))
         known = np.repeat((cells.knots >= 0).all(1), np.diff(cells.first)) & inside[order]
         result = np.full((len(points), coefficients.shape[1]), np.nan)
+        # Where a knot is not there another takes its place, but the result is not kept.
         result[order[known]] = cells.evaluate(coefficients)[known]
         return result
 
@@ -166,21 +167,31 @@ def lattice(places: np.ndarray, step: float) -> Lattice:
 
 @numba.njit(cache=True, nogil=True)
 def _evaluate(knots, first, across, down, coefficients, values):
+    own = np.empty((4, 4))
     for cell in range(len(knots)):
-        for point in range(first[cell], first[cell + 1]):
+        for field in range(values.shape[1]):
             for k in range(16):
-                if knots[cell, k] >= 0:
-                    share = down[point, k // 4] * across[point, k % 4]
-                    for field in range(values.shape[1]):
-                        values[point, field] += share * coefficients[knots[cell, k], field]
+                own[k // 4, k % 4] = coefficients[knots[cell, k], field]
+            for point in range(first[cell], first[cell + 1]):
+                total = 0.0
+                for i in range(4):
+                    row = 0.0
+                    for j in range(4):
+                        row += across[point, j] * own[i, j]
+                    total += down[point, i] * row
+                values[point, field] = total
 
 
 @numba.njit(cache=True, nogil=True)
 def _gather(knots, first, across, down, values, sums):
+    own = np.empty((4, 4))
     for cell in range(len(knots)):
-        for point in range(first[cell], first[cell + 1]):
+        for field in range(values.shape[1]):
+            own[:] = 0
+            for point in range(first[cell], first[cell + 1]):
+                for i in range(4):
+                    share = down[point, i] * values[point, field]
+                    for j in range(4):
+                        own[i, j] += share * across[point, j]
             for k in range(16):
-                if knots[cell, k] >= 0:
-                    share = down[point, k // 4] * across[point, k % 4]
-                    for field in range(values.shape[1]):
-                        sums[knots[cell, k], field] += share * values[point, field]
+                sums[knots[cell, k], field] += own[k // 4, k % 4]

@@ -20,7 +20,7 @@ from scipy import ndimage
 from echotruth.config.tracking import BsplineDic
 from echotruth.imaging import spline
 from echotruth.tracking.alignment import grey_at
-from echotruth.tracking.dis import flow
+from echotruth.tracking.dis import SMALLEST, flow
 from echotruth.tracking.flow import sample
 from echotruth.tracking.grey import amplitudes, levels
 from echotruth.tracking.likeness import Likeness
@@ -28,6 +28,8 @@ from echotruth.tracking.region import Region, region
 
 CLOSEST = 4.0
 """Least distance of knots, px: between closer ones there is less to see than there are unknowns."""
+SEEN = 8
+"""Pixels of the dense flow between knots at least, of which it takes the mean of several: it is smoothed anyway."""
 RARER = 3
 """Power of the correlation in the variance of a step. The noise about one match asks for 2; where images are unlike, a
 field may besides settle on what only looks like the template."""
@@ -68,16 +70,29 @@ def track(
     if not mask.any():
         return np.full((len(frames), len(points), 2), np.nan), np.full((len(frames), len(points)), np.nan)
     values = settings.si()
-    bright = amplitudes(np.nan_to_num(levels(frames)), values.range)
     blur = max(values.blur / spacing, values.blur_px)
-    images = [spline.coefficients(ndimage.gaussian_filter(frame, blur)) for frame in bright]
     knots = max(values.knots / spacing, CLOSEST)
     body = region(mask, knots, values.margin / spacing, values.across)
     likeness = Likeness(body.places, body.inside, points, 2 * knots)
-    follower = Follower(body, likeness, bright / (bright.max() or 1), images, settings)
+    times = max(1, min(int(knots / SEEN), min(mask.shape) // SMALLEST))
+
+    def prepare(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        bright = amplitudes(np.nan_to_num(frame), values.range)
+        return coarsened(bright, times), ndimage.gaussian_filter(bright, blur)
+
     with ThreadPoolExecutor(2) as threads:
+        coarse, blurred = zip(*threads.map(prepare, levels(frames)), strict=True)
+        images = [spline.coefficients(frame) for frame in blurred]
+        coarse = np.array(coarse) / (np.max(coarse) or 1)
+        follower = Follower(body, likeness, coarse, times, images, settings)
         paths = list(threads.map(follower.follow, (range(len(frames)), [0, *range(len(frames) - 1, 0, -1)])))
     return blend(body, points, *paths)
+
+
+def coarsened(image: np.ndarray, times: int) -> np.ndarray:
+    """Means over squares of some pixels a side; what is left at the end of rows and columns is left out."""
+    rows, columns = (length // times for length in image.shape)
+    return image[: rows * times, : columns * times].reshape(rows, times, columns, times).mean((1, 3))
 
 
 @dataclass(frozen=True)
@@ -89,8 +104,10 @@ class Follower:
     body : Region
     likeness : Likeness
         Of the pixels of the body, and about the points that are asked for.
-    bright : ndarray of shape (frame, axial, lateral)
-        Amplitudes over the greatest.
+    coarse : ndarray of shape (frame, rows, columns)
+        Amplitudes over the greatest, for the dense flow.
+    times : int
+        Pixels of the clip along a side of one of these.
     images : list of ndarray
         Spline coefficients of the amplitudes, blurred.
     settings : BsplineDic
@@ -98,7 +115,8 @@ class Follower:
 
     body: Region
     likeness: Likeness
-    bright: np.ndarray
+    coarse: np.ndarray
+    times: int
     images: list[np.ndarray]
     settings: BsplineDic
 
@@ -113,7 +131,7 @@ class Follower:
             found, moved = self._align(now, template, start, coefficients[before])
             if key != last and not self._overall(template, moved) > self.settings.renewal:
                 key, template = last, seen
-                found, moved = self._align(now, template, start, coefficients[before])
+                found, moved = self._align(now, template, found, coefficients[before])
             coefficients[now], variance[now] = found, variance[key] + self._doubt(template, moved)
             alike[now] = self.likeness.about_points(template[:, 0], moved[:, 0])
             if np.isfinite(variance[now]):
@@ -138,7 +156,8 @@ class Follower:
     def _start(self, now: int, before: int, coefficients: np.ndarray, template: np.ndarray) -> np.ndarray:
         """Coefficients after a step as the dense flow has it, or before it if that is nearer to the template."""
         places = self.body.places + self.body.cells.evaluate(coefficients)
-        step = sample(flow(self.bright[before], self.bright[now]), places)
+        places = (places - (self.times - 1) / 2) / self.times
+        step = self.times * sample(flow(self.coarse[before], self.coarse[now]), places)
         moved = coefficients + self.body.fit(np.nan_to_num(step))
         return min(coefficients, moved, key=lambda each: self._misfit(now, each, template))
 

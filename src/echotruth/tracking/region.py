@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -11,12 +12,14 @@ from echotruth.tracking.alignment import add_matrix, factorise, grey_at, product
 from echotruth.tracking.bspline import Cells, Lattice, lattice
 from echotruth.tracking.roughness import frame, roughness
 
-STEPS = 15
+STEPS = 24
 """Most iterations."""
-FAR = 0.05
-"""Root mean square of a step up to which the normal matrix stays, px."""
+HELD = 6
+"""Iterations for which the normal matrix stays."""
 STILL = 0.005
 """Root mean square of the last step, px."""
+FITS = 3
+"""Iterations for a dense flow."""
 LOOSE = 0.1
 """Weight of the roughness of a dense flow, which is smooth already."""
 FINE = 16
@@ -43,7 +46,8 @@ class Region:
     roughness : ndarray of shape (unknowns, width)
         Band of its matrix, see :mod:`echotruth.tracking.roughness`.
     shifts : ndarray of shape (unknowns, 2)
-        Its products with a lateral and an axial shift of all knots by 1.
+        Its product with the lateral and axial shift of all knots whose product has a sum of 1 over the knots in the
+        lateral and axial component.
     """
 
     lattice: Lattice
@@ -78,36 +82,49 @@ class Region:
             Image carried back, and its slopes per px.
         """
         smoothness, tolerance = stiffness
-        found, place, moved = start, self.places + self.cells.evaluate(start), np.inf
-        for _ in range(STEPS):
+        found, place = start, self.places + self.cells.evaluate(start)
+        for iteration in range(STEPS):
             grey = grey_at(image, place)
             residual = grey[:, 0] - template
             weight = robust(residual, tolerance)
-            if moved > FAR:
-                factor, rough = self._factor(grey[:, 1:], weight, smoothness)
-            force = self.cells.gather((weight * residual)[:, None] * grey[:, 1:], self.lattice.size).ravel()
-            change = -force - rough * self._bend(found - anchor)
-            solve(factor, change)
-            step = self.cells.evaluate(change.reshape(-1, 2))
-            found, place, moved = found + change.reshape(-1, 2), place + step, np.sqrt(np.mean(step**2))
-            if moved < STILL:
+            if iteration % HELD == 0:
+                normal = self._normal(grey[:, 1:], weight, smoothness)
+            change = self._change(normal, (weight * residual)[:, None] * grey[:, 1:], found - anchor)
+            step = self.cells.evaluate(change)
+            found, place = found + change, place + step
+            if np.sqrt(np.mean(step**2)) < STILL:
                 break
         return found, grey_at(image, place)
 
     def fit(self, flow: np.ndarray) -> np.ndarray:
-        """Coefficients (knot, 2) of the field that is like a flow (pixel, 2), px, without its outliers."""
+        """Coefficients (knot, 2) of the field that is like a flow (pixel, 2), px, without its outliers.
+
+        Weights of one in the mean are in the force alone, so that one matrix does for all flows: modified residuals
+        (Huber 1981, Robust Statistics, section 7.8).
+        """
         found = np.zeros((self.lattice.size, 2))
-        # Lateral and axial motion are taken from every other pixel, so that one matrix does for both.
-        slopes = np.eye(2)[np.arange(len(flow)) % 2]
-        for _ in range(3):
+        for _ in range(FITS):
             residual = self.cells.evaluate(found) - flow
             weight = robust(np.hypot(*residual.T), 2)
-            factor, rough = self._factor(slopes, weight, LOOSE)
-            force = self.cells.gather(weight[:, None] * residual * slopes, self.lattice.size).ravel()
-            change = -force - rough * self._bend(found)
-            solve(factor, change)
-            found = found + change.reshape(-1, 2)
+            force = (weight / weight.mean())[:, None] * residual * self._turns
+            found = found + self._change(self._even, force, found)
         return found
+
+    @cached_property
+    def _turns(self) -> np.ndarray:
+        """Lateral and axial motion are taken from every other pixel, so that one matrix does for both."""
+        return np.eye(2)[np.arange(len(self.places)) % 2]
+
+    @cached_property
+    def _even(self) -> tuple[np.ndarray, float]:
+        return self._normal(self._turns, np.ones(len(self.places)), LOOSE)
+
+    def _change(self, normal: tuple[np.ndarray, float], force: np.ndarray, field: np.ndarray) -> np.ndarray:
+        """Change of coefficients (knot, 2) against a force (pixel, 2) and the roughness of a field (knot, 2)."""
+        factor, rough = normal
+        change = -self.cells.gather(force, self.lattice.size).ravel() - rough * self._bend(field)
+        solve(factor, change)
+        return change.reshape(-1, 2)
 
     def _bend(self, change: np.ndarray) -> np.ndarray:
         """Half the slope of the roughness of a change (knot, 2), shape (unknowns,).
@@ -116,10 +133,10 @@ class Region:
         rough, though its components along and across the wall are.
         """
         bend = product(self.roughness, change.ravel())
-        shift = np.linalg.pinv(self.shifts.reshape(-1, 2, 2).sum(0)) @ bend.reshape(-1, 2).sum(0)
-        return bend - self.shifts[:, 0] * shift[0] - self.shifts[:, 1] * shift[1]
+        lateral, axial = bend.reshape(-1, 2).sum(0)
+        return bend - self.shifts[:, 0] * lateral - self.shifts[:, 1] * axial
 
-    def _factor(self, slope: np.ndarray, weight: np.ndarray, smoothness: float) -> tuple[np.ndarray, float]:
+    def _normal(self, slope: np.ndarray, weight: np.ndarray, smoothness: float) -> tuple[np.ndarray, float]:
         """Cholesky factor of the normal matrix with its roughness, and the weight that the roughness has in it."""
         band = np.zeros(self.roughness.shape)
         cells = self.cells
@@ -164,4 +181,5 @@ def region(mask: np.ndarray, knots: float, margin: float, across: float) -> Regi
     cells, order = net.cells(places)
     rough = roughness(cells, *(each[order] for each in frame(mask, wide, knots, across)), net.size)
     shifts = np.stack([product(rough, np.tile(shift, net.size)) for shift in np.eye(2)], -1)
+    shifts = shifts @ np.linalg.pinv(shifts.reshape(-1, 2, 2).sum(0))
     return Region(net, cells, places[order], mask[wide][order], rough, shifts)
