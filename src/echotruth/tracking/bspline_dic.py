@@ -131,7 +131,8 @@ class Follower:
             found, moved = self._align(now, template, start, coefficients[before])
             if key != last and not self._overall(template, moved) > self.settings.renewal:
                 key, template = last, seen
-                found, moved = self._align(now, template, found, coefficients[before])
+                start = self._nearest(now, template, start, found)
+                found, moved = self._align(now, template, start, coefficients[before])
             coefficients[now], variance[now] = found, variance[key] + self._doubt(template, moved)
             alike[now] = self.likeness.about_points(template[:, 0], moved[:, 0])
             if np.isfinite(variance[now]):
@@ -159,11 +160,16 @@ class Follower:
         places = (places - (self.times - 1) / 2) / self.times
         step = self.times * sample(flow(self.coarse[before], self.coarse[now]), places)
         moved = coefficients + self.body.fit(np.nan_to_num(step))
-        return min(coefficients, moved, key=lambda each: self._misfit(now, each, template))
+        return self._nearest(now, template, coefficients, moved)
 
-    def _misfit(self, frame: int, coefficients: np.ndarray, template: np.ndarray) -> float:
-        moved = grey_at(self.images[frame], self.body.places + self.body.cells.evaluate(coefficients))
-        return float(np.abs(moved[:, 0] - template[:, 0]).mean())
+    def _nearest(self, frame: int, template: np.ndarray, *fields: np.ndarray) -> np.ndarray:
+        """The field that leaves the least difference from the template."""
+
+        def misfit(coefficients: np.ndarray) -> float:
+            moved = grey_at(self.images[frame], self.body.places + self.body.cells.evaluate(coefficients))
+            return float(np.abs(moved[:, 0] - template[:, 0]).mean())
+
+        return min(fields, key=misfit)
 
 
 def blend(body: Region, points: np.ndarray, forward: Path, backward: Path) -> tuple[np.ndarray, np.ndarray]:
