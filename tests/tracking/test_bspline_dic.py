@@ -144,9 +144,9 @@ def test_same_bytes_on_one_thread_and_on_two(clip):
         np.testing.assert_array_equal(one, two)
 
 
-def test_knots_are_four_pixels_apart_at_least(shifted):
+def test_knots_are_five_pixels_apart_at_least(shifted):
     frames = np.stack([shifted(SIZE, 0, 0), shifted(SIZE, 1, -2)])
     mask, points = ring()
-    close, four = (found(frames, mask, points, knots_mm=1e3 * SPACING * knots)[0] for knots in (1, 4))
-    np.testing.assert_array_equal(close, four)
+    close, five = (found(frames, mask, points, knots_mm=1e3 * SPACING * knots)[0] for knots in (1, 5))
+    np.testing.assert_array_equal(close, five)
     assert np.isfinite(close).all()

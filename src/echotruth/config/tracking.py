@@ -69,7 +69,7 @@ class BsplineDic(Section):
     method: Literal["bspline_dic"] = "bspline_dic"
     """Name of the method."""
     knots_mm: Positive = 0.4
-    """Distance of the knots, four pixels at least. Default: as suits `bmode.field_of_view_mm`."""
+    """Distance of the knots, five pixels at least. Default: as suits `bmode.field_of_view_mm`."""
     margin_um: Annotated[FiniteFloat, Field(ge=0)] = 180.0
     """How far around the wall pixels count; its edge shows how it thickens. Default: as suits
     `bmode.field_of_view_mm`."""
@@ -80,7 +80,7 @@ class BsplineDic(Section):
     """Standard deviation of the Gaussian that blurs the images; the larger of this and `blur_um` holds."""
     blur_um: Annotated[FiniteFloat, Field(ge=0)] = 20.0
     """The same in the tissue. Default: as suits `bmode.field_of_view_mm`."""
-    smoothness: Positive = 8.0
+    smoothness: Positive = 12.0
     """Weight of the roughness of a step from one frame to the next over that of the images."""
     across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.3
     """Length of a unit through the wall where roughness is measured; of one along it, 1."""

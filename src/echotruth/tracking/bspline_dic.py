@@ -26,7 +26,7 @@ from echotruth.tracking.grey import amplitudes, levels
 from echotruth.tracking.likeness import Likeness
 from echotruth.tracking.region import Region, region
 
-CLOSEST = 4.0
+CLOSEST = 5.0
 """Least distance of knots, px: between closer ones there is less to see than there are unknowns."""
 SEEN = 8
 """Pixels of the dense flow between knots at least, of which it takes the mean of several: it is smoothed anyway."""
