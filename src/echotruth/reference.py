@@ -51,7 +51,8 @@ _RF = """The group is there where `rf.keep` asks for it, and holds `lines`, `cha
 SI units, sampling_frequency (of the channels), demodulation_frequency (of the lines), sound_speed, centre_frequency,
 bandwidth, element_width, element_height, elevation_focus, attenuation (nepers per metre and hertz); transmit, scan,
 apodization and f_number, as in the section `rf`; foci (ranges of those of focused transmits, of which number `zone` x
-lines + `line` serves that line in that zone); and how far the RF may be off the exact sum, relative: accuracy.
+lines + `line` serves that line in that zone); accuracy (how far the RF may be off the exact sum, relative) and
+accuracy_from (the range from which on that holds).
 """
 
 

@@ -125,6 +125,7 @@ def test_what_is_no_longer_asked_for_goes(rf_repository, rf_layout):
 def test_group_says_how_its_rf_was_made(rf_repository):
     settings = opened(rf_repository(transmit="plane", transmits=3)).attrs
     assert settings["accuracy"] == 0.015 and settings["transmit"] == "plane"
+    assert 0 < settings["accuracy_from"] < 3e-3
     assert settings["sound_speed"] == 1540 and settings["centre_frequency"] == 25e6
     assert settings["demodulation_frequency"] == pytest.approx(25e6, rel=0.01)
 

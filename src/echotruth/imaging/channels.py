@@ -19,7 +19,7 @@ from echotruth.imaging.scanner import Scanner
 from echotruth.imaging.transmit import KINDS
 
 LENS_ACCURACY = 0.015
-"""Relative error (L2) of the RF under a lens, near a tall one apart; see docs/conventions.md."""
+"""Relative error (L2) of the RF under a lens, from the range on that the lens tells; see docs/conventions.md."""
 
 PER_PERIOD = 2.1
 """Samples kept per period of the highest frequency, at least; a record that is finer is thinned."""
@@ -125,6 +125,7 @@ def described(config: Config, scanner: Scanner) -> tuple[Arrays, dict[str, int],
             "sampling_frequency": float(sampling),
             "demodulation_frequency": scanner.frequency,
             "foci": waves.foci.tolist(),
+            "accuracy_from": matrix.accurate_from,
         },
     )
 

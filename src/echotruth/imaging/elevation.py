@@ -35,6 +35,8 @@ WIDEST_PART = 0.17
 over the range r: what is left of E beyond the first order is then about 1 %."""
 MOST_PARTS = 2
 """Of the array."""
+CUT = 1e-2
+"""What a kernel may miss, over the echo from the plane at the same range, where echoes count as accurate."""
 
 
 class Lens:
@@ -61,6 +63,8 @@ class Lens:
         g: real part that of the amplitude, imaginary part that of the phase.
     blocks : ndarray of shape (CURVATURES, slopes), uint8
         Blocks of samples that an echo needs; 0 where it is fainter than `FAINT`.
+    accurate_from : float, m
+        Range from which on no kernel is cut by more than `CUT`, and `MOST_PARTS` of the array are enough.
     """
 
     def __init__(self, probe: Probe, reach: float, band: Band) -> None:
@@ -78,9 +82,11 @@ class Lens:
         change -= (self.growth.real[..., None] + np.multiply.outer(self.growth.imag, undamped / turn)) * beam
         self.change = (turned * change).astype(np.complex64)
         self.beam = (turned * beam).astype(np.complex64)
-        self.blocks = _blocks(self.beam**2, band)
+        self.blocks, missed = _blocks(self.beam**2, band)
         self._elements, self._half = p.elements, p.elements * p.pitch / 2
         self._number = p.height**2 * p.frequency / (4 * p.sound_speed)
+        longest = np.cbrt(self._number * self._half**2 / (WIDEST_PART * MOST_PARTS**2))
+        self.accurate_from = float(max(longest, *1 / self.curvature[missed > CUT], 0.0))
 
     def places(self, position: Floats) -> Floats:
         """Rows and columns of scatterers (n, 3), m, in the tables: (n, 2), within them."""
@@ -190,14 +196,15 @@ def _delays(pulse: NDArray, band: Band) -> Floats:
     return -(energy * turn).sum(axis=-1) / np.maximum((energy * step).sum(axis=-1), 1e-300) / (2 * np.pi)
 
 
-def _blocks(spectrum: NDArray, band: Band) -> NDArray[np.uint8]:
-    """Blocks of samples that pulses (curvatures, slopes, NODES) need."""
+def _blocks(spectrum: NDArray, band: Band) -> tuple[NDArray[np.uint8], Floats]:
+    """Blocks of samples that pulses (curvatures, slopes, NODES) need; and what the longest kernel misses of those at a
+    curvature, at most, over the echo from the plane there: (curvatures,)."""
     asked = stacked(spectrum)
     energy = (asked**2 @ np.concatenate([band.weight, band.weight])).astype(float)
-    allowed = LEFT * energy.max(axis=1, keepdims=True)
+    greatest = energy.max(axis=1, keepdims=True)
     needed = np.full(energy.shape, MOST_BLOCKS, np.uint8)
+    left = [np.square(asked @ fit(band, blocks, 0.3)[1].T).sum(axis=-1) for blocks in range(1, MOST_BLOCKS + 1)]
     for blocks in range(MOST_BLOCKS - 1, 0, -1):
-        missed = np.square(asked @ fit(band, blocks, 0.3)[1].T).sum(axis=-1)
-        needed[missed <= allowed] = blocks
+        needed[left[blocks - 1] <= LEFT * greatest] = blocks
     needed[energy < FAINT**2] = 0
-    return needed
+    return needed, np.sqrt((left[-1] / greatest).max(axis=1))

@@ -157,6 +157,11 @@ class FullMatrix:
         given, lens = (time, weight, colour, bend, amplitude, entries, tables), self._lens is not None
         deposit.add_echoes(traces, *given, size, bounds(len(self.centres), parts), lens, (0,) * scheme)
 
+    @property
+    def accurate_from(self) -> float:
+        """Range from which on the error is that of the lens, m; 0 without one."""
+        return self._lens.accurate_from if self._lens else 0.0
+
     def _kind(self, position: np.ndarray) -> np.ndarray:
         """Which of the angles from the centre of the array is nearest, shape (n,)."""
         sine = np.abs(position[:, 0]) / np.linalg.norm(position, axis=1)
