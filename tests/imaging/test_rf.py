@@ -147,3 +147,10 @@ def test_every_pair_is_filled_whatever_the_number_of_elements(elements):
 def test_a_record_beyond_the_clock_is_refused():
     with pytest.raises(ValueError, match="too long"):
         FullMatrix(Probe(), 0.4)
+
+
+def test_no_record_is_a_multiple_of_256_samples_long():
+    """Or the traces of all pairs would share a few cache lines."""
+    probe = Probe()
+    lengths = {FullMatrix(probe, depth, elevation=False).samples for depth in np.linspace(11e-3, 12.5e-3, 7)}
+    assert len(lengths) > 2 and all(length % 256 for length in lengths)

@@ -34,6 +34,15 @@ FINEST = 1e-4
 """Accuracy below which the tables are `FINE`."""
 
 
+def _length(least: int) -> int:
+    """Samples of a record of at least so many, quickly transformed.
+
+    No multiple of 256: echoes stand at like places of all traces, and those of such a length share a few cache lines.
+    """
+    samples = fft.next_fast_len(least, real=True)
+    return samples if samples % 256 else _length(samples + 1)
+
+
 class FullMatrix:
     """Echoes between all pairs of elements of a probe.
 
@@ -78,7 +87,7 @@ class FullMatrix:
         self.reach = depth + p.sound_speed * half_pulse / 2
         last = 2 * self.reach / p.sound_speed + p.elements * p.pitch / p.sound_speed + half_pulse
         room = 2 * deposit.LEAD + MOST_BLOCKS * TAPS
-        self.samples = fft.next_fast_len(int((last + 2 * latest) * self.sampling) + room, real=True)
+        self.samples = _length(int((last + 2 * latest) * self.sampling) + room)
         if self.samples >= 1 << (31 - deposit.FRACTION_BITS):
             raise ValueError(f"A record of {self.samples} samples is too long: image less deep or sample slower.")
         self.centres = element_centres(probe)
