@@ -51,9 +51,9 @@ TRACKER = BsplineDic()
 Places = np.ndarray
 
 
-def nrmse(found: np.ndarray, truth: Truth) -> float:
-    """RMS error over RMS displacement (%) at end-systole of displacements (frame, point, 2), m."""
-    error, true = found[truth.es] - truth.displacement[truth.es], truth.displacement[truth.es]
+def nrmse(found: np.ndarray, true: np.ndarray) -> float:
+    """RMS error over RMS displacement (%) of displacements (point, 2) in one frame, m, where they are known."""
+    error = found - true
     known = np.isfinite(error).all(-1)
     return float(100 * np.sqrt((error[known] ** 2).sum() / (true[known] ** 2).sum()))
 
@@ -121,17 +121,15 @@ def halved(clip: Clip, truth: Truth) -> float:
     """RMS error over RMS displacement (%) of a track by every other frame, in the one at end-systole or before it."""
     frames, points, mask, spacing, time, seed = clip.given
     found = track(frames[::2], points, mask, spacing, time[::2], seed, TRACKER)[0][truth.es // 2] * spacing
-    true = truth.displacement[2 * (truth.es // 2)]
-    known = np.isfinite(found).all(1)
-    return float(100 * np.sqrt(((found - true)[known] ** 2).sum() / (true[known] ** 2).sum()))
+    return nrmse(found, truth.displacement[2 * (truth.es // 2)])
 
 
 def rows(job: Job, view: str) -> list[list[str]]:
     """Lines of the table for one view, one an image size."""
     truth, plane = ground_truth(job), Plane(**job.read("phantom", "origin", "axes"))
-    count, found = len(truth.displacement), []
-    forward = nrmse(in_plane(job, plane, truth, np.arange(count)), truth)
-    backward = nrmse(in_plane(job, plane, truth, np.append(0, np.arange(count - 1, 0, -1))), truth)
+    count, true, found = len(truth.displacement), truth.displacement[truth.es], []
+    forward = nrmse(in_plane(job, plane, truth, np.arange(count))[truth.es], true)
+    backward = nrmse(in_plane(job, plane, truth, np.append(0, np.arange(count - 1, 0, -1)))[truth.es], true)
     given = clips(job)
     free = blobs(job, plane, next(iter(given.values())))
     for size, clip in given.items():

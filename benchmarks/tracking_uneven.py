@@ -6,7 +6,7 @@ A ring of scatterers of the size of the default heart's mid slice moves inwards 
 inside, and by less with 1/radius, and back again, in the plane; it is imaged by the RF engine. Beside the RMS error of
 the radial displacement at the greatest contraction, over its RMS, stands the share of the m-th harmonic that a tracker
 gives back, at the inside and the outside of the wall. The last columns are of the repository's heart, whose contraction
-is the same all around, so that it alone would ask for ever more smoothness. The results are results/tracking_uneven.md.
+is the same all around and so tells nothing of what is evened out. The results are results/tracking_uneven.md.
 """
 
 from __future__ import annotations
