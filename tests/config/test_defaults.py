@@ -66,7 +66,8 @@ def test_lengths_of_trackers_follow_the_field_of_view():
     assert set(trackers) == set(Config().tracking.trackers)
     assert (trackers["bspline_dic"].knots_mm, trackers["affine_dic"].subset_mm) == (0.4 * 12.5, 12.5)
     assert trackers["window_deformation"].windows_mm == [1.5 * 12.5, 0.75 * 12.5]
-    assert (trackers["corrected"].window_px, trackers["corrected"].reference) == (64, "previous")
+    assert (trackers["corrected"].window_mm, trackers["corrected"].reference) == (1.5 * 12.5, "cycle")
+    assert trackers["faithful"].window_px == 64
     given = configured(bmode={"field_of_view_mm": 24.0}, tracking={"trackers": {"one": {"method": "bspline_dic"}}})
     assert given.tracking.trackers["one"].knots_mm == 0.8
     fixed = {"one": {"method": "bspline_dic", "knots_mm": 0.3}}

@@ -39,7 +39,7 @@ def test_formula_undoes_itself(points):
     np.testing.assert_allclose(shear(shear(points, 3.0), -3.0), points, atol=1e-12)
 
 
-@pytest.mark.parametrize("reference", ["ED", "previous"])
+@pytest.mark.parametrize("reference", ["ED", "previous", "cycle"])
 def test_steps_are_read_where_the_tissue_then_is(points, reference):
     """The motion is that of the tissue that was at a point at first, whichever frames are compared."""
     moved, quality = accumulate(Formula(shear), FRAMES, points, reference)
@@ -61,6 +61,27 @@ def test_against_end_diastole_a_lost_point_comes_back(points):
     np.testing.assert_array_equal(lost[:, 0], np.arange(7) == 3)
     assert (np.isnan(quality) == lost).all()
     np.testing.assert_allclose(moved[6], shear(points, 6.0) - points, atol=1e-12)
+
+
+def test_around_the_cycle_a_point_lost_on_one_way_is_followed_on_the_other(points):
+    moved, quality = accumulate(Formula(shear, lost=(3.0,)), FRAMES, points, "cycle")
+    lost = np.isnan(moved).any(-1)
+    np.testing.assert_array_equal(lost[:, 0], np.arange(7) == 3)
+    assert (np.isnan(quality) == lost).all()
+    np.testing.assert_allclose(moved[6], shear(points, 6.0) - points, atol=1e-12)
+
+
+def test_around_the_cycle_a_bad_step_counts_as_little_as_its_images_are_alike(points):
+    class Slipping(Formula):
+        def match(self, first, second, points):
+            step, quality = super().match(first, second, points)
+            return (step + 1.0, 0.1 + 0 * quality) if (first, second) == (0.0, 1.0) else (step, quality)
+
+    moved, _ = accumulate(Slipping(lambda places, t: places), FRAMES, points, "cycle")
+    # Each of the other steps has the variance 1 / 0.5^2 - 1 = 3, the bad one 1 / 0.1^2 - 1 = 99.
+    t = np.arange(1, 7)
+    forward, backward = 99 + 3 * (t - 1), 3 * (7 - t)
+    np.testing.assert_allclose(moved[1:, 0, 0], backward / (forward + backward))
 
 
 def test_every_image_is_prepared_once(points):

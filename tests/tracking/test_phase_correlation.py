@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from echotruth.config import PhaseCorrelation
 from echotruth.tracking import grid, track
@@ -41,6 +42,19 @@ def test_fraction_is_exact_for_the_peak_of_a_shifted_texture():
     np.testing.assert_allclose(fraction(*(np.sinc(k - shift) for k in (-1, 0, 1))), shift, atol=1e-12)
 
 
+@pytest.mark.parametrize("floor, found", [(0.0, False), (0.05, True)])
+def test_shift_of_coarse_speckle_under_noise_is_found_by_the_frequencies_above_a_floor(floor, found):
+    """Phase-only correlation makes frequencies that hold nothing but noise as loud as those of the speckle."""
+    rng = np.random.default_rng(3)
+    speckle = gaussian_filter(rng.standard_normal((160, 160)), 3, mode="wrap")
+    speckle *= 60 / speckle.std()
+    frames = [128 + np.roll(speckle, (-3 * t, 2 * t), (0, 1)) + rng.normal(0, 4, speckle.shape) for t in range(2)]
+    tracker = PhaseCorrelation(taper="hann", floor=floor, reference="previous")
+    points = grid(speckle.shape, 20).reshape(-1, 2)
+    moved, _ = track(np.stack(frames), points, speckle < np.inf, 25e-6, np.arange(2.0), 0, tracker)
+    assert (np.median(np.hypot(*(moved[1] - [2, -3]).T)) < 0.3) == found
+
+
 def test_window_without_texture_has_no_displacement(shifted):
     image = shifted(96, 0, 0)
     image[:, 48:] = 0
@@ -55,7 +69,9 @@ def test_window_in_tissue_keeps_its_size():
     assert window_side(PhaseCorrelation(), 1.0) == 64
 
 
-@pytest.mark.parametrize("options", [{}, {"taper": "hann", "reference": "previous"}])
+@pytest.mark.parametrize(
+    "options", [{}, {"taper": "hann", "reference": "previous"}, {"taper": "hann", "reference": "cycle", "floor": 0.01}]
+)
 def test_rigid_shift_is_followed_to_half_a_pixel(clip, options):
     frames = clip(lambda place, t: place + np.array([2 * t, -3 * t]), 5)
     points = grid(frames.shape[1:], 20).reshape(-1, 2)

@@ -83,7 +83,7 @@ def _with_lengths(values: dict[str, Any], scale: float) -> dict[str, Any]:
         return values
     given = tracking.get("trackers")
     if given is None:
-        standard = standard_trackers().items()
+        standard = standard_trackers(scale).items()
         given = {name: {"method": each.method} | each.model_dump(exclude_unset=True) for name, each in standard}
     if not isinstance(given, dict):
         return values

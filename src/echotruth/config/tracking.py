@@ -10,8 +10,14 @@ from pydantic import BeforeValidator, Discriminator, Field, FiniteFloat, Tag, mo
 
 from echotruth.section import Name, Positive, Section, impossible
 
-Reference = Literal["ED", "previous"]
-"""Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
+Reference = Annotated[
+    Literal["ED", "previous", "cycle"],
+    Field(
+        description="Each frame against `ED`; or against the `previous` one, the steps added along the tissue's path; "
+        "or likewise from ED both forwards and, as the cycle closes, backwards, averaged by how alike the frames were."
+    ),
+]
+"""How the motion of pairs of frames makes that of a clip."""
 
 
 class PhaseCorrelation(Section):
@@ -27,8 +33,10 @@ class PhaseCorrelation(Section):
     """Step between windows over the side of a window."""
     taper: Literal["none", "hann"] = "none"
     """Weights over a window before its transform."""
+    floor: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.0
+    """Magnitude over the greatest below which a frequency does not count: there is only noise, and phase-only
+    correlation makes it as loud as the speckle."""
     reference: Reference = "ED"
-    """Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
 
     @model_validator(mode="after")
     def _one_window(self) -> PhaseCorrelation:
@@ -48,8 +56,7 @@ class WindowDeformation(Section):
     """Sides of the windows, one a pass; 8 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
     sweeps: Annotated[int, Field(ge=1, le=20)] = 3
     """Passes at the last size."""
-    reference: Reference = "previous"
-    """Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
+    reference: Reference = "cycle"
 
 
 class AffineDic(Section):
@@ -59,8 +66,7 @@ class AffineDic(Section):
     """Name of the method."""
     subset_mm: Positive = 1.0
     """Side of a subset; 17 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
-    reference: Reference = "previous"
-    """Each frame against ED, or against the frame before it with the steps added along the tissue's path."""
+    reference: Reference = "cycle"
 
 
 class BsplineDic(Section):
@@ -97,6 +103,7 @@ class Dis(Section):
     """Name of the method."""
     preset: Literal["ultrafast", "fast", "medium"] = "medium"
     """Preset of OpenCV."""
+    reference: Reference = "cycle"
 
 
 class Ilk(Section):
@@ -106,6 +113,7 @@ class Ilk(Section):
     """Name of the method."""
     radius_px: Annotated[int, Field(ge=1, le=64)] = 7
     """Radius of the window about a pixel."""
+    reference: Reference = "cycle"
 
 
 GIVEN = ("frames", "points", "mask", "spacing", "frame_time", "seed")
@@ -214,11 +222,18 @@ Tracker = Annotated[
 """Section of any of the methods."""
 
 
-def standard_trackers() -> dict[str, Any]:
-    """The paper's as printed and as corrected, stronger ones, and one of a library."""
+def standard_trackers(scale: float = 1.0) -> dict[str, Any]:
+    """The paper's as printed and as corrected, stronger ones, and one of a library.
+
+    Parameters
+    ----------
+    scale : float
+        Side of the field of view over the 12 mm at which 64 pixels of 512, the paper's window, are 1.5 mm.
+    """
+    window = {"window_px": None, "window_mm": 1.5 * scale}
     return {
         "faithful": PhaseCorrelation(),
-        "corrected": PhaseCorrelation(taper="hann", reference="previous"),
+        "corrected": PhaseCorrelation(**window, taper="hann", floor=0.01, reference="cycle"),
         "window_deformation": WindowDeformation(),
         "affine_dic": AffineDic(),
         "dis": Dis(),
@@ -233,4 +248,5 @@ class Tracking(Section):
     """Spacing of the points at which displacement is reported, in pixels of the largest image; the points are the same
     at all sizes, and lie in the wall at end-diastole."""
     trackers: Annotated[dict[Name, Tracker], Field(min_length=1)] = Field(default_factory=standard_trackers)
-    """Name to settings: `faithful` is the paper as printed, `corrected` tapers and goes frame to frame."""
+    """Name to settings: `faithful` is the paper as printed, `corrected` has tapered windows of the same
+    tissue at every image size, leaves out frequencies without speckle, and goes frame to frame around the cycle."""

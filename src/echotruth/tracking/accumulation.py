@@ -6,6 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from echotruth.tracking import cycle
+
 
 class Pairs(Protocol):
     """A tracker that compares two images."""
@@ -49,9 +51,10 @@ def accumulate(pairs: Pairs, frames: np.ndarray, points: np.ndarray, reference: 
         Grey values; frame 0 is end-diastole.
     points : ndarray of shape (n, 2)
         Where the points are at end-diastole: lateral, axial, px (0 is the centre of the first pixel).
-    reference : {"ED", "previous"}
+    reference : {"ED", "previous", "cycle"}
         Against `ED` every frame is compared with frame 0 at the points' first place; against `previous` each step is
-        read where the point then is, and the steps are added: a point once lost stays lost.
+        read where the point then is, and the steps are added: a point once lost stays lost. Over the `cycle` that is
+        done from frame 0 both forwards and backwards, and the two are averaged by their :func:`doubt`.
 
     Returns
     -------
@@ -60,15 +63,48 @@ def accumulate(pairs: Pairs, frames: np.ndarray, points: np.ndarray, reference: 
     quality : ndarray of shape (frame, n)
         1 at frame 0.
     """
+    if reference != "cycle":
+        return _path(pairs, frames, points, reference == "previous")
+    moved, alike, variance = [], [], []
+    for way in cycle.ways(len(frames)):
+        # The order in which a way takes the frames is its own inverse.
+        total, quality = _path(pairs, frames[way], points, True)
+        moved.append(total[way])
+        alike.append(quality[way])
+        variance.append(doubt(quality)[way])
+    share = cycle.share(*variance)
+    return cycle.blend(share[..., None], *moved), cycle.blend(share, *alike)
+
+
+def doubt(quality: np.ndarray) -> np.ndarray:
+    """Variance of a sum of steps up to a factor, from the correlation of their images.
+
+    Parameters
+    ----------
+    quality : ndarray of shape (frame, n)
+        Correlation, in the order in which the steps were added; not a number where the point is lost.
+
+    Returns
+    -------
+    ndarray of shape (frame, n)
+        Sum of 1 / quality^2 - 1, to which the least variance of a shift found by correlation is proportional (Walker
+        and Trahey 1995, IEEE Trans Ultrason Ferroelectr Freq Control 42:301); infinite once lost.
+    """
+    known = quality > 0
+    return np.cumsum(np.where(known, 1 / np.where(known, quality, 1) ** 2 - 1, np.inf), axis=0)
+
+
+def _path(pairs: Pairs, frames: np.ndarray, points: np.ndarray, stepwise: bool) -> tuple[np.ndarray, np.ndarray]:
+    """What :func:`accumulate` returns, frame to frame or against the first."""
     total = np.zeros((len(frames), *points.shape))
     quality = np.ones(total.shape[:2])
     first = pairs.prepare(frames[0])
     for t in range(1, len(frames)):
         second = pairs.prepare(frames[t])
-        start = total[t - 1] if reference == "previous" else np.zeros_like(points)
+        start = total[t - 1] if stepwise else np.zeros_like(points)
         step, quality[t] = pairs.match(first, second, points + start)
         total[t] = start + step
-        if reference == "previous":
+        if stepwise:
             first = second
     quality[np.isnan(total).any(-1)] = np.nan
     return total, quality

@@ -19,6 +19,7 @@ from scipy import ndimage
 
 from echotruth.config.tracking import BsplineDic
 from echotruth.imaging import spline
+from echotruth.tracking import cycle
 from echotruth.tracking.alignment import grey_at
 from echotruth.tracking.dis import SMALLEST, flow
 from echotruth.tracking.flow import sample
@@ -85,7 +86,7 @@ def track(
         images = [spline.coefficients(frame) for frame in blurred]
         coarse = np.array(coarse) / (np.max(coarse) or 1)
         follower = Follower(body, likeness, coarse, times, images, settings)
-        paths = list(threads.map(follower.follow, (range(len(frames)), [0, *range(len(frames) - 1, 0, -1)])))
+        paths = list(threads.map(follower.follow, cycle.ways(len(frames))))
     return blend(body, points, *paths)
 
 
@@ -181,19 +182,11 @@ def blend(body: Region, points: np.ndarray, forward: Path, backward: Path) -> tu
         px.
     quality : ndarray of shape (frame, n)
     """
-    share = np.array([_share(*pair) for pair in zip(forward.variance, backward.variance, strict=True)])[:, None]
-    coefficients = share[..., None] * forward.coefficients + (1 - share[..., None]) * backward.coefficients
+    share = cycle.share(forward.variance, backward.variance)[:, None]
+    coefficients = cycle.blend(share[..., None], forward.coefficients, backward.coefficients)
     flat = coefficients.transpose(1, 0, 2).reshape(body.lattice.size, -1)
     displacement = np.moveaxis(body.lattice.at(flat, points).reshape(len(points), len(share), 2), 0, 1).copy()
-    quality = np.where(share > 0, share * np.maximum(forward.alike, 0), 0)
-    quality += np.where(share < 1, (1 - share) * np.maximum(backward.alike, 0), 0)
+    quality = cycle.blend(share, np.maximum(forward.alike, 0), np.maximum(backward.alike, 0))
     quality[0] += 1 - quality[0]
     displacement[np.isnan(quality)] = np.nan
     return displacement, quality
-
-
-def _share(ours: float, theirs: float) -> float:
-    """Weight of a value beside another by their variances; a half where neither is known."""
-    if np.isinf(ours) or np.isinf(theirs):
-        return 0.5 * (1 + float(np.isinf(theirs)) - float(np.isinf(ours)))
-    return theirs / (ours + theirs) if ours + theirs > 0 else 0.5

@@ -32,7 +32,7 @@ def track(
 
     The library says nothing of quality; :mod:`echotruth.tracking.flow` does.
     """
-    return follow(partial(flow, preset=settings.preset), frames, points, spacing)
+    return follow(partial(flow, preset=settings.preset), frames, points, spacing, settings.reference)
 
 
 def flow(first: np.ndarray, second: np.ndarray, preset: str = "medium") -> np.ndarray:

@@ -16,9 +16,13 @@ SQUARE = 0.75e-3
 
 
 def follow(
-    flow: Callable[[np.ndarray, np.ndarray], np.ndarray], frames: np.ndarray, points: np.ndarray, spacing: float
+    flow: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    frames: np.ndarray,
+    points: np.ndarray,
+    spacing: float,
+    reference: str,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement of points since the first frame, frame to frame.
+    """Displacement of points since the first frame.
 
     Parameters
     ----------
@@ -30,6 +34,8 @@ def follow(
         Lateral, axial, px.
     spacing : float
         Distance of pixel centres, m.
+    reference : {"ED", "previous", "cycle"}
+        As :func:`echotruth.tracking.accumulation.accumulate` takes it.
 
     Returns
     -------
@@ -39,7 +45,7 @@ def follow(
         Correlation of the first image with the second carried back, none below 0.
     """
     side = max(9, 2 * round(SQUARE / spacing / 2) + 1)
-    return accumulate(FlowPairs(flow, side), levels(frames), points, "previous")
+    return accumulate(FlowPairs(flow, side), levels(frames), points, reference)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ def track(
 
     The library says nothing of quality; :mod:`echotruth.tracking.flow` does.
     """
-    return follow(partial(flow, radius=settings.radius_px), frames, points, spacing)
+    return follow(partial(flow, radius=settings.radius_px), frames, points, spacing, settings.reference)
 
 
 def flow(first: np.ndarray, second: np.ndarray, radius: int = 7) -> np.ndarray:

@@ -16,6 +16,8 @@ from echotruth.config.tracking import PhaseCorrelation
 from echotruth.tracking.accumulation import accumulate
 from echotruth.tracking.windows import SMALLEST, Windows, arrange
 
+ABSENT = 1e-9
+"""Magnitude of a frequency over the greatest that is nothing but rounding, whose phase is left to chance."""
 FAINTEST = 1 / 255
 """Standard deviation of a window over the range of the clip below which it counts as without texture: a grey level."""
 
@@ -36,7 +38,8 @@ def track(
     windows = arrange(frames.shape[1:], window_side(settings, spacing), settings.stride)
     finite = frames[np.isfinite(frames)] if frames.dtype.kind == "f" else frames
     contrast = float(finite.max()) - float(finite.min()) if finite.size else 0.0
-    return accumulate(PhasePairs(windows, settings.taper, contrast), frames, points, settings.reference)
+    pairs = PhasePairs(windows, settings.taper, contrast, max(settings.floor, ABSENT))
+    return accumulate(pairs, frames, points, settings.reference)
 
 
 def window_side(settings: PhaseCorrelation, spacing: float) -> int:
@@ -71,15 +74,18 @@ class PhasePairs:
         Weights over a window.
     contrast : float
         Range of grey values in the clip.
+    floor : float
+        Magnitude over the greatest from which on a frequency counts.
     """
 
     windows: Windows
     taper: str
     contrast: float
+    floor: float
 
     def prepare(self, image: np.ndarray) -> np.ndarray:
         """:func:`phases` of an image."""
-        return phases(image, self.windows, self.taper, self.contrast)
+        return phases(image, self.windows, self.taper, self.contrast, self.floor)
 
     def match(self, first: np.ndarray, second: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step (n, 2) in px and quality (n,) of points, linear between the windows."""
@@ -88,7 +94,7 @@ class PhasePairs:
         return step[:, :2], step[:, 2]
 
 
-def phases(image: np.ndarray, windows: Windows, taper: str, contrast: float) -> np.ndarray:
+def phases(image: np.ndarray, windows: Windows, taper: str, contrast: float, floor: float = ABSENT) -> np.ndarray:
     """Transforms of all windows with the magnitude taken out.
 
     Parameters
@@ -101,11 +107,13 @@ def phases(image: np.ndarray, windows: Windows, taper: str, contrast: float) -> 
         Weights over a window, on its departure from its mean.
     contrast : float
         Range of grey values in the clip, against which texture is judged.
+    floor : float
+        Magnitude over the greatest from which on a frequency counts.
 
     Returns
     -------
     ndarray of shape (rows, columns, side, side // 2 + 1), complex
-        Unit numbers; 0 where a frequency is absent, NaN throughout a window without texture.
+        Unit numbers; 0 where a frequency does not count, NaN throughout a window without texture.
     """
     side = windows.side
     cut = windows.cut(image)
@@ -117,8 +125,7 @@ def phases(image: np.ndarray, windows: Windows, taper: str, contrast: float) -> 
         cut *= hann[:, None] * hann
     spectrum = fft.rfft2(cut)
     magnitude = np.abs(spectrum)
-    # Rounding leaves the phase of an absent frequency to chance.
-    present = magnitude > 1e-9 * magnitude.max((-2, -1), keepdims=True)
+    present = magnitude > floor * magnitude.max((-2, -1), keepdims=True)
     result = np.divide(spectrum, magnitude, out=np.zeros_like(spectrum), where=present)
     result[~textured] = np.nan
     return result
@@ -158,11 +165,12 @@ def displacement(first: np.ndarray, second: np.ndarray, side: int) -> tuple[np.n
 
 
 def fraction(before: np.ndarray, peak: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Sub-pixel place of a phase-correlation peak from its neighbours.
+    """Sub-pixel place of a phase-correlation peak: the centroid of it and its neighbours, where they are above 0.
 
-    The peak of a shifted texture is sin(pi x) / (pi x) about the shift, so that the larger neighbour over the
-    sum of both is the fraction: Foroosh, Zerubia and Berthod 2002, IEEE Trans Image Process 11:188, equation 12.
-    A parabola through the three values falls short by up to 0.17 px.
+    The peak of a shifted texture of all frequencies is sin(pi x) / (pi x) about the shift, whose lesser neighbour is
+    below 0: then the larger neighbour over its sum with the peak is the fraction (Foroosh, Zerubia and Berthod 2002,
+    IEEE Trans Image Process 11:188, equation 12). A parabola through the three values falls short by up to 0.17 px.
+    Where frequencies do not count the peak is wider, and the lesser neighbour takes its part.
 
     Parameters
     ----------
@@ -174,7 +182,5 @@ def fraction(before: np.ndarray, peak: np.ndarray, after: np.ndarray) -> np.ndar
     ndarray of the same shape
         px, within -0.5 to 0.5.
     """
-    side = np.where(after >= before, after, before)
-    share = np.maximum(side, 0)
-    sign = np.where(after >= before, 1.0, -1.0)
-    return sign * np.divide(share, share + peak, out=np.full_like(peak, np.nan), where=peak > 0)
+    before, after = np.maximum(before, 0), np.maximum(after, 0)
+    return np.divide(after - before, before + peak + after, out=np.full_like(peak, np.nan), where=peak > 0)
