@@ -37,7 +37,7 @@ INWARDS, UNEVEN = 0.3e-3, 0.4
 FRAMES, CYCLE = 20, 0.12
 """Of the cycle, and its duration, s."""
 HARMONICS = (2, 3, 4)
-SMOOTHNESS = (3.0, 6.0, BsplineDic().smoothness, 20.0, 40.0)
+SMOOTHNESS = tuple(share * BsplineDic().smoothness for share in (1 / 8, 1 / 4, 1 / 2, 1, 2))
 RADII = np.array([1.5e-3, 2.2e-3])
 """Where the harmonics are told, m."""
 ANGLES = np.linspace(0, 2 * np.pi, 144, endpoint=False)

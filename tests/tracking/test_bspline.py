@@ -81,14 +81,17 @@ def forces(body, slope):
     return (shares[:, :, None] * slope[:, None]).reshape(len(slope), -1)
 
 
-def test_normal_equations_are_those_of_the_dense_problem(random):
+@pytest.mark.parametrize("every", [1, 3])
+def test_normal_equations_are_those_of_the_dense_problem(random, every):
     body = region(MASK, STEP, 0.0, 0.5)
     count = len(body.places)
     slope, weight = random.normal(size=(count, 2)), random.uniform(size=count)
-    design = forces(body, slope)
-    expected = design.T @ (weight[:, None] * design)
     band, cells = np.zeros(body.roughness.shape), body.cells
-    add_matrix(cells.knots, cells.first, cells.across, cells.down, slope, weight, band)
+    add_matrix(cells.knots, cells.first, cells.across, cells.down, slope, weight, every, band)
+    # Every so many of the pixels of a cell count, and each for so many.
+    place = np.arange(count) - np.repeat(cells.first[:-1], np.diff(cells.first))
+    design, counted = forces(body, slope), every * weight * (place % every == 0)
+    expected = design.T @ (counted[:, None] * design)
     np.testing.assert_allclose(dense(band), expected, atol=1e-10)
     x = random.normal(size=len(band))
     np.testing.assert_allclose(product(band, x), expected @ x, atol=1e-9)
@@ -97,6 +100,17 @@ def test_normal_equations_are_those_of_the_dense_problem(random):
     factorise(factor)
     solve(factor, right)
     np.testing.assert_allclose(right, linalg.solve(expected + np.eye(len(x)), x), atol=1e-10)
+
+
+def test_noise_is_its_power_over_that_of_the_speckle_times_the_length_of_speckle_over_the_distance_of_knots(random):
+    body = region(MASK, STEP, 3.0, 0.5)
+    turn = 2 * np.pi / 6
+    slope = turn * np.cos(turn * body.places)
+    template, residual = np.sin(turn * body.places).sum(1), 0.2 * random.standard_normal(len(body.places))
+    weight = random.uniform(size=len(residual))
+    # Power 1, slopes of power turn^2 / 2 along either axis.
+    expected = 0.2**2 * np.sqrt(2) / turn / STEP
+    np.testing.assert_allclose(body._noise(template, residual, weight, slope), expected, rtol=0.1)
 
 
 def test_fit_of_a_flow_becomes_that_by_least_squares_with_its_own_weights(random, monkeypatch):
@@ -127,12 +141,14 @@ def test_alignment_with_a_matrix_held_ends_where_that_with_a_matrix_of_its_own_f
         spline.coefficients(ndimage.gaussian_filter(shifted(80, *by)[:60] / 255, 1)) for by in ([0, 0], [2.7, 1.4])
     ]
     template, start = grey_at(images[0], body.places)[:, 0], np.zeros((body.lattice.size, 2))
+    monkeypatch.setattr(region_module, "STILL", 1e-6)
+    monkeypatch.setattr(region_module, "STEPS", 100)
     held, fresh = (
         monkeypatch.setattr(region_module, "HELD", count)
-        or body.cells.evaluate(body.align(images[1], template, start, start, (8.0, 4.0))[0])
+        or body.cells.evaluate(body.align(images[1], template, start, start, (2000.0, 4.0))[0])
         for count in (region_module.HELD, 1)
     )
-    assert np.abs(held - fresh).max() < 0.01
+    assert np.abs(held - fresh).max() < 0.002
     np.testing.assert_allclose(held.mean(0), [2.7, 1.4], atol=0.01)
 
 
@@ -219,7 +235,7 @@ def test_frame_of_a_ring_turns_with_its_angle():
 def test_correlation_does_not_see_gain_and_offset_but_sees_noise(random):
     places = np.argwhere(MASK)[:, ::-1].astype(float)
     points = np.array([[40.0, 30.0], [20.0, 20.0], [5.0, 5.0]])
-    alike = Likeness(places, np.ones(len(places), bool), points, 16.0)
+    alike = Likeness(places, np.ones(len(places), bool), points, 16.0, 0.0)
     first, noise = random.normal(size=(2, len(places)))
     np.testing.assert_allclose(alike.about_points(first, 3 * first + 2)[:2], 1, atol=1e-9)
     np.testing.assert_allclose(alike.about_points(first, -first)[:2], -1, atol=1e-9)

@@ -33,7 +33,7 @@ ARRAYS: dict[str, dict[str, float]] = {name: dict(zip(_KEYS, row, strict=True)) 
 
 SIDE_MM = 12.0
 """Side of the field of view for which the lengths of trackers are given in their sections."""
-LENGTHS = ("windows_mm", "subset_mm", "knots_mm", "margin_um", "blur_um")
+LENGTHS = ("windows_mm", "subset_mm", "knots_mm", "margin_um", "resolved_um")
 """Keys of trackers that follow `bmode.field_of_view_mm`: walls are the thicker the larger the heart."""
 
 

@@ -14,7 +14,7 @@ POLE = np.float32(np.sqrt(3) - 2)
 MEMORY = 14
 """Samples after which the filter has forgotten: POLE^14 is 1e-8."""
 COLUMNS = 64
-"""Columns that one thread filters at a time."""
+"""Columns, or rows, that one thread filters at a time."""
 
 
 @numba.njit(cache=True)
@@ -48,10 +48,13 @@ def coefficients(samples):
         part = slice(block * COLUMNS, min((block + 1) * COLUMNS, columns))
         padded[1 : rows + 1, 1 + part.start : 1 + part.stop] = samples[:, part]
         filter_rows(padded[1 : rows + 1, 1 + part.start : 1 + part.stop])
-    for row in numba.prange(1, rows + 1):
-        line = padded[row]
-        filter_rows(line[1 : columns + 1].reshape(columns, 1))
-        line[0], line[columns + 1], line[columns + 2] = line[2], line[columns - 1], line[columns - 2]
+    for block in numba.prange((rows + COLUMNS - 1) // COLUMNS):
+        part = padded[1 + block * COLUMNS : 1 + min((block + 1) * COLUMNS, rows)]
+        # Turned, so that many rows go through the recursion at a time.
+        turned = part[:, 1 : columns + 1].T.copy()
+        filter_rows(turned)
+        part[:, 1 : columns + 1] = turned.T
+        part[:, 0], part[:, columns + 1], part[:, columns + 2] = part[:, 2], part[:, columns - 1], part[:, columns - 2]
     padded[0], padded[rows + 1], padded[rows + 2] = padded[2], padded[rows - 1], padded[rows - 2]
     return padded
 

@@ -47,8 +47,8 @@ def grey_at(padded, place):
 
 
 @numba.njit(cache=True, nogil=True)
-def add_matrix(knots, first, across, down, slope, weight, band):
-    """Add the normal matrix of all points to a band.
+def add_matrix(knots, first, across, down, slope, weight, every, band):
+    """Add the normal matrix of every so many points to a band.
 
     Unknown 2 k + c is component c of knot k; band[a, b - a + width - 1] is the entry in row a and column b of the
     lower triangle.
@@ -59,14 +59,16 @@ def add_matrix(knots, first, across, down, slope, weight, band):
         See :class:`echotruth.tracking.bspline.Cells`.
     slope, weight
         Shapes (points, 2) and (points,).
+    every
+        How many points one stands for.
     band
         Shape (unknowns, width); added to.
     """
     local = np.empty((3, 16, 16))
     for cell in range(len(knots)):
         local[:] = 0
-        for point in range(first[cell], first[cell + 1]):
-            _add_point(across[point], down[point], slope[point], weight[point], local)
+        for point in range(first[cell], first[cell + 1], every):
+            _add_point(across[point], down[point], slope[point], every * weight[point], local)
         add_cell(knots[cell], local, band)
 
 

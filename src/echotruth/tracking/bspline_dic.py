@@ -71,15 +71,15 @@ def track(
     if not mask.any():
         return np.full((len(frames), len(points), 2), np.nan), np.full((len(frames), len(points)), np.nan)
     values = settings.si()
-    blur = max(values.blur / spacing, values.blur_px)
+    blur = values.blur_px * np.sqrt(max(0.0, 1 - (values.resolved / spacing) ** 2))
     knots = max(values.knots / spacing, CLOSEST)
     body = region(mask, knots, values.margin / spacing, values.across)
-    likeness = Likeness(body.places, body.inside, points, 2 * knots)
+    likeness = Likeness(body.places, body.inside, points, 2 * knots, values.range)
     times = max(1, min(int(knots / SEEN), min(mask.shape) // SMALLEST))
 
     def prepare(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         bright = amplitudes(np.nan_to_num(frame), values.range)
-        return coarsened(bright, times), ndimage.gaussian_filter(bright, blur)
+        return coarsened(bright, times), ndimage.gaussian_filter(bright, blur) if blur else bright
 
     with ThreadPoolExecutor(2) as threads:
         coarse, blurred = zip(*threads.map(prepare, levels(frames)), strict=True)

@@ -45,8 +45,17 @@ def amplitudes(values: np.ndarray, decibels: float) -> np.ndarray:
     ndarray of the same shape and type
         Less that of black, in such a unit that the faintest are their grey values.
     """
-    nepers = decibels * np.log(10) / 20
-    return np.expm1(nepers * values) / nepers if nepers else values
+    nepers = _nepers(decibels)
+    return (np.exp(nepers * values) - 1) / nepers if nepers else values
+
+
+def steepness(amplitudes: np.ndarray, decibels: float) -> np.ndarray:
+    """Change of :func:`amplitudes` with the grey value, at amplitudes of any shape."""
+    return 1 + _nepers(decibels) * amplitudes
+
+
+def _nepers(decibels: float) -> float:
+    return decibels * np.log(10) / 20
 
 
 def similarity(first: np.ndarray, second: np.ndarray, side: int) -> np.ndarray:

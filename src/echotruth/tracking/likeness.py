@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from echotruth.tracking.bspline import lattice
-from echotruth.tracking.grey import FAINTEST
+from echotruth.tracking.grey import FAINTEST, steepness
 
 
 class Likeness:
-    """Zero-normalised correlation of grey values of the same pixels of the wall.
+    """Zero-normalised correlation of amplitudes at the same pixels of the wall.
 
     Parameters
     ----------
@@ -21,10 +21,12 @@ class Likeness:
         Where the correlation is wanted: lateral, axial, px.
     reach : float
         Half of the width of the weights about a point, px: two cubic B-splines in a row, knots a fourth of it apart.
+    decibels : float
+        As :func:`echotruth.tracking.grey.amplitudes` took it: a grey level is the more, the brighter it is around.
     """
 
-    def __init__(self, places: np.ndarray, inside: np.ndarray, points: np.ndarray, reach: float):
-        self._inside, self._points = inside, points
+    def __init__(self, places: np.ndarray, inside: np.ndarray, points: np.ndarray, reach: float, decibels: float):
+        self._inside, self._points, self._decibels = inside, points, decibels
         self._net = lattice(places, reach / 4)
         self._cells, self._order = self._net.cells(places[inside])
 
@@ -34,7 +36,7 @@ class Likeness:
         Parameters
         ----------
         first, second : ndarray of shape (pixel,)
-            Grey values from 0 to 1.
+            Amplitudes.
 
         Returns
         -------
@@ -46,10 +48,18 @@ class Likeness:
         total, *sums = self._net.at(moments, self._points).T
         a, b, aa, bb, ab = (np.divide(each, total, out=np.full_like(total, np.nan), where=total > 0) for each in sums)
         variances = aa - a * a, bb - b * b
-        product = np.where(np.minimum(*variances) > FAINTEST**2, variances[0] * variances[1], np.nan)
+        product = np.where(
+            self._textured(a, variances[0]) & self._textured(b, variances[1]), np.prod(variances, 0), np.nan
+        )
         return np.clip((ab - a * b) / np.sqrt(product), -1, 1)
 
     def overall(self, first: np.ndarray, second: np.ndarray) -> float:
         """Correlation over all pixels that count; NaN where either has no texture."""
-        a, b = (each[self._inside] - each[self._inside].mean() for each in (first, second))
-        return float(np.mean(a * b) / (a.std() * b.std())) if min(a.std(), b.std()) > FAINTEST else np.nan
+        a, b = first[self._inside], second[self._inside]
+        if not (self._textured(a.mean(), a.var()) and self._textured(b.mean(), b.var())):
+            return np.nan
+        return float(np.mean((a - a.mean()) * (b - b.mean())) / (a.std() * b.std()))
+
+    def _textured(self, mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
+        """Whether amplitudes with such a mean and variance differ by more than a grey level."""
+        return variance > (FAINTEST * steepness(mean, self._decibels)) ** 2

@@ -16,14 +16,20 @@ STEPS = 24
 """Most iterations."""
 HELD = 6
 """Iterations for which the normal matrix stays."""
-STILL = 0.005
-"""Root mean square of the last step, px."""
+STILL = 5e-4
+"""Root mean square of the last step over the distance of the knots."""
 FITS = 3
 """Iterations for a dense flow."""
 LOOSE = 0.1
 """Weight of the roughness of a dense flow, which is smooth already."""
 FINE = 16
 """Pixels between knots above which every other one will do."""
+LEAST = 0.3
+"""Least weight of the roughness, which fills what shows no speckle even where there is no noise."""
+ENOUGH = 40
+"""Pixels of a cell that do for its part of a normal matrix, which only sets how fast a field is found, not which."""
+SAMPLE = 4
+"""Of so many residuals one does for their median."""
 DEVIATION = 1.4826
 """Standard deviation of a Gaussian over the median of its absolute value."""
 ANCHOR = 1e-5
@@ -71,8 +77,8 @@ class Region:
         start, anchor : ndarray of shape (knot, 2)
             Coefficients to begin with, and those from which the change is counted, px.
         stiffness : (float, float)
-            Weight of the roughness over that of the image, and residual over its standard deviation at which a pixel
-            has a quarter of its weight.
+            Weight of the roughness over that of the image were noise as strong as the speckle and speckle as long as
+            the knots are apart, and residual over its standard deviation at which a pixel has a quarter of its weight.
 
         Returns
         -------
@@ -88,11 +94,12 @@ class Region:
             residual = grey[:, 0] - template
             weight = robust(residual, tolerance)
             if iteration % HELD == 0:
-                normal = self._normal(grey[:, 1:], weight, smoothness)
+                rough = max(LEAST, smoothness * self._noise(template, residual, weight, grey[:, 1:]))
+                normal = self._normal(grey[:, 1:], weight, rough, self._every)
             change = self._change(normal, (weight * residual)[:, None] * grey[:, 1:], found - anchor)
             step = self.cells.evaluate(change)
             found, place = found + change, place + step
-            if np.sqrt(np.mean(step**2)) < STILL:
+            if np.sqrt(np.mean(step**2)) < STILL * self.lattice.step:
                 break
         return found, grey_at(image, place)
 
@@ -109,6 +116,10 @@ class Region:
             force = (weight / weight.mean())[:, None] * residual * self._turns
             found = found + self._change(self._even, force, found)
         return found
+
+    @property
+    def _every(self) -> int:
+        return max(1, len(self.places) // (ENOUGH * len(self.cells.knots)))
 
     @cached_property
     def _turns(self) -> np.ndarray:
@@ -136,11 +147,22 @@ class Region:
         lateral, axial = bend.reshape(-1, 2).sum(0)
         return bend - self.shifts[:, 0] * lateral - self.shifts[:, 1] * axial
 
-    def _normal(self, slope: np.ndarray, weight: np.ndarray, smoothness: float) -> tuple[np.ndarray, float]:
-        """Cholesky factor of the normal matrix with its roughness, and the weight that the roughness has in it."""
-        band = np.zeros(self.roughness.shape)
-        cells = self.cells
-        add_matrix(cells.knots, cells.first, cells.across, cells.down, np.ascontiguousarray(slope), weight, band)
+    def _noise(self, template: np.ndarray, residual: np.ndarray, weight: np.ndarray, slope: np.ndarray) -> float:
+        """Noise over speckle, times the length of speckle over the distance of the knots.
+
+        Power of the residuals (pixel,) by their weights over that of the template (pixel,); the length is that over
+        which grey values with these slopes (pixel, 2) change by their standard deviation.
+        """
+        power, steepness = np.var(template), np.sqrt(np.mean(slope**2))
+        noise = np.sum(weight * residual**2) / np.sum(weight)
+        return noise / (np.sqrt(power) * steepness * self.lattice.step or 1.0)
+
+    def _normal(
+        self, slope: np.ndarray, weight: np.ndarray, smoothness: float, every: int = 1
+    ) -> tuple[np.ndarray, float]:
+        """Cholesky factor of the normal matrix of every so many pixels, and the weight that the roughness has in it."""
+        band, cells = np.zeros(self.roughness.shape), self.cells
+        add_matrix(cells.knots, cells.first, cells.across, cells.down, np.ascontiguousarray(slope), weight, every, band)
         scale = band[:, -1].mean() or 1.0
         band += scale * smoothness * self.roughness
         band[:, -1] += scale * ANCHOR
@@ -150,7 +172,7 @@ class Region:
 
 def robust(residual: np.ndarray, tolerance: float) -> np.ndarray:
     """Weights of Geman and McClure for residuals, with their own scale; a quarter where they are `tolerance` of it."""
-    scale = tolerance * DEVIATION * np.median(np.abs(residual))
+    scale = tolerance * DEVIATION * np.median(np.abs(residual[::SAMPLE]))
     return 1 / (1 + (residual / (scale or 1.0)) ** 2) ** 2
 
 
