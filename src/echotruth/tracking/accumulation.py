@@ -90,8 +90,8 @@ def doubt(quality: np.ndarray) -> np.ndarray:
         Sum of 1 / quality^2 - 1, to which the least variance of a shift found by correlation is proportional (Walker
         and Trahey 1995, IEEE Trans Ultrason Ferroelectr Freq Control 42:301); infinite once lost.
     """
-    known = quality > 0
-    return np.cumsum(np.where(known, 1 / np.where(known, quality, 1) ** 2 - 1, np.inf), axis=0)
+    known = np.where(quality > 0, np.minimum(quality, 1), np.nan)
+    return np.cumsum(np.nan_to_num(1 / known**2 - 1, nan=np.inf), axis=0)
 
 
 def _path(pairs: Pairs, frames: np.ndarray, points: np.ndarray, stepwise: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -49,9 +49,9 @@ def amplitudes(values: np.ndarray, decibels: float) -> np.ndarray:
     return (np.exp(nepers * values) - 1) / nepers if nepers else values
 
 
-def steepness(amplitudes: np.ndarray, decibels: float) -> np.ndarray:
-    """Change of :func:`amplitudes` with the grey value, at amplitudes of any shape."""
-    return 1 + _nepers(decibels) * amplitudes
+def steepness(bright: np.ndarray, decibels: float) -> np.ndarray:
+    """Change of :func:`amplitudes` with the grey value, where they are `bright`; of the same shape."""
+    return 1 + _nepers(decibels) * bright
 
 
 def _nepers(decibels: float) -> float:
