@@ -81,6 +81,21 @@ def forces(body, slope):
     return (shares[:, :, None] * slope[:, None]).reshape(len(slope), -1)
 
 
+def affine(body):
+    """Coefficients of the shifts and of what is in proportion to the place, as their values at the pixels ask."""
+    place = body.places / 80
+    motions = np.column_stack([np.ones(len(place)), place])
+    shares = body.cells.evaluate(np.eye(body.lattice.size))
+    return np.kron(np.linalg.lstsq(shares, motions, rcond=None)[0], np.eye(2))
+
+
+def test_shift_and_stretch_of_the_whole_are_not_rough_and_a_bend_is(random):
+    body = region(MASK, STEP, 3.0, 0.5)
+    bend = body._bend(random.normal(size=(2 * body.lattice.size)))
+    for motion in affine(body).T:
+        assert np.abs(body._bend(motion)).max() < 1e-9 * np.abs(bend).max()
+
+
 @pytest.mark.parametrize("every", [1, 3])
 def test_normal_equations_are_those_of_the_dense_problem(random, every):
     body = region(MASK, STEP, 0.0, 0.5)
@@ -125,8 +140,8 @@ def test_fit_of_a_flow_becomes_that_by_least_squares_with_its_own_weights(random
     design = forces(body, np.eye(2)[which])
     gradient = design.T @ (weight / weight.mean() * residual[np.arange(len(flow)), which])
     rough = LOOSE * np.diagonal(design.T @ design).mean() * dense(body.roughness)
-    shift = np.tile(np.eye(2), (body.lattice.size, 1))
-    rough -= rough @ shift @ np.linalg.solve(shift.T @ rough @ shift, shift.T @ rough)
+    whole = affine(body)
+    rough -= rough @ whole @ np.linalg.solve(whole.T @ rough @ whole, whole.T @ rough)
     np.testing.assert_allclose(gradient, -rough @ found.ravel(), atol=1e-6 * np.abs(gradient).max() + 1e-6)
     assert weight[::7].max() < 0.01
     monkeypatch.undo()

@@ -76,7 +76,7 @@ class BsplineDic(Section):
     """Name of the method."""
     knots_mm: Positive = 0.4
     """Distance of the knots, five pixels at least. Default: as suits `bmode.field_of_view_mm`."""
-    margin_um: Annotated[FiniteFloat, Field(ge=0)] = 220.0
+    margin_um: Annotated[FiniteFloat, Field(ge=0)] = 180.0
     """How far around the wall pixels count; its edge shows how it thickens. Default: as suits
     `bmode.field_of_view_mm`."""
     range_dB: Annotated[FiniteFloat, Field(ge=0, le=120)] = 45.0
@@ -85,15 +85,15 @@ class BsplineDic(Section):
     blur_px: Annotated[FiniteFloat, Field(ge=0, le=5)] = 0.6
     """Standard deviation of the Gaussian that blurs images of pixels much larger than `resolved_um`, against their
     aliasing; of pixels of that size, none."""
-    resolved_um: Annotated[FiniteFloat, Field(ge=0)] = 24.0
-    """Size of pixels that show all of the speckle: a quarter of the speed of sound over the bandwidth. Default: as
-    suits `bmode.field_of_view_mm`."""
-    smoothness: Positive = 2200.0
+    resolved_um: Annotated[FiniteFloat, Field(ge=0)] = 16.0
+    """Size of pixels that show all of the speckle: a sixth of the speed of sound over the bandwidth. Default: as suits
+    `bmode.field_of_view_mm`."""
+    smoothness: Positive = 3000.0
     """Weight of the roughness of a step from one frame to the next over that of the images, were noise as strong as the
     speckle and speckle as long as the knots are apart."""
-    across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.25
+    across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2
     """Length of a unit through the wall where roughness is measured; of one along it, 1."""
-    tolerance: Positive = 3.0
+    tolerance: Positive = 4.0
     """Difference of grey values at which a pixel has a quarter of its weight, over their standard deviation."""
     renewal: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.75
     """Correlation of image and template below which the frame before becomes the template."""

@@ -104,6 +104,19 @@ class Lattice:
         across, down = (np.stack(cubic.shares(each), -1) for each in fraction.T)
         return Cells(knots.reshape(-1, 16), np.append(first, len(points)), fraction, across, down), order
 
+    def affine(self) -> np.ndarray:
+        """Coefficients, shape (2 size, 6), of the two shifts and of the four motions in proportion to the place.
+
+        Unknown 2 k + c is component c of knot k; the place of a knot, the middle of the lattice being 0 and half its
+        longer side 1, is itself the coefficient of such a motion.
+        """
+        row, column = np.nonzero(self.number >= 0)
+        place = np.empty((self.size, 2))
+        place[self.number[row, column]] = np.stack([column, row], -1)
+        place = (place - (np.array(self.number.shape[::-1]) - 1) / 2) / (max(self.number.shape) / 2)
+        motions = np.column_stack([np.ones(self.size), place])
+        return np.kron(motions, np.eye(2))
+
     def at(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Fields at points.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import log
+
 import numpy as np
 from scipy import ndimage
 
@@ -55,7 +57,7 @@ def steepness(bright: np.ndarray, decibels: float) -> np.ndarray:
 
 
 def _nepers(decibels: float) -> float:
-    return decibels * np.log(10) / 20
+    return decibels * log(10) / 20
 
 
 def similarity(first: np.ndarray, second: np.ndarray, side: int) -> np.ndarray:

@@ -24,7 +24,7 @@ LOOSE = 0.1
 """Weight of the roughness of a dense flow, which is smooth already."""
 FINE = 16
 """Pixels between knots above which every other one will do."""
-LEAST = 0.3
+LEAST = 3.0
 """Least weight of the roughness, which fills what shows no speckle even where there is no noise."""
 ENOUGH = 40
 """Pixels of a cell that do for its part of a normal matrix, which only sets how fast a field is found, not which."""
@@ -51,9 +51,10 @@ class Region:
         Pixels of the wall itself.
     roughness : ndarray of shape (unknowns, width)
         Band of its matrix, see :mod:`echotruth.tracking.roughness`.
-    shifts : ndarray of shape (unknowns, 2)
-        Its product with the lateral and axial shift of all knots whose product has a sum of 1 over the knots in the
-        lateral and axial component.
+    bent : ndarray of shape (unknowns, 6)
+        Its product with the motions of the whole that count as not rough, see :meth:`Lattice.affine`.
+    freed : ndarray of shape (unknowns, 6)
+        By which the product of `bent` with a field is multiplied to take these motions out of the field's own.
     """
 
     lattice: Lattice
@@ -61,7 +62,8 @@ class Region:
     places: np.ndarray
     inside: np.ndarray
     roughness: np.ndarray
-    shifts: np.ndarray
+    bent: np.ndarray
+    freed: np.ndarray
 
     def align(
         self, image: np.ndarray, template: np.ndarray, start: np.ndarray, anchor: np.ndarray, stiffness: tuple
@@ -133,19 +135,18 @@ class Region:
     def _change(self, normal: tuple[np.ndarray, float], force: np.ndarray, field: np.ndarray) -> np.ndarray:
         """Change of coefficients (knot, 2) against a force (pixel, 2) and the roughness of a field (knot, 2)."""
         factor, rough = normal
-        change = -self.cells.gather(force, self.lattice.size).ravel() - rough * self._bend(field)
+        change = -self.cells.gather(force, self.lattice.size).ravel() - rough * self._bend(field.ravel())
         solve(factor, change)
         return change.reshape(-1, 2)
 
     def _bend(self, change: np.ndarray) -> np.ndarray:
-        """Half the slope of the roughness of a change (knot, 2), shape (unknowns,).
+        """Half the slope of the roughness of a change, both of shape (unknowns,).
 
-        That of the change less the shift of all knots that leaves the least of it: a wall that moves as a whole is not
-        rough, though its components along and across the wall are.
+        That of the change less the affine motion of all knots that leaves the least of it: a wall that is shifted or
+        stretched as a whole is not rough, though its components along and across the wall are.
         """
-        bend = product(self.roughness, change.ravel())
-        lateral, axial = bend.reshape(-1, 2).sum(0)
-        return bend - self.shifts[:, 0] * lateral - self.shifts[:, 1] * axial
+        whole = np.sum(self.bent * change[:, None], 0)
+        return product(self.roughness, change) - np.sum(self.freed * whole, 1)
 
     def _noise(self, template: np.ndarray, residual: np.ndarray, weight: np.ndarray, slope: np.ndarray) -> float:
         """Noise over speckle, times the length of speckle over the distance of the knots.
@@ -202,6 +203,7 @@ def region(mask: np.ndarray, knots: float, margin: float, across: float) -> Regi
     net = lattice(places, knots)
     cells, order = net.cells(places)
     rough = roughness(cells, *(each[order] for each in frame(mask, wide, knots, across)), net.size)
-    shifts = np.stack([product(rough, np.tile(shift, net.size)) for shift in np.eye(2)], -1)
-    shifts = shifts @ np.linalg.pinv(shifts.reshape(-1, 2, 2).sum(0))
-    return Region(net, cells, places[order], mask[wide][order], rough, shifts)
+    affine = net.affine()
+    bent = np.stack([product(rough, each) for each in affine.T], -1)
+    freed = bent @ np.linalg.pinv(affine.T @ bent)
+    return Region(net, cells, places[order], mask[wide][order], rough, bent, freed)
