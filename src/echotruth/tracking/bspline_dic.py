@@ -14,8 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 
+import cv2
 import numpy as np
-from scipy import ndimage
 
 from echotruth.config.tracking import BsplineDic
 from echotruth.imaging import spline
@@ -79,7 +79,8 @@ def track(
 
     def prepare(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         bright = amplitudes(np.nan_to_num(frame), values.range)
-        return coarsened(bright, times), ndimage.gaussian_filter(bright, blur) if blur else bright
+        blurred = cv2.GaussianBlur(bright, (0, 0), blur, borderType=cv2.BORDER_REFLECT) if blur else bright
+        return coarsened(bright, times), blurred
 
     with ThreadPoolExecutor(2) as threads:
         coarse, blurred = zip(*threads.map(prepare, levels(frames)), strict=True)

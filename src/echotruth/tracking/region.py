@@ -14,7 +14,7 @@ from echotruth.tracking.roughness import frame, roughness
 
 STEPS = 24
 """Most iterations."""
-HELD = 6
+HELD = 8
 """Iterations for which the normal matrix stays."""
 STILL = 5e-4
 """Root mean square of the last step over the distance of the knots."""
