@@ -20,6 +20,7 @@ truly is. The results are results/tracking_split.md.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -36,7 +37,7 @@ from echotruth.location import locate
 from echotruth.repository import ledger
 from echotruth.repository.job import Job
 from echotruth.tetrahedra import MaterialPoints, interpolate
-from echotruth.tracking import track
+from echotruth.tracking import cycle, track
 from echotruth.tracking.clip import Clip, clips
 from echotruth.tracking.scoring import Truth, ground_truth, row, score
 
@@ -58,7 +59,7 @@ def nrmse(found: np.ndarray, true: np.ndarray) -> float:
     return float(100 * np.sqrt((error[known] ** 2).sum() / (true[known] ** 2).sum()))
 
 
-def in_plane(job: Job, plane: Plane, truth: Truth, order: np.ndarray) -> np.ndarray:
+def in_plane(job: Job, plane: Plane, truth: Truth, order: Sequence[int]) -> np.ndarray:
     """Displacement (frame, point, 2), m, of points that go with whatever tissue is in the plane, frame by frame."""
     heart, here = job.heart, truth.wall.position
     found = np.zeros_like(truth.displacement)
@@ -127,9 +128,10 @@ def halved(clip: Clip, truth: Truth) -> float:
 def rows(job: Job, view: str) -> list[list[str]]:
     """Lines of the table for one view, one an image size."""
     truth, plane = ground_truth(job), Plane(**job.read("phantom", "origin", "axes"))
-    count, true, found = len(truth.displacement), truth.displacement[truth.es], []
-    forward = nrmse(in_plane(job, plane, truth, np.arange(count))[truth.es], true)
-    backward = nrmse(in_plane(job, plane, truth, np.append(0, np.arange(count - 1, 0, -1)))[truth.es], true)
+    true, found = truth.displacement[truth.es], []
+    forward, backward = (
+        nrmse(in_plane(job, plane, truth, way)[truth.es], true) for way in cycle.ways(len(truth.displacement))
+    )
     given = clips(job)
     free = blobs(job, plane, next(iter(given.values())))
     for size, clip in given.items():

@@ -55,16 +55,9 @@ def test_frame_to_frame_a_lost_point_stays_lost_and_the_others_do_not(points):
     assert not lost[:, 1].any() and (np.isnan(quality) == lost).all()
 
 
-def test_against_end_diastole_a_lost_point_comes_back(points):
-    moved, quality = accumulate(Formula(shear, lost=(3.0,)), FRAMES, points, "ED")
-    lost = np.isnan(moved).any(-1)
-    np.testing.assert_array_equal(lost[:, 0], np.arange(7) == 3)
-    assert (np.isnan(quality) == lost).all()
-    np.testing.assert_allclose(moved[6], shear(points, 6.0) - points, atol=1e-12)
-
-
-def test_around_the_cycle_a_point_lost_on_one_way_is_followed_on_the_other(points):
-    moved, quality = accumulate(Formula(shear, lost=(3.0,)), FRAMES, points, "cycle")
+@pytest.mark.parametrize("reference", ["ED", "cycle"])
+def test_against_end_diastole_and_by_the_other_way_around_the_cycle_a_lost_point_comes_back(points, reference):
+    moved, quality = accumulate(Formula(shear, lost=(3.0,)), FRAMES, points, reference)
     lost = np.isnan(moved).any(-1)
     np.testing.assert_array_equal(lost[:, 0], np.arange(7) == 3)
     assert (np.isnan(quality) == lost).all()
