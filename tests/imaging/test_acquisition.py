@@ -41,7 +41,7 @@ def acquire(twisting_heart, scanner):
     def made(**realism):
         config = Config.model_validate(SMALL | {"realism": realism})
         where = plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
-        seeded = seed(config, twisting_heart, where, random)
+        seeded = seed(config, twisting_heart, where, random, scanner.matrix.in_beam)
         medium = Medium(config, twisting_heart, where, time=TIME, seeded=seeded, random=random)
         return Acquisition(config, scanner, medium, random), medium
 

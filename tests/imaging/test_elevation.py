@@ -6,7 +6,7 @@ from imaging.exact import fresnel
 from scipy.optimize import brentq
 
 from echotruth.config import Probe
-from echotruth.imaging.elevation import FAINT, Lens, bounds
+from echotruth.imaging.elevation import LEFT_OUT, Lens, bounds
 from echotruth.imaging.kernel import Band, Grid
 
 WAVELENGTH = 1540 / 25e6
@@ -67,10 +67,20 @@ def test_growth_is_the_change_of_the_integral_with_range(lens, band):
     assert lens.growth[row, column] == pytest.approx(np.log(high / low) / (2 * step), rel=1e-3)
 
 
-def test_scatterers_far_beside_the_plane_are_left_out_and_those_in_it_take_one_block(lens):
-    blocks = lens.blocks_of(at(np.array([0.0, 6e-3, -7e-3]), 6.5e-3))
-    assert blocks.tolist() == [1, 0, 0]
-    assert FAINT <= 1e-3
+def test_scatterers_far_beside_the_plane_are_out_of_the_beam_and_those_in_it_take_one_block(lens):
+    beside = at(np.array([0.0, 6e-3, -7e-3]), 6.5e-3)
+    assert lens.in_beam(beside).tolist() == [True, False, False]
+    assert lens.blocks_at(lens.places(beside[:1])).tolist() == [1]
+
+
+@pytest.mark.parametrize("depth", [3e-3, 5e-3, 6.5e-3, 10e-3])
+def test_echoes_beyond_the_edge_of_the_beam_have_the_share_of_the_energy_that_may_be_left_out(lens, band, depth):
+    """Summed over evenly spread elevations with the integral itself, a nearer tail than the tables'."""
+    edge = depth * np.interp(1 / depth, lens.curvature, lens.edge)
+    beside = (np.arange(3000) + 0.5) / 3000 * depth
+    heard = np.array([fresnel(Probe(elements=3), at(beside, depth), frequency)[1] for frequency in band.frequency])
+    energy = band.weight @ np.abs(heard) ** 4
+    assert 0.8 * LEFT_OUT < energy[beside > edge].sum() / energy.sum() < 1.2 * LEFT_OUT
 
 
 def test_either_side_of_the_plane_is_alike(lens):
@@ -79,7 +89,7 @@ def test_either_side_of_the_plane_is_alike(lens):
 
 
 def test_near_the_array_it_is_looked_up_from_its_parts(lens):
-    assert [lens.parts(reach) for reach in (3e-3, 6.5e-3)] == [2, 1]
+    assert lens.parts(np.array([3e-3, 6.5e-3])).tolist() == [2, 1]
     position = at(np.linspace(0, 3e-4, 5), 3e-3)
     _, told = lens.lean(position, 1540.0, 2)
     quarter = 16 * Probe().si().pitch

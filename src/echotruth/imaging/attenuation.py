@@ -29,6 +29,8 @@ def separated(rate: Floats, time: Floats) -> tuple[Floats, Floats]:
     courses : ndarray of shape (rank, samples)
     filters : ndarray of shape (rank, bins)
     """
+    if not rate.any():
+        return np.ones((1, len(time))), np.ones((1, len(rate)))
     damping = np.exp(-np.multiply.outer(rate, time))
     left, size, right = np.linalg.svd(damping, full_matrices=False)
     rank = int((size > ERROR * size[0]).sum())

@@ -2,8 +2,7 @@
 
 A pair of elements is one row, and one thread writes a row in the order of the scatterers, so the sums do not depend
 on the number of threads. Kernels come from tables: polynomials in the fraction of a sample, added with factors in which
-a pair differs from others, its colour and its bend, each a sum over the two elements. Two polynomials stand side by
-side in a row, so that one wide vector carries both; the second of them is multiplied by the colour.
+a pair differs from others, its colour and its bend, each a sum over the two elements.
 """
 
 from __future__ import annotations
@@ -16,21 +15,28 @@ from numba.core.cgutils import get_or_insert_function
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-from echotruth.imaging.directivity import SLOPE, VALUE, WIDEST, polynomial
-from echotruth.imaging.kernel import PHASE_BITS, PHASES, TAPS
+from echotruth.imaging.directivity import STEPS
+from echotruth.imaging.kernel import TAPS
 
 FRACTION_BITS = 18
 """Times are integers in units of 2^-18 samples, so that the sum over both ways is exact."""
 LEAD = 32
 """Samples of a row before time 0: room for what of a kernel comes before its echo."""
 
-ROWS = {1: (2, 1, 2, 0), 2: (2, 1, 0, 0), 3: (3, 2, 1, 0), 4: (2, 1, 2, 1)}
-"""Rows of a table for every phase, by the number of a scheme: so many for a pair of polynomials, then for one that is
-multiplied by the square of the colour, for one that is multiplied by the bend and for one by the skew.
-There are as many rows as a polynomial has coefficients, the highest power first."""
+ROWS = {
+    1: (2, 1, 0, 0, 1, 0, 0),
+    2: (2, 2, 1, 1, 0, 0, 0),
+    3: (3, 3, 2, 2, 1, 1, 0),
+    4: (2, 1, 0, 0, 1, 0, 1),
+}
+"""Rows of a table for every phase, by the number of a scheme: as many as the polynomial of a term has coefficients, the
+highest power first. Terms are multiplied by 1, e, e^2, e^3, g, g e and the skew, e being the colour and g the bend."""
+PHASE_BITS = (0, 3, 4, 4, 3)
+"""By the number of a scheme: its polynomials are in the fraction of a sample within each of 2^bits phases."""
 APART = 4
 """Scheme for echoes that parts of the array look up apart."""
-PAIR = 2 * TAPS
+LANES = 8
+"""Pairs whose terms are worked out at a time."""
 LARGEST = 0.3
 """Greatest change, logarithm of the amplitude or radians, that an element makes of what its lens hears."""
 SHARES = 32
@@ -58,15 +64,28 @@ class _Vectors:
     def load(self, address, place=0):
         return self._builder.load(self._builder.gep(address, [ir.Constant(ir.IntType(64), place)]), align=4)
 
+    def place(self, kind, array, row, column):
+        """Address of an element of a matrix."""
+        found = self._context.make_array(kind)(self._context, self._builder, array)
+        width = self._builder.extract_value(found.shape, 1)
+        row = ir.Constant(width.type, row) if isinstance(row, int) else row
+        return self._builder.gep(found.data, [self._builder.add(self._builder.mul(width, row), column)])
+
+    def lanes(self, kind, array, row, column):
+        """Address of LANES neighbours in a row of a matrix, as a vector."""
+        place = self.place(kind, array, row, column)
+        return self._builder.bitcast(place, ir.VectorType(place.type.pointee, LANES).as_pointer())
+
+    def filled(self, scalar):
+        """A vector of LANES times a scalar of any type."""
+        kind = ir.VectorType(scalar.type, LANES)
+        one = self._builder.insert_element(ir.Constant(kind, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
+        return self._builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined), _lanes([0] * LANES))
+
     def spread(self, scalar, width):
         nothing = ir.Constant(_vector(width), ir.Undefined)
         one = self._builder.insert_element(nothing, scalar, ir.Constant(ir.IntType(32), 0))
         return self._builder.shuffle_vector(one, nothing, _lanes([0] * width))
-
-    def part(self, vector, start):
-        """TAPS numbers of a vector of PAIR."""
-        nothing = ir.Constant(_vector(PAIR), ir.Undefined)
-        return self._builder.shuffle_vector(vector, nothing, _lanes(range(start, start + TAPS)))
 
     def fused(self, a, b, c):
         """a b + c, rounded once: what comes out must not hang on how a compiler joins sums and products."""
@@ -91,32 +110,38 @@ def _lanes(places):
 
 
 @intrinsic
-def add_kernel(typing_context, traces, start, table, row, scheme, weight, fraction, colour, bend, skew):  # noqa: PLR0913, PLR0917
-    """traces[start:start + TAPS] += weight * kernel, as vectors, the kernel from the rows of a table at `row`.
+def add_kernel(typing_context, traces, start, tables, scheme, places, factors, pair):  # noqa: PLR0913, PLR0917
+    """traces[start + place:][:TAPS] += weight * kernel, as vectors, for the element `pair` of some pairs.
 
-    `scheme` is a tuple whose length is that of :data:`ROWS`: it is known when this is compiled, and the sums are
-    unrolled.
+    `places` (2, pairs), int32, are the sample where the kernel begins and where its rows begin in the tables; `factors`
+    (5, pairs), float32, are weight, fraction of a sample, colour, bend and skew. `scheme` is a tuple whose length is
+    that of :data:`ROWS`: it is known when this is compiled, and the sums are unrolled.
     """
-    single = types.Array(types.float32, 1, "C")
-    if traces != single or table != single:
-        raise TypingError("traces and table must be contiguous float32 vectors")
-    signature = types.void(traces, types.intp, table, types.intp, scheme, *[types.float32] * 5)
+    single, integers = types.Array(types.float32, 1, "C"), types.Array(types.int32, 2, "C")
+    if (traces, tables, places, factors) != (single, single, integers, types.Array(types.float32, 2, "C")):
+        raise TypingError("add_kernel takes contiguous vectors of float32, places of int32 and factors of float32")
+    signature = types.void(traces, types.intp, tables, scheme, places, factors, types.intp)
 
     def generate(context, builder, signature, arguments):
-        traces, start, table, row, _, weight, fraction, colour, bend, skew = arguments
-        vectors = _Vectors(context, builder)
-        rows = vectors.address(signature.args[2], table, row, PAIR)
-        fraction = vectors.spread(fraction, PAIR)
+        traces, start, tables, _, places, factors, pair = arguments
+        vectors, kinds = _Vectors(context, builder), signature.args
+
+        def of_pair(argument, array, row):
+            return builder.load(vectors.place(kinds[argument], array, row, pair))
+
+        place, row = (builder.sext(of_pair(4, places, k), pair.type) for k in range(2))
+        weight, fraction, colour, bend, skew = (of_pair(5, factors, k) for k in range(5))
+        rows = vectors.address(kinds[2], tables, row, TAPS)
+        fraction = vectors.spread(fraction, TAPS)
         first, *others = ROWS[len(scheme)]
-        value, place = vectors.polynomial(rows, 0, first, fraction), first
+        kernel, at = vectors.polynomial(rows, 0, first, fraction), first
         square = builder.fmul(colour, colour)
-        for count, factor in zip(others, (square, bend, skew), strict=True):
+        terms = colour, square, builder.fmul(square, colour), bend, builder.fmul(bend, colour), skew
+        for count, factor in zip(others, terms, strict=True):
             if count:
-                both = vectors.polynomial(rows, place, count, fraction)
-                value = vectors.fused(both, vectors.spread(factor, PAIR), value)
-                place += count
-        kernel = vectors.fused(vectors.part(value, TAPS), vectors.spread(colour, TAPS), vectors.part(value, 0))
-        target = vectors.address(signature.args[0], traces, start, TAPS)
+                term = vectors.polynomial(rows, at, count, fraction)
+                kernel, at = vectors.fused(term, vectors.spread(factor, TAPS), kernel), at + count
+        target = vectors.address(kinds[0], traces, builder.add(start, place), TAPS)
         total = vectors.fused(vectors.spread(weight, TAPS), kernel, vectors.load(target))
         builder.store(total, target, align=4)
         return context.get_dummy_value()
@@ -124,8 +149,58 @@ def add_kernel(typing_context, traces, start, table, row, scheme, weight, fracti
     return signature, generate
 
 
-@numba.njit(parallel=True, cache=True)
-def one_way(position, centres, scales, tilts, lean, time, weight, colour, bend):  # noqa: PLR0913, PLR0917
+@intrinsic
+def add_terms(typing_context, time, weight, colour, bend, k, j, element, table, scheme, places, factors):  # noqa: PLR0913, PLR0917
+    """Write what :func:`add_kernel` takes of one element with LANES others from the `j`-th on, for scatterer `k`.
+
+    `element` holds its time, its weight times the amplitude, colour and bend, and 1 where the square of the colour is
+    taken off the bend; `table` where the table of the scatterer begins and the numbers in the rows of a phase.
+    """
+    matrix, integers = types.Array(types.float32, 2, "C"), types.Array(types.int32, 2, "C")
+    if (time, weight, colour, bend, places, factors) != (integers, *[matrix] * 3, integers, matrix):
+        raise TypingError("add_terms takes matrices of float32, and times and places of int32")
+    signature = types.void(time, weight, colour, bend, types.intp, types.intp, element, table, scheme, places, factors)
+
+    def generate(context, builder, signature, arguments):
+        *others, k, j, element, table, _, places, factors = arguments
+        vectors, kinds = _Vectors(context, builder), signature.args
+        time, weight, colour, bend = (
+            builder.load(vectors.lanes(kind, array, k, j), align=4)
+            for kind, array in zip(kinds[:4], others, strict=True)
+        )
+        late, loud, hue, bent, own = (vectors.filled(builder.extract_value(element, n)) for n in range(5))
+        base, size = (vectors.filled(builder.extract_value(table, n)) for n in range(2))
+
+        def whole(number):
+            return vectors.filled(ir.Constant(ir.IntType(32), number))
+
+        bits = FRACTION_BITS - PHASE_BITS[len(scheme)]
+        at = builder.add(late, time)
+        phase = builder.and_(builder.ashr(at, whole(bits)), whole((1 << PHASE_BITS[len(scheme)]) - 1))
+        rest = builder.sitofp(builder.and_(at, whole((1 << bits) - 1)), weight.type)
+        unit = vectors.filled(ir.Constant(ir.FloatType(), 2.0**-FRACTION_BITS))
+        both = builder.fadd(hue, colour)
+        contrast = builder.fmul(builder.fmul(own, both), both)
+        found = (
+            (builder.ashr(at, whole(FRACTION_BITS)), builder.add(builder.mul(phase, size), base)),
+            (
+                builder.fmul(loud, weight),
+                builder.fmul(rest, unit),
+                both,
+                builder.fsub(builder.fadd(bent, bend), contrast),
+                builder.fsub(bent, bend),
+            ),
+        )
+        for kind, array, rows in zip(kinds[-2:], (places, factors), found, strict=True):
+            for row, value in enumerate(rows):
+                builder.store(value, vectors.lanes(kind, array, row, j), align=4)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@numba.njit(parallel=True, cache=True, error_model="numpy")
+def one_way(position, centres, scales, directivity, tilts, lean, time, weight, colour, bend):  # noqa: PLR0913, PLR0917
     """Travel time, amplitude and colour between every scatterer and every element.
 
     Parameters
@@ -135,8 +210,10 @@ def one_way(position, centres, scales, tilts, lean, time, weight, colour, bend):
     centres
         Shape (elements,), m.
     scales
-        Sampling frequency over the speed of sound, 1/m; square of pi times the width of an element in wavelengths;
-        attenuation at the centre frequency, 1/m; wavelengths at the centre frequency per m.
+        Sampling frequency over the speed of sound, 1/m; attenuation at the centre frequency, 1/m; wavelengths at the
+        centre frequency per m.
+    directivity
+        As :func:`~echotruth.imaging.directivity.tabulated`.
     tilts
         Shape (scatterers,): b of the kind of pulse of each (see :mod:`~echotruth.imaging.directivity`).
     lean
@@ -148,28 +225,33 @@ def one_way(position, centres, scales, tilts, lean, time, weight, colour, bend):
         directivity and the loss over the distance (spherical spreading, 1/r on each way). The bend is 1/range beyond
         that from the centre of its part, 1/m, under a lens, and else twice the square of the colour.
     """
-    samples, square, loss, waves = scales
+    samples, loss, waves = scales
     unit = samples * (1 << FRACTION_BITS)
     elements, parts = len(centres), lean.shape[1]
     for k in numba.prange(len(position)):
-        axial = position[k, 1] * position[k, 1]
-        beside = position[k, 2] * position[k, 2]
+        axial, beside = position[k, 1] * position[k, 1], position[k, 2] * position[k, 2]
         for element in range(elements):
             lateral = (position[k, 0] - centres[element]) ** 2
             square_distance = lateral + axial + beside
             distance = np.sqrt(square_distance)
-            wide = square * lateral / square_distance
-            strength = polynomial(VALUE, wide) * position[k, 1] / square_distance * np.exp(-loss * distance)
-            wide = min(wide, WIDEST)
-            hue = 2 * wide * polynomial(SLOPE, wide) / polynomial(VALUE, wide) - tilts[k]
+            step = STEPS * lateral / square_distance
+            row = int(step)
+            rest = step - row
+            strength = directivity[row, 0] + rest * (directivity[row + 1, 0] - directivity[row, 0])
+            hue = directivity[row, 1] + rest * (directivity[row + 1, 1] - directivity[row, 1]) - tilts[k]
+            strength *= position[k, 1] / square_distance
             colour[k, element] = hue
+            if loss > 0:
+                strength *= np.exp(-loss * distance)
             if len(lean):
                 middle, delay, louder, later = lean[k, element * parts // elements]
                 away = 1 / np.sqrt(lateral + axial) - middle
                 bend[k, element] = away
                 # To first order; beyond that, beside the beam, it would grow without bounds.
                 distance += delay - min(max(later * away, -LARGEST), LARGEST) / (2 * np.pi * waves)
-                strength *= np.exp(min(max(louder * away, -LARGEST), LARGEST))
+                grown = min(max(louder * away, -LARGEST), LARGEST)
+                # The exponential of so little is its Taylor polynomial to 2e-5.
+                strength *= 1 + grown * (1 + grown * (1 / 2 + grown * (1 / 6 + grown / 24)))
             else:
                 bend[k, element] = 2 * hue * hue
             time[k, element] = np.int32(distance * unit + 0.5)
@@ -186,7 +268,7 @@ def add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, s
         Shape (pairs, samples), float32; added to. Sample LEAD is time 0. Pairs (i, j), i <= j, in the order of
         `numpy.triu_indices`.
     time, weight, colour, bend
-        As :func:`one_way` writes them, shape (scatterers, elements).
+        As :func:`one_way` writes them, shape (scatterers, elements or more, a multiple of LANES).
     amplitude
         Shape (scatterers,), float32.
     entries
@@ -203,17 +285,15 @@ def add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, s
     scheme
         Tuple of the length by which the rows are listed in :data:`ROWS`.
     """
-    elements, samples = time.shape[1], traces.shape[1]
+    elements, samples, width = bounds[-1], traces.shape[1], time.shape[1]
     flat = traces.reshape(traces.size)
-    rest_bits = FRACTION_BITS - PHASE_BITS
-    rest = (1 << rest_bits) - 1
-    unit = np.float32(1 / (1 << FRACTION_BITS))
     own = np.float32(lens == 0)
     for number in numba.prange(SHARES):
+        places, factors = np.empty((2, width), np.int32), np.empty((5, width), np.float32)
         for entry in range(len(entries)):
             k, base, shift, sender, listener = entries[entry]
             first, last, nearest, beyond = 0, elements, 0, elements
-            if len(scheme) == APART:  # known when this is compiled: that no index is negative is seen for the others
+            if len(scheme) == APART:
                 first, last = bounds[sender], bounds[sender + 1]
                 nearest, beyond = bounds[listener], bounds[listener + 1]
             for start in range(0, elements, SHARES):
@@ -221,18 +301,13 @@ def add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, s
                 i = start + (np.int64(number) if start // SHARES % 2 == 0 else SHARES - 1 - np.int64(number))
                 if i < first or i >= last:
                     continue
-                loud, late = weight[k, i] * amplitude[k], np.int64(time[k, i])
-                hue, bent = colour[k, i], bend[k, i]
+                element = time[k, i], weight[k, i] * amplitude[k], colour[k, i], bend[k, i], own
+                table = np.int32(base), np.int32(size)
+                for j in range(max(i, nearest) // LANES * LANES, beyond, LANES):
+                    add_terms(time, weight, colour, bend, k, j, element, table, scheme, places, factors)
                 row = (i * elements - i * (i + 1) // 2) * samples + LEAD + shift
                 for j in range(max(i, nearest), beyond):
-                    at = late + time[k, j]
-                    phase = base + ((at >> rest_bits) & (PHASES - 1)) * size
-                    fraction = np.float32(at & rest) * unit
-                    place = row + j * samples + (at >> FRACTION_BITS)
-                    both = hue + colour[k, j]
-                    between = bent + bend[k, j] - own * both * both
-                    skew, strong = bent - bend[k, j], loud * weight[k, j]
-                    add_kernel(flat, place, tables, phase, scheme, strong, fraction, both, between, skew)
+                    add_kernel(flat, row + j * samples, tables, scheme, places, factors, j)
 
 
 @numba.njit(parallel=True, cache=True)

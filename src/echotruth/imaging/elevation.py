@@ -19,8 +19,8 @@ from echotruth.imaging.kernel import Band, fit, stacked
 
 Floats = NDArray[np.float64]
 
-FAINT = 1e-3
-"""Scatterers whose echo is fainter than this because of their elevation are left out; in the focus it is 1."""
+LEFT_OUT = 1.4e-4
+"""Energy of the echoes that are left out beside the beam, over that of all echoes from scatterers at the same range."""
 MOST_BLOCKS = 4
 """Blocks of samples that the longest echoes get; what is longer is cut."""
 LEFT = 3e-5
@@ -62,7 +62,10 @@ class Lens:
     growth : ndarray of shape (CURVATURES, slopes), m
         g: real part that of the amplitude, imaginary part that of the phase.
     blocks : ndarray of shape (CURVATURES, slopes), uint8
-        Blocks of samples that an echo needs; 0 where it is fainter than `FAINT`.
+        Blocks of samples that an echo needs.
+    edge : ndarray of shape (CURVATURES,)
+        Slope at which the beam ends: scatterers evenly spread beyond it together have the share `LEFT_OUT` of the
+        energy of all at that range.
     accurate_from : float, m
         Range from which on no kernel is cut by more than `CUT`, and `MOST_PARTS` of the array are enough.
     """
@@ -83,6 +86,7 @@ class Lens:
         self.change = (turned * change).astype(np.complex64)
         self.beam = (turned * beam).astype(np.complex64)
         self.blocks, missed = _blocks(self.beam**2, band)
+        self.edge = _edge(self.beam**2, band, self.slope)
         self._elements, self._half = p.elements, p.elements * p.pitch / 2
         self._number = p.height**2 * p.frequency / (4 * p.sound_speed)
         longest = np.cbrt(self._number * self._half**2 / (WIDEST_PART * MOST_PARTS**2))
@@ -92,20 +96,20 @@ class Lens:
         """Rows and columns of scatterers (n, 3), m, in the tables: (n, 2), within them."""
         return self.lean(position, 1.0)[0][:, 0]
 
-    def blocks_of(self, position: Floats) -> NDArray[np.int64]:
-        """Blocks of samples that the echoes of scatterers (n, 3), m, need: (n,); 0 where they are too faint."""
-        steep = np.abs(position[:, 2]) > STEEPEST * np.hypot(position[:, 0], position[:, 1])
-        return np.where(steep, 0, self.blocks_at(self.places(position)))
+    def in_beam(self, position: Floats) -> NDArray[np.bool_]:
+        """Which scatterers at positions (n, 3), m, are within the beam, (n,)."""
+        curvature = 1 / np.hypot(position[:, 0], position[:, 1])
+        return np.abs(position[:, 2]) * curvature <= np.interp(curvature, self.curvature, self.edge)
 
     def blocks_at(self, places: Floats) -> NDArray[np.int64]:
-        """The same at places (..., 2) in the tables: (...)."""
+        """Blocks of samples that echoes at places (..., 2) in the tables need: (...)."""
         place = np.rint(places).astype(np.intp)
         return self.blocks[place[..., 0], place[..., 1]].astype(np.int64)
 
-    def parts(self, reach: float) -> int:
-        """Parts of the array from which scatterers at a range, m, and beyond are looked up apart."""
+    def parts(self, reach: Floats) -> NDArray[np.int64]:
+        """Parts of the array from which scatterers at ranges (n,), m, are looked up apart: (n,)."""
         needed = np.sqrt(self._number * self._half**2 / (WIDEST_PART * reach**3))
-        return int(np.clip(np.ceil(needed), 1, min(MOST_PARTS, self._elements)))
+        return np.clip(np.ceil(needed), 1, min(MOST_PARTS, self._elements)).astype(np.int64)
 
     def lean(self, position: Floats, sound_speed: float, parts: int = 1) -> tuple[Floats, Floats]:
         """Places of scatterers (n, 3), m, in the tables, (n, parts, 2), from the centre of each part of the array, and
@@ -206,5 +210,14 @@ def _blocks(spectrum: NDArray, band: Band) -> tuple[NDArray[np.uint8], Floats]:
     left = [np.square(asked @ fit(band, blocks, 0.3)[1].T).sum(axis=-1) for blocks in range(1, MOST_BLOCKS + 1)]
     for blocks in range(MOST_BLOCKS - 1, 0, -1):
         needed[left[blocks - 1] <= LEFT * greatest] = blocks
-    needed[energy < FAINT**2] = 0
     return needed, np.sqrt((left[-1] / greatest).max(axis=1))
+
+
+def _edge(spectrum: NDArray, band: Band, slope: Floats) -> Floats:
+    """Slope beyond which scatterers evenly spread over elevation have the share `LEFT_OUT` of the energy of all.
+
+    Of pulses (curvatures, slopes, NODES): (curvatures,).
+    """
+    energy = (np.abs(spectrum) ** 2 * band.weight).sum(axis=-1)
+    outside = energy[:, ::-1].cumsum(axis=1)[:, ::-1] / energy.sum(axis=1, keepdims=True)
+    return slope[np.minimum((outside > LEFT_OUT).sum(axis=1), len(slope) - 1)]

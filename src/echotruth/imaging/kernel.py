@@ -17,9 +17,6 @@ Floats = NDArray[np.float64]
 
 TAPS = 8
 """Samples of a block of a kernel."""
-PHASE_BITS = 4
-"""A kernel is a polynomial in the fraction of a sample within each of 2^4 phases."""
-PHASES = 2**PHASE_BITS
 NODES = 24
 """Frequencies at which spectra are sampled."""
 
@@ -115,7 +112,7 @@ def fit(band: Band, blocks: int, fraction: float) -> tuple[Floats, Floats]:
     return taps, asked - reached @ taps
 
 
-def fits(band: Band, blocks: int, degree: int) -> Floats:
+def fits(band: Band, blocks: int, degree: int, phases: int) -> Floats:
     """Maps from a spectrum to the polynomials in the fraction of a sample, for every phase.
 
     Parameters
@@ -124,18 +121,20 @@ def fits(band: Band, blocks: int, degree: int) -> Floats:
     blocks : int
     degree : int
         Of the polynomials.
+    phases : int
+        Equal parts of a sample, each with a polynomial of its own.
 
     Returns
     -------
-    ndarray of shape (blocks, PHASES, degree + 1, TAPS, 2 NODES)
+    ndarray of shape (blocks, phases, degree + 1, TAPS, 2 NODES)
         The coefficient of the highest power first; the variable is the fraction of a sample beyond the phase.
     """
-    cell = 1 / PHASES
+    cell = 1 / phases
     nodes = cell * (0.5 - 0.5 * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1)))
     powers = np.linalg.inv(np.vander(nodes, degree + 1))
-    found = np.stack([[fit(band, blocks, phase * cell + node)[0] for node in nodes] for phase in range(PHASES)])
+    found = np.stack([[fit(band, blocks, phase * cell + node)[0] for node in nodes] for phase in range(phases)])
     coefficients = np.einsum("dn,pntf->pdtf", powers, found)
-    return coefficients.reshape(PHASES, degree + 1, blocks, TAPS, -1).transpose(2, 0, 1, 3, 4)
+    return coefficients.reshape(phases, degree + 1, blocks, TAPS, -1).transpose(2, 0, 1, 3, 4)
 
 
 def stacked(spectra: NDArray[np.complex128]) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -10,19 +10,22 @@ from numpy.typing import NDArray
 
 from echotruth.config import Config
 from echotruth.heart import Heart
-from echotruth.imaging.blood import Blood, fill
+from echotruth.imaging.blood import Blood, Cavity, fill
 from echotruth.imaging.course import Random, fading, wandering
 from echotruth.imaging.phantom import Scatterers, scatter
 from echotruth.imaging.surroundings import Following, outside, surround
 from echotruth.imaging.view import Plane
 from echotruth.location import locate
-from echotruth.tetrahedra import Floats, MaterialPoints
+from echotruth.mechanics.loop import read_loop
+from echotruth.tetrahedra import Floats, MaterialPoints, interpolate
 
 Arrays = dict[str, NDArray[Any]]
+InBeam = Callable[[Floats], NDArray[np.bool_]]
+"""Positions in the image (n, 3), m, to whether they are within the beam, (n,)."""
 
 
-def seed(config: Config, heart: Heart, plane: Plane, random: Random) -> Arrays:
-    """Everything that echoes in a view, as arrays that can be handed on.
+def seed(config: Config, heart: Heart, plane: Plane, random: Random, in_beam: InBeam) -> Arrays:
+    """Everything that echoes in a view, as arrays that can be handed on; what no frame's beam reaches is left out.
 
     Parameters
     ----------
@@ -31,22 +34,59 @@ def seed(config: Config, heart: Heart, plane: Plane, random: Random) -> Arrays:
     plane : Plane
     random : Random
         Of each kind of scatterer.
+    in_beam : callable
+        As :meth:`echotruth.imaging.rf.FullMatrix.in_beam`.
 
     Returns
     -------
     dict of ndarray
         cell, xi and amplitude of the scatterers in the wall; blood_* and around_* where there are such.
     """
+    frames = [heart.positions(frame) for frame in range(len(heart.displacement))]
     wall = scatter(config, heart, plane, random("phantom"))
     arrays: Arrays = {"cell": wall.points.cell, "xi": wall.points.xi, "amplitude": wall.amplitude}
+    arrays = _ever(arrays, (wall.image(nodes, heart.cells, plane) for nodes in frames), in_beam)
     if config.realism.blood.level_dB is not None:
-        blood = fill(config, heart, random("blood"))
-        arrays |= {"blood_cell": blood.points.cell, "blood_xi": blood.points.xi}
-        arrays |= {"blood_room": blood.room, "blood_amplitude": blood.amplitude}
+        blood, cavity = fill(config, heart, random("blood")), Cavity(heart.endo)
+        found = {"blood_cell": blood.points.cell, "blood_xi": blood.points.xi}
+        found |= {"blood_room": blood.room, "blood_amplitude": blood.amplitude}
+        carried = (interpolate(cavity.positions(nodes), cavity.cells, blood.points) for nodes in frames)
+        reach = FARTHEST * diffusion(config, read_loop(config.loop).period)
+        arrays |= _ever(found, (_nearer(plane.image(place), reach) for place in carried), in_beam)
     if config.realism.surroundings.level_dB is not None:
         around = surround(config, heart, plane, random("surroundings"))
-        arrays |= {"around_position": around.position, "around_amplitude": around.amplitude}
+        moves = Following(heart, around.position, config.realism.surroundings.si().follow)
+        found = {"around_position": around.position, "around_amplitude": around.amplitude}
+        arrays |= _ever(found, (plane.image(moves(frame)) for frame in range(len(frames))), in_beam)
     return arrays
+
+
+def _ever(arrays: Arrays, places: Iterable[Floats], in_beam: InBeam) -> Arrays:
+    """Of arrays over scatterers, those that are in the beam in any frame; places (n, 3), m, are those of each."""
+    inside = np.logical_or.reduce([in_beam(place) for place in places])
+    return {name: values[inside] for name, values in arrays.items()}
+
+
+def _nearer(place: Floats, distance: float) -> Floats:
+    """Places (n, 3), m, moved to the plane by a distance, m, or into it."""
+    beside = np.maximum(np.abs(place[:, 2]) - distance, 0)
+    return np.column_stack([place[:, :2], beside])
+
+
+FARTHEST = 5
+"""How far blood is taken to diffuse over a cycle, over the standard deviation of its offset."""
+
+
+def diffusion(config: Config, period: float) -> float:
+    """Standard deviation of the offset of blood after a time, s, along an axis, m; see :func:`wandering`."""
+    constant, wavelength = _flow(config)
+    return float(np.sqrt(2 * period / constant) * wavelength / (4 * np.pi))
+
+
+def _flow(config: Config) -> tuple[float, float]:
+    """Time in which the echo of blood is another, s, and the wavelength, m."""
+    probe = config.probe.si()
+    return config.realism.blood.si().time, probe.sound_speed / probe.frequency
 
 
 class Medium:
@@ -75,9 +115,7 @@ class Medium:
         if "blood_cell" in seeded:
             points = MaterialPoints(seeded["blood_cell"], seeded["blood_xi"])
             self._blood = Blood(points, seeded["blood_room"], seeded["blood_amplitude"])
-            wavelength = config.probe.si().sound_speed / config.probe.si().frequency
-            constant = config.realism.blood.si().time
-            self._flow = wandering(len(points), time, constant, wavelength, random)
+            self._flow = wandering(len(points), time, *_flow(config), random)
         if "around_position" in seeded:
             self._around = Following(heart, seeded["around_position"], config.realism.surroundings.si().follow)
             self._around_strength = self._speckle(seeded["around_amplitude"], time, "surroundings", random)

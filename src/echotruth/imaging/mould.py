@@ -13,10 +13,8 @@ from numba import types
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
-from echotruth.imaging.kernel import PHASES, TAPS
+from echotruth.imaging.kernel import TAPS
 
-SKEW = 5
-"""Row of the difference of what the change at either element makes, in a table that has one."""
 
 
 @intrinsic
@@ -45,14 +43,14 @@ def mould(places, kinds, beams, shapes, linear, constant, entries, tables):
     beams
         What an element hears and its change, two of shape (curvatures, slopes, nodes), complex64.
     shapes
-        For all angles, shape (KINDS, 4, nodes), float32.
+        For all angles, shape (KINDS, 2, nodes), float32.
     linear, constant
-        Maps from spectra to polynomials of that degree, float32, shape (blocks, 2 nodes, PHASES 2 TAPS) and (blocks,
-        2 nodes, PHASES TAPS).
+        Maps from spectra to polynomials of that degree, float32, shape (blocks, 2 nodes, phases 2 TAPS) and (blocks,
+        2 nodes, phases TAPS).
     entries
         Blocks to make, shape (entries, 4): scatterer, block, part that sends and part that listens.
     tables
-        Written: shape (entries, PHASES, 5, 2, TAPS), float32, or 6 in the place of 5 where there is a row for the skew.
+        Written: shape (entries, phases, 4, TAPS), float32, or 5 in the place of 4 where there is a row for the skew.
     """
     nodes = beams[0].shape[2]
     for entry in numba.prange(len(entries)):
@@ -61,34 +59,34 @@ def mould(places, kinds, beams, shapes, linear, constant, entries, tables):
         heard, other = sent, grown
         if listener != sender:
             heard, other = between(beams[0], places[k, listener]), between(beams[1], places[k, listener])
-        # Terms: the echo, its change, the echo once more, the skew; two shapes; real and imaginary parts.
-        weights = np.empty((4, 2, 2, nodes), np.float32)
-        for half in range(2):
-            shape, square = shapes[kinds[k], half], shapes[kinds[k], 2 + half]
-            real, imaginary = weights[:, half, 0], weights[:, half, 1]
-            for node in range(nodes):
-                pulse, one, two = sent[node] * heard[node], grown[node] * heard[node], sent[node] * other[node]
-                change, skew, part = one + two, one - two, np.float32(0.5) * shape[node]
-                real[0, node], imaginary[0, node] = pulse.real * shape[node], pulse.imag * shape[node]
-                real[1, node], imaginary[1, node] = change.real * part, change.imag * part
-                real[2, node], imaginary[2, node] = pulse.real * square[node], pulse.imag * square[node]
-                real[3, node], imaginary[3, node] = skew.real * part, skew.imag * part
-        write(tables[entry], weights.reshape(4, 2, 2 * nodes), linear[block], constant[block])
+        # Terms: the echo, its colour, its change and the skew; real and imaginary parts.
+        weights = np.empty((4, 2, nodes), np.float32)
+        shape, colour = shapes[kinds[k], 0], shapes[kinds[k], 1]
+        for node in range(nodes):
+            pulse, one, two = sent[node] * heard[node], grown[node] * heard[node], sent[node] * other[node]
+            half = np.float32(0.5) * shape[node]
+            change, skew = (one + two) * half, (one - two) * half
+            weights[0, 0, node], weights[0, 1, node] = pulse.real * shape[node], pulse.imag * shape[node]
+            weights[1, 0, node], weights[1, 1, node] = pulse.real * colour[node], pulse.imag * colour[node]
+            weights[2, 0, node], weights[2, 1, node] = change.real, change.imag
+            weights[3, 0, node], weights[3, 1, node] = skew.real, skew.imag
+        write(tables[entry], weights.reshape(4, 2 * nodes), linear[block], constant[block])
 
 
 @numba.njit(cache=True)
 def write(table, weights, linear, constant):
-    """Fill the rows (PHASES, 5 or 6, 2, TAPS) of a table from the weights (4, 2, 2 nodes) of its terms."""
-    echo, change = combined(weights[0], linear), combined(weights[1], linear)
-    square = combined(weights[2], constant)
-    for half in range(2):
-        table[:, :2, half] = echo[half].reshape(PHASES, 2, TAPS)
-        table[:, 2, half] = square[half].reshape(PHASES, TAPS)
-        table[:, 3:5, half] = change[half].reshape(PHASES, 2, TAPS)
-    if table.shape[1] > SKEW:
-        skew = combined(weights[3], constant)
-        for half in range(2):
-            table[:, SKEW, half] = skew[half].reshape(PHASES, TAPS)
+    """Fill the rows (phases, 4 or 5, TAPS) of a table from the weights (4, 2 nodes) of its terms."""
+    found = np.empty(linear.shape[1], np.float32)
+    combine(weights[0], linear, found)
+    for phase in range(len(table)):
+        for tap in range(TAPS):
+            table[phase, 0, tap] = found[2 * phase * TAPS + tap]
+            table[phase, 1, tap] = found[(2 * phase + 1) * TAPS + tap]
+    for term in range(1, table.shape[1] - 1):
+        combine(weights[term], constant, found)
+        for phase in range(len(table)):
+            for tap in range(TAPS):
+                table[phase, term + 1, tap] = found[phase * TAPS + tap]
 
 
 @numba.njit(cache=True)
@@ -107,16 +105,15 @@ def between(table, place):
 
 
 @numba.njit(cache=True)
-def combined(weights, rows):
-    """Two sums of rows (a multiple of 4, n) times weights (2, rows): shape (2, n), float32."""
-    totals = np.zeros((2, rows.shape[1]), np.float32)
-    one, other = totals[0], totals[1]
-    for m in range(0, len(rows), 4):
-        # Four at a time, so that the totals are seldom stored.
-        a, b, c, d = weights[0, m], weights[0, m + 1], weights[0, m + 2], weights[0, m + 3]
-        e, f, g, h = weights[1, m], weights[1, m + 1], weights[1, m + 2], weights[1, m + 3]
-        for n in range(len(one)):
+def combine(weights, rows, total):
+    """Write the sum of rows (a multiple of 8, n) times weights (rows,) to the first n of a total, float32."""
+    for m in range(0, len(rows), 8):
+        # Eight at a time, so that the total is seldom stored.
+        a, b, c, d = weights[m], weights[m + 1], weights[m + 2], weights[m + 3]
+        e, f, g, h = weights[m + 4], weights[m + 5], weights[m + 6], weights[m + 7]
+        for n in range(rows.shape[1]):
+            first = total[n] if m else np.float32(0)
             x, y, z, w = rows[m, n], rows[m + 1, n], rows[m + 2, n], rows[m + 3, n]
-            one[n] = fused(a, x, fused(b, y, fused(c, z, fused(d, w, one[n]))))
-            other[n] = fused(e, x, fused(f, y, fused(g, z, fused(h, w, other[n]))))
-    return totals
+            first = fused(a, x, fused(b, y, fused(c, z, fused(d, w, first))))
+            x, y, z, w = rows[m + 4, n], rows[m + 5, n], rows[m + 6, n], rows[m + 7, n]
+            total[n] = fused(e, x, fused(f, y, fused(g, z, fused(h, w, first))))

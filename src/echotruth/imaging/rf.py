@@ -25,6 +25,8 @@ from echotruth.imaging.probe import element_centres, pulse_band, pulse_spectrum,
 
 BLOCK = 96
 """Scatterers deposited at a time."""
+TILE = (0.2e-3, 0.04)
+"""Range, m, and angle, rad, over which scatterers are gathered before they are deposited."""
 FINE, FAST, LENS, NEAR = 3, 2, 1, deposit.APART
 """Schemes of the kernels' tables (see :data:`~echotruth.imaging.deposit.ROWS`) for an error of 2e-5 and of 1e-3 in the
 plane, and under a lens, there also for scatterers that parts of the array look up apart."""
@@ -73,6 +75,7 @@ class FullMatrix:
         Length of the record; it starts at time 0 and ends with the latest echo plus room for delays and pulse.
     centres : ndarray of shape (elements,), m
         Of the elements.
+    sound_speed : float, m/s
     """
 
     def __init__(
@@ -91,9 +94,10 @@ class FullMatrix:
         if self.samples >= 1 << (31 - deposit.FRACTION_BITS):
             raise ValueError(f"A record of {self.samples} samples is too long: image less deep or sample slower.")
         self.centres = element_centres(probe)
-        self._speed, self._width = p.sound_speed, p.width * p.frequency / p.sound_speed
+        self.sound_speed, self._width = p.sound_speed, p.width * p.frequency / p.sound_speed
         loss = p.attenuation * p.frequency
-        self._scales = (self.sampling / p.sound_speed, (np.pi * self._width) ** 2, loss, p.frequency / p.sound_speed)
+        self._scales = self.sampling / p.sound_speed, loss, p.frequency / p.sound_speed
+        self._directivity = directivity.tabulated(self._width)
         self._filter(probe, grid, low, high)
         band = _band(probe, grid, low, high)
         self._lens = Lens(probe, self.reach, band) if elevation else None
@@ -117,54 +121,58 @@ class FullMatrix:
 
     def _tabulate(self, band: Band, ratio: np.ndarray) -> None:
         """Tables of kernels in the plane, or what makes those under the lens."""
-        rows = deposit.ROWS[self._scheme]
-        self._tilts, shapes = directivity.shapes(self._width, ratio, 2 * sum(count > 0 for count in rows))
+        rows, phases = deposit.ROWS[self._scheme], _phases(self._scheme)
+        count = 1 + max(term for term, degree in enumerate(rows) if degree) if not self._lens else 2
+        self._tilts, shapes = directivity.shapes(self._width, ratio, count)
         if self._lens:
-            self._shapes = np.ascontiguousarray(shapes[:, :4], np.float32)
-            self._maps = [_maps(band, degree) for degree in (1, 0)]
+            self._shapes = np.ascontiguousarray(shapes, np.float32)
+            self._maps = [_maps(band, degree, phases) for degree in (1, 0)]
             return
-        spectra = stacked(shapes + 0j).reshape(len(shapes), -1, 2, 2 * NODES)
-        polynomials = [fits(band, 1, count - 1)[0] for count in rows if count]
-        found = [np.einsum("pdtf,khf->kpdht", fit, spectra[:, n]) for n, fit in enumerate(polynomials)]
+        spectra = stacked(shapes + 0j)
+        terms = [(term, fits(band, 1, degree - 1, phases)[0]) for term, degree in enumerate(rows) if degree]
+        found = [np.einsum("pdtf,kf->kpdt", fit, spectra[:, term]) for term, fit in terms]
         whole = np.concatenate(found, axis=2).ravel()
         self._tables = deposit.aligned(len(whole))
         self._tables[:] = whole
 
-    def heard(self, position: np.ndarray, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Scatterers within the record and the beam, the nearest first: positions (m, 3), m, and amplitudes (m,).
+    def in_beam(self, position: np.ndarray) -> np.ndarray:
+        """Which of the scatterers at `position` (n, 3), m, are within the record and the beam: (n,), bool.
 
-        Sorted, since neighbours in range share the part of the traces that is at hand.
+        All others together add no more than :data:`~echotruth.imaging.elevation.LEFT_OUT` says.
         """
-        reach = np.linalg.norm(position, axis=1)
-        order = np.argsort(reach, kind="stable")
-        order = order[: np.searchsorted(reach[order], self.reach, side="right")]
+        inside = np.linalg.norm(position, axis=1) <= self.reach
         if self._lens:
-            order = order[self._lens.blocks_of(position[order]) > 0]
-        return position[order], amplitude[order]
+            inside[inside] = self._lens.in_beam(position[inside])
+        return inside
 
     def traces(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
         """Deposited echoes before window and pulse are accounted for, shape (pairs, samples), float32."""
-        position, amplitude = self.heard(position, amplitude)
+        inside = self.in_beam(position)
+        position, amplitude = position[inside], amplitude[inside].astype(np.float32)
         elements = len(self.centres)
         traces = np.zeros((elements * (elements + 1) // 2, self.samples), np.float32)
-        for start in range(0, len(position), BLOCK):
-            part = slice(start, start + BLOCK)
-            self._add(traces, position[part], amplitude[part].astype(np.float32))
+        parts = self._lens.parts(np.linalg.norm(position, axis=1)) if self._lens else np.ones(len(position), int)
+        for number in np.unique(parts):
+            alike = np.flatnonzero(parts == number)
+            alike = alike[_tiled(position[alike])]
+            self._add(traces, position[alike], amplitude[alike], int(number))
         return traces
 
-    def _add(self, traces: np.ndarray, position: np.ndarray, amplitude: np.ndarray) -> None:
-        shape = (len(position), len(self.centres))
-        time = np.empty(shape, np.int32)
-        weight, colour, bend = np.empty((3, *shape), np.float32)
-        kinds = self._kind(position)
-        parts = self._lens.parts(float(np.linalg.norm(position[0]))) if self._lens else 1
+    def _add(self, traces: np.ndarray, position: np.ndarray, amplitude: np.ndarray, parts: int) -> None:
+        """Add the echoes of scatterers that so many parts of the array look up apart, a block at a time."""
         scheme = NEAR if parts > 1 else self._scheme
-        size = sum(deposit.ROWS[scheme]) * deposit.PAIR
-        made = self._under_lens(position, kinds, parts, size) if self._lens else self._in_plane(kinds, size)
-        lean, entries, tables = made
-        deposit.one_way(position, self.centres, self._scales, self._tilts[kinds], lean, time, weight, colour, bend)
-        given, lens = (time, weight, colour, bend, amplitude, entries, tables), self._lens is not None
-        deposit.add_echoes(traces, *given, size, bounds(len(self.centres), parts), lens, (0,) * scheme)
+        size, lens = sum(deposit.ROWS[scheme]) * TAPS, self._lens is not None
+        limits, kinds = bounds(len(self.centres), parts), self._kind(position)
+        source = _LensKernels(self, position, kinds, parts) if lens else _PlaneKernels(self, kinds, size)
+        width = -(-len(self.centres) // deposit.LANES) * deposit.LANES
+        time, (weight, colour, bend) = np.zeros((BLOCK, width), np.int32), np.zeros((3, BLOCK, width), np.float32)
+        for start in range(0, len(position), BLOCK):
+            part = slice(start, min(start + BLOCK, len(position)))
+            lean, entries, tables = source(part)
+            each = self._tilts[kinds[part]]
+            terms = time, weight, colour, bend
+            deposit.one_way(position[part], self.centres, self._scales, self._directivity, each, lean, *terms)
+            deposit.add_echoes(traces, *terms, amplitude[part], entries, tables, size, limits, lens, (0,) * scheme)
 
     @property
     def accurate_from(self) -> float:
@@ -175,28 +183,6 @@ class FullMatrix:
         """Which of the angles from the centre of the array is nearest, shape (n,)."""
         sine = np.abs(position[:, 0]) / np.linalg.norm(position, axis=1)
         return np.rint(sine * (directivity.KINDS - 1)).astype(np.int64)
-
-    def _in_plane(self, kinds: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        entries = np.zeros((len(kinds), 5), int)
-        entries[:, 0], entries[:, 1] = np.arange(len(kinds)), kinds * size * deposit.PHASES
-        entries[:, 2] = offsets(1)[0]
-        return np.empty((0, 1, 4)), entries, self._tables
-
-    def _under_lens(
-        self, position: np.ndarray, kinds: np.ndarray, parts: int, size: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        lens = self._lens
-        places, lean = lens.lean(position, self._speed, parts)
-        sender, listener = np.triu_indices(parts)
-        blocks = lens.blocks_at(places)
-        owner, block, first = _entries(np.maximum(blocks[:, sender], blocks[:, listener]).ravel())
-        owner, pair = np.divmod(owner, len(sender))
-        made = np.stack([owner, block, sender[pair], listener[pair]], axis=1)
-        tables = deposit.aligned(len(owner), deposit.PHASES, size // deposit.PAIR, 2, TAPS)
-        mould(places, kinds, (lens.beam, lens.change), self._shapes, *self._maps, made, tables)
-        place = np.arange(len(owner)) * size * deposit.PHASES
-        entries = np.stack([owner, place, first, sender[pair], listener[pair]], axis=1)
-        return lean, entries, tables.ravel()
 
     def __call__(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
         """Spectra of the echoes of all pairs at `frequency`.
@@ -227,6 +213,73 @@ class FullMatrix:
         return found
 
 
+class _PlaneKernels:
+    """Tables of echoes in the plane: one for each angle from the centre of the array, whatever the scatterer."""
+
+    def __init__(self, full: FullMatrix, kinds: np.ndarray, size: int) -> None:
+        self._tables = full._tables
+        self._base = kinds * size * _phases(full._scheme)
+
+    def __call__(self, part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What :func:`deposit.one_way` and :func:`deposit.add_echoes` take for some of the scatterers."""
+        base = self._base[part]
+        entries = np.zeros((len(base), 5), int)
+        entries[:, 0], entries[:, 1], entries[:, 2] = np.arange(len(base)), base, offsets(1)[0]
+        return np.empty((0, 1, 4)), entries, self._tables
+
+
+class _LensKernels:
+    """Tables of echoes under the lens, made for every scatterer.
+
+    Parameters
+    ----------
+    full : FullMatrix
+    position : ndarray of shape (n, 3), m
+    kinds : ndarray of shape (n,)
+        Angle from the centre of the array of each.
+    parts : int
+        Parts of the array that look them up apart.
+    """
+
+    def __init__(self, full: FullMatrix, position: np.ndarray, kinds: np.ndarray, parts: int) -> None:
+        self._full, self._kinds = full, kinds
+        self._places, self._lean = full._lens.lean(position, full.sound_speed, parts)
+        sender, listener = np.triu_indices(parts)
+        blocks = full._lens.blocks_at(self._places)
+        owner, block, self._first = _entries(np.maximum(blocks[:, sender], blocks[:, listener]).ravel())
+        self._owner, pair = np.divmod(owner, len(sender))
+        self._made = np.stack([self._owner, block, sender[pair], listener[pair]], axis=1)
+        starts = np.searchsorted(self._owner, np.arange(0, len(position) + BLOCK, BLOCK))
+        scheme = NEAR if parts > 1 else LENS
+        self._size = sum(deposit.ROWS[scheme]) * TAPS
+        rows = _phases(scheme), sum(deposit.ROWS[scheme])
+        self._tables = deposit.aligned(int(np.diff(starts).max(initial=0)), *rows, TAPS)
+        self._base = np.arange(len(self._tables)) * rows[0] * self._size
+
+    def __call__(self, part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What :func:`deposit.one_way` and :func:`deposit.add_echoes` take for some of the scatterers."""
+        full, which = self._full, slice(*np.searchsorted(self._owner, [part.start, part.stop]))
+        made = self._made[which] - [part.start, 0, 0, 0]
+        tables = self._tables[: len(made)]
+        beams = full._lens.beam, full._lens.change
+        mould(self._places[part], self._kinds[part], beams, full._shapes, *full._maps, made, tables)
+        entries = np.column_stack([made[:, 0], self._base[: len(made)], self._first[which], made[:, 2:]])
+        return self._lean[part], entries, tables.ravel()
+
+
+def _tiled(position: np.ndarray) -> np.ndarray:
+    """Order of scatterers (n, 3), m, in which neighbours are near to each other in range and angle, (n,).
+
+    Their echoes stand close together in the traces of all pairs, and that part of the traces stays at hand.
+    """
+    reach, angle = np.linalg.norm(position, axis=1), np.arctan2(position[:, 0], position[:, 1])
+    return np.lexsort((reach, np.floor(angle / TILE[1]), np.floor(reach / TILE[0])))
+
+
+def _phases(scheme: int) -> int:
+    return 1 << deposit.PHASE_BITS[scheme]
+
+
 def _loss(p, frequency: np.ndarray) -> np.ndarray:
     """Rate at which an echo at these frequencies fades faster than at the centre frequency, 1/s."""
     return p.attenuation * (frequency - p.frequency) * p.sound_speed
@@ -239,9 +292,9 @@ def _band(probe: Probe, grid: Grid, low: float, high: float) -> Band:
     return Band(frequency, energy / energy.sum(), grid, _loss(probe.si(), frequency))
 
 
-def _maps(band: Band, degree: int) -> np.ndarray:
-    """Maps to the polynomials of all blocks, shape (blocks, 2 NODES, PHASES (degree + 1) TAPS), float32."""
-    maps = np.concatenate([fits(band, blocks, degree) for blocks in range(1, MOST_BLOCKS + 1)])
+def _maps(band: Band, degree: int, phases: int) -> np.ndarray:
+    """Maps to the polynomials of all blocks, shape (blocks, 2 NODES, phases (degree + 1) TAPS), float32."""
+    maps = np.concatenate([fits(band, blocks, degree, phases) for blocks in range(1, MOST_BLOCKS + 1)])
     return np.ascontiguousarray(np.moveaxis(maps, -1, 1).reshape(len(maps), 2 * NODES, -1), np.float32)
 
 

@@ -7,9 +7,10 @@ import numpy as np
 from echotruth.config import Probe, Rf
 from echotruth.imaging.aperture import Aperture
 from echotruth.imaging.beamform import ReceiveFocus
+from echotruth.imaging.gate import span
 from echotruth.imaging.rf import FullMatrix
 from echotruth.imaging.scan import imaging_depth, points, scan_lines
-from echotruth.imaging.synthesis import Synthesis
+from echotruth.imaging.synthesis import Synthesis, sampled
 from echotruth.imaging.transmit import KINDS, Zone
 
 __all__ = ["Scanner", "checked", "imaging_depth"]
@@ -53,6 +54,7 @@ class Scanner:
         latest = max(np.abs(zone.transmits.delay).max() for zone in zones)
         reach = np.hypot(*points(self.scan, self.range)).max()
         self.matrix = FullMatrix(probe, reach, latest, rf.accuracy, rf.elevation)
+        self._sampling = sampled(self.matrix, p.frequency)
         self._focus = [_ZoneFocus(probe, rf, self, zone) for zone in zones]
         self.frequency = self._focus[0].channels.frequency
         self._carrier = np.exp(-4j * np.pi * self.frequency / p.sound_speed * self.range).astype(np.complex64)
@@ -82,8 +84,11 @@ class Scanner:
     def beamform(self, matrix: np.ndarray) -> np.ndarray:
         """Lines (lines, ranges) of one frame, as :meth:`lines`, of its full matrix (bins, elements, elements)."""
         lines = np.zeros((len(self.scan.angle), len(self.range)), np.complex64)
+        gated = any(focus.channels.gate for focus in self._focus)
+        echoes = self._sampling.in_time(matrix) if gated else None
         for focus in self._focus:
-            lines[:, focus.zone.part] += focus(matrix)
+            gate = focus.channels.gate
+            lines[:, focus.zone.part] += focus(gate.spectra(echoes) if gate else matrix)
         lines *= self._carrier
         return lines
 
@@ -105,7 +110,9 @@ class _ZoneFocus:
         p, scan = probe.si(), scanner.scan
         self.zone, self._range = zone, scanner.range[zone.part]
         self._points = points(scan, self._range)
-        self.channels = Synthesis(scanner.matrix, p.frequency, zone.transmits)
+        needed = span(scanner.matrix, zone, self._range, self._points) if len(zone.transmits.foci) else None
+        self.channels = Synthesis(scanner.matrix, p.frequency, zone.transmits, needed)
+        self._before = p.sound_speed * self.channels.start
         self._receive = ReceiveFocus(
             Aperture(probe, rf),
             scan.foot,
@@ -117,12 +124,18 @@ class _ZoneFocus:
         )
 
     def __call__(self, matrix: np.ndarray) -> np.ndarray:
-        """Before demodulation, (lines, ranges of the zone), complex64, of a full matrix (bins, elements, elements)."""
+        """Before demodulation, (lines, ranges of the zone), complex64.
+
+        Parameters
+        ----------
+        matrix
+            Of the whole record, or of the gate of the zone: shape (bins, elements, elements).
+        """
         transmits = self.zone.transmits
         lines = np.zeros(self._points[0].shape, np.complex64)
         for part, channels in self.channels(matrix):
             if len(transmits.foci):
-                path = np.tile(self._range, (len(channels), 1))
+                path = np.tile(self._range - self._before, (len(channels), 1))
                 self._receive(lines, part.start, channels, np.arange(len(channels)), path)
                 continue
             for number in range(part.start, part.stop):

@@ -14,6 +14,8 @@ import numpy as np
 from scipy import fft
 
 from echotruth.imaging import interpolation
+from echotruth.imaging.gate import Gate, Sampling
+from echotruth.imaging.mould import fused
 from echotruth.imaging.rf import FullMatrix
 from echotruth.imaging.transmit import Transmits
 
@@ -26,13 +28,31 @@ multiplication, so that those of the first alone are kept."""
 
 @numba.njit(cache=True)
 def add_products(real, imaginary, matrix, weights):
-    """Add a matrix (elements, elements) times weights (2, elements, transmits) to its real and imaginary part."""
+    """Add a matrix (elements, elements) times weights (2, elements, transmits) to its real and imaginary part.
+
+    Four elements at a time, so that the sums are seldom stored.
+    """
+    elements, transmits = weights.shape[1:]
+    whole = elements // 4 * 4
     for i in range(matrix.shape[0]):
-        for j in range(matrix.shape[1]):
+        for j in range(0, whole, 4):
             a, b = matrix[i, j].real, matrix[i, j].imag
-            for k in range(weights.shape[2]):
-                real[i, k] += a * weights[0, j, k] - b * weights[1, j, k]
-                imaginary[i, k] += a * weights[1, j, k] + b * weights[0, j, k]
+            c, d = matrix[i, j + 1].real, matrix[i, j + 1].imag
+            e, f = matrix[i, j + 2].real, matrix[i, j + 2].imag
+            g, h = matrix[i, j + 3].real, matrix[i, j + 3].imag
+            for k in range(transmits):
+                p, q, r, s = weights[0, j, k], weights[0, j + 1, k], weights[0, j + 2, k], weights[0, j + 3, k]
+                t, u, v, w = weights[1, j, k], weights[1, j + 1, k], weights[1, j + 2, k], weights[1, j + 3, k]
+                one = fused(a, p, fused(c, q, fused(e, r, fused(g, s, real[i, k]))))
+                real[i, k] = fused(-b, t, fused(-d, u, fused(-f, v, fused(-h, w, one))))
+                one = fused(a, t, fused(c, u, fused(e, v, fused(g, w, imaginary[i, k]))))
+                imaginary[i, k] = fused(b, p, fused(d, q, fused(f, r, fused(h, s, one))))
+        for j in range(whole, elements):
+            a, b = matrix[i, j].real, matrix[i, j].imag
+            for k in range(transmits):
+                p, t = weights[0, j, k], weights[1, j, k]
+                real[i, k] = fused(a, p, fused(-b, t, real[i, k]))
+                imaginary[i, k] = fused(a, t, fused(b, p, imaginary[i, k]))
 
 
 @numba.njit(cache=True)
@@ -80,6 +100,17 @@ def synthesise(matrix, start, turn, factor, bins, spectra):
                     spectra[transmit, element, bins[first + k]] = np.complex64(value * factor[first + k])
 
 
+def sampled(matrix: FullMatrix, frequency: float) -> Sampling:
+    """Samples of the echoes of a matrix that can be interpolated, the carrier being at `frequency`, Hz."""
+    place = matrix.first + np.arange(len(matrix.frequency))
+    nearest = int(np.abs(matrix.frequency - frequency).argmin())
+    # Without a sample a period of the carrier, its phase would turn too fast between those of the table.
+    samples = fft.next_fast_len(int(max(interpolation.OVERSAMPLING * len(place), place[nearest])) + 1)
+    # Twice for the analytic signal.
+    scale = 2 * samples / matrix.samples
+    return Sampling(place % samples, samples, matrix.sampling * samples / matrix.samples, scale)
+
+
 class Synthesis:
     """Channel data of transmits, phases worked out once for all frames.
 
@@ -91,35 +122,43 @@ class Synthesis:
         Centre frequency of the pulse, Hz.
     transmits
         Delays and weights.
+    span
+        Earliest and latest echo that is needed, s; None for all of them.
 
     Attributes
     ----------
     frequency : float
         The frequency of the record nearest the centre frequency, Hz.
+    gate : Gate or None
+        The part of the record that is needed, where that is less than all.
     samples : int
         Of a channel.
     sampling : float
         Of a channel, Hz.
+    start : float
+        Time of the echoes at the beginning of a channel, s.
     """
 
-    def __init__(self, matrix: FullMatrix, frequency: float, transmits: Transmits):
-        place = matrix.first + np.arange(len(matrix.frequency))
-        nearest = int(np.abs(matrix.frequency - frequency).argmin())
-        self.frequency = float(matrix.frequency[nearest])
-        # Without a sample a period of the carrier, its phase would turn too fast between those of the table.
-        self.samples = fft.next_fast_len(int(max(interpolation.OVERSAMPLING * len(place), place[nearest])) + 1)
-        self.sampling = matrix.sampling * self.samples / matrix.samples
-        self._bins = place % self.samples
-        cycles = (place - place[nearest]) / self.samples
-        # Twice for the analytic signal.
-        scale = 2 * self.samples / matrix.samples
+    def __init__(
+        self, matrix: FullMatrix, frequency: float, transmits: Transmits, span: tuple[float, float] | None = None
+    ):
+        record = sampled(matrix, frequency)
+        self.frequency = float(matrix.frequency[np.abs(matrix.frequency - frequency).argmin()])
+        self.sampling = record.rate
+        gate = span and Gate(record, matrix.frequency[[0, -1]], _interpolated(span, record.rate))
+        self.gate = gate if gate and gate.samples < record.samples else None
+        part, scale = (self.gate, 1.0) if self.gate else (record, record.scale)
+        frequencies = self.gate.frequency if self.gate else matrix.frequency
+        self.samples, self._bins = part.samples, part.bins
+        self.start = self.gate.first / record.rate if self.gate else 0.0
+        cycles = (frequencies - self.frequency) / self.sampling
         self._factor = (scale / interpolation.spectrum(cycles)).astype(np.float32)
-        # Channels begin so much before time 0 that what an echo at time 0 is interpolated from is within them.
+        # Channels begin so much earlier that what the first echo is interpolated from is within them.
         delay = transmits.delay + interpolation.LEAD / self.sampling
-        step = matrix.sampling / matrix.samples
+        step = frequencies[1] - frequencies[0]
         blocks = [slice(at, at + BLOCK) for at in range(0, len(delay), BLOCK)]
         self._phases = [
-            phases(delay[block].T, transmits.weight[block].T, matrix.frequency[::TILE], step) for block in blocks
+            phases(delay[block].T, transmits.weight[block].T, frequencies[::TILE], step) for block in blocks
         ]
 
     def __call__(self, matrix: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
@@ -128,7 +167,8 @@ class Synthesis:
         Parameters
         ----------
         matrix
-            Shape (bins, elements, elements), complex64: column j holds the echoes to element j sending alone.
+            Shape (bins, elements, elements), complex64, of the whole record or of the gate: column j holds the echoes
+            to element j sending alone.
 
         Yields
         ------
@@ -145,6 +185,11 @@ class Synthesis:
             channels = fft.ifft(spectra, axis=2, overwrite_x=True, workers=numba.get_num_threads())
             yield slice(first, first + len(spectra)), channels
             first += len(spectra)
+
+
+def _interpolated(span: tuple[float, float], rate: float) -> tuple[float, float]:
+    """A span of time and what the samples in it are interpolated from, s."""
+    return span[0] - interpolation.TAPS / rate, span[1] + interpolation.TAPS / rate
 
 
 def phases(delay: np.ndarray, weight: np.ndarray, frequency: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:

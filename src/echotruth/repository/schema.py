@@ -82,7 +82,7 @@ PHYSIOLOGY = (
 )
 
 PHANTOM = (
-    _array("scatterers", "case view", "int32", "1", "number of scatterers"),
+    _array("scatterers", "case view", "int32", "1", "number of scatterers in the wall that come into the beam"),
     _array("origin", "case view xyz", "float64", "m", "centre of the array in the heart frame"),
     _array("axes", "case view vector xyz", "float64", "1", "lateral, axial and elevation axes in the heart frame"),
     _array("centre", "case view plane", "float64", "m", "origin of polar components in the image"),
