@@ -56,7 +56,8 @@ def locate(positions: Floats, cells: Integers, points: Floats) -> MaterialPoints
     grid = _grid(low, high, points)
     near = np.flatnonzero(((low <= grid[1]) & (high >= grid[0])).all(axis=1)).astype(np.int32)
     start, members = _members(low[near], high[near], grid)
-    found, xi = _locate(points, grid, start, members, *_shapes(np.swapaxes(hull[:, near], 0, 1)))
+    shapes = _shapes(np.ascontiguousarray(np.swapaxes(hull[:, near], 0, 1)))
+    found, xi = _locate(points, grid, start, members, *shapes)
     return MaterialPoints(np.append(near, np.int32(-1))[found], xi)
 
 

@@ -133,7 +133,9 @@ def displacement(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
 
 def strain(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
     """Green-Lagrange strain of material points since end-diastole along the wall's axes there, (n, 6)."""
-    return kinematics.strain(_deformation(heart, frame, points), _axes(heart, points), kinematics.RCL)
+    values = np.column_stack([heart.positions(frame), heart.wall_depth])
+    slopes = gradient(values, heart.positions(0), heart.cells, points)
+    return kinematics.strain(slopes[:, :3], axes_about(slopes[:, 3]), kinematics.RCL)
 
 
 def _axes(heart: Heart, points: MaterialPoints) -> Floats:
