@@ -127,7 +127,7 @@ def _shapes(hull: Floats) -> tuple[Floats, Floats, Floats]:
     reach = np.minimum(np.concatenate([1 - place.sum(axis=2, keepdims=True), place], axis=2).min(axis=1), 0) - _MARGIN
     slope = hull[:, _BESIDE] - hull[:, _BESIDE[:, :1]]
     curve = np.concatenate([slope[:, :1], slope[:, 1:] - slope[:, :1]], axis=1)[:, :, 1:]
-    return np.concatenate([hull[:, :1], inverse], axis=1), reach, 2 * curve
+    return np.concatenate([hull[:, :1], inverse], axis=1), reach, np.ascontiguousarray(2 * curve)
 
 
 @numba.njit(cache=True, error_model="numpy")
