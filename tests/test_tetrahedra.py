@@ -44,3 +44,25 @@ def test_the_gradient_of_an_affine_motion_is_its_matrix(coarse_mesh, points):
     moved = coarse_mesh.nodes @ matrix.T
     assert np.allclose(gradient(moved, coarse_mesh.nodes, coarse_mesh.cells, points), matrix, atol=1e-12)
     assert np.allclose(gradient(coarse_mesh.nodes, moved, coarse_mesh.cells, points), np.linalg.inv(matrix), atol=1e-12)
+
+
+def test_values_of_any_shape_are_carried_by_the_shape_functions(coarse_mesh, points):
+    random = np.random.default_rng(2)
+    for shape_of_one in ((), (2,), (3, 4)):
+        values = random.standard_normal((len(coarse_mesh.nodes), *shape_of_one))
+        expected = np.einsum("pa,pa...->p...", shape(points.xi), values[coarse_mesh.cells[points.cell]])
+        assert np.allclose(interpolate(values, coarse_mesh.cells, points), expected, rtol=0, atol=1e-14)
+
+
+def test_the_gradient_of_a_field_is_its_slope_along_any_way(coarse_mesh, points):
+    # Of squares and products, which curved cells do not hold exactly: what is interpolated is differentiated.
+    x, y, z = coarse_mesh.nodes.T
+    values, step = np.stack([x * y, y * z - x**2], axis=-1), 1e-6
+    slope = gradient(values, coarse_mesh.nodes, coarse_mesh.cells, points)
+    for axis in np.eye(3):
+        ends = [MaterialPoints(points.cell, points.xi + way * step * axis) for way in (-1, 1)]
+        places, there = (
+            [interpolate(each, coarse_mesh.cells, end) for end in ends] for each in (coarse_mesh.nodes, values)
+        )
+        along = np.einsum("pki,pi->pk", slope, places[1] - places[0])
+        assert np.allclose(along, there[1] - there[0], rtol=1e-6, atol=1e-6 * np.abs(along).max())

@@ -23,7 +23,11 @@ def mid(twisting_heart):
 
 @pytest.fixture(scope="module")
 def moved(twisting_heart, mid):
-    return truth(twisting_heart, 1, mid, AXIS, AXIS - 6e-3)
+    return _frame(truth(twisting_heart, mid, AXIS, AXIS - 6e-3), 1)
+
+
+def _frame(clip, number):
+    return {name: each[number] for name, each in clip.items()}
 
 
 def _places(mask, mid):
@@ -57,7 +61,7 @@ def test_a_scatterer_and_the_pixel_at_its_place_agree_to_round_off(twisting_hear
 
 
 def test_nothing_moves_at_end_diastole(twisting_heart, mid):
-    still = truth(twisting_heart, 0, mid, AXIS, AXIS - 6e-3)
+    still = _frame(truth(twisting_heart, mid, AXIS, AXIS - 6e-3), 0)
     assert np.all(still["displacement"][still["mask"]] == 0)
     assert np.abs(still["strain"][still["mask"]]).max() < 1e-12
 
@@ -75,7 +79,7 @@ def test_labels_are_of_the_wall_and_nothing_is_known_outside(moved):
 def test_the_wall_in_the_image_has_the_area_of_the_wall_in_the_plane(twisting_heart, mid):
     # The unloaded wall's cut is an annulus between two ellipses of revolution.
     fine = (np.arange(512) + 0.5) / 512 * 12e-3
-    still = truth(twisting_heart, 0, mid, fine, fine - 6e-3)
+    still = _frame(truth(twisting_heart, mid, fine, fine - 6e-3), 0)
     height = mid.origin[2] + 1.40e-3  # above the equator
     radii = [r * np.sqrt(1 - (height / length) ** 2) for r, length in ((1.45e-3, 5.40e-3), (2.45e-3, 6.20e-3))]
     expected = np.pi * (radii[1] ** 2 - radii[0] ** 2)
@@ -161,7 +165,7 @@ def test_the_region_of_disease_is_that_of_the_tissue_at_the_pixel(twisting_heart
     assert not moved["region"].any()
     corners = twisting_heart.nodes[twisting_heart.cells[:, :4]]
     septal = (corners[..., 0].mean(axis=1) > 0).astype(np.uint8)
-    ill = truth(replace(twisting_heart, region=septal), 1, mid, AXIS, AXIS - 6e-3)
+    ill = _frame(truth(replace(twisting_heart, region=septal), mid, AXIS, AXIS - 6e-3), 1)
     matrix, shift = affine
     before = (_places(ill["mask"], mid) - shift) @ np.linalg.inv(matrix).T
     # A cell of this coarse mesh is 1 mm wide, and the seam runs along its faces.

@@ -89,6 +89,18 @@ def test_lost_points_have_no_strain_and_leave_that_of_the_others(wall):
     np.testing.assert_allclose(found[there], whole[there], atol=1e-11)
 
 
+def test_strain_where_points_are_lost_is_that_of_a_wall_without_them(wall):
+    moved = np.repeat(twisting(wall)[0][None], 4, axis=0)
+    random = np.random.default_rng(5)
+    for frame, share in ((1, 0.01), (2, 0.1), (3, 0.6)):
+        moved[frame, random.random(len(wall.position)) < share] = np.nan
+    found = wall.strain(moved)
+    for frame in range(4):
+        known = np.isfinite(moved[frame]).all(-1)
+        without = Operator(wall.position[known], wall.axes[known], wall.radius).strain(moved[frame : frame + 1, known])
+        np.testing.assert_allclose(found[frame, known], without[0], atol=1e-11)
+
+
 def test_too_few_points_or_all_on_a_line_have_no_strain():
     line = np.stack([np.linspace(0, 1e-3, 30), np.zeros(30)], -1)
     axes = np.broadcast_to(np.eye(2), (30, 2, 2))

@@ -100,7 +100,7 @@ def write_clip(folder, store, case, place, beating, view):
     write(store, "phantom", place, origin=where.origin, axes=where.axes, centre=[0, CONFIG.rf.si().focus])
     random = np.random.default_rng(place)
     for size in CONFIG.bmode.sizes:
-        mask = truth(beating, 0, where, *pixel_centres(CONFIG.bmode, size))["mask"]
+        mask = truth(beating, where, *pixel_centres(CONFIG.bmode, size))["mask"][0]
         store.write(f"truth/{size}", {"mask": np.broadcast_to(mask, (len(COURSE), size, size))}, *place)
         store.write(f"bmode/{size}", {"image": random.integers(0, 256, (len(COURSE), size, size))}, *place)
     for stage in ("truth", "bmode"):

@@ -2,8 +2,6 @@
 
 import logging
 
-import numpy as np
-
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import truth
 from echotruth.imaging.view import Plane
@@ -16,8 +14,7 @@ def work(job: Job) -> Result:
     result: Result = {}
     for size in bmode.sizes:
         axial, lateral = pixel_centres(bmode, size)
-        frames = [truth(heart, frame, plane, axial, lateral) for frame in range(len(heart.displacement))]
-        result[f"truth/{size}"] = {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
+        result[f"truth/{size}"] = truth(heart, plane, axial, lateral)
         logging.getLogger("echotruth").info("%d px", size)
     return result
 

@@ -19,34 +19,48 @@ ORDER = {"short_axis": (0, 1, 2), "long_axis": (0, 2, 1)}
 """R, C, L in the order radial, tangential in an image, across it."""
 
 
-def truth(heart: Heart, frame: int, plane: Plane, axial: Floats, lateral: Floats) -> dict[str, NDArray[np.generic]]:
-    """What the tissue at each pixel of a frame has done since end-diastole.
+def truth(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> dict[str, NDArray[np.generic]]:
+    """What the tissue at each pixel of each frame has done since end-diastole.
 
     Parameters
     ----------
     heart : Heart
-    frame : int
     plane : Plane
     axial, lateral : ndarray of shape (n_axial,), (n_lateral,), m
         Pixel centres.
 
     Returns
     -------
-    dict of ndarray of shape (n_axial, n_lateral, ...)
+    dict of ndarray of shape (frame, n_axial, n_lateral, ...)
         displacement (3; lateral, axial, elevation; m), strain (6; RR, CC, LL, RC, RL, CL), mask, layer,
         segment, region, wall_depth. Outside the wall: NaN, False or 0.
     """
-    pixels = np.stack(np.broadcast_arrays(lateral, axial[:, None], 0.0), axis=-1).reshape(-1, 3)
-    points = locate(heart.positions(frame), heart.cells, plane.heart(pixels))
-    inside = points.cell >= 0
-    wall = MaterialPoints(points.cell[inside], points.xi[inside])
-    values = {
+    pixels = plane.heart(np.stack(np.broadcast_arrays(lateral, axial[:, None], 0.0), axis=-1).reshape(-1, 3))
+    frames, clip = len(heart.displacement), {}
+    for frame in range(frames):
+        inside, wall = _in_wall(heart, frame, pixels)
+        for name, value in _motion(heart, frame, plane, wall).items():
+            if name not in clip:
+                clip[name] = _nothing((frames, len(pixels), *value.shape[1:]), value.dtype)
+            clip[name][frame, inside] = value
+    return {name: each.reshape(frames, len(axial), len(lateral), *each.shape[2:]) for name, each in clip.items()}
+
+
+def _in_wall(heart: Heart, frame: int, places: Floats) -> tuple[NDArray[np.int64], MaterialPoints]:
+    """Which of the places (n, 3), m, are in the wall in a frame, and what is there."""
+    points = locate(heart.positions(frame), heart.cells, places)
+    inside = np.flatnonzero(points.cell >= 0)
+    return inside, MaterialPoints(points.cell[inside], points.xi[inside])
+
+
+def _motion(heart: Heart, frame: int, plane: Plane, wall: MaterialPoints) -> dict[str, NDArray[np.generic]]:
+    """Motion since end-diastole and labels of points of the wall."""
+    return {
         "displacement": displacement(heart, frame, wall) @ plane.axes.T,
         "strain": strain(heart, frame, wall),
         "mask": np.ones(len(wall), bool),
         **labels(heart, wall),
     }
-    return {name: _on_pixels(value, inside, (len(axial), len(lateral))) for name, value in values.items()}
 
 
 def follow(heart: Heart, plane: Plane, places: Floats, kind: str) -> dict[str, NDArray[np.generic]]:
@@ -72,9 +86,7 @@ def follow(heart: Heart, plane: Plane, places: Floats, kind: str) -> dict[str, N
     """
     shape = places.shape[:2]
     flat = np.column_stack([places.reshape(-1, 2), np.zeros(shape[0] * shape[1])])
-    points = locate(heart.positions(0), heart.cells, plane.heart(flat))
-    inside = points.cell >= 0
-    wall = MaterialPoints(points.cell[inside], points.xi[inside])
+    inside, wall = _in_wall(heart, 0, plane.heart(flat))
     frames = range(len(heart.displacement))
     motion = np.stack([displacement(heart, frame, wall) @ plane.axes.T for frame in frames])
     deformation = np.stack([_deformation(heart, frame, wall) for frame in frames])
@@ -121,7 +133,9 @@ def displacement(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
 
 def strain(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
     """Green-Lagrange strain of material points since end-diastole along the wall's axes there, (n, 6)."""
-    return kinematics.strain(_deformation(heart, frame, points), _axes(heart, points), kinematics.RCL)
+    values = np.column_stack([heart.positions(frame), heart.wall_depth])
+    slopes = gradient(values, heart.positions(0), heart.cells, points)
+    return kinematics.strain(slopes[:, :3], axes_about(slopes[:, 3]), kinematics.RCL)
 
 
 def _axes(heart: Heart, points: MaterialPoints) -> Floats:
@@ -177,10 +191,13 @@ def _cut(triangle: Floats) -> Floats | None:
     return np.array(ends) if len(ends) == 2 else None
 
 
-def _on_pixels(values: NDArray[np.generic], inside: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.generic]:
-    floating = values.dtype.kind == "f"
-    image = np.full(
-        (len(inside), *values.shape[1:]), np.nan if floating else 0, np.float32 if floating else values.dtype
-    )
+def _on_pixels(values: NDArray[np.generic], inside: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.generic]:
+    """An image of values at some of its pixels (flat numbers), with nothing at the others."""
+    image = _nothing((shape[0] * shape[1], *values.shape[1:]), values.dtype)
     image[inside] = values
     return image.reshape(*shape, *values.shape[1:])
+
+
+def _nothing(shape: tuple[int, ...], dtype: np.dtype) -> NDArray[np.generic]:
+    """An array of NaN, in single precision, or of 0."""
+    return np.full(shape, np.nan, np.float32) if dtype.kind == "f" else np.zeros(shape, dtype)

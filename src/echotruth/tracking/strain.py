@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from echotruth.mechanics.kinematics import IMAGE, strain
@@ -74,9 +75,9 @@ class Operator:
         patterns, which = np.unique(known, axis=0, return_inverse=True)
         for number, pattern in enumerate(patterns):
             frames = np.flatnonzero(which.ravel() == number)
-            slope = self._slope(pattern)
-            for frame in frames:
-                result[frame] = np.einsum("nkj,nkc->ncj", slope, filled[frame][self._neighbours[0]])
+            columns = np.moveaxis(filled[frames], 1, 0).reshape(len(pattern), 2 * len(frames))
+            slope = (self._slope(pattern) @ columns).reshape(len(pattern), 2, len(frames), 2)
+            result[frames] = slope.transpose(2, 0, 3, 1)
         return result
 
     @cached_property
@@ -94,14 +95,34 @@ class Operator:
         x, y = np.moveaxis((self.position[near] - self.position[:, None]) / self.radius, -1, 0)
         return near, weight, np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
 
-    def _slope(self, known: np.ndarray) -> np.ndarray:
-        """Shares of the neighbours in the slope at each point, (point, neighbour, 2), 1/m."""
-        near, weight, terms = self._neighbours
+    def _slope(self, known: np.ndarray) -> csr_array:
+        """The slopes at the points, x before y, by the values at the points that are known, (2 point, point), 1/m."""
+        near, weight, _ = self._neighbours
+        lost = ((weight > 0) & ~known[near]).any(1)
+        shares = self._whole
+        if lost.any():
+            shares = shares.copy()
+            shares[lost] = self._shares(lost, known)
+        most, points = near.shape[1], len(near)
+        values = np.swapaxes(shares, 1, 2).ravel()
+        return csr_array(
+            (values, np.repeat(near, 2, axis=0).ravel(), np.arange(2 * points + 1) * most), (2 * points, points)
+        )
+
+    @cached_property
+    def _whole(self) -> np.ndarray:
+        """Shares where all points are known."""
+        every = np.ones(len(self.position), bool)
+        return self._shares(every, every)
+
+    def _shares(self, where: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """Shares of the neighbours in the slope at some of the points, (point, neighbour, 2), 1/m."""
+        near, weight, terms = (each[where] for each in self._neighbours)
         weight = weight * known[near]
-        normal = np.einsum("nk,nki,nkj->nij", weight, terms, terms)
+        weighted = np.swapaxes(weight[..., None] * terms, 1, 2)
+        normal = weighted @ terms
         values = np.linalg.eigvalsh(normal)
-        fit = known & ((weight > 0).sum(1) >= FEWEST) & (values[:, 0] > WORST * values[:, -1])
+        fit = known[where] & ((weight > 0).sum(1) >= FEWEST) & (values[:, 0] > WORST * values[:, -1])
         shares = np.full((*weight.shape, 2), np.nan)
-        inverse = np.linalg.inv(normal[fit])[:, 1:3]
-        shares[fit] = np.einsum("nji,nki,nk->nkj", inverse, terms[fit], weight[fit]) / self.radius
+        shares[fit] = np.swapaxes(np.linalg.inv(normal[fit])[:, 1:3] @ weighted[fit], 1, 2) / self.radius
         return shares
