@@ -88,6 +88,22 @@ def shares(u):
     )
 
 
+@numba.njit(cache=True, nogil=True)
+def value(padded, row, column):
+    """Value of a spline, as :func:`coefficients` makes it, at one point (float32), from 0 to the last sample."""
+    i = min(np.int32(row), padded.shape[0] - 5)
+    j = min(np.int32(column), padded.shape[1] - 5)
+    down, across = shares(row - np.float32(i)), shares(column - np.float32(j))
+    total = np.float32(0)
+    for a in range(4):
+        line = padded[i + a]
+        part = np.float32(0)
+        for b in range(4):
+            part += across[b] * line[j + b]
+        total += down[a] * part
+    return total
+
+
 @numba.njit(parallel=True, cache=True)
 def at_points(padded, row, column, values):
     """Values of a spline at points.
@@ -102,14 +118,4 @@ def at_points(padded, row, column, values):
         Written: shape (points,), float32.
     """
     for k in numba.prange(len(row)):
-        i = min(np.int32(row[k]), padded.shape[0] - 5)
-        j = min(np.int32(column[k]), padded.shape[1] - 5)
-        down, across = shares(row[k] - np.float32(i)), shares(column[k] - np.float32(j))
-        total = np.float32(0)
-        for a in range(4):
-            line = padded[i + a]
-            part = np.float32(0)
-            for b in range(4):
-                part += across[b] * line[j + b]
-            total += down[a] * part
-        values[k] = total
+        values[k] = value(padded, row[k], column[k])
