@@ -53,9 +53,9 @@ def test_affine_motion_is_found_to_the_thousandth_of_a_pixel(inner):
 
 def test_slopes_of_a_template_are_those_of_its_spline():
     padded, half, e = texture(), 3, 1e-3
-    values, rows = np.empty(49), np.empty((49, 6))
-    norm = subset.template(padded, 40.3, 51.7, half, values, rows)
-    for axis, column in enumerate((0, 3)):
+    values, *slopes = np.empty((3, 7, 7), np.float32)
+    norm = subset.template(padded, np.array([40.3, 51.7]), half, values, *slopes)
+    for axis in (0, 1):
         there = []
         for sign in (-1, 1):
             place = np.array([40.3, 51.7])
@@ -67,26 +67,40 @@ def test_slopes_of_a_template_are_those_of_its_spline():
                     np.meshgrid(place[1] + 1 + offset, place[0] + 1 + offset, indexing="ij"),
                     order=3,
                     prefilter=False,
-                ).ravel()
+                )
             )
-        np.testing.assert_allclose(rows[:, column], (there[1] - there[0]) / 2 / e, atol=1e-6)
+        np.testing.assert_allclose(slopes[axis], (there[1] - there[0]) / 2 / e, atol=1e-6)
         middle = np.mean(there, axis=0)
     assert norm == pytest.approx(np.linalg.norm(middle - middle.mean()), rel=1e-4)
+    np.testing.assert_allclose(values, middle - middle.mean(), atol=1e-6)
 
 
 def test_factor_and_solution_are_those_of_the_normal_equations():
     random = np.random.default_rng(1)
-    rows, right = random.normal(size=(40, 6)), random.normal(size=6)
-    lower, solution = subset.factor(rows), right.copy()
+    slopes, values = random.normal(size=(2, 7, 7)).astype(np.float32), random.normal(size=(7, 7)).astype(np.float32)
+    rows = rows_of(*slopes.astype(float))
+    matrix, right = subset.hessian(*slopes), subset.force(*slopes, values)
+    np.testing.assert_allclose(matrix, rows.T @ rows, atol=1e-10)
+    np.testing.assert_allclose(right, rows.T @ values.ravel().astype(float), atol=1e-10)
+    lower, solution = matrix.copy(), right.copy()
+    subset.factor(lower)
     subset.solve(lower, solution)
-    np.testing.assert_allclose(np.tril(lower), np.linalg.cholesky(rows.T @ rows), atol=1e-12)
-    np.testing.assert_allclose(solution, np.linalg.solve(rows.T @ rows, right), atol=1e-12)
+    np.testing.assert_allclose(np.tril(lower), np.linalg.cholesky(matrix), atol=1e-12)
+    np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), atol=1e-12)
+
+
+def rows_of(along, deep):
+    """Change of each pixel of a subset (side, side) with the six numbers of its motion, by its slopes."""
+    offset = np.arange(len(along)) - len(along) // 2
+    dx, dy = np.meshgrid(offset, offset)
+    return np.stack([slope * factor for slope in (along, deep) for factor in (1, dx, dy)], -1).reshape(-1, 6)
 
 
 def test_singular_hessian_is_told():
-    rows = np.random.default_rng(1).normal(size=(40, 6))
-    rows[:, 5] = 2 * rows[:, 0]
-    assert (subset.factor(rows) == 0).all()
+    along = np.random.default_rng(1).normal(size=(7, 7)).astype(np.float32)
+    matrix = subset.hessian(along, 2 * along)
+    subset.factor(matrix)
+    assert (matrix == 0).all()
 
 
 def matrix_of(motion):

@@ -4,9 +4,9 @@ from scipy import ndimage
 
 from echotruth.config.tracking import WindowDeformation
 from echotruth.tracking import track
-from echotruth.tracking.correlation import match, peaks
-from echotruth.tracking.field import dense, smooth, validated
-from echotruth.tracking.window_deformation import arranged, carry, sides
+from echotruth.tracking.correlation import match, peaks, textured
+from echotruth.tracking.field import motion, smooth, validated
+from echotruth.tracking.window_deformation import WindowPairs, arranged, carry, sides
 from echotruth.tracking.windows import Windows, arrange
 
 SPACING = 3e-5
@@ -49,7 +49,7 @@ def test_correlation_of_a_window_at_a_lag_is_pearson_s():
     first = ndimage.gaussian_filter(noise[0], 1.5).astype(np.float32)
     second = (np.roll(first, (1, 1), (0, 1)) + 0.02 * noise[1]).astype(np.float32)
     windows = Windows(8, np.array([12]), np.array([20]))
-    shift, peak = match(first, second, windows, 3)
+    shift, peak = match(first, second, windows, textured(first, windows), 3)
     np.testing.assert_allclose(shift[0, 0], [1, 1], atol=0.5)
     expected = np.corrcoef(first[12:20, 20:28].ravel(), second[13:21, 21:29].ravel())[0, 1]
     assert peak[0, 0] == pytest.approx(expected, abs=1e-6)
@@ -58,18 +58,18 @@ def test_correlation_of_a_window_at_a_lag_is_pearson_s():
 def test_place_of_a_gaussian_peak_is_exact():
     lag = np.arange(-3, 4)
     lateral, axial = np.meshgrid(lag - 0.37, lag + 1.21)
-    shift, peak = peaks(np.exp(-(lateral**2) / 3 - axial**2 / 5)[None, None])
-    np.testing.assert_allclose(shift[0, 0], [0.37, -1.21], atol=1e-12)
-    assert 0.9 < peak[0, 0] < 1
+    shift, peak = peaks(np.exp(-(lateral**2) / 3 - axial**2 / 5)[None])
+    np.testing.assert_allclose(shift[0], [0.37, -1.21], atol=1e-12)
+    assert 0.9 < peak[0] < 1
 
 
 def test_peak_at_the_border_or_beside_what_is_not_alike_is_none():
     edge, lone, unknown = np.full((3, 5, 5), -0.2)
     edge[2, 0], lone[2, 2] = 0.9, 0.9
     unknown[:] = np.nan
-    shift, peak = peaks(np.stack([edge, lone, unknown])[None])
+    shift, peak = peaks(np.stack([edge, lone, unknown]))
     assert np.isnan(shift).all()
-    np.testing.assert_allclose(peak[0], [0.9, 0.9, np.nan])
+    np.testing.assert_allclose(peak, [0.9, 0.9, np.nan])
 
 
 def test_outliers_become_the_median_of_their_neighbours_and_linear_motion_stays():
@@ -91,10 +91,25 @@ def test_missing_vectors_are_the_nearest_there_are_and_none_are_none():
 def test_field_between_windows_is_a_cubic_spline_through_their_centres():
     windows = arrange((96, 128), 16, 0.5)
     field = np.random.default_rng(5).normal(size=(len(windows.top), len(windows.left), 2))
-    # Centres lie between pixels, so that sides are made odd to look at them.
-    windows = Windows(17, windows.top, windows.left)
-    every = dense(field, windows, (113, 145))
-    np.testing.assert_allclose(every[8 : 8 + 81 : 8, 8 : 8 + 113 : 8], field, atol=1e-5)
+    moved = motion(field, windows, (96, 128))
+    lateral, axial = np.meshgrid(windows.left + 7.5, windows.top + 7.5)
+    np.testing.assert_allclose(
+        moved.at(np.stack([lateral, axial], -1).reshape(-1, 2)).reshape(field.shape), field, atol=1e-5
+    )
+    between = ndimage.map_coordinates(field[..., 0], [[3.3, 0], [5.9, 4]], order=3, mode="mirror")
+    places = np.array([[windows.left[5] + 7.5 + 0.9 * 8, windows.top[3] + 7.5 + 0.3 * 8], [windows.left[4] + 7.5, 2]])
+    np.testing.assert_allclose(moved.at(places)[:, 0], between, atol=1e-5)
+    assert np.isnan(moved.at(np.array([[-0.1, 5.0], [5.0, 95.1], [np.nan, 5.0]]))).all()
+
+
+def test_mean_motion_under_other_windows_is_that_of_their_pixels():
+    windows, smaller = arrange((90, 128), 16, 0.5), arrange((90, 128), 10, 0.5)
+    field = np.random.default_rng(6).normal(size=(len(windows.top), len(windows.left), 2))
+    moved = motion(field, windows, (90, 128))
+    pixels = np.stack(np.meshgrid(np.arange(128.0), np.arange(90.0)), -1)
+    every = moved.at(pixels.reshape(-1, 2)).reshape(pixels.shape)
+    expected = np.stack([smaller.cut(each).mean((-2, -1)) for each in np.moveaxis(every, -1, 0)], -1)
+    np.testing.assert_allclose(moved.mean(smaller), expected, atol=1e-6)
 
 
 def test_smoothing_keeps_linear_motion_and_removes_what_alternates():
@@ -106,7 +121,10 @@ def test_smoothing_keeps_linear_motion_and_removes_what_alternates():
 
 def test_image_carried_back_by_its_motion_is_the_first(shifted):
     first, second = shifted(96, 0, 0), shifted(96, 2.5, -1.25)
-    back = carry(second.astype(np.float32), np.broadcast_to(np.float32([2.5, -1.25]), (96, 96, 2)))
+    windows = arrange((96, 96), 16, 0.5)
+    field = np.broadcast_to([2.5, -1.25], (len(windows.top), len(windows.left), 2))
+    image = WindowPairs([windows]).prepare(second.astype(np.float32))
+    back = carry(image, motion(field, windows, (96, 96)), np.ones((96, 96), bool))
     # Dark seams of speckle, cut off at black, are no smooth function.
     assert np.median(np.abs(back - first.astype(float))[5:-5, 5:-5]) < 1
 

@@ -29,13 +29,6 @@ def test_cut_has_the_right_pixels():
     np.testing.assert_array_equal(cut[2, 3], image[row : row + 8, column : column + 8])
 
 
-def test_mean_is_that_of_the_pixels_of_a_window():
-    image = np.random.default_rng(0).normal(size=(30, 45, 2))
-    windows = arrange(image.shape[:2], 8, 0.5)
-    cut = np.stack([windows.cut(image[..., k]).mean((-2, -1)) for k in (0, 1)], -1)
-    np.testing.assert_allclose(windows.mean(image), cut, atol=1e-12)
-
-
 def test_interpolation_is_exact_for_linear_fields_and_nearest_outside():
     windows = arrange((64, 96), 16, 0.5)
     lateral, axial = np.meshgrid(windows.left + 7.5, windows.top + 7.5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, Protocol
 
 import numpy as np
@@ -63,12 +64,14 @@ def accumulate(pairs: Pairs, frames: np.ndarray, points: np.ndarray, reference: 
     quality : ndarray of shape (frame, n)
         1 at frame 0.
     """
+    prepared = map(pairs.prepare, frames)
     if reference != "cycle":
-        return _path(pairs, frames, points, reference == "previous")
+        return _path(pairs, prepared, points, reference == "previous")
+    images = list(prepared)
     moved, alike, variance = [], [], []
-    for way in cycle.ways(len(frames)):
+    for way in cycle.ways(len(images)):
         # The order in which a way takes the frames is its own inverse.
-        total, quality = _path(pairs, frames[way], points, True)
+        total, quality = _path(pairs, (images[t] for t in way), points, True)
         moved.append(total[way])
         alike.append(quality[way])
         variance.append(doubt(quality)[way])
@@ -94,17 +97,15 @@ def doubt(quality: np.ndarray) -> np.ndarray:
     return np.cumsum(np.nan_to_num(1 / known**2 - 1, nan=np.inf), axis=0)
 
 
-def _path(pairs: Pairs, frames: np.ndarray, points: np.ndarray, stepwise: bool) -> tuple[np.ndarray, np.ndarray]:
-    """What :func:`accumulate` returns, frame to frame or against the first."""
-    total = np.zeros((len(frames), *points.shape))
-    quality = np.ones(total.shape[:2])
-    first = pairs.prepare(frames[0])
-    for t in range(1, len(frames)):
-        second = pairs.prepare(frames[t])
-        start = total[t - 1] if stepwise else np.zeros_like(points)
-        step, quality[t] = pairs.match(first, second, points + start)
-        total[t] = start + step
+def _path(pairs: Pairs, images: Iterator[Any], points: np.ndarray, stepwise: bool) -> tuple[np.ndarray, np.ndarray]:
+    """What :func:`accumulate` returns, frame to frame or against the first, from prepared images."""
+    total, quality = [np.zeros_like(points)], [np.ones(len(points))]
+    first = next(images)
+    for second in images:
+        start = total[-1] if stepwise else total[0]
+        step, alike = pairs.match(first, second, points + start)
+        total.append(start + step)
+        quality.append(np.where(np.isnan(total[-1]).any(-1), np.nan, alike))
         if stepwise:
             first = second
-    quality[np.isnan(total).any(-1)] = np.nan
-    return total, quality
+    return np.array(total), np.array(quality)

@@ -17,7 +17,7 @@ from echotruth.tracking import subset
 from echotruth.tracking.accumulation import accumulate
 from echotruth.tracking.flow import sample
 from echotruth.tracking.grey import FAINTEST, levels
-from echotruth.tracking.window_deformation import WindowPairs, arranged
+from echotruth.tracking.window_deformation import Prepared, WindowPairs, arranged
 
 SMALLEST_HALF = 8
 """Pixels of the smallest subset to either side of its middle: six unknowns ask for more texture than two."""
@@ -69,17 +69,17 @@ class AffinePairs:
     half: int
     start: WindowPairs
 
-    def prepare(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The image, the spline of its blur, and where a subset would reach a pixel without a value."""
+    def prepare(self, image: np.ndarray) -> tuple[Prepared, np.ndarray, np.ndarray]:
+        """The image for the start, the spline of its blur, and where a subset would reach a pixel without a value."""
         unknown = np.isnan(image)
         blurred = ndimage.gaussian_filter(np.where(unknown, np.float32(0), image), BLUR)
         near = ndimage.maximum_filter(unknown, 2 * (self.half + REACH) + 1)
-        return image, spline.coefficients(blurred), near
+        return self.start.prepare(image), spline.coefficients(blurred), near
 
     def match(self, first: tuple, second: tuple, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step (n, 2) in px and quality (n,) of points."""
         motion, alike = np.full((len(points), 6), np.nan), np.full(len(points), np.nan)
-        begin = sample(self.start.field(first[0], second[0])[0], points)
+        begin = self.start.field(first[0], second[0])[0].at(points)
         inside = np.isfinite(begin).all(1)
         refined, found = np.zeros((inside.sum(), 6)), alike[inside]
         refined[:, [0, 3]] = begin[inside]

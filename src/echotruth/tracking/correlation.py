@@ -11,86 +11,156 @@ import numpy as np
 from echotruth.tracking.grey import FAINTEST
 from echotruth.tracking.windows import Windows
 
+LANES = 8
+"""Lags that are summed side by side."""
 
-def match(first: np.ndarray, second: np.ndarray, windows: Windows, reach: int) -> tuple[np.ndarray, np.ndarray]:
+
+def textured(image: np.ndarray, windows: Windows) -> np.ndarray:
+    """Which windows of an image (axial, lateral) have texture and no pixel without a value: (rows, columns), bool."""
+    seen = np.empty((len(windows.top), len(windows.left)), bool)
+    _textured(image, windows.top, windows.left, windows.side, seen)
+    return seen
+
+
+def match(
+    first: np.ndarray, second: np.ndarray, windows: Windows, seen: np.ndarray, reach: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Where the texture under each window of one image is in another.
 
     Parameters
     ----------
     first, second : ndarray of shape (axial, lateral), float32
-        Grey values from 0 to 1; NaN where there are none.
+        Grey values from 0 to 1; NaN where there are none. Beyond the border, the border's are taken.
     windows : Windows
         Where to look.
+    seen : ndarray of shape (rows, columns), bool
+        Windows that are looked for, all of them :func:`textured`.
     reach : int
         Largest lag, px.
 
     Returns
     -------
     shift : ndarray of shape (rows, columns, 2)
-        Lateral, axial, px; NaN where a window has no texture, and where no lag within reach is the best.
+        Lateral, axial, px; NaN where a window is not looked for, and where no lag within reach is the best.
     peak : ndarray of shape (rows, columns)
-        Largest correlation, from -1 to 1; NaN where a window has no texture.
+        Largest correlation, from -1 to 1; NaN where a window is not looked for, or has no texture at any lag.
     """
-    side = windows.side
-    wide = np.pad(second, reach, mode="edge")
-    deviation = np.sqrt(np.maximum(_variance(wide, side), 0))
-    template = windows.cut(first)
-    template -= template.mean((-2, -1), keepdims=True)
-    norm = np.sqrt((template**2).sum((-2, -1)))
-    norm[~(norm > FAINTEST * side)] = np.nan
-    plane = np.empty((*norm.shape, 2 * reach + 1, 2 * reach + 1), np.float32)
-    correlate(template.astype(np.float32), norm, np.nan_to_num(wide), windows.top, windows.left, plane)
-    lag = np.arange(2 * reach + 1)
-    spread = deviation[
-        windows.top[:, None, None, None] + lag[:, None], windows.left[None, :, None, None] + lag[None, None, None, :]
-    ]
-    plane = plane / (norm[..., None, None] * side * np.where(spread > FAINTEST, spread, np.nan))
-    return peaks(plane)
+    row, column = np.nonzero(seen)
+    plane = np.empty((len(row), 2 * reach + 1, 2 * reach + 1), np.float32)
+    correlate(first, second, np.stack([windows.top[row], windows.left[column]], -1), windows.side, plane)
+    shift, peak = np.full((*seen.shape, 2), np.nan), np.full(seen.shape, np.nan)
+    shift[seen], peak[seen] = peaks(plane)
+    return shift, peak
 
 
-def _variance(image: np.ndarray, side: int) -> np.ndarray:
-    """Variance of the window that starts at each pixel; NaN where it holds a pixel without a value."""
-    known = np.isfinite(image)
-    value = np.where(known, image, 0).astype(float)
-    sums = []
-    for each in (value, value**2, 1.0 - known):
-        corner = np.pad(each, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
-        sums.append(corner[side:, side:] - corner[:-side, side:] - corner[side:, :-side] + corner[:-side, :-side])
-    mean = sums[0] / side**2
-    return np.where(sums[2] > 0.5, np.nan, sums[1] / side**2 - mean**2)
+@numba.njit(cache=True, nogil=True)
+def _textured(image, top, left, side, seen):
+    for i in range(len(top)):
+        for j in range(len(left)):
+            total, square = 0.0, 0.0
+            for y in range(top[i], top[i] + side):
+                for x in range(left[j], left[j] + side):
+                    total += image[y, x]
+                    square += image[y, x] * image[y, x]
+            seen[i, j] = square / side**2 - (total / side**2) ** 2 > FAINTEST**2
 
 
-@numba.njit(parallel=True, cache=True)
-def correlate(template, norm, image, top, left, plane):
-    """Sums of products of windows and an image at all lags.
+@numba.njit(cache=True, nogil=True)
+def correlate(first, second, corners, side, plane):
+    """Correlations of windows of one image with another at all lags.
 
     Parameters
     ----------
-    template
-        Windows less their means, shape (rows, columns, side, side), float32.
-    norm
-        Root of the sum of their squares, shape (rows, columns); NaN where a window is left out.
-    image
-        float32; window (i, j) at lag (0, 0) starts at its pixel (top[i], left[j]).
+    first, second
+        See :func:`match`.
+    corners
+        First row and column of every window, shape (n, 2).
+    side
+        Of a window, px.
     plane
-        Written, NaN for windows left out: shape (rows, columns, lags, lags), float32, axial lag first.
+        Written, NaN where either image has no texture or lacks a value: shape (n, lags, lags), axial lag first.
     """
-    rows, columns, side, _ = template.shape
-    lags = plane.shape[2]
-    for window in numba.prange(rows * columns):
-        i, j = window // columns, window % columns
-        if np.isnan(norm[i, j]):
-            plane[i, j] = np.nan
-            continue
-        plane[i, j] = 0
+    lags = plane.shape[1]
+    reach, lanes = lags // 2, LANES * ((lags + LANES - 1) // LANES)
+    template, wide = np.empty((side, side), np.float32), np.zeros((side + lags - 1, side + lanes), np.float32)
+    products = np.empty((lags, lanes), np.float32)
+    for window in range(len(corners)):
+        top, left = corners[window]
+        norm = cut(first, top, left, template)
+        for y in range(side + lags - 1):
+            for x in range(side + lags - 1):
+                row, column = top - reach + y, left - reach + x
+                row, column = min(max(row, 0), second.shape[0] - 1), min(max(column, 0), second.shape[1] - 1)
+                wide[y, x] = second[row, column]
+        multiply(template, wide, products)
+        normalise(products, norm, wide, side, plane[window])
+
+
+@numba.njit(cache=True, nogil=True)
+def cut(image, top, left, template):
+    """Write the grey values of a window less their mean; the root of the sum of their squares."""
+    side = len(template)
+    mean, square = 0.0, 0.0
+    for y in range(side):
+        for x in range(side):
+            mean += image[top + y, left + x] / side**2
+    for y in range(side):
+        for x in range(side):
+            template[y, x] = image[top + y, left + x] - mean
+            square += template[y, x] * template[y, x]
+    return np.sqrt(square)
+
+
+@numba.njit(cache=True, nogil=True)
+def multiply(template, wide, products):
+    """Write the sums of products of a window and a wider one at all lags (lags, lanes), and at more than are wanted."""
+    side = len(template)
+    lags, lanes = products.shape
+    fours = side - side % 4
+    for down in range(lags):
+        total = products[down]
+        for lane in range(lanes):
+            total[lane] = 0
         for y in range(side):
-            for down in range(lags):
-                line = image[top[i] + y + down, left[j] : left[j] + side + lags - 1]
-                total = plane[i, j, down]
-                for x in range(side):
-                    grey = template[i, j, y, x]
-                    for across in range(lags):
-                        total[across] += grey * line[x + across]
+            line = wide[y + down]
+            # Four at a time, so that the totals are not fetched and stored for each.
+            for x in range(0, fours, 4):
+                a, b, c, d = template[y, x], template[y, x + 1], template[y, x + 2], template[y, x + 3]
+                near = line[x : x + lanes + 3]
+                for lane in range(lanes):
+                    total[lane] += (a * near[lane] + b * near[lane + 1]) + (c * near[lane + 2] + d * near[lane + 3])
+            for x in range(fours, side):
+                a, near = template[y, x], line[x : x + lanes]
+                for lane in range(lanes):
+                    total[lane] += a * near[lane]
+
+
+@numba.njit(cache=True, nogil=True)
+def normalise(products, norm, wide, side, plane):
+    """Divide sums of products by the norms of the window and of what it was compared with, at every lag."""
+    size = side + len(plane) - 1
+    value, square = np.zeros(size), np.zeros(size)
+    for y in range(size):
+        # What comes in at the bottom and what goes out at the top; the sum of a pixel without a value is NaN already.
+        for x in range(size):
+            new = np.float64(wide[y, x]) if wide[y, x] == wide[y, x] else 0.0
+            gone = np.float64(wide[y - side, x]) if y >= side and wide[y - side, x] == wide[y - side, x] else 0.0
+            value[x] += new - gone
+            square[x] += new * new - gone * gone
+        if y < side - 1:
+            continue
+        total, power = 0.0, 0.0
+        for x in range(size):
+            total += value[x]
+            power += square[x]
+            if x >= side:
+                total -= value[x - side]
+                power -= square[x - side]
+            if x >= side - 1:
+                down, across = y - side + 1, x - side + 1
+                variance = power / side**2 - (total / side**2) ** 2
+                known = variance > FAINTEST**2 and norm > FAINTEST * side
+                plane[down, across] = products[down, across] / (norm * side * np.sqrt(variance)) if known else np.nan
 
 
 def peaks(plane: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,27 +170,27 @@ def peaks(plane: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Parameters
     ----------
-    plane : ndarray of shape (rows, columns, lags, lags)
+    plane : ndarray of shape (n, lags, lags)
         Axial lag first; the middle is no lag.
 
     Returns
     -------
-    shift : ndarray of shape (rows, columns, 2)
+    shift : ndarray of shape (n, 2)
         Lateral, axial, px; NaN where the largest lies on the border or a neighbour is not above 0.
-    peak : ndarray of shape (rows, columns)
+    peak : ndarray of shape (n,)
     """
-    rows, columns, lags = plane.shape[:3]
-    flat = np.where(np.isnan(plane), -1, plane).reshape(rows, columns, -1)
+    number, lags = plane.shape[:2]
+    flat = np.where(np.isnan(plane), -1, plane).reshape(number, lags**2)
     place = np.stack(np.divmod(flat.argmax(-1), lags), -1)
-    row, column = np.ogrid[:rows, :columns]
+    every = np.arange(number)
     inner = np.clip(place, 1, lags - 2)
     shift = []
     for axis in (1, 0):
         near = [inner + k * (np.arange(2) == axis) for k in (-1, 0, 1)]
-        value = np.stack([plane[row, column, each[..., 0], each[..., 1]] for each in near])
+        value = np.stack([plane[every, each[:, 0], each[:, 1]] for each in near])
         before, middle, after = np.log(np.where(value > 0, value, np.nan))
         bend = before - 2 * middle + after
-        shift.append(inner[..., axis] - lags // 2 + (before - after) / 2 / np.where(bend < 0, bend, np.nan))
+        shift.append(inner[:, axis] - lags // 2 + (before - after) / 2 / np.where(bend < 0, bend, np.nan))
     shift = np.stack(shift, -1)
     shift[(inner != place).any(-1)] = np.nan
     return shift, np.where(np.isnan(plane).all((-2, -1)), np.nan, flat.max(-1))

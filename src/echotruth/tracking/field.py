@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import ndimage
 
 from echotruth.imaging import spline
+from echotruth.tracking import cubic
 from echotruth.tracking.windows import Windows
 
 DOUBT = 2.0
@@ -58,45 +61,60 @@ def smooth(field: np.ndarray) -> np.ndarray:
     return field
 
 
-def dense(field: np.ndarray, windows: Windows, shape: tuple[int, int]) -> np.ndarray:
-    """Cubic spline through the centres of windows at every pixel; beyond the outermost centres, theirs.
+@dataclass(frozen=True)
+class Motion:
+    """Cubic spline through the motion at the centres of windows; beyond the outermost centres, theirs.
 
-    Parameters
+    Attributes
     ----------
-    field : ndarray of shape (rows, columns, 2)
-        px, all finite; two or more rows and columns.
+    coefficients : ndarray of shape (rows + 3, columns + 3, 2), float32
+        Of the spline, with a margin: lateral, axial, px.
     windows : Windows
+        Two or more rows and columns.
     shape : tuple of int
         Axial and lateral size of the image, px.
-
-    Returns
-    -------
-    ndarray of shape (axial, lateral, 2), float32
-        px.
     """
-    place = []
-    for size, start in zip(shape, (windows.top, windows.left), strict=True):
-        index = (np.arange(size) - start[0] - (windows.side - 1) / 2) / (start[1] - start[0])
-        place.append(np.clip(index, 0, len(start) - 1))
-    row, column = np.meshgrid(*place, indexing="ij")
-    return np.stack([resample(each, row, column) for each in np.moveaxis(field, -1, 0)], -1)
+
+    coefficients: np.ndarray
+    windows: Windows
+    shape: tuple[int, int]
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Motion (n, 2) at points (n, 2): lateral, axial, px; NaN outside the image."""
+        inside = ((points >= 0) & (points <= np.array(self.shape[::-1]) - 1)).all(1)
+        (column, across), (row, down) = self.cells(*np.where(inside[:, None], points, 0).T)
+        around = np.arange(4)
+        near = self.coefficients[row[:, None, None] + around[:, None], column[:, None, None] + around]
+        return np.where(inside[:, None], np.einsum("na,nb,nabk->nk", down, across, near), np.nan)
+
+    def mean(self, windows: Windows) -> np.ndarray:
+        """Mean over the pixels of other windows, shape (rows, columns, 2)."""
+        result = self.coefficients
+        for corners, (first, shares) in zip((windows.left, windows.top), self.pixels, strict=True):
+            each = np.zeros((len(first), result.shape[1]))
+            each[np.arange(len(first))[:, None], first[:, None] + np.arange(4)] = shares
+            part = each[corners[:, None] + np.arange(windows.side)].mean(1)
+            # The axis that is done goes to the front, so that the other one comes next.
+            result = np.einsum("jb,abk->jak", part, result)
+        return result
+
+    @property
+    def pixels(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """:meth:`cells` of all columns and rows of the image."""
+        return self.cells(*(np.arange(size, dtype=float) for size in self.shape[::-1]))
+
+    def cells(self, lateral: np.ndarray, axial: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """First of the four columns and rows of coefficients at places (n,), px, and the shares (n, 4) of these."""
+        result = []
+        for place, start in ((lateral, self.windows.left), (axial, self.windows.top)):
+            index = (place - start[0] - (self.windows.side - 1) / 2) / (start[1] - start[0])
+            index = np.clip(index, 0, len(start) - 1)
+            first = np.minimum(index.astype(int), len(start) - 2)
+            result.append((first, np.stack(cubic.shares(index - first), -1)))
+        return tuple(result)
 
 
-def resample(samples: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Cubic spline through samples on an even grid, at places inside it.
-
-    Parameters
-    ----------
-    samples : ndarray of shape (rows, columns)
-        Two or more of both.
-    row, column : ndarray of one shape
-        From 0 to the last sample.
-
-    Returns
-    -------
-    ndarray of that shape, float32
-    """
-    values = np.empty(row.size, np.float32)
-    padded = spline.coefficients(np.ascontiguousarray(samples, np.float32))
-    spline.at_points(padded, row.ravel().astype(np.float32), column.ravel().astype(np.float32), values)
-    return values.reshape(row.shape)
+def motion(field: np.ndarray, windows: Windows, shape: tuple[int, int]) -> Motion:
+    """Motion between the centres of windows, from that at them: (rows, columns, 2), all finite, px."""
+    parts = [spline.coefficients(np.ascontiguousarray(each, np.float32)) for each in np.moveaxis(field, -1, 0)]
+    return Motion(np.stack(parts, -1), windows, shape)

@@ -70,13 +70,23 @@ class FlowPairs:
     def match(self, first: np.ndarray, second: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step (n, 2) in px and quality (n,) of points, linear between the pixels."""
         moved = self.flow(*(np.nan_to_num(image) for image in (first, second)))
-        row, column = np.indices(first.shape, np.float32)
+        box, corner = self._box(points, first.shape)
+        moved, first = moved[box], first[box]
+        row, column = np.indices(first.shape, np.float32) + np.float32(corner[::-1])[:, None, None]
         back = ndimage.map_coordinates(second, [row + moved[..., 1], column + moved[..., 0]], order=1, mode="nearest")
         alike = similarity(first, back, self.side)
         told = np.concatenate([moved, alike[..., None]], -1)
         told[np.isnan(alike)] = np.nan
-        step = sample(told, points)
+        step = sample(told, points - corner)
         return step[:, :2], np.maximum(step[:, 2], 0)
+
+    def _box(self, points: np.ndarray, shape: tuple[int, int]) -> tuple[tuple[slice, slice], np.ndarray]:
+        """Rows and columns of what can be seen from the points, and the first pixel of it: lateral, axial."""
+        inside = ((points >= 0) & (points <= np.array(shape[::-1]) - 1)).all(1)
+        near = points[inside] if inside.any() else np.zeros((1, 2))
+        low = np.maximum(np.floor(near.min(0)).astype(int) - self.side, 0)
+        high = np.ceil(near.max(0)).astype(int) + self.side + 1
+        return (slice(low[1], high[1]), slice(low[0], high[0])), low
 
 
 def sample(field: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import log
 
+import cv2
 import numpy as np
-from scipy import ndimage
 
 FAINTEST = 1 / 255
 """Standard deviation of a window below which it counts as without texture: a level of an 8-bit image."""
@@ -77,7 +77,10 @@ def similarity(first: np.ndarray, second: np.ndarray, side: int) -> np.ndarray:
     """
     known = np.isfinite(first) & np.isfinite(second)
     a, b = (np.where(known, image, 0).astype(float) for image in (first, second))
-    over = [ndimage.uniform_filter(image, side) for image in (a, b, a * a, b * b, a * b, 1.0 - known)]
+    every = (a, b, a * a, b * b, a * b, 1.0 - known)
+    # Running sums, whose rounding depends on where a thread begins.
+    cv2.setNumThreads(1)
+    over = [cv2.blur(image, (side, side), borderType=cv2.BORDER_REFLECT) for image in every]
     variances = over[2] - over[0] ** 2, over[3] - over[1] ** 2
     told = (np.minimum(*variances) > FAINTEST**2) & (over[5] < 0.5 / side**2)
     product = np.where(told, variances[0] * variances[1], np.nan)

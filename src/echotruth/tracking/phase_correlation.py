@@ -83,19 +83,35 @@ class PhasePairs:
     contrast: float
     floor: float
 
-    def prepare(self, image: np.ndarray) -> np.ndarray:
+    def prepare(self, image: np.ndarray) -> Phases:
         """:func:`phases` of an image."""
         return phases(image, self.windows, self.taper, self.contrast, self.floor)
 
-    def match(self, first: np.ndarray, second: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def match(self, first: Phases, second: Phases, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step (n, 2) in px and quality (n,) of points, linear between the windows."""
         moved, peak = displacement(first, second, self.windows.side)
         step = self.windows.interpolate(np.concatenate([moved, peak[..., None]], -1), points)
         return step[:, :2], step[:, 2]
 
 
-def phases(image: np.ndarray, windows: Windows, taper: str, contrast: float, floor: float = ABSENT) -> np.ndarray:
-    """Transforms of all windows with the magnitude taken out.
+@dataclass(frozen=True)
+class Phases:
+    """Transforms of windows with the magnitude taken out.
+
+    Attributes
+    ----------
+    seen : ndarray of shape (rows, columns), bool
+        Windows that have texture.
+    unit : ndarray of shape (n, side, side // 2 + 1), complex
+        Theirs: unit numbers; 0 where a frequency does not count.
+    """
+
+    seen: np.ndarray
+    unit: np.ndarray
+
+
+def phases(image: np.ndarray, windows: Windows, taper: str, contrast: float, floor: float = ABSENT) -> Phases:
+    """Transforms of the windows of an image with the magnitude taken out.
 
     Parameters
     ----------
@@ -112,13 +128,13 @@ def phases(image: np.ndarray, windows: Windows, taper: str, contrast: float, flo
 
     Returns
     -------
-    ndarray of shape (rows, columns, side, side // 2 + 1), complex
-        Unit numbers; 0 where a frequency does not count, NaN throughout a window without texture.
+    Phases
     """
     side = windows.side
     cut = windows.cut(image)
     cut -= cut.mean((-2, -1), keepdims=True)
-    textured = cut.std((-2, -1)) > FAINTEST * (contrast or np.inf)
+    seen = cut.std((-2, -1)) > FAINTEST * (contrast or np.inf)
+    cut = cut[seen]
     if taper == "hann":
         # Sampled at pixel centres, so that the weights are symmetric and none is lost to zero.
         hann = np.sin(np.pi * (np.arange(side) + 0.5) / side) ** 2
@@ -126,18 +142,16 @@ def phases(image: np.ndarray, windows: Windows, taper: str, contrast: float, flo
     spectrum = fft.rfft2(cut)
     magnitude = np.abs(spectrum)
     present = magnitude > floor * magnitude.max((-2, -1), keepdims=True)
-    result = np.divide(spectrum, magnitude, out=np.zeros_like(spectrum), where=present)
-    result[~textured] = np.nan
-    return result
+    return Phases(seen, np.divide(spectrum, magnitude, out=np.zeros_like(spectrum), where=present))
 
 
-def displacement(first: np.ndarray, second: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+def displacement(first: Phases, second: Phases, side: int) -> tuple[np.ndarray, np.ndarray]:
     """Motion of the tissue in every window from the first image to the second.
 
     Parameters
     ----------
-    first, second : ndarray of shape (rows, columns, side, side // 2 + 1), complex
-        :func:`phases` of the two images.
+    first, second : Phases
+        Of the two images.
     side : int
         Side of a window, px.
 
@@ -148,20 +162,22 @@ def displacement(first: np.ndarray, second: np.ndarray, side: int) -> tuple[np.n
     quality : ndarray of shape (rows, columns)
         Height of the correlation peak: 1 for a whole-pixel shift of the same texture, near 0 for unlike ones.
     """
-    plane = fft.irfft2(first.conj() * second, s=(side, side))
-    rows, columns = plane.shape[:2]
-    flat = plane.reshape(rows, columns, -1)
-    # The NaN of a window without texture reaches the peak, and with it the displacement.
+    seen = first.seen & second.seen
+    plane = fft.irfft2(
+        first.unit[second.seen[first.seen]].conj() * second.unit[first.seen[second.seen]], s=(side, side)
+    )
+    every, flat = np.arange(len(plane)), plane.reshape(len(plane), side**2)
     axial, lateral = np.divmod(flat.argmax(-1), side)
     peak = flat.max(-1)
-    row, column = np.ogrid[:rows, :columns]
     shift = []
     for i, j, place in ((0, 1, lateral), (1, 0, axial)):
-        before = plane[row, column, (axial - i) % side, (lateral - j) % side]
-        after = plane[row, column, (axial + i) % side, (lateral + j) % side]
+        before = plane[every, (axial - i) % side, (lateral - j) % side]
+        after = plane[every, (axial + i) % side, (lateral + j) % side]
         whole = (place + side // 2) % side - side // 2
         shift.append(whole + fraction(before, peak, after))
-    return np.stack(shift, -1), peak
+    moved, quality = np.full((*seen.shape, 2), np.nan), np.full(seen.shape, np.nan)
+    moved[seen], quality[seen] = np.stack(shift, -1), peak
+    return moved, quality
 
 
 def fraction(before: np.ndarray, peak: np.ndarray, after: np.ndarray) -> np.ndarray:

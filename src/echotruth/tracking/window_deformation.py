@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from echotruth.config.tracking import WindowDeformation
+from echotruth.imaging import spline
 from echotruth.tracking.accumulation import accumulate
-from echotruth.tracking.correlation import match
-from echotruth.tracking.field import dense, resample, smooth, validated
-from echotruth.tracking.flow import sample
+from echotruth.tracking.correlation import match, textured
+from echotruth.tracking.field import Motion, motion, smooth, validated
 from echotruth.tracking.grey import levels
 from echotruth.tracking.windows import SMALLEST, Windows, arrange
 
@@ -104,58 +105,117 @@ class WindowPairs:
 
     passes: list[Windows]
 
-    def prepare(self, image: np.ndarray) -> np.ndarray:
-        """The image as it is, grey values from 0 to 1."""
-        return image
+    def prepare(self, image: np.ndarray) -> Prepared:
+        """An image (axial, lateral), float32, with grey values from 0 to 1 or NaN, and what is worth knowing of it."""
+        unknown = np.isnan(image)
+        seen = {windows.side: textured(image, windows) for windows in self.passes}
+        near = {windows.side: covered(windows, seen[windows.side], image.shape) for windows in self.passes[1:]}
+        return Prepared(image, spline.coefficients(np.where(unknown, np.float32(0), image)), unknown, seen, near)
 
-    def match(self, first: np.ndarray, second: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def match(self, first: Prepared, second: Prepared, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step (n, 2) in px and quality (n,) of points."""
         moved, peak = self.field(first, second)
-        step, alike = sample(moved, points), self.passes[-1].interpolate(peak[..., None], points)
+        step, alike = moved.at(points), self.passes[-1].interpolate(peak[..., None], points)
         return np.where(np.isnan(alike), np.nan, step), np.maximum(alike[:, 0], 0)
 
-    def field(self, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Motion of all pixels.
-
-        Parameters
-        ----------
-        first, second : ndarray of shape (axial, lateral)
-            Grey values from 0 to 1; NaN where there are none.
+    def field(self, first: Prepared, second: Prepared) -> tuple[Motion, np.ndarray]:
+        """Motion everywhere.
 
         Returns
         -------
-        moved : ndarray of shape (axial, lateral, 2)
-            Lateral, axial, px; that of the windows near by where there is no texture.
+        moved : Motion
+            That of the windows near by where there is no texture.
         peak : ndarray of shape (rows, columns)
             Correlation of the last windows; NaN where they have no texture.
         """
-        moved = np.zeros((*first.shape, 2), np.float32)
+        moved = None
         for windows in self.passes:
-            shift, peak = match(first, carry(second, moved), windows, round(REACH * windows.side))
-            moved = dense(smooth(validated(windows.mean(moved) + shift)), windows, first.shape)
+            side = windows.side
+            back = carry(second, moved, first.near[side]) if moved else second.image
+            shift, peak = match(first.image, back, windows, first.seen[side], round(REACH * side))
+            shift += moved.mean(windows) if moved else 0.0
+            moved = motion(smooth(validated(shift)), windows, first.image.shape)
         return moved, peak
 
 
-def carry(image: np.ndarray, moved: np.ndarray) -> np.ndarray:
+@dataclass(frozen=True)
+class Prepared:
+    """An image and what is worth working out once.
+
+    Attributes
+    ----------
+    image : ndarray of shape (axial, lateral), float32
+        Grey values from 0 to 1; NaN where there are none.
+    coefficients : ndarray
+        Of its spline, see :func:`echotruth.imaging.spline.coefficients`.
+    unknown : ndarray of shape (axial, lateral), bool
+        Pixels without a value.
+    seen : dict of ndarray of shape (rows, columns), bool
+        By the side of windows, which of them have texture.
+    near : dict of ndarray of shape (axial, lateral), bool
+        By the side of windows, the pixels with which those are compared.
+    """
+
+    image: np.ndarray
+    coefficients: np.ndarray
+    unknown: np.ndarray
+    seen: dict[int, np.ndarray]
+    near: dict[int, np.ndarray]
+
+
+def covered(windows: Windows, seen: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Pixels (axial, lateral), bool, under the windows that are seen (rows, columns) at any lag."""
+    result, reach = np.zeros(shape, bool), round(REACH * windows.side)
+    for row, column in np.argwhere(seen):
+        top, left = windows.top[row] - reach, windows.left[column] - reach
+        result[max(0, top) : top + windows.side + 2 * reach, max(0, left) : left + windows.side + 2 * reach] = True
+    return result
+
+
+def carry(image: Prepared, moved: Motion, near: np.ndarray) -> np.ndarray:
     """An image carried back by the motion to it.
 
     Parameters
     ----------
-    image : ndarray of shape (axial, lateral)
-        Grey values; NaN where there are none.
-    moved : ndarray of shape (axial, lateral, 2)
-        Lateral, axial, px.
+    image : Prepared
+    moved : Motion
+    near : ndarray of shape (axial, lateral), bool
+        Pixels that are wanted.
 
     Returns
     -------
     ndarray of shape (axial, lateral), float32
-        At every pixel what is at the end of its motion, or at the border nearest to it.
+        At every pixel what is at the end of its motion, or at the border nearest to it; NaN where there is nothing, or
+        it is not wanted.
     """
-    row, column = (
-        np.clip(index + moved[..., 1 - axis], 0, image.shape[axis] - 1)
-        for axis, index in enumerate(np.indices(image.shape, np.float32))
-    )
-    unknown = np.isnan(image)
-    result = resample(np.where(unknown, 0, image), row, column)
-    result[unknown[row.round().astype(int), column.round().astype(int)]] = np.nan
+    columns, rows = moved.pixels
+    result = np.full(near.shape, np.nan, np.float32)
+    _carry(image.coefficients, image.unknown, moved.coefficients, columns, rows, near, result)
     return result
+
+
+@numba.njit(cache=True, nogil=True)
+def _carry(image, unknown, moved, columns, rows, near, result):
+    height, width = near.shape
+    (column, across), line = columns, np.empty(moved.shape[1:])
+    for y in range(height):
+        _along(moved, rows[0][y], rows[1][y], line)
+        for x in range(width):
+            if near[y, x]:
+                lateral, axial = np.float64(x), np.float64(y)
+                for b in range(4):
+                    lateral += across[x, b] * line[column[x] + b, 0]
+                    axial += across[x, b] * line[column[x] + b, 1]
+                lateral, axial = min(max(lateral, 0.0), width - 1.0), min(max(axial, 0.0), height - 1.0)
+                if not unknown[int(axial + 0.5), int(lateral + 0.5)]:
+                    result[y, x] = spline.value(image, np.float32(axial), np.float32(lateral))
+
+
+@numba.njit(cache=True, nogil=True)
+def _along(moved, first, shares, line):
+    """Write the coefficients (columns, 2) of the motion along a row of pixels, by the shares of four rows of them."""
+    for j in range(len(line)):
+        for k in range(2):
+            line[j, k] = 0.0
+            for a in range(4):
+                line[j, k] += shares[a] * moved[first + a, j, k]

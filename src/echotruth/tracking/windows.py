@@ -45,21 +45,6 @@ class Windows:
         every = np.lib.stride_tricks.sliding_window_view(image, (self.side, self.side))
         return every[np.ix_(self.top, self.left)].astype(float)
 
-    def mean(self, image: np.ndarray) -> np.ndarray:
-        """Mean under every window.
-
-        Parameters
-        ----------
-        image : ndarray of shape (axial, lateral, k)
-
-        Returns
-        -------
-        ndarray of shape (rows, columns, k)
-        """
-        # Windows are square, so that a mean along one axis may be cut along the other.
-        along = np.lib.stride_tricks.sliding_window_view(image, self.side, axis=1)[:, self.left].mean(-1)
-        return np.lib.stride_tricks.sliding_window_view(along, self.side, axis=0)[self.top].mean(-1)
-
     def interpolate(self, field: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Bilinear interpolation between the window centres, nearest value outside them.
 
