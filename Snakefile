@@ -16,8 +16,7 @@ from echotruth.config.loading import ConfigError, validate
 from echotruth.mechanics.geometry.body import fingerprint
 from echotruth.mechanics.loop import read_loop
 from echotruth.provenance import code_version, settings_version
-from echotruth.repository.job import GATES, record_path
-from echotruth.repository.publication import VIEW_STAGES
+from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
 
 if not config:
 
