@@ -9,9 +9,16 @@ rule mechanics:
         settings=lambda wildcards: mechanics_settings(CASES[wildcards.case].config),
     log:
         FOLDER / "logs/mechanics/{case}.log",
-    threads: max(1, (workflow.cores or 1) // len(CASES))
+    # One core is left to what compiles meanwhile.
+    threads: max(1, ((workflow.cores or 1) - any(not Path(mark).exists() for mark in MARKS.values())) // len(CASES))
+    priority: 3
     shell:
-        "{RUN}/mechanics.py {FOLDER} {wildcards.case} --threads {threads} 2>&1 | tee {log}"
+        """
+        {{
+            {COMPILED[mechanics]}
+            {RUN}/mechanics.py {FOLDER} {wildcards.case} --threads {threads}
+        }} &> {log}
+        """
 
 
 def mechanics_settings(config):

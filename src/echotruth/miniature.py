@@ -1,0 +1,62 @@
+"""A miniature of a configuration: hearts, images and trackers of the same kinds, and next to no size.
+
+Its jobs call the same functions on arrays of the same types as those of the configuration itself, in seconds.
+"""
+
+from __future__ import annotations
+
+from echotruth.cases import expand
+from echotruth.config import Bmode, Config, Geometry, Motion, Pathology
+
+FRAMES = 3
+"""The fewest of which a cycle has a frame between two others."""
+LINES = 16
+THINNED = 100
+"""Scatterers of the configuration to one of the miniature."""
+SIDE = 128
+"""Most pixels along a side of the image, if the windows of all trackers fit into it."""
+
+
+def miniature(config: Config) -> Config:
+    """A configuration of one small heart that moves by a formula.
+
+    Parameters
+    ----------
+    config : Config
+        Of which the first case is taken.
+
+    Returns
+    -------
+    Config
+        One view of each plane and one image size; array, transmits, realism and trackers are as they were.
+    """
+    first = expand(config)[0].config
+    planes = {view.plane: name for name, view in first.views.items()}
+    return first.model_copy(
+        update={
+            "name": "miniature",
+            "geometry": _geometry(first),
+            "fibres": first.fibres.model_copy(update={"source": "rule", "disarray_deg": 0.0}),
+            "pathology": Pathology(),
+            "loop": first.loop.model_copy(update={"frames": FRAMES}),
+            "motion": Motion(kind="rigid") if first.motion.kind == "beat" else first.motion,
+            "views": {name: first.views[name] for name in planes.values()},
+            "phantom": first.phantom.model_copy(update={"density_per_mm3": first.phantom.density_per_mm3 / THINNED}),
+            "rf": first.rf.model_copy(update={"lines": LINES}),
+            "bmode": _bmode(first),
+        }
+    )
+
+
+def _geometry(config: Config) -> Geometry:
+    """The heart in the coarsest mesh; one of the size of the array where it was read from a file."""
+    species = config.probe.preset.partition("_")[0]
+    geometry = Geometry(preset=species) if config.geometry.file else config.geometry
+    elements = ("circumferential_elements", "longitudinal_elements", "transmural_elements")
+    return geometry.model_copy(update=dict(zip(elements, (12, 6, 1), strict=True)) | {"state": "unloaded"})
+
+
+def _bmode(config: Config) -> Bmode:
+    windows = [getattr(tracker, "window_px", None) or 0 for tracker in config.tracking.trackers.values()]
+    side = max(min(SIDE, config.bmode.sizes[0]), 2 * max(windows))
+    return config.bmode.model_copy(update={"size_px": side, "downsampling": (1,)})
