@@ -6,6 +6,7 @@
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from shlex import quote
 

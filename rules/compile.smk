@@ -12,7 +12,7 @@ GROUPS = {
 }
 # A compiled function is cached by the file it stands in, not by those it calls from: one cache a version of the code.
 CACHE = {group: f".snakemake/numba/{group}-{code(*stages)}" for group, stages in GROUPS.items()}
-SMALL = miniature(CONFIG)
+SMALL = miniature(next(iter(CASES.values())).config)
 KINDS = {
     "imaging": (*SMALL.views.values(), SMALL.phantom, SMALL.probe, SMALL.rf, SMALL.realism, SMALL.bmode, SMALL.motion),
     "tracking": (SMALL.tracking, SMALL.bmode),

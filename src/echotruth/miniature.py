@@ -5,7 +5,6 @@ Its jobs call the same functions on arrays of the same types as those of the con
 
 from __future__ import annotations
 
-from echotruth.cases import expand
 from echotruth.config import Bmode, Config, Geometry, Motion, Pathology
 
 FRAMES = 3
@@ -23,27 +22,26 @@ def miniature(config: Config) -> Config:
     Parameters
     ----------
     config : Config
-        Of which the first case is taken.
+        Of one case.
 
     Returns
     -------
     Config
         One view of each plane and one image size; array, transmits, realism and trackers are as they were.
     """
-    first = expand(config)[0].config
-    planes = {view.plane: name for name, view in first.views.items()}
-    return first.model_copy(
+    planes = {view.plane: name for name, view in config.views.items()}
+    return config.model_copy(
         update={
             "name": "miniature",
-            "geometry": _geometry(first),
-            "fibres": first.fibres.model_copy(update={"source": "rule", "disarray_deg": 0.0}),
+            "geometry": _geometry(config),
+            "fibres": config.fibres.model_copy(update={"source": "rule", "disarray_deg": 0.0}),
             "pathology": Pathology(),
-            "loop": first.loop.model_copy(update={"frames": FRAMES}),
-            "motion": Motion(kind="rigid") if first.motion.kind == "beat" else first.motion,
-            "views": {name: first.views[name] for name in planes.values()},
-            "phantom": first.phantom.model_copy(update={"density_per_mm3": first.phantom.density_per_mm3 / THINNED}),
-            "rf": first.rf.model_copy(update={"lines": LINES}),
-            "bmode": _bmode(first),
+            "loop": config.loop.model_copy(update={"frames": FRAMES}),
+            "motion": Motion(kind="rigid") if config.motion.kind == "beat" else config.motion,
+            "views": {name: config.views[name] for name in planes.values()},
+            "phantom": config.phantom.model_copy(update={"density_per_mm3": config.phantom.density_per_mm3 / THINNED}),
+            "rf": config.rf.model_copy(update={"lines": LINES}),
+            "bmode": _bmode(config),
         }
     )
 

@@ -28,7 +28,7 @@ def images(job: Job) -> Result:
 
 
 def work(group: str, folder: Path) -> None:
-    config = miniature(load(folder / "config.yaml"))
+    config = miniature(expand(load(folder / "config.yaml"))[0].config)
     with tempfile.TemporaryDirectory() as place:
         cases = expand(config)
         lay_out(Path(place), config, cases)

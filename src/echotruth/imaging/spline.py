@@ -18,8 +18,8 @@ COLUMNS = 64
 
 
 @numba.njit(cache=True)
-def filter_rows(values):
-    """Turn samples along the first axis into spline coefficients, in place; (n, columns), float32, n of 2 or more."""
+def begin(values):
+    """Turn the first row of samples (n, columns), float32, into what the filter has there, all being mirrored."""
     n, columns = values.shape
     start = np.zeros(columns, np.float32)
     power = np.float32(1)
@@ -29,6 +29,13 @@ def filter_rows(values):
         power *= POLE
     for column in range(columns):
         values[0, column] = start[column]
+
+
+@numba.njit(cache=True)
+def filter_rows(values):
+    """Turn samples along the first axis into spline coefficients, in place; (n, columns), float32, n of 2 or more."""
+    n, columns = values.shape
+    begin(values)
     for k in range(1, n):
         for column in range(columns):
             values[k, column] += POLE * values[k - 1, column]
