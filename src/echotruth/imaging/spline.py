@@ -18,24 +18,15 @@ COLUMNS = 64
 
 
 @numba.njit(cache=True)
-def begin(values):
-    """Turn the first row of samples (n, columns), float32, into what the filter has there, all being mirrored."""
+def filter_rows(values):
+    """Turn samples along the first axis into spline coefficients, in place; (n, columns), float32, n of 2 or more."""
     n, columns = values.shape
     start = np.zeros(columns, np.float32)
     power = np.float32(1)
     for k in range(min(n, MEMORY)):
-        for column in range(columns):
-            start[column] += power * values[k, column]
+        start += power * values[k]
         power *= POLE
-    for column in range(columns):
-        values[0, column] = start[column]
-
-
-@numba.njit(cache=True)
-def filter_rows(values):
-    """Turn samples along the first axis into spline coefficients, in place; (n, columns), float32, n of 2 or more."""
-    n, columns = values.shape
-    begin(values)
+    values[0] = start
     for k in range(1, n):
         for column in range(columns):
             values[k, column] += POLE * values[k - 1, column]
@@ -45,55 +36,26 @@ def filter_rows(values):
     for k in range(n - 2, -1, -1):
         for column in range(columns):
             values[k, column] = POLE * (values[k + 1, column] - values[k, column])
-    for k in range(n):
-        for column in range(columns):
-            values[k, column] *= np.float32(6)
+    values *= np.float32(6)
 
 
-@numba.njit(cache=True)
-def filter_down(samples, padded, first, last):
-    """Write the columns `first` to `last` of samples, filtered along them, into the padded array."""
-    rows = samples.shape[0]
-    part = np.empty((rows, last - first), np.float32)
-    for row in range(rows):
-        for column in range(first, last):
-            part[row, column - first] = samples[row, column]
-    filter_rows(part)
-    for row in range(rows):
-        for column in range(first, last):
-            padded[1 + row, 1 + column] = part[row, column - first]
-
-
-@numba.njit(cache=True)
-def filter_across(padded, first, last):
-    """Filter the rows `first` to `last` of the padded array, in place, and mirror them about their ends."""
-    columns = padded.shape[1] - 3
-    # Turned, so that many rows go through the recursion at a time.
-    part = np.empty((columns, last - first), np.float32)
-    for row in range(first, last):
-        for column in range(columns):
-            part[column, row - first] = padded[row, 1 + column]
-    filter_rows(part)
-    for row in range(first, last):
-        for column in range(columns):
-            padded[row, 1 + column] = part[column, row - first]
-        padded[row, 0] = padded[row, 2]
-        padded[row, columns + 1], padded[row, columns + 2] = padded[row, columns - 1], padded[row, columns - 2]
-
-
-# Slices and whole arrays stay out of what is compiled for many threads: there they take seconds to compile.
 @numba.njit(parallel=True, cache=True)
 def coefficients(samples):
     """Spline coefficients of samples (rows, columns), float32, with a mirrored margin: (rows + 3, columns + 3)."""
     rows, columns = samples.shape
     padded = np.empty((rows + 3, columns + 3), np.float32)
     for block in numba.prange((columns + COLUMNS - 1) // COLUMNS):
-        filter_down(samples, padded, block * COLUMNS, min((block + 1) * COLUMNS, columns))
+        part = slice(block * COLUMNS, min((block + 1) * COLUMNS, columns))
+        padded[1 : rows + 1, 1 + part.start : 1 + part.stop] = samples[:, part]
+        filter_rows(padded[1 : rows + 1, 1 + part.start : 1 + part.stop])
     for block in numba.prange((rows + COLUMNS - 1) // COLUMNS):
-        filter_across(padded, 1 + block * COLUMNS, 1 + min((block + 1) * COLUMNS, rows))
-    for column in range(columns + 3):
-        padded[0, column], padded[rows + 1, column] = padded[2, column], padded[rows - 1, column]
-        padded[rows + 2, column] = padded[rows - 2, column]
+        part = padded[1 + block * COLUMNS : 1 + min((block + 1) * COLUMNS, rows)]
+        # Turned, so that many rows go through the recursion at a time.
+        turned = part[:, 1 : columns + 1].T.copy()
+        filter_rows(turned)
+        part[:, 1 : columns + 1] = turned.T
+        part[:, 0], part[:, columns + 1], part[:, columns + 2] = part[:, 2], part[:, columns - 1], part[:, columns - 2]
+    padded[0], padded[rows + 1], padded[rows + 2] = padded[2], padded[rows - 1], padded[rows - 2]
     return padded
 
 
