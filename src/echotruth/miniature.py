@@ -27,9 +27,8 @@ def miniature(config: Config) -> Config:
     Returns
     -------
     Config
-        One view of each plane and one image size; array, transmits, realism and trackers are as they were.
+        One view and one image size; array, transmits, realism and trackers are as they were.
     """
-    planes = {view.plane: name for name, view in config.views.items()}
     return config.model_copy(
         update={
             "name": "miniature",
@@ -38,7 +37,7 @@ def miniature(config: Config) -> Config:
             "pathology": Pathology(),
             "loop": config.loop.model_copy(update={"frames": FRAMES}),
             "motion": Motion(kind="rigid") if config.motion.kind == "beat" else config.motion,
-            "views": {name: config.views[name] for name in planes.values()},
+            "views": dict(list(config.views.items())[:1]),
             "phantom": config.phantom.model_copy(update={"density_per_mm3": config.phantom.density_per_mm3 / THINNED}),
             "rf": config.rf.model_copy(update={"lines": LINES}),
             "bmode": _bmode(config),
