@@ -6,6 +6,7 @@
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from shlex import quote
 
@@ -15,9 +16,9 @@ from echotruth.cases import expand as expand_cases
 from echotruth.config.loading import ConfigError, validate
 from echotruth.mechanics.geometry.body import fingerprint
 from echotruth.mechanics.loop import read_loop
+from echotruth.miniature import miniature
 from echotruth.provenance import code_version, settings_version
-from echotruth.repository.job import GATES, record_path
-from echotruth.repository.publication import VIEW_STAGES
+from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
 
 if not config:
 
@@ -41,10 +42,7 @@ def code(*stages):
     return code_version(*(str(SCRIPTS / f"{stage}.py") for stage in stages))
 
 
-# A compiled function is cached by the file it stands in, not by those it calls from: one cache a version of the code.
-ALL_CODE = code(*(script.stem for script in SCRIPTS.glob("*.py")))
-CACHE = quote(str(Path(".snakemake/numba").absolute() / ALL_CODE))
-shell.prefix(f"set -euo pipefail; export NUMBA_CACHE_DIR={CACHE}; ")
+shell.prefix("set -euo pipefail; ")
 
 
 def record(stage, case="{case}", view=None):
@@ -60,6 +58,7 @@ wildcard_constraints:
 
 
 include: "rules/repository.smk"
+include: "rules/compile.smk"
 include: "rules/mechanics.smk"
 include: "rules/physiology.smk"
 include: "rules/imaging.smk"
@@ -70,6 +69,7 @@ include: "rules/report.smk"
 rule all:
     default_target: True
     input:
+        MARKS.values(),
         RECORDS,
         rules.repository.output,
         rules.report.output,

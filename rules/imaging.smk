@@ -21,11 +21,12 @@ rule imaging:
         FOLDER / "logs/imaging/{case}/{view}.log",
     shell:
         """
-        rm -rf {params.scratch}
-        for stage in phantom truth rf bmode; do
-            {RUN}/$stage.py {FOLDER} {wildcards.case} {wildcards.view} --threads {threads}
-        done 2>&1 | tee {log}
-        rm -rf {params.scratch}
+        {{
+            rm -rf {params.scratch}
+            {COMPILED[imaging]}
+            {RUN}/series.py {FOLDER} {wildcards.case} {wildcards.view} phantom truth rf bmode --threads {threads}
+            rm -rf {params.scratch}
+        }} &> {log}
         """
 
 

@@ -9,19 +9,31 @@ rule mechanics:
         settings=lambda wildcards: mechanics_settings(CASES[wildcards.case].config),
     log:
         FOLDER / "logs/mechanics/{case}.log",
-    threads: max(1, (workflow.cores or 1) // len(CASES))
+    # One core is left to what compiles meanwhile.
+    threads: max(1, ((workflow.cores or 1) - any(not Path(mark).exists() for mark in MARKS.values())) // len(CASES))
+    priority: 3
     shell:
-        "{RUN}/mechanics.py {FOLDER} {wildcards.case} --threads {threads} 2>&1 | tee {log}"
+        """
+        {{
+            {COMPILED[mechanics]}
+            {RUN}/mechanics.py {FOLDER} {wildcards.case} --threads {threads}
+        }} &> {log}
+        """
+
+
+@cache
+def course(loop):
+    """Time and what is prescribed of a loop, read once for all hearts that it drives."""
+    read = read_loop(loop)
+    prescribed = (read.time, read.pressure, read.volume, read.tension)
+    return [None if values is None else values.tolist() for values in prescribed]
 
 
 def mechanics_settings(config):
-    loop = read_loop(config.loop)
-    prescribed = (loop.time, loop.pressure, loop.volume, loop.tension)
-    course = [None if values is None else values.tolist() for values in prescribed]
     # The seed enters by the disarray of the fibres alone.
     seed = config.seed if config.fibres.disarray_deg else None
     anatomy = (config.geometry.settled(), fingerprint(config.geometry), config.fibres, seed, config.pathology)
     if config.motion.kind == "beat":
-        return settings_version(*anatomy, config.loop, course, config.mechanics)
+        return settings_version(*anatomy, config.loop, course(config.loop), config.mechanics)
     formula = getattr(config.motion, config.motion.kind)
-    return settings_version(*anatomy, loop.time.tolist(), config.motion.course, formula, config.rf.focus_mm)
+    return settings_version(*anatomy, course(config.loop)[0], config.motion.course, formula, config.rf.focus_mm)

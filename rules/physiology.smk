@@ -12,4 +12,4 @@ rule physiology:
     log:
         FOLDER / "logs/physiology/{case}.log",
     shell:
-        "{RUN}/physiology.py {FOLDER} {wildcards.case} 2>&1 | tee {log}"
+        "{RUN}/physiology.py {FOLDER} {wildcards.case} &> {log}"

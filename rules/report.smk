@@ -31,4 +31,4 @@ rule report:
     log:
         FOLDER / "logs/report.log",
     shell:
-        "{RUN}/report.py {FOLDER} 2>&1 | tee {log}"
+        "{{ {COMPILED[report]}; {RUN}/report.py {FOLDER}; }} &> {log}"

@@ -26,4 +26,4 @@ rule repository:
     log:
         FOLDER / "logs/repository.log",
     shell:
-        "{RUN}/repository.py {FOLDER} 2>&1 | tee {log}"
+        "{RUN}/repository.py {FOLDER} &> {log}"

@@ -14,7 +14,8 @@ rule tracking:
         FOLDER / "logs/tracking/{case}/{view}.log",
     shell:
         """
-        for stage in tracking evaluation; do
-            {RUN}/$stage.py {FOLDER} {wildcards.case} {wildcards.view} --threads {threads}
-        done 2>&1 | tee {log}
+        {{
+            {COMPILED[tracking]}
+            {RUN}/series.py {FOLDER} {wildcards.case} {wildcards.view} tracking evaluation --threads {threads}
+        }} &> {log}
         """

@@ -6,7 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from echotruth.config import Bmode, PhaseCorrelation
-from echotruth.provenance import _closure, _tree, code_version, packages, settings_version
+from echotruth.provenance import _closure, _imports, _plain, _tree, code_version, packages, settings_version
 
 ROOT = Path(__file__).parents[1]
 
@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 def _version(tmp_path, text):
     script = tmp_path / "script.py"
     script.write_text(text)
-    for cached in (code_version, _tree):  # one file, two texts
+    for cached in (code_version, _imports, _plain, _tree):  # one file, two texts
         cached.cache_clear()
     return code_version(str(script))
 

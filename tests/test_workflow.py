@@ -186,6 +186,14 @@ def test_figures_stand_beside_the_repository_and_scratch_does_not(made):
     assert not [path for path in made.out.glob("scratch/*/*") if any(path.iterdir())]
 
 
+def test_jobs_of_a_view_find_all_that_they_call_compiled(made):
+    """What is compiled on a miniature, before them, is what they call: function by function and type by type."""
+    records = [json.loads(path.read_text()) for path in made.out.glob("ledger/*/*/*.json")]
+    assert {record["stage"] for record in records} == {"phantom", "truth", "rf", "bmode", "tracking", "evaluation"}
+    assert {record["stage"]: record["compile_seconds"] for record in records if record["compile_seconds"]} == {}
+    assert "miniature fails" not in "".join(path.read_text() for path in made.out.glob("logs/compile_*.log"))
+
+
 def test_second_run_has_nothing_to_do(made):
     assert "Nothing to be done" in made.snakemake("-n", "--cores", "2")
 
@@ -261,5 +269,8 @@ def test_killed_run_keeps_the_mechanics_it_had(killed):
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
-def test_run_leaves_the_report(killed):
-    assert (killed[0].out / "report.html").stat().st_size > 10_000
+def test_run_leaves_the_report_and_all_words_in_logs(killed):
+    out = killed[0].out
+    assert (out / "report.html").stat().st_size > 10_000
+    assert "Job stats" in (out / "logs/snakemake.log").read_text()
+    assert "done in" in next(out.glob("logs/imaging/*/mid.log")).read_text()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import fcntl
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -22,12 +23,8 @@ def main() -> None:
     arguments, options = _parser().parse_known_args()
     if options and arguments.command != "run":
         sys.exit(f"echotruth {arguments.command}: {options[0]} is not an option: see echotruth --help")
-    if arguments.command == "validate":
-        sys.exit(validate(Path(arguments.folder), arguments.quick))
-    if arguments.command == "export":
-        sys.exit(export(arguments))
-    if arguments.command == "evaluate":
-        sys.exit(evaluate(arguments))
+    if command := {"validate": validate, "export": export, "evaluate": evaluate}.get(arguments.command):
+        sys.exit(command(arguments))
     try:
         config = load(arguments.config)
         cases = expand(config, arguments.config)
@@ -38,7 +35,10 @@ def main() -> None:
     elif arguments.command == "cases":
         table(cases).to_csv(sys.stdout, index=False)
     else:
-        sys.exit(run(arguments.config, config, options))
+        try:
+            sys.exit(run(arguments.config, config, options))
+        except KeyboardInterrupt:
+            sys.exit("echotruth: interrupted; run it again and it goes on where it was")
 
 
 def run(path: str, config: Config, options: list[str]) -> int:
@@ -55,14 +55,20 @@ def run(path: str, config: Config, options: list[str]) -> int:
     """
     if not Path("Snakefile").is_file():
         return _complain("no Snakefile here: run this in a checkout of echotruth")
+    from echotruth.execution import execute
+    from echotruth.progress import measured
+
     folder = Path("out") / config.name
     snakemake = [sys.executable, "-m", "snakemake", "--configfile", path]
     with _alone(folder):
         # A killed run leaves Snakemake's own lock behind; ours dies with its process, so nobody is at work here.
-        _quietly([*snakemake, "--unlock"])
-        status = subprocess.call([*snakemake, *options])
-        planned_only = {"-n", "--dry-run", "--dryrun"} & set(options)
-        if status or planned_only or not (folder / "figures/leaderboard.csv").is_file():
+        if any(Path(".snakemake/locks").glob("*")):
+            _quietly([*snakemake, "--unlock"])
+        if any(map(_only_tells, options)):
+            return subprocess.call([*snakemake, *options])
+        weights = measured(folder / "ledger")
+        status = execute([*snakemake, *options], folder / "logs/snakemake.log", config.name, weights)
+        if status or not (folder / "figures/leaderboard.csv").is_file():
             return status
         report = folder / "report.html"
         status = _quietly([*snakemake, "--report", str(report)])
@@ -71,19 +77,23 @@ def run(path: str, config: Config, options: list[str]) -> int:
     return status
 
 
-def validate(folder: Path, quick: bool) -> int:
-    """Check the heart against what is known and write the page; 1 if a number is off, otherwise 0.
+TELLS = {
+    *("--dry-run", "--dryrun", "--dag", "--rulegraph", "--filegraph", "--d3dag", "--summary", "--detailed-summary"),
+    *("--lint", "--list", "--list-rules", "--list-target-rules", "--help", "-h", "-l", "-S", "-D"),
+}
+"""Options with which Snakemake tells something and makes nothing; so does it with an n among short ones, as -np."""
 
-    Parameters
-    ----------
-    folder : Path
-        Where validation.md is put, its pictures in the folder validation beside it.
-    quick : bool
-        Coarse meshes: a few minutes in place of half an hour.
-    """
+
+def _only_tells(option: str) -> bool:
+    return option in TELLS or re.fullmatch(r"-[a-z]*n[a-z]*", option) is not None
+
+
+def validate(arguments: argparse.Namespace) -> int:
+    """Check the heart against what is known and write the page; 1 if a number is off, otherwise 0."""
     from echotruth.validation.page import write
 
-    met = write(folder, quick, lambda said: print(said, flush=True))
+    folder = Path(arguments.folder)
+    met = write(folder, arguments.quick, lambda said: print(said, flush=True))
     print(f"\nPage: {folder / 'validation.md'}")
     return 0 if met else 1
 

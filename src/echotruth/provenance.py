@@ -32,7 +32,7 @@ def code_version(*modules: str) -> str:
     """
     digest = sha256()
     for name in sorted(_closure(modules)):
-        digest.update(ast.dump(_without_docstrings(_tree(name))).encode())
+        digest.update(_plain(name))
     return digest.hexdigest()[:16]
 
 
@@ -69,14 +69,15 @@ def _closure(modules: tuple[str, ...]) -> set[str]:
         name = open_names.pop()
         if name not in found and not name.startswith(_APART):
             found.add(name)
-            open_names.extend(_imports(_tree(name), name))
+            open_names.extend(_imports(name))
     return found
 
 
-def _imports(tree: ast.Module, importer: str) -> list[str]:
+@cache
+def _imports(importer: str) -> list[str]:
     """Modules of echotruth that a module imports, anywhere in it, their packages included."""
     names: set[str] = set()
-    for node in ast.walk(tree):
+    for node in ast.walk(_tree(importer)):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -105,6 +106,12 @@ def _path(name: str) -> Path | None:
 def _tree(name: str) -> ast.Module:
     path = _path(name)
     return ast.parse(path.read_text(encoding="utf-8") if path else "")
+
+
+@cache
+def _plain(name: str) -> bytes:
+    """The parsed source of a script or module, as text without docstrings."""
+    return ast.dump(_without_docstrings(_tree(name))).encode()
 
 
 def _without_docstrings(tree: ast.Module) -> ast.Module:

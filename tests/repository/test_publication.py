@@ -15,8 +15,10 @@ from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Ph
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
-from echotruth.repository.job import GATES, Job
-from echotruth.repository.publication import VIEW_STAGES, Damaged, publish
+from echotruth.repository.cost import Cost
+from echotruth.repository.job import Job
+from echotruth.repository.ledger import GATES, VIEW_STAGES
+from echotruth.repository.publication import Damaged, publish
 from echotruth.repository.store import Store, schema_of
 from echotruth.tracking import grid
 
@@ -56,7 +58,7 @@ def folder(tmp_path, monkeypatch) -> Path:
     for case in CASES:
         for stage, view in JOBS:
             job = Job(folder, stage, case.id, view)
-            job.commit({group: blank(job.store, group) for group in GROUPS[stage]}, 1.0)
+            job.commit({group: blank(job.store, group) for group in GROUPS[stage]}, Cost())
     return folder
 
 
@@ -120,7 +122,7 @@ def doubt(folder):
     """The second heart measured again, and found out of bounds."""
     job = Job(folder, "physiology", CASES[1].id)
     job.mark("implausible", LENGTHENS)
-    job.commit({"physiology": blank(job.store, "physiology")}, 1.0)
+    job.commit({"physiology": blank(job.store, "physiology")}, Cost())
 
 
 def test_heart_out_of_bounds_keeps_its_arrays_and_is_marked(folder):

@@ -6,7 +6,7 @@ import xarray as xr
 
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking, View
 from echotruth.repository import ledger
-from echotruth.repository.job import record_path
+from echotruth.repository.ledger import record_path
 from echotruth.repository.schema import EVALUATION, LABELS
 from echotruth.tracking.digest import digest
 from echotruth.tracking.leaderboard import rows

@@ -22,7 +22,8 @@ from echotruth.imaging.view import plane
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
-from echotruth.repository.job import Job, record_path
+from echotruth.repository.job import Job
+from echotruth.repository.ledger import record_path
 from echotruth.repository.store import Store
 from echotruth.tracking import grid, scoring
 from echotruth.tracking.digest import digest

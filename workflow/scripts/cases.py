@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from echotruth.cases import expand, table
+from echotruth.cases import Case, expand, table
+from echotruth.config import Config
 from echotruth.config.loading import ConfigError, validate
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.channels import described
@@ -18,32 +19,49 @@ from echotruth.repository import layout, ledger, schema
 from echotruth.repository.store import Store
 from echotruth.tracking import grid
 
-parser = argparse.ArgumentParser(description=__doc__)
-parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
-parser.add_argument("config", type=argparse.FileType("r"), help="YAML file, or - for standard input")
-arguments = parser.parse_args()
 
-try:
-    config = validate(yaml.safe_load(arguments.config) or {}, arguments.config.name)
-    cases = {case.id: case for case in expand(config, arguments.config.name)}
+def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
+    """Write the table of the cases and the arrays of all jobs, without values; what is there already stays.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the repository.
+    config : Config
+    cases : list of Case
+        Those of the configuration.
+    """
     mesh = left_ventricle(config.geometry)
-except (ConfigError, GeometryError) as error:
-    sys.exit(str(error))
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = ledger.register(folder / "registry.txt", [case.id for case in cases])
+    times = np.full((len(rows), config.loop.frames), np.nan)
+    loops = {loop: read_loop(loop) for loop in {case.config.loop for case in cases}}
+    for case in cases:
+        times[rows[case.id]] = loops[case.config.loop].time
+    frame = table(cases)
+    columns = layout.columns(frame, list(rows))
+    scanner = config.rf.keep and Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+    values, lengths, settings = described(config, scanner) if scanner else ({}, {}, {})
+    sizes = layout.sizes(mesh) | lengths
+    labels = layout.labels(config, list(rows), times) | layout.positions(config, pixel_centres, grid) | columns
+    labels |= {f"rf:{name}": value for name, value in values.items()}
+    arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
+    Store(folder / f"{config.name}.zarr").lay_out(arrays, sizes, labels, {"rf": settings})
+    frame.to_csv(folder / "cases.csv", index=False)
+    (folder / "config.yaml").write_text(yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False))
 
-arguments.repository.mkdir(parents=True, exist_ok=True)
-rows = ledger.register(arguments.repository / "registry.txt", list(cases))
-times = np.full((len(rows), config.loop.frames), np.nan)
-loops = {loop: read_loop(loop) for loop in {case.config.loop for case in cases.values()}}
-for id, case in cases.items():
-    times[rows[id]] = loops[case.config.loop].time
-frame = table(list(cases.values()))
-columns = layout.columns(frame, list(rows))
-scanner = config.rf.keep and Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
-values, lengths, settings = described(config, scanner) if scanner else ({}, {}, {})
-sizes = layout.sizes(mesh) | lengths
-labels = layout.labels(config, list(rows), times) | layout.positions(config, pixel_centres, grid) | columns
-labels |= {f"rf:{name}": value for name, value in values.items()}
-arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
-Store(arguments.repository / f"{config.name}.zarr").lay_out(arrays, sizes, labels, {"rf": settings})
-frame.to_csv(arguments.repository / "cases.csv", index=False)
-(arguments.repository / "config.yaml").write_text(yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False))
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
+    parser.add_argument("config", type=argparse.FileType("r"), help="YAML file, or - for standard input")
+    arguments = parser.parse_args()
+    try:
+        config = validate(yaml.safe_load(arguments.config) or {}, arguments.config.name)
+        lay_out(arguments.repository, config, expand(config, arguments.config.name))
+    except (ConfigError, GeometryError) as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import logging
 import sys
-import time
 from collections.abc import Callable
+from inspect import getfile
 from itertools import takewhile
 from pathlib import Path
 from shutil import rmtree
@@ -20,14 +20,12 @@ from echotruth.config.loading import load
 from echotruth.heart import Heart
 from echotruth.provenance import code_version
 from echotruth.repository import ledger, schema
+from echotruth.repository.cost import Cost
+from echotruth.repository.ledger import GATES, record_path
 from echotruth.repository.store import NotWritten, Store, Values
 
 Result = dict[str, Values]
 log = logging.getLogger("echotruth")
-
-
-GATES = ("mechanics", "physiology")
-"""Stages whose verdict on a heart keeps the later ones from it."""
 
 
 class CannotBeMade(ValueError):
@@ -47,10 +45,13 @@ class Job:
         Case id.
     view : str, optional
         Name of the view, for stages that work on one.
+    script : str, optional
+        Path of the script of the stage (default: the one that runs).
     """
 
-    def __init__(self, folder: Path, stage: str, case: str, view: str | None = None) -> None:
+    def __init__(self, folder: Path, stage: str, case: str, view: str | None = None, script: str | None = None) -> None:
         self.folder, self.stage = folder, stage
+        self._script = script or sys.argv[0]
         self.case: Case = find(load(folder / "config.yaml"), case)
         self.view_name = view
         self.verdict = {"status": "complete"}
@@ -81,7 +82,7 @@ class Job:
     @property
     def unfinished(self) -> Path:
         """Folder for what a stopped run of this stage leaves to the next, until it is committed."""
-        return self.folder / "scratch" / self.case.id / f"{self.stage}-{code_version(sys.argv[0])}"
+        return self.folder / "scratch" / self.case.id / f"{self.stage}-{code_version(self._script)}"
 
     @property
     def record(self) -> Path:
@@ -136,14 +137,16 @@ class Job:
         """Let the record say, beside what is written, what is wrong with it."""
         self.verdict = {"status": status, "reason": reason}
 
-    def commit(self, result: Result, seconds: float) -> None:
-        """Write the results and then the record that says so."""
+    def commit(self, result: Result, cost: Cost) -> dict[str, float]:
+        """Write the results and then the record that says so; what it has cost."""
         files: list[Path] = []
         for group, values in result.items():
             self.store.write(group, values, *self.place)
             files += self.store.files(group, *self.place)
         sha256 = ledger.checksums(files, self.store.path)
-        self._record(**self.verdict, seconds=round(seconds, 3), sha256=sha256)
+        spent = cost.spent()
+        self._record(**self.verdict, **spent, frames=self.case.config.loop.frames, sha256=sha256)
+        return spent
 
     def give_up(self, status: str, reason: str) -> None:
         """Record that there is no result, and why; one of an earlier run goes."""
@@ -154,26 +157,38 @@ class Job:
 
     def _record(self, **entries: Any) -> None:
         named = {"stage": self.stage, "case": self.case.id, "view": self.view_name, "seed": self.case.config.seed}
-        ledger.commit(self.record, named | {"code": code_version(sys.argv[0])} | entries)
+        ledger.commit(self.record, named | {"code": code_version(self._script)} | entries)
         rmtree(self.unfinished, ignore_errors=True)
 
 
-def record_path(folder: Path, stage: str, case: str, view: str | None = None) -> Path:
-    """Where the record of a job stands: ledger/STAGE/CASE.json or ledger/STAGE/CASE/VIEW.json."""
-    name = f"{case}.json" if view is None else f"{case}/{view}.json"
-    return folder / "ledger" / stage / name
+Work = Callable[[Job], Result]
 
 
-def main(stage: str, work: Callable[[Job], Result], description: str | None, per_view: bool = True) -> None:
+def main(stage: str, work: Work, description: str | None, per_view: bool = True) -> None:
     """Run the work of a script from its command line."""
-    arguments = _parser(stage, description, per_view).parse_args()
-    job = _open(stage, arguments)
+    run(stage, work, parser(stage, description, per_view).parse_args(), Cost())
+
+
+def run(stage: str, work: Work, arguments: argparse.Namespace, cost: Cost) -> None:
+    """Do the work of a stage and record what came of it.
+
+    Parameters
+    ----------
+    stage : str
+    work : callable
+        From the job to its arrays, by group.
+    arguments : Namespace
+        As of :func:`parser`.
+    cost : Cost
+        Of this process.
+    """
+    job = _open(stage, getfile(work), arguments)
     _prepare(job, arguments.threads)
     if reason := job.left_out():
         log.warning("skipped: %s", reason)
         job.give_up("skipped", reason)
         return
-    start = time.perf_counter()
+    cost.begin()
     try:
         result = _single_blas(work, job)
     except NotWritten as error:
@@ -182,14 +197,13 @@ def main(stage: str, work: Callable[[Job], Result], description: str | None, per
         log.warning("gives up: %s", error)
         job.give_up("failed", str(error))
         return
-    job.commit(result, time.perf_counter() - start)
-    log.info("done in %.1f s", time.perf_counter() - start)
+    log.info("done in %.1f s", job.commit(result, cost)["seconds"])
 
 
-def _open(stage: str, arguments: argparse.Namespace) -> Job:
+def _open(stage: str, script: str, arguments: argparse.Namespace) -> Job:
     try:
         view = getattr(arguments, "view", None)
-        job = Job(arguments.repository, stage, arguments.case, view)
+        job = Job(arguments.repository, stage, arguments.case, view, script)
     except ValueError as error:
         sys.exit(f"{stage}: {error}")
     if view is not None and view not in job.case.config.views:
@@ -197,7 +211,7 @@ def _open(stage: str, arguments: argparse.Namespace) -> Job:
     return job
 
 
-def _single_blas(work: Callable[[Job], Result], job: Job) -> Result:
+def _single_blas(work: Work, job: Job) -> Result:
     """BLAS on one thread: its sums depend on how many there are, and the bytes must not."""
     from threadpoolctl import threadpool_limits
 
@@ -214,7 +228,8 @@ def _prepare(job: Job, threads: int) -> None:
     logging.getLogger("numba").setLevel(logging.WARNING)
 
 
-def _parser(stage: str, description: str | None, per_view: bool) -> argparse.ArgumentParser:
+def parser(stage: str, description: str | None, per_view: bool = True) -> argparse.ArgumentParser:
+    """Command line of a stage: repository, case, view where there is one, threads."""
     parser = argparse.ArgumentParser(prog=stage, description=description)
     parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
     parser.add_argument("case", help="case id, as in cases.csv")

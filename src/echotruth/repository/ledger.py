@@ -8,6 +8,18 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+GATES = ("mechanics", "physiology")
+"""Stages whose verdict on a heart keeps the later ones from it."""
+
+VIEW_STAGES = ("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
+"""Stages with a record for every view of a case."""
+
+
+def record_path(folder: Path, stage: str, case: str, view: str | None = None) -> Path:
+    """Where the record of a job stands: ledger/STAGE/CASE.json or ledger/STAGE/CASE/VIEW.json."""
+    name = f"{case}.json" if view is None else f"{case}/{view}.json"
+    return folder / "ledger" / stage / name
+
 
 def commit(path: Path, record: dict[str, Any]) -> None:
     """Write a record whole or not at all: on disk before it takes its name."""

@@ -11,11 +11,8 @@ from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.provenance import packages
 from echotruth.repository import ledger
-from echotruth.repository.job import GATES, record_path
+from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
 from echotruth.repository.store import Store
-
-VIEW_STAGES = ("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
-"""Stages with a record for every view of a case."""
 
 
 class Damaged(ValueError):

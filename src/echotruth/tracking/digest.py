@@ -7,7 +7,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from echotruth.repository import ledger
-from echotruth.repository.job import record_path
+from echotruth.repository.ledger import record_path
 
 
 def digest(folder: Path, case: str, view: str) -> str:

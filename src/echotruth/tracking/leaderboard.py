@@ -19,7 +19,7 @@ import xarray as xr
 from echotruth.config import Config
 from echotruth.config.imaging import ALL
 from echotruth.repository import ledger
-from echotruth.repository.job import record_path
+from echotruth.repository.ledger import record_path
 from echotruth.repository.schema import EVALUATION
 from echotruth.tracking.digest import digest
 from echotruth.tracking.program import in_one_line

@@ -23,7 +23,8 @@ from echotruth.cases import expand
 from echotruth.config import Config
 from echotruth.config.loading import load, validate
 from echotruth.repository import ledger
-from echotruth.repository.job import Job, record_path
+from echotruth.repository.job import Job
+from echotruth.repository.ledger import record_path
 from echotruth.section import Name, Section
 from echotruth.tracking.clip import Clip, clips
 from echotruth.tracking.digest import digest

@@ -1,0 +1,236 @@
+"""What every stage of a run has cost, beside what its parts cost on the same machine, measured one by one.
+
+    python benchmarks/chain.py out/demo out/human
+
+The first table of a repository is made of the records in its ledger: processor seconds a heart and a frame, how many of
+them compiling and starting, seconds of the clock, greatest memory, and bytes written. The second has, for one view,
+what the stage cost without compiling, and what its parts cost in a short loop in this process, on one thread:
+
+phantom      seeding
+truth        the truth of four frames, for all frames
+rf           the full matrix of as many scatterers, evenly spread over the block that they fill, and beamforming; of one
+             frame, for all frames
+bmode        images from four frames of noise, for all frames
+tracking     every tracker on the first frames of the clip, for all frames
+evaluation   the truth at the points, and one score, for all trackers and image sizes
+
+Above 1.3 something is spent between the parts. The machine's own speed stands above: figures of machines
+compare only over it. The results are results/chain.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numba
+import numpy as np
+import report
+from threadpoolctl import threadpool_limits
+
+from echotruth.cases import generator
+from echotruth.config.loading import load
+from echotruth.imaging.bmode import clip, pixel_centres, time_gain
+from echotruth.imaging.medium import Medium, seed
+from echotruth.imaging.scan import scan_lines
+from echotruth.imaging.scanner import Scanner, checked, imaging_depth
+from echotruth.imaging.truth import truth
+from echotruth.imaging.view import Plane
+from echotruth.mechanics.loop import read_loop
+from echotruth.repository import ledger
+from echotruth.repository.job import Job
+from echotruth.repository.ledger import GATES, VIEW_STAGES
+from echotruth.tracking.clip import clips
+from echotruth.tracking.scoring import ground_truth, score
+from echotruth.tracking.tracker import track
+
+RESULTS = Path(__file__).parent / "results"
+EXCERPT = 5
+"""Frames in the short loops of trackers: the first is compared with the others, or each with the next."""
+SOME = 4
+"""Frames in the other loops over frames."""
+TURNS = 3
+"""How often a part is timed; the median counts."""
+BEYOND = 1.3
+"""Cost over that of its parts above which a stage is marked."""
+
+Record = dict[str, Any]
+
+
+def timed(work: Callable[[], Any]) -> float:
+    """Median of the processor seconds of a call; the first, which compiles, is not counted."""
+    work()
+    spent = []
+    for _ in range(TURNS):
+        start = time.process_time()
+        work()
+        spent.append(time.process_time() - start)
+    return median(spent)
+
+
+def machine() -> dict[str, float]:
+    """Seconds of a loop in plain Python and of a product of matrices, which measure the machine."""
+
+    def loop() -> int:
+        total = 0
+        for number in range(10_000_000):
+            total += number & 3
+        return total
+
+    matrix = np.random.default_rng(0).standard_normal((2048, 2048), dtype=np.float32)
+    return {"loop": timed(loop), "product": timed(lambda: matrix @ matrix)}
+
+
+def records(folder: Path) -> list[Record]:
+    """Records of all jobs that were timed, of a repository."""
+    found = [ledger.read(path) for stage in (*GATES, *VIEW_STAGES) for path in folder.glob(f"ledger/{stage}/**/*.json")]
+    return [record for record in found if "cpu_seconds" in record]
+
+
+def costs(folder: Path, found: list[Record]) -> list[list[Any]]:
+    """Rows of the first table, one a stage."""
+    stages: dict[str, list[Record]] = defaultdict(list)
+    for record in found:
+        stages[record["stage"]].append(record)
+    store = folder / f"{load(folder / 'config.yaml').name}.zarr"
+    return [_cost(stage, members, store) for stage, members in stages.items()]
+
+
+def _cost(stage: str, members: list[Record], store: Path) -> list[Any]:
+    def total(name: str) -> float:
+        return sum(record[name] for record in members)
+
+    hearts = len({record["case"] for record in members})
+    written = sum((store / name).stat().st_size for record in members for name in record["sha256"])
+    frames = total("frames") if stage in VIEW_STAGES else hearts * members[0]["frames"]
+    return [
+        stage,
+        len(members),
+        f"{total('cpu_seconds') / hearts:.1f}",
+        f"{total('cpu_seconds') / frames:.3f}",
+        f"{total('compile_seconds') / hearts:.1f}",
+        f"{total('start_seconds') / hearts:.1f}",
+        f"{total('seconds') / hearts:.1f}",
+        f"{max(record['memory_MB'] for record in members):.0f}",
+        f"{written / hearts / 1e6:.1f}",
+    ]
+
+
+class Parts:
+    """The parts of the stages of one view, each by itself.
+
+    Parameters
+    ----------
+    folder : Path
+        Of a repository.
+    case, view : str
+    """
+
+    def __init__(self, folder: Path, case: str, view: str) -> None:
+        self._job = partial(Job, folder, case=case, view=view)
+        self._heart, self._config = self._job(stage="truth").heart, self._job(stage="truth").case.config
+        self._frames = len(self._heart.displacement)
+        place = self._job(stage="truth").read("phantom", "origin", "axes")
+        self._plane, self._random = Plane(**place), partial(generator, self._job(stage="rf").case, view)
+
+    def phantom(self) -> float:
+        return timed(lambda: seed(self._config, self._heart, self._plane, self._random))
+
+    def truth(self) -> float:
+        some = replace(self._heart, displacement=self._heart.displacement[:SOME])
+        grids = [pixel_centres(self._config.bmode, size) for size in self._config.bmode.sizes]
+        spent = timed(lambda: [truth(some, self._plane, *grid) for grid in grids])
+        return self._frames / len(some.displacement) * spent
+
+    def rf(self) -> float:
+        config, heart = self._config, self._heart
+        seeded = seed(config, heart, self._plane, self._random)
+        times = read_loop(config.loop).time
+        medium = Medium(config, heart, self._plane, time=times, seeded=seeded, random=self._random)
+        scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+        position, amplitude = medium(0)
+        even = np.random.default_rng(0).uniform(position.min(0), position.max(0), position.shape)
+        scatterers = checked(even, amplitude)
+        matrix = scanner.matrix(*scatterers)
+        return self._frames * (timed(lambda: scanner.matrix(*scatterers)) + timed(lambda: scanner.beamform(matrix)))
+
+    def bmode(self) -> float:
+        config = self._config
+        scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+        shape = (SOME, len(scanner.angle), len(scanner.range))
+        lines = np.random.default_rng(0).standard_normal((*shape, 2), np.float32).view(np.complex64)[..., 0]
+        gain, scan = time_gain(config.probe, config.bmode, scanner.range), scan_lines(config.probe, config.rf)
+        return self._frames / SOME * timed(lambda: clip(lines, scan, scanner.range, config.bmode, gain))
+
+    def tracking(self) -> float:
+        trackers = self._config.tracking.trackers.values()
+        excerpts = []
+        for whole in clips(self._job(stage="tracking")).values():
+            excerpts.append(replace(whole, frames=whole.frames[:EXCERPT], frame_time=whole.frame_time[:EXCERPT]))
+        spent = sum(timed(partial(track, *each.given, tracker)) for each in excerpts for tracker in trackers)
+        return (self._frames - 1) / (EXCERPT - 1) * spent
+
+    def evaluation(self) -> float:
+        job = self._job(stage="evaluation")
+        largest = self._config.bmode.sizes[0]
+        tracked, true = job.read(f"tracking/{largest}", "displacement")["displacement"], ground_truth(job)
+        times = len(self._config.bmode.sizes) * len(tracked)
+        return timed(lambda: ground_truth(job)) + times * timed(lambda: score(tracked[-1], true))
+
+
+def beside(folder: Path, found: list[Record]) -> list[list[Any]]:
+    """Rows of the second table: the stages of the first view that has them all."""
+    by_view: dict[tuple[str, str], dict[str, Record]] = defaultdict(dict)
+    for record in found:
+        by_view[record["case"], record["view"]][record["stage"]] = record
+    views = [(place, stages) for place, stages in by_view.items() if set(stages) >= set(VIEW_STAGES)]
+    if not views:
+        return []
+    (case, view), stages = views[0]
+    parts, rows = Parts(folder, case, view), []
+    for stage in VIEW_STAGES:
+        spent = stages[stage]["cpu_seconds"] - stages[stage]["compile_seconds"]
+        predicted = getattr(parts, stage)()
+        ratio = spent / predicted
+        rows.append([stage, f"{spent:.1f}", f"{predicted:.1f}", f"{ratio:.2f}{' **' if ratio > BEYOND else ''}"])
+    return rows
+
+
+def section(folder: Path) -> list[str]:
+    """Markdown of one repository."""
+    found = records(folder)
+    head = ["stage", "jobs", "CPU s a heart", "CPU s a frame", "compiling", "starting", "wall s", "memory, MB", "MB"]
+    text = [f"## {folder.name}", "", *report.table(head, costs(folder, found)), ""]
+    if rows := beside(folder, found):
+        text += [*report.table(["stage, one view", "CPU s", "CPU s of its parts", "ratio"], rows), ""]
+    return text
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("repositories", type=Path, nargs="+", help="folders of repositories, as out/demo")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of chain.md")
+    arguments = parser.parse_args()
+    numba.set_num_threads(1)
+    with threadpool_limits(1):
+        speed = machine()
+        sections = [line for folder in arguments.repositories for line in section(folder)]
+    told = f"A loop of ten million turns in plain Python takes this machine {speed['loop']:.2f} s, a product of two "
+    told += f"matrices of 2048 x 2048 in single precision {speed['product']:.2f} s, on one thread."
+    remark = (
+        f"Compiling and starting are CPU seconds a heart; wall seconds are added up over views. **: above {BEYOND}."
+    )
+    text = ["# The chain, stage by stage", "", told, "", remark, "", *sections]
+    (arguments.results / "chain.md").write_text("\n".join(text))
+    print("\n".join(text))
+
+
+if __name__ == "__main__":
+    main()

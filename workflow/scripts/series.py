@@ -1,0 +1,12 @@
+"""Run stages of one heart and view one after the other in one process, which loads what they need once."""
+
+from importlib import import_module
+
+from echotruth.repository.cost import Cost
+from echotruth.repository.job import parser, run
+
+command = parser("series", __doc__)
+command.add_argument("stages", nargs="+", help="names of scripts beside this one, as phantom truth rf bmode")
+arguments, cost = command.parse_args(), Cost()
+for stage in arguments.stages:
+    run(stage, import_module(stage).work, arguments, cost)
