@@ -124,20 +124,22 @@ class Blocks(NamedTuple):
     tangent: Floats
 
 
-def elements(mesh: Mesh, fibre_frames: Floats, frame: Floats) -> Elements:
+def elements(mesh: Mesh, axes: Floats | None = None, frame: Floats | None = None) -> Elements:
     """Cells of a wall with fibres.
 
     Parameters
     ----------
     mesh : Mesh
-    fibre_frames : ndarray of shape (n_cells, n_points, 3, 3)
-        Rows f, s, n at the points of `quadrature.tetrahedron`.
-    frame : ndarray of shape (n_nodes, 3, 3)
-        Rows: the directions of the displacements of each node.
+    axes : ndarray of shape (n_cells, n_points, 3, 3), optional
+        Rows f, s, n, or other axes of the material, at the points of `quadrature.tetrahedron`; x, y, z if not given.
+    frame : ndarray of shape (n_nodes, 3, 3), optional
+        Rows: the directions of the displacements of each node; x, y, z if not given.
     """
     xi, weight = tetrahedron()
     slope, volume = gradients(mesh, xi)
-    slope = np.einsum("cqai,cqji->cqaj", slope, fibre_frames)
+    if axes is not None:
+        slope = np.einsum("cqai,cqji->cqaj", slope, axes)
+    frame = np.tile(np.eye(3), (len(mesh.nodes), 1, 1)) if frame is None else frame
     turned = np.any(frame != np.eye(3), axis=(1, 2))
     return Elements(mesh.cells, np.ascontiguousarray(slope), volume * weight, frame, turned)
 
@@ -169,14 +171,16 @@ def respond(nodes: Floats, body: Elements, law: Law, load: Load, out: Blocks) ->
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def stretch(nodes: Floats, body: Elements, c: Floats) -> None:
-    """Fill C, (n_cells, n_points, 6), along the fibre axes, for nodes at (n_nodes, 3), m."""
+def stretch(nodes: Floats, body: Elements, c: Floats) -> Floats:
+    """Fill C, (n_cells, n_points, 6), along the fibre axes, for nodes at (n_nodes, 3), m; returns J, (n_cells, n_points)."""
+    j = np.empty(body.weight.shape)
     for cell in prange(body.cells.shape[0]):
         f, x = np.empty((3, 3)), np.empty((10, 3))
         for a in range(10):
             x[a] = nodes[body.cells[cell, a]]
         for q in range(body.weight.shape[1]):
-            point.deform(x, body.slope[cell, q], f, c[cell, q])
+            j[cell, q] = point.deform(x, body.slope[cell, q], f, c[cell, q])
+    return j
 
 
 @njit(**COMPILED)
