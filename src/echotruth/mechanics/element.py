@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from echotruth.mechanics import point
@@ -124,20 +124,22 @@ class Blocks(NamedTuple):
     tangent: Floats
 
 
-def elements(mesh: Mesh, fibre_frames: Floats, frame: Floats) -> Elements:
+def elements(mesh: Mesh, axes: Floats | None = None, frame: Floats | None = None) -> Elements:
     """Cells of a wall with fibres.
 
     Parameters
     ----------
     mesh : Mesh
-    fibre_frames : ndarray of shape (n_cells, n_points, 3, 3)
-        Rows f, s, n at the points of `quadrature.tetrahedron`.
-    frame : ndarray of shape (n_nodes, 3, 3)
-        Rows: the directions of the displacements of each node.
+    axes : ndarray of shape (n_cells, n_points, 3, 3), optional
+        Rows f, s, n, or other axes of the material, at the points of `quadrature.tetrahedron`; x, y, z if not given.
+    frame : ndarray of shape (n_nodes, 3, 3), optional
+        Rows: the directions of the displacements of each node; x, y, z if not given.
     """
     xi, weight = tetrahedron()
     slope, volume = gradients(mesh, xi)
-    slope = np.einsum("cqai,cqji->cqaj", slope, fibre_frames)
+    if axes is not None:
+        slope = np.einsum("cqai,cqji->cqaj", slope, axes)
+    frame = np.tile(np.eye(3), (len(mesh.nodes), 1, 1)) if frame is None else frame
     turned = np.any(frame != np.eye(3), axis=(1, 2))
     return Elements(mesh.cells, np.ascontiguousarray(slope), volume * weight, frame, turned)
 
@@ -148,11 +150,9 @@ def blocks(n_cells: int, with_tangent: bool) -> Blocks:
     return Blocks(np.empty((n_cells, 4, DOFS)), np.empty(n_cells), tangent)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(**COMPILED)
 def respond(nodes: Floats, body: Elements, law: Law, load: Load, out: Blocks) -> None:
     """Forces and tangents of all cells.
-
-    Each cell writes to its own place, so the result does not depend on the number of threads.
 
     Parameters
     ----------
@@ -164,47 +164,44 @@ def respond(nodes: Floats, body: Elements, law: Law, load: Load, out: Blocks) ->
     out : Blocks
         Filled.
     """
-    for cell in prange(body.cells.shape[0]):
-        _cell(cell, nodes, body, law, load, out)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def stretch(nodes: Floats, body: Elements, c: Floats) -> None:
-    """Fill C, (n_cells, n_points, 6), along the fibre axes, for nodes at (n_nodes, 3), m."""
-    for cell in prange(body.cells.shape[0]):
-        f, x = np.empty((3, 3)), np.empty((10, 3))
+    with_tangent = out.tangent.shape[0] > 0
+    x, ke, along, at = np.empty((10, 3)), np.empty((DOFS, WIDTH)), np.zeros((9, WIDTH)), point.room()
+    for cell in range(body.cells.shape[0]):
+        force = out.force[cell]
+        force[:], ke[:], out.volume[cell] = 0.0, 0.0, 0.0
+        scale = load.stiffness[cell], load.tension[cell], load.pressure[cell], load.viscosity[cell]
         for a in range(10):
-            x[a] = nodes[body.cells[cell, a]]
+            for i in range(3):
+                x[a, i] = nodes[body.cells[cell, a], i]
         for q in range(body.weight.shape[1]):
-            point.deform(x, body.slope[cell, q], f, c[cell, q])
+            slope, weight = body.slope[cell, q], body.weight[cell, q]
+            j = point.deform(x, slope, at.f, at.c)
+            point.respond(j, law, scale, load.before[cell, q], at, with_tangent)
+            point.add_force(at, slope, weight, force, PASSIVE if with_tangent else WHOLE)
+            if with_tangent:
+                point.moduli(at, weight)
+                _add_tangent(at.modulus, slope, along, ke)
+            out.volume[cell] += weight * j if j > 0 else np.nan
+        if with_tangent:
+            _add_condensed(force[VOLUMETRIC], law.bulk_modulus / np.sum(body.weight[cell]), ke)
+        for a in range(10):
+            if body.turned[body.cells[cell, a]]:
+                _turn(a, body.frame[body.cells[cell, a]], force, ke)
+        if with_tangent:
+            _pack(ke, out.tangent[cell])
 
 
 @njit(**COMPILED)
-def _cell(cell, nodes, body, law, load, out):
-    nodes_of, force, with_tangent = body.cells[cell], out.force[cell], out.tangent.shape[0] > 0
-    scale = load.stiffness[cell], load.tension[cell], load.pressure[cell], load.viscosity[cell]
-    stress, tangent, c = np.empty((4, 6)), np.empty((6, 6)), np.empty((3, 6))
-    f, x, ke, volume = np.empty((3, 3)), np.empty((10, 3)), np.zeros((DOFS, WIDTH)), 0.0
-    for a in range(10):
-        x[a] = nodes[nodes_of[a]]
-    force[:] = 0.0
-    for q in range(body.weight.shape[1]):
-        slope, weight = body.slope[cell, q], body.weight[cell, q]
-        j = point.deform(x, slope, f, c[0])
-        point.elastic(c, j, law, scale, stress, tangent, with_tangent)
-        point.add_up(c[0], load.before[cell, q], scale, stress, tangent)
-        _add_force(f, slope, stress, weight, force, PASSIVE if with_tangent else WHOLE)
-        if with_tangent:
-            _add_tangent(f, slope, stress[WHOLE], tangent, weight, ke)
-        volume += weight * j if j > 0 else np.nan
-    out.volume[cell] = volume
-    if with_tangent:
-        _add_condensed(force[VOLUMETRIC], law.bulk_modulus / np.sum(body.weight[cell]), ke)
-    for a in range(10):
-        if body.turned[nodes_of[a]]:
-            _turn(a, body.frame[nodes_of[a]], force, ke)
-    if with_tangent:
-        _pack(ke, out.tangent[cell])
+def stretch(nodes: Floats, body: Elements, c: Floats) -> Floats:
+    """Fill C, (n_cells, n_points, 6), along the fibre axes, for nodes (n_nodes, 3), m; returns J, (n_cells, n_points)."""
+    j, f, x = np.empty(body.weight.shape), np.empty((3, 3)), np.empty((10, 3))
+    for cell in range(body.cells.shape[0]):
+        for a in range(10):
+            for i in range(3):
+                x[a, i] = nodes[body.cells[cell, a], i]
+        for q in range(body.weight.shape[1]):
+            j[cell, q] = point.deform(x, body.slope[cell, q], f, c[cell, q])
+    return j
 
 
 @njit(**COMPILED)
@@ -216,34 +213,16 @@ def _add_condensed(growth, factor, ke):
 
 
 @njit(**COMPILED)
-def _add_force(f, slope, stress, weight, force, start):
-    """Add the parts of the force from `start` on."""
-    first = np.empty((3, 3))
-    for part in range(start, 4):
-        point.first_stress(f, stress[part], weight, first)
-        for a in range(10):
-            for i in range(3):
-                force[part, 3 * a + i] += (
-                    first[i, 0] * slope[a, 0] + first[i, 1] * slope[a, 1] + first[i, 2] * slope[a, 2]
-                )
-
-
-@njit(**COMPILED)
-def _add_tangent(f, slope, stress, tangent, weight, ke):
+def _add_tangent(modulus, slope, along, ke):
     """Add the second derivatives of the energy by the displacements to all entries.
 
     dP/dF, a matrix over pairs (axis, material axis), stands between the gradients of the shape functions.
     """
-    modulus, along = np.empty((9, 9)), np.zeros((9, WIDTH))
-    point.moduli(f, stress, tangent, weight, modulus)
     for r in range(9):
-        for a in range(10):
-            for i in range(3):
-                along[r, 3 * a + i] = (
-                    modulus[r, 3 * i] * slope[a, 0]
-                    + modulus[r, 3 * i + 1] * slope[a, 1]
-                    + modulus[r, 3 * i + 2] * slope[a, 2]
-                )
+        for i in range(3):
+            first, second, third = modulus[r, 3 * i], modulus[r, 3 * i + 1], modulus[r, 3 * i + 2]
+            for a in range(10):
+                along[r, 3 * a + i] = first * slope[a, 0] + second * slope[a, 1] + third * slope[a, 2]
     for a in range(10):
         x, y, z = slope[a, 0], slope[a, 1], slope[a, 2]
         for i in range(3):

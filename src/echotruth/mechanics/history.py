@@ -86,15 +86,8 @@ def _wall_strain(mesh: Mesh, displacement: Floats, depth: Floats, layers: int) -
     """Statistics over the quadrature points: a layer may be thinner than a cell and hold no centroid."""
     xi, weight = tetrahedron()
     volume = (fibres.gradients(mesh, xi)[1] * weight).ravel()
-    axes = fibres.wall_axes(mesh, depth, xi)
-    at_ed = kinematics.deformation_gradient(mesh, displacement[0], xi)
-    carried, back = kinematics.carried_axes(axes, at_ed), np.linalg.inv(at_ed)
-    strains = np.stack(
-        [
-            kinematics.strain(kinematics.deformation_gradient(mesh, moved, xi) @ back, carried, kinematics.RCL)
-            for moved in displacement
-        ]
-    ).reshape(len(displacement), -1, len(kinematics.RCL))
+    strains = kinematics.wall_strain(mesh, displacement, fibres.wall_axes(mesh, depth, xi))
+    strains = strains.reshape(len(displacement), -1, len(kinematics.RCL))
     mean, sd = kinematics.weighted(strains, volume)
     layer = fibres.layer(fibres.at_points(mesh, depth, xi), layers).ravel()
     by_layer = kinematics.layer_strain(strains, volume, layer, layers)

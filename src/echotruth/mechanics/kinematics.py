@@ -6,9 +6,12 @@ unloaded state or to end-diastole (F_rel = F F_ED^-1, along axes carried to ED).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from echotruth.mechanics import element
 from echotruth.mechanics.fibres import CENTROID, axes_about, gradients, unit
 from echotruth.mechanics.quadrature import tetrahedron
 from echotruth.tetrahedra import Floats, Mesh
@@ -29,16 +32,16 @@ def deformation_gradient(mesh: Mesh, displacement: Floats, xi: Floats = CENTROID
     Parameters
     ----------
     mesh : Mesh
-    displacement : ndarray of shape (n_nodes, 3), m
+    displacement : ndarray of shape (..., n_nodes, 3), m
     xi : ndarray of shape (n_points, 3), optional
         Local coordinates, the same in every tetrahedron; the centroid if not given.
 
     Returns
     -------
-    ndarray of shape (n_cells, n_points, 3, 3)
+    ndarray of shape (..., n_cells, n_points, 3, 3)
     """
     slope, _ = gradients(mesh, xi)
-    return np.eye(3) + np.einsum("cai,cqaj->cqij", displacement[mesh.cells], slope)
+    return np.eye(3) + np.einsum("...cai,cqaj->...cqij", displacement[..., mesh.cells, :], slope)
 
 
 def carried_axes(axes: Floats, gradient: Floats) -> Floats:
@@ -95,6 +98,30 @@ def strain(gradient: Floats, axes: Floats, components: tuple[tuple[int, int], ..
     return np.stack([(sum(along[i][k] * along[j][k] for k in size) - (i == j)) / 2 for i, j in components], axis=-1)
 
 
+def wall_strain(mesh: Mesh, displacement: Floats, axes: Floats) -> Floats:
+    """Strain since ED (frame 0) at the quadrature points.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    displacement : ndarray of shape (n_frames, n_nodes, 3), m
+    axes : ndarray of shape (n_cells, n_points, 3, 3)
+        Rows R, C, L of the unloaded wall; the strain is along these, carried to ED.
+
+    Returns
+    -------
+    ndarray of shape (n_frames, n_cells, n_points, 6)
+        RR, CC, LL, RC, RL, CL.
+    """
+    carried = carried_axes(axes, deformation_gradient(mesh, displacement[0], tetrahedron()[0]))
+    # The wall at ED takes the place of the unloaded one: F F_ED^-1 is the gradient by its positions.
+    wall = element.elements(replace(mesh, nodes=mesh.nodes + displacement[0]), carried)
+    stretch = np.empty((len(displacement), *wall.weight.shape, 6))
+    for moved, c in zip(displacement, stretch, strict=True):
+        element.stretch(mesh.nodes + moved, wall, c)
+    return (stretch - [1, 1, 1, 0, 0, 0]) / 2
+
+
 def volume_ratios(mesh: Mesh, displacement: Floats) -> tuple[Floats, Floats]:
     """J at the quadrature points.
 
@@ -108,12 +135,11 @@ def volume_ratios(mesh: Mesh, displacement: Floats) -> tuple[Floats, Floats]:
     smallest, mean : ndarray of shape (n_frames,)
         The mean is weighted by unloaded volume.
     """
-    xi, weight = tetrahedron()
-    slope, volume = gradients(mesh, xi)
-    volume = volume * weight
+    wall = element.elements(mesh)
+    volume, c = wall.weight, np.empty((*wall.weight.shape, 6))
     ratio = np.empty((2, len(displacement)))
     for frame, moved in enumerate(displacement):
-        j = np.linalg.det(np.eye(3) + np.einsum("cai,cqaj->cqij", moved[mesh.cells], slope))
+        j = element.stretch(mesh.nodes + moved, wall, c)
         ratio[:, frame] = j.min(), np.sum(j * volume) / np.sum(volume)
     return ratio[0], ratio[1]
 
@@ -131,9 +157,9 @@ def weighted(values: Floats, weight: Floats) -> tuple[Floats, Floats]:
     -------
     mean, sd : ndarray of shape (n_frames, n_components)
     """
-    share = (weight / np.sum(weight))[:, None]
-    mean = np.sum(values * share, axis=1)
-    return mean, np.sqrt(np.sum((values - mean[:, None]) ** 2 * share, axis=1))
+    share = weight / np.sum(weight)
+    mean = np.einsum("fci,c->fi", values, share)
+    return mean, np.sqrt(np.einsum("fci,c->fi", (values - mean[:, None]) ** 2, share))
 
 
 def motion(mesh: Mesh, displacement: Floats, axes: Floats, frames: Floats) -> dict[str, NDArray]:
@@ -153,7 +179,7 @@ def motion(mesh: Mesh, displacement: Floats, axes: Floats, frames: Floats) -> di
         `strain` (frame, cell, 6: RR, CC, LL, RC, RL, CL); `fibre_strain_unloaded` and `fibre_strain`
         (frame, cell, 6: ff, ss, nn, fs, fn, sn).
     """
-    gradient = np.stack([deformation_gradient(mesh, moved)[:, 0] for moved in displacement])
+    gradient = deformation_gradient(mesh, displacement)[:, :, 0]
     relative = gradient @ np.linalg.inv(gradient[0])
     return {
         "deformation_gradient": gradient,
@@ -182,6 +208,6 @@ def layer_strain(strains: Floats, weight: Floats, layer: NDArray[np.integer], la
     """
     means = np.full((len(strains), layers, strains.shape[-1]), np.nan)
     for number in np.unique(layer):
-        inside = layer == number
-        means[:, number - 1] = weighted(strains[:, inside], weight[inside])[0]
+        share = np.where(layer == number, weight, 0.0)
+        means[:, number - 1] = np.einsum("fci,c->fi", strains, share / np.sum(share))
     return means

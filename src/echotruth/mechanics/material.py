@@ -18,8 +18,14 @@ Floats = NDArray[np.float64]
 PAIRS = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)])
 """Axes of each component."""
 
+COMPONENT = np.array([(0, 3, 4), (3, 1, 5), (4, 5, 2)])
+"""Component of each pair of axes."""
+
 SHEAR = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 """How often a component stands in a double contraction."""
+
+_FACTORS = np.array([[COMPONENT[[p, q, p, q], [r, s, s, r]] for r, s in PAIRS] for p, q in PAIRS])
+"""Components pr, qs, ps and qr for each two components pq and rs."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -86,9 +92,8 @@ def isochoric_tangent(c: Floats, inverse: Floats, scale: float, trace: float, st
 @njit(cache=True, error_model="numpy")
 def product(a: Floats, i: int, k: int) -> float:
     """Entry (i, k) of the symmetrised square product (a_pr a_qs + a_ps a_qr) / 2 of a tensor of shape (6,)."""
-    p, q = PAIRS[i, 0], PAIRS[i, 1]
-    r, s = PAIRS[k, 0], PAIRS[k, 1]
-    return (entry(a, p, r) * entry(a, q, s) + entry(a, p, s) * entry(a, q, r)) / 2
+    pr, qs, ps, qr = _FACTORS[i, k, 0], _FACTORS[i, k, 1], _FACTORS[i, k, 2], _FACTORS[i, k, 3]
+    return (a[pr] * a[qs] + a[ps] * a[qr]) / 2
 
 
 @njit(cache=True, error_model="numpy")
@@ -123,4 +128,4 @@ def active(c_ff: float, beta: float, power: float) -> tuple[float, float]:
 @njit(cache=True, error_model="numpy")
 def entry(a: Floats, p: int, q: int) -> float:
     """Entry (p, q) of a symmetric tensor of shape (6,)."""
-    return a[p] if p == q else a[p + q + 2]
+    return a[COMPONENT[p, q]]

@@ -6,10 +6,15 @@ after them `WHOLE`, with the viscous stress; `scale` holds the factors.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from echotruth.mechanics import material
+
+Floats = NDArray[np.float64]
 
 PASSIVE, ACTIVE, VOLUMETRIC, WHOLE = range(4)
 """Parts: for a stiffness, an active tension and a pressure of one, and the whole."""
@@ -17,19 +22,61 @@ PASSIVE, ACTIVE, VOLUMETRIC, WHOLE = range(4)
 COMPILED = {"cache": True, "error_model": "numpy"}
 """How the functions of an element are compiled. Nothing is contracted: code from the cache would be so otherwise."""
 
-_COMPONENT = np.array([(0, 3, 4), (3, 1, 5), (4, 5, 2)])
-"""Component of each pair of axes."""
+
+class Point(NamedTuple):
+    """Room for one point.
+
+    Attributes
+    ----------
+    f : ndarray of shape (3, 3)
+        Deformation gradient, from the fibre axes.
+    c, inverse, strain : ndarray of shape (6,)
+        Right Cauchy-Green tensor, its inverse, and the isochoric strain.
+    passive : ndarray of shape (6,)
+        Passive stress for a stiffness of one.
+    stress : ndarray of shape (4, 6)
+        Parts of the stress.
+    tangent : ndarray of shape (6, 6), Pa
+        Derivative of the whole stress by the strain.
+    modulus : ndarray of shape (9, 9)
+        dP/dF times a weight.
+    """
+
+    f: Floats
+    c: Floats
+    inverse: Floats
+    strain: Floats
+    passive: Floats
+    stress: Floats
+    tangent: Floats
+    modulus: Floats
+
+
+@njit(**COMPILED)
+def room():
+    """Room for one point."""
+    return Point(
+        np.empty((3, 3)),
+        np.empty(6),
+        np.empty(6),
+        np.empty(6),
+        np.empty(6),
+        np.empty((4, 6)),
+        np.empty((6, 6)),
+        np.empty((9, 9)),
+    )
 
 
 @njit(**COMPILED)
 def deform(x, slope, f, c):
     """Fill the deformation gradient (3, 3) and C (6,); returns det F, which is negative inside out."""
     for i in range(3):
-        for k in range(3):
-            total = 0.0
-            for a in range(10):
-                total += x[a, i] * slope[a, k]
-            f[i, k] = total
+        first, second, third = 0.0, 0.0, 0.0
+        for a in range(10):
+            first += x[a, i] * slope[a, 0]
+            second += x[a, i] * slope[a, 1]
+            third += x[a, i] * slope[a, 2]
+        f[i, 0], f[i, 1], f[i, 2] = first, second, third
     for k in range(6):
         p, q = material.PAIRS[k, 0], material.PAIRS[k, 1]
         c[k] = f[0, p] * f[0, q] + f[1, p] * f[1, q] + f[2, p] * f[2, q]
@@ -41,71 +88,61 @@ def deform(x, slope, f, c):
 
 
 @njit(**COMPILED)
-def elastic(strain, j, law, scale, stress, tangent, with_tangent):
-    """Fill the elastic parts of the stress (3, 6), each for a factor of one, and the tangent (6, 6).
+def respond(j, law, scale, before, at, with_tangent):
+    """Fill the parts of the stress and its tangent of a point whose C and J are known.
 
-    Rows of `strain`: C, which is given, its inverse and the isochoric strain.
+    Elastic parts, each for a factor of one, and what resists the growth of strain since `before`, a C (6,) too
+    (Kelvin-Voigt).
     """
-    c, inverse, isochoric = strain[0], strain[1], strain[2]
+    stiffness, tension, pressure, viscosity = scale
+    c, inverse, passive, stress, tangent = at.c, at.inverse, at.passive, at.stress, at.tangent
     material.invert(c, inverse)
-    shrink = material.isochoric_strain(c, abs(j), isochoric)
-    law.energy(isochoric, law.constants, stress[0], tangent)
-    trace = material.isochoric_stress(c, inverse, shrink, stress[0])
-    stress[1] = 0.0
-    stress[1, 0], slope = material.active(c[0], law.active[0], law.active[1])
-    for k in range(6):
-        stress[2, k] = j * inverse[k]
+    shrink = material.isochoric_strain(c, abs(j), at.strain)
+    law.energy(at.strain, law.constants, passive, tangent)
+    trace = material.isochoric_stress(c, inverse, shrink, passive)
+    active, slope = material.active(c[0], law.active[0], law.active[1])
     if with_tangent:
-        material.isochoric_tangent(c, inverse, shrink, trace, stress[0], tangent)
-        material.add_volumetric(inverse, j, law.local_bulk * (j - 1), law.local_bulk, tangent)
-        tangent *= scale[0]
-        tangent[0, 0] += scale[1] * slope
-        material.add_volumetric(inverse, j, scale[2], 0.0, tangent)
+        material.isochoric_tangent(c, inverse, shrink, trace, passive, tangent)
+        tangent *= stiffness
+        bulk = stiffness * law.local_bulk
+        material.add_volumetric(inverse, j, bulk * (j - 1) + pressure, bulk, tangent)
+        tangent[0, 0] += tension * slope
         for k in range(6):
+            tangent[k, k] += viscosity / material.SHEAR[k]
             for m in range(k):
                 tangent[k, m] = tangent[m, k]
     for k in range(6):
-        stress[0, k] += law.local_bulk * (j - 1) * stress[2, k]
+        stress[PASSIVE, k] = passive[k] + law.local_bulk * (j - 1) * j * inverse[k]
+        stress[ACTIVE, k] = active if k == 0 else 0.0
+        stress[VOLUMETRIC, k] = j * inverse[k]
+        viscous = viscosity * (c[k] - before[k]) / 2
+        elastic = stiffness * stress[PASSIVE, k] + tension * stress[ACTIVE, k] + pressure * stress[VOLUMETRIC, k]
+        stress[WHOLE, k] = elastic + viscous
 
 
 @njit(**COMPILED)
-def add_up(c, before, scale, stress, tangent):
-    """Fill the whole of the stress (4, 6), what resists the growth of strain (Kelvin-Voigt) and its tangent added."""
-    for k in range(6):
-        viscous = scale[3] * (c[k] - before[k]) / 2
-        stress[WHOLE, k] = scale[0] * stress[0, k] + scale[1] * stress[1, k] + scale[2] * stress[2, k] + viscous
-        tangent[k, k] += scale[3] / material.SHEAR[k]
+def add_force(at, slope, weight, force, start):
+    """Add the parts of the force (4, 30) from `start` on: the first Piola-Kirchhoff stress along the slopes (10, 3)."""
+    f, stress = at.f, at.stress
+    for part in range(start, 4):
+        ff, ss, nn = stress[part, 0], stress[part, 1], stress[part, 2]
+        fs, fn, sn = stress[part, 3], stress[part, 4], stress[part, 5]
+        for i in range(3):
+            first = weight * (f[i, 0] * ff + f[i, 1] * fs + f[i, 2] * fn)
+            second = weight * (f[i, 0] * fs + f[i, 1] * ss + f[i, 2] * sn)
+            third = weight * (f[i, 0] * fn + f[i, 1] * sn + f[i, 2] * nn)
+            for a in range(10):
+                force[part, 3 * a + i] += first * slope[a, 0] + second * slope[a, 1] + third * slope[a, 2]
 
 
 @njit(**COMPILED)
-def first_stress(f, stress, weight, first):
-    """Fill the first Piola-Kirchhoff stress, times a weight."""
-    for i in range(3):
-        for k in range(3):
-            first[i, k] = weight * (
-                f[i, 0] * material.entry(stress, 0, k)
-                + f[i, 1] * material.entry(stress, 1, k)
-                + f[i, 2] * material.entry(stress, 2, k)
-            )
-
-
-@njit(**COMPILED)
-def moduli(f, stress, tangent, weight, modulus):
-    """Fill dP/dF (9, 9), times a weight: F D F and the whole stress (6,) itself (Holzapfel, section 6.6)."""
-    _material_moduli(f, tangent, weight, modulus)
-    for k in range(3):
-        for m in range(3):
-            whole = weight * stress[_COMPONENT[k, m]]
-            for i in range(3):
-                modulus[3 * i + k, 3 * i + m] += whole
-
-
-@njit(**COMPILED)
-def _material_moduli(f, tangent, weight, modulus):
+def moduli(at, weight):
+    """Fill dP/dF, times a weight: F D F and the whole stress itself (Holzapfel, section 6.6)."""
+    f, tangent, modulus = at.f, at.tangent, at.modulus
     half = np.empty((9, 6))
     for r in range(9):
         i, k = r // 3, r % 3
-        first, second, third = _COMPONENT[0, k], _COMPONENT[1, k], _COMPONENT[2, k]
+        first, second, third = material.COMPONENT[0, k], material.COMPONENT[1, k], material.COMPONENT[2, k]
         for n in range(6):
             half[r, n] = weight * (
                 f[i, 0] * tangent[first, n] + f[i, 1] * tangent[second, n] + f[i, 2] * tangent[third, n]
@@ -114,7 +151,12 @@ def _material_moduli(f, tangent, weight, modulus):
         for s in range(9):
             i, k = s // 3, s % 3
             modulus[r, s] = (
-                f[i, 0] * half[r, _COMPONENT[0, k]]
-                + f[i, 1] * half[r, _COMPONENT[1, k]]
-                + f[i, 2] * half[r, _COMPONENT[2, k]]
+                f[i, 0] * half[r, material.COMPONENT[0, k]]
+                + f[i, 1] * half[r, material.COMPONENT[1, k]]
+                + f[i, 2] * half[r, material.COMPONENT[2, k]]
             )
+    for k in range(3):
+        for m in range(3):
+            whole = weight * at.stress[WHOLE, material.COMPONENT[k, m]]
+            for i in range(3):
+                modulus[3 * i + k, 3 * i + m] += whole

@@ -7,6 +7,8 @@ Both run on one thread: sums in another order would change the last bytes of the
 
 from __future__ import annotations
 
+import os
+from importlib.metadata import PackageNotFoundError, files
 from typing import Protocol
 
 import numpy as np
@@ -84,6 +86,7 @@ class Pardiso:
     """
 
     def __init__(self, single: bool = False) -> None:
+        _point_at_mkl()
         from pypardiso import PyPardisoSolver
 
         self._solvers = {precision: PyPardisoSolver(mtype=_SYMMETRIC_INDEFINITE) for precision in _PRECISIONS}
@@ -150,6 +153,16 @@ class Pardiso:
             return solver._call_pardiso(self._values, _aligned(right, self._precision))
         except PyPardisoError as error:
             raise SingularMatrix(f"MKL Pardiso could not factor the matrix ({error}).") from None
+
+
+def _point_at_mkl() -> None:
+    """Name MKL's library to pypardiso, which for each solver would look for it in every folder of the environment."""
+    try:
+        shipped = [str(file.locate()) for file in files("mkl") or [] if "mkl_rt" in file.name]
+    except PackageNotFoundError:
+        return
+    for path in filter(os.path.exists, shipped):
+        os.environ.setdefault("PYPARDISO_MKL_RT", path)
 
 
 def _aligned(values: Floats, precision: type) -> NDArray:
