@@ -1,6 +1,6 @@
 """Meshes and motions of which everything is known."""
 
-import compilation  # noqa: F401 - before whatever compiles
+import cores  # noqa: F401 - before whatever multiplies or compiles
 import numpy as np
 import pytest
 

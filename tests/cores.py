@@ -1,4 +1,4 @@
-"""One cache of compiled functions for all tests, their processes and the workflow; to be imported before numba."""
+"""What the processes of the tests share: the cores, and what is compiled. To be imported before numpy and numba."""
 
 import fcntl
 import os
@@ -10,6 +10,8 @@ ROOT = Path(__file__).parents[1]
 # A compiled function is cached by the file it stands in, not by those it calls from: one cache a version of the code.
 CACHE = ROOT / ".snakemake/numba" / code_version(*map(str, (ROOT / "workflow/scripts").glob("*.py")))
 os.environ["NUMBA_CACHE_DIR"] = str(CACHE)
+# Threads of BLAS that wait for a core that is taken spin: a decomposition of a matrix then costs twenty times its work.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 
 def one_at_a_time(save):
