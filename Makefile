@@ -1,18 +1,20 @@
-# Two commands: make demo, make test. Both first set up .venv from requirements.lock.
+# Two commands: make demo, make test. Both first set up .venv from requirements.lock. make test-all takes longer.
 
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test reference validation lock clean
+.PHONY: demo test test-all reference validation lock clean
 
 demo: .venv/ready
 	$(BIN)/echotruth run config/demo.yaml
 
-test: .venv/ready
+# Two workers; the tests of a module stay together, for they share what is dear to make.
+test: CHOICE := -m "not slow"
+test test-all: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(CHOICE)
 
 .venv/ready: requirements.lock pyproject.toml
 	@test -n "$(PYTHON)" || { echo "echotruth needs Python 3.11, 3.12 or 3.13: install one, or name it with make PYTHON=/path/to/python"; exit 1; }

@@ -1,5 +1,6 @@
 """Meshes and motions of which everything is known."""
 
+import cores  # noqa: F401 - before whatever multiplies or compiles
 import numpy as np
 import pytest
 
@@ -8,6 +9,12 @@ from echotruth.heart import Heart
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.tetrahedra import Mesh
+
+
+def pytest_collection_modifyitems(items):
+    """What takes longest goes first, so that no worker waits for it at the end."""
+    items.sort(key=lambda item: item.path.stem != "test_workflow")
+
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
 

@@ -3,22 +3,40 @@
 import io
 import subprocess
 import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+from unittest.mock import patch
 
 import pandas as pd
 import pytest
 
 import echotruth
 from echotruth.cases import expand
+from echotruth.cli import main
 from echotruth.config.loading import load
 
 ROOT = Path(__file__).parents[1]
 
 
 def echotruth_(*arguments, cwd=ROOT):
-    """Status, output and errors of the command."""
-    command = [sys.executable, "-c", "from echotruth.cli import main; main()", *map(str, arguments)]
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    """Status, output and errors of the command, without the start of a process."""
+    said, complaint, status = io.StringIO(), io.StringIO(), 0
+    with chdir(cwd), redirect_stdout(said), redirect_stderr(complaint):
+        try:
+            with patch("sys.argv", ["echotruth", *map(str, arguments)]):
+                main()
+        except SystemExit as left:
+            status = left.code
+            if isinstance(status, str):  # as the interpreter does it
+                print(status, file=sys.stderr)
+                status = 1
+    return status or 0, said.getvalue(), complaint.getvalue()
+
+
+def as_process(*arguments):
+    """The same of a process of its own."""
+    command = [sys.executable, "-c", "from echotruth.cli import main; main()", *arguments]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -96,6 +114,11 @@ def test_help_names_every_command():
 
 def test_version():
     assert echotruth_("--version")[1].strip() == echotruth.__version__
+
+
+@pytest.mark.parametrize("arguments", [("check", "config/demo.yaml"), ("check", "nowhere.yaml")])
+def test_process_ends_with_the_same_words_and_status(arguments):
+    assert as_process(*arguments) == echotruth_(*arguments)
 
 
 def test_cases_are_printed_as_a_table_of_their_own_parameters():

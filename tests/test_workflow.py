@@ -42,20 +42,24 @@ RUN = "from echotruth.cli import main; main()"
 
 
 class Checkout:
-    """A copy of what the workflow runs from, with the package of `source`."""
+    """A copy of what the workflow runs from, with the package and the compiled functions of this checkout."""
 
-    def __init__(self, folder, source=None):
-        self.folder, self.source = folder, source or folder
-        for name in ("Snakefile", "rules", "workflow", "profiles", *([] if source else ["src"])):
+    def __init__(self, folder):
+        self.folder = folder
+        for name in ("Snakefile", "rules", "workflow", "profiles"):
             copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
             folder.mkdir(exist_ok=True)
             copy(ROOT / name, folder / name)
+        compiled = ROOT / ".snakemake/numba"
+        compiled.mkdir(parents=True, exist_ok=True)
+        (folder / ".snakemake").mkdir()
+        (folder / ".snakemake/numba").symlink_to(compiled)
         (folder / "tiny.yaml").write_text(CONFIG)
         self.out = folder / "out/tiny"
 
     def start(self, *command):
         """A process of its own group."""
-        surroundings = os.environ | {"PYTHONPATH": str(self.source / "src"), "MPLBACKEND": "agg"}
+        surroundings = os.environ | {"PYTHONPATH": str(ROOT / "src"), "MPLBACKEND": "agg"}
         return subprocess.Popen(
             [sys.executable, *command],
             cwd=self.folder,
@@ -241,8 +245,7 @@ def test_record_that_a_failed_job_lost_is_made_again(made, stage, rule):
 @pytest.fixture(scope="module")
 def killed(made, tmp_path_factory):
     """A checkout whose run on one core was killed amid imaging and then taken up again; mechanics done before it."""
-    checkout = Checkout(tmp_path_factory.mktemp("second") / "echotruth", made.folder)
-    shutil.copytree(made.folder / ".snakemake/numba", checkout.folder / ".snakemake/numba")
+    checkout = Checkout(tmp_path_factory.mktemp("second") / "echotruth")
     process = checkout.start("-m", "snakemake", "--configfile", "tiny.yaml", "--cores", "1")
     end = time.monotonic() + 120
     while not list(checkout.out.glob("scratch/*/*/phantom.npz")):

@@ -270,6 +270,7 @@ print(sha256(lines.tobytes() + images[64].tobytes()).hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_code_compiled_anew_and_code_from_the_cache_give_the_same_bytes(tmp_path):
     surroundings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-c", FRAME]

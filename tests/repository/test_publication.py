@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pandas as pd
@@ -43,12 +44,18 @@ def blank(store: Store, group: str) -> dict:
     return {array.name: np.ones(opened[array.name].shape[array.leading :]) for array in schema_of(group)}
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch) -> Path:
+@pytest.fixture(scope="module", autouse=True)
+def script():
+    """The version in a record is that of the script that runs: here, of this file."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", [__file__])
+        yield
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory) -> Path:
     """A repository of two cases, all of whose jobs are done."""
-    monkeypatch.setattr(sys, "argv", [__file__])
-    folder = tmp_path / "small"
-    folder.mkdir()
+    folder = tmp_path_factory.mktemp("done")
     (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG.model_dump(mode="json")))
     rows = list(ledger.register(folder / "registry.txt", [case.id for case in CASES]))
     columns = layout.columns(table(CASES), rows)
@@ -60,6 +67,12 @@ def folder(tmp_path, monkeypatch) -> Path:
             job = Job(folder, stage, case.id, view)
             job.commit({group: blank(job.store, group) for group in GROUPS[stage]}, Cost())
     return folder
+
+
+@pytest.fixture
+def folder(done, tmp_path) -> Path:
+    """A copy of it of its own for every test: the jobs take much longer."""
+    return copytree(done, tmp_path / "small")
 
 
 def test_whole_repository_is_verified_and_opens(folder):
