@@ -31,7 +31,7 @@ ROWS = {
 }
 """Rows of a table for every phase, by the number of a scheme: as many as the polynomial of a term has coefficients, the
 highest power first. Terms are multiplied by 1, e, e^2, e^3, g, g e and the skew, e being the colour and g the bend."""
-PHASE_BITS = (0, 3, 4, 4, 3)
+PHASE_BITS = (0, 4, 4, 4, 4)
 """By the number of a scheme: its polynomials are in the fraction of a sample within each of 2^bits phases."""
 APART = 4
 """Scheme for echoes that parts of the array look up apart."""

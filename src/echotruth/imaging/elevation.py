@@ -19,7 +19,7 @@ from echotruth.imaging.kernel import Band, fit, stacked
 
 Floats = NDArray[np.float64]
 
-LEFT_OUT = 1.4e-4
+LEFT_OUT = 1.3e-4
 """Energy of the echoes that are left out beside the beam, over that of all echoes from scatterers at the same range."""
 MOST_BLOCKS = 4
 """Blocks of samples that the longest echoes get; what is longer is cut."""
