@@ -103,7 +103,8 @@ def cut(image, top, left, template):
     mean, square = 0.0, 0.0
     for y in range(side):
         for x in range(side):
-            mean += image[top + y, left + x] / side**2
+            mean += image[top + y, left + x]
+    mean /= side**2
     for y in range(side):
         for x in range(side):
             template[y, x] = image[top + y, left + x] - mean

@@ -24,7 +24,7 @@ STILL = 1e-3
 """Largest motion of a corner of the subset in the last iteration, px (Pan, Li and Tong 2013)."""
 STRAY = 0.25
 """Distance from its start at which a motion is given up, over half the side of a subset."""
-ONE, TWO, THREE = np.uintp(1), np.uintp(2), np.uintp(3)
+ZERO, ONE, TWO, THREE = np.float32(0), np.uintp(1), np.uintp(2), np.uintp(3)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -74,22 +74,23 @@ def template(padded, place, half, values, along, deep):
 def carried(padded, place, half, motion, values):
     """Write the centred values of a subset after a motion; their norm."""
     side, columns = 2 * half + 1, np.int32(padded.shape[1])
-    right, bottom = padded.shape[1] - 4.001, padded.shape[0] - 4.001
-    grey, down = padded.reshape(-1), np.uintp(columns)
+    right, bottom = np.float32(padded.shape[1] - 4.001), np.float32(padded.shape[0] - 4.001)
+    grey, below = padded.reshape(-1), np.uintp(columns)
+    along, across = np.float32(1 + motion[1]), np.float32(motion[4])
     first, lateral, axial = np.empty(side, np.int32), np.empty(side, np.float32), np.empty(side, np.float32)
     for row in range(side):
         dy = row - half
-        x, y = place[0] + motion[0] + motion[2] * dy, place[1] + motion[3] + dy + motion[5] * dy
+        x = np.float32(place[0] + motion[0] + motion[2] * dy)
+        y = np.float32(place[1] + motion[3] + motion[5] * dy + dy)
         for k in range(side):
-            dx = k - half
-            u = min(max(x + dx + motion[1] * dx, 0.0), right)
-            v = min(max(y + motion[4] * dx, 0.0), bottom)
+            dx = np.float32(k - half)
+            u, v = min(max(x + along * dx, ZERO), right), min(max(y + across * dx, ZERO), bottom)
             j, i = np.int32(u), np.int32(v)
-            first[k], lateral[k], axial[k] = i * columns + j, u - j, v - i
+            first[k], lateral[k], axial[k] = i * columns + j, u - np.float32(j), v - np.float32(i)
         # Numbers without a sign, for of others the compiler would ask whether they count from the end.
         for k in range(side):
             a = np.uintp(first[k])
-            b, c, d = a + down, a + down + down, a + down + down + down
+            b, c, d = a + below, a + below + below, a + below + below + below
             p, q, r, s = spline.shares(axial[k])
             e, f, g, h = spline.shares(lateral[k])
             values[row, k] = (
