@@ -78,7 +78,7 @@ def test_heart_that_cannot_be_filled_says_what_to_change():
 def test_load_without_equilibrium_ends_in_one_sentence(hemisphere, caplog):
     walk = Walk(hemisphere, C)
     with (
-        caplog.at_level(logging.INFO, "echotruth.mechanics"),
+        caplog.at_level(logging.DEBUG, "echotruth.mechanics"),
         pytest.raises(Diverged, match=r"kPa and a volume of .* uL"),
     ):
         walk.to(Load(1e3, 1e-12), "tension")

@@ -9,7 +9,7 @@ pressure that follows the wall, and its Hessian is symmetric.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from echotruth.mechanics.quadrature import triangle
@@ -41,6 +41,8 @@ def triangle_shape(xi: Floats) -> tuple[Floats, Floats]:
 
 _XI, _WEIGHT = triangle()
 _VALUE, _SLOPE = triangle_shape(_XI)
+_FACTORS = np.stack([_VALUE, _SLOPE[..., 0], _SLOPE[..., 1]])
+"""What the position and its two derivatives are of the nodes, (3, n_points, 6): the volume is their determinant."""
 
 
 def cavity_volume(nodes: NDArray[np.float64], endo: Integers) -> float:
@@ -76,19 +78,12 @@ def load(nodes: Floats, endo: Integers) -> Floats:
     -------
     ndarray of shape (n_facets, 6, 3), m^2
     """
-    x = nodes[endo]
-    position = np.einsum("qa,fai->fqi", _VALUE, x)
-    first, second = (np.einsum("qa,fai->fqi", _SLOPE[..., k], x) for k in (0, 1))
-    slots = (np.cross(first, second), np.cross(second, position), np.cross(position, first))
-    factors = (_VALUE, _SLOPE[..., 0], _SLOPE[..., 1])
-    parts = (
-        np.einsum("qa,fqi->fai", -_WEIGHT[:, None] / 3 * factor, slot)
-        for factor, slot in zip(factors, slots, strict=True)
-    )
-    return sum(parts)
+    slots = (_FACTORS.reshape(-1, 6) @ nodes[endo]).reshape(len(endo), 3, -1, 3)
+    others = np.cross(slots[:, [1, 2, 0]], slots[:, [2, 0, 1]]).reshape(len(endo), -1, 3)
+    return (-_WEIGHT[:, None] / 3 * _FACTORS).reshape(-1, 6).T @ others
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def stiffness(nodes: Floats, endo: Integers, hessian: Floats) -> None:
     """Second derivatives of the volume of the cavity, facet by facet.
 
@@ -99,7 +94,7 @@ def stiffness(nodes: Floats, endo: Integers, hessian: Floats) -> None:
     hessian : ndarray of shape (n_facets, 18, 18), m
         Filled. Rows and columns run over node and axis.
     """
-    for f in prange(endo.shape[0]):
+    for f in range(endo.shape[0]):
         _facet(nodes, endo[f], hessian[f])
 
 

@@ -166,14 +166,14 @@ def _kept(walk: Walk, progress: Progress | None) -> Frame:
 
 def _report(cycle: Cycle, frames: list[Frame]) -> None:
     number, (before, now) = len(frames) - 1, frames[-2:]
-    place = (number, cycle.time[number] * 1e3, now.load.pressure / 1e3, now.load.volume * 1e9)
+    place = (number, len(cycle.time), cycle.time[number] * 1e3, now.load.pressure / 1e3, now.load.volume * 1e9)
     row = (*place, now.state.tension / 1e3, now.steps - before.steps)
-    logger.info("frame %d, %.4g ms: %.2f kPa, %.4g uL, T_Ca %.2f kPa, %d steps", *row)
+    logger.info("frame %d of %d, %.4g ms: %.2f kPa, %.4g uL, T_Ca %.2f kPa, %d steps", *row)
 
 
 def _extrapolated(states: list[State]) -> tuple[State, ...]:
-    """On from the last states by polynomials of degrees 1 to 3."""
-    weights = ((-1, 2), (1, -3, 3), (-1, 4, -6, 4))
+    """On from the last states by polynomials of degrees 3 to 1."""
+    weights = ((-1, 4, -6, 4), (1, -3, 3), (-1, 2))
     return tuple(combined(states[-len(row) :], row) for row in weights if len(states) >= len(row))
 
 

@@ -170,9 +170,7 @@ def respond(nodes: Floats, body: Elements, law: Law, load: Load, out: Blocks) ->
         force = out.force[cell]
         force[:], ke[:], out.volume[cell] = 0.0, 0.0, 0.0
         scale = load.stiffness[cell], load.tension[cell], load.pressure[cell], load.viscosity[cell]
-        for a in range(10):
-            for i in range(3):
-                x[a, i] = nodes[body.cells[cell, a], i]
+        _gather(nodes, body.cells, cell, x)
         for q in range(body.weight.shape[1]):
             slope, weight = body.slope[cell, q], body.weight[cell, q]
             j = point.deform(x, slope, at.f, at.c)
@@ -184,21 +182,23 @@ def respond(nodes: Floats, body: Elements, law: Law, load: Load, out: Blocks) ->
             out.volume[cell] += weight * j if j > 0 else np.nan
         if with_tangent:
             _add_condensed(force[VOLUMETRIC], law.bulk_modulus / np.sum(body.weight[cell]), ke)
-        for a in range(10):
-            if body.turned[body.cells[cell, a]]:
-                _turn(a, body.frame[body.cells[cell, a]], force, ke)
+        _turn_nodes(body, cell, force, ke)
         if with_tangent:
             _pack(ke, out.tangent[cell])
 
 
 @njit(**COMPILED)
 def stretch(nodes: Floats, body: Elements, c: Floats) -> Floats:
-    """Fill C, (n_cells, n_points, 6), along the fibre axes, for nodes (n_nodes, 3), m; returns J, (n_cells, n_points)."""
+    """Fill C, (n_cells, n_points, 6), along the fibre axes, for nodes at (n_nodes, 3), m.
+
+    Returns
+    -------
+    ndarray of shape (n_cells, n_points)
+        J.
+    """
     j, f, x = np.empty(body.weight.shape), np.empty((3, 3)), np.empty((10, 3))
     for cell in range(body.cells.shape[0]):
-        for a in range(10):
-            for i in range(3):
-                x[a, i] = nodes[body.cells[cell, a], i]
+        _gather(nodes, body.cells, cell, x)
         for q in range(body.weight.shape[1]):
             j[cell, q] = point.deform(x, body.slope[cell, q], f, c[cell, q])
     return j
@@ -229,6 +229,22 @@ def _add_tangent(modulus, slope, along, ke):
             row, first, second, third = ke[3 * a + i], along[3 * i], along[3 * i + 1], along[3 * i + 2]
             for s in range(WIDTH):  # all of the row, of a length known beforehand: that is what vector units like
                 row[s] += x * first[s] + y * second[s] + z * third[s]
+
+
+@njit(**COMPILED)
+def _gather(nodes, cells, cell, x):
+    """Fill the positions (10, 3) of the nodes of a cell."""
+    for a in range(10):
+        for i in range(3):
+            x[a, i] = nodes[cells[cell, a], i]
+
+
+@njit(**COMPILED)
+def _turn_nodes(body, cell, force, ke):
+    """Turn the forces and the tangent of a cell to the directions of its nodes."""
+    for a in range(10):
+        if body.turned[body.cells[cell, a]]:
+            _turn(a, body.frame[body.cells[cell, a]], force, ke)
 
 
 @njit(**COMPILED)

@@ -224,12 +224,13 @@ class Equilibrium:
         stiffness, tension = state.stiffness * self.stiffness_scale, self.tension(state, load)
         scale = element.Load(stiffness, tension, state.pressure, self._rate, self._before)
         element.respond(nodes, self.body, self.law, scale, out)
-        load_of_facets = self.assembly.turn(self.mesh.endo, cavity.load(nodes, self.mesh.endo))
-        self._gradient = self.assembly.vector(load_of_facets, ENDO)
+        slope = cavity.load(nodes, self.mesh.endo)
+        self._gradient = self.assembly.vector(self.assembly.turn(self.mesh.endo, slope), ENDO)
         inside = self.assembly.vector(out.force[:, point.WHOLE]) + self._spring_force(nodes)
         blood = (state.cavity_pressure if unknown == "cavity_pressure" else load.pressure) * self._gradient
         growth = out.volume / self.unloaded - 1 - state.pressure / self.law.bulk_modulus
-        volume = cavity.cavity_volume(nodes, self.mesh.endo) - load.volume if unknown else 0.0
+        # The volume is of third degree in the positions (Euler's theorem).
+        volume = float(np.sum(slope * nodes[self.mesh.endo])) / 3 - load.volume if unknown else 0.0
         errors = norm(inside - blood) / self._size(blood, out), abs(volume) / load.volume if unknown else 0.0
         return Imbalance(inside - blood, growth, volume, *errors, norm(growth) / np.sqrt(len(growth)))
 

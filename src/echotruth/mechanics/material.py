@@ -59,11 +59,10 @@ def isochoric_stress(c: Floats, inverse: Floats, scale: float, stress: Floats) -
     J^(-2/3) Dev(dW/dE), with Dev(A) = A - (A : C) C^-1 / 3; Holzapfel, Nonlinear Solid Mechanics, eq. 6.90.
     `stress`, shape (6,), is changed in its place; J^(-2/3) dW/dE : C is returned.
     """
-    trace = 0.0
+    normal = stress[0] * c[0] + stress[1] * c[1] + stress[2] * c[2]
+    trace = normal + 2 * (stress[3] * c[3] + stress[4] * c[4] + stress[5] * c[5])
     for i in range(6):
-        trace += SHEAR[i] * stress[i] * c[i]
-    for i in range(6):
-        stress[i] = scale * (stress[i] - trace * inverse[i] / 3)
+        stress[i] = scale * (stress[i] - trace / 3 * inverse[i])
     return scale * trace
 
 

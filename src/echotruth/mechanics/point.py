@@ -101,23 +101,23 @@ def respond(j, law, scale, before, at, with_tangent):
     law.energy(at.strain, law.constants, passive, tangent)
     trace = material.isochoric_stress(c, inverse, shrink, passive)
     active, slope = material.active(c[0], law.active[0], law.active[1])
+    bulk = stiffness * law.local_bulk
+    swelling = bulk * (j - 1) + pressure
+    for k in range(6):
+        stress[WHOLE, k] = stiffness * passive[k] + swelling * j * inverse[k] + viscosity * (c[k] - before[k]) / 2
+    stress[WHOLE, 0] += tension * active
     if with_tangent:
         material.isochoric_tangent(c, inverse, shrink, trace, passive, tangent)
         tangent *= stiffness
-        bulk = stiffness * law.local_bulk
-        material.add_volumetric(inverse, j, bulk * (j - 1) + pressure, bulk, tangent)
+        material.add_volumetric(inverse, j, swelling, bulk, tangent)
         tangent[0, 0] += tension * slope
         for k in range(6):
             tangent[k, k] += viscosity / material.SHEAR[k]
             for m in range(k):
                 tangent[k, m] = tangent[m, k]
-    for k in range(6):
-        stress[PASSIVE, k] = passive[k] + law.local_bulk * (j - 1) * j * inverse[k]
-        stress[ACTIVE, k] = active if k == 0 else 0.0
-        stress[VOLUMETRIC, k] = j * inverse[k]
-        viscous = viscosity * (c[k] - before[k]) / 2
-        elastic = stiffness * stress[PASSIVE, k] + tension * stress[ACTIVE, k] + pressure * stress[VOLUMETRIC, k]
-        stress[WHOLE, k] = elastic + viscous
+            stress[PASSIVE, k] = passive[k] + law.local_bulk * (j - 1) * j * inverse[k]
+            stress[ACTIVE, k] = active if k == 0 else 0.0
+            stress[VOLUMETRIC, k] = j * inverse[k]
 
 
 @njit(**COMPILED)

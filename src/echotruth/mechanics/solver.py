@@ -35,7 +35,10 @@ _MOST_STEPS = 25
 _LEAST_SHARE = 1 / 16
 _LEAST_LOAD_STEP = 1 / 128
 
-_WORTH = 7
+_NEAR = 0.05
+"""Imbalance of a guess at which no other is tried."""
+
+_WORTH = 15
 """Corrections with old factors that cost as much as a tangent, its factors and one correction."""
 
 
@@ -76,7 +79,7 @@ class Walk:
                 self.state = self._solve(goal, unknown, (*guesses, *_ahead(path, done + step)), step)
             except Diverged as failure:
                 step, guesses = step / 2, ()
-                logger.info("step of the load halved to %g: %s", step, failure)
+                logger.debug("step of the load halved to %g: %s", step, failure)
                 if step < _LEAST_LOAD_STEP:
                     raise
                 continue
@@ -118,9 +121,15 @@ class Walk:
         raise Diverged(f"no equilibrium within {_MOST_STEPS} Newton steps {_place(load, unknown)}.")
 
     def _nearest(self, load: Load, unknown: Unknown, guesses: tuple[State, ...]) -> tuple[State, Imbalance]:
-        """The best of the last state and the guesses."""
-        starts = [(state, self.heart.imbalance(state, load, unknown)) for state in (*guesses, self.state)]
-        return min(starts, key=lambda start: np.nan_to_num(start[1].error, nan=np.inf))
+        """The first of the guesses and the last state that is near, or else the best of them."""
+        best, least = self.state, None
+        for state in (*guesses, self.state):
+            found = self.heart.imbalance(state, load, unknown)
+            if least is None or np.nan_to_num(found.error, nan=np.inf) < np.nan_to_num(least.error, nan=np.inf):
+                best, least = state, found
+            if least.error < _NEAR:
+                break
+        return best, least
 
     def _newton(self, state: State, imbalance: Imbalance, load: Load, unknown: Unknown) -> tuple[State, Imbalance]:
         """Corrections with one factorization, the last or a new one."""
