@@ -66,16 +66,21 @@ def run(path: str, config: Config, options: list[str]) -> int:
             _quietly([*snakemake, "--unlock"])
         if any(map(_only_tells, options)):
             return subprocess.call([*snakemake, *options])
-        weights = measured(folder / "ledger")
-        status = execute([*snakemake, *options], folder / "logs/snakemake.log", config.name, weights)
+        report = ["--report", str(folder / "report.html")]
+        # One start of Snakemake does for all, where all is made.
+        at_once = not [option for option in options if option not in CORES and not option.isdigit()]
+        command = [*snakemake, *options, *(["--report-after-run", *report] if at_once else [])]
+        status = execute(command, folder / "logs/snakemake.log", config.name, measured(folder / "ledger"))
         if status or not (folder / "figures/leaderboard.csv").is_file():
             return status
-        report = folder / "report.html"
-        status = _quietly([*snakemake, "--report", str(report)])
+        status = 0 if at_once else _quietly([*snakemake, *report])
     if status == 0:
-        print(f"\nRepository: {folder / f'{config.name}.zarr'}\nReport:     {report}")
+        print(f"\nRepository: {folder / f'{config.name}.zarr'}\nReport:     {folder / 'report.html'}")
     return status
 
+
+CORES = ("--cores", "-c", "--jobs", "-j", "all")
+"""Options, and what may stand beside them, that leave open what is made: everything."""
 
 TELLS = {
     *("--dry-run", "--dryrun", "--dag", "--rulegraph", "--filegraph", "--d3dag", "--summary", "--detailed-summary"),

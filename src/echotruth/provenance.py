@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+from collections.abc import Iterator
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
@@ -77,7 +78,7 @@ def _closure(modules: tuple[str, ...]) -> set[str]:
 def _imports(importer: str) -> list[str]:
     """Modules of echotruth that a module imports, anywhere in it, their packages included."""
     names: set[str] = set()
-    for node in ast.walk(_tree(importer)):
+    for node in _statements(_tree(importer)):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -115,10 +116,18 @@ def _plain(name: str) -> bytes:
 
 
 def _without_docstrings(tree: ast.Module) -> ast.Module:
-    for node in ast.walk(tree):
+    for node in [tree, *_statements(tree)]:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
             node.body = [line for line in node.body if not _is_text(line)]
     return tree
+
+
+def _statements(node: ast.AST) -> Iterator[Any]:
+    """All statements in a node, however deep, and no expressions, which are most of a tree."""
+    for block in ("body", "orelse", "finalbody", "handlers", "cases"):
+        for statement in getattr(node, block, ()):
+            yield statement
+            yield from _statements(statement)
 
 
 def _is_text(line: ast.stmt) -> bool:
