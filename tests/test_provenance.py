@@ -1,5 +1,6 @@
 """Versions: code is known by what it does, settings by what they say."""
 
+import os
 import sys
 from importlib.metadata import version
 from pathlib import Path
@@ -37,6 +38,16 @@ def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_
     assert "echotruth.mechanics.materials.neo_hooke" in closure("mechanics"), "found in its folder, not by an import"
     assert "echotruth.mechanics.solver" not in closure("tracking")
     assert "echotruth.tracking.phase_correlation" not in closure("mechanics") | closure("rf")
+
+
+def test_cache_of_compiled_functions_has_the_version_of_all_modules_that_compile():
+    scripts = tuple(str(script) for script in (ROOT / "workflow/scripts").glob("*.py"))
+    texts = {path: path.read_text() for path in (ROOT / "src").rglob("*.py")}
+    files = [path.relative_to(ROOT / "src") for path, text in texts.items() if "njit" in text or "from numba" in text]
+    compiled = {".".join(file.with_suffix("").parts).removesuffix(".__init__") for file in files}
+    assert len(compiled) > 20
+    assert compiled <= _closure(scripts)
+    assert os.environ["NUMBA_CACHE_DIR"].endswith(code_version(*scripts))
 
 
 def test_settings_version_depends_on_values_alone():

@@ -247,7 +247,7 @@ def killed(made, tmp_path_factory):
     """A checkout whose run on one core was killed amid imaging and then taken up again; mechanics done before it."""
     checkout = Checkout(tmp_path_factory.mktemp("second") / "echotruth")
     process = checkout.start("-m", "snakemake", "--configfile", "tiny.yaml", "--cores", "1")
-    end = time.monotonic() + 120
+    end = time.monotonic() + 600
     while not list(checkout.out.glob("scratch/*/*/phantom.npz")):
         assert process.poll() is None and time.monotonic() < end
         time.sleep(0.02)
