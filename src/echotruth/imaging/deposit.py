@@ -27,13 +27,14 @@ ROWS = {
     1: (2, 1, 0, 0, 1, 0, 0),
     2: (2, 2, 1, 1, 0, 0, 0),
     3: (3, 3, 2, 2, 1, 1, 0),
-    4: (2, 1, 0, 0, 1, 0, 1),
+    4: (2, 2, 1, 0, 1, 1, 0),
+    5: (2, 2, 1, 0, 1, 1, 1),
 }
 """Rows of a table for every phase, by the number of a scheme: as many as the polynomial of a term has coefficients, the
 highest power first. Terms are multiplied by 1, e, e^2, e^3, g, g e and the skew, e being the colour and g the bend."""
-PHASE_BITS = (0, 4, 4, 4, 4)
+PHASE_BITS = (0, 4, 4, 4, 4, 4)
 """By the number of a scheme: its polynomials are in the fraction of a sample within each of 2^bits phases."""
-APART = 4
+APART = 5
 """Scheme for echoes that parts of the array look up apart."""
 LANES = 8
 """Pairs whose terms are worked out at a time."""

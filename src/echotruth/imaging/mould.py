@@ -30,7 +30,7 @@ def fused(typing_context, a, b, c):
 
 
 @numba.njit(parallel=True, cache=True)
-def mould(places, kinds, beams, shapes, linear, constant, entries, tables):
+def mould(places, kinds, beams, shapes, maps, terms, entries, tables):
     """Make the tables of echoes that a lens has shaped.
 
     Parameters
@@ -43,50 +43,52 @@ def mould(places, kinds, beams, shapes, linear, constant, entries, tables):
     beams
         What an element hears and its change, two of shape (curvatures, slopes, nodes), complex64.
     shapes
-        For all angles, shape (KINDS, 2, nodes), float32.
-    linear, constant
-        Maps from spectra to polynomials of that degree, float32, shape (blocks, 2 nodes, phases 2 TAPS) and (blocks,
-        2 nodes, phases TAPS).
+        For all angles, shape (KINDS, 3, nodes), float32.
+    maps
+        From spectra to polynomials of first degree and to constants, float32, shape (blocks, 2 nodes, phases 2 TAPS)
+        and (blocks, 2 nodes, phases TAPS).
+    terms
+        Terms of the tables and the coefficients that each has, as :data:`~echotruth.imaging.deposit.ROWS` lists them:
+        shape (terms, 2).
     entries
         Blocks to make, shape (entries, 4): scatterer, block, part that sends and part that listens.
     tables
-        Written: shape (entries, phases, 4, TAPS), float32, or 5 in the place of 4 where there is a row for the skew.
+        Written: shape (entries, phases, rows, TAPS), float32.
     """
     nodes = beams[0].shape[2]
+    linear, constant = maps
     for entry in numba.prange(len(entries)):
         k, block, sender, listener = entries[entry]
         sent, grown = between(beams[0], places[k, sender]), between(beams[1], places[k, sender])
         heard, other = sent, grown
         if listener != sender:
             heard, other = between(beams[0], places[k, listener]), between(beams[1], places[k, listener])
-        # Terms: the echo, its colour, its change and the skew; real and imaginary parts.
-        weights = np.empty((4, 2, nodes), np.float32)
-        shape, colour = shapes[kinds[k], 0], shapes[kinds[k], 1]
+        # The echo, its colour and the square of that; none; its change and the colour of that; the skew.
+        weights = np.zeros((7, 2 * nodes), np.float32)
         for node in range(nodes):
             pulse, one, two = sent[node] * heard[node], grown[node] * heard[node], sent[node] * other[node]
-            half = np.float32(0.5) * shape[node]
-            change, skew = (one + two) * half, (one - two) * half
-            weights[0, 0, node], weights[0, 1, node] = pulse.real * shape[node], pulse.imag * shape[node]
-            weights[1, 0, node], weights[1, 1, node] = pulse.real * colour[node], pulse.imag * colour[node]
-            weights[2, 0, node], weights[2, 1, node] = change.real, change.imag
-            weights[3, 0, node], weights[3, 1, node] = skew.real, skew.imag
-        write(tables[entry], weights.reshape(4, 2 * nodes), linear[block], constant[block])
+            change, skew = np.float32(0.5) * (one + two), np.float32(0.5) * (one - two)
+            shape, colour = shapes[kinds[k], 0, node], shapes[kinds[k], 1, node]
+            for term in range(3):
+                part = shapes[kinds[k], term, node]
+                weights[term, node], weights[term, nodes + node] = pulse.real * part, pulse.imag * part
+            weights[4, node], weights[4, nodes + node] = change.real * shape, change.imag * shape
+            weights[5, node], weights[5, nodes + node] = change.real * colour, change.imag * colour
+            weights[6, node], weights[6, nodes + node] = skew.real * shape, skew.imag * shape
+        write(tables[entry], weights, terms, linear[block], constant[block])
 
 
 @numba.njit(cache=True)
-def write(table, weights, linear, constant):
-    """Fill the rows (phases, 4 or 5, TAPS) of a table from the weights (4, 2 nodes) of its terms."""
-    found = np.empty(linear.shape[1], np.float32)
-    combine(weights[0], linear, found)
-    for phase in range(len(table)):
-        for tap in range(TAPS):
-            table[phase, 0, tap] = found[2 * phase * TAPS + tap]
-            table[phase, 1, tap] = found[(2 * phase + 1) * TAPS + tap]
-    for term in range(1, table.shape[1] - 1):
-        combine(weights[term], constant, found)
+def write(table, weights, terms, linear, constant):
+    """Fill the rows (phases, rows, TAPS) of a table from the weights (7, 2 nodes) of its terms."""
+    found, row = np.empty(linear.shape[1], np.float32), 0
+    for term, count in terms:
+        combine(weights[term], linear if count == 2 else constant, found)
         for phase in range(len(table)):
-            for tap in range(TAPS):
-                table[phase, term + 1, tap] = found[phase * TAPS + tap]
+            for power in range(count):
+                for tap in range(TAPS):
+                    table[phase, row + power, tap] = found[(count * phase + power) * TAPS + tap]
+        row += count
 
 
 @numba.njit(cache=True)

@@ -27,10 +27,13 @@ BLOCK = 96
 """Scatterers deposited at a time."""
 TILE = (0.2e-3, 0.04)
 """Range, m, and angle, rad, over which scatterers are gathered before they are deposited."""
-FINE, FAST, LENS, NEAR = 3, 2, 1, deposit.APART
+FINE, FAST, LENS, WIDE, NEAR = 3, 2, 1, 4, deposit.APART
 """Schemes of the kernels' tables (see :data:`~echotruth.imaging.deposit.ROWS`) for an error of 2e-5 and of 1e-3 in the
-plane, and under a lens, there also for scatterers that parts of the array look up apart."""
-DENSEST, SHARPNESS = {FINE: 0.32, FAST: 0.41, LENS: 0.41}, {FINE: 20.0, FAST: 15.0, LENS: 15.0}
+plane, and under a lens, there also for elements wider than `NARROW` and for scatterers that parts of the array look up
+apart."""
+NARROW = 0.75
+"""Width of an element, in wavelengths, up to which its directivity hardly changes with frequency."""
+DENSEST, SHARPNESS = {FINE: 0.32, FAST: 0.41}, {FINE: 20.0, FAST: 15.0}
 """Greatest frequency of the pulse over that of the grid, and sharpness of the window."""
 FINEST = 1e-4
 """Accuracy below which the tables are `FINE`."""
@@ -83,8 +86,10 @@ class FullMatrix:
     ) -> None:
         p = probe.si()
         low, high = pulse_band(probe)
-        self._scheme = LENS if elevation else FINE if accuracy < FINEST else FAST
-        grid = Grid(max(p.sampling, high / DENSEST[self._scheme]), SHARPNESS[self._scheme])
+        self._width = p.width * p.frequency / p.sound_speed
+        in_plane = FINE if accuracy < FINEST and not elevation else FAST
+        self._scheme = (LENS if self._width <= NARROW else WIDE) if elevation else in_plane
+        grid = Grid(max(p.sampling, high / DENSEST[in_plane]), SHARPNESS[in_plane])
         self.sampling = grid.sampling
         half_pulse = 4.5 / (2 * np.pi * spectral_width(probe))
         self.reach = depth + p.sound_speed * half_pulse / 2
@@ -94,7 +99,7 @@ class FullMatrix:
         if self.samples >= 1 << (31 - deposit.FRACTION_BITS):
             raise ValueError(f"A record of {self.samples} samples is too long: image less deep or sample slower.")
         self.centres = element_centres(probe)
-        self.sound_speed, self._width = p.sound_speed, p.width * p.frequency / p.sound_speed
+        self.sound_speed = p.sound_speed
         loss = p.attenuation * p.frequency
         self._scales = self.sampling / p.sound_speed, loss, p.frequency / p.sound_speed
         self._directivity = directivity.tabulated(self._width)
@@ -122,11 +127,11 @@ class FullMatrix:
     def _tabulate(self, band: Band, ratio: np.ndarray) -> None:
         """Tables of kernels in the plane, or what makes those under the lens."""
         rows, phases = deposit.ROWS[self._scheme], _phases(self._scheme)
-        count = 1 + max(term for term, degree in enumerate(rows) if degree) if not self._lens else 2
+        count = 6 if self._lens else 1 + max(term for term, degree in enumerate(rows) if degree)
         self._tilts, shapes = directivity.shapes(self._width, ratio, count)
         if self._lens:
-            self._shapes = np.ascontiguousarray(shapes, np.float32)
-            self._maps = [_maps(band, degree, phases) for degree in (1, 0)]
+            self._shapes = np.ascontiguousarray(shapes[:, :3], np.float32)
+            self._maps = tuple(_maps(band, degree, phases) for degree in (1, 0))
             return
         spectra = stacked(shapes + 0j)
         terms = [(term, fits(band, 1, degree - 1, phases)[0]) for term, degree in enumerate(rows) if degree]
@@ -250,11 +255,11 @@ class _LensKernels:
         self._owner, pair = np.divmod(owner, len(sender))
         self._made = np.stack([self._owner, block, sender[pair], listener[pair]], axis=1)
         starts = np.searchsorted(self._owner, np.arange(0, len(position) + BLOCK, BLOCK))
-        scheme = NEAR if parts > 1 else LENS
-        self._size = sum(deposit.ROWS[scheme]) * TAPS
+        scheme = NEAR if parts > 1 else full._scheme
+        self._terms = np.array([(term, count) for term, count in enumerate(deposit.ROWS[scheme]) if count])
         rows = _phases(scheme), sum(deposit.ROWS[scheme])
         self._tables = deposit.aligned(int(np.diff(starts).max(initial=0)), *rows, TAPS)
-        self._base = np.arange(len(self._tables)) * rows[0] * self._size
+        self._base = np.arange(len(self._tables)) * np.prod(rows) * TAPS
 
     def __call__(self, part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What :func:`deposit.one_way` and :func:`deposit.add_echoes` take for some of the scatterers."""
@@ -262,7 +267,7 @@ class _LensKernels:
         made = self._made[which] - [part.start, 0, 0, 0]
         tables = self._tables[: len(made)]
         beams = full._lens.beam, full._lens.change
-        mould(self._places[part], self._kinds[part], beams, full._shapes, *full._maps, made, tables)
+        mould(self._places[part], self._kinds[part], beams, full._shapes, full._maps, self._terms, made, tables)
         entries = np.column_stack([made[:, 0], self._base[: len(made)], self._first[which], made[:, 2:]])
         return self._lean[part], entries, tables.ravel()
 
