@@ -2,14 +2,16 @@
 
     python benchmarks/density.py out/demo --densities 1000 2000 5000 10000
 
-Envelopes are those of boxes about the focus with normally distributed amplitudes, compared with Rayleigh's distribution;
-the clip is one view of a heart that is solved, imaged anew at each density. The results are results/density.md.
+Envelopes are those of boxes about the focus with normally distributed amplitudes, compared with Rayleigh's
+distribution; the clip is one view of a heart that is solved, imaged anew at each density. The results are
+results/density.md.
 """
 
 from __future__ import annotations
 
 import argparse
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +87,7 @@ def errors(job: Job, images: dict[int, np.ndarray], tracker: str) -> list[float]
 def likeness(frames: np.ndarray, mask: np.ndarray) -> float:
     """Mean correlation of the wall's grey values from frame to frame, nothing followed."""
     wall = frames[:, mask].astype(float)
-    return float(np.mean([np.corrcoef(one, other)[0, 1] for one, other in zip(wall[:-1], wall[1:], strict=True)]))
+    return float(np.mean([np.corrcoef(one, other)[0, 1] for one, other in pairwise(wall)]))
 
 
 def main() -> None:
@@ -111,8 +113,8 @@ def main() -> None:
         "# Scatterers per cubic millimetre",
         "",
         f"Array of 25 MHz. Speckle of {arguments.boxes} boxes about the focus, 1.913 where fully developed; view",
-        f"`{arguments.view}` of the repository `{job.case.config.name}`: {arguments.tracker} at end-systole, and the mean",
-        "correlation of the wall's grey values from frame to frame where nothing is followed.",
+        f"`{arguments.view}` of the repository `{job.case.config.name}`: {arguments.tracker} at end-systole, and the",
+        "mean correlation of the wall's grey values from frame to frame where nothing is followed.",
         "",
         f"| density | mean / deviation | NRMSE at {heads} px (%) | frame to frame |",
         "|---|---|---|---|",

@@ -43,7 +43,7 @@ def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_
 def test_cache_of_compiled_functions_has_the_version_of_all_modules_that_compile():
     scripts = tuple(str(script) for script in (ROOT / "workflow/scripts").glob("*.py"))
     texts = {path: path.read_text() for path in (ROOT / "src").rglob("*.py")}
-    files = [path.relative_to(ROOT / "src") for path, text in texts.items() if "njit" in text or "from numba" in text]
+    files = [path.relative_to(ROOT / "src") for path, text in texts.items() if "njit(" in text or "intrinsic" in text]
     compiled = {".".join(file.with_suffix("").parts).removesuffix(".__init__") for file in files}
     assert len(compiled) > 20
     assert compiled <= _closure(scripts)

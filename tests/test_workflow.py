@@ -16,6 +16,8 @@ import pandas as pd
 import pytest
 import xarray as xr
 
+from echotruth.provenance import code_version
+
 ROOT = Path(__file__).parents[1]
 CONFIG = """\
 name: tiny
@@ -42,18 +44,26 @@ RUN = "from echotruth.cli import main; main()"
 
 
 class Checkout:
-    """A copy of what the workflow runs from, with the package and the compiled functions of this checkout."""
+    """A copy of what the workflow runs from, with the package of this checkout.
 
-    def __init__(self, folder):
-        self.folder = folder
+    Its compiled functions are those of another checkout, if given; else only those of the mechanics are there already.
+    """
+
+    def __init__(self, folder, other=None):
+        self.folder, self.compiled = folder, folder / ".snakemake/numba"
         for name in ("Snakefile", "rules", "workflow", "profiles"):
             copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
             folder.mkdir(exist_ok=True)
             copy(ROOT / name, folder / name)
-        compiled = ROOT / ".snakemake/numba"
-        compiled.mkdir(parents=True, exist_ok=True)
         (folder / ".snakemake").mkdir()
-        (folder / ".snakemake/numba").symlink_to(compiled)
+        if other:
+            self.compiled.symlink_to(other.compiled)
+        else:
+            self.compiled.mkdir()
+            scripts = (str(ROOT / f"workflow/scripts/{stage}.py") for stage in ("mechanics", "physiology"))
+            mechanics = f"mechanics-{code_version(*scripts)}"
+            (ROOT / ".snakemake/numba" / mechanics).mkdir(parents=True, exist_ok=True)
+            (self.compiled / mechanics).symlink_to(ROOT / ".snakemake/numba" / mechanics)
         (folder / "tiny.yaml").write_text(CONFIG)
         self.out = folder / "out/tiny"
 
@@ -245,7 +255,7 @@ def test_record_that_a_failed_job_lost_is_made_again(made, stage, rule):
 @pytest.fixture(scope="module")
 def killed(made, tmp_path_factory):
     """A checkout whose run on one core was killed amid imaging and then taken up again; mechanics done before it."""
-    checkout = Checkout(tmp_path_factory.mktemp("second") / "echotruth")
+    checkout = Checkout(tmp_path_factory.mktemp("second") / "echotruth", made)
     process = checkout.start("-m", "snakemake", "--configfile", "tiny.yaml", "--cores", "1")
     end = time.monotonic() + 600
     while not list(checkout.out.glob("scratch/*/*/phantom.npz")):

@@ -92,21 +92,6 @@ def test_under_a_tall_lens_it_is_so_near_the_plane_and_beyond_two_apertures(atte
     assert (lens_errors(probe, 120e-3, 9.8e-3, [(66, 120)]) < bound).all()
 
 
-@pytest.mark.parametrize(
-    "preset, scale", [("mouse_25MHz", 1), ("mouse_40MHz", 1), ("rat_15MHz", 1.67), ("human_2_7MHz", 10)]
-)
-def test_what_is_beside_the_beam_adds_a_hundredth_to_the_echoes_of_a_wall_at_most(preset, scale):
-    """Of a slab as thick as hearts are long; the exact sum of all is the measure."""
-    probe = Probe(preset=preset)
-    matrix = FullMatrix(probe, DEPTH * scale)
-    place = sector(1500, elevation=3.5e-3 * scale, nearest=4e-3 * scale, farthest=10e-3 * scale)
-    outside = ~matrix.in_beam(place[0])
-    frequency = matrix.frequency[len(matrix.frequency) // 3 :: len(matrix.frequency) // 3]
-    left_out = exact_matrix(probe, *(each[outside] for each in place), frequency, True)
-    assert outside.mean() > 0.2
-    assert np.linalg.norm(left_out) < 0.012 * np.linalg.norm(exact_matrix(probe, *place, frequency, True))
-
-
 def test_under_the_lens_a_scatterer_in_the_plane_is_nearly_exact():
     assert error(Probe(), np.array([[0.4e-3, 6.5e-3, 0.0]]), np.ones(1), lens=True) < 2e-3
 

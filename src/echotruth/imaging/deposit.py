@@ -111,7 +111,7 @@ def _lanes(places):
 
 
 @intrinsic
-def add_kernel(typing_context, traces, start, tables, scheme, places, factors, pair):  # noqa: PLR0913, PLR0917
+def add_kernel(typing_context, traces, start, tables, scheme, places, factors, pair):
     """traces[start + place:][:TAPS] += weight * kernel, as vectors, for the element `pair` of some pairs.
 
     `places` (2, pairs), int32, are the sample where the kernel begins and where its rows begin in the tables; `factors`

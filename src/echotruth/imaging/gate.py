@@ -1,8 +1,8 @@
 """Range gates: the part of the record in which the echoes of a focal zone stand.
 
-A zone needs a few of the record's samples, and its transmits cost as much as it has frequencies. The echoes of all pairs
-are taken to time once, sampled little more often than their band asks for; each zone cuts its gate out of them, and its
-edges, beyond what is needed, fall off smoothly, so that the spectrum of the gate keeps within the band.
+A zone needs a few of the record's samples, and its transmits cost as much as it has frequencies. The echoes of all
+pairs are taken to time once, sampled little more often than their band asks for; each zone cuts its gate out of them,
+and its edges, beyond what is needed, fall off smoothly, so that the spectrum of the gate hardly leaves the band.
 """
 
 from __future__ import annotations
@@ -13,17 +13,19 @@ import numba
 import numpy as np
 from scipy import fft
 
+from echotruth.config import Probe
 from echotruth.imaging.interpolation import TAPS
 from echotruth.imaging.kernel import window
-from echotruth.imaging.rf import FullMatrix
+from echotruth.imaging.probe import element_centres
 from echotruth.imaging.transmit import Zone
 
-EDGE = 20
+EDGE = 36
 """Samples over which a gate falls off at either end."""
-SHARPNESS = 4.0
+SHARPNESS = 9.0
 """Of the window whose integral that fall is (see :func:`~echotruth.imaging.kernel.window`)."""
-MARGIN = 0.04
-"""How far the spectrum of a gate is kept beyond the band, over its width; with it gates err by 5e-5."""
+MARGIN = 0.08
+"""How far the spectrum of a gate is kept beyond the band, over the sampling rate; so gates err by less than 1e-5, of
+echoes that fill their band, too."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ class Gate:
         self._taper = np.ones((self.samples, 1, 1), np.float32)
         self._taper[:EDGE, 0, 0] = ramp / ramp[-1]
         self._taper[-EDGE:, 0, 0] = ramp[::-1] / ramp[-1]
-        margin = MARGIN * (band[1] - band[0])
+        margin = min(MARGIN * sampling.rate, (sampling.rate - (band[1] - band[0])) / 2)
         alias = np.arange(self.samples) * sampling.rate / self.samples
         # Of all the frequencies that look alike when sampled, the one in the band.
         true = alias + np.ceil((band[0] - margin - alias) / sampling.rate) * sampling.rate
@@ -99,12 +101,12 @@ class Gate:
         return fft.fft(gated, axis=0, overwrite_x=True, workers=numba.get_num_threads())[self.bins]
 
 
-def span(full: FullMatrix, zone: Zone, range_: np.ndarray, points: tuple[np.ndarray, np.ndarray]) -> tuple[float, float]:
+def span(probe: Probe, zone: Zone, range_: np.ndarray, points: tuple[np.ndarray, np.ndarray]) -> tuple[float, float]:
     """Earliest and latest echo between any two elements that the lines of a zone are made of, s.
 
     Parameters
     ----------
-    full : FullMatrix
+    probe : Probe
     zone : Zone
         Of focused waves.
     range_ : ndarray of shape (ranges,), m
@@ -114,9 +116,8 @@ def span(full: FullMatrix, zone: Zone, range_: np.ndarray, points: tuple[np.ndar
     """
     # On a line all paths grow with range, so that its ends tell.
     lateral, axial = (each[:, [0, -1], None] for each in points)
-    path = range_[[0, -1], None] + np.hypot(lateral - full.centres, axial)
-    latest, earliest = (extreme(zone.transmits.delay, axis=1) for extreme in (np.max, np.min))
-    speed = full.sound_speed
-    return float((path[:, 0].min(axis=1) / speed - latest).min()), float(
-        (path[:, 1].max(axis=1) / speed - earliest).max()
-    )
+    path = range_[[0, -1], None] + np.hypot(lateral - element_centres(probe), axial)
+    received, delay = path / probe.si().sound_speed, zone.transmits.delay
+    earliest = received[:, 0].min(axis=1) - delay.max(axis=1)
+    latest = received[:, 1].max(axis=1) - delay.min(axis=1)
+    return float(earliest.min()), float(latest.max())

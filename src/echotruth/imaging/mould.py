@@ -16,7 +16,6 @@ from numba.extending import intrinsic
 from echotruth.imaging.kernel import TAPS
 
 
-
 @intrinsic
 def fused(typing_context, a, b, c):
     """a b + c of float32, rounded once."""

@@ -110,7 +110,7 @@ class _ZoneFocus:
         p, scan = probe.si(), scanner.scan
         self.zone, self._range = zone, scanner.range[zone.part]
         self._points = points(scan, self._range)
-        needed = span(scanner.matrix, zone, self._range, self._points) if len(zone.transmits.foci) else None
+        needed = span(probe, zone, self._range, self._points) if len(zone.transmits.foci) else None
         self.channels = Synthesis(scanner.matrix, p.frequency, zone.transmits, needed)
         self._before = p.sound_speed * self.channels.start
         self._receive = ReceiveFocus(
