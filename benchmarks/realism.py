@@ -125,9 +125,9 @@ def random(name: str) -> np.random.Generator:
 
 def pictures(config: Config, beating: Heart, time: np.ndarray, where: Plane) -> Iterator[np.ndarray]:
     """Lines of two frames in a row, and so on through the cycle: (2, lines, ranges)."""
-    seeded = seed(config, beating, where, random)
-    medium = Medium(config, beating, where, time=time, seeded=seeded, random=random)
     scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+    seeded = seed(config, beating, where, random, scanner.matrix.in_beam)
+    medium = Medium(config, beating, where, time=time, seeded=seeded, random=random)
     acquire = Acquisition(config, scanner, medium, random)
     show = partial(clip, scan=scanner.scan, range_=scanner.range, bmode=config.bmode)
     lines = [scanner.beamform(acquire(k + more)) for k in range(0, FRAMES - 1, EVERY) for more in (0, 1)]

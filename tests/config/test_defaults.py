@@ -29,14 +29,14 @@ def test_heart_stands_within_the_field_of_view_and_the_sector(species):
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_scan_of_a_preset_has_ten_scatterers_in_its_resolution_cell(name):
-    """-6 dB widths of two ways: 4 ln 2 / (pi B) c / 2 in depth, 1.38 wavelengths F# of two Hann apertures, 0.64 in
-    elevation (sinc^2)."""
+    """-6 dB widths of two ways: 4 ln 2 / (pi B) c / 2 in depth, 1.38 wavelengths F# of two Hann apertures, 0.886 in
+    elevation, where sinc^2 is one half."""
     config = configured(probe={"preset": name})
     probe, focus = config.probe.si(), config.rf.si().focus
     wavelength = probe.sound_speed / probe.frequency
     axial = 4 * log(2) / (pi * probe.bandwidth * probe.frequency) * probe.sound_speed / 2
     lateral = 1.38 * wavelength * focus / (probe.elements * probe.pitch)
-    elevation = 0.64 * wavelength * probe.elevation_focus / probe.height
+    elevation = 0.886 * wavelength * probe.elevation_focus / probe.height
     assert config.phantom.si().density * axial * lateral * elevation > 10
 
 

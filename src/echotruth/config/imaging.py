@@ -35,10 +35,9 @@ ALL = "all"
 class Phantom(Section):
     """Scatterers in the wall."""
 
-    density_per_mm3: Positive = 2000.0
-    """Scatterers per cubic millimetre of unloaded wall; the default is some twelve a resolution cell. More change
-    neither the statistics of the speckle nor the errors of trackers (benchmarks/results/density.md). Default: as suits
-    `probe.preset`."""
+    density_per_mm3: Positive = 2800.0
+    """Scatterers per cubic millimetre of unloaded wall; the default is ten a resolution cell, the fewest that
+    make fully developed speckle. Default: as suits `probe.preset`."""
     in_plane_only: bool = False
     """Scatterers lie in the imaging plane and move within it, as the paper's phantom is printed."""
 

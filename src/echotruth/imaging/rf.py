@@ -25,8 +25,6 @@ from echotruth.imaging.probe import element_centres, pulse_band, pulse_spectrum,
 
 BLOCK = 96
 """Scatterers deposited at a time."""
-TILE = (0.2e-3, 0.04)
-"""Range, m, and angle, rad, over which scatterers are gathered before they are deposited."""
 FINE, FAST, LENS, WIDE, NEAR = 3, 2, 1, 4, deposit.APART
 """Schemes of the kernels' tables (see :data:`~echotruth.imaging.deposit.ROWS`) for an error of 2e-5 and of 1e-3 in the
 plane, and under a lens, there also for elements wider than `NARROW` and for scatterers that parts of the array look up
@@ -156,10 +154,12 @@ class FullMatrix:
         position, amplitude = position[inside], amplitude[inside].astype(np.float32)
         elements = len(self.centres)
         traces = np.zeros((elements * (elements + 1) // 2, self.samples), np.float32)
-        parts = self._lens.parts(np.linalg.norm(position, axis=1)) if self._lens else np.ones(len(position), int)
+        reach = np.linalg.norm(position, axis=1)
+        # Neighbours in range share the part of the traces that is at hand.
+        order = np.argsort(reach, kind="stable")
+        parts = self._lens.parts(reach[order]) if self._lens else np.ones(len(order), int)
         for number in np.unique(parts):
-            alike = np.flatnonzero(parts == number)
-            alike = alike[_tiled(position[alike])]
+            alike = order[parts == number]
             self._add(traces, position[alike], amplitude[alike], int(number))
         return traces
 
@@ -270,15 +270,6 @@ class _LensKernels:
         mould(self._places[part], self._kinds[part], beams, full._shapes, full._maps, self._terms, made, tables)
         entries = np.column_stack([made[:, 0], self._base[: len(made)], self._first[which], made[:, 2:]])
         return self._lean[part], entries, tables.ravel()
-
-
-def _tiled(position: np.ndarray) -> np.ndarray:
-    """Order of scatterers (n, 3), m, in which neighbours are near to each other in range and angle, (n,).
-
-    Their echoes stand close together in the traces of all pairs, and that part of the traces stays at hand.
-    """
-    reach, angle = np.linalg.norm(position, axis=1), np.arctan2(position[:, 0], position[:, 1])
-    return np.lexsort((reach, np.floor(angle / TILE[1]), np.floor(reach / TILE[0])))
 
 
 def _phases(scheme: int) -> int:
