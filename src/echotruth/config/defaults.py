@@ -22,10 +22,10 @@ HEARTS = {
 _KEYS = ("phantom.density_per_mm3", "rf.focus_mm", "rf.zones", "rf.zone_mm", "rf.sector_deg", "bmode.field_of_view_mm")
 _SCANS = {
     "mouse_25MHz": (2800.0, 6.5, 5, 1.0, 64.0, 12.0),
-    "mouse_30MHz": (5000.0, 6.5, 5, 1.0, 64.0, 12.0),
+    "mouse_30MHz": (5300.0, 6.5, 5, 1.0, 64.0, 12.0),
     "mouse_40MHz": (9500.0, 6.5, 5, 1.0, 64.0, 12.0),
     "rat_15MHz": (620.0, 10.8, 5, 1.7, 64.0, 20.0),
-    "human_2_7MHz": (4.5, 70.0, 3, 25.0, 75.0, 150.0),
+    "human_2_7MHz": (5.0, 70.0, 3, 25.0, 75.0, 150.0),
 }
 ARRAYS: dict[str, dict[str, float]] = {name: dict(zip(_KEYS, row, strict=True)) for name, row in _SCANS.items()}
 """`probe.preset` to the keys that follow it."""
