@@ -153,17 +153,17 @@ def test_times_just_before_a_sample_belong_to_the_sample_before():
     """Right to the last bit: rounded up, they would ask for an interpolator beyond the table."""
     early = np.nextafter(np.arange(1.0, RANGES + 1), 0)
     geometry = np.zeros((4, RANGES))
-    times = np.empty((2, RANGES), np.int32), np.empty((2, RANGES), np.float32)
-    echo_times(early, geometry, (0, RANGES), 0.0, 1.0, 10**6, False, (*times[0], *times[1]))
-    assert (times[0][0] == np.arange(RANGES)).all()
-    assert (times[0][1] == 2**PHASE_BITS - 1).all()
+    times = np.empty(RANGES), *np.empty((2, RANGES), np.int32), *np.empty((3, RANGES), np.float32)
+    echo_times(early, geometry, (0, RANGES), 0.0, (1.0, 10**6, 0.25), False, times)
+    assert (times[1] == np.arange(RANGES)).all()
+    assert (times[2] == 2**PHASE_BITS - 1).all()
 
 
 def test_echoes_out_of_the_record_weigh_nothing():
     path = np.array([-1.0, -1e-9, 0.0, 9.5, 10.0, np.inf])
-    times = np.empty((2, 6), np.int32), np.empty((2, 6), np.float32)
-    echo_times(path, np.zeros((4, 6)), (0, 6), 0.0, 1.0, 10, False, (*times[0], *times[1]))
-    assert times[1][1].tolist() == [0, 0, 1, 1, 0, 0]
+    times = np.empty(6), *np.empty((2, 6), np.int32), *np.empty((3, 6), np.float32)
+    echo_times(path, np.zeros((4, 6)), (0, 6), 0.0, (1.0, 10, 0.25), False, times)
+    assert np.hypot(*times[-2:]) == pytest.approx([0, 0, 1, 1, 0, 0], abs=1e-6)
 
 
 def test_lines_of_a_frame_do_not_depend_on_how_many_there_are(matrix):

@@ -11,12 +11,11 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core.cgutils import get_or_insert_function
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
 from echotruth.imaging.directivity import STEPS
-from echotruth.imaging.kernel import TAPS
+from echotruth.imaging.vectors import LANES, Vectors
 
 FRACTION_BITS = 18
 """Times are integers in units of 2^-18 samples, so that the sum over both ways is exact."""
@@ -24,20 +23,18 @@ LEAD = 32
 """Samples of a row before time 0: room for what of a kernel comes before its echo."""
 
 ROWS = {
-    1: (2, 1, 0, 0, 1, 0, 0),
+    1: (3, 2, 0, 0, 2, 0, 0),
     2: (2, 2, 1, 1, 0, 0, 0),
     3: (3, 3, 2, 2, 1, 1, 0),
-    4: (2, 2, 1, 0, 1, 1, 0),
-    5: (2, 2, 1, 0, 1, 1, 1),
+    4: (3, 2, 2, 0, 2, 2, 0),
+    5: (3, 2, 2, 0, 2, 2, 2),
 }
 """Rows of a table for every phase, by the number of a scheme: as many as the polynomial of a term has coefficients, the
 highest power first. Terms are multiplied by 1, e, e^2, e^3, g, g e and the skew, e being the colour and g the bend."""
-PHASE_BITS = (0, 4, 4, 4, 4, 4)
+PHASE_BITS = (0, 2, 4, 4, 2, 2)
 """By the number of a scheme: its polynomials are in the fraction of a sample within each of 2^bits phases."""
 APART = 5
 """Scheme for echoes that parts of the array look up apart."""
-LANES = 8
-"""Pairs whose terms are worked out at a time."""
 LARGEST = 0.3
 """Greatest change, logarithm of the amplitude or radians, that an element makes of what its lens hears."""
 SHARES = 32
@@ -52,67 +49,9 @@ def aligned(*shape: int) -> np.ndarray:
     return memory[start : start + size].view(np.float32).reshape(shape)
 
 
-class _Vectors:
-    """Vectors of single-precision numbers in LLVM's language."""
-
-    def __init__(self, context, builder):
-        self._context, self._builder = context, builder
-
-    def address(self, kind, array, index, width):
-        data = self._context.make_array(kind)(self._context, self._builder, array).data
-        return self._builder.bitcast(self._builder.gep(data, [index]), _vector(width).as_pointer())
-
-    def load(self, address, place=0):
-        return self._builder.load(self._builder.gep(address, [ir.Constant(ir.IntType(64), place)]), align=4)
-
-    def place(self, kind, array, row, column):
-        """Address of an element of a matrix."""
-        found = self._context.make_array(kind)(self._context, self._builder, array)
-        width = self._builder.extract_value(found.shape, 1)
-        row = ir.Constant(width.type, row) if isinstance(row, int) else row
-        return self._builder.gep(found.data, [self._builder.add(self._builder.mul(width, row), column)])
-
-    def lanes(self, kind, array, row, column):
-        """Address of LANES neighbours in a row of a matrix, as a vector."""
-        place = self.place(kind, array, row, column)
-        return self._builder.bitcast(place, ir.VectorType(place.type.pointee, LANES).as_pointer())
-
-    def filled(self, scalar):
-        """A vector of LANES times a scalar of any type."""
-        kind = ir.VectorType(scalar.type, LANES)
-        one = self._builder.insert_element(ir.Constant(kind, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
-        return self._builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined), _lanes([0] * LANES))
-
-    def spread(self, scalar, width):
-        nothing = ir.Constant(_vector(width), ir.Undefined)
-        one = self._builder.insert_element(nothing, scalar, ir.Constant(ir.IntType(32), 0))
-        return self._builder.shuffle_vector(one, nothing, _lanes([0] * width))
-
-    def fused(self, a, b, c):
-        """a b + c, rounded once: what comes out must not hang on how a compiler joins sums and products."""
-        kind = a.type
-        function = ir.FunctionType(kind, [kind] * 3)
-        fused = get_or_insert_function(self._builder.module, function, f"llvm.fma.v{kind.count}f32")
-        return self._builder.call(fused, [a, b, c])
-
-    def polynomial(self, address, first, count, variable):
-        value = self.load(address, first)
-        for power in range(1, count):
-            value = self.fused(value, variable, self.load(address, first + power))
-        return value
-
-
-def _vector(width):
-    return ir.VectorType(ir.FloatType(), width)
-
-
-def _lanes(places):
-    return ir.Constant(ir.VectorType(ir.IntType(32), len(places)), list(places))
-
-
 @intrinsic
 def add_kernel(typing_context, traces, start, tables, scheme, places, factors, pair):
-    """traces[start + place:][:TAPS] += weight * kernel, as vectors, for the element `pair` of some pairs.
+    """traces[start + place:][:LANES] += weight * kernel, as vectors, for the element `pair` of some pairs.
 
     `places` (2, pairs), int32, are the sample where the kernel begins and where its rows begin in the tables; `factors`
     (5, pairs), float32, are weight, fraction of a sample, colour, bend and skew. `scheme` is a tuple whose length is
@@ -125,15 +64,15 @@ def add_kernel(typing_context, traces, start, tables, scheme, places, factors, p
 
     def generate(context, builder, signature, arguments):
         traces, start, tables, _, places, factors, pair = arguments
-        vectors, kinds = _Vectors(context, builder), signature.args
+        vectors, kinds = Vectors(context, builder), signature.args
 
         def of_pair(argument, array, row):
             return builder.load(vectors.place(kinds[argument], array, row, pair))
 
         place, row = (builder.sext(of_pair(4, places, k), pair.type) for k in range(2))
         weight, fraction, colour, bend, skew = (of_pair(5, factors, k) for k in range(5))
-        rows = vectors.address(kinds[2], tables, row, TAPS)
-        fraction = vectors.spread(fraction, TAPS)
+        rows = vectors.address(kinds[2], tables, row)
+        fraction = vectors.filled(fraction)
         first, *others = ROWS[len(scheme)]
         kernel, at = vectors.polynomial(rows, 0, first, fraction), first
         square = builder.fmul(colour, colour)
@@ -141,9 +80,9 @@ def add_kernel(typing_context, traces, start, tables, scheme, places, factors, p
         for count, factor in zip(others, terms, strict=True):
             if count:
                 term = vectors.polynomial(rows, at, count, fraction)
-                kernel, at = vectors.fused(term, vectors.spread(factor, TAPS), kernel), at + count
-        target = vectors.address(kinds[0], traces, builder.add(start, place), TAPS)
-        total = vectors.fused(vectors.spread(weight, TAPS), kernel, vectors.load(target))
+                kernel, at = vectors.fused(term, vectors.filled(factor), kernel), at + count
+        target = vectors.address(kinds[0], traces, builder.add(start, place))
+        total = vectors.fused(vectors.filled(weight), kernel, vectors.load(target))
         builder.store(total, target, align=4)
         return context.get_dummy_value()
 
@@ -164,7 +103,7 @@ def add_terms(typing_context, time, weight, colour, bend, k, j, element, table, 
 
     def generate(context, builder, signature, arguments):
         *others, k, j, element, table, _, places, factors = arguments
-        vectors, kinds = _Vectors(context, builder), signature.args
+        vectors, kinds = Vectors(context, builder), signature.args
         time, weight, colour, bend = (
             builder.load(vectors.lanes(kind, array, k, j), align=4)
             for kind, array in zip(kinds[:4], others, strict=True)
@@ -201,7 +140,7 @@ def add_terms(typing_context, time, weight, colour, bend, k, j, element, table, 
 
 
 @numba.njit(parallel=True, cache=True, error_model="numpy")
-def one_way(position, centres, scales, directivity, tilts, lean, time, weight, colour, bend):  # noqa: PLR0913, PLR0917
+def one_way(position, centres, parts, scales, directivity, tilts, lean, time, weight, colour, bend):  # noqa: PLR0913, PLR0917
     """Travel time, amplitude and colour between every scatterer and every element.
 
     Parameters
@@ -210,6 +149,8 @@ def one_way(position, centres, scales, directivity, tilts, lean, time, weight, c
         Shape (scatterers, 3), m.
     centres
         Shape (elements,), m.
+    parts
+        Part of the array in which each of them is, shape (elements,).
     scales
         Sampling frequency over the speed of sound, 1/m; attenuation at the centre frequency, 1/m; wavelengths at the
         centre frequency per m.
@@ -228,7 +169,7 @@ def one_way(position, centres, scales, directivity, tilts, lean, time, weight, c
     """
     samples, loss, waves = scales
     unit = samples * (1 << FRACTION_BITS)
-    elements, parts = len(centres), lean.shape[1]
+    elements = len(centres)
     for k in numba.prange(len(position)):
         axial, beside = position[k, 1] * position[k, 1], position[k, 2] * position[k, 2]
         for element in range(elements):
@@ -245,7 +186,7 @@ def one_way(position, centres, scales, directivity, tilts, lean, time, weight, c
             if loss > 0:
                 strength *= np.exp(-loss * distance)
             if len(lean):
-                middle, delay, louder, later = lean[k, element * parts // elements]
+                middle, delay, louder, later = lean[k, parts[element]]
                 away = 1 / np.sqrt(lateral + axial) - middle
                 bend[k, element] = away
                 # To first order; beyond that, beside the beam, it would grow without bounds.

@@ -1,8 +1,8 @@
 """Interpolation of channel data at any time.
 
-The exponential of a semicircle (Barnett, Magland, af Klinteberg 2019, SIAM J Sci Comput 41:C479), turning with the
-carrier, so that data sampled below the carrier are taken as they are. With the spectrum of the data divided by that
-of the interpolator, the error is 1e-5 or less of a strong echo.
+The data are those below the carrier, interpolated by the exponential of a semicircle (Barnett, Magland, af Klinteberg
+2019, SIAM J Sci Comput 41:C479) and turned with the carrier. With the spectrum of the data divided by that of the
+interpolator, the error is 1e-5 or less of a strong echo.
 """
 
 from __future__ import annotations
@@ -14,17 +14,18 @@ from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
 from echotruth.imaging.kernel import TAPS, window, window_spectrum
+from echotruth.imaging.vectors import LANES, Vectors
 
 LEAD = TAPS // 2 - 1
 """Samples of them before its time; channels begin this much before time 0."""
-OVERSAMPLING = 1.25
+OVERSAMPLING = 1.3
 """Least sampling frequency over the band of the data."""
 SHARPNESS = 14.0
 """Of the window that interpolates."""
 PHASE_BITS = 9
 """Interpolators are tabulated for 2^9 fractions of a sample, with a slope between them."""
-LANES = 4 * TAPS
-"""Numbers of a tabulated interpolator: its real part at every tap, twice, then its imaginary part likewise."""
+NUMBERS = 2 * TAPS
+"""Of an interpolator: each value twice, for real and imaginary part."""
 
 
 def spectrum(frequency: np.ndarray) -> np.ndarray:
@@ -32,62 +33,46 @@ def spectrum(frequency: np.ndarray) -> np.ndarray:
     return window_spectrum(2j * np.pi * frequency, SHARPNESS).real
 
 
-def table(carrier: float) -> np.ndarray:
-    """Interpolators that turn by `carrier` (cycles per sample), and their slopes per phase.
+def table() -> np.ndarray:
+    """Interpolators, and their slopes per phase.
 
     Returns
     -------
-    Shape (2^PHASE_BITS * 2 * LANES,), float32: for each fraction of a sample LANES values and LANES slopes.
+    Shape (2^PHASE_BITS * 2 * NUMBERS,), float32: for each fraction of a sample NUMBERS values and NUMBERS slopes.
     """
     fraction = np.arange(2**PHASE_BITS + 1) / 2**PHASE_BITS
-    offset = fraction[:, None] - (np.arange(TAPS) - LEAD)
-    turning = window(offset, SHARPNESS) * np.exp(2j * np.pi * carrier * offset)
-    lanes = np.concatenate([np.repeat(turning.real, 2, axis=1), np.repeat(turning.imag, 2, axis=1)], axis=1)
-    return np.concatenate([lanes[:-1], np.diff(lanes, axis=0)], axis=1).astype(np.float32).ravel()
+    values = np.repeat(window(fraction[:, None] - (np.arange(TAPS) - LEAD), SHARPNESS), 2, axis=1)
+    return np.concatenate([values[:-1], np.diff(values, axis=0)], axis=1).astype(np.float32).ravel()
 
 
 @intrinsic
 def add_taps(typing_context, sums, place, samples, start, table, row, scale):
-    """Add weight * samples * (values + step * slopes) to LANES sums, tap by tap, as one vector.
+    """Add weight * samples * (values + step * slopes) to NUMBERS sums, tap by tap.
 
-    The 2 TAPS numbers from samples[start] on (real and imaginary parts in turn) are taken twice: against the real
-    and against the imaginary part of the interpolator at table[row]. `scale` is (step, weight).
+    The samples are the NUMBERS from samples[start] on, real and imaginary parts in turn, the values those at
+    table[row].
+    `scale` is (step, real and imaginary part of the weight).
     """
     single = types.Array(types.float32, 1, "C")
     if (sums, samples, table) != (single, single, single):
         raise TypingError("sums, samples and table must be contiguous float32 vectors")
-    signature = types.void(*(single, types.intp) * 3, types.UniTuple(types.float32, 2))
+    signature = types.void(*(single, types.intp) * 3, types.UniTuple(types.float32, 3))
 
     def generate(context, builder, signature, arguments):
         sums, place, samples, start, table, row, scale = arguments
-        step, weight = (builder.extract_value(scale, k) for k in range(2))
-
-        def lanes(count, kind):
-            return ir.VectorType(kind, count)
-
-        def address(array, index, count):
-            data = context.make_array(single)(context, builder, array).data
-            return builder.bitcast(builder.gep(data, [index]), lanes(count, ir.FloatType()).as_pointer())
-
-        def load(array, index, count):
-            return builder.load(address(array, index, count), align=4)
-
-        def spread(scalar, count):
-            none, zero = ir.Constant(lanes(count, ir.FloatType()), ir.Undefined), ir.Constant(ir.IntType(32), 0)
-            one = builder.insert_element(none, scalar, zero)
-            return builder.shuffle_vector(one, none, ir.Constant(lanes(count, ir.IntType(32)), None))
-
-        def plus_product(a, b, c):
-            return builder.fadd(a, builder.fmul(b, c, flags=("contract",)), flags=("contract",))
-
-        half = LANES // 2
-        weighted = builder.fmul(load(samples, start, half), spread(weight, half))
-        twice = ir.Constant(lanes(LANES, ir.IntType(32)), [k % half for k in range(LANES)])
-        weighted = builder.shuffle_vector(weighted, weighted, twice)
-        slope = load(table, builder.add(row, ir.Constant(row.type, LANES)), LANES)
-        values = plus_product(load(table, row, LANES), spread(step, LANES), slope)
-        total = plus_product(load(sums, place, LANES), weighted, values)
-        builder.store(total, address(sums, place, LANES), align=4)
+        vectors = Vectors(context, builder)
+        step, real, imaginary = (vectors.filled(builder.extract_value(scale, k)) for k in range(3))
+        sign = ir.Constant(real.type, [-1.0, 1.0] * (LANES // 2))
+        swapped = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [k ^ 1 for k in range(LANES)])
+        across = builder.fmul(imaginary, sign)
+        given, values = vectors.address(single, samples, start), vectors.address(single, table, row)
+        target, parts = vectors.address(single, sums, place), NUMBERS // LANES
+        for part in range(parts):
+            value = vectors.fused(step, vectors.load(values, parts + part), vectors.load(values, part))
+            each = builder.fmul(value, vectors.load(given, part))
+            total = vectors.fused(each, real, vectors.load(target, part))
+            total = vectors.fused(builder.shuffle_vector(each, each, swapped), across, total)
+            vectors.store(total, target, part)
         return context.get_dummy_value()
 
     return signature, generate

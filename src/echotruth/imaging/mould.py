@@ -8,28 +8,28 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core.cgutils import get_or_insert_function
-from numba.extending import intrinsic
 
 from echotruth.imaging.kernel import TAPS
+from echotruth.imaging.product import HEIGHT, product
+from echotruth.imaging.vectors import fused
+
+QUADRATIC = 3
+"""Coefficients of a polynomial of second degree."""
 
 
-@intrinsic
-def fused(typing_context, a, b, c):
-    """a b + c of float32, rounded once."""
-
-    def generate(context, builder, signature, arguments):
-        kind = ir.FloatType()
-        function = ir.FunctionType(kind, [kind] * 3)
-        return builder.call(get_or_insert_function(builder.module, function, "llvm.fma.f32"), arguments)
-
-    return types.float32(types.float32, types.float32, types.float32), generate
+def together(blocks):
+    """Entries (n,) of the same block in groups, -1 where there are too few for a whole one: shape (groups, HEIGHT)."""
+    order = np.argsort(blocks, kind="stable")
+    counts = np.bincount(blocks)
+    sizes = -(-counts // HEIGHT) * HEIGHT
+    place = np.arange(len(order)) + np.repeat(np.cumsum(sizes) - sizes - np.cumsum(counts) + counts, counts)
+    groups = np.full(sizes.sum(), -1)
+    groups[place] = order
+    return groups.reshape(-1, HEIGHT)
 
 
 @numba.njit(parallel=True, cache=True)
-def mould(places, kinds, beams, shapes, maps, terms, entries, tables):
+def mould(places, kinds, moulds, terms, entries, groups, tables):
     """Make the tables of echoes that a lens has shaped.
 
     Parameters
@@ -39,82 +39,85 @@ def mould(places, kinds, beams, shapes, maps, terms, entries, tables):
         parts, 2).
     kinds
         Angle from the centre of the array of each, shape (scatterers,).
-    beams
-        What an element hears and its change, two of shape (curvatures, slopes, nodes), complex64.
-    shapes
-        For all angles, shape (KINDS, 3, nodes), float32.
-    maps
-        From spectra to polynomials of first degree and to constants, float32, shape (blocks, 2 nodes, phases 2 TAPS)
-        and (blocks, 2 nodes, phases TAPS).
+    moulds
+        What an element hears and its change, two of shape (curvatures, slopes, 2 nodes), float32: real parts before
+        imaginary ones. Shapes for all angles, (KINDS, 3, nodes), float32. Maps from spectra to polynomials of second
+        and of first degree, float32, shape (blocks, 2 nodes, phases 3 TAPS) and (blocks, 2 nodes, phases 2 TAPS).
     terms
-        Terms of the tables and the coefficients that each has, as :data:`~echotruth.imaging.deposit.ROWS` lists them:
-        shape (terms, 2).
+        Terms of the tables, their coefficients as :data:`~echotruth.imaging.deposit.ROWS` lists them, and the spectrum
+        and the shape whose product they are: shape (terms, 4).
     entries
         Blocks to make, shape (entries, 4): scatterer, block, part that sends and part that listens.
+    groups
+        Entries of the same block, as :func:`together` gives them.
     tables
         Written: shape (entries, phases, rows, TAPS), float32.
     """
-    nodes = beams[0].shape[2]
-    linear, constant = maps
-    for entry in numba.prange(len(entries)):
-        k, block, sender, listener = entries[entry]
-        sent, grown = between(beams[0], places[k, sender]), between(beams[1], places[k, sender])
-        heard, other = sent, grown
-        if listener != sender:
-            heard, other = between(beams[0], places[k, listener]), between(beams[1], places[k, listener])
-        # The echo, its colour and the square of that; none; its change and the colour of that; the skew.
-        weights = np.zeros((7, 2 * nodes), np.float32)
-        for node in range(nodes):
-            pulse, one, two = sent[node] * heard[node], grown[node] * heard[node], sent[node] * other[node]
-            change, skew = np.float32(0.5) * (one + two), np.float32(0.5) * (one - two)
-            shape, colour = shapes[kinds[k], 0, node], shapes[kinds[k], 1, node]
-            for term in range(3):
-                part = shapes[kinds[k], term, node]
-                weights[term, node], weights[term, nodes + node] = pulse.real * part, pulse.imag * part
-            weights[4, node], weights[4, nodes + node] = change.real * shape, change.imag * shape
-            weights[5, node], weights[5, nodes + node] = change.real * colour, change.imag * colour
-            weights[6, node], weights[6, nodes + node] = skew.real * shape, skew.imag * shape
-        write(tables[entry], weights, terms, linear[block], constant[block])
+    beams, shapes, maps = moulds
+    nodes, phases = shapes.shape[2], tables.shape[1]
+    for group in numba.prange(len(groups)):
+        some = groups[group][groups[group] >= 0]
+        spectra, weights = np.empty((HEIGHT, 3, 2 * nodes), np.float32), np.zeros((2 * nodes, HEIGHT), np.float32)
+        for n, entry in enumerate(some):
+            k, _, sender, listener = entries[entry]
+            echoes(beams, places[k, sender], places[k, listener], sender == listener, spectra[n])
+        block, row = entries[some[0], 1], 0
+        for _, count, spectrum, shape in terms:
+            for n, entry in enumerate(some):
+                weigh(spectra[n, spectrum], shapes[kinds[entries[entry, 0]], shape], weights[:, n])
+            found = np.empty((HEIGHT, count * phases * TAPS), np.float32)
+            product(weights, maps[0][block] if count == QUADRATIC else maps[1][block], found)
+            for n, entry in enumerate(some):
+                write(tables[entry], row, count, found[n])
+            row += count
 
 
 @numba.njit(cache=True)
-def write(table, weights, terms, linear, constant):
-    """Fill the rows (phases, rows, TAPS) of a table from the weights (7, 2 nodes) of its terms."""
-    found, row = np.empty(linear.shape[1], np.float32), 0
-    for term, count in terms:
-        combine(weights[term], linear if count == 2 else constant, found)
-        for phase in range(len(table)):
-            for power in range(count):
-                for tap in range(TAPS):
-                    table[phase, row + power, tap] = found[(count * phase + power) * TAPS + tap]
-        row += count
+def weigh(spectrum, shape, weights):
+    """Write the product of a spectrum (2 nodes,) and a shape (nodes,)."""
+    for node in range(len(shape)):
+        weights[node] = spectrum[node] * shape[node]
+        weights[len(shape) + node] = spectrum[len(shape) + node] * shape[node]
+
+
+@numba.njit(cache=True)
+def write(table, row, count, found):
+    """Write the coefficients (phases count TAPS,) of a term to its rows of a table (phases, rows, TAPS)."""
+    for phase in range(len(table)):
+        for power in range(count):
+            for tap in range(TAPS):
+                table[phase, row + power, tap] = found[(count * phase + power) * TAPS + tap]
+
+
+@numba.njit(cache=True)
+def echoes(beams, sends, listens, alike, spectra):
+    """Write the spectra (3, 2 nodes) of an echo, of its change and of its skew, from the places of the two parts."""
+    sent, grown = between(beams[0], sends), between(beams[1], sends)
+    heard, other = sent, grown
+    if not alike:
+        heard, other = between(beams[0], listens), between(beams[1], listens)
+    nodes = len(sent) // 2
+    half = np.float32(0.5)
+    for n in range(nodes):
+        m = nodes + n
+        spectra[0, n] = sent[n] * heard[n] - sent[m] * heard[m]
+        spectra[0, m] = sent[n] * heard[m] + sent[m] * heard[n]
+        one, two = grown[n] * heard[n] - grown[m] * heard[m], sent[n] * other[n] - sent[m] * other[m]
+        spectra[1, n], spectra[2, n] = half * (one + two), half * (one - two)
+        one, two = grown[n] * heard[m] + grown[m] * heard[n], sent[n] * other[m] + sent[m] * other[n]
+        spectra[1, m], spectra[2, m] = half * (one + two), half * (one - two)
 
 
 @numba.njit(cache=True)
 def between(table, place):
-    """Bilinear interpolation of a table (rows, columns, nodes) at a place (row, column): (nodes,)."""
+    """Bilinear interpolation of a table (rows, columns, n), float32, at a place (row, column): (n,)."""
     row, column = np.int64(place[0]), np.int64(place[1])
     down, right = np.float32(place[0] - row), np.float32(place[1] - column)
     up, left = np.float32(1) - down, np.float32(1) - right
     a, b, c, d = up * left, up * right, down * left, down * right
-    near, far = table[row], table[row + 1]
-    found = np.empty(table.shape[2], table.dtype)
-    for node in range(len(found)):
-        here = a * near[column, node] + b * near[column + 1, node]
-        found[node] = here + (c * far[column, node] + d * far[column + 1, node])
+    above, after = table[row, column], table[row, column + 1]
+    below, beyond = table[row + 1, column], table[row + 1, column + 1]
+    found = np.empty(table.shape[2], np.float32)
+    for n in range(len(found)):
+        found[n] = fused(a, above[n], fused(b, after[n], fused(c, below[n], d * beyond[n])))
     return found
-
-
-@numba.njit(cache=True)
-def combine(weights, rows, total):
-    """Write the sum of rows (a multiple of 8, n) times weights (rows,) to the first n of a total, float32."""
-    for m in range(0, len(rows), 8):
-        # Eight at a time, so that the total is seldom stored.
-        a, b, c, d = weights[m], weights[m + 1], weights[m + 2], weights[m + 3]
-        e, f, g, h = weights[m + 4], weights[m + 5], weights[m + 6], weights[m + 7]
-        for n in range(rows.shape[1]):
-            first = total[n] if m else np.float32(0)
-            x, y, z, w = rows[m, n], rows[m + 1, n], rows[m + 2, n], rows[m + 3, n]
-            first = fused(a, x, fused(b, y, fused(c, z, fused(d, w, first))))
-            x, y, z, w = rows[m + 4, n], rows[m + 5, n], rows[m + 6, n], rows[m + 7, n]
-            total[n] = fused(e, x, fused(f, y, fused(g, z, fused(h, w, first))))

@@ -3,10 +3,11 @@
 The echo of a scatterer between two elements is its amplitude times their directivities, the spreading 1/r and the loss
 on each way and the beam in elevation, delayed by the two ways and shaped by the pulse. Echoes are put on a grid in time
 by short kernels (:mod:`~echotruth.imaging.kernel`) and then filtered together. By reciprocity only the pairs i <= j
-are computed.
+are computed, and of those only the ones between a few elements, from which all others follow for scatterers that are
+close together (:mod:`~echotruth.imaging.clusters`).
 
-With n elements the memory is 2 n (n + 1) bytes a sample of the record, 8 n^2 bytes a frequency of the matrix, half of
-that again while it is made, and a few MB for tables: 50 MB for the default array, however many scatterers there are.
+With n elements the memory is 8 n^2 bytes a frequency of the matrix, about as much again while it is made, and a few MB
+for tables: 50 MB for the default array, however many scatterers there are.
 """
 
 from __future__ import annotations
@@ -18,23 +19,28 @@ from scipy import fft
 from echotruth.config import Probe
 from echotruth.imaging import deposit, directivity
 from echotruth.imaging.attenuation import separated
+from echotruth.imaging.clusters import Clusters, Spread
 from echotruth.imaging.elevation import MOST_BLOCKS, Lens, bounds
 from echotruth.imaging.kernel import NODES, TAPS, Band, Grid, fits, offsets, stacked, window_spectrum
-from echotruth.imaging.mould import mould
+from echotruth.imaging.mould import mould, together
 from echotruth.imaging.probe import element_centres, pulse_band, pulse_spectrum, spectral_width
 
-BLOCK = 96
+BLOCK = 256
 """Scatterers deposited at a time."""
 FINE, FAST, LENS, WIDE, NEAR = 3, 2, 1, 4, deposit.APART
 """Schemes of the kernels' tables (see :data:`~echotruth.imaging.deposit.ROWS`) for an error of 2e-5 and of 1e-3 in the
 plane, and under a lens, there also for elements wider than `NARROW` and for scatterers that parts of the array look up
 apart."""
+SPECTRA, SHAPES = (0, 0, 0, 0, 1, 1, 2), (0, 1, 2, 2, 0, 1, 0)
+"""By the number of a term: the spectrum under the lens (echo, change or skew) and the shape that make it."""
 NARROW = 0.75
 """Width of an element, in wavelengths, up to which its directivity hardly changes with frequency."""
 DENSEST, SHARPNESS = {FINE: 0.32, FAST: 0.41}, {FINE: 20.0, FAST: 15.0}
 """Greatest frequency of the pulse over that of the grid, and sharpness of the window."""
 FINEST = 1e-4
 """Accuracy below which the tables are `FINE`."""
+TOLERANCE = {FINE: 1e-6, FAST: 2e-4, LENS: 1e-3, WIDE: 1e-3}
+"""Of the clusters, by the scheme: too little to be seen in the error."""
 
 
 def _length(least: int) -> int:
@@ -104,6 +110,7 @@ class FullMatrix:
         self._filter(probe, grid, low, high)
         band = _band(probe, grid, low, high)
         self._lens = Lens(probe, self.reach, band) if elevation else None
+        self._clusters = Clusters(self.centres, p.sound_speed, band, self.reach, TOLERANCE[self._scheme])
         self._tabulate(band, band.frequency / p.frequency)
 
     def _filter(self, probe: Probe, grid: Grid, low: float, high: float) -> None:
@@ -128,8 +135,9 @@ class FullMatrix:
         count = 6 if self._lens else 1 + max(term for term, degree in enumerate(rows) if degree)
         self._tilts, shapes = directivity.shapes(self._width, ratio, count)
         if self._lens:
-            self._shapes = np.ascontiguousarray(shapes[:, :3], np.float32)
-            self._maps = tuple(_maps(band, degree, phases) for degree in (1, 0))
+            beams = stacked(self._lens.beam), stacked(self._lens.change)
+            maps = tuple(_maps(band, degree, phases) for degree in (2, 1))
+            self._moulds = beams, np.ascontiguousarray(shapes[:, :3], np.float32), maps
             return
         spectra = stacked(shapes + 0j)
         terms = [(term, fits(band, 1, degree - 1, phases)[0]) for term, degree in enumerate(rows) if degree]
@@ -148,35 +156,33 @@ class FullMatrix:
             inside[inside] = self._lens.in_beam(position[inside])
         return inside
 
-    def traces(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
-        """Deposited echoes before window and pulse are accounted for, shape (pairs, samples), float32."""
-        inside = self.in_beam(position)
-        position, amplitude = position[inside], amplitude[inside].astype(np.float32)
-        elements = len(self.centres)
-        traces = np.zeros((elements * (elements + 1) // 2, self.samples), np.float32)
+    def _traces(self, elements: np.ndarray, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+        """Deposited echoes of pairs of some elements, before window and pulse are accounted for: (pairs, samples)."""
+        traces = np.zeros((len(elements) * (len(elements) + 1) // 2, self.samples), np.float32)
         reach = np.linalg.norm(position, axis=1)
         # Neighbours in range share the part of the traces that is at hand.
         order = np.argsort(reach, kind="stable")
         parts = self._lens.parts(reach[order]) if self._lens else np.ones(len(order), int)
         for number in np.unique(parts):
             alike = order[parts == number]
-            self._add(traces, position[alike], amplitude[alike], int(number))
+            self._add(traces, elements, position[alike], amplitude[alike], int(number))
         return traces
 
-    def _add(self, traces: np.ndarray, position: np.ndarray, amplitude: np.ndarray, parts: int) -> None:
+    def _add(self, traces: np.ndarray, elements: np.ndarray, position: np.ndarray, amplitude: np.ndarray, parts: int):
         """Add the echoes of scatterers that so many parts of the array look up apart, a block at a time."""
         scheme = NEAR if parts > 1 else self._scheme
         size, lens = sum(deposit.ROWS[scheme]) * TAPS, self._lens is not None
-        limits, kinds = bounds(len(self.centres), parts), self._kind(position)
+        first, kinds = bounds(len(self.centres), parts), self._kind(position)
+        part_of, limits = np.searchsorted(first, elements, "right") - 1, np.searchsorted(elements, first)
         source = _LensKernels(self, position, kinds, parts) if lens else _PlaneKernels(self, kinds, size)
-        width = -(-len(self.centres) // deposit.LANES) * deposit.LANES
+        width = -(-len(elements) // deposit.LANES) * deposit.LANES
         time, (weight, colour, bend) = np.zeros((BLOCK, width), np.int32), np.zeros((3, BLOCK, width), np.float32)
+        array = self.centres[elements], part_of, self._scales, self._directivity
         for start in range(0, len(position), BLOCK):
             part = slice(start, min(start + BLOCK, len(position)))
             lean, entries, tables = source(part)
-            each = self._tilts[kinds[part]]
             terms = time, weight, colour, bend
-            deposit.one_way(position[part], self.centres, self._scales, self._directivity, each, lean, *terms)
+            deposit.one_way(position[part], *array, self._tilts[kinds[part]], lean, *terms)
             deposit.add_echoes(traces, *terms, amplitude[part], entries, tables, size, limits, lens, (0,) * scheme)
 
     @property
@@ -202,19 +208,27 @@ class FullMatrix:
         ndarray of shape (bins, elements, elements), complex64
             Symmetric in the elements. Units: amplitude / m^2 / sample.
         """
-        traces = self.traces(position, amplitude)
-        spectra = np.empty((len(traces), len(self.frequency)), np.complex64)
-        for start in range(0, len(traces), 64):
-            spectra[start : start + 64] = self._filtered(traces[start : start + 64])
-        matrix = np.empty((len(self.frequency), len(self.centres), len(self.centres)), np.complex64)
-        deposit.unfold(spectra, matrix)
-        return matrix
+        inside = self.in_beam(position)
+        position, amplitude = position[inside], amplitude[inside].astype(np.float32)
+        numbers = self._clusters.numbers(position)
+        clusters, spectra = [], []
+        for number in np.unique(numbers):
+            own, cluster = numbers == number, self._clusters[number]
+            clusters.append(cluster)
+            spectra.append(self._filtered(self._traces(cluster.elements, position[own], amplitude[own])))
+        if not clusters:
+            return np.zeros((len(self.frequency), *[len(self.centres)] * 2), np.complex64)
+        return Spread(clusters, self.frequency)(np.concatenate(spectra, axis=1))
 
     def _filtered(self, traces: np.ndarray) -> np.ndarray:
+        """Spectra (bins, pairs) of traces (pairs, samples)."""
         band, threads = slice(self.first, self.first + len(self.frequency)), numba.get_num_threads()
-        found = np.zeros((len(traces), len(self.frequency)), np.complex64)
-        for course, response in zip(self._courses, self._responses, strict=True):
-            found += fft.rfft(traces * course, axis=1, workers=threads)[:, band] * response
+        found = np.zeros((len(self.frequency), len(traces)), np.complex64)
+        for start in range(0, len(traces), 64):
+            some = traces[start : start + 64]
+            for course, response in zip(self._courses, self._responses, strict=True):
+                spectra = fft.rfft(some * course, axis=1, workers=threads)[:, band] * response
+                found[:, start : start + 64] += spectra.T
         return found
 
 
@@ -256,7 +270,8 @@ class _LensKernels:
         self._made = np.stack([self._owner, block, sender[pair], listener[pair]], axis=1)
         starts = np.searchsorted(self._owner, np.arange(0, len(position) + BLOCK, BLOCK))
         scheme = NEAR if parts > 1 else full._scheme
-        self._terms = np.array([(term, count) for term, count in enumerate(deposit.ROWS[scheme]) if count])
+        rows = zip(deposit.ROWS[scheme], SPECTRA, SHAPES, strict=True)
+        self._terms = np.array([(term, count, *which) for term, (count, *which) in enumerate(rows) if count])
         rows = _phases(scheme), sum(deposit.ROWS[scheme])
         self._tables = deposit.aligned(int(np.diff(starts).max(initial=0)), *rows, TAPS)
         self._base = np.arange(len(self._tables)) * np.prod(rows) * TAPS
@@ -266,8 +281,9 @@ class _LensKernels:
         full, which = self._full, slice(*np.searchsorted(self._owner, [part.start, part.stop]))
         made = self._made[which] - [part.start, 0, 0, 0]
         tables = self._tables[: len(made)]
-        beams = full._lens.beam, full._lens.change
-        mould(self._places[part], self._kinds[part], beams, full._shapes, full._maps, self._terms, made, tables)
+        groups = together(made[:, 1])
+        scatterers = self._places[part], self._kinds[part]
+        mould(*scatterers, full._moulds, self._terms, made, groups, tables)
         entries = np.column_stack([made[:, 0], self._base[: len(made)], self._first[which], made[:, 2:]])
         return self._lean[part], entries, tables.ravel()
 

@@ -54,7 +54,7 @@ class Scanner:
         latest = max(np.abs(zone.transmits.delay).max() for zone in zones)
         reach = np.hypot(*points(self.scan, self.range)).max()
         self.matrix = FullMatrix(probe, reach, latest, rf.accuracy, rf.elevation)
-        self._sampling = sampled(self.matrix, p.frequency)
+        self._sampling = sampled(self.matrix)
         self._focus = [_ZoneFocus(probe, rf, self, zone) for zone in zones]
         self.frequency = self._focus[0].channels.frequency
         self._carrier = np.exp(-4j * np.pi * self.frequency / p.sound_speed * self.range).astype(np.complex64)
@@ -118,7 +118,7 @@ class _ZoneFocus:
             scan.foot,
             self._range,
             self._points,
-            frequency=self.channels.frequency,
+            frequency=self.channels.carrier,
             sampling=self.channels.sampling,
             sound_speed=p.sound_speed,
         )

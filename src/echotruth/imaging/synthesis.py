@@ -15,44 +15,32 @@ from scipy import fft
 
 from echotruth.imaging import interpolation
 from echotruth.imaging.gate import Gate, Sampling
-from echotruth.imaging.mould import fused
+from echotruth.imaging.product import HEIGHT, padded, product
 from echotruth.imaging.rf import FullMatrix
 from echotruth.imaging.transmit import Transmits
 
-BLOCK = 64
-"""Transmits synthesised at a time. Memory is BLOCK * elements * samples * 8 bytes, 27 MB for the default array."""
+BLOCK = 128
+"""Transmits synthesised at a time. Memory is BLOCK * elements * samples * 8 bytes, 31 MB for the default array."""
+APART = 16
+"""Numbers by which rows of matrices are longer than needed, or what is read together would share a few lines of the
+cache."""
 TILE = 16
 """Frequencies that one thread takes at a time: two cache lines of a spectrum. Their phases follow one another by
 multiplication, so that those of the first alone are kept."""
 
 
 @numba.njit(cache=True)
-def add_products(real, imaginary, matrix, weights):
-    """Add a matrix (elements, elements) times weights (2, elements, transmits) to its real and imaginary part.
+def arrange(matrix, rows, left):
+    """Write a matrix (elements, elements), complex, as real ones: for :func:`product`, which sums over the first axis.
 
-    Four elements at a time, so that the sums are seldom stored.
+    Its transpose and that times i, real parts before imaginary ones on both axes, (2 elements, 2 rows or more).
     """
-    elements, transmits = weights.shape[1:]
-    whole = elements // 4 * 4
-    for i in range(matrix.shape[0]):
-        for j in range(0, whole, 4):
-            a, b = matrix[i, j].real, matrix[i, j].imag
-            c, d = matrix[i, j + 1].real, matrix[i, j + 1].imag
-            e, f = matrix[i, j + 2].real, matrix[i, j + 2].imag
-            g, h = matrix[i, j + 3].real, matrix[i, j + 3].imag
-            for k in range(transmits):
-                p, q, r, s = weights[0, j, k], weights[0, j + 1, k], weights[0, j + 2, k], weights[0, j + 3, k]
-                t, u, v, w = weights[1, j, k], weights[1, j + 1, k], weights[1, j + 2, k], weights[1, j + 3, k]
-                one = fused(a, p, fused(c, q, fused(e, r, fused(g, s, real[i, k]))))
-                real[i, k] = fused(-b, t, fused(-d, u, fused(-f, v, fused(-h, w, one))))
-                one = fused(a, t, fused(c, u, fused(e, v, fused(g, w, imaginary[i, k]))))
-                imaginary[i, k] = fused(b, p, fused(d, q, fused(f, r, fused(h, s, one))))
-        for j in range(whole, elements):
-            a, b = matrix[i, j].real, matrix[i, j].imag
-            for k in range(transmits):
-                p, t = weights[0, j, k], weights[1, j, k]
-                real[i, k] = fused(a, p, fused(-b, t, real[i, k]))
-                imaginary[i, k] = fused(a, t, fused(b, p, imaginary[i, k]))
+    elements = len(matrix)
+    for j in range(elements):
+        for i in range(elements):
+            real, imaginary = matrix[i, j].real, matrix[i, j].imag
+            left[j, i], left[j, rows + i] = real, imaginary
+            left[elements + j, i], left[elements + j, rows + i] = -imaginary, real
 
 
 @numba.njit(cache=True)
@@ -75,7 +63,8 @@ def synthesise(matrix, start, turn, factor, bins, spectra):
         Shape (bins, elements, elements), complex64.
     start, turn
         Weights at the first frequency of each tile and what turns them into those at the next frequency, shapes
-        (tiles, 2, elements, transmits) and (2, elements, transmits), float32: real and imaginary parts.
+        (tiles, 2, elements, columns) and (2, elements, columns), float32: real and imaginary parts. The
+        columns are those of the transmits, filled up, and APART.
     factor
         Of the spectra, shape (bins,), float32.
     bins
@@ -83,29 +72,29 @@ def synthesise(matrix, start, turn, factor, bins, spectra):
     spectra
         Written at `bins`: shape (transmits, elements, samples), complex64.
     """
-    elements, transmits = turn.shape[1:]
+    elements, transmits = matrix.shape[1], len(spectra)
+    rows, columns = -(-elements // HEIGHT) * HEIGHT, turn.shape[2]
     for tile in numba.prange(len(start)):
         first = tile * TILE
         count = min(TILE, len(bins) - first)
-        real = np.zeros((count, elements, transmits), np.float32)
-        imaginary = np.zeros((count, elements, transmits), np.float32)
+        found = np.empty((count, 2 * rows + 1, columns - APART), np.float32)
+        left = np.zeros((2 * elements, 2 * rows + APART), np.float32)
         weights = start[tile].copy()
         for k in range(count):
-            add_products(real[k], imaginary[k], matrix[first + k], weights)
+            arrange(matrix[first + k], rows, left)
+            product(left, weights.reshape(2 * elements, columns), found[k, : 2 * rows])
             turn_on(weights, turn)
-        for transmit in range(transmits):
-            for element in range(elements):
+        for element in range(elements):
+            for transmit in range(transmits):
                 for k in range(count):
-                    value = complex(real[k, element, transmit], imaginary[k, element, transmit])
+                    value = complex(found[k, element, transmit], found[k, rows + element, transmit])
                     spectra[transmit, element, bins[first + k]] = np.complex64(value * factor[first + k])
 
 
-def sampled(matrix: FullMatrix, frequency: float) -> Sampling:
-    """Samples of the echoes of a matrix that can be interpolated, the carrier being at `frequency`, Hz."""
+def sampled(matrix: FullMatrix) -> Sampling:
+    """Samples of the echoes of a matrix that can be interpolated."""
     place = matrix.first + np.arange(len(matrix.frequency))
-    nearest = int(np.abs(matrix.frequency - frequency).argmin())
-    # Without a sample a period of the carrier, its phase would turn too fast between those of the table.
-    samples = fft.next_fast_len(int(max(interpolation.OVERSAMPLING * len(place), place[nearest])) + 1)
+    samples = fft.next_fast_len(int(interpolation.OVERSAMPLING * len(place)) + 1)
     # Twice for the analytic signal.
     scale = 2 * samples / matrix.samples
     return Sampling(place % samples, samples, matrix.sampling * samples / matrix.samples, scale)
@@ -129,6 +118,8 @@ class Synthesis:
     ----------
     frequency : float
         The frequency of the record nearest the centre frequency, Hz.
+    carrier : float
+        Frequency below which the channels are, Hz.
     gate : Gate or None
         The part of the record that is needed, where that is less than all.
     samples : int
@@ -142,23 +133,25 @@ class Synthesis:
     def __init__(
         self, matrix: FullMatrix, frequency: float, transmits: Transmits, span: tuple[float, float] | None = None
     ):
-        record = sampled(matrix, frequency)
-        self.frequency = float(matrix.frequency[np.abs(matrix.frequency - frequency).argmin()])
+        record = sampled(matrix)
+        self.frequency = _nearest(matrix.frequency, frequency)[1]
         self.sampling = record.rate
         gate = span and Gate(record, matrix.frequency[[0, -1]], _interpolated(span, record.rate))
         self.gate = gate if gate and gate.samples < record.samples else None
         part, scale = (self.gate, 1.0) if self.gate else (record, record.scale)
         frequencies = self.gate.frequency if self.gate else matrix.frequency
-        self.samples, self._bins = part.samples, part.bins
-        self.start = self.gate.first / record.rate if self.gate else 0.0
-        cycles = (frequencies - self.frequency) / self.sampling
+        self.samples, self.start = part.samples, self.gate.first / record.rate if self.gate else 0.0
+        number, self.carrier = _nearest(frequencies, frequency)
+        # Channels are below their carrier, which need not be one of the record.
+        self._bins = (np.arange(len(frequencies)) - number) % self.samples
+        cycles = (frequencies - self.carrier) / self.sampling
         self._factor = (scale / interpolation.spectrum(cycles)).astype(np.float32)
         # Channels begin so much earlier that what the first echo is interpolated from is within them.
         delay = transmits.delay + interpolation.LEAD / self.sampling
         step = frequencies[1] - frequencies[0]
-        blocks = [slice(at, at + BLOCK) for at in range(0, len(delay), BLOCK)]
+        self._blocks = [slice(at, min(at + BLOCK, len(delay))) for at in range(0, len(delay), BLOCK)]
         self._phases = [
-            phases(delay[block].T, transmits.weight[block].T, frequencies[::TILE], step) for block in blocks
+            phases(delay[block].T, transmits.weight[block].T, frequencies[::TILE], step) for block in self._blocks
         ]
 
     def __call__(self, matrix: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
@@ -175,16 +168,19 @@ class Synthesis:
         The transmits as a slice, and their data, shape (transmits, elements, samples), complex64: what
         :class:`~echotruth.imaging.beamform.ReceiveFocus` takes. The data hold until the next are asked for.
         """
-        elements, first = matrix.shape[1], 0
         # Fresh memory for every block would cost more than the transform.
-        memory = np.empty((min(BLOCK, self._phases[0][1].shape[2]), elements, self.samples), np.complex64)
-        for start, turn in self._phases:
-            spectra = memory[: turn.shape[2]]
+        memory = np.empty((self._blocks[0].stop, matrix.shape[1], self.samples), np.complex64)
+        for block, (start, turn) in zip(self._blocks, self._phases, strict=True):
+            spectra = memory[: block.stop - block.start]
             spectra[:] = 0
             synthesise(matrix, start, turn, self._factor, self._bins, spectra)
-            channels = fft.ifft(spectra, axis=2, overwrite_x=True, workers=numba.get_num_threads())
-            yield slice(first, first + len(spectra)), channels
-            first += len(spectra)
+            yield block, fft.ifft(spectra, axis=2, overwrite_x=True, workers=numba.get_num_threads())
+
+
+def _nearest(frequencies: np.ndarray, frequency: float) -> tuple[int, float]:
+    """Number of the nearest of some frequencies, and that frequency."""
+    number = int(np.abs(frequencies - frequency).argmin())
+    return number, float(frequencies[number])
 
 
 def _interpolated(span: tuple[float, float], rate: float) -> tuple[float, float]:
@@ -206,8 +202,11 @@ def phases(delay: np.ndarray, weight: np.ndarray, frequency: np.ndarray, step: f
 
     Returns
     -------
-    Shapes (tiles, 2, elements, transmits) and (2, elements, transmits), float32: real and imaginary parts.
+    Shapes (tiles, 2, elements, columns) and (2, elements, columns), float32: real and imaginary parts, filled up with
+    columns of weight 0.
     """
+    more = padded(delay.shape[1]) + APART - delay.shape[1]
+    delay, weight = (np.pad(each, ((0, 0), (0, more))) for each in (delay, weight))
     start = -2 * np.pi * np.multiply.outer(frequency, delay)
     turn = -2 * np.pi * step * delay
     weights = weight * np.stack([np.cos(start), np.sin(start)], axis=1)
