@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from echotruth.imaging.kernel import Band
-from echotruth.imaging.product import HEIGHT, WIDTH, padded, product
+from echotruth.imaging.product import HEIGHT, padded, product
 
 Floats = NDArray[np.float64]
 
@@ -191,21 +191,24 @@ def spread(spectra, first, elements, weights, turn, matrix):
     """
     width, count = weights.shape[1], matrix.shape[1]
     for f in numba.prange(len(spectra)):
-        real, imaginary = np.zeros((width, width), np.float32), np.zeros((width, width), np.float32)
-        x, y = np.zeros((width, width), np.float32), np.zeros((width, width), np.float32)
+        real, imaginary = np.empty((width, width), np.float32), np.empty((width, width), np.float32)
         pair = 0
         for k in range(len(first) - 1):
-            own, rows = elements[first[k] : first[k + 1]], weights[first[k] : first[k + 1]]
+            some, size = weights[first[k] : first[k + 1]], first[k + 1] - first[k]
             c, s = turn[f, k]
-            a, b = np.zeros((len(own), len(own)), np.float32), np.zeros((len(own), len(own)), np.float32)
-            pair += align(spectra[f, pair:], own, c, s, a, b)
-            to, by = np.empty((len(own), width), np.float32), np.empty((len(own), width), np.float32)
-            product(a, rows, to)
-            product(b, rows, by)
-            product(rows, to, x, True)
-            product(rows, by, y, True)
-            for i in range(count):
-                add_turned(real[i], imaginary[i], x[i], y[i], c, s, i)
+            a, b = np.zeros((size, size), np.float32), np.zeros((size, size), np.float32)
+            pair += align(spectra[f, pair:], elements[first[k] : first[k + 1]], c, s, a, b)
+            between, carry = np.empty((2, size, width), np.float32), np.empty((2 * size, width), np.float32)
+            product(a, some, between[0])
+            product(b, some, between[1])
+            # What carries them from the few elements to all, and is summed over these for real and imaginary part.
+            echoes = np.empty((2, 2 * size, width), np.float32)
+            for n in range(size):
+                weigh(some[n], c, s, carry[n], carry[size + n])
+                delay(between[0, n], between[1, n], c, s, echoes[0, n], echoes[1, n])
+                turn_back(echoes[0, n], echoes[1, n], echoes[1, size + n], echoes[0, size + n])
+            product(carry, echoes[0], real, True, k > 0)
+            product(carry, echoes[1], imaginary, True, k > 0)
         for i in range(count):
             for j in range(i, count):
                 matrix[f, i, j] = complex(real[i, j], imaginary[i, j])
@@ -232,11 +235,25 @@ def align(spectra, elements, c, s, real, imaginary):
 
 
 @numba.njit(cache=True)
-def add_turned(real, imaginary, x, y, c, s, i):
-    """Put the delays of a cluster back into the echoes of an element `i` with those from it on, and add them."""
-    one, other, start = c[i], s[i], i // WIDTH * WIDTH
-    # Loops over few arrays each, which compilers make vectors of.
-    for j in range(start, len(x)):
-        real[j] += (one * c[j] - other * s[j]) * x[j] - (one * s[j] + other * c[j]) * y[j]
-    for j in range(start, len(x)):
-        imaginary[j] += (one * c[j] - other * s[j]) * y[j] + (one * s[j] + other * c[j]) * x[j]
+def weigh(weights, c, s, real, imaginary):
+    """Write the products of weights with c and with s."""
+    for j in range(len(c)):
+        real[j] = weights[j] * c[j]
+    for j in range(len(c)):
+        imaginary[j] = weights[j] * s[j]
+
+
+@numba.njit(cache=True)
+def delay(one, other, c, s, real, imaginary):
+    """Put the delays of a cluster back into the echoes of an element with all others: (one + i other) (c + i s)."""
+    for j in range(len(c)):
+        real[j] = one[j] * c[j] - other[j] * s[j]
+    for j in range(len(c)):
+        imaginary[j] = one[j] * s[j] + other[j] * c[j]
+
+
+@numba.njit(cache=True)
+def turn_back(real, imaginary, one, other):
+    """Write i times a number: its imaginary part is the real one, its real part the imaginary one with another sign."""
+    for j in range(len(real)):
+        one[j], other[j] = real[j], -imaginary[j]
