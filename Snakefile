@@ -73,3 +73,4 @@ rule all:
         RECORDS,
         rules.repository.output,
         rules.report.output,
+        rules.report_images.output,

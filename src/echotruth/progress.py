@@ -16,7 +16,8 @@ SECONDS = {
     "compile_imaging": 45.0,
     "compile_tracking": 40.0,
     "repository": 3.0,
-    "report": 20.0,
+    "report": 12.0,
+    "report_images": 12.0,
 }
 """Rule to the seconds that its job takes of a heart of 40 frames, until one has been timed."""
 STAGES = {"imaging": ("phantom", "truth", "rf", "bmode"), "tracking": ("tracking", "evaluation")}

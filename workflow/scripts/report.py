@@ -5,13 +5,14 @@ import sys
 from pathlib import Path
 
 from echotruth.config.loading import load
-from echotruth.report.figures import Figures
+from echotruth.report.figures import PARTS, Figures
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
-folder = parser.parse_args().repository
-config = load(folder / "config.yaml")
+parser.add_argument("part", choices=PARTS, help="which figures")
+given = parser.parse_args()
+config = load(given.repository / "config.yaml")
 try:
-    Figures(folder / f"{config.name}.zarr", config, folder / "figures").draw()
+    Figures(given.repository / f"{config.name}.zarr", config, given.repository / "figures").draw(given.part)
 except ValueError as error:
     sys.exit(f"report: {error}")

@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 
 ARROWS = 0.45e-3
 """Distance between the points whose motion is drawn on a clip, m."""
+PARTS = {
+    "motion": ("heart", "loop", "strain", "bullseye", "error", "leaderboard"),
+    "images": ("clip", "resolutions", "views"),
+}
+"""Figures that are drawn together, one job each part."""
 
 
 class Figures:
@@ -45,18 +50,11 @@ class Figures:
         self.sizes = config.bmode.sizes
         self.view = next((name for name, view in config.views.items() if name == "mid"), next(iter(config.views)))
 
-    def draw(self) -> None:
-        """Draw all figures and write the leaderboard."""
+    def draw(self, part: str) -> None:
+        """Draw the figures of a part of `PARTS`; the leaderboard is written, too."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        self.heart()
-        self.loop()
-        self.strain()
-        self.clip()
-        self.resolutions()
-        self.views()
-        self.bullseye()
-        self.error()
-        self.leaderboard()
+        for name in PARTS[part]:
+            getattr(self, name)()
 
     def group(self, path: str) -> xr.Dataset:
         """A group for the heart that stands for all."""

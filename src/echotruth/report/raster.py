@@ -113,5 +113,7 @@ def _fill(screen: np.ndarray, triangles: np.ndarray, colours: np.ndarray, image:
                 z = az + u * (bz - az) + v * (cz - az)
                 if u >= 0 and v >= 0 and u + v <= 1 and z > depth[row, column]:
                     depth[row, column] = z
-                    image[row, column, :3] = (1 - u - v) * colours[a] + u * colours[b] + v * colours[c]
+                    for k in range(3):
+                        mean = (1 - u - v) * colours[a, k] + u * colours[b, k] + v * colours[c, k]
+                        image[row, column, k] = mean
                     image[row, column, 3] = 1.0
