@@ -168,7 +168,9 @@ def respond(nodes: Floats, body: Elements, law: Law, load: Load, out: Blocks) ->
     x, ke, along, at = np.empty((10, 3)), np.empty((DOFS, WIDTH)), np.zeros((9, WIDTH)), point.room()
     for cell in range(body.cells.shape[0]):
         force = out.force[cell]
-        force[:], ke[:], out.volume[cell] = 0.0, 0.0, 0.0
+        force[:], out.volume[cell] = 0.0, 0.0
+        if with_tangent:
+            ke[:] = 0.0
         scale = load.stiffness[cell], load.tension[cell], load.pressure[cell], load.viscosity[cell]
         _gather(nodes, body.cells, cell, x)
         for q in range(body.weight.shape[1]):
@@ -182,7 +184,7 @@ def respond(nodes: Floats, body: Elements, law: Law, load: Load, out: Blocks) ->
             out.volume[cell] += weight * j if j > 0 else np.nan
         if with_tangent:
             _add_condensed(force[VOLUMETRIC], law.bulk_modulus / np.sum(body.weight[cell]), ke)
-        _turn_nodes(body, cell, force, ke)
+        _turn_nodes(body, cell, force, ke, with_tangent)
         if with_tangent:
             _pack(ke, out.tangent[cell])
 
@@ -240,24 +242,39 @@ def _gather(nodes, cells, cell, x):
 
 
 @njit(**COMPILED)
-def _turn_nodes(body, cell, force, ke):
+def _turn_nodes(body, cell, force, ke, with_tangent):
     """Turn the forces and the tangent of a cell to the directions of its nodes."""
     for a in range(10):
         if body.turned[body.cells[cell, a]]:
-            _turn(a, body.frame[body.cells[cell, a]], force, ke)
+            frame = body.frame[body.cells[cell, a]]
+            for part in range(4):
+                _turn_force(a, frame, force[part])
+            if with_tangent:
+                _turn_tangent(a, frame, ke)
 
 
 @njit(**COMPILED)
-def _turn(a, frame, force, ke):
-    """Turn the forces and the tangent of node a to its own directions."""
+def _turn_force(a, frame, force):
+    """Turn the force of node a to its own directions."""
+    x, y, z = force[3 * a], force[3 * a + 1], force[3 * a + 2]
+    for i in range(3):
+        force[3 * a + i] = frame[i, 0] * x + frame[i, 1] * y + frame[i, 2] * z
+
+
+@njit(**COMPILED)
+def _turn_tangent(a, frame, ke):
+    """Turn the tangent of node a to its own directions."""
     for r in range(DOFS):
         for s in range(r):
             ke[r, s] = ke[s, r]
-    rows = frame @ np.ascontiguousarray(ke[3 * a : 3 * a + 3, :DOFS])
-    rows[:, 3 * a : 3 * a + 3] = np.ascontiguousarray(rows[:, 3 * a : 3 * a + 3]) @ frame.T
-    ke[3 * a : 3 * a + 3, :DOFS] = rows
-    ke[:, 3 * a : 3 * a + 3] = rows.T
-    force[:, 3 * a : 3 * a + 3] = np.ascontiguousarray(force[:, 3 * a : 3 * a + 3]) @ frame.T
+    for s in range(DOFS):
+        x, y, z = ke[3 * a, s], ke[3 * a + 1, s], ke[3 * a + 2, s]
+        for i in range(3):
+            ke[3 * a + i, s] = frame[i, 0] * x + frame[i, 1] * y + frame[i, 2] * z
+    for r in range(DOFS):
+        x, y, z = ke[r, 3 * a], ke[r, 3 * a + 1], ke[r, 3 * a + 2]
+        for i in range(3):
+            ke[r, 3 * a + i] = x * frame[i, 0] + y * frame[i, 1] + z * frame[i, 2]
 
 
 @njit(**COMPILED)
