@@ -13,6 +13,7 @@ from shlex import quote
 from snakemake.exceptions import WorkflowError
 
 from echotruth.cases import expand as expand_cases
+from echotruth.compiled import GROUPS, folder
 from echotruth.config.loading import ConfigError, validate
 from echotruth.mechanics.geometry.body import fingerprint
 from echotruth.mechanics.loop import read_loop

@@ -4,14 +4,7 @@ The jobs that fill it are nobody's input. Snakemake looks no further below a rul
 what has another input than before; so a job looks for the mark itself, and fills the cache where it is the first.
 """
 
-GROUPS = {
-    "mechanics": ("mechanics", "physiology"),
-    "imaging": ("phantom", "truth", "rf", "bmode"),
-    "tracking": ("tracking", "evaluation"),
-    "report": ("report",),
-}
-# A compiled function is cached by the file it stands in, not by those it calls from: one cache a version of the code.
-CACHE = {group: f".snakemake/numba/{group}-{code(*stages)}" for group, stages in GROUPS.items()}
+CACHE = {group: f".snakemake/numba/{folder(group, SCRIPTS)}" for group in GROUPS}
 SMALL = miniature(next(iter(CASES.values())).config)
 KINDS = {
     "imaging": (*SMALL.views.values(), SMALL.phantom, SMALL.probe, SMALL.rf, SMALL.realism, SMALL.bmode, SMALL.motion),

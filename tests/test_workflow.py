@@ -11,12 +11,11 @@ import time
 from hashlib import sha256
 from pathlib import Path
 
+import cores
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-
-from echotruth.provenance import code_version
 
 ROOT = Path(__file__).parents[1]
 CONFIG = """\
@@ -46,24 +45,17 @@ RUN = "from echotruth.cli import main; main()"
 class Checkout:
     """A copy of what the workflow runs from, with the package of this checkout.
 
-    Its compiled functions are those of another checkout, if given; else only those of the mechanics are there already.
+    Its compiled functions are those of the tests, unless it is to compile them itself.
     """
 
-    def __init__(self, folder, other=None):
-        self.folder, self.compiled = folder, folder / ".snakemake/numba"
+    def __init__(self, folder, lent=True):
+        self.folder = folder
         for name in ("Snakefile", "rules", "workflow", "profiles"):
             copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
             folder.mkdir(exist_ok=True)
             copy(ROOT / name, folder / name)
-        (folder / ".snakemake").mkdir()
-        if other:
-            self.compiled.symlink_to(other.compiled)
-        else:
-            self.compiled.mkdir()
-            scripts = (str(ROOT / f"workflow/scripts/{stage}.py") for stage in ("mechanics", "physiology"))
-            mechanics = f"mechanics-{code_version(*scripts)}"
-            (ROOT / ".snakemake/numba" / mechanics).mkdir(parents=True, exist_ok=True)
-            (self.compiled / mechanics).symlink_to(ROOT / ".snakemake/numba" / mechanics)
+        if lent:
+            cores.lend(folder / ".snakemake/numba")
         (folder / "tiny.yaml").write_text(CONFIG)
         self.out = folder / "out/tiny"
 
@@ -200,8 +192,11 @@ def test_figures_stand_beside_the_repository_and_scratch_does_not(made):
     assert not [path for path in made.out.glob("scratch/*/*") if any(path.iterdir())]
 
 
-def test_jobs_of_a_view_find_all_that_they_call_compiled(made):
+@pytest.mark.slow
+def test_jobs_of_a_view_find_all_that_they_call_compiled(tmp_path):
     """What is compiled on a miniature, before them, is what they call: function by function and type by type."""
+    made = Checkout(tmp_path / "echotruth", lent=False)
+    made.snakemake("--cores", "2", "--until", "tracking")
     records = [json.loads(path.read_text()) for path in made.out.glob("ledger/*/*/*.json")]
     assert {record["stage"] for record in records} == {"phantom", "truth", "rf", "bmode", "tracking", "evaluation"}
     assert {record["stage"]: record["compile_seconds"] for record in records if record["compile_seconds"]} == {}
@@ -255,7 +250,7 @@ def test_record_that_a_failed_job_lost_is_made_again(made, stage, rule):
 @pytest.fixture(scope="module")
 def killed(made, tmp_path_factory):
     """A checkout whose run on one core was killed amid imaging and then taken up again; mechanics done before it."""
-    checkout = Checkout(tmp_path_factory.mktemp("second") / "echotruth", made)
+    checkout = Checkout(tmp_path_factory.mktemp("second") / "echotruth")
     process = checkout.start("-m", "snakemake", "--configfile", "tiny.yaml", "--cores", "1")
     end = time.monotonic() + 600
     while not list(checkout.out.glob("scratch/*/*/phantom.npz")):

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from echotruth.cases import Case, find, generator
+from echotruth.compiled import share
 from echotruth.config import View
 from echotruth.config.loading import load
 from echotruth.heart import Heart
@@ -222,6 +223,7 @@ def _single_blas(work: Work, job: Job) -> Result:
 def _prepare(job: Job, threads: int) -> None:
     import numba
 
+    share()
     numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))
     place = " ".join(filter(None, [job.stage, job.case.id, job.view_name]))
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format=f"{place}: %(message)s", force=True)
