@@ -11,7 +11,9 @@ import numpy as np
 from cases import lay_out
 
 from echotruth.cases import expand, generator
+from echotruth.config import Config
 from echotruth.config.loading import load
+from echotruth.imaging.scanner import Scanner, imaging_depth
 from echotruth.mechanics.prescribed import prescribed
 from echotruth.miniature import miniature
 from echotruth.repository.cost import Cost
@@ -27,6 +29,13 @@ def images(job: Job) -> Result:
     return {f"bmode/{size}": {"image": random.integers(256, size=(config.loop.frames, size, size), dtype=np.uint8)}}
 
 
+def image_all_ranges(config: Config) -> None:
+    """Scatterers from close before the array on: those have kernels of another kind, and the heart may have none."""
+    depth = imaging_depth(config.rf, config.bmode)
+    position = np.stack([np.zeros(100), np.linspace(0.01, 1, 100) * depth, np.zeros(100)], axis=1)
+    Scanner(config.probe, config.rf, depth).lines(position, np.ones(100))
+
+
 def work(group: str, folder: Path) -> None:
     config = miniature(expand(load(folder / "config.yaml"))[0].config)
     with tempfile.TemporaryDirectory() as place:
@@ -39,6 +48,8 @@ def work(group: str, folder: Path) -> None:
             parser("mechanics", None, False).parse_args(words),
             cost,
         )
+        if group == "imaging":
+            image_all_ranges(config)
         for view in config.views:
             arguments = parser(group, None).parse_args([*words, view])
             if group == "tracking":
