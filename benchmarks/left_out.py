@@ -1,0 +1,79 @@
+"""What is lost of the echoes of a heart where scatterers beside the beam are left out.
+
+    python benchmarks/left_out.py out/demo out/rat out/human
+
+The full matrix of every view at end-diastole and end-systole, of the scatterers in the beam and of all: the norm of the
+difference over that of all. The results are results/left_out.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from echotruth.cases import generator
+from echotruth.imaging import elevation
+from echotruth.imaging.medium import seed
+from echotruth.imaging.phantom import Scatterers
+from echotruth.imaging.scanner import Scanner, imaging_depth
+from echotruth.imaging.view import Plane
+from echotruth.repository.job import Job
+from echotruth.repository.ledger import record_path
+from echotruth.tetrahedra import MaterialPoints
+
+
+def scanners(job: Job) -> tuple[Scanner, Scanner]:
+    """The scanner of a view, and one whose beam has no end in elevation."""
+    config, share = job.case.config, elevation.LEFT_OUT
+    given = config.probe, config.rf, imaging_depth(config.rf, config.bmode)
+    own = Scanner(*given)
+    elevation.LEFT_OUT = 0.0
+    endless = Scanner(*given)
+    elevation.LEFT_OUT = share
+    return own, endless
+
+
+def losses(job: Job) -> list[str]:
+    """Rows of the table: scatterers of all and in the beam, and what is lost, at ED and at ES."""
+    heart, config, rows = job.heart, job.case.config, []
+    own, endless = scanners(job)
+    plane = Plane(**job.read("phantom", "origin", "axes"))
+    seeded = seed(config, heart, plane, partial(generator, job.case, job.view_name), endless.matrix.in_beam)
+    scatterers = Scatterers(MaterialPoints(seeded["cell"], seeded["xi"]), seeded["amplitude"], False)
+    for name, frame in (("ED", 0), ("ES", heart.es)):
+        position = scatterers.image(heart.positions(frame), heart.cells, plane)
+        inside = own.matrix.in_beam(position)
+        whole = endless.matrix(position, seeded["amplitude"])
+        lost = np.linalg.norm(own.matrix(position, seeded["amplitude"]) - whole) / np.linalg.norm(whole)
+        where = f"| {config.probe.preset} | {job.view_name} | {name} |"
+        rows.append(f"{where} {len(position)} | {inside.sum()} | {100 * lost:.2f} |")
+        print(rows[-1], flush=True)
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("repositories", type=Path, nargs="+", help="folders of repositories of one heart, as out/demo")
+    rows = []
+    for folder in parser.parse_args().repositories:
+        records = record_path(folder, "rf", "*", "*")
+        for path in sorted(folder.glob(str(records.relative_to(folder)))):
+            rows += losses(Job(folder, "rf", path.parent.name, path.stem))
+    lines = [
+        "# Echoes that are left out beside the beam",
+        "",
+        "Scatterers of the wall, those in the beam of the frame, and the echoes of the others over all (L2).",
+        "",
+        "| array | view | frame | scatterers | in the beam | left out (%) |",
+        "|---|---|---|---|---|---|",
+        *rows,
+        "",
+    ]
+    (Path(__file__).parent / "results/left_out.md").write_text("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()
