@@ -220,23 +220,27 @@ def test_changed_tracker_reruns_tracking_and_what_follows_it(made):
     assert not {"mechanics", "imaging"} & set(jobs)
 
 
+@pytest.mark.slow
 def test_changed_probe_reruns_imaging_and_not_mechanics(made):
     jobs = planned(made, CONFIG.replace("elements: 16}", "elements: 20}"))
     assert jobs["imaging"] == jobs["tracking"] == 4
     assert "mechanics" not in jobs
 
 
+@pytest.mark.slow
 def test_changed_bound_solves_no_heart_again(made):
     jobs = planned(made, CONFIG + "physiology: {twist_max_deg: 50}\n")
     assert (jobs["physiology"], jobs["imaging"], jobs["tracking"]) == (2, 4, 4)
     assert "mechanics" not in jobs
 
 
+@pytest.mark.slow
 def test_changed_mechanics_reruns_everything(made):
     jobs = planned(made, CONFIG + "mechanics: {base: fixed}\n")
     assert (jobs["mechanics"], jobs["imaging"], jobs["tracking"]) == (2, 4, 4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stage, rule", [("phantom", "imaging"), ("bmode", "imaging"), ("tracking", "tracking")])
 def test_record_that_a_failed_job_lost_is_made_again(made, stage, rule):
     record = next(made.out.glob(f"ledger/{stage}/*/mid.json"))
@@ -264,6 +268,7 @@ def killed(made, tmp_path_factory):
     return checkout, before, unfinished
 
 
+@pytest.mark.slow
 def test_killed_run_taken_up_again_gives_the_bytes_of_an_unbroken_run_on_more_cores(made, killed):
     checkout, _, unfinished = killed
     assert unfinished < 4
@@ -271,12 +276,14 @@ def test_killed_run_taken_up_again_gives_the_bytes_of_an_unbroken_run_on_more_co
     assert not [path for path in sorted({*first, *second}) if first.get(path) != second.get(path)]
 
 
+@pytest.mark.slow
 def test_killed_run_keeps_the_mechanics_it_had(killed):
     _, before, _ = killed
     assert before
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
+@pytest.mark.slow
 def test_run_leaves_the_report_and_all_words_in_logs(killed):
     out = killed[0].out
     assert (out / "report.html").stat().st_size > 10_000

@@ -48,6 +48,7 @@ def acquire(twisting_heart, scanner):
     return made
 
 
+@pytest.mark.slow
 def test_nothing_asked_for_leaves_the_bytes_as_they_were(acquire, scanner, twisting_heart):
     from echotruth.imaging.phantom import scatter
 
@@ -59,6 +60,7 @@ def test_nothing_asked_for_leaves_the_bytes_as_they_were(acquire, scanner, twist
     assert acquisition(1).tobytes() == scanner.matrix(places, bare.amplitude).tobytes()
 
 
+@pytest.mark.slow
 def test_frames_come_out_the_same_in_any_order_and_again(acquire):
     first, second = acquire(**ALL)[0], acquire(**ALL)[0]
     forwards = [first(frame).tobytes() for frame in (0, 1)]

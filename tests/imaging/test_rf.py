@@ -82,6 +82,7 @@ def test_under_the_lens_of_another_array_too():
     assert (lens_errors(probe, DEPTH, 0.7e-3, [(5.5, 10)]) < 0.015).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("attenuation, bound", [(0.0, 0.015), (0.5, 0.035)])
 def test_under_a_tall_lens_it_is_so_near_the_plane_and_beyond_two_apertures(attenuation, bound):
     """There echoes are longer than the longest kernel, and what it misses is loud at the frequencies that are left."""

@@ -201,6 +201,7 @@ def seen(depth, pivot, shift, **keys):
     return place_of_peak(TURN_LAGS * (scanner.angle[1] - scanner.angle[0]) * depth, match) / shift
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("depth", "pivot"), [(4.5e-3, 6.5e-3), (8.5e-3, 6.5e-3)])
 def test_speckle_that_turns_off_the_middle_focus_moves_as_its_tissue_with_zones_and_slips_with_one(depth, pivot):
     """Blocks turned by 70 um about a point 2 mm away (Kallel, Bertrand & Meunier 1994, IEEE Trans UFFC 41:105)."""

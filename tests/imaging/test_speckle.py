@@ -49,6 +49,7 @@ def test_dense_speckle_is_fully_developed():
     assert kstest(sample, "rayleigh", args=(0, 1 / np.sqrt(2))).pvalue > 0.05
 
 
+@pytest.mark.slow
 def test_sparse_speckle_has_the_kurtosis_of_its_density(fine):
     """<I^2> / <I>^2 = 2 + 1 / (density * area), the area from the lines of a point (Jakeman 1980)."""
     depth = np.flatnonzero((fine.range > 6e-3) & (fine.range < 7e-3))

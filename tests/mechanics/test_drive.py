@@ -70,6 +70,7 @@ def test_stopped_beat_goes_on_and_ends_in_the_same_bytes(cycle, driven, tmp_path
         assert np.asarray(getattr(driven, name)).tobytes() == np.asarray(getattr(resumed, name)).tobytes(), name
 
 
+@pytest.mark.slow
 def test_viscosity_lets_a_wall_that_weakens_as_it_shortens_go_on(cycle):
     """With a tension that does not fall with length (beta = 0) no equilibrium neighbours that of early ejection."""
     constant = Mechanics(active={"length_dependence": 0.0})  # and the viscosity that stands by default
@@ -88,6 +89,7 @@ def test_infarct_stretches_where_healthy_wall_shortens():
     assert fibre[region == 0].mean() < -0.08
 
 
+@pytest.mark.slow
 def test_late_wall_is_stretched_first():
     late = CONFIG.model_copy(update={"pathology": Pathology(late_activation={"preset": "lbbb"}), "loop": Loop()})
     arrays = beat(late)

@@ -221,6 +221,7 @@ def test_program_and_method_of_ours_are_tried_too(made, evaluate):
     assert scores(made, "phase_correlation")["nrmse_percent"].notna().all()
 
 
+@pytest.mark.slow
 def test_scores_are_the_same_bytes_whatever_the_number_of_processes(made, evaluate):
     read = [
         (

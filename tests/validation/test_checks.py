@@ -5,7 +5,7 @@ import pytest
 
 from echotruth.validation.page import CHECKS
 
-SLOW = {"ventricle"}
+SLOW = {"ventricle", "refinement", "inflation"}
 
 
 def named(check):

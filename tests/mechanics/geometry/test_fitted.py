@@ -71,6 +71,7 @@ def test_cut_that_leaves_nothing_is_refused(human, surface_written):
         left_ventricle(Geometry(file=file, remesh=True, cut_mm=70.0))
 
 
+@pytest.mark.slow
 def test_factors_shape_a_wall_from_a_file_too(human, surface_written):
     file = surface_written(1e3 * human.nodes, surface(human))
 
