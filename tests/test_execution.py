@@ -53,9 +53,11 @@ print("pid", job.pid, flush=True)
 time.sleep(60)
 """
 RUN = """
-import sys
+import signal, sys
 from pathlib import Path
 from echotruth import execution
+# Tests that run in the background may have been told to ignore it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 execution.PATIENCE = 0.5
 execution.execute([sys.executable, "-c", sys.argv[1]], Path(sys.argv[2]), "demo", {})
 """
