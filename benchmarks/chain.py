@@ -141,9 +141,12 @@ class Parts:
         self._frames = len(self._heart.displacement)
         place = self._job(stage="truth").read("phantom", "origin", "axes")
         self._plane, self._random = Plane(**place), partial(generator, self._job(stage="rf").case, view)
+        given = self._config.probe, self._config.rf, imaging_depth(self._config.rf, self._config.bmode)
+        self._scanner = Scanner(*given)
 
     def phantom(self) -> float:
-        return timed(lambda: seed(self._config, self._heart, self._plane, self._random))
+        in_beam = self._scanner.matrix.in_beam
+        return timed(lambda: seed(self._config, self._heart, self._plane, self._random, in_beam))
 
     def truth(self) -> float:
         some = replace(self._heart, displacement=self._heart.displacement[:SOME])
@@ -152,11 +155,10 @@ class Parts:
         return self._frames / len(some.displacement) * spent
 
     def rf(self) -> float:
-        config, heart = self._config, self._heart
-        seeded = seed(config, heart, self._plane, self._random)
+        config, heart, scanner = self._config, self._heart, self._scanner
+        seeded = seed(config, heart, self._plane, self._random, scanner.matrix.in_beam)
         times = read_loop(config.loop).time
         medium = Medium(config, heart, self._plane, time=times, seeded=seeded, random=self._random)
-        scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
         position, amplitude = medium(0)
         even = np.random.default_rng(0).uniform(position.min(0), position.max(0), position.shape)
         scatterers = checked(even, amplitude)
@@ -164,8 +166,7 @@ class Parts:
         return self._frames * (timed(lambda: scanner.matrix(*scatterers)) + timed(lambda: scanner.beamform(matrix)))
 
     def bmode(self) -> float:
-        config = self._config
-        scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+        config, scanner = self._config, self._scanner
         shape = (SOME, len(scanner.angle), len(scanner.range))
         lines = np.random.default_rng(0).standard_normal((*shape, 2), np.float32).view(np.complex64)[..., 0]
         gain, scan = time_gain(config.probe, config.bmode, scanner.range), scan_lines(config.probe, config.rf)
