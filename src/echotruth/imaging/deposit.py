@@ -250,20 +250,3 @@ def add_echoes(traces, time, weight, colour, bend, amplitude, entries, tables, s
                 row = (i * elements - i * (i + 1) // 2) * samples + LEAD + shift
                 for j in range(max(i, nearest), beyond):
                     add_kernel(flat, row + j * samples, tables, scheme, places, factors, j)
-
-
-@numba.njit(parallel=True, cache=True)
-def unfold(spectra, matrix):
-    """Write spectra (pairs, bins) into the symmetric matrix (bins, elements, elements)."""
-    tile = 16
-    elements = matrix.shape[1]
-    tiles = (matrix.shape[0] + tile - 1) // tile
-    for number in numba.prange(tiles):
-        stop = min((number + 1) * tile, matrix.shape[0])
-        pair = 0
-        for i in range(elements):
-            for j in range(i, elements):
-                for f in range(number * tile, stop):
-                    matrix[f, i, j] = spectra[pair, f]
-                    matrix[f, j, i] = spectra[pair, f]
-                pair += 1

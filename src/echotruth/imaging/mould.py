@@ -10,7 +10,7 @@ import numba
 import numpy as np
 
 from echotruth.imaging.kernel import TAPS
-from echotruth.imaging.product import HEIGHT, product
+from echotruth.imaging.product import HEIGHT, padded, product
 from echotruth.imaging.vectors import fused
 
 QUADRATIC = 3
@@ -21,7 +21,7 @@ def together(blocks):
     """Entries (n,) of the same block in groups, -1 where there are too few for a whole one: shape (groups, HEIGHT)."""
     order = np.argsort(blocks, kind="stable")
     counts = np.bincount(blocks)
-    sizes = -(-counts // HEIGHT) * HEIGHT
+    sizes = padded(counts, HEIGHT)
     place = np.arange(len(order)) + np.repeat(np.cumsum(sizes) - sizes - np.cumsum(counts) + counts, counts)
     groups = np.full(sizes.sum(), -1)
     groups[place] = order

@@ -18,8 +18,8 @@ HEIGHT, WIDTH = 4, 16
 """Rows and columns of a tile."""
 
 
-def padded(count: int, multiple: int = WIDTH) -> int:
-    """The least multiple that is no less than a count."""
+def padded(count, multiple=WIDTH):
+    """The least multiple that is no less than a count, or than each of an array."""
     return -(-count // multiple) * multiple
 
 

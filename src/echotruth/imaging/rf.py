@@ -24,6 +24,7 @@ from echotruth.imaging.elevation import MOST_BLOCKS, Lens, bounds
 from echotruth.imaging.kernel import NODES, TAPS, Band, Grid, fits, offsets, stacked, window_spectrum
 from echotruth.imaging.mould import mould, together
 from echotruth.imaging.probe import element_centres, pulse_band, pulse_spectrum, spectral_width
+from echotruth.imaging.product import padded
 
 BLOCK = 256
 """Scatterers deposited at a time."""
@@ -175,7 +176,7 @@ class FullMatrix:
         first, kinds = bounds(len(self.centres), parts), self._kind(position)
         part_of, limits = np.searchsorted(first, elements, "right") - 1, np.searchsorted(elements, first)
         source = _LensKernels(self, position, kinds, parts) if lens else _PlaneKernels(self, kinds, size)
-        width = -(-len(elements) // deposit.LANES) * deposit.LANES
+        width = padded(len(elements), deposit.LANES)
         time, (weight, colour, bend) = np.zeros((BLOCK, width), np.int32), np.zeros((3, BLOCK, width), np.float32)
         array = self.centres[elements], part_of, self._scales, self._directivity
         for start in range(0, len(position), BLOCK):
