@@ -13,12 +13,12 @@ from shlex import quote
 from snakemake.exceptions import WorkflowError
 
 from echotruth.cases import expand as expand_cases
-from echotruth.compiled import GROUPS, folder
+from echotruth.workflow.compiled import GROUPS, folder
 from echotruth.config.loading import ConfigError, validate
-from echotruth.mechanics.geometry.body import fingerprint
-from echotruth.mechanics.loop import read_loop
-from echotruth.miniature import miniature
-from echotruth.provenance import code_version, settings_version
+from echotruth.mechanics.geometry.imported_mesh import fingerprint
+from echotruth.loop.cycle import read_loop
+from echotruth.workflow.miniature import miniature
+from echotruth.repository.provenance import code_version, settings_version
 from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
 
 if not config:

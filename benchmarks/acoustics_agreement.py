@@ -14,8 +14,8 @@ from acoustics_arrays import ARRAYS, Array, delays
 from acoustics_peers import Esdiva, Pymust
 from numpy.typing import NDArray
 
-from echotruth.imaging.probe import pulse_spectrum
-from echotruth.imaging.rf import FullMatrix
+from echotruth.imaging.rf.full_matrix import FullMatrix
+from echotruth.imaging.rf.probe import pulse_spectrum
 
 Spectra = NDArray[np.complexfloating[Any, Any]]
 

@@ -11,8 +11,8 @@ from acoustics_peers import Pymust
 from numpy.typing import NDArray
 
 from echotruth.config import Probe
-from echotruth.imaging.probe import element_centres, pulse_spectrum
-from echotruth.imaging.rf import FullMatrix
+from echotruth.imaging.rf.full_matrix import FullMatrix
+from echotruth.imaging.rf.probe import element_centres, pulse_spectrum
 
 Spectra = NDArray[np.complex128]
 

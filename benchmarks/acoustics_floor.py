@@ -13,7 +13,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from echotruth.imaging import deposit, rf
+from echotruth.imaging.rf import full_matrix as rf
+from echotruth.imaging.rf import spreading as deposit
 
 VECTOR = 8
 """Numbers in 32 bytes."""

@@ -11,12 +11,12 @@ from acoustics_arrays import ARRAYS, SECTOR, Array
 from worker import Clock
 
 from echotruth.config import Bmode, Rf
+from echotruth.imaging.beamforming.scan import scan_lines
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.synthesis import Synthesis
+from echotruth.imaging.beamforming.transmit import KINDS
 from echotruth.imaging.bmode import clip
-from echotruth.imaging.rf import FullMatrix
-from echotruth.imaging.scan import scan_lines
-from echotruth.imaging.scanner import Scanner, imaging_depth
-from echotruth.imaging.synthesis import Synthesis
-from echotruth.imaging.transmit import KINDS
+from echotruth.imaging.rf.full_matrix import FullMatrix
 
 Seconds = dict[str, dict[str, float]]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.config import Probe
-from echotruth.imaging.probe import pulse, spectral_width
+from echotruth.imaging.rf.probe import pulse, spectral_width
 
 Floats = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from acoustics_arrays import ARRAYS, Array, Floats, delays
 from acoustics_peers import Esdiva, Pymust
 from worker import Clock, serve
 
-from echotruth.imaging.rf import FullMatrix
+from echotruth.imaging.rf.full_matrix import FullMatrix
 
 Run = Callable[[Floats, Floats], Any]
 

@@ -38,20 +38,21 @@ from threadpoolctl import threadpool_limits
 
 from echotruth.cases import generator
 from echotruth.config.loading import load
+from echotruth.evaluation.clip import Clip, clips
+from echotruth.evaluation.scoring import ground_truth, score
+from echotruth.imaging.beamforming.scan import scan_lines
+from echotruth.imaging.beamforming.scanner import Scanner, checked, imaging_depth
 from echotruth.imaging.bmode import clip, pixel_centres, time_gain
-from echotruth.imaging.medium import Medium, seed
-from echotruth.imaging.scan import scan_lines
-from echotruth.imaging.scanner import Scanner, checked, imaging_depth
+from echotruth.imaging.medium.medium import Medium, seed
 from echotruth.imaging.truth import truth
 from echotruth.imaging.view import Plane
-from echotruth.mechanics.loop import read_loop
+from echotruth.loop.cycle import read_loop
 from echotruth.repository import ledger
-from echotruth.repository.job import Job
 from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.section import Section
-from echotruth.tracking.clip import Clip, clips
-from echotruth.tracking.scoring import ground_truth, score
-from echotruth.tracking.tracker import TrackerFailed, track
+from echotruth.tracking.failure import TrackerFailed
+from echotruth.tracking.tracker import track
+from echotruth.workflow.job import Job
 
 RESULTS = Path(__file__).parent / "results"
 EXCERPT = 5

@@ -19,16 +19,16 @@ import speckle
 
 from echotruth.cases import generator
 from echotruth.config import Probe, Rf
-from echotruth.imaging.acquisition import Acquisition
+from echotruth.evaluation.clip import Clip, places
+from echotruth.evaluation.scoring import ground_truth, score
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import clip
-from echotruth.imaging.medium import Medium, seed
-from echotruth.imaging.scanner import Scanner, imaging_depth
+from echotruth.imaging.medium.medium import Medium, seed
+from echotruth.imaging.rf.acquisition import Acquisition
 from echotruth.imaging.view import Plane
-from echotruth.mechanics.loop import read_loop
-from echotruth.repository.job import Job
-from echotruth.tracking.clip import Clip, places
-from echotruth.tracking.scoring import ground_truth, score
+from echotruth.loop.cycle import read_loop
 from echotruth.tracking.tracker import track
+from echotruth.workflow.job import Job
 
 HALF = np.array([2.2e-3, 1.1e-3, 1.2e-3])
 """Half the sides of the box (lateral, axial, elevation), m: beyond the beam to all sides."""

@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 
 from echotruth.cases import generator
-from echotruth.imaging import elevation
-from echotruth.imaging.medium import seed
-from echotruth.imaging.phantom import Scatterers
-from echotruth.imaging.scanner import Scanner, imaging_depth
+from echotruth.fem.tetrahedra import MaterialPoints
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.medium.medium import seed
+from echotruth.imaging.medium.phantom import Scatterers
+from echotruth.imaging.rf import elevation
 from echotruth.imaging.view import Plane
-from echotruth.repository.job import Job
 from echotruth.repository.ledger import record_path
-from echotruth.tetrahedra import MaterialPoints
+from echotruth.workflow.job import Job
 
 
 def scanners(job: Job) -> tuple[Scanner, Scanner]:

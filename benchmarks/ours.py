@@ -10,16 +10,17 @@ import numpy as np
 from worker import Clock, serve
 
 from echotruth.config import Config, Geometry, Loop, Mechanics
-from echotruth.mechanics import drive, fibres
-from echotruth.mechanics.activation import Activation
-from echotruth.mechanics.equilibrium import Equilibrium, Load
+from echotruth.fem.quadrature import tetrahedron
+from echotruth.fem.tetrahedra import Floats, Mesh, shape
+from echotruth.loop.cycle import Cycle, read_loop
+from echotruth.mechanics import fibres
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.loop import Cycle, read_loop
-from echotruth.mechanics.quadrature import tetrahedron
-from echotruth.mechanics.solver import Walk
-from echotruth.mechanics.support import of_base
-from echotruth.mechanics.wall import Wall, equilibrium, law, wall
-from echotruth.tetrahedra import Floats, Mesh, shape
+from echotruth.mechanics.solver import drive
+from echotruth.mechanics.solver.activation import Activation
+from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
+from echotruth.mechanics.solver.newton import Walk
+from echotruth.mechanics.solver.support import of_base
+from echotruth.mechanics.solver.wall import Wall, equilibrium, law, wall
 
 ELASTIC = Mechanics(viscosity_Pa_s=0.0)
 """The wall that ships, less its viscosity, which the peer's has not."""

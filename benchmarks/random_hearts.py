@@ -57,7 +57,7 @@ def solved(number: int, elements: tuple[int, int, int]) -> dict[str, Any]:
     from echotruth.config.loading import resolved
     from echotruth.mechanics.beat import beat
     from echotruth.mechanics.physiology import measures, verdict
-    from echotruth.mechanics.solver import Diverged
+    from echotruth.mechanics.solver.newton import Diverged
 
     numba.set_num_threads(1)
     names = ("circumferential_elements", "longitudinal_elements", "transmural_elements")

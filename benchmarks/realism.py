@@ -22,14 +22,14 @@ import numpy as np
 
 from echotruth.config import Config, Rf
 from echotruth.config.loading import load
+from echotruth.fem.location import locate
 from echotruth.heart import Heart
-from echotruth.imaging.acquisition import Acquisition
+from echotruth.imaging.beamforming.scan import imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import clip, pixel_centres
-from echotruth.imaging.medium import Medium, seed
-from echotruth.imaging.scan import imaging_depth
-from echotruth.imaging.scanner import Scanner
+from echotruth.imaging.medium.medium import Medium, seed
+from echotruth.imaging.rf.acquisition import Acquisition
 from echotruth.imaging.view import Plane, plane
-from echotruth.location import locate
 
 HERE = Path(__file__).parent
 FRAMES = 27

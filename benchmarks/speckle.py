@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import kstest
 
 from echotruth.config import Probe, Rf
-from echotruth.imaging.scanner import Scanner
+from echotruth.imaging.beamforming.scanner import Scanner
 
 RESULTS = Path(__file__).parent / "results"
 LOW, HIGH = np.array([-2.2e-3, 5.4e-3, -0.4e-3]), np.array([2.2e-3, 7.6e-3, 0.4e-3])

@@ -28,12 +28,12 @@ from scipy.ndimage import gaussian_filter
 
 from echotruth.config import Config
 from echotruth.config.tracking import Guest, standard_trackers
+from echotruth.evaluation.clip import Clip, clips
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import clip
-from echotruth.imaging.scanner import Scanner
 from echotruth.repository import ledger
-from echotruth.repository.job import Job
 from echotruth.tracking import grid, track
-from echotruth.tracking.clip import Clip, clips
+from echotruth.workflow.job import Job
 
 RESULTS = Path(__file__).parent / "results"
 LOW, HIGH = np.array([-1.8e-3, 5.2e-3, -0.4e-3]), np.array([1.8e-3, 8.2e-3, 0.4e-3])

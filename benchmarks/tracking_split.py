@@ -30,16 +30,16 @@ from scipy.interpolate import RBFInterpolator
 from scipy.ndimage import map_coordinates
 
 from echotruth.config.tracking import BsplineDic
+from echotruth.evaluation.clip import Clip, clips
+from echotruth.evaluation.scoring import Truth, ground_truth, row, score
+from echotruth.fem.location import locate
+from echotruth.fem.tetrahedra import MaterialPoints, interpolate
 from echotruth.imaging.bmode import downsample
 from echotruth.imaging.truth import displacement
 from echotruth.imaging.view import Plane
-from echotruth.location import locate
 from echotruth.repository import ledger
-from echotruth.repository.job import Job
-from echotruth.tetrahedra import MaterialPoints, interpolate
-from echotruth.tracking import cycle, track
-from echotruth.tracking.clip import Clip, clips
-from echotruth.tracking.scoring import Truth, ground_truth, row, score
+from echotruth.tracking import bidirectional, track
+from echotruth.workflow.job import Job
 
 RESULTS = Path(__file__).parent / "results"
 WIDTH = 28e-6
@@ -130,7 +130,7 @@ def rows(job: Job, view: str) -> list[list[str]]:
     truth, plane = ground_truth(job), Plane(**job.read("phantom", "origin", "axes"))
     true, found = truth.displacement[truth.es], []
     forward, backward = (
-        nrmse(in_plane(job, plane, truth, way)[truth.es], true) for way in cycle.ways(len(truth.displacement))
+        nrmse(in_plane(job, plane, truth, way)[truth.es], true) for way in bidirectional.ways(len(truth.displacement))
     )
     given = clips(job)
     free = blobs(job, plane, next(iter(given.values())))

@@ -19,13 +19,13 @@ import report
 
 from echotruth.config import Config
 from echotruth.config.tracking import BsplineDic
+from echotruth.evaluation.clip import clips
+from echotruth.evaluation.scoring import ground_truth, row, score
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import clip
-from echotruth.imaging.scanner import Scanner
 from echotruth.repository import ledger
-from echotruth.repository.job import Job
 from echotruth.tracking import track
-from echotruth.tracking.clip import clips
-from echotruth.tracking.scoring import ground_truth, row, score
+from echotruth.workflow.job import Job
 
 RESULTS = Path(__file__).parent / "results"
 INNER, OUTER, DEPTH = 1.4e-3, 2.3e-3, 6.5e-3

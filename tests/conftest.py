@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
+from echotruth.fem.tetrahedra import Mesh
 from echotruth.heart import Heart
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.tetrahedra import Mesh
 
 
 def pytest_collection_modifyitems(items):

@@ -3,8 +3,8 @@
 import os
 from pathlib import Path
 
-from echotruth.compiled import GROUPS, folder, share
-from echotruth.provenance import code_version
+from echotruth.repository.provenance import code_version
+from echotruth.workflow.compiled import GROUPS, folder, share
 
 ROOT = Path(__file__).parents[1]
 SCRIPTS = ROOT / "workflow/scripts"

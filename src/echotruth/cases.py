@@ -131,7 +131,7 @@ def _check(config: Config, key: str, source: str) -> None:
 
 
 def _check_loop(loop: Loop, source: str) -> None:
-    from echotruth.mechanics.loop import LoopError, read_loop
+    from echotruth.loop.cycle import LoopError, read_loop
 
     try:
         read_loop(loop)

@@ -55,8 +55,8 @@ def run(path: str, config: Config, options: list[str]) -> int:
     """
     if not Path("Snakefile").is_file():
         return _complain("no Snakefile here: run this in a checkout of echotruth")
-    from echotruth.execution import execute
-    from echotruth.progress import measured
+    from echotruth.workflow.execution import execute
+    from echotruth.workflow.progress import measured
 
     folder = Path("out") / config.name
     snakemake = [sys.executable, "-m", "snakemake", "--configfile", path]
@@ -95,7 +95,10 @@ def _only_tells(option: str) -> bool:
 
 def validate(arguments: argparse.Namespace) -> int:
     """Check the heart against what is known and write the page; 1 if a number is off, otherwise 0."""
-    from echotruth.validation.page import write
+    if not Path("validation/page.py").is_file():
+        return _complain("no folder validation here: run this in a checkout of echotruth")
+    sys.path.insert(0, str(Path.cwd()))
+    from validation.page import write
 
     folder = Path(arguments.folder)
     met = write(folder, arguments.quick, lambda said: print(said, flush=True))
@@ -118,8 +121,8 @@ def export(arguments: argparse.Namespace) -> int:
 
 def evaluate(arguments: argparse.Namespace) -> int:
     """Try a tracker on a repository; 0, or 1 if it failed on every clip, or 2 where it cannot be tried."""
-    from echotruth.tracking import trial
-    from echotruth.tracking.entrant import CannotTry, entrant
+    from echotruth.evaluation import run as trial
+    from echotruth.evaluation.tracker_options import CannotTry, entrant
 
     rows = []
     try:

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from echotruth.arrays import Floats
+
+SHORT_AXIS = np.array([[-1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
+"""Rows: lateral, axial and elevation axis of all short-axis views, in the heart frame."""
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,10 @@ from math import log, pi
 
 import pytest
 
-from echotruth import anatomy
-from echotruth.config import Bmode, Config, Geometry, Probe, Rf
+from echotruth.config import Bmode, Config, Geometry, Probe, Rf, anatomy
 from echotruth.config.defaults import ARRAYS
 from echotruth.config.loading import ConfigError, validate
-from echotruth.transducers import PRESETS
+from echotruth.config.transducers import PRESETS
 
 
 def configured(**sections):
@@ -19,7 +18,7 @@ def configured(**sections):
 def test_heart_stands_within_the_field_of_view_and_the_sector(species):
     """The ellipsoid a fifth larger, as at end-diastole, in the short axis and along its axis."""
     config = configured(geometry={"preset": species})
-    size = anatomy.lengths(config.geometry)
+    size = config.geometry.lengths()
     across = 1.2 * (size["endo_radius_mm"] + size["wall_mm"])
     along = 1.2 * ((size["endo_length_mm"] + size["base_mm"]) / 2 + size["apex_wall_mm"])
     focus, side = config.rf.focus_mm, config.bmode.field_of_view_mm
@@ -92,4 +91,4 @@ def test_radius_of_the_heart_is_that_of_its_mesh():
     few = {"circumferential_elements": 12, "longitudinal_elements": 4, "transmural_elements": 1}
     geometry = Geometry(preset="rat", dilation=1.3, hypertrophy=1.5, scale=0.9, **few)
     nodes = left_ventricle(geometry).nodes[:, :2]
-    assert (nodes**2).sum(axis=1).max() ** 0.5 == pytest.approx(1e-3 * anatomy.radius_mm(geometry), rel=0.01)
+    assert (nodes**2).sum(axis=1).max() ** 0.5 == pytest.approx(1e-3 * geometry.outer_radius_mm(), rel=0.01)

@@ -2,9 +2,9 @@
 
 import pytest
 
-from echotruth.anatomy import PRESETS
 from echotruth.cases import expand
 from echotruth.config import Config, Geometry
+from echotruth.config.anatomy import PRESETS
 from echotruth.config.loading import ConfigError, validate
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from echotruth.config import Config, Mechanics
 from echotruth.config.loading import ConfigError, load, resolved
-from echotruth.mechanics.materials import LAWS
+from echotruth.materials import LAWS
 
 ROOT = Path(__file__).parents[2]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.imaging import scanner
+from echotruth.imaging.beamforming import scanner
 
 SPEED = 1540.0
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config
-from echotruth.imaging.acquisition import Acquisition
-from echotruth.imaging.haze import response, reverberation
-from echotruth.imaging.medium import Medium, seed
-from echotruth.imaging.scan import imaging_depth, points
-from echotruth.imaging.scanner import Scanner
-from echotruth.imaging.shadow import Rib
+from echotruth.imaging.beamforming.scan import imaging_depth, points
+from echotruth.imaging.beamforming.scanner import Scanner
+from echotruth.imaging.medium.medium import Medium, seed
+from echotruth.imaging.rf.acquisition import Acquisition
+from echotruth.imaging.rf.haze import response, reverberation
+from echotruth.imaging.rf.shadow import Rib
 from echotruth.imaging.view import plane
 
 SMALL = {"probe": {"elements": 16, "pitch_um": 90.0}, "rf": {"lines": 16}, "phantom": {"density_per_mm3": 300.0}}
@@ -50,7 +50,7 @@ def acquire(twisting_heart, scanner):
 
 @pytest.mark.slow
 def test_nothing_asked_for_leaves_the_bytes_as_they_were(acquire, scanner, twisting_heart):
-    from echotruth.imaging.phantom import scatter
+    from echotruth.imaging.medium.phantom import scatter
 
     acquisition, _ = acquire()
     config = Config.model_validate(SMALL)

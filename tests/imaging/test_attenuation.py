@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.imaging.attenuation import separated
+from echotruth.imaging.rf.attenuation import separated
 
 
 @pytest.mark.parametrize("decibel", [0.5, 1.0, 2.0])

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config
-from echotruth.imaging.blood import Cavity, fill
-from echotruth.imaging.course import wandering
-from echotruth.location import locate
-from echotruth.mechanics.cavity import cavity_volume
+from echotruth.fem.location import locate
+from echotruth.fem.tetrahedra import Mesh
+from echotruth.imaging.medium.blood import Cavity, fill
+from echotruth.imaging.medium.random_process import wandering
 from echotruth.mechanics.geometry import cell_volumes
-from echotruth.tetrahedra import Mesh
+from echotruth.mechanics.solver.cavity import cavity_volume
 
 CONFIG = Config.model_validate({"realism": {"blood": {"level_dB": -20.0, "density": 0.3}}})
 TIME = np.array([0, 3e-3])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Bmode, Probe
+from echotruth.imaging.beamforming.scan import Linear, Sector
 from echotruth.imaging.bmode import (
     ScanConversion,
     clip,
@@ -14,7 +15,6 @@ from echotruth.imaging.bmode import (
     pixel_centres,
     time_gain,
 )
-from echotruth.imaging.scan import Linear, Sector
 
 BMODE = Bmode(size_px=128, downsampling=(1, 2, 4))
 ANGLE = np.radians(np.linspace(-32, 32, 129))

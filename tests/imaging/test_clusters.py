@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from echotruth.config import Probe
-from echotruth.imaging.clusters import Clusters, Spread
-from echotruth.imaging.kernel import Band, Grid
-from echotruth.imaging.probe import element_centres, pulse_band, pulse_spectrum
+from echotruth.imaging.rf.clusters import Clusters, Spread
+from echotruth.imaging.rf.kernel import Band, Grid
+from echotruth.imaging.rf.probe import element_centres, pulse_band, pulse_spectrum
 
 SPEED = 1540.0
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.imaging.directivity import APERTURE, KINDS, WIDEST, shapes, sinc, tilt
+from echotruth.imaging.rf.directivity import APERTURE, KINDS, WIDEST, shapes, sinc, tilt
 
 RATIO = np.linspace(0.5, 1.5, 11)
 

@@ -6,8 +6,8 @@ from imaging.exact import fresnel
 from scipy.optimize import brentq
 
 from echotruth.config import Probe
-from echotruth.imaging.elevation import LEFT_OUT, Lens, bounds
-from echotruth.imaging.kernel import Band, Grid
+from echotruth.imaging.rf.elevation import LEFT_OUT, Lens, bounds
+from echotruth.imaging.rf.kernel import Band, Grid
 
 WAVELENGTH = 1540 / 25e6
 

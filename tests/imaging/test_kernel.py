@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.imaging.kernel import Band, Grid, fit, fits, offsets, stacked, window_spectrum
+from echotruth.imaging.rf.kernel import Band, Grid, fit, fits, offsets, stacked, window_spectrum
 
 
 @pytest.fixture(scope="module", params=[0.0, 2e5])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config, Phantom
-from echotruth.imaging.phantom import scatter, seed
+from echotruth.fem.tetrahedra import interpolate
+from echotruth.imaging.medium.phantom import scatter, seed
 from echotruth.imaging.view import plane
 from echotruth.mechanics.geometry import cell_volumes
-from echotruth.tetrahedra import interpolate
 
 CONFIG = Config(phantom=Phantom(density_per_mm3=1500.0))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Probe
-from echotruth.imaging.probe import apodization, element_centres, pulse, pulse_spectrum
+from echotruth.imaging.rf.probe import apodization, element_centres, pulse, pulse_spectrum
 
 
 def test_elements_are_a_pitch_apart_and_centred():

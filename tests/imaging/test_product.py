@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.imaging.product import WIDTH, product
+from echotruth.imaging.rf.product import WIDTH, product
 
 
 def matrices(count, height, width, more=0):

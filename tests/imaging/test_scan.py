@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Bmode, Probe, Rf
-from echotruth.imaging.scan import imaging_depth, points, scan_lines, scan_width
+from echotruth.imaging.beamforming.scan import imaging_depth, points, scan_lines, scan_width
 
 RANGE = np.linspace(1e-3, 9e-3, 11)
 

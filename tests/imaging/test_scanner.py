@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Probe, Rf
-from echotruth.imaging.scanner import Scanner
+from echotruth.imaging.beamforming.scanner import Scanner
 
 SPEED, CENTRE = 1540.0, 25e6
 WAVELENGTH = SPEED / CENTRE
@@ -261,7 +261,7 @@ import numpy as np
 from hashlib import sha256
 from echotruth.config import Bmode, Probe, Rf
 from echotruth.imaging.bmode import clip
-from echotruth.imaging.scanner import Scanner
+from echotruth.imaging.beamforming.scanner import Scanner
 random = np.random.default_rng(0)
 scanner = Scanner(Probe(elements=12), Rf(lines=24), 9e-3)
 position = random.uniform([-3e-3, 3e-3, -3e-4], [3e-3, 9e-3, 3e-4], (400, 3))

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import kstest
 
 from echotruth.config import Probe, Rf
-from echotruth.imaging.scanner import Scanner
+from echotruth.imaging.beamforming.scanner import Scanner
 
 WAVELENGTH = 1540.0 / 25e6
 LOW, HIGH = np.array([-1.9e-3, 5.4e-3]), np.array([1.9e-3, 7.6e-3])

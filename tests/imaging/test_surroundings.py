@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config
-from echotruth.imaging.surroundings import Following, epicardium, outside, surround
+from echotruth.imaging.medium.surroundings import Following, epicardium, outside, surround
 from echotruth.imaging.view import plane
 
 CONFIG = Config.model_validate({"realism": {"surroundings": {"level_dB": -12.0, "density": 0.02, "follow_mm": 0.5}}})

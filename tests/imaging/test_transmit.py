@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from echotruth.config import Probe, Rf
-from echotruth.imaging.scan import scan_lines
-from echotruth.imaging.transmit import KINDS, source_distance
+from echotruth.imaging.beamforming.scan import scan_lines
+from echotruth.imaging.beamforming.transmit import KINDS, source_distance
 
 SPEED, LENGTH = 1540.0, 64 * 46e-6
 X = (np.arange(64) - 31.5) * 46e-6

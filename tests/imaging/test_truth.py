@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config, Phantom
-from echotruth.imaging.phantom import seed
+from echotruth.fem.location import locate
+from echotruth.fem.tetrahedra import interpolate
+from echotruth.imaging.medium.phantom import seed
 from echotruth.imaging.truth import cavity_centre, displacement, follow, truth
 from echotruth.imaging.view import plane
-from echotruth.location import locate
-from echotruth.tetrahedra import interpolate
 
 CONFIG = Config()
 AXIS = (np.arange(96) + 0.5) / 96 * 12e-3

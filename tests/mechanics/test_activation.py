@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.mechanics.activation import Activation
+from echotruth.mechanics.solver.activation import Activation
 
 STEP = 3e-3
 DELAYS = np.array([0.0, 0.4, 1.0, 2.5, 9.0]) * STEP

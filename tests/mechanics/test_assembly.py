@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.mechanics.assembly import Assembly
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.support import of_base
+from echotruth.mechanics.solver.assembly import Assembly
+from echotruth.mechanics.solver.support import of_base
 
 
 @pytest.fixture(scope="module")

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config, Fibres, Geometry, Loop, Mechanics
+from echotruth.fem.quadrature import tetrahedron
 from echotruth.mechanics import fibres, kinematics
 from echotruth.mechanics.beat import beat
-from echotruth.mechanics.cavity import cavity_volume
 from echotruth.mechanics.fibres import gradients
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.quadrature import tetrahedron
+from echotruth.mechanics.solver.cavity import cavity_volume
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
 SHAPES = {

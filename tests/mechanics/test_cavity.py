@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.mechanics.cavity import cavity_volume, load, stiffness
 from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.solver.cavity import cavity_volume, load, stiffness
 
 
 @pytest.fixture(scope="module")

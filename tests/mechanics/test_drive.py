@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config, Geometry, Loop, Mechanics, Pathology
-from echotruth.mechanics import drive
-from echotruth.mechanics.activation import Activation
+from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.loop import read_loop
-from echotruth.mechanics.progress import Progress
-from echotruth.mechanics.wall import equilibrium, wall
+from echotruth.mechanics.solver import drive
+from echotruth.mechanics.solver.activation import Activation
+from echotruth.mechanics.solver.checkpoint import Progress
+from echotruth.mechanics.solver.wall import equilibrium, wall
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
 CONFIG = Config(geometry=COARSE, loop=Loop(frames=12), mechanics=Mechanics(viscosity_Pa_s=0.0))

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.mechanics import element
+from echotruth.fem.tetrahedra import Mesh
+from echotruth.materials import LAWS, compiled
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.materials import LAWS, compiled
-from echotruth.mechanics.point import WHOLE
-from echotruth.tetrahedra import Mesh
+from echotruth.mechanics.solver import element
+from echotruth.mechanics.solver.stress_point import WHOLE
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from echotruth.config import Fibres, Geometry
+from echotruth.fem.quadrature import tetrahedron
+from echotruth.fem.tetrahedra import shape
 from echotruth.mechanics import angles, fibres
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.quadrature import tetrahedron
-from echotruth.tetrahedra import shape
 
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 2}
 VERTICES = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * 0.98 + 0.005

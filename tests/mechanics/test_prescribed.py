@@ -9,16 +9,16 @@ from skimage.registration import phase_cross_correlation
 
 from echotruth.config import Config, Geometry
 from echotruth.config.loading import load
+from echotruth.fem.tetrahedra import Mesh, shape
 from echotruth.heart import Heart
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import clip, time_gain
-from echotruth.imaging.phantom import scatter
-from echotruth.imaging.scanner import Scanner, imaging_depth
+from echotruth.imaging.medium.phantom import scatter
 from echotruth.imaging.view import plane
 from echotruth.mechanics.fibres import CENTROID
 from echotruth.mechanics.geometry import cell_volumes, left_ventricle
 from echotruth.mechanics.physiology import measures
 from echotruth.mechanics.prescribed import MotionError, course, move, prescribed
-from echotruth.tetrahedra import Mesh, shape
 
 INNER, OUTER, LENGTH = 1.45e-3, 2.45e-3, 6.8e-3
 """Of the default tube, m."""

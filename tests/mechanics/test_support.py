@@ -6,7 +6,7 @@ import pytest
 from echotruth.config import Config, Geometry, Loop, Mechanics
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.support import of_base, springs
+from echotruth.mechanics.solver.support import of_base, springs
 
 HEMISPHERE = Geometry(
     endo_radius_mm=2.0,

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config, Geometry, Loop, Mechanics
-from echotruth.mechanics import unloaded
 from echotruth.mechanics.beat import beat
-from echotruth.mechanics.cavity import cavity_volume
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver import Diverged
+from echotruth.mechanics.solver import unloaded
+from echotruth.mechanics.solver.cavity import cavity_volume
+from echotruth.mechanics.solver.newton import Diverged
 
 IMAGE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1, state="end_diastole")
 

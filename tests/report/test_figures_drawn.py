@@ -4,8 +4,8 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
+from echotruth.evaluation.leaderboard import best, standings
 from echotruth.report import bullseye, error, leaderboard, loop, resolutions, strain, views
-from echotruth.tracking.leaderboard import best, standings
 
 TIME = np.arange(10) * 3e-3
 WAVE = np.sin(np.pi * np.arange(10) / 10) ** 2

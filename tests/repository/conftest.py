@@ -7,9 +7,9 @@ import pytest
 import yaml
 
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Probe, Rf, Tracking, View
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.channels import Kept, described
-from echotruth.imaging.scanner import Scanner, imaging_depth
+from echotruth.imaging.rf.recorder import Kept, described
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, schema
 from echotruth.repository.store import Store

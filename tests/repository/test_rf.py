@@ -8,8 +8,8 @@ import zarr
 from echotruth.cases import expand
 from echotruth.config import Config, Probe, Rf
 from echotruth.config.loading import ConfigError, validate
-from echotruth.imaging.channels import channels, digitised, samples_kept
-from echotruth.imaging.rf import FullMatrix
+from echotruth.imaging.rf.full_matrix import FullMatrix
+from echotruth.imaging.rf.recorder import channels, digitised, samples_kept
 from echotruth.repository import schema
 from echotruth.repository.store import Store
 

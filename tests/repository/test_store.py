@@ -9,8 +9,8 @@ import pytest
 from echotruth.cases import expand, table
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tracking, View
 from echotruth.imaging.bmode import pixel_centres
+from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.loop import read_loop
 from echotruth.repository import layout, schema
 from echotruth.repository.store import Store, schema_of
 from echotruth.tracking import grid

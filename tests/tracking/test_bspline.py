@@ -8,11 +8,11 @@ from scipy import interpolate, linalg, ndimage
 from echotruth.imaging import spline
 from echotruth.tracking import region as region_module
 from echotruth.tracking.alignment import add_matrix, factorise, grey_at, product, solve
+from echotruth.tracking.bending_energy import frame, roughness
 from echotruth.tracking.bspline import lattice
-from echotruth.tracking.bspline_dic import coarsened
-from echotruth.tracking.likeness import Likeness
+from echotruth.tracking.ncc import Likeness
 from echotruth.tracking.region import LOOSE, region
-from echotruth.tracking.roughness import frame, roughness
+from echotruth.tracking.trackers.bspline_dic import coarsened
 
 MASK = np.zeros((60, 80), bool)
 MASK[12:45, 15:70] = True

@@ -4,7 +4,7 @@ import pytest
 
 from echotruth.config.tracking import Dis
 from echotruth.tracking import track
-from echotruth.tracking.dis import SMALLEST, flow
+from echotruth.tracking.trackers.dis import SMALLEST, flow
 
 SHIFT = np.array([3.0, -1.5])
 

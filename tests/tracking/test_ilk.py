@@ -4,7 +4,7 @@ from skimage.registration import optical_flow_ilk
 
 from echotruth.config.tracking import Ilk
 from echotruth.tracking import track
-from echotruth.tracking.ilk import flow
+from echotruth.tracking.trackers.ilk import flow
 
 SHIFT = np.array([3.0, -1.5])
 

@@ -4,7 +4,7 @@ from scipy.ndimage import gaussian_filter
 
 from echotruth.config import PhaseCorrelation
 from echotruth.tracking import grid, track
-from echotruth.tracking.phase_correlation import displacement, fraction, phases, window_side
+from echotruth.tracking.trackers.phase_correlation import displacement, fraction, phases, window_side
 from echotruth.tracking.windows import arrange
 
 

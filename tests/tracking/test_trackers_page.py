@@ -14,7 +14,7 @@ from echotruth.config import Config
 from echotruth.config.loading import validate
 from echotruth.config.tracking import GIVEN, Guest
 from echotruth.tracking import track
-from echotruth.tracking.guest import GROUP
+from echotruth.tracking.trackers.external import GROUP
 
 PAGE = (Path(__file__).parents[2] / "docs/trackers.md").read_text()
 TRACKER, PROGRAM = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)

@@ -6,7 +6,7 @@ from echotruth.config.tracking import WindowDeformation
 from echotruth.tracking import track
 from echotruth.tracking.correlation import match, peaks, textured
 from echotruth.tracking.field import motion, smooth, validated
-from echotruth.tracking.window_deformation import WindowPairs, arranged, carry, sides
+from echotruth.tracking.trackers.window_deformation import WindowPairs, arranged, carry, sides
 from echotruth.tracking.windows import Windows, arrange
 
 SPACING = 3e-5

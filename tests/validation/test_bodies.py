@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from echotruth.mechanics.geometry.facets import boundary
-from echotruth.validation import beam, bodies
+from echotruth.mechanics.geometry.boundary import boundary
+from validation import beam, bodies
 
 
 def test_volumes_are_those_of_the_bodies():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.validation.page import CHECKS
+from validation.page import CHECKS
 
 SLOW = {"ventricle", "refinement", "inflation"}
 

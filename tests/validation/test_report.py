@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from echotruth.cli import main
-from echotruth.validation import page
-from echotruth.validation.report import Report, Row
+from validation import page
+from validation.report import Report, Row
 
 
 def test_row_says_what_was_found_expected_and_allowed():
@@ -32,7 +32,7 @@ def test_nothing_is_not_a_number_within_tolerance():
 def sums(found):
     """A check that finds a number, where half is allowed."""
     return SimpleNamespace(
-        __name__="echotruth.validation.sums",
+        __name__="validation.sums",
         measure=lambda quick: found,
         report=lambda numbers: Report("Sums", "One and one.", (Row("error", numbers, None, 0.5, "counting"),)),
     )

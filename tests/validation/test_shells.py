@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echotruth.mechanics.materials import LAWS
-from echotruth.validation.energies import Wall
-from echotruth.validation.shells import Sphere, Tube, integral
+from echotruth.materials import LAWS
+from validation.energies import Wall
+from validation.shells import Sphere, Tube, integral
 
 RUBBER = Wall(LAWS["neo_hooke"].Law(), 2e3)
 

@@ -1,8 +1,8 @@
 """Envelope, gain, log compression, scan conversion and downsampling of one clip."""
 
+from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.bmode import clip, time_gain
-from echotruth.imaging.scan import scan_lines
-from echotruth.repository.job import Job, Result, main
+from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:

@@ -10,11 +10,11 @@ import yaml
 from echotruth.cases import Case, expand, table
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, validate
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.channels import described
-from echotruth.imaging.scanner import Scanner, imaging_depth
+from echotruth.imaging.rf.recorder import described
+from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.geometry import GeometryError, left_ventricle
-from echotruth.mechanics.loop import read_loop
 from echotruth.repository import layout, ledger, schema
 from echotruth.repository.store import Store
 from echotruth.tracking import grid

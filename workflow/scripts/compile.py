@@ -13,11 +13,11 @@ from cases import lay_out
 from echotruth.cases import expand, generator
 from echotruth.config import Config
 from echotruth.config.loading import load
-from echotruth.imaging.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.mechanics.prescribed import prescribed
-from echotruth.miniature import miniature
-from echotruth.repository.cost import Cost
-from echotruth.repository.job import Job, Result, parser, run
+from echotruth.workflow.cost import Cost
+from echotruth.workflow.job import Job, Result, parser, run
+from echotruth.workflow.miniature import miniature
 
 STAGES = {"imaging": ("phantom", "truth", "rf", "bmode"), "tracking": ("phantom", "truth", "tracking", "evaluation")}
 """Group to the stages that are done on the miniature; the images that are tracked are noise."""

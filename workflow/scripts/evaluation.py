@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from echotruth.repository.job import Job, Result, main
-from echotruth.tracking.scoring import ground_truth, score
+from echotruth.evaluation.scoring import ground_truth, score
+from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:

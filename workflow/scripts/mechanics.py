@@ -1,13 +1,13 @@
 """FE update: geometry, fibres, mechanics and kinematics of one heart through its loop, or by its formula."""
 
+from echotruth.loop.cycle import LoopError
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.fibres import FibreError
 from echotruth.mechanics.geometry import GeometryError
-from echotruth.mechanics.loop import LoopError
 from echotruth.mechanics.pathology import PathologyError
 from echotruth.mechanics.prescribed import MotionError, prescribed
-from echotruth.mechanics.solver import Diverged
-from echotruth.repository.job import CannotBeMade, Job, Result, main
+from echotruth.mechanics.solver.newton import Diverged
+from echotruth.workflow.job import CannotBeMade, Job, Result, main
 
 
 def work(job: Job) -> Result:

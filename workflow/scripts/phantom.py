@@ -3,11 +3,11 @@
 from functools import partial
 
 from echotruth.cases import generator
-from echotruth.imaging.medium import seed
-from echotruth.imaging.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.medium.medium import seed
 from echotruth.imaging.truth import cavity_centre
 from echotruth.imaging.view import plane
-from echotruth.repository.job import Job, Result, main
+from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:

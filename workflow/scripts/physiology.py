@@ -3,7 +3,7 @@
 import logging
 
 from echotruth.mechanics.physiology import measures, verdict
-from echotruth.repository.job import Job, Result, main
+from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:

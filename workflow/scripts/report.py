@@ -4,9 +4,9 @@ import argparse
 import sys
 from pathlib import Path
 
-from echotruth.compiled import share
 from echotruth.config.loading import load
 from echotruth.report.figures import PARTS, Figures
+from echotruth.workflow.compiled import share
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")

@@ -6,13 +6,13 @@ from functools import partial
 import numpy as np
 
 from echotruth.cases import generator
-from echotruth.imaging.acquisition import Acquisition
-from echotruth.imaging.channels import Kept
-from echotruth.imaging.medium import Medium
-from echotruth.imaging.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.medium.medium import Medium
+from echotruth.imaging.rf.acquisition import Acquisition
+from echotruth.imaging.rf.recorder import Kept
 from echotruth.imaging.view import Plane
-from echotruth.mechanics.loop import read_loop
-from echotruth.repository.job import Job, Result, main
+from echotruth.loop.cycle import read_loop
+from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:

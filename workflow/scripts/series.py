@@ -2,8 +2,8 @@
 
 from importlib import import_module
 
-from echotruth.repository.cost import Cost
-from echotruth.repository.job import parser, run
+from echotruth.workflow.cost import Cost
+from echotruth.workflow.job import parser, run
 
 command = parser("series", __doc__)
 command.add_argument("stages", nargs="+", help="names of scripts beside this one, as phantom truth rf bmode")

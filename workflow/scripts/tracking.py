@@ -4,9 +4,10 @@ import logging
 
 import numpy as np
 
-from echotruth.repository.job import Job, Result, main
-from echotruth.tracking.clip import Clip, clips
-from echotruth.tracking.tracker import TrackerFailed, track
+from echotruth.evaluation.clip import Clip, clips
+from echotruth.tracking.failure import TrackerFailed
+from echotruth.tracking.tracker import track
+from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:

@@ -5,7 +5,7 @@ import logging
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import truth
 from echotruth.imaging.view import Plane
-from echotruth.repository.job import Job, Result, main
+from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from echotruth.config.sections import Config
-from echotruth.mechanics.materials import Material
+from echotruth.materials import Material
 from echotruth.section import Section, chooser, kinds
 
 

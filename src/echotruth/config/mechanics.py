@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
-from echotruth.mechanics.materials import DEFAULT, LAWS, AnyLaw
+from echotruth.materials import DEFAULT, LAWS, AnyLaw
 from echotruth.section import Section
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from echotruth import transducers
+from echotruth.config.transducers import OPEN, PRESETS, sampling
 from echotruth.section import Positive, Section, impossible
 
 
@@ -38,19 +38,27 @@ class Probe(Section):
 
     def settled(self) -> Probe:
         """The same with the preset's values written out."""
-        return self.model_copy(update={key: getattr(self, key) for key in transducers.OPEN})
+        return self.model_copy(update={key: getattr(self, key) for key in OPEN})
 
     @model_validator(mode="after")
     def _complete(self) -> Probe:
-        found = transducers.complete(self)
+        found = self._left_open()
         # Whoever asks for a value gets a number, yet what was left open follows the preset when a case changes it.
         self.__dict__.update(found)
         self.__pydantic_fields_set__.difference_update(found)
         return self
 
+    def _left_open(self) -> dict[str, Any]:
+        """Values of the keys that were left open: the preset's, and the sampling that suits the band."""
+        found = {key: value for key, value in PRESETS[self.preset].items() if getattr(self, key) is None}
+        if self.sampling_MHz is None:
+            frequency, bandwidth = (found.get(key, getattr(self, key)) for key in ("frequency_MHz", "bandwidth"))
+            found["sampling_MHz"] = sampling(frequency, bandwidth)
+        return found
+
     @model_serializer(mode="wrap")
     def _as_given(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        left_open = set(transducers.OPEN) - self.model_fields_set
+        left_open = set(OPEN) - self.model_fields_set
         return {key: None if key in left_open else value for key, value in dump(self).items()}
 
     @model_validator(mode="after")

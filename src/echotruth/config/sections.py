@@ -6,7 +6,6 @@ from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints, model_validator
 
-from echotruth import anatomy
 from echotruth.config.defaults import suited
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
@@ -86,7 +85,7 @@ class Config(Section):
 
     @model_validator(mode="after")
     def _heart_before_the_array(self) -> Config:
-        radius = 0.0 if self.geometry.file else anatomy.radius_mm(self.geometry)
+        radius = 0.0 if self.geometry.file else self.geometry.outer_radius_mm()
         if self.rf.focus_mm <= radius:
             remedy = f"must exceed {radius:g}, the radius of the heart, which stands at the focus"
             raise impossible("rf.focus_mm", self.rf.focus_mm, remedy)

@@ -10,7 +10,7 @@ import numpy as np
 
 from echotruth.config import Bmode, Probe
 from echotruth.imaging import spline
-from echotruth.imaging.scan import Scan
+from echotruth.imaging.beamforming.scan import Scan
 
 
 def time_gain(probe: Probe, bmode: Bmode, range_: np.ndarray) -> np.ndarray:

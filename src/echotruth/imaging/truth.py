@@ -6,14 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.aha import segment
+from echotruth.arrays import Floats
+from echotruth.fem.location import locate
+from echotruth.fem.tetrahedra import MaterialPoints, gradient, interpolate
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
-from echotruth.location import locate
 from echotruth.mechanics import kinematics
 from echotruth.mechanics.fibres import axes_about, layer, unit
-from echotruth.tetrahedra import MaterialPoints, gradient, interpolate
-
-Floats = NDArray[np.float64]
 
 ORDER = {"short_axis": (0, 1, 2), "long_axis": (0, 2, 1)}
 """R, C, L in the order radial, tangential in an image, across it."""

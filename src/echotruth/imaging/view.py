@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from echotruth.arrays import Floats
 from echotruth.config import Rf, View
-
-Floats = NDArray[np.float64]
-
-SHORT_AXIS = np.array([[-1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
-"""Rows: lateral, axial and elevation axis of all short-axis views, in the heart frame."""
+from echotruth.heart import SHORT_AXIS
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echotruth.tetrahedra import Floats
+from echotruth.fem.tetrahedra import Floats
 
 
 def frames(axes: Floats, helix: Floats, transverse: Floats, sheet: Floats) -> Floats:

@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from echotruth.config import Config
-from echotruth.mechanics import drive, phases
-from echotruth.mechanics.activation import Activation
+from echotruth.loop import phases
+from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.history import Arrays, history
-from echotruth.mechanics.loop import Cycle, read_loop
-from echotruth.mechanics.progress import Progress
-from echotruth.mechanics.unloaded import unloaded
-from echotruth.mechanics.wall import Wall, equilibrium, wall
+from echotruth.mechanics.solver import drive
+from echotruth.mechanics.solver.activation import Activation
+from echotruth.mechanics.solver.checkpoint import Progress
+from echotruth.mechanics.solver.unloaded import unloaded
+from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
 logger = logging.getLogger("echotruth.mechanics")
 

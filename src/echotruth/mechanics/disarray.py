@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echotruth.tetrahedra import Floats
+from echotruth.fem.tetrahedra import Floats
 
 WAVES = 1024
 """Waves in the sum; the covariance is met to about 1/sqrt(WAVES)."""

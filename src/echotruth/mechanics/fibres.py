@@ -13,10 +13,10 @@ import numpy as np
 from scipy.sparse import csr_matrix, triu
 
 from echotruth.config import Fibres
+from echotruth.fem.quadrature import tetrahedron
+from echotruth.fem.sparse import factorization
+from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape, shape_gradient
 from echotruth.mechanics import angles, disarray
-from echotruth.mechanics.quadrature import tetrahedron
-from echotruth.mechanics.sparse import factorization
-from echotruth.tetrahedra import Floats, Integers, Mesh, shape, shape_gradient
 
 CENTROID = np.full((1, 3), 0.25)
 """Local coordinates of the centroid of a tetrahedron."""

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from echotruth.aha import segment
 from echotruth.config import Config, Fibres
+from echotruth.fem.quadrature import tetrahedron
+from echotruth.fem.tetrahedra import Floats, Mesh, shape
 from echotruth.mechanics import angles, fibres, kinematics
-from echotruth.mechanics.quadrature import tetrahedron
-from echotruth.mechanics.wall import Wall
-from echotruth.tetrahedra import Floats, Mesh, shape
+from echotruth.mechanics.solver.wall import Wall
 
 Arrays = dict[str, NDArray]
 

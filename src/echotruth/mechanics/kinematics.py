@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.mechanics import element
+from echotruth.fem.quadrature import tetrahedron
+from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.mechanics.fibres import CENTROID, axes_about, gradients, unit
-from echotruth.mechanics.quadrature import tetrahedron
-from echotruth.tetrahedra import Floats, Mesh
+from echotruth.mechanics.solver import element
 
 RCL = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Components RR, CC, LL, RC, RL, CL."""

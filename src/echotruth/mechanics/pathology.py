@@ -11,8 +11,8 @@ from scipy.spatial import KDTree
 from echotruth.aha import segment
 from echotruth.config import Pathology
 from echotruth.config.pathology import Infarct, LateActivation
-from echotruth.location import locate
-from echotruth.tetrahedra import Floats, MaterialPoints, Mesh, interpolate, shape
+from echotruth.fem.location import locate
+from echotruth.fem.tetrahedra import Floats, MaterialPoints, Mesh, interpolate, shape
 
 HEALTHY, INFARCT, BORDER, LATE = range(4)
 """Regions; where two hold, an infarct goes before its border zone and that before late activation."""

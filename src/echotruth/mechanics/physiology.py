@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from echotruth.arrays import Floats
 from echotruth.config.physiology import Physiology
 
-Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray]
 
 BASE, APEX = 0.2, 0.8

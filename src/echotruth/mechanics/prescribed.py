@@ -6,14 +6,14 @@ import numpy as np
 
 from echotruth.config import Config
 from echotruth.config.motion import Affine, Course, Cylinder, Rigid
-from echotruth.imaging.view import SHORT_AXIS
+from echotruth.fem.tetrahedra import Floats, Mesh
+from echotruth.heart import SHORT_AXIS
+from echotruth.loop.cycle import read_loop
+from echotruth.loop.phases import FILLING
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.geometry.tube import Tube, lengths
 from echotruth.mechanics.history import Arrays, history
-from echotruth.mechanics.loop import read_loop
-from echotruth.mechanics.phases import FILLING
-from echotruth.mechanics.wall import wall
-from echotruth.tetrahedra import Floats, Mesh
+from echotruth.mechanics.solver.wall import wall
 
 
 class MotionError(ValueError):

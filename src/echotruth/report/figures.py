@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from echotruth.config import Config
+from echotruth.evaluation.leaderboard import best, rows, standings
 from echotruth.report import bullseye, clip, error, heart, leaderboard, loop, resolutions, strain, views
-from echotruth.tracking.leaderboard import best, rows, standings
 
 if TYPE_CHECKING:
     import pandas as pd

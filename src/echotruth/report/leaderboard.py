@@ -31,7 +31,7 @@ def draw(path: str | Path, standings: pd.DataFrame, order: list[str]) -> Path:
     path : str or Path
         Picture to write.
     standings : DataFrame
-        As of :func:`echotruth.tracking.leaderboard.standings`.
+        As of :func:`echotruth.evaluation.leaderboard.standings`.
     order : list of str
         Trackers from the top.
 

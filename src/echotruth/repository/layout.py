@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from echotruth.config import Config
+from echotruth.fem.tetrahedra import Mesh
 from echotruth.repository import schema
-from echotruth.tetrahedra import Mesh
 
 if TYPE_CHECKING:
     import pandas as pd

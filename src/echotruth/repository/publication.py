@@ -9,9 +9,9 @@ from typing import Any
 from echotruth.cases import expand
 from echotruth.config import Config
 from echotruth.config.loading import load
-from echotruth.provenance import packages
 from echotruth.repository import ledger
 from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
+from echotruth.repository.provenance import packages
 from echotruth.repository.store import Store
 
 

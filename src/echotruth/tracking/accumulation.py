@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from echotruth.tracking import cycle
+from echotruth.tracking import bidirectional
 
 
 class Pairs(Protocol):
@@ -69,14 +69,14 @@ def accumulate(pairs: Pairs, frames: np.ndarray, points: np.ndarray, reference: 
         return _path(pairs, prepared, points, reference == "previous")
     images = list(prepared)
     moved, alike, variance = [], [], []
-    for way in cycle.ways(len(images)):
+    for way in bidirectional.ways(len(images)):
         # The order in which a way takes the frames is its own inverse.
         total, quality = _path(pairs, (images[t] for t in way), points, True)
         moved.append(total[way])
         alike.append(quality[way])
         variance.append(doubt(quality)[way])
-    share = cycle.share(*variance)
-    return cycle.blend(share[..., None], *moved), cycle.blend(share, *alike)
+    share = bidirectional.share(*variance)
+    return bidirectional.blend(share[..., None], *moved), bidirectional.blend(share, *alike)
 
 
 def doubt(quality: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ import numpy as np
 from scipy import ndimage
 
 from echotruth.tracking.alignment import add_matrix, factorise, grey_at, product, solve
+from echotruth.tracking.bending_energy import frame, roughness
 from echotruth.tracking.bspline import Cells, Lattice, lattice
-from echotruth.tracking.roughness import frame, roughness
 
 STEPS = 24
 """Most iterations."""
@@ -50,7 +50,7 @@ class Region:
     inside : ndarray of shape (pixel,), bool
         Pixels of the wall itself.
     roughness : ndarray of shape (unknowns, width)
-        Band of its matrix, see :mod:`echotruth.tracking.roughness`.
+        Band of its matrix, see :mod:`echotruth.tracking.bending_energy`.
     bent : ndarray of shape (unknowns, 6)
         Its product with the motions of the whole that count as not rough, see :meth:`Lattice.affine`.
     freed : ndarray of shape (unknowns, 6)

@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 
 from echotruth.section import Section
+from echotruth.tracking.failure import TrackerFailed
 
 Track = Callable[..., tuple[np.ndarray, np.ndarray]]
-
-
-class TrackerFailed(ValueError):
-    """A tracker that gave no answer, or none that can be used; the message says why in one sentence."""
 
 
 def track(
@@ -77,19 +74,19 @@ def _method(settings: Any) -> Track:
     """The function of a method; each is imported only where it is used, for some take long to import."""
     match settings.method:
         case "phase_correlation":
-            from echotruth.tracking import phase_correlation as module
+            from echotruth.tracking.trackers import phase_correlation as module
         case "window_deformation":
-            from echotruth.tracking import window_deformation as module
+            from echotruth.tracking.trackers import window_deformation as module
         case "affine_dic":
-            from echotruth.tracking import affine_dic as module
+            from echotruth.tracking.trackers import affine_dic as module
         case "bspline_dic":
-            from echotruth.tracking import bspline_dic as module
+            from echotruth.tracking.trackers import bspline_dic as module
         case "dis":
-            from echotruth.tracking import dis as module
+            from echotruth.tracking.trackers import dis as module
         case "ilk":
-            from echotruth.tracking import ilk as module
+            from echotruth.tracking.trackers import ilk as module
         case "guest":
-            from echotruth.tracking import guest as module
+            from echotruth.tracking.trackers import external as module
     return partial(module.track, settings=settings)
 
 

@@ -5,10 +5,10 @@ import pytest
 
 from echotruth.config import Geometry
 from echotruth.config.geometry import Labels
-from echotruth.mechanics.geometry.body import Body, read
+from echotruth.mechanics.geometry.boundary import boundary, edges_of, neighbours
 from echotruth.mechanics.geometry.cut import marked, volumes, wall_of
-from echotruth.mechanics.geometry.facets import boundary, edges_of, neighbours
-from echotruth.mechanics.geometry.soundness import GeometryError
+from echotruth.mechanics.geometry.imported_mesh import Body, read
+from echotruth.mechanics.geometry.mesh_quality import GeometryError
 
 
 def body_of(nodes, cells, **arrays):

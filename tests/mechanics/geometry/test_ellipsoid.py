@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.mechanics.cavity import cavity_volume, triangle_shape
+from echotruth.fem.quadrature import triangle
 from echotruth.mechanics.geometry import cell_volumes
 from echotruth.mechanics.geometry.ellipsoid import ellipsoid, shells
-from echotruth.mechanics.geometry.soundness import GeometryError
-from echotruth.mechanics.quadrature import triangle
+from echotruth.mechanics.geometry.mesh_quality import GeometryError
+from echotruth.mechanics.solver.cavity import cavity_volume, triangle_shape
 
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
 

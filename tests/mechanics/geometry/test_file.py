@@ -10,16 +10,17 @@ import pyvista
 from echotruth.config import Geometry
 from echotruth.config.geometry import Labels
 from echotruth.config.loading import load
-from echotruth.mechanics.cavity import cavity_volume
-from echotruth.mechanics.geometry import GeometryError, cell_volumes, left_ventricle, soundness
-from echotruth.mechanics.geometry.body import read
+from echotruth.mechanics.geometry import GeometryError, cell_volumes, left_ventricle
+from echotruth.mechanics.geometry import mesh_quality as soundness
+from echotruth.mechanics.geometry.boundary import boundary
+from echotruth.mechanics.geometry.boundary_labels import BASE, ENDO, EPI, with_sides
 from echotruth.mechanics.geometry.cut import wall_of
-from echotruth.mechanics.geometry.facets import boundary
 from echotruth.mechanics.geometry.file import quadratic
-from echotruth.mechanics.geometry.sides import BASE, ENDO, EPI, with_sides
-from echotruth.mechanics.geometry.soundness import scaled_jacobian
+from echotruth.mechanics.geometry.imported_mesh import read
+from echotruth.mechanics.geometry.mesh_quality import scaled_jacobian
+from echotruth.mechanics.solver.cavity import cavity_volume
 
-EXAMPLE = Path(__file__).parents[2] / "config/rodero.yaml"
+EXAMPLE = Path(__file__).parents[3] / "config/rodero.yaml"
 
 
 @pytest.fixture

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from echotruth.mechanics.geometry.facets import boundary
+from echotruth.mechanics.geometry.boundary import boundary
+from echotruth.mechanics.geometry.boundary_labels import BASE, ENDO, EPI, Skin
 from echotruth.mechanics.geometry.frame import apex_of, axes_about, frame_of, rim_centroid
-from echotruth.mechanics.geometry.sides import BASE, ENDO, EPI, Skin
 
 
 @pytest.fixture

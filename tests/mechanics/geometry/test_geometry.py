@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.mechanics.cavity import cavity_volume
 from echotruth.mechanics.geometry import GeometryError, cell_volumes, left_ventricle
+from echotruth.mechanics.solver.cavity import cavity_volume
 
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
 

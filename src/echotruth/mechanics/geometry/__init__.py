@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from echotruth.config import Geometry
+from echotruth.fem.quadrature import tetrahedron
+from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.mechanics.geometry.ellipsoid import ellipsoid
-from echotruth.mechanics.geometry.soundness import GeometryError, jacobians
+from echotruth.mechanics.geometry.mesh_quality import GeometryError, jacobians
 from echotruth.mechanics.geometry.tube import tube
-from echotruth.mechanics.quadrature import tetrahedron
-from echotruth.tetrahedra import Floats, Mesh
 
 __all__ = ["GeometryError", "cell_volumes", "left_ventricle"]
 

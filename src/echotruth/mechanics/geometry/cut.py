@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.config.geometry import Labels
-from echotruth.mechanics.geometry.body import Body
-from echotruth.mechanics.geometry.facets import boundary, crowded_faces, edges_of, neighbours, pieces
-from echotruth.mechanics.geometry.soundness import GeometryError
-from echotruth.tetrahedra import Floats, Integers
+from echotruth.fem.tetrahedra import Floats, Integers
+from echotruth.mechanics.geometry.boundary import boundary, crowded_faces, edges_of, neighbours, pieces
+from echotruth.mechanics.geometry.imported_mesh import Body
+from echotruth.mechanics.geometry.mesh_quality import GeometryError
 
 logger = logging.getLogger("echotruth.mechanics")
 

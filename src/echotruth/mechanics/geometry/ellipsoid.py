@@ -6,12 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from echotruth import anatomy
 from echotruth.config import Geometry
-from echotruth.mechanics.geometry.soundness import check_cavity, check_turned
+from echotruth.fem.tetrahedra import Floats, Mesh
+from echotruth.mechanics.geometry.mesh_quality import check_cavity, check_turned
 from echotruth.mechanics.geometry.template import course, laid_through
 from echotruth.section import UNITS
-from echotruth.tetrahedra import Floats, Mesh
 
 
 def ellipsoid(geometry: Geometry) -> Mesh:
@@ -50,7 +49,7 @@ def shells(geometry: Geometry) -> tuple[tuple[float, float, float], tuple[float,
     endo, epi : tuple of float, m
         The cavity is dilated and elongated, then the wall put around it, then all scaled.
     """
-    size = {key: value * UNITS["mm"] * geometry.scale for key, value in anatomy.lengths(geometry).items()}
+    size = {key: value * UNITS["mm"] * geometry.scale for key, value in geometry.lengths().items()}
     along = geometry.dilation * geometry.elongation
     radius, length = size["endo_radius_mm"] * geometry.dilation, size["endo_length_mm"] * along
     wall, apex_wall = (size[key] * geometry.hypertrophy for key in ("wall_mm", "apex_wall_mm"))

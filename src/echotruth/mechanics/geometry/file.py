@@ -7,16 +7,16 @@ import logging
 import numpy as np
 
 from echotruth.config import Geometry
-from echotruth.mechanics.geometry import body as reading
-from echotruth.mechanics.geometry.body import METRES, Body
+from echotruth.fem.tetrahedra import EDGES, Floats, Integers, Mesh
+from echotruth.mechanics.geometry import imported_mesh as reading
+from echotruth.mechanics.geometry.boundary import beside, boundary, edges_of, pieces
+from echotruth.mechanics.geometry.boundary_labels import NAMES, Skin, with_sides
 from echotruth.mechanics.geometry.cut import marked, wall_of
-from echotruth.mechanics.geometry.facets import beside, boundary, edges_of, pieces
-from echotruth.mechanics.geometry.fitted import refilled
+from echotruth.mechanics.geometry.file_fibres import carried
 from echotruth.mechanics.geometry.frame import Frame, frame_of
-from echotruth.mechanics.geometry.muscle import carried
-from echotruth.mechanics.geometry.sides import NAMES, Skin, with_sides
-from echotruth.mechanics.geometry.soundness import GeometryError, check_cavity, check_flat, check_turned
-from echotruth.tetrahedra import EDGES, Floats, Integers, Mesh
+from echotruth.mechanics.geometry.imported_mesh import METRES, Body
+from echotruth.mechanics.geometry.mesh_quality import GeometryError, check_cavity, check_flat, check_turned
+from echotruth.mechanics.geometry.remeshing import refilled
 
 logger = logging.getLogger("echotruth.mechanics")
 

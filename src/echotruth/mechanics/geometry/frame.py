@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echotruth.mechanics.geometry.facets import area_vectors
-from echotruth.mechanics.geometry.sides import BASE, ENDO, Skin
-from echotruth.tetrahedra import Floats
+from echotruth.fem.tetrahedra import Floats
+from echotruth.mechanics.geometry.boundary import area_vectors
+from echotruth.mechanics.geometry.boundary_labels import BASE, ENDO, Skin
 
 LEVEL = 0.01
 """Distance of the base from its own plane, root mean square, over the length of the cavity, below which it is plane."""

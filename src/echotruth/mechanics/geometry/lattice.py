@@ -7,8 +7,8 @@ from itertools import permutations
 
 import numpy as np
 
-from echotruth.mechanics.geometry.facets import boundary
-from echotruth.tetrahedra import EDGES, Floats, Integers, Mesh
+from echotruth.fem.tetrahedra import EDGES, Floats, Integers, Mesh
+from echotruth.mechanics.geometry.boundary import boundary
 
 Counts = tuple[int, int, int]
 Place = Callable[[Floats], Floats]

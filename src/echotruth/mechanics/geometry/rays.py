@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echotruth.tetrahedra import Floats, Integers
+from echotruth.fem.tetrahedra import Floats, Integers
 
 SAME = 1e-6
 """Distance below which two meetings are one, over the size of the surface."""

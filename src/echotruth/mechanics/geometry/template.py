@@ -14,8 +14,8 @@ from collections.abc import Callable
 import numpy as np
 
 from echotruth.config import Geometry
-from echotruth.mechanics.geometry.facets import boundary
-from echotruth.tetrahedra import EDGES, Floats, Integers, Mesh
+from echotruth.fem.tetrahedra import EDGES, Floats, Integers, Mesh
+from echotruth.mechanics.geometry.boundary import boundary
 
 Wall = Callable[[Floats, Floats, Floats], Floats]
 """Depth, distance from the apex and azimuth, each of shape (n_nodes,), to positions (n_nodes, 3), m."""

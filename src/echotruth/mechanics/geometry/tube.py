@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from echotruth.config import Geometry
+from echotruth.fem.tetrahedra import Mesh
 from echotruth.mechanics.geometry.ellipsoid import shells
 from echotruth.mechanics.geometry.lattice import lattice, tubular
-from echotruth.tetrahedra import Mesh
 
 
 class Tube(NamedTuple):

@@ -1,0 +1,121 @@
+"""A clip as it is given to a tracker, and the grid on which the answer is kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echotruth.config import Config
+from echotruth.loop.cycle import read_loop
+from echotruth.tracking.windows import grid
+
+if TYPE_CHECKING:
+    from echotruth.workflow.job import Job
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One view of one heart at one image size.
+
+    Attributes
+    ----------
+    frames : ndarray of shape (frame, axial, lateral), uint8
+        B-mode; frame 0 is end-diastole.
+    mask : ndarray of shape (axial, lateral), bool
+        The wall at end-diastole.
+    inside : ndarray of shape (grid rows, grid columns), bool
+        Points of the grid that are in the wall at end-diastole.
+    points : ndarray of shape (n, 2)
+        Those points: lateral, axial, px of this size.
+    spacing : float
+        Distance of pixel centres, m.
+    frame_time : ndarray of shape (frame,)
+        Time since end-diastole, s.
+    seed : int
+    """
+
+    frames: np.ndarray
+    mask: np.ndarray
+    inside: np.ndarray
+    points: np.ndarray
+    spacing: float
+    frame_time: np.ndarray
+    seed: int
+
+    @property
+    def size(self) -> int:
+        """Pixels along a side."""
+        return self.frames.shape[-1]
+
+    @property
+    def given(self) -> tuple:
+        """What a tracker gets, in the order of :func:`echotruth.tracking.tracker.track`."""
+        return self.frames, self.points, self.mask, self.spacing, self.frame_time, self.seed
+
+    @property
+    def nothing(self) -> tuple[np.ndarray, np.ndarray]:
+        """The answer of a tracker that finds none: displacement (frame, n, 2) and quality (frame, n), all NaN."""
+        shape = len(self.frames), len(self.points)
+        return np.full((*shape, 2), np.nan), np.full(shape, np.nan)
+
+    def on_grid(self, displacement: np.ndarray, quality: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Answer of a tracker on the whole grid.
+
+        Parameters
+        ----------
+        displacement : ndarray of shape (frame, n, 2)
+            Lateral, axial, px.
+        quality : ndarray of shape (frame, n)
+
+        Returns
+        -------
+        displacement : ndarray of shape (frame, grid rows, grid columns, 2)
+            Lateral, axial, m; NaN outside the wall.
+        quality : ndarray of shape (frame, grid rows, grid columns)
+        """
+        both = np.full((len(self.frames), *self.inside.shape, 3), np.nan)
+        both[:, self.inside, :2] = displacement * self.spacing
+        both[:, self.inside, 2] = quality
+        return both[..., :2], both[..., 2]
+
+
+def places(config: Config, size: int) -> np.ndarray:
+    """The grid, the same in the tissue at every image size.
+
+    Parameters
+    ----------
+    config : Config
+    size : int
+        Image size in whose pixels the places are told.
+
+    Returns
+    -------
+    ndarray of shape (grid rows, grid columns, 2)
+        Lateral, axial, px; pixel centres of the largest image.
+    """
+    largest = config.bmode.sizes[0]
+    # Pixels of a smaller image are blocks of the largest, and their centres lie between those of the block.
+    return (grid((largest, largest), config.tracking.grid_px) + 0.5) * (size / largest) - 0.5
+
+
+def clips(job: Job) -> dict[int, Clip]:
+    """The clips of a job's heart and view by their size."""
+    config, largest = job.case.config, job.case.config.bmode.sizes[0]
+    masks = {size: job.read(f"truth/{size}", "mask")["mask"][0] for size in config.bmode.sizes}
+    lateral, axial = np.moveaxis(places(config, largest).round().astype(int), -1, 0)
+    inside = masks[largest][axial, lateral]
+    seed, time = int(job.random.integers(2**31)), read_loop(config.loop).time
+    return {
+        size: Clip(
+            frames=job.read(f"bmode/{size}", "image")["image"],
+            mask=mask,
+            inside=inside,
+            points=places(config, size)[inside],
+            spacing=config.bmode.si().field_of_view / size,
+            frame_time=time,
+            seed=seed,
+        )
+        for size, mask in masks.items()
+    }

@@ -1,0 +1,245 @@
+"""Quadratic tetrahedra: shape functions, interpolation and gradients.
+
+Everything that moves with the wall - scatterers, pixels, tracked points - is a
+material point, named by a tetrahedron and local coordinates in it, and carried
+by the shape functions here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.arrays import Floats
+
+Integers = NDArray[np.int32]
+
+EDGES = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])
+"""Vertices beside each mid-edge node 4..9; the order is VTK's."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A ventricle of quadratic (isoparametric) tetrahedra, unloaded.
+
+    Attributes
+    ----------
+    nodes : ndarray of shape (n_nodes, 3), m
+    cells : ndarray of shape (n_cells, 10)
+        Nodes of each tetrahedron: four vertices, then the middles of `EDGES`; positively oriented.
+    endo, epi, base : ndarray of shape (n_facets, 6)
+        Quadratic triangles of the boundary: three vertices, then the middles of edges 01, 12, 20;
+        their normals point out of the wall.
+    fibre, sheet : ndarray of shape (n_cells, 3), optional
+        Directions of fibres and sheets that came with the mesh, of any length.
+    """
+
+    nodes: Floats
+    cells: Integers
+    endo: Integers
+    epi: Integers
+    base: Integers
+    fibre: Floats | None = None
+    sheet: Floats | None = None
+
+
+@dataclass(frozen=True)
+class MaterialPoints:
+    """Points fixed in the material.
+
+    Attributes
+    ----------
+    cell : ndarray of shape (n,)
+        Tetrahedron of each point; -1 is outside the mesh.
+    xi : ndarray of shape (n, 3)
+        Local coordinates in the tetrahedron with corners 000, 100, 010, 001.
+    """
+
+    cell: Integers
+    xi: Floats
+
+    def __len__(self) -> int:
+        return len(self.cell)
+
+
+def shape(xi: Floats) -> Floats:
+    """Quadratic shape functions at local coordinates.
+
+    Parameters
+    ----------
+    xi : ndarray of shape (n, 3)
+
+    Returns
+    -------
+    ndarray of shape (n, 10)
+        Zienkiewicz & Taylor, The Finite Element Method, vol. 1, section 6.
+    """
+    corner = _barycentric(xi)
+    middle = 4 * corner[:, EDGES[:, 0]] * corner[:, EDGES[:, 1]]
+    return np.hstack([corner * (2 * corner - 1), middle])
+
+
+def shape_gradient(xi: Floats) -> Floats:
+    """Derivatives of the shape functions by the local coordinates.
+
+    Parameters
+    ----------
+    xi : ndarray of shape (n, 3)
+
+    Returns
+    -------
+    ndarray of shape (n, 10, 3)
+    """
+    corner = _barycentric(xi)[..., None]
+    slope = np.vstack([-np.ones(3), np.eye(3)])
+    a, b = EDGES.T
+    middle = 4 * (corner[:, a] * slope[b] + corner[:, b] * slope[a])
+    return np.concatenate([(4 * corner - 1) * slope, middle], axis=1)
+
+
+def _barycentric(xi: Floats) -> Floats:
+    return np.column_stack([1 - xi.sum(axis=1), xi])
+
+
+def interpolate(values: Floats, cells: Integers, points: MaterialPoints) -> Floats:
+    """Nodal values carried to material points by the shape functions.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_nodes, ...)
+    cells : ndarray of shape (n_cells, 10)
+    points : MaterialPoints of length n
+        All inside the mesh.
+
+    Returns
+    -------
+    ndarray of shape (n, ...), in the unit of `values`
+    """
+    columns = np.ascontiguousarray(values, float).reshape(len(values), -1)
+    return _interpolate(columns, *_plain(cells, points)).reshape(len(points), *values.shape[1:])
+
+
+def gradient(values: Floats, positions: Floats, cells: Integers, points: MaterialPoints) -> Floats:
+    """Gradient of nodal values by position at material points.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_nodes, ...)
+    positions : ndarray of shape (n_nodes, 3), m
+        Of the nodes in the state by which to differentiate.
+    cells : ndarray of shape (n_cells, 10)
+    points : MaterialPoints of length n
+
+    Returns
+    -------
+    ndarray of shape (n, ..., 3), unit of `values` per metre
+        The deformation gradient, where `values` are the nodes' deformed positions.
+    """
+    columns = np.ascontiguousarray(values, float).reshape(len(values), -1)
+    slopes = _gradient(columns, np.ascontiguousarray(positions, float), *_plain(cells, points))
+    return slopes.reshape(len(points), *values.shape[1:], 3)
+
+
+def jacobian(positions: Floats, cells: Integers, points: MaterialPoints) -> Floats:
+    """Derivative of position by local coordinates at material points.
+
+    Parameters
+    ----------
+    positions : ndarray of shape (n_nodes, 3), m
+    cells : ndarray of shape (n_cells, 10)
+    points : MaterialPoints of length n
+
+    Returns
+    -------
+    ndarray of shape (n, 3, 3), m
+        Its determinant is the volume of tissue per volume of local coordinates.
+    """
+    return np.swapaxes(positions[cells[points.cell]], 1, 2) @ shape_gradient(points.xi)
+
+
+def _plain(cells: Integers, points: MaterialPoints) -> tuple[Integers, Integers, Floats]:
+    """Cells, and cell and local coordinates of points, of one type each, so that little is compiled."""
+    whole = (np.ascontiguousarray(each, np.int32) for each in (cells, points.cell))
+    return (*whole, np.ascontiguousarray(points.xi, float))
+
+
+@numba.njit(cache=True)
+def _interpolate(values, cells, cell, xi):  # pragma: no cover - compiled
+    result, corner, weight = np.empty((len(cell), values.shape[1])), np.empty(4), np.empty(10)
+    for p in range(len(cell)):
+        _corners(xi[p], corner)
+        for a in range(4):
+            weight[a] = corner[a] * (2 * corner[a] - 1)
+        for e in range(6):
+            weight[4 + e] = 4 * corner[EDGES[e, 0]] * corner[EDGES[e, 1]]
+        for k in range(values.shape[1]):
+            total = 0.0
+            for a in range(10):
+                total += weight[a] * values[cells[cell[p], a], k]
+            result[p, k] = total
+    return result
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _gradient(values, positions, cells, cell, xi):  # pragma: no cover - compiled
+    result, corner, slope = np.empty((len(cell), values.shape[1], 3)), np.empty(4), np.empty((3, 10))
+    place, inverse, local = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    for p in range(len(cell)):
+        nodes = cells[cell[p]]
+        _corners(xi[p], corner)
+        _slopes(corner, slope)
+        for i in range(3):
+            _sum(slope, positions, nodes, i, local)
+            for m in range(3):
+                place[m, i] = local[m]
+        _invert(place, inverse)
+        for k in range(values.shape[1]):
+            _sum(slope, values, nodes, k, local)
+            for j in range(3):
+                result[p, k, j] = local[0] * inverse[0, j] + local[1] * inverse[1, j] + local[2] * inverse[2, j]
+    return result
+
+
+@numba.njit(cache=True)
+def _corners(xi, corner):  # pragma: no cover - compiled
+    """Barycentric coordinates, into (4,)."""
+    corner[0] = 1 - (xi[0] + xi[1] + xi[2])
+    for k in range(3):
+        corner[1 + k] = xi[k]
+
+
+@numba.njit(cache=True)
+def _slopes(corner, slope):  # pragma: no cover - compiled
+    """Derivatives of the shape functions by the local coordinates, into (3, 10)."""
+    for m in range(3):
+        for a in range(4):
+            slope[m, a] = (4 * corner[a] - 1) * ((a == m + 1) - (a == 0))
+        for e in range(6):
+            a, b = EDGES[e, 0], EDGES[e, 1]
+            slope[m, 4 + e] = 4 * (corner[b] * ((a == m + 1) - (a == 0)) + corner[a] * ((b == m + 1) - (b == 0)))
+
+
+@numba.njit(cache=True)
+def _sum(slope, values, nodes, column, local):  # pragma: no cover - compiled
+    """Derivatives of a column of nodal values by the local coordinates, into (3,)."""
+    for m in range(3):
+        local[m] = 0.0
+        for a in range(10):
+            local[m] += slope[m, a] * values[nodes[a], column]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _invert(matrix, inverse):  # pragma: no cover - compiled
+    """Inverse of the transpose of a matrix (3, 3), by its cofactors."""
+    for m in range(3):
+        a, b = (m + 1) % 3, (m + 2) % 3
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            inverse[m, i] = matrix[a, j] * matrix[b, k] - matrix[a, k] * matrix[b, j]
+    whole = matrix[0, 0] * inverse[0, 0] + matrix[0, 1] * inverse[0, 1] + matrix[0, 2] * inverse[0, 2]
+    for m in range(3):
+        for i in range(3):
+            inverse[m, i] /= whole

@@ -1,0 +1,163 @@
+"""The scanner: from scatterers to the lines of a frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echotruth.config import Probe, Rf
+from echotruth.imaging.beamforming.aperture import Aperture
+from echotruth.imaging.beamforming.gate import span
+from echotruth.imaging.beamforming.receive import ReceiveFocus
+from echotruth.imaging.beamforming.scan import imaging_depth, points, scan_lines
+from echotruth.imaging.beamforming.synthesis import Synthesis, sampled
+from echotruth.imaging.beamforming.transmit import KINDS, Zone
+from echotruth.imaging.rf.full_matrix import FullMatrix
+
+__all__ = ["Scanner", "checked", "imaging_depth"]
+
+
+class Scanner:
+    """A probe that scans a frame; delays and phases are worked out once for all frames.
+
+    The whole frame is taken of scatterers at rest. There is no multiple scattering.
+
+    What is kept for all frames are 48 bytes a sample of the lines, up to twice that with focal zones, and half a byte a
+    frequency, element and transmit: 60 MB for the default array. A frame takes another 30 MB beside its matrix.
+
+    Parameters
+    ----------
+    probe, rf
+        The array, and its lines and transmits.
+    depth
+        Greatest range, m; see :func:`imaging_depth`.
+
+    Attributes
+    ----------
+    scan : Scan
+        The lines.
+    range : ndarray (ranges,)
+        Of the samples on a line from its foot, m; a step is half a wave path of one RF sample.
+    frequency : float
+        Frequency to which the lines are demodulated, Hz.
+    matrix : FullMatrix
+        The echoes between all pairs.
+    """
+
+    def __init__(self, probe: Probe, rf: Rf, depth: float):
+        p = probe.si()
+        if not np.isfinite(depth) or depth < 20 * p.sound_speed / p.frequency:
+            raise ValueError(f"The depth is {depth:g} m; it must be at least twenty wavelengths.")
+        step = p.sound_speed / (2 * p.sampling)
+        self.scan = scan_lines(probe, rf)
+        self.range = step * np.arange(1, int(depth / step) + 2)
+        zones = KINDS[rf.transmit](probe, rf, self.scan).zones(self.range)
+        latest = max(np.abs(zone.transmits.delay).max() for zone in zones)
+        reach = np.hypot(*points(self.scan, self.range)).max()
+        self.matrix = FullMatrix(probe, reach, latest, rf.accuracy, rf.elevation)
+        self._sampling = sampled(self.matrix)
+        self._focus = [_ZoneFocus(probe, rf, self, zone) for zone in zones]
+        self.frequency = self._focus[0].channels.frequency
+        self._carrier = np.exp(-4j * np.pi * self.frequency / p.sound_speed * self.range).astype(np.complex64)
+
+    @property
+    def angle(self) -> np.ndarray:
+        """Of the lines from the axial axis, shape (lines,), rad; the smallest lateral coordinate first."""
+        return self.scan.angle
+
+    def lines(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+        """Lines of one frame.
+
+        Parameters
+        ----------
+        position
+            Scatterers in the frame of the probe (lateral, axial, elevation), shape (scatterers, 3), m.
+        amplitude
+            Their reflectivity, shape (scatterers,), 1.
+
+        Returns
+        -------
+        Shape (lines, ranges), complex64, demodulated by exp(-2 pi i frequency 2 range / c): a scatterer that moves
+        away by d turns the phase by -4 pi frequency d / c.
+        """
+        return self.beamform(self.matrix(*checked(position, amplitude)))
+
+    def beamform(self, matrix: np.ndarray) -> np.ndarray:
+        """Lines (lines, ranges) of one frame, as :meth:`lines`, of its full matrix (bins, elements, elements)."""
+        lines = np.zeros((len(self.scan.angle), len(self.range)), np.complex64)
+        gated = any(focus.channels.gate for focus in self._focus)
+        echoes = self._sampling.in_time(matrix) if gated else None
+        for focus in self._focus:
+            gate = focus.channels.gate
+            lines[:, focus.zone.part] += focus(gate.spectra(echoes) if gate else matrix)
+        lines *= self._carrier
+        return lines
+
+
+class _ZoneFocus:
+    """The part of the lines in a zone.
+
+    Parameters
+    ----------
+    probe, rf
+        As of the scanner.
+    scanner
+        Its scan, ranges and matrix.
+    zone
+        The waves, the samples of a line that they serve, and their share there.
+    """
+
+    def __init__(self, probe: Probe, rf: Rf, scanner: Scanner, zone: Zone):
+        p, scan = probe.si(), scanner.scan
+        self.zone, self._range = zone, scanner.range[zone.part]
+        self._points = points(scan, self._range)
+        needed = span(probe, zone, self._range, self._points) if len(zone.transmits.foci) else None
+        self.channels = Synthesis(scanner.matrix, p.frequency, zone.transmits, needed)
+        self._before = p.sound_speed * self.channels.start
+        self._receive = ReceiveFocus(
+            Aperture(probe, rf),
+            scan.foot,
+            self._range,
+            self._points,
+            frequency=self.channels.carrier,
+            sampling=self.channels.sampling,
+            sound_speed=p.sound_speed,
+        )
+
+    def __call__(self, matrix: np.ndarray) -> np.ndarray:
+        """Before demodulation, (lines, ranges of the zone), complex64.
+
+        Parameters
+        ----------
+        matrix
+            Of the whole record, or of the gate of the zone: shape (bins, elements, elements).
+        """
+        transmits = self.zone.transmits
+        lines = np.zeros(self._points[0].shape, np.complex64)
+        for part, channels in self.channels(matrix):
+            if len(transmits.foci):
+                path = np.tile(self._range - self._before, (len(channels), 1))
+                self._receive(lines, part.start, channels, np.arange(len(channels)), path)
+                continue
+            for number in range(part.start, part.stop):
+                path = transmits.path(number, *self._points)
+                which = np.full(len(lines), number - part.start)
+                self._receive(lines, 0, channels, which, path)
+        lines *= self.zone.share
+        return lines
+
+
+def checked(position: np.ndarray, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Scatterers as contiguous float64 arrays, or a ValueError that says what is wrong with them."""
+    position = np.ascontiguousarray(position, np.float64)
+    amplitude = np.ascontiguousarray(amplitude, np.float64)
+    if position.ndim != 2 or position.shape[1] != 3 or amplitude.shape != position.shape[:1]:
+        raise ValueError(
+            f"Scatterers need positions (n, 3) and amplitudes (n,); got {position.shape} and {amplitude.shape}."
+        )
+    if not len(position):
+        raise ValueError("There are no scatterers to image.")
+    if not (np.isfinite(position).all() and np.isfinite(amplitude).all()):
+        raise ValueError("Positions and amplitudes of scatterers must be finite numbers.")
+    if position[:, 1].min() <= 0:
+        raise ValueError("Scatterers must lie in front of the array: their axial coordinate must be positive.")
+    return position, amplitude

@@ -1,0 +1,36 @@
+"""Attenuation proportional to frequency, applied to the traces of all echoes at once.
+
+In a full matrix the time of arrival tells the path, so that exp(-alpha (f - f0) c t) may be applied after the echoes
+have been summed. As a function of time and frequency it is of low rank: a few courses in time, each with a filter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echotruth.arrays import Floats
+
+ERROR = 1e-6
+"""Relative error of the sum of products."""
+
+
+def separated(rate: Floats, time: Floats) -> tuple[Floats, Floats]:
+    """Courses in time and filters whose products sum to exp(-rate time).
+
+    Parameters
+    ----------
+    rate : ndarray of shape (bins,), 1/s
+        Of either sign.
+    time : ndarray of shape (samples,), s
+
+    Returns
+    -------
+    courses : ndarray of shape (rank, samples)
+    filters : ndarray of shape (rank, bins)
+    """
+    if not rate.any():
+        return np.ones((1, len(time))), np.ones((1, len(rate)))
+    damping = np.exp(-np.multiply.outer(rate, time))
+    left, size, right = np.linalg.svd(damping, full_matrices=False)
+    rank = int((size > ERROR * size[0]).sum())
+    return right[:rank], (left[:, :rank] * size[:rank]).T

@@ -1,0 +1,79 @@
+"""Matrix products in single precision, rounded alike on every machine.
+
+A tile of the product stays in registers while the sum runs; sums run in the order of the rows, each step rounded once.
+"""
+
+from __future__ import annotations
+
+import numba
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
+
+from echotruth.imaging.rf.vectors import LANES, VECTOR, Vectors
+
+HEIGHT, WIDTH = 4, 16
+"""Rows and columns of a tile."""
+
+
+def padded(count, multiple=WIDTH):
+    """The least multiple that is no less than a count, or than each of an array."""
+    return -(-count // multiple) * multiple
+
+
+@intrinsic
+def tile(typing_context, weights, rows, i, n, out, more):
+    """out[i : i + HEIGHT, n : n + WIDTH] = weights[:, i : i + HEIGHT].T @ rows[:, n : n + WIDTH], or `more` by that."""
+    matrix = types.Array(types.float32, 2, "C")
+    if (weights, rows, out) != (matrix, matrix, matrix):
+        raise TypingError("tile takes contiguous matrices of float32")
+
+    def generate(context, builder, signature, arguments):
+        weights, rows, i, n, out, more = arguments
+        vectors = Vectors(context, builder)
+        parts, nothing = range(WIDTH // LANES), ir.Constant(VECTOR, [0.0] * LANES)
+        targets, sums = [], []
+        for height in range(HEIGHT):
+            target = vectors.place(matrix, out, builder.add(i, ir.Constant(i.type, height)), n)
+            targets.append(builder.bitcast(target, VECTOR.as_pointer()))
+            found = [builder.select(more, vectors.load(targets[-1], part), nothing) for part in parts]
+            sums.append([cgutils.alloca_once_value(builder, value) for value in found])
+        count = builder.extract_value(context.make_array(matrix)(context, builder, rows).shape, 0)
+        with cgutils.for_range(builder, count) as loop:
+            row, weight = vectors.place(matrix, rows, loop.index, n), vectors.place(matrix, weights, loop.index, i)
+            row = builder.bitcast(row, VECTOR.as_pointer())
+            right = [vectors.load(row, part) for part in parts]
+            for height in range(HEIGHT):
+                left = vectors.filled(builder.load(builder.gep(weight, [ir.Constant(ir.IntType(64), height)])))
+                for part, total in enumerate(sums[height]):
+                    builder.store(vectors.fused(left, right[part], builder.load(total)), total)
+        for target, totals in zip(targets, sums, strict=True):
+            for part, total in enumerate(totals):
+                vectors.store(builder.load(total), target, part)
+        return context.get_dummy_value()
+
+    return types.void(matrix, matrix, types.intp, types.intp, matrix, types.boolean), generate
+
+
+@numba.njit(cache=True)
+def product(weights, rows, out, half=False, more=False):
+    """Write weights.T @ rows to a matrix, as much of it as is asked for.
+
+    Parameters
+    ----------
+    weights
+        Shape (m, i or more), float32.
+    rows
+        Shape (m, n or more), float32.
+    out
+        Written: shape (i, n), float32; i is a multiple of HEIGHT, n of WIDTH.
+    half
+        Whether only the columns from the row on are needed; those before may be left as they are.
+    more
+        Whether the product is added to what is in the matrix.
+    """
+    for n in range(0, out.shape[1], WIDTH):
+        for i in range(0, min(n + WIDTH, len(out)) if half else len(out), HEIGHT):
+            tile(weights, rows, i, n, out, more)

@@ -1,0 +1,68 @@
+"""Passive laws of the wall, one module each.
+
+A module here is a law if it has two names. `Law` is its section of the configuration, a `Material`
+with a key `law` that is the name of the module. `energy(e, constants, stress, tangent)` is a plain
+function that Numba can compile: given the isochoric Green-Lagrange strain e, shape (6,), in the
+order ff, ss, nn, fs, fn, sn (tensor components), and the numbers of `Law.constants`, it returns
+W / C, and fills `stress`, dW/dE / C of shape (6,), and `tangent`, shape (6, 6), which turns a strain
+with doubled shear into a stress. Whoever adds a law adds such a file and nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import Annotated, Any, Union
+
+from pydantic import Discriminator, Tag
+
+from echotruth.materials.material import Material
+
+DEFAULT = "fung"
+"""The law where none is named."""
+
+
+def _laws() -> dict[str, ModuleType]:
+    names = sorted(module.name for module in iter_modules(__path__) if module.name != "material")
+    return {name: import_module(f"{__name__}.{name}") for name in names}
+
+
+LAWS = _laws()
+"""Name to module of each law."""
+
+
+def _named(values: Any) -> Any:
+    """Name of the law a section of the configuration asks for."""
+    return values.get("law", DEFAULT) if isinstance(values, dict) else getattr(values, "law", DEFAULT)
+
+
+AnyLaw = Annotated[
+    Union[tuple(Annotated[module.Law, Tag(name)] for name, module in LAWS.items())],  # noqa: UP007
+    Discriminator(_named),
+]
+"""Section of any of the laws."""
+
+
+@cache
+def compiled(name: str) -> Callable:
+    """The energy of a law as a function that compiled code calls.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    numba CFunc
+        Of one type for all laws, so that the element is compiled once.
+    """
+    from numba import cfunc, float64
+
+    signature = float64(float64[::1], float64[::1], float64[::1], float64[:, ::1])
+    return cfunc(signature, cache=True, error_model="numpy")(LAWS[name].energy)
+
+
+__all__ = ["DEFAULT", "LAWS", "AnyLaw", "Material", "compiled"]

@@ -1,0 +1,92 @@
+"""What a ventricle must be to be solved; anything else is refused in one sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.fem.quadrature import tetrahedron
+from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape_gradient
+from echotruth.mechanics.solver.cavity import cavity_volume
+
+CAVITIES = (0.1e-9, 5e-3)
+"""Volumes (m^3) that a cavity may have: 0.1 uL, an embryo's, to 5 L, an elephant's."""
+
+FLATTEST = 0.02
+"""Smallest scaled Jacobian of a tetrahedron, 1 for the regular one; 0.1 is poor, 0 is flat
+(Knupp, Finite Elem Anal Des 39 (2003) 217)."""
+
+
+class GeometryError(ValueError):
+    """A ventricle that cannot be meshed."""
+
+
+def jacobians(nodes: Floats, cells: Integers) -> NDArray[np.float64]:
+    """Volume of tissue per volume of local coordinates, at the quadrature points.
+
+    Parameters
+    ----------
+    nodes : ndarray of shape (n_nodes, 3), m
+    cells : ndarray of shape (n_cells, 10)
+
+    Returns
+    -------
+    ndarray of shape (n_cells, 14), m^3
+    """
+    return np.linalg.det(np.einsum("cai,qaj->cqij", nodes[cells], shape_gradient(tetrahedron()[0])))
+
+
+def scaled_jacobian(nodes: Floats, cells: Integers) -> Floats:
+    """Shape of the straight tetrahedra between the vertices.
+
+    Parameters
+    ----------
+    nodes : ndarray of shape (n_nodes, 3), m
+    cells : ndarray of shape (n_cells, 4 or more)
+        Of which the first four nodes are the vertices.
+
+    Returns
+    -------
+    ndarray of shape (n_cells,)
+        sqrt(2) times six times the volume, over the largest product of the three edges at a vertex: 1 for the
+        regular tetrahedron, 0 for a flat one, negative for an inverted one.
+    """
+    corner = nodes[cells[:, :4]]
+    edge = corner[:, :, None] - corner[:, None]
+    length = np.linalg.norm(edge, axis=-1)
+    product = np.max([np.prod([length[:, i, j] for j in range(4) if j != i], axis=0) for i in range(4)], axis=0)
+    volume = np.einsum("ci,ci->c", np.cross(edge[:, 1, 0], edge[:, 2, 0]), edge[:, 3, 0])
+    return np.sqrt(2) * volume / np.maximum(product, np.finfo(float).tiny)
+
+
+def check_turned(mesh: Mesh, source: str, remedy: str) -> None:
+    """Refuse tetrahedra that are inside out; `source` and `remedy` begin and end the sentence."""
+    inside_out = np.count_nonzero(jacobians(mesh.nodes, mesh.cells).min(axis=1) <= 0)
+    if inside_out:
+        raise GeometryError(
+            f"{source}: {inside_out} of {len(mesh.cells)} tetrahedra of the wall are inside out: {remedy}"
+        )
+
+
+def check_flat(mesh: Mesh, source: str, remedy: str) -> None:
+    """Refuse tetrahedra without a volume to speak of."""
+    flat = np.count_nonzero(scaled_jacobian(mesh.nodes, mesh.cells) < FLATTEST)
+    if flat:
+        raise GeometryError(
+            f"{source}: {flat} of {len(mesh.cells)} tetrahedra of the wall are flat (scaled Jacobian below "
+            f"{FLATTEST:g}): {remedy}"
+        )
+
+
+def check_cavity(mesh: Mesh, source: str, remedy: str) -> None:
+    """Refuse a cavity that no heart has."""
+    volume = cavity_volume(mesh.nodes, mesh.endo)
+    if not CAVITIES[0] <= volume <= CAVITIES[1]:
+        raise GeometryError(f"{source}: the cavity holds {_readable(volume)}, no heart has that: {remedy}")
+
+
+def _readable(volume: float) -> str:
+    for size, name in ((1e-3, "L"), (1e-6, "mL")):
+        if abs(volume) >= size:
+            return f"{volume / size:.3g} {name}"
+    return f"{volume / 1e-9:.3g} uL"

@@ -1,0 +1,1 @@
+"""The trackers, one module a method; each has a function `track`."""

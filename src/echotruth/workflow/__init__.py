@@ -1,0 +1,1 @@
+"""What the Snakemake workflow runs with: jobs and their cost, compiled functions, execution and progress."""

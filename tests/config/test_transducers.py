@@ -1,0 +1,79 @@
+"""Arrays by name: complete, sampled, and as their sources print them."""
+
+import numpy as np
+import pytest
+
+from echotruth.cases import expand, table
+from echotruth.config import Config, Probe
+from echotruth.config.loading import ConfigError, resolved, validate
+from echotruth.config.transducers import OPEN, PRESETS
+from echotruth.imaging.rf.probe import HIGHEST, pulse_band
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_preset_settles_every_key_that_is_left_open(name):
+    probe = Probe(preset=name)
+    assert all(getattr(probe, key) is not None for key in OPEN)
+    assert {key: getattr(probe, key) for key in PRESETS[name]} == PRESETS[name]
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_preset_is_sampled_to_the_faint_edge_of_its_pulse(name):
+    """The Gaussian spectrum is below 1 % at sqrt(ln 100 / ln 2) times its -6 dB half-width."""
+    probe = Probe(preset=name)
+    edge = probe.frequency_MHz * (1 + probe.bandwidth * np.sqrt(np.log(100) / np.log(2)) / 2)
+    assert probe.sampling_MHz * HIGHEST > edge
+    assert pulse_band(probe)[1] == pytest.approx(edge * 1e6, rel=1e-3)
+
+
+def test_human_array_is_the_p4_2v():
+    """Frequency, bandwidth, pitch, width, height and focus of PyMUST's getparam('P4-2v')."""
+    probe = Probe(preset="human_2_7MHz").si()
+    found = (probe.frequency, probe.bandwidth, probe.pitch, probe.width, probe.height, probe.elevation_focus)
+    assert found == pytest.approx((2.72e6, 0.74, 300e-6, 250e-6, 14e-3, 60e-3))
+    assert probe.elements == 64
+
+
+def test_a_key_given_stands_on_top_of_the_preset():
+    probe = Probe(preset="human_2_7MHz", elements=96)
+    assert (probe.elements, probe.pitch_um) == (96, 300)
+
+
+def test_sampling_follows_a_band_that_is_given():
+    assert Probe(frequency_MHz=50.0).sampling_MHz == 200
+    assert Probe(bandwidth=1.0).sampling_MHz * HIGHEST > 25 * (1 + np.sqrt(np.log(100) / np.log(2)) / 2)
+    assert Probe(frequency_MHz=20.0, sampling_MHz=70.0).sampling_MHz == 70
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [{"sampling_MHz": 70.0}, {"bandwidth": 1.1, "sampling_MHz": 100.0}, {"frequency_MHz": 40.0, "sampling_MHz": 100.0}],
+)
+def test_band_above_the_nyquist_frequency_is_refused(keys):
+    with pytest.raises(ConfigError, match=r"^a\.yaml: probe\.frequency_MHz = .*: its band reaches .*, or sample at"):
+        validate({"probe": keys}, "a.yaml")
+
+
+def test_unknown_array_is_refused_with_those_there_are():
+    with pytest.raises(ConfigError, match=r"probe\.preset = 'mouse': should be 'mouse_25MHz', .* or 'human_2_7MHz'"):
+        validate({"probe": {"preset": "mouse"}}, "a.yaml")
+
+
+def test_values_of_a_preset_are_not_pinned_when_a_case_changes_it():
+    cases = expand(Config(probe=Probe(width_um=30.0), cases={"probe.preset": ["mouse_25MHz", "mouse_40MHz"]}))
+    assert [case.config.probe.pitch_um for case in cases] == [46, 38]
+    assert [case.config.probe.width_um for case in cases] == [30, 30]
+    assert list(table(cases)["probe.pitch_um"]) == [46, 38]
+
+
+def test_a_configuration_written_and_read_is_the_same():
+    config = validate({"probe": {"preset": "human_2_7MHz", "elements": 96}}, "a.yaml")
+    again = validate(config.model_dump(), "b.yaml")
+    assert again == config
+    assert resolved(again, {"probe.preset": "mouse_30MHz"}).probe.pitch_um == 50
+
+
+def test_settled_probe_says_every_value():
+    written = Probe(preset="rat_15MHz").settled().model_dump()
+    assert written["pitch_um"] == 77 and written["sampling_MHz"] == 60
+    assert Probe(**written) == Probe(preset="rat_15MHz")

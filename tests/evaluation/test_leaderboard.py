@@ -1,0 +1,170 @@
+"""The order of trackers, and how sure it is."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking, View
+from echotruth.evaluation.leaderboard import best, interval, ranks, rows, standings
+from echotruth.repository.schema import EVALUATION, LABELS
+
+
+def scores(values, views=("mid",), failure=""):
+    """Rows of trackers: name to one NRMSE (%) a heart, the same in all views."""
+    lines = [
+        {"case": f"heart{k}", "view": view, "size_px": 64, "tracker": name, "nrmse_all_percent": value}
+        for name, each in values.items()
+        for k, value in enumerate(each)
+        for view in views
+    ]
+    strains = {f"{name}_rms_points": 1.0 for name in ("ecc", "ell", "err")}
+    return pd.DataFrame(lines).assign(**strains, failure=failure)
+
+
+def overall(table):
+    return table[table["view"] == "all"].set_index("tracker")
+
+
+def test_interval_of_two_hearts_is_the_whole_range():
+    # Each heart is drawn twice in a quarter of the draws: more than 2.5 %.
+    low, high = interval(np.array([[1.0], [3.0]]), np.random.default_rng(0).integers(2, size=(2000, 2)))
+    assert low == 1 and high == 3
+
+
+def test_interval_of_many_hearts_is_that_of_normal_theory():
+    random = np.random.default_rng(1)
+    values = random.normal(5, 2, (400, 1))
+    low, high = interval(values, random.integers(400, size=(4000, 400)))
+    expected = values.mean() + 1.96 * values.std() / 20 * np.array([-1, 1])
+    np.testing.assert_allclose([low[0], high[0]], expected, atol=0.02)
+
+
+def test_trackers_alike_share_a_rank():
+    np.testing.assert_array_equal(ranks(np.array([3.0, 1.0, 1.0, 2.0, np.nan])), [4, 1, 1, 3, np.nan])
+    table = overall(standings(scores({"a": [5, 7, 9], "b": [5, 7, 9], "c": [6, 8, 10]}), 1))
+    assert list(table["rank"]) == [1, 1, 3]
+    assert (table.loc["a"].drop("hearts") == table.loc["b"].drop("hearts"))[["rank_low", "rank_high"]].all()
+
+
+def test_a_tracker_better_on_every_heart_is_first_for_sure_and_one_that_swaps_is_not():
+    table = overall(standings(scores({"b": [4, 9, 4, 9, 5], "a": [1, 2, 3, 2, 1], "c": [9, 4, 9, 4, 6]}), 1))
+    assert list(table.index) == ["a", "b", "c"]
+    assert list(table.loc["a", ["rank_low", "rank_high"]]) == [1, 1]
+    assert list(table.loc["b", ["rank_low", "rank_high"]]) == [2, 3]
+
+
+def test_one_heart_has_an_order_and_no_interval():
+    table = overall(standings(scores({"a": [5], "b": [4]}), 1))
+    assert list(table.index) == ["b", "a"] and list(table["rank"]) == [1, 2]
+    assert table[[name for name in table if name.endswith(("_low", "_high"))]].isna().all(axis=None)
+
+
+def test_a_tracker_not_tried_on_every_clip_has_no_rank():
+    whole = scores({"a": [5, 5], "b": [1, 1]}, views=("mid", "apex"))
+    table = standings(whole[~((whole["tracker"] == "b") & (whole["view"] == "apex") & (whole["case"] == "heart1"))], 1)
+    assert overall(table).loc["a", "rank"] == 1 and np.isnan(overall(table).loc["b", "rank"])
+    assert list(overall(table)["hearts"]) == [2, 1] and best(table) == ["a", "b"]
+    mid = table[table["view"] == "mid"].set_index("tracker")
+    assert mid.loc["b", "rank"] == 1
+
+
+@pytest.mark.parametrize("failure", ["b: no motion found", ""])
+def test_losing_the_hard_clip_does_not_pay(failure):
+    """Of two trackers alike, one has no answer on the clip with the largest errors, and says so or not."""
+    whole = scores({"a": [5, 5], "b": [5, 5]}, views=("mid", "apex"))
+    hard = (whole["case"] == "heart1") & (whole["view"] == "apex")
+    whole = whole.assign(epe_um=np.where(hard, 40.0, 10.0), coverage_percent=100.0)
+    lost = hard & (whole["tracker"] == "b")
+    figures = ["epe_um", "ecc_rms_points", "ell_rms_points", "err_rms_points"]
+    whole.loc[lost, figures] = np.nan
+    whole.loc[lost, ["nrmse_all_percent", "coverage_percent", "failure"]] = 100.0, 0.0, failure
+    table = standings(whole, 1)
+    means = overall(table)
+    assert list(means["rank"]) == [1, 2] and list(means["nrmse_all_percent"]) == [5, 28.75]
+    assert means.loc["a", "epe_um"] == 17.5 and means.loc["b", "coverage_percent"] == 75
+    bounds = [f"{name}_{end}" for name in figures[1:] for end in ("low", "high")]
+    assert means.loc["a", [*figures, *bounds]].notna().all() and means.loc["b", [*figures, *bounds]].isna().all()
+    assert means["nrmse_all_percent_high"].notna().all() and means.loc["b", "failures"] == bool(failure)
+    mid, apex = (table[table["view"] == view].set_index("tracker") for view in ("mid", "apex"))
+    assert list(mid["epe_um"]) == [10, 10] and apex["epe_um"].isna().tolist() == [False, True]
+
+
+def test_views_that_show_a_strain_to_no_tracker_do_not_count_in_its_mean():
+    whole = scores({"a": [5, 6], "b": [7, 8]}, views=("mid", "long_axis"))
+    whole.loc[whole["view"] == "mid", "ell_rms_points"] = np.nan
+    table = standings(whole, 1)
+    assert (overall(table)[["ell_rms_points", "ell_rms_points_low", "ell_rms_points_high"]] == 1).all(axis=None)
+    assert table[table["view"] == "mid"]["ell_rms_points"].isna().all()
+
+
+def test_a_mean_over_views_is_one_of_hearts():
+    table = scores({"a": [4, 8]}, views=("mid", "apex"))
+    table.loc[table["view"] == "apex", "nrmse_all_percent"] *= 3
+    found = standings(table, 1)
+    assert list(found["nrmse_all_percent"]) == [12, 6, 18] and list(found["view"]) == ["all", "mid", "apex"]
+
+
+def test_the_seed_decides_the_draws():
+    table = scores({"a": np.random.default_rng(0).normal(9, 1, 7), "b": np.random.default_rng(1).normal(9, 1, 7)})
+    pd.testing.assert_frame_equal(standings(table, 3), standings(table, 3))
+    assert not standings(table, 3).equals(standings(table, 4))
+
+
+CONFIG = Config(
+    views={"mid": View(), "long_axis": View(plane="long_axis")},
+    bmode=Bmode(size_px=64, downsampling=(1,)),
+    tracking=Tracking(trackers={name: PhaseCorrelation(window_px=16) for name in ("one", "two")}),
+)
+LENGTHS = {"case": 3, "view": 2, "tracker": 2, "frame": 4, "axial": 2, "lateral": 2, "region": 7, "aha": 17, "plane": 2}
+
+
+@pytest.fixture
+def tree():
+    """Three hearts of which everything is 0.1 or, of the second tracker, 0.2."""
+    lengths = LENGTHS | {name: len(labels) for name, labels in LABELS.items()}
+    data = {}
+    for array in EVALUATION:
+        values = np.full([lengths[dim] for dim in array.dims], 0.1)
+        if "tracker" in array.dims:
+            values[:, :, 1] *= 2
+        data[array.name] = (array.dims, values)
+    hearts = xr.Dataset(data, coords={"case": ["a", "b", "c"]})
+    return xr.DataTree.from_dict({"/evaluation/64": hearts})
+
+
+def test_rows_are_of_the_hearts_that_count(tree, tmp_path):
+    table = rows(tree, CONFIG, np.array([0, 2]), tmp_path)
+    assert list(table["case"]) == ["a"] * 4 + ["c"] * 4 and list(table["tracker"]) == ["one", "two"] * 4
+    assert list(table["nrmse_percent"][:2]) == [10, 20] and (table["failure"] == "").all()
+    assert table["ecc_rms_points"].isna().tolist() == [False, False, True, True] * 2
+
+
+def test_a_failure_is_told_from_the_ledger(tree, tmp_path):
+    (tmp_path / "ledger/tracking/b").mkdir(parents=True)
+    record = {"failures": {"two/64": "two: no motion found"}}
+    (tmp_path / "ledger/tracking/b/mid.json").write_text(json.dumps(record))
+    table = rows(tree, CONFIG, np.arange(3), tmp_path)
+    assert list(table[table["failure"] != ""][["case", "view", "tracker"]].iloc[0]) == ["b", "mid", "two"]
+    assert overall(standings(table, 1)).loc["two", "failures"] == 1
+
+
+def test_guests_stand_beside_the_others_on_the_clips_that_count(tree, tmp_path):
+    (tmp_path / "guests").mkdir()
+    own = rows(tree, CONFIG, np.arange(3), tmp_path)
+    guest = own[own["tracker"] == "one"].assign(tracker="mine", nrmse_all_percent=1.0, failure=np.nan)
+    guest.to_csv(tmp_path / "guests/mine.csv", index=False)
+    own.assign(nrmse_all_percent=0.0).to_csv(tmp_path / "guests/one.csv", index=False)
+    table = rows(tree, CONFIG, np.arange(2), tmp_path)
+    assert len(table) == 12 and set(table["case"]) == {"a", "b"}
+    assert best(standings(table, 1)) == ["mine", "one", "two"]
+    assert (table["failure"] == "").all()
+
+
+def test_a_table_of_a_guest_without_a_column_is_refused(tree, tmp_path):
+    (tmp_path / "guests").mkdir()
+    pd.DataFrame({"case": ["a"]}).to_csv(tmp_path / "guests/mine.csv", index=False)
+    with pytest.raises(ValueError, match=r"mine\.csv: has no column view: evaluate that tracker again"):
+        rows(tree, CONFIG, np.arange(3), tmp_path)

@@ -1,0 +1,384 @@
+"""`echotruth evaluate` scores anyone's tracker on a repository whose motion is an affine map."""
+
+import runpy
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+import zarr
+
+from echotruth.cases import expand
+from echotruth.cli import main
+from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tracking, View
+from echotruth.config.tracking import Guest
+from echotruth.evaluation import scoring
+from echotruth.evaluation.digest import digest
+from echotruth.evaluation.tracker_options import entrant
+from echotruth.heart import Heart
+from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.truth import truth
+from echotruth.imaging.view import plane
+from echotruth.mechanics.fibres import wall_depth
+from echotruth.mechanics.geometry import left_ventricle
+from echotruth.repository import layout, ledger, schema
+from echotruth.repository.ledger import record_path
+from echotruth.repository.store import Store
+from echotruth.tracking import grid
+from echotruth.workflow.job import Job
+
+ROOT = Path(__file__).parents[2]
+COURSE = np.array([0, 0.4, 1, 0.3])
+"""Share of the motion in each frame."""
+
+CONFIG = Config(
+    name="small",
+    geometry=Geometry(circumferential_elements=12, longitudinal_elements=4, transmural_elements=1),
+    loop=Loop(frames=len(COURSE)),
+    views={"mid": View(), "apex": View(position=0.7)},
+    bmode=Bmode(size_px=128, downsampling=(1, 2)),
+    tracking=Tracking(
+        grid_px=2,
+        trackers={
+            "ours": PhaseCorrelation(window_px=32),
+            "lot": Guest(track="guests:drawn"),
+            "poor": Guest(track="guests:small_only"),
+        },
+    ),
+    cases={"seed": [1, 2]},
+)
+
+GUESTS = """
+import os
+import numpy as np
+
+def exact(frames, points, mask, spacing, frame_time, seed, course, gradient, shift):
+    place = (points + 0.5) * spacing
+    return np.multiply.outer(course, place @ np.transpose(gradient) + shift) / spacing
+
+def still(frames, points, mask, spacing, frame_time, seed):
+    return np.zeros((len(frames), *points.shape))
+
+def small_only(frames, points, mask, spacing, frame_time, seed):
+    if frames.shape[-1] > 64:
+        raise MemoryError("no room")
+    return still(frames, points, mask, spacing, frame_time, seed)
+
+def drawn(frames, points, mask, spacing, frame_time, seed):
+    return np.random.default_rng(seed).normal(size=(1, *points.shape)) * np.arange(len(frames))[:, None, None]
+
+def crash(*given):
+    os._exit(1)
+"""
+
+PROGRAM = """
+import sys
+import numpy as np
+clip = np.load(sys.argv[1])
+np.savez(sys.argv[2], displacement=np.zeros((len(clip["frames"]), *clip["points"].shape)))
+"""
+
+
+def heart(affine):
+    """A ventricle moved by an affine map: deformation gradient and shift (m)."""
+    mesh, (matrix, shift) = left_ventricle(CONFIG.geometry), affine
+    motion = np.multiply.outer(COURSE, mesh.nodes @ (matrix - np.eye(3)).T + shift)
+    return Heart(mesh.nodes, mesh.cells, motion, wall_depth(mesh), mesh.endo, layers=6, es=2), mesh
+
+
+def write(store, group, place, **values):
+    """What one job writes of a group; arrays not given are zero."""
+    opened = zarr.open_group(store.path, path=group, mode="r")
+    shapes = {array.name: opened[array.name].shape[array.leading :] for array in schema.ALL[group.partition("/")[0]]}
+    store.write(group, {name: np.zeros(shape) for name, shape in shapes.items()} | values, *place)
+
+
+def write_clip(folder, store, case, place, beating, view):
+    """Phantom, truth, images of noise and their records."""
+    where = plane(CONFIG.views[view], CONFIG.rf, beating.positions(0)[beating.endo.ravel()])
+    write(store, "phantom", place, origin=where.origin, axes=where.axes, centre=[0, CONFIG.rf.si().focus])
+    random = np.random.default_rng(place)
+    for size in CONFIG.bmode.sizes:
+        mask = truth(beating, where, *pixel_centres(CONFIG.bmode, size))["mask"][0]
+        store.write(f"truth/{size}", {"mask": np.broadcast_to(mask, (len(COURSE), size, size))}, *place)
+        store.write(f"bmode/{size}", {"image": random.integers(0, 256, (len(COURSE), size, size))}, *place)
+    for stage in ("truth", "bmode"):
+        files = [file for size in CONFIG.bmode.sizes for file in store.files(f"{stage}/{size}", *place)]
+        record = {"status": "complete", "sha256": ledger.checksums(files, store.path)}
+        ledger.commit(record_path(folder, stage, case, view), record)
+
+
+@pytest.fixture(scope="module")
+def made(affine, tmp_path_factory):
+    """Folder of a repository of two hearts, of which the second has one view only."""
+    folder = tmp_path_factory.mktemp("made") / "small"
+    folder.mkdir()
+    (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG.model_dump(mode="json"), sort_keys=False))
+    cases = [case.id for case in expand(CONFIG)]
+    ledger.register(folder / "registry.txt", cases)
+    beating, mesh = heart(affine)
+    store = Store(folder / "small.zarr")
+    labels = layout.labels(CONFIG, cases, np.zeros((2, len(COURSE)))) | layout.positions(CONFIG, pixel_centres, grid)
+    store.lay_out(schema.groups(CONFIG), layout.sizes(mesh), labels)
+    for row, case in enumerate(cases):
+        write(store, "geometry", (row,), node_position=mesh.nodes, cell_node=mesh.cells, endo=mesh.endo)
+        write(store, "fibres", (row,), wall_depth=beating.wall_depth)
+        write(store, "pathology", (row,))
+        write(store, "mechanics", (row,), displacement=beating.displacement, es_frame=beating.es)
+        for index, view in enumerate(list(CONFIG.views)[: 2 - row]):
+            write_clip(folder, store, case, (row, index), beating, view)
+    return folder
+
+
+@pytest.fixture
+def evaluate(made, tmp_path, monkeypatch, capsys):
+    """Run the command where the guests are; its status, output and errors."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    monkeypatch.delitem(sys.modules, "guests", raising=False)
+    Path("guests.py").write_text(GUESTS)
+
+    def run(*arguments, repository=made):
+        monkeypatch.setattr(sys, "argv", ["echotruth", "evaluate", str(repository), *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        return left.value.code, *capsys.readouterr()
+
+    return run
+
+
+def scores(made, name):
+    return pd.read_csv(made / f"guests/{name}.csv")
+
+
+def in_image(affine, view):
+    """The affine map in the image: its gradient less one, and the shift of the corner of the first pixel (m)."""
+    matrix, shift = affine[0] - np.eye(3), affine[1]
+    beating, _ = heart(affine)
+    where = plane(CONFIG.views[view], CONFIG.rf, beating.positions(0)[beating.endo.ravel()])
+    axial, lateral = pixel_centres(CONFIG.bmode, 128)
+    corner = np.array([lateral[0], axial[0]]) - CONFIG.bmode.si().field_of_view / 128 / 2
+    axes = where.axes[:2]
+    return axes @ matrix @ axes.T, axes @ (matrix @ (where.origin + corner @ axes) + shift)
+
+
+def test_tracker_that_knows_the_motion_has_no_error_at_any_size(made, evaluate, affine):
+    gradient, shift = in_image(affine, "mid")
+    options = {"course": COURSE.tolist(), "gradient": gradient.tolist(), "shift": shift.tolist()}
+    given = [word for key, value in options.items() for word in ("--option", f"{key}={value}")]
+    status, said, complaint = evaluate("--tracker", "guests:exact", "--view", "mid", *given)
+    assert (status, complaint) == (0, "")
+    table = scores(made, "guests_exact")
+    assert str(made / "guests/guests_exact.csv") in said
+    assert list(table["size_px"]) == [128, 64, 128, 64]
+    assert (table["nrmse_percent"] < 1e-3).all() and (table["coverage_percent"] == 100).all()
+
+
+def test_tracker_that_sees_no_motion_is_off_by_all_of_it(made, evaluate):
+    assert evaluate("--tracker", "guests:still")[0] == 0
+    table = scores(made, "guests_still")
+    np.testing.assert_allclose(table["nrmse_percent"], 100)
+    assert list(table.columns[:4]) == ["case", "view", "size_px", "tracker"] and table.columns[-1] == "failure"
+    assert set(table["tracker"]) == {"guests_still"} and table["failure"].isna().all()
+
+
+def test_every_complete_clip_is_tried_and_no_other(made, evaluate):
+    first, second = (case.id for case in expand(CONFIG))
+    evaluate("--tracker", "guests:still", "--name", "all")
+    tried = list(scores(made, "all")[["case", "view", "size_px"]].itertuples(index=False, name=None))
+    assert tried == [
+        (*place, size) for place in ((first, "mid"), (first, "apex"), (second, "mid")) for size in (128, 64)
+    ]
+    evaluate("--tracker", "guests:still", "--name", "few", "--case", first, "--view", "apex", "--size", "64")
+    assert list(scores(made, "few")[["case", "view", "size_px"]].iloc[0]) == [first, "apex", 64]
+    assert len(scores(made, "few")) == 1
+
+
+def test_failure_on_one_clip_is_a_row_and_the_others_go_on(made, evaluate):
+    status, said, _ = evaluate("--tracker", "guests:small_only", "--view", "mid")
+    table = scores(made, "guests_small_only").set_index("size_px")
+    assert status == 0 and "no room" in said
+    assert table.loc[128, "failure"].str.startswith("guests:small_only raised MemoryError: no room").all()
+    assert table.loc[128, "nrmse_percent"].isna().all() and (table.loc[128, "coverage_percent"] == 0).all()
+    assert table.loc[64, "failure"].isna().all() and np.allclose(table.loc[64, "nrmse_percent"], 100)
+
+
+def test_tracker_that_fails_everywhere_ends_with_status_1(made, evaluate):
+    status, said, complaint = evaluate("--tracker", "guests:nothing", "--name", "nothing")
+    assert (status, complaint) == (1, "") and said.count("cannot be imported: AttributeError") == 6
+    assert scores(made, "nothing")["failure"].notna().all()
+
+
+def test_program_and_method_of_ours_are_tried_too(made, evaluate):
+    Path("program.py").write_text(PROGRAM)
+    command = f"'{sys.executable}' program.py {{input}} {{output}}"
+    assert evaluate("--command", command, "--name", "program", "--view", "apex")[0] == 0
+    np.testing.assert_allclose(scores(made, "program")["nrmse_percent"], 100)
+    ours = ("--tracker", "phase_correlation", "--option", "window_px=16", "--view", "apex", "--size", "64")
+    assert evaluate(*ours)[0] == 0
+    assert scores(made, "phase_correlation")["nrmse_percent"].notna().all()
+
+
+@pytest.mark.slow
+def test_scores_are_the_same_bytes_whatever_the_number_of_processes(made, evaluate):
+    read = [
+        (
+            evaluate("--tracker", "guests:drawn", "--view", "mid", "--jobs", jobs),
+            (made / "guests/guests_drawn.csv").read_bytes(),
+        )
+        for jobs in (1, 2)
+    ]
+    assert [outcome[0] for outcome, _ in read] == [0, 0]
+    assert read[0] == read[1]
+
+
+def test_later_trial_replaces_its_own_scores_and_no_others(made, evaluate):
+    for name in ("one", "two"):
+        evaluate("--tracker", "guests:still", "--name", name, "--view", "mid")
+    before = {path.name: path.read_bytes() for path in made.rglob("*") if path.is_file()}
+    evaluate("--tracker", "guests:still", "--name", "two", "--view", "apex")
+    after = {path.name: path.read_bytes() for path in made.rglob("*") if path.is_file()}
+    assert {name for name in {*before, *after} if before.get(name) != after.get(name)} == {"two.csv"}
+
+
+def test_scores_of_images_made_anew_are_of_another_clip(made, evaluate, tmp_path):
+    again = tmp_path / "again"
+    shutil.copytree(made, again, ignore=shutil.ignore_patterns("guests"))
+    evaluate("--tracker", "guests:still", "--view", "mid", "--size", "64", repository=again)
+    before = scores(again, "guests_still")
+    path = record_path(again, "bmode", before["case"][0], "mid")
+    record = ledger.read(path)
+    ledger.commit(path, record | {"seconds": 7})
+    assert list(before["clip"]) == [digest(again, case, "mid") for case in before["case"]]
+    ledger.commit(path, record | {"sha256": record["sha256"] | {sorted(record["sha256"])[0]: 64 * "0"}})
+    same = [clip == digest(again, case, "mid") for case, clip in zip(before["case"], before["clip"], strict=True)]
+    assert same == [False, True] and before["clip"].str.fullmatch("[0-9a-f]{12}").all()
+
+
+def test_scores_that_could_not_be_written_are_refused_before_the_first_clip(made, evaluate, tmp_path):
+    shutil.copytree(made, tmp_path / "taken", ignore=shutil.ignore_patterns("guests"))
+    (tmp_path / "taken/guests").write_text("")
+    status, said, complaint = evaluate("--tracker", "guests:still", repository=tmp_path / "taken")
+    assert (status, said, complaint.count("\n")) == (2, "", 1) and "taken/guests cannot hold the scores" in complaint
+
+
+def test_tracker_that_ends_its_process_is_told_in_one_sentence(made, evaluate):
+    status, _, complaint = evaluate("--tracker", "guests:crash", "--view", "apex", "--jobs", "2")
+    assert status == 2 and complaint.count("\n") == 1 and "--command" in complaint
+    assert not (made / "guests/guests_crash.csv").exists()
+
+
+def test_repository_with_a_damaged_clip_is_refused_in_one_sentence(made, evaluate, tmp_path):
+    shutil.copytree(made, tmp_path / "damaged")
+    shard = tmp_path / "damaged/small.zarr/bmode/128/image/c/0/0/0/0/0"
+    content = bytearray(shard.read_bytes())
+    content[len(content) // 3] ^= 1
+    shard.write_bytes(content)
+    status, _, complaint = evaluate("--tracker", "guests:still", repository=tmp_path / "damaged")
+    assert (status, complaint.count("\n")) == (2, 1) and "cannot be read at" in complaint
+
+
+@pytest.mark.parametrize(
+    "tracker, name", [("a:track", "a"), ("a.b:track", "a_b"), ("a:other", "a_other"), ("a-b", "a_b"), ("dis", "dis")]
+)
+def test_scores_stand_under_a_name_made_of_that_of_the_tracker(tracker, name):
+    assert entrant(tracker, None, [])[0] == name
+
+
+@pytest.mark.parametrize(
+    "command, name",
+    [
+        ("./my-tracker {input} {output}", "my_tracker"),
+        ("python3 code/network.py {input} {output}", "network"),
+        ("julia -t 4 --project=. flow.jl {input} {output}", "flow"),
+        ("Rscript warp.R {input} {output}", "warp"),
+        ("matlab -batch \"follow('{input}', '{output}')\"", "matlab"),
+        ("track --config settings.yaml {input} {output}", "track"),
+    ],
+)
+def test_scores_of_a_program_stand_under_the_name_of_its_script_or_its_own(command, name):
+    assert entrant(None, command, [])[0] == name
+
+
+@pytest.mark.parametrize(
+    "text, value",
+    [("1e-3", 0.001), ("-1.5E3", -1500.0), ("[1e-3, 2]", [0.001, 2]), ("{b: 1e2}", {"b": 100.0}), ("e3", "e3")],
+)
+@pytest.mark.parametrize("tracker", ["a:b", "dis"])
+def test_option_that_looks_like_a_number_is_one(tracker, text, value):
+    settings = entrant(tracker, None, [f"a={text}"])[1]
+    assert settings.get("options", settings)["a"] == value
+
+
+@pytest.fixture
+def worked(made, evaluate):
+    """Job and result of the workflow's own script on one view of the first heart."""
+    job = Job(made, "tracking", expand(CONFIG)[0].id, "mid")
+    return job, runpy.run_path(str(ROOT / "workflow/scripts/tracking.py"))["work"](job)
+
+
+def test_guest_of_the_configuration_gets_the_scores_it_gets_on_the_command_line(made, worked, evaluate):
+    job, result = worked
+    evaluate("--tracker", "guests:drawn", "--case", job.case.id, "--view", "mid")
+    truth = scoring.ground_truth(job)
+    for _, found in scores(made, "guests_drawn").iterrows():
+        tracked = result[f"tracking/{found['size_px']}"]["displacement"][1]
+        for name, value in scoring.row(scoring.score(tracked, truth), "short_axis").items():
+            np.testing.assert_allclose(found[name], value, rtol=1e-9, err_msg=name)
+
+
+def test_guest_of_the_configuration_that_fails_leaves_the_others_their_motion(worked):
+    job, result = worked
+    assert list(job.verdict["failures"]) == ["poor/128"] and "no room" in job.verdict["failures"]["poor/128"]
+    large, small = (result[f"tracking/{size}"]["displacement"] for size in (128, 64))
+    assert np.isnan(large[2]).all() and not np.nanmax(abs(small[2]))
+    for tracked in (large[0], large[1], small[0], small[1]):
+        assert np.nanmax(abs(tracked)) > 0
+
+
+REFUSED = {
+    "ours": (["--tracker", "a:b", "--name", "ours"], "ours is a tracker of {made} already"),
+    "name": (["--tracker", "a:b", "--name", "my tracker"], "'my tracker' cannot be the name of a tracker: use letters"),
+    "its own name": (["--command", "./2d {input} {output}"], "'2d' cannot be the name of a tracker: use letters"),
+    "path": (["--tracker", "code/own.py:track"], "write package.module:function (dots, no path, no .py)"),
+    "date": (["--tracker", "a:b", "--option", "a=2026-01-01"], "must be finite numbers, text"),
+    "case": (["--tracker", "a:b", "--case", "seed9"], "seed9 is not a case of {made}: use seed1_"),
+    "view": (["--tracker", "a:b", "--view", "base"], "base is not a view of {made}: use mid, apex"),
+    "size": (["--tracker", "a:b", "--size", "512"], "512 is not a size of {made}: use 128, 64"),
+    "option": (["--tracker", "a:b", "--option", "window"], "--option window: has no value: write key=value"),
+    "YAML": (["--tracker", "a:b", "--option", "a=[1"], "--option a=[1: the value is not YAML"),
+    "key": (["--tracker", "dis", "--option", "window=3"], "window is not a key of the method dis"),
+    "window": (
+        ["--tracker", "phase_correlation", "--option", "window_px=128"],
+        "window_px = 128: must not exceed the smallest image, 64 px",
+    ),
+    "quotes": (["--command", "'a {input} {output}"], "no closing quotation"),
+    "places": (["--command", "a {input}"], "must say where the path of the output goes: {{output}}"),
+    "timeout": (["--command", "a {input} {output}", "--timeout", "0"], "timeout_s = 0.0: should be greater than 0"),
+    "untimed": (["--tracker", "a:b", "--timeout", "5"], "--timeout 5: a:b is not timed"),
+    "jobs": (["--tracker", "a:b", "--jobs", "0"], "--jobs 0: must be 1 or more"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_trial_that_cannot_be_held_is_refused_in_one_sentence(made, evaluate, case):
+    arguments, expected = REFUSED[case]
+    status, said, complaint = evaluate(*arguments)
+    assert (status, said) == (2, "") and complaint.count("\n") == 1
+    assert expected.format(made=made) in complaint
+
+
+@pytest.mark.parametrize("name", ["nowhere", "."])
+def test_folder_that_is_no_repository_is_refused_in_one_sentence(evaluate, name):
+    status, said, complaint = evaluate("--tracker", "a:b", repository=name)
+    assert (status, said, complaint.count("\n")) == (2, "", 1) and f"{name} is not a repository" in complaint
+
+
+def test_repository_that_was_not_run_is_refused_in_one_sentence(made, evaluate, tmp_path):
+    for name in ("config.yaml", "registry.txt"):
+        (tmp_path / name).write_text((made / name).read_text())
+    status, _, complaint = evaluate("--tracker", "guests:still", repository=tmp_path)
+    assert (status, complaint.count("\n")) == (2, 1) and "no complete clip" in complaint

@@ -1,0 +1,86 @@
+"""What a guest was scored on is what it stands for, and a table that cannot be read is told of in one sentence."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking, View
+from echotruth.evaluation.digest import digest
+from echotruth.evaluation.leaderboard import rows
+from echotruth.repository import ledger
+from echotruth.repository.ledger import record_path
+from echotruth.repository.schema import EVALUATION, LABELS
+
+CONFIG = Config(
+    views={"mid": View(), "null": View(position=0.7)},
+    bmode=Bmode(size_px=64, downsampling=(1,)),
+    tracking=Tracking(trackers={"ours": PhaseCorrelation(window_px=16)}),
+)
+LENGTHS = {"case": 1, "view": 2, "tracker": 1, "frame": 4, "axial": 2, "lateral": 2, "region": 7, "aha": 17, "plane": 2}
+
+
+def commit(folder, stage, view, content):
+    record = {"status": "complete", "sha256": {f"{stage}/64/c/0": content}, "seconds": 1.0}
+    ledger.commit(record_path(folder, stage, "a", view), record)
+
+
+@pytest.fixture
+def board(tmp_path):
+    """Rows of the leaderboard of one heart and two views."""
+    lengths = LENGTHS | {name: len(labels) for name, labels in LABELS.items()}
+    data = {array.name: (array.dims, np.full([lengths[dim] for dim in array.dims], 0.1)) for array in EVALUATION}
+    tree = xr.DataTree.from_dict({"/evaluation/64": xr.Dataset(data, coords={"case": ["a"]})})
+    (tmp_path / "guests").mkdir()
+    for view in CONFIG.views:
+        for stage in ("bmode", "truth"):
+            commit(tmp_path, stage, view, "0")
+    return lambda: rows(tree, CONFIG, np.arange(1), tmp_path)
+
+
+@pytest.fixture
+def file(board, tmp_path):
+    """Table of a guest that was scored on both clips."""
+    table = board().assign(tracker="mine", clip=[digest(tmp_path, "a", view) for view in CONFIG.views])
+    table.to_csv(tmp_path / "guests/mine.csv", index=False)
+    return tmp_path / "guests/mine.csv"
+
+
+def views(board):
+    table = board()
+    return list(table["view"][table["tracker"] == "mine"])
+
+
+def test_guest_stands_under_the_name_of_its_file_on_clips_that_are_what_they_were(board, file, caplog):
+    assert views(board) == ["mid", "null"] and not caplog.messages
+    assert board()["size_px"].tolist() == [64] * 4 and board()["failure"].eq("").all()
+
+
+@pytest.mark.parametrize("stage", ["bmode", "truth"])
+def test_scores_of_older_images_are_left_out_and_told_of(board, file, tmp_path, stage, caplog):
+    commit(tmp_path, stage, "mid", "1")
+    assert views(board) == ["null"]
+    assert caplog.messages == ["guests/mine.csv: 1 of 2 rows are of older images: evaluate that tracker again"]
+
+
+def test_scores_of_unknown_images_are_left_out(board, file):
+    lines = [line.split(",") for line in file.read_text().splitlines()]
+    assert lines[0][-1] == "clip"
+    file.write_text("".join(",".join(line[:-1]) + "\n" for line in lines))
+    assert views(board) == []
+
+
+BROKEN = {
+    "no number": lambda content: content.replace(b",mine,", b",mine,about ", 1),
+    "no size": lambda content: content.replace(b",64,", b",small,", 1),
+    "nothing": lambda content: b"",
+    "no text": lambda content: b"\xff\xfe\x00" + content,
+    "ragged": lambda content: content.replace(b"\n", b"\n,,,,", 1) + b"," * 99,
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_table_that_cannot_be_read_is_refused_in_one_sentence(board, file, case):
+    file.write_bytes(BROKEN[case](file.read_bytes()))
+    with pytest.raises(ValueError, match=r"mine\.csv: cannot be read \(.+\): evaluate that tracker again$") as refusal:
+        board()
+    assert "\n" not in str(refusal.value)

@@ -1,0 +1,119 @@
+"""The strain operator: exact where it should be, of known order elsewhere, and no further than the wall."""
+
+import numpy as np
+import pytest
+
+from echotruth.evaluation.strain import Operator
+
+INNER, OUTER = 1.45e-3, 2.45e-3
+
+
+def annulus(step, radius):
+    """The operator on a grid in the cross-section of a ventricle; radial outwards, tangential counter-clockwise."""
+    place = np.arange(-OUTER, OUTER, step) + step / 3
+    position = np.stack(np.meshgrid(place, place), -1).reshape(-1, 2)
+    position = position[np.abs(np.hypot(*position.T) - (INNER + OUTER) / 2) < (OUTER - INNER) / 2]
+    outwards = position / np.hypot(*position.T)[:, None]
+    axes = np.stack([outwards, np.stack([-outwards[:, 1], outwards[:, 0]], -1)], 1)
+    return Operator(position, axes, radius)
+
+
+@pytest.fixture(scope="module")
+def wall():
+    return annulus(0.117e-3, 0.45e-3)
+
+
+def test_affine_motion_has_its_strain_at_every_point(wall):
+    gradient = np.array([[0.2, -0.13], [0.07, -0.18]])
+    found = wall.strain((wall.position @ gradient.T + 4e-4)[None])[0]
+    green = ((np.eye(2) + gradient).T @ (np.eye(2) + gradient) - np.eye(2)) / 2
+    for k, (a, b) in enumerate(((0, 0), (1, 1), (0, 1))):
+        expected = np.einsum("ni,ij,nj->n", wall.axes[:, a], green, wall.axes[:, b])
+        np.testing.assert_allclose(found[:, k], expected, atol=1e-12)
+
+
+def test_slope_of_a_quadratic_field_is_exact_to_the_borders_of_the_wall(wall):
+    x, y = wall.position.T * 1e3
+    moved = 1e-3 * np.stack([0.1 * x * x - 0.2 * x * y, 0.3 * y * y + 0.05 * x], -1)
+    expected = np.moveaxis(np.array([[0.2 * x - 0.2 * y, -0.2 * x], [0.05 + 0 * x, 0.6 * y]]), -1, 0)
+    np.testing.assert_allclose(wall.gradient(moved[None])[0], expected, atol=1e-11)
+
+
+def twisting(wall):
+    """Isochoric contraction r^2 = R^2 - R_i^2 + r_i^2 with a twist that falls to the epicardium, and its strain.
+
+    From F_rR = R / r, F_tR = r a', F_tT = r / R in polar coordinates.
+    """
+    place = np.hypot(*wall.position.T)
+    turn, slope = 0.15 - 120 * (place - INNER), -120.0
+    now = np.sqrt(place**2 - INNER**2 + 1.1e-3**2)
+    angle = np.arctan2(wall.position[:, 1], wall.position[:, 0]) + turn
+    moved = now[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1) - wall.position
+    radial = ((place / now) ** 2 + (now * slope) ** 2 - 1) / 2
+    return moved, np.stack([radial, ((now / place) ** 2 - 1) / 2, now**2 * slope / place / 2], -1)
+
+
+def test_contraction_with_twist_has_the_strain_of_its_closed_form(wall):
+    moved, expected = twisting(wall)
+    error = wall.strain(moved[None])[0] - expected
+    assert expected[:, 0].max() > 0.25 and expected[:, 1].min() < -0.15
+    assert (np.sqrt(np.mean(error**2, axis=0)) < [0.02, 0.01, 0.01]).all()
+
+
+def test_error_falls_with_the_square_of_the_radius():
+    errors = []
+    for step, radius in ((0.1e-3, 0.4e-3), (0.05e-3, 0.2e-3)):
+        wall = annulus(step, radius)
+        moved, expected = twisting(wall)
+        errors.append(np.sqrt(np.mean((wall.strain(moved[None])[0] - expected) ** 2, axis=0)))
+    assert (errors[0] / errors[1] > 3.5).all()
+
+
+def test_still_tissue_has_no_strain_and_frames_do_not_mix(wall):
+    moved, _ = twisting(wall)
+    found = wall.strain(np.stack([0 * moved, moved, 0 * moved]))
+    assert np.abs(found[[0, 2]]).max() < 1e-12
+    np.testing.assert_array_equal(found[1], wall.strain(moved[None])[0])
+
+
+def test_lost_points_have_no_strain_and_leave_that_of_the_others(wall):
+    gradient = np.array([[0.2, 0.1], [0.0, -0.15]])
+    moved = np.stack([wall.position @ gradient.T] * 3)
+    whole = wall.strain(moved)
+    lost = np.random.default_rng(0).random(moved.shape[:2]) < [[0.0], [0.1], [0.3]]
+    moved[lost] = np.nan
+    found = wall.strain(moved)
+    assert np.isnan(found[lost]).all()
+    there = np.isfinite(found).all(-1)
+    assert there[~lost].mean() > 0.97
+    np.testing.assert_allclose(found[there], whole[there], atol=1e-11)
+
+
+def test_strain_where_points_are_lost_is_that_of_a_wall_without_them(wall):
+    moved = np.repeat(twisting(wall)[0][None], 4, axis=0)
+    random = np.random.default_rng(5)
+    for frame, share in ((1, 0.01), (2, 0.1), (3, 0.6)):
+        moved[frame, random.random(len(wall.position)) < share] = np.nan
+    found = wall.strain(moved)
+    for frame in range(4):
+        known = np.isfinite(moved[frame]).all(-1)
+        without = Operator(wall.position[known], wall.axes[known], wall.radius).strain(moved[frame : frame + 1, known])
+        np.testing.assert_allclose(found[frame, known], without[0], atol=1e-11)
+
+
+def test_too_few_points_or_all_on_a_line_have_no_strain():
+    line = np.stack([np.linspace(0, 1e-3, 30), np.zeros(30)], -1)
+    axes = np.broadcast_to(np.eye(2), (30, 2, 2))
+    assert np.isnan(Operator(line, axes, 0.45e-3).strain(line[None])).all()
+    scattered = np.random.default_rng(0).uniform(0, 3e-4, (9, 2))
+    assert np.isnan(Operator(scattered, axes[:9], 0.45e-3).strain(scattered[None])).all()
+
+
+def test_the_wall_across_a_narrow_cavity_is_no_neighbour():
+    place = np.stack(np.meshgrid(np.arange(0, 1e-3, 1e-4), np.arange(0, 8e-4, 1e-4)), -1).reshape(-1, 2)
+    position = np.concatenate([place + [0, 1e-4], place * [1, -1] - [0, 1e-4]])
+    upper = np.arange(len(position)) < len(place)
+    normal = np.where(upper[:, None], [0.0, 1.0], [0.0, -1.0])
+    operator = Operator(position, np.stack([normal, np.tile([1.0, 0.0], (len(position), 1))], 1), 0.45e-3)
+    shifted = np.where(upper[:, None], [0.0, -5e-5], [0.0, 5e-5])
+    assert np.abs(operator.strain(shifted[None])).max() < 1e-12

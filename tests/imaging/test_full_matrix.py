@@ -1,0 +1,159 @@
+"""The RF against the exact sum over elements, and the laws it must keep."""
+
+import numba
+import numpy as np
+import pytest
+from imaging.exact import exact_matrix
+
+from echotruth.config import Probe
+from echotruth.imaging.rf.full_matrix import FullMatrix
+
+CENTRE = 25e6
+DEVIATION = 12.5e6 / np.sqrt(8 * np.log(2))
+DEPTH = 11e-3
+
+
+@pytest.fixture(scope="module")
+def matrix():
+    return FullMatrix(Probe(), DEPTH)
+
+
+def sector(number, seed=0, elevation=0.0, nearest=3e-3, farthest=10e-3, half_angle=32.0):
+    """Scatterers at random in a sector, their positions (m) and amplitudes."""
+    random = np.random.default_rng(seed)
+    angle = np.radians(random.uniform(-half_angle, half_angle, number))
+    reach = random.uniform(nearest, farthest, number)
+    beside = random.uniform(-elevation, elevation, number)
+    return np.stack([reach * np.sin(angle), reach * np.cos(angle), beside], axis=1), random.standard_normal(number)
+
+
+def relative(estimate, exact):
+    return np.linalg.norm(estimate - exact) / np.linalg.norm(exact)
+
+
+def error(probe, position, amplitude, lens=False, **options):
+    """Of every sixth frequency against the exact sum."""
+    matrix = FullMatrix(probe, options.pop("depth", DEPTH), elevation=lens, **options)
+    found = matrix(position, amplitude)[::6]
+    return relative(found, exact_matrix(probe, position, amplitude, matrix.frequency[::6], lens))
+
+
+@pytest.mark.parametrize("attenuation", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("accuracy", [2e-5, 1e-3])
+def test_in_the_plane_the_rf_is_the_exact_sum_with_directivity_and_attenuation(accuracy, attenuation):
+    probe = Probe(attenuation_dB_per_cm_MHz=attenuation)
+    assert error(probe, *sector(60), accuracy=accuracy) < accuracy
+
+
+@pytest.mark.parametrize(
+    "preset, scale, half_angle",
+    [("mouse_30MHz", 1, 24), ("mouse_40MHz", 1, 24), ("rat_15MHz", 2, 32), ("human_2_7MHz", 12, 32)],
+)
+def test_other_arrays_come_as_near_to_the_exact_sum(preset, scale, half_angle):
+    """Elements of 0.88 wavelengths only within 24 degrees: further out their echoes are longer than a kernel."""
+    probe = Probe(preset=preset, attenuation_dB_per_cm_MHz=0.5)
+    place = {"nearest": 4e-3 * scale, "farthest": 10e-3 * scale, "half_angle": half_angle}
+    position, amplitude = sector(40, **place)
+    assert error(probe, position, amplitude, depth=11e-3 * scale, accuracy=2e-5) < 2e-5
+    assert error(probe, position, amplitude, depth=11e-3 * scale, accuracy=1e-3) < 1e-3
+
+
+def lens_errors(probe, depth, beside, bands):
+    """Of scatterers in the beam at ranges between two, mm, for every such band, at every 24th frequency."""
+    matrix, found = FullMatrix(probe, depth), []
+    for nearest, farthest in bands:
+        position, amplitude = sector(60, elevation=beside, nearest=nearest * 1e-3, farthest=farthest * 1e-3)
+        inside = matrix.in_beam(position)
+        place = position[inside], amplitude[inside]
+        exact = exact_matrix(probe, *place, matrix.frequency[::24], True)
+        found.append(relative(matrix(*place)[::24], exact))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("attenuation", [0.0, 0.5])
+def test_under_the_lens_the_rf_is_the_fresnel_integral_at_all_ranges(attenuation):
+    probe = Probe(attenuation_dB_per_cm_MHz=attenuation)
+    bands = [(3, 3.5), (3.5, 4), (4, 5.5), (5.5, 11)]
+    assert (lens_errors(probe, DEPTH, 0.7e-3, bands) < 0.015).all()
+
+
+def test_under_the_lens_of_another_array_too():
+    probe = Probe(preset="mouse_40MHz", attenuation_dB_per_cm_MHz=0.5)
+    assert (lens_errors(probe, DEPTH, 0.7e-3, [(5.5, 10)]) < 0.015).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("attenuation, bound", [(0.0, 0.015), (0.5, 0.035)])
+def test_under_a_tall_lens_it_is_so_near_the_plane_and_beyond_two_apertures(attenuation, bound):
+    """There echoes are longer than the longest kernel, and what it misses is loud at the frequencies that are left."""
+    probe = Probe(preset="human_2_7MHz", attenuation_dB_per_cm_MHz=attenuation)
+    nearest = 1e3 * FullMatrix(probe, 120e-3).accurate_from
+    assert 20 < nearest < 40
+    assert (lens_errors(probe, 120e-3, 3e-3, [(25, 35), (nearest, 50), (50, 120)]) < 0.015).all()
+    assert (lens_errors(probe, 120e-3, 9.8e-3, [(66, 120)]) < bound).all()
+
+
+def test_under_the_lens_a_scatterer_in_the_plane_is_nearly_exact():
+    assert error(Probe(), np.array([[0.4e-3, 6.5e-3, 0.0]]), np.ones(1), lens=True) < 2e-3
+
+
+def test_band_reaches_the_faint_edges_of_the_pulse(matrix):
+    weight = np.exp(-((matrix.frequency[[0, -1]] - CENTRE) ** 2) / (2 * DEVIATION**2))
+    assert (weight < 0.02).all()
+
+
+def test_sending_and_receiving_can_be_swapped(matrix):
+    echoes = matrix(*sector(50, elevation=3e-4))
+    assert (echoes == echoes.transpose(0, 2, 1)).all()
+
+
+def test_echoes_superpose(matrix):
+    position, amplitude = sector(60, elevation=3e-4)
+    parts = matrix(position[:25], amplitude[:25]) + matrix(position[25:], amplitude[25:])
+    assert relative(matrix(position, amplitude), parts) < 1e-5
+
+
+def test_echoes_are_proportional_to_the_amplitude(matrix):
+    position, amplitude = sector(20)
+    assert relative(matrix(position, -3 * amplitude), -3 * matrix(position, amplitude)) < 1e-6
+
+
+def test_elevation_sign_does_not_matter(matrix):
+    position, amplitude = sector(30, elevation=3e-4)
+    assert (matrix(position, amplitude) == matrix(position * [1, 1, -1], amplitude)).all()
+
+
+def test_scatterers_out_of_the_record_or_the_beam_are_left_out(matrix):
+    far = np.array([[0.0, 13e-3, 0.0], [0.0, 6.5e-3, 5e-3]])
+    assert not matrix.in_beam(far).any()
+    assert not matrix(far, np.ones(2)).any()
+    assert matrix.in_beam(np.array([[0.0, 6.5e-3, 0.0]])).all()
+
+
+@pytest.mark.parametrize("elevation", [True, False])
+def test_bytes_do_not_depend_on_threads(elevation):
+    position, amplitude = sector(2000, elevation=5e-4)
+    results = []
+    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
+        numba.set_num_threads(threads)
+        results.append(FullMatrix(Probe(), DEPTH, elevation=elevation)(position, amplitude).tobytes())
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    assert results[0] == results[1]
+
+
+@pytest.mark.parametrize("elements", [2, 17, 33])
+def test_every_pair_is_filled_whatever_the_number_of_elements(elements):
+    position, amplitude = sector(10)
+    assert error(Probe(elements=elements), position, amplitude) < 2e-5
+
+
+def test_a_record_beyond_the_clock_is_refused():
+    with pytest.raises(ValueError, match="too long"):
+        FullMatrix(Probe(), 0.4)
+
+
+def test_no_record_is_a_multiple_of_256_samples_long():
+    """Or the traces of all pairs would share a few cache lines."""
+    probe = Probe()
+    lengths = {FullMatrix(probe, depth, elevation=False).samples for depth in np.linspace(11e-3, 12.5e-3, 7)}
+    assert len(lengths) > 2 and all(length % 256 for length in lengths)

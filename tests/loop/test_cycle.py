@@ -1,0 +1,218 @@
+"""The shipped cycles, what each drive takes, their sampling, and what is said about files that hold none."""
+
+import numpy as np
+import pytest
+
+from echotruth.config import Loop
+from echotruth.loop.cycle import LoopError, read_loop
+from echotruth.loop.phases import es_frame
+
+MMHG, UL = 133.322387415, 1e-9
+HEAD = "time_ms,pressure_mmHg,volume_uL\n"
+GOOD = ["0,4,50", "30,100,40", "60,100,20", "90,5,25", "120,4,50"]
+
+
+def written(tmp_path, rows, head=HEAD):
+    path = tmp_path / "loop.csv"
+    path.write_text("# a comment\n" + head + "\n".join(rows) + "\n")
+    return Loop(file=str(path), frames=8)
+
+
+def test_shipped_loop_is_a_mouse():
+    loop = read_loop(Loop(frames=1000))
+    slope = np.gradient(loop.pressure, loop.time) / MMHG
+    assert loop.period == pytest.approx(0.12)
+    assert loop.pressure[0] == pytest.approx(4 * MMHG)
+    assert loop.volume[0] == pytest.approx(50 * UL)
+    assert loop.volume.min() == pytest.approx(18 * UL)
+    assert loop.pressure.max() == pytest.approx(105 * MMHG, rel=1e-3)
+    assert loop.pressure[es_frame(loop.pressure, loop.volume)] == pytest.approx(100 * MMHG, rel=0.01)
+    assert slope.max() == pytest.approx(10_000, rel=0.03)
+    assert slope.min() == pytest.approx(-8_500, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("name", "period", "pressures", "volumes", "slopes"),
+    [
+        ("rat", 0.16, (4, 124, 130), (230, 80), (9_700, -6_900)),
+        ("human", 0.8, (7, 115, 120), (150_000, 50_000), (1_584, -1_980)),
+    ],
+)
+def test_other_shipped_loops_have_the_values_at_their_head(name, period, pressures, volumes, slopes):
+    loop = read_loop(Loop(file=name, frames=1000))
+    slope = np.gradient(loop.pressure, loop.time) / MMHG
+    es = es_frame(loop.pressure, loop.volume)
+    assert loop.period == pytest.approx(period)
+    found = (loop.pressure[0], loop.pressure[es], loop.pressure.max())
+    assert np.array(found) / MMHG == pytest.approx(pressures, rel=0.01)
+    assert np.array([loop.volume[0], loop.volume.min()]) / UL == pytest.approx(volumes, rel=1e-6)
+    assert (slope.max(), slope.min()) == pytest.approx(slopes, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "end", "constant"),
+    [("mouse", 0.066, 0.082, 9e-3), ("rat", 0.085, 0.12, 13.5e-3), ("human", 0.365, 0.45, 45e-3)],
+)
+def test_pressure_relaxes_with_its_time_constant(name, start, end, constant):
+    loop = read_loop(Loop(file=name, frames=1000))
+    falling = (loop.time > start) & (loop.time < end)
+    rate = np.polyfit(loop.time[falling], np.log(loop.pressure[falling]), 1)[0]
+    assert -1 / rate == pytest.approx(constant, rel=0.03)
+
+
+def test_twitch_has_the_volume_of_the_mouse_and_the_tension_solved_for_it():
+    twitch, mouse = read_loop(Loop(file="twitch", drive="volume")), read_loop(Loop())
+    assert twitch.pressure is None
+    np.testing.assert_allclose(twitch.volume, mouse.volume, rtol=1e-4)
+    pressed = read_loop(Loop(file="twitch", drive="pressure"))
+    np.testing.assert_allclose(pressed.pressure, mouse.pressure, rtol=1e-3)
+    assert twitch.tension[0] == 0
+    assert twitch.tension[es_frame(mouse.pressure, mouse.volume)] == pytest.approx(43e3, rel=0.03)
+
+
+def test_default_frames_reach_from_ed_to_es_in_about_twenty():
+    loop = read_loop(Loop())
+    assert len(loop.time) == 40
+    assert 18 <= es_frame(loop.pressure, loop.volume) <= 20
+    np.testing.assert_allclose(loop.time, np.arange(40) * 3e-3)
+
+
+def test_isovolumic_phases_keep_their_volume():
+    loop = read_loop(Loop())
+    np.testing.assert_allclose(loop.volume[:4], 50 * UL, rtol=1e-6)
+    np.testing.assert_allclose(loop.volume[20:29], 18 * UL, rtol=1e-6)
+
+
+def test_volumes_and_heart_rate_are_mapped():
+    loop = read_loop(Loop(edv_uL=60.0, esv_uL=24.0, heart_rate_per_min=600.0, frames=400))
+    assert (loop.volume[0], loop.volume.min()) == pytest.approx((60 * UL, 24 * UL))
+    assert loop.period == pytest.approx(0.1)
+    assert loop.time[-1] == pytest.approx(0.1 * 399 / 400)
+
+
+def test_sampling_goes_through_the_rows_without_overshoot(tmp_path):
+    loop = read_loop(written(tmp_path, GOOD))
+    np.testing.assert_allclose(loop.pressure[::2] / MMHG, [4, 100, 100, 5])
+    assert loop.pressure.max() / MMHG <= 100 * (1 + 1e-12)
+    assert loop.pressure.min() / MMHG >= 4 * (1 - 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (["0,4,50", "30,x,40", *GOOD[2:]], "line 4: pressure_mmHg is 'x'; give a finite number"),
+        (["0,4,50", "30,nan,40", *GOOD[2:]], "line 4: pressure_mmHg is 'nan'"),
+        (["0,4,50", "30,100", *GOOD[2:]], "line 4: volume_uL is ''"),
+        (GOOD[:3], "there are 3 rows"),
+        (["5,4,50", *GOOD[1:]], "row 1: time_ms is 5; begin at 0"),
+        (["0,4,50", "30,100,40", "30,100,20", *GOOD[3:]], "row 3: time_ms is 30 and must increase"),
+        (["0,4,50", "30,-1,40", *GOOD[2:]], "row 2: pressure_mmHg is -1 and must be positive"),
+        (["0,4,50", "30,100,0", *GOOD[2:]], "row 2: volume_uL is 0 and must be positive"),
+        ([*GOOD[:4], "120,9,50"], "pressure_mmHg begins at 4 and ends at 9"),
+        (["0,4,50", "30,100,50", "60,100,50", "90,5,50", "120,4,50"], "must not be flat"),
+        (["0,4,30", "30,100,50", "60,100,20", "90,5,25", "120,4,30"], "begin the loop at end-diastole"),
+    ],
+)
+def test_what_is_no_loop_is_refused_in_one_sentence(tmp_path, rows, said):
+    with pytest.raises(LoopError) as caught:
+        read_loop(written(tmp_path, rows))
+    assert said in str(caught.value)
+    assert "loop.csv" in str(caught.value)
+    assert str(caught.value).endswith(".")
+
+
+def test_every_unit_of_the_field_gives_the_same_cycle(tmp_path):
+    fine = read_loop(written(tmp_path, GOOD))
+    for units, factors in (
+        ("time_s,pressure_kPa,volume_mL", (1e-3, MMHG / 1e3, 1e-3)),
+        ("time_s,pressure_Pa,volume_m3", (1e-3, MMHG, 1e-9)),
+    ):
+        rows = [",".join(repr(float(n) * k) for n, k in zip(row.split(","), factors, strict=True)) for row in GOOD]
+        same = read_loop(written(tmp_path, rows, head=units + "\n"))
+        for name in ("time", "pressure", "volume"):
+            np.testing.assert_allclose(getattr(same, name), getattr(fine, name), rtol=1e-12)
+
+
+TWITCH = ["0,4,0,50", "30,100,40,40", "60,100,45,20", "90,5,1,25", "120,4,0,50"]
+ALL = "time_ms,pressure_mmHg,tension_kPa,volume_uL\n"
+
+
+@pytest.mark.parametrize(
+    ("drive", "given"),
+    [
+        ("pressure_volume", {"pressure", "volume"}),
+        ("pressure", {"pressure", "tension"}),
+        ("volume", {"volume", "tension"}),
+    ],
+)
+def test_a_drive_takes_its_own_columns_and_leaves_the_rest_open(tmp_path, drive, given):
+    loop = written(tmp_path, TWITCH, head=ALL).model_copy(update={"drive": drive})
+    cycle = read_loop(loop)
+    assert cycle.drive == drive
+    assert {name for name in ("pressure", "volume", "tension") if getattr(cycle, name) is not None} == given
+    if drive != "pressure_volume":
+        np.testing.assert_allclose(cycle.tension[::2], [0, 40e3, 45e3, 1e3])
+
+
+def test_without_a_tension_the_volume_drives_a_passive_heart(tmp_path):
+    cycle = read_loop(written(tmp_path, GOOD).model_copy(update={"drive": "volume"}))
+    assert cycle.pressure is None
+    np.testing.assert_array_equal(cycle.tension, np.zeros(8))
+
+
+def test_scaling_keeps_the_ejection_fraction_and_all_else():
+    mouse = read_loop(Loop())
+    twice = mouse.scaled(2.0)
+    np.testing.assert_allclose(twice.volume, 2 * mouse.volume)
+    assert twice.pressure is mouse.pressure and twice.time is mouse.time
+    assert read_loop(Loop(file="twitch", drive="pressure")).scaled(2.0).volume is None
+
+
+@pytest.mark.parametrize(
+    ("drive", "head", "row", "said"),
+    [
+        (
+            "pressure_volume",
+            "time_ms,pressure_mmHg,volume_ml",
+            "0,4,50",
+            "no column of the volume, which the drive press",
+        ),
+        (
+            "pressure",
+            "time_ms,pressure_mmHg,volume_uL",
+            "0,4,50",
+            "the drive pressure needs; add one and name it tension_",
+        ),
+        ("volume", "time_ms,pressure_mmHg", "0,4", "name it volume_uL or volume_mL or volume_m3"),
+        ("volume", "time_ms,time_s,volume_uL", "0,0,50", "time_ms and time_s both give the time; keep one of them"),
+    ],
+)
+def test_missing_column_and_one_given_twice_are_named(tmp_path, drive, head, row, said):
+    with pytest.raises(LoopError) as caught:
+        read_loop(written(tmp_path, [row] * 5, head=head + "\n").model_copy(update={"drive": drive}))
+    assert said in str(caught.value)
+    assert str(caught.value).endswith(".") and "loop.csv" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (["0,4,0,50", "30,100,-1,40", *TWITCH[2:]], "row 2: tension_kPa is -1 and must not be negative"),
+        (["0,4,9,50", *TWITCH[1:-1], "120,4,9,50"], "the first row has tension_kPa 9 of 1 to 45; begin"),
+        ([*TWITCH[:4], "120,4,9,50"], "tension_kPa begins at 0 and ends at 9"),
+    ],
+)
+def test_tension_that_no_beat_has_is_refused(tmp_path, rows, said):
+    with pytest.raises(LoopError) as caught:
+        read_loop(written(tmp_path, rows, head=ALL).model_copy(update={"drive": "pressure"}))
+    assert said in str(caught.value)
+
+
+def test_missing_file_is_named_with_what_there_is(tmp_path):
+    with pytest.raises(LoopError, match=r"no readable loop of this name; .*\(human, mouse, rat, twitch\)"):
+        read_loop(Loop(file="dog"))
+
+
+def test_volumes_that_do_not_eject_are_refused():
+    with pytest.raises(LoopError, match="set edv_uL and esv_uL so that the heart ejects"):
+        read_loop(Loop(edv_uL=15.0))

@@ -1,0 +1,130 @@
+"""What is read from files, and what is refused."""
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import pyvista
+
+from echotruth.config import Geometry
+from echotruth.mechanics.geometry.imported_mesh import fingerprint, read
+from echotruth.mechanics.geometry.mesh_quality import GeometryError
+
+
+def test_linear_tetrahedra_and_their_arrays(lying, written):
+    cells = lying.mesh.cells[:, :4]
+    body = read(Geometry(file=written(lying.nodes, cells, part=np.arange(len(cells)))))
+    np.testing.assert_allclose(body.nodes[body.cells], 1e-3 * lying.nodes[cells], atol=1e-7)
+    np.testing.assert_array_equal(body.cell_arrays["part"], np.arange(len(cells)))
+
+
+def test_quadratic_tetrahedra_come_in_the_order_of_vtk(lying, written):
+    body = read(Geometry(file=written(lying.nodes, lying.mesh.cells)))
+    np.testing.assert_allclose(body.nodes[body.cells], 1e-3 * lying.nodes[lying.mesh.cells], atol=1e-7)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6)])
+def test_unit_and_scale(lying, written, unit, factor):
+    file = written(lying.nodes, lying.mesh.cells)
+    body = read(Geometry(file=file, unit=unit, scale=2.0))
+    assert np.ptp(body.nodes, axis=0) == pytest.approx(2 * factor * np.ptp(lying.nodes, axis=0), rel=1e-6)
+
+
+def test_groups_of_gmsh_have_names(lying, tmp_path):
+    mesh, facets = lying.mesh, lying.mesh.endo[:, [0, 1, 2, 3, 4, 5]]
+    groups = [np.full(len(mesh.cells), 9), np.full(len(facets), 2)]
+    meshio.Mesh(
+        lying.nodes,
+        [("tetra10", mesh.cells), ("triangle6", facets)],
+        cell_data={"gmsh:physical": groups, "gmsh:geometrical": groups},
+        field_data={"muscle": np.array([9, 3]), "inner": np.array([2, 2])},
+    ).write(tmp_path / "heart.msh", file_format="gmsh22", binary=False)
+    body = read(Geometry(file=str(tmp_path / "heart.msh")))
+    assert body.names == {"muscle": 9, "inner": 2}
+    assert body.cells.shape == mesh.cells.shape and body.triangles.shape == (len(facets), 3)
+    np.testing.assert_allclose(body.nodes[body.cells], 1e-3 * lying.nodes[mesh.cells], atol=1e-9)
+    assert set(body.cell_arrays["gmsh:physical"]) == {9} and set(body.triangle_arrays["gmsh:physical"]) == {2}
+
+
+def test_points_without_a_cell_and_points_there_twice_are_left_out(lying, written):
+    cells = lying.mesh.cells[:, :4]
+    apart = np.arange(cells.size).reshape(cells.shape)
+    nodes = np.vstack([lying.nodes[cells].reshape(-1, 3), [[900.0, 0, 0]]])
+    body = read(Geometry(file=written(nodes, apart)))
+    assert len(body.nodes) == len(np.unique(cells))
+
+
+def test_surface_is_welded_together(lying, surface_written):
+    mesh = lying.mesh
+    body = read(Geometry(file=surface_written(lying.nodes, np.vstack([mesh.endo, mesh.epi, mesh.base])), remesh=True))
+    assert len(body.cells) == 0 and len(body.triangles) == len(mesh.endo) + len(mesh.epi) + len(mesh.base)
+    assert len(body.nodes) == 2 + len(body.triangles) // 2
+
+
+@pytest.mark.parametrize("suffix", ["vtu", "vtk", "msh", "stl", "ply", "vtp"])
+@pytest.mark.parametrize("content", ["", "hello"])
+def test_file_that_cannot_be_read(tmp_path, capfd, suffix, content):
+    file = tmp_path / f"bad.{suffix}"
+    file.write_text(content)
+    with pytest.raises(
+        GeometryError, match=rf"bad\.{suffix}: .*(cannot be read as|is empty).*: write the file anew"
+    ) as caught:
+        read(Geometry(file=str(file)))
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_file_cut_short(lying, written):
+    file = written(lying.nodes, lying.mesh.cells)
+    whole = Path(file).read_bytes()
+    Path(file).write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(GeometryError, match=r"heart\.vtu: .*write the file anew"):
+        read(Geometry(file=file))
+
+
+REFUSED = {
+    "heart.dat": r"ends in \.dat: give tetrahedra as \.vtu, \.vtk, \.msh, or a closed surface of the wall as \.stl",
+    "heart": r"ends in no suffix: give tetrahedra",
+    "gone.vtu": r"geometry\.file is not there: give its path",
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_wrong_or_missing_file(name):
+    with pytest.raises(GeometryError, match=REFUSED[name]):
+        read(Geometry(file=name))
+
+
+def test_file_without_cells(tmp_path):
+    pyvista.UnstructuredGrid().save(tmp_path / "none.vtu")
+    with pytest.raises(GeometryError, match="is empty"):
+        read(Geometry(file=str(tmp_path / "none.vtu")))
+
+
+def test_triangles_where_tetrahedra_belong(tmp_path):
+    pyvista.Sphere().cast_to_unstructured_grid().save(tmp_path / "flat.vtu")
+    with pytest.raises(GeometryError, match=r"holds no tetrahedra: give tetrahedra as .* or a closed surface"):
+        read(Geometry(file=str(tmp_path / "flat.vtu")))
+
+
+def test_hexahedra_are_refused(tmp_path):
+    grid = pyvista.StructuredGrid(*np.meshgrid(*[np.arange(3.0)] * 3)).cast_to_unstructured_grid()
+    grid.save(tmp_path / "bricks.vtu")
+    with pytest.raises(GeometryError, match="holds cells of the kind hexahedron: split them into tetrahedra"):
+        read(Geometry(file=str(tmp_path / "bricks.vtu")))
+
+
+def test_points_that_are_no_numbers(lying, written):
+    nodes = lying.nodes.copy()
+    nodes[3] = np.nan
+    with pytest.raises(GeometryError, match="points that are not finite numbers: mend the file"):
+        read(Geometry(file=written(nodes, lying.mesh.cells)))
+
+
+def test_fingerprint_is_that_of_the_content(lying, written):
+    file = written(lying.nodes, lying.mesh.cells)
+    before = fingerprint(Geometry(file=file))
+    written(lying.nodes + 1, lying.mesh.cells)
+    assert len(before) == 16 and fingerprint(Geometry(file=file)) != before
+    assert fingerprint(Geometry()) == ""

@@ -1,0 +1,69 @@
+"""Versions: code is known by what it does, settings by what they say."""
+
+import os
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from types import SimpleNamespace
+
+from echotruth.config import Bmode, PhaseCorrelation
+from echotruth.repository.provenance import _closure, _imports, _plain, _tree, code_version, packages, settings_version
+
+ROOT = Path(__file__).parents[2]
+
+
+def _version(tmp_path, text):
+    script = tmp_path / "script.py"
+    script.write_text(text)
+    for cached in (code_version, _imports, _plain, _tree):  # one file, two texts
+        cached.cache_clear()
+    return code_version(str(script))
+
+
+def test_comments_layout_and_docstrings_do_not_change_the_version(tmp_path):
+    plain = _version(tmp_path, "def f(x):\n    return x + 1\n")
+    dressed = _version(tmp_path, '"""Says."""\n\ndef f(x):\n    """Does."""\n    # adds\n    return (x   + 1)\n')
+    assert plain == dressed
+
+
+def test_another_statement_changes_the_version(tmp_path):
+    assert _version(tmp_path, "x = 1\n") != _version(tmp_path, "x = 2\n")
+
+
+def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_path):
+    def closure(stage):
+        return _closure((str(ROOT / f"workflow/scripts/{stage}.py"),))
+
+    assert "echotruth.mechanics.solver.newton" in closure("mechanics")
+    assert "echotruth.materials.neo_hooke" in closure("mechanics"), "found in its folder, not by an import"
+    assert "echotruth.mechanics.solver.newton" not in closure("tracking")
+    assert "echotruth.tracking.trackers.phase_correlation" not in closure("mechanics") | closure("rf")
+
+
+def test_cache_of_compiled_functions_has_the_version_of_all_modules_that_compile():
+    scripts = tuple(str(script) for script in (ROOT / "workflow/scripts").glob("*.py"))
+    texts = {path: path.read_text() for path in (ROOT / "src").rglob("*.py")}
+    files = [path.relative_to(ROOT / "src") for path, text in texts.items() if "njit(" in text or "intrinsic" in text]
+    compiled = {".".join(file.with_suffix("").parts).removesuffix(".__init__") for file in files}
+    assert len(compiled) > 20
+    assert compiled <= _closure(scripts)
+    assert os.environ["NUMBA_CACHE_DIR"].endswith(code_version(*scripts))
+
+
+def test_settings_version_depends_on_values_alone():
+    assert settings_version(Bmode(), 1) == settings_version(Bmode(), 1)
+    assert settings_version(PhaseCorrelation()) != settings_version(PhaseCorrelation(taper="hann"))
+
+
+def test_versions_of_packages_are_those_of_their_distributions():
+    found = packages()
+    for name in ("numpy", "scikit-image", "echotruth"):
+        assert found[name] == version(name)
+    assert "opencv" in found
+
+
+def test_opencv_is_told_under_whatever_name_it_is_installed_and_missed_where_it_is_not(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cv2", SimpleNamespace(__version__="4.10.0"))
+    assert packages()["opencv"] == "4.10.0"
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    assert "opencv" not in packages()

@@ -1,0 +1,78 @@
+"""A run says what failed, and nothing that it has started outlives it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+
+from echotruth.workflow.execution import LAST, execute
+
+
+def python(code):
+    return [sys.executable, "-c", code]
+
+
+def test_words_of_snakemake_are_in_the_log_and_not_on_the_terminal(tmp_path, capfd):
+    log = tmp_path / "logs/snakemake.log"
+    assert execute(python("print('Building DAG of jobs...')"), log, "demo", {}) == 0
+    assert "Building DAG" in log.read_text()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_failed_job_is_told_by_the_end_of_its_log_and_the_status(tmp_path, capfd):
+    job = tmp_path / "mid.log"
+    job.write_text("\n".join(f"line {number}" for number in range(100)))
+    said = f"Error in rule imaging:\n    jobid: 3\n    log: {job} (check log file(s) for error details)\n"
+    assert execute(python(f"print({said!r}); exit(1)"), tmp_path / "snakemake.log", "demo", {}) == 1
+    told = capfd.readouterr().err
+    assert f"The last lines of {job}" in told and "line 99" in told
+    assert f"line {100 - LAST}\n" in told and f"line {99 - LAST}\n" not in told
+
+
+def test_failure_before_any_job_is_told_by_snakemakes_own_log(tmp_path, capfd):
+    log = tmp_path / "snakemake.log"
+    assert execute(python("print('no such rule'); exit(2)"), log, "demo", {}) == 2
+    told = capfd.readouterr().err
+    assert str(log) in told and "no such rule" in told
+
+
+def at_work(number):
+    """Whether a process has not ended; one that has may stay in the table until its new parent asks for its status."""
+    return psutil.pid_exists(number) and psutil.Process(number).status() != psutil.STATUS_ZOMBIE
+
+
+STUBBORN = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print(1, flush=True); time.sleep(60)"
+PARENT = f"""
+import subprocess, sys, time
+job = subprocess.Popen([sys.executable, "-c", {STUBBORN!r}])
+print("pid", job.pid, flush=True)
+time.sleep(60)
+"""
+RUN = """
+import signal, sys
+from pathlib import Path
+from echotruth import execution
+# Tests that run in the background may have been told to ignore it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+execution.PATIENCE = 0.5
+execution.execute([sys.executable, "-c", sys.argv[1]], Path(sys.argv[2]), "demo", {})
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP], ids=lambda number: number.name)
+def test_signal_ends_all_jobs(tmp_path, number):
+    log = tmp_path / "snakemake.log"
+    run = subprocess.Popen([*python(RUN), PARENT, str(log)], stderr=subprocess.PIPE)
+    end = time.monotonic() + 60
+    while not (log.is_file() and log.read_text().count("\n") == 2):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    job = int(log.read_text().split("pid ")[1].split()[0])
+    os.kill(run.pid, number)
+    run.communicate(timeout=30)
+    assert run.returncode != 0
+    assert not at_work(job)
