@@ -1,4 +1,4 @@
-# Two commands: make demo, make test. Both first set up .venv from requirements.lock. make test-all takes longer.
+# make demo and make test set up .venv from requirements.lock first; make test-all runs the slow tests too.
 
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
@@ -9,16 +9,18 @@ BIN := .venv/bin
 demo: .venv/ready
 	$(BIN)/echotruth run config/demo.yaml
 
-# Two workers; the tests of a module stay together, for they share what is dear to make.
+# Two workers; the tests of a module stay on one worker, because they share expensive fixtures.
 test: CHOICE := -m "not slow"
 test test-all: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(CHOICE)
 
 .venv/ready: requirements.lock pyproject.toml
-	@test -n "$(PYTHON)" || { echo "echotruth needs Python 3.11, 3.12 or 3.13: install one, or name it with make PYTHON=/path/to/python"; exit 1; }
-	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null || { echo "echotruth needs Python 3.11, 3.12 or 3.13, and $(PYTHON) is not one: name another with make PYTHON=/path/to/python"; exit 1; }
+	@test -n "$(PYTHON)" || { echo "echotruth needs Python 3.11, 3.12 or 3.13: install one, or give its path: make PYTHON=/path/to/python"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null || { echo "echotruth needs Python 3.11, 3.12 or 3.13, but $(PYTHON) is another version: give the path of one: make PYTHON=/path/to/python"; exit 1; }
 	$(PYTHON) -m venv --clear .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .
@@ -27,7 +29,7 @@ test test-all: .venv/ready
 reference: .venv/ready  ## generated pages: schema and tables
 	$(BIN)/python -m echotruth.reference
 
-validation: .venv/ready  ## docs/validation.md, half an hour on one core
+validation: .venv/ready  ## docs/validation.md; takes half an hour on one core
 	$(BIN)/echotruth validate
 
 lock:  ## needs uv

@@ -1,4 +1,4 @@
-"""A repository of hearts, one DAG: geometry ... tracking for every case and view, then repository and report.
+"""Workflow of a repository: geometry to tracking for every case and view, then repository and report.
 
     snakemake --configfile config/demo.yaml
 """
@@ -13,7 +13,7 @@ from shlex import quote
 from snakemake.exceptions import WorkflowError
 
 from echotruth.cases import expand as expand_cases
-from echotruth.workflow.compiled import GROUPS, folder
+from echotruth.workflow.compiled import CACHE_GROUPS, cache_folder
 from echotruth.config.loading import ConfigError, validate
 from echotruth.mechanics.geometry.imported_mesh import fingerprint
 from echotruth.loop.cycle import read_loop
@@ -35,11 +35,11 @@ except ConfigError as error:
 
 FOLDER = Path("out") / CONFIG.name
 SCRIPTS = Path(workflow.basedir) / "workflow/scripts"
-RUN = f"{quote(sys.executable)} {quote(str(SCRIPTS))}"  # {RUN}/rf.py runs a script
+RUN = f"{quote(sys.executable)} {quote(str(SCRIPTS))}"  # used as {RUN}/rf.py
 
 
 def code(*stages):
-    """Version of the code behind stages; a change of it runs them again."""
+    """Version of the code of some stages; if it changes, they are run again."""
     return code_version(*(str(SCRIPTS / f"{stage}.py") for stage in stages))
 
 
@@ -47,6 +47,7 @@ shell.prefix("set -euo pipefail; ")
 
 
 def record(stage, case="{case}", view=None):
+    """Path of the record of a job."""
     return record_path(FOLDER, stage, case, view)
 
 

@@ -68,7 +68,7 @@ def to_pymust(
     delay = delays(probe, (focus * np.sin(STEERED), focus * np.cos(STEERED)))
     phase = np.exp(-2j * np.pi * np.outer(matrix.frequency, delay))
     ours = np.einsum("fij,fi->fj", matrix(position, amplitude), phase)
-    bins, step = matrix.first + np.arange(len(matrix.frequency)), matrix.sampling / matrix.samples
+    bins, step = matrix.first_bin + np.arange(len(matrix.frequency)), matrix.sampling / matrix.samples
     theirs = Pymust(probe, elevation=elevation, **options).spectra(position, amplitude, delay, bins, step)
     return likeness(ours, theirs * pulse_spectrum(probe, matrix.frequency)[:, None])
 

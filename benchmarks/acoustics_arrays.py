@@ -16,8 +16,8 @@ SECTOR = np.deg2rad(64)
 """Opening angle of the sector that is imaged."""
 
 THIN = 0.1
-"""Height over wavelength of an element that is a point in elevation: both the lens and the beam are then without
-effect, and the spreading is 1/r, which a simulator in two dimensions has not."""
+"""Height over wavelength of an element that is a point in elevation: lens and beam then have no effect, and the loss
+over distance is 1/r, which a simulator in two dimensions does not have."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,9 @@ class Array:
         """
         random = np.random.default_rng([2026, seed])
         angle = random.uniform(-SECTOR / 2, SECTOR / 2, number)
-        reach = np.sqrt(random.uniform(self.near**2, self.far**2, number))
+        range_ = np.sqrt(random.uniform(self.near**2, self.far**2, number))
         elevation = random.uniform(-self.slab, self.slab, number) if thick else np.zeros(number)
-        position = np.stack([reach * np.sin(angle), reach * np.cos(angle), elevation], axis=1)
+        position = np.stack([range_ * np.sin(angle), range_ * np.cos(angle), elevation], axis=1)
         return position, random.standard_normal(number)
 
 

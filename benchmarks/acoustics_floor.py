@@ -1,6 +1,6 @@
 """What the machine allows: how fast one core loads, stores, and multiplies and adds, in single precision.
 
-All loops run over arrays that stay in the first-level cache, as the blocks of the deposit are made to.
+All loops run over arrays that stay in the first-level cache, as the blocks of scatterers are made to.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from echotruth.imaging.rf import full_matrix as rf
-from echotruth.imaging.rf import spreading as deposit
+from echotruth.imaging.rf import full_matrix, spreading
 
 VECTOR = 8
 """Numbers in 32 bytes."""
@@ -61,20 +60,21 @@ def multiply(one, other, repeats):
     return other[0]
 
 
-TERMS = {"ours": rf.FINE, "ours, 1e-3": rf.FAST}
-"""Party to the terms of its tables."""
+SCHEMES = {"ours": full_matrix.FINE, "ours, 1e-3": full_matrix.FAST}
+"""Party to the scheme of its tables."""
 
 LOOPS = {"load": (load, 2), "store": (store, 2), "multiply": (multiply, HORNER)}
 """Name to loop and how often it does that to every number."""
 
 
-def counts(terms: int) -> dict[str, dict[str, int]]:
-    """Bytes and instructions of the deposit of an echo, a vector of eight at a time.
+def counts(scheme: int) -> dict[str, dict[str, int]]:
+    """Bytes and instructions of spreading an echo, a vector of eight at a time.
 
-    Loads of every row of its table, of the trace, and of time, weight and colour at the receiver; a store of the trace;
+    Loads of every row of its table, of the trace, and of time, weight and spectral exponent of the receiver; a store of
+    the trace;
     as many multiply-adds as the table has rows.
     """
-    rows = sum(deposit.ROWS[terms])
+    rows = sum(spreading.COEFFICIENTS[scheme])
     return {
         "load": {"bytes": (rows + 1) * 32 + 3 * 4, "instructions": rows + 1 + 3},
         "store": {"bytes": 32, "instructions": 1},

@@ -13,9 +13,9 @@ from worker import Clock
 from echotruth.config import Bmode, Rf
 from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
-from echotruth.imaging.beamforming.synthesis import Synthesis
-from echotruth.imaging.beamforming.transmit import KINDS
-from echotruth.imaging.bmode import clip
+from echotruth.imaging.beamforming.synthesis import TransmitSynthesis
+from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES
+from echotruth.imaging.bmode import bmode_clip
 from echotruth.imaging.rf.full_matrix import FullMatrix
 
 Seconds = dict[str, dict[str, float]]
@@ -29,18 +29,20 @@ def scan(array: Array, **changes: Any) -> tuple[Rf, Bmode]:
 
 def frame(array: str, scatterers: int, lines: int, repeats: int) -> dict[str, Any]:
     """Seconds of the parts of a frame of focused lines, from scatterers to uint8; medians."""
-    given = ARRAYS[array]
-    rf, bmode = scan(given, lines=lines)
-    scanner = Scanner(given.probe(), rf, imaging_depth(rf, bmode))
-    channels = Synthesis(
-        scanner.matrix, given.probe().si().frequency, KINDS[rf.transmit](given.probe(), rf, scanner.scan)
+    setup = ARRAYS[array]
+    rf, bmode = scan(setup, lines=lines)
+    scanner = Scanner(setup.probe(), rf, imaging_depth(rf, bmode))
+    channels = TransmitSynthesis(
+        scanner.matrix, setup.probe().si().frequency, TRANSMIT_SEQUENCES[rf.transmit](setup.probe(), rf, scanner.scan)
     )
-    phantom = given.scatterers(scatterers, thick=True)
+    phantom = setup.scatterers(scatterers, thick=True)
     turns = [_parts(scanner, channels, phantom, bmode).seconds for _ in range(repeats + 1)][1:]
     return {"seconds": _medians(turns), "threads": numba.get_num_threads(), "size_px": bmode.size_px}
 
 
-def _parts(scanner: Scanner, channels: Synthesis, phantom: tuple[np.ndarray, np.ndarray], bmode: Bmode) -> Clock:
+def _parts(
+    scanner: Scanner, channels: TransmitSynthesis, phantom: tuple[np.ndarray, np.ndarray], bmode: Bmode
+) -> Clock:
     """One frame; the channels are made twice, once alone, as beamforming takes them block by block."""
     clock = Clock()
     with clock("matrix"):
@@ -51,7 +53,7 @@ def _parts(scanner: Scanner, channels: Synthesis, phantom: tuple[np.ndarray, np.
     with clock("channels and receive focus"):
         lines = scanner.beamform(matrix)
     with clock("image"):
-        images = clip(lines[None], scanner.scan, scanner.range, bmode)
+        images = bmode_clip(lines[None], scanner.scan, scanner.range, bmode)
     if images[bmode.size_px].dtype != np.uint8:
         raise TypeError("The image must have eight bits.")
     return clock
@@ -59,11 +61,11 @@ def _parts(scanner: Scanner, channels: Synthesis, phantom: tuple[np.ndarray, np.
 
 def transmits(array: str, scatterers: int, number: int, repeats: int) -> Seconds:
     """Seconds of the matrix and of the channel data of a number of diverging waves made from it; medians."""
-    given = ARRAYS[array]
-    probe, rf = given.probe(), scan(given, transmit="diverging", transmits=number)[0]
-    waves = KINDS[rf.transmit](probe, rf, scan_lines(probe, rf))
-    full = FullMatrix(probe, given.far, np.abs(waves.delay).max(), elevation=False)
-    phantom, channels, turns = given.scatterers(scatterers), Synthesis(full, probe.si().frequency, waves), []
+    setup = ARRAYS[array]
+    probe, rf = setup.probe(), scan(setup, transmit="diverging", transmits=number)[0]
+    waves = TRANSMIT_SEQUENCES[rf.transmit](probe, rf, scan_lines(probe, rf))
+    full = FullMatrix(probe, setup.far, np.abs(waves.delay).max(), elevation=False)
+    phantom, channels, turns = setup.scatterers(scatterers), TransmitSynthesis(full, probe.si().frequency, waves), []
     for _ in range(repeats + 1):
         clock = Clock()
         with clock("matrix"):

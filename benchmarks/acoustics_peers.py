@@ -104,9 +104,9 @@ class Pymust:
         middle = round(param.fc / step)
         param.fc = middle * step
         # PyMUST's own step, and how finely it divides ours; a hair more, as it rounds the number of bins up.
-        own = self._own_step(position, delay)
-        finer = int(np.ceil(step / own))
-        self.options.FrequencyStep = step / finer / own * (1 + 1e-9)
+        default = self._default_step(position, delay)
+        finer = int(np.ceil(step / default))
+        self.options.FrequencyStep = step / finer / default * (1 + 1e-9)
         _, spectra = self(position, amplitude, delay)
         frequency = bins * step
         wave = param.getPulseSpectrumFunction()(2 * np.pi * frequency)
@@ -115,7 +115,7 @@ class Pymust:
         size = (param.height * gaussians()) ** 2 if self._elevation else param.width
         return np.conj(spectra[finer * bins] / wave[:, None]) / (step / finer * size)
 
-    def _own_step(self, position: Floats, delay: Floats) -> float:
+    def _default_step(self, position: Floats, delay: Floats) -> float:
         """Frequency step that `simus` multiplies by its option, Hz."""
         centre = (np.arange(self.param.Nelements) - (self.param.Nelements - 1) / 2) * self.param.pitch
         farthest = np.hypot(position[:, :1] - centre, position[:, 1:2]).max()
@@ -125,8 +125,8 @@ class Pymust:
 
 def gaussians() -> float:
     """Integral over elevation of the Gaussians that PyMUST takes for an element, over its height; 0.992."""
-    share, width = import_module("pymust.pfield").MGBMcoeff(4)
-    return float(np.sum(share * np.sqrt(np.pi / np.asarray(width))).real)
+    weight, width = import_module("pymust.pfield").MGBMcoeff(4)
+    return float(np.sum(weight * np.sqrt(np.pi / np.asarray(width))).real)
 
 
 class Esdiva:

@@ -78,7 +78,7 @@ PARTIES: dict[str, tuple[Callable[..., Run], dict[str, Any]]] = {
     "eSDIva, elevation": (esdiva, {"patches": PATCHES}),
     "eSDIva, matrix": (esdiva_matrix, {}),
 }
-"""Who takes turns: what makes it, and its options."""
+"""Party to what makes it, and its options."""
 
 
 @cache
@@ -93,18 +93,18 @@ def ready(party: str, array: str, elements: int, thick: bool) -> Run:
 def turn(party: str, array: str, scatterers: int, elements: int = ELEMENTS, thick: bool = False) -> dict[str, float]:
     """Wall and CPU seconds of a turn."""
     run, clock = ready(party, array, elements, thick), Clock()
-    given = ARRAYS[array].scatterers(scatterers, thick=thick)
+    phantom = ARRAYS[array].scatterers(scatterers, thick=thick)
     with clock("turn"):
-        run(*given)
+        run(*phantom)
     return clock.seconds["turn"]
 
 
 def pair(party: str, array: str) -> dict[str, Any]:
-    """Nanoseconds of CPU of a pair of elements and a scatterer (what more scatterers add), and what it must do."""
+    """Nanoseconds of CPU of a pair of elements and a scatterer (what more scatterers add), and its least work."""
     spent = [[turn(party, array, number)["cpu"] for number in PAIRED] for _ in range(TURNS)]
     few, many = (median(turns) for turns in zip(*spent, strict=True))
     taken = 1e9 * (many - few) / (PAIRED[1] - PAIRED[0]) / (ELEMENTS * (ELEMENTS + 1) / 2)
-    return {"ns": taken, "counts": acoustics_floor.counts(acoustics_floor.TERMS[party])}
+    return {"ns": taken, "counts": acoustics_floor.counts(acoustics_floor.SCHEMES[party])}
 
 
 def peak() -> float:
@@ -114,7 +114,7 @@ def peak() -> float:
 
 
 def versions() -> dict[str, str]:
-    """Of everything that takes part."""
+    """Versions of all packages that are compared."""
     return {name: version(name) for name in ("echotruth", "PyMUST", "esdiva", "numba", "numpy", "scipy")}
 
 

@@ -41,10 +41,10 @@ from echotruth.config.loading import load
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.scoring import ground_truth, score
 from echotruth.imaging.beamforming.scan import scan_lines
-from echotruth.imaging.beamforming.scanner import Scanner, checked, imaging_depth
-from echotruth.imaging.bmode import clip, pixel_centres, time_gain
-from echotruth.imaging.medium.medium import Medium, seed
-from echotruth.imaging.truth import truth
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth, validate_scatterers
+from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
+from echotruth.imaging.medium.medium import Medium, seed_medium
+from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import ledger
@@ -147,22 +147,22 @@ class Parts:
 
     def phantom(self) -> float:
         in_beam = self._scanner.matrix.in_beam
-        return timed(lambda: seed(self._config, self._heart, self._plane, self._random, in_beam))
+        return timed(lambda: seed_medium(self._config, self._heart, self._plane, self._random, in_beam))
 
     def truth(self) -> float:
         some = replace(self._heart, displacement=self._heart.displacement[:SOME])
         grids = [pixel_centres(self._config.bmode, size) for size in self._config.bmode.sizes]
-        spent = timed(lambda: [truth(some, self._plane, *grid) for grid in grids])
+        spent = timed(lambda: [pixel_truth(some, self._plane, *grid) for grid in grids])
         return self._frames / len(some.displacement) * spent
 
     def rf(self) -> float:
         config, heart, scanner = self._config, self._heart, self._scanner
-        seeded = seed(config, heart, self._plane, self._random, scanner.matrix.in_beam)
+        seeded = seed_medium(config, heart, self._plane, self._random, scanner.matrix.in_beam)
         times = read_loop(config.loop).time
         medium = Medium(config, heart, self._plane, time=times, seeded=seeded, random=self._random)
         position, amplitude = medium(0)
         even = np.random.default_rng(0).uniform(position.min(0), position.max(0), position.shape)
-        scatterers = checked(even, amplitude)
+        scatterers = validate_scatterers(even, amplitude)
         matrix = scanner.matrix(*scatterers)
         return self._frames * (timed(lambda: scanner.matrix(*scatterers)) + timed(lambda: scanner.beamform(matrix)))
 
@@ -170,8 +170,9 @@ class Parts:
         config, scanner = self._config, self._scanner
         shape = (SOME, len(scanner.angle), len(scanner.range))
         lines = np.random.default_rng(0).standard_normal((*shape, 2), np.float32).view(np.complex64)[..., 0]
-        gain, scan = time_gain(config.probe, config.bmode, scanner.range), scan_lines(config.probe, config.rf)
-        return self._frames / SOME * timed(lambda: clip(lines, scan, scanner.range, config.bmode, gain))
+        scan = scan_lines(config.probe, config.rf)
+        gain = time_gain_compensation(config.probe, config.bmode, scanner.range)
+        return self._frames / SOME * timed(lambda: bmode_clip(lines, scan, scanner.range, config.bmode, gain))
 
     def tracking(self) -> float:
         trackers = self._config.tracking.trackers.values()
@@ -192,7 +193,7 @@ class Parts:
 def _try(excerpt: Clip, tracker: Section) -> None:
     """Track, with whatever success."""
     with suppress(TrackerFailed):
-        track(*excerpt.given, tracker)
+        track(*excerpt.tracker_arguments, tracker)
 
 
 def beside(folder: Path, found: list[Record]) -> list[list[Any]]:

@@ -19,12 +19,12 @@ import speckle
 
 from echotruth.cases import generator
 from echotruth.config import Probe, Rf
-from echotruth.evaluation.clip import Clip, places
+from echotruth.evaluation.clip import Clip, grid_points
 from echotruth.evaluation.scoring import ground_truth, score
+from echotruth.imaging.acquisition import Acquisition
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
-from echotruth.imaging.bmode import clip
-from echotruth.imaging.medium.medium import Medium, seed
-from echotruth.imaging.rf.acquisition import Acquisition
+from echotruth.imaging.bmode import bmode_clip
+from echotruth.imaging.medium.medium import Medium, seed_medium
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
 from echotruth.tracking.tracker import track
@@ -58,11 +58,11 @@ def clips(job: Job, density: float) -> dict[int, np.ndarray]:
     plane = Plane(**job.read("phantom", "origin", "axes"))
     random = partial(generator, job.case, job.view_name)
     scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
-    seeded = seed(config, heart, plane, random, scanner.matrix.in_beam)
+    seeded = seed_medium(config, heart, plane, random, scanner.matrix.in_beam)
     medium = Medium(config, heart, plane, time=read_loop(config.loop).time, seeded=seeded, random=random)
     acquire = Acquisition(config, scanner, medium, random)
     lines = np.stack([scanner.beamform(acquire(frame)) for frame in range(len(heart.displacement))])
-    return clip(lines, scanner.scan, scanner.range, config.bmode)
+    return bmode_clip(lines, scanner.scan, scanner.range, config.bmode)
 
 
 def errors(job: Job, images: dict[int, np.ndarray], tracker: str) -> list[float]:
@@ -74,12 +74,12 @@ def errors(job: Job, images: dict[int, np.ndarray], tracker: str) -> list[float]
             frames=frames,
             mask=mask,
             inside=truth.inside,
-            points=places(config, size)[truth.inside],
+            points=grid_points(config, size)[truth.inside],
             spacing=config.bmode.si().field_of_view / size,
             frame_time=read_loop(config.loop).time,
             seed=1,
         )
-        displacement, _ = given.on_grid(*track(*given.given, config.tracking.trackers[tracker]))
+        displacement, _ = given.on_grid(*track(*given.tracker_arguments, config.tracking.trackers[tracker]))
         found.append(100 * float(score(displacement, truth)["nrmse"][0, -1]))
     return found
 

@@ -1,4 +1,4 @@
-"""What is lost of the echoes of a heart where scatterers beside the beam are left out.
+"""How much of the echoes of a heart is lost where scatterers beside the beam are left out.
 
     python benchmarks/left_out.py out/demo out/rat out/human
 
@@ -17,7 +17,7 @@ import numpy as np
 from echotruth.cases import generator
 from echotruth.fem.tetrahedra import MaterialPoints
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
-from echotruth.imaging.medium.medium import seed
+from echotruth.imaging.medium.medium import seed_medium
 from echotruth.imaging.medium.phantom import Scatterers
 from echotruth.imaging.rf import elevation
 from echotruth.imaging.view import Plane
@@ -27,29 +27,29 @@ from echotruth.workflow.job import Job
 
 def scanners(job: Job) -> tuple[Scanner, Scanner]:
     """The scanner of a view, and one whose beam has no end in elevation."""
-    config, share = job.case.config, elevation.LEFT_OUT
-    given = config.probe, config.rf, imaging_depth(config.rf, config.bmode)
-    own = Scanner(*given)
-    elevation.LEFT_OUT = 0.0
-    endless = Scanner(*given)
-    elevation.LEFT_OUT = share
-    return own, endless
+    config, energy = job.case.config, elevation.BEAM_TAIL_ENERGY
+    settings = config.probe, config.rf, imaging_depth(config.rf, config.bmode)
+    limited = Scanner(*settings)
+    elevation.BEAM_TAIL_ENERGY = 0.0
+    endless = Scanner(*settings)
+    elevation.BEAM_TAIL_ENERGY = energy
+    return limited, endless
 
 
 def losses(job: Job) -> list[str]:
-    """Rows of the table: scatterers of all and in the beam, and what is lost, at ED and at ES."""
+    """Rows of the table: all scatterers, those in the beam, and the loss, at ED and at ES."""
     heart, config, rows = job.heart, job.case.config, []
-    own, endless = scanners(job)
+    limited, endless = scanners(job)
     plane = Plane(**job.read("phantom", "origin", "axes"))
-    seeded = seed(config, heart, plane, partial(generator, job.case, job.view_name), endless.matrix.in_beam)
+    seeded = seed_medium(config, heart, plane, partial(generator, job.case, job.view_name), endless.matrix.in_beam)
     scatterers = Scatterers(MaterialPoints(seeded["cell"], seeded["xi"]), seeded["amplitude"], False)
     for name, frame in (("ED", 0), ("ES", heart.es)):
-        position = scatterers.image(heart.positions(frame), heart.cells, plane)
-        inside = own.matrix.in_beam(position)
-        whole = endless.matrix(position, seeded["amplitude"])
-        lost = np.linalg.norm(own.matrix(position, seeded["amplitude"]) - whole) / np.linalg.norm(whole)
-        where = f"| {config.probe.preset} | {job.view_name} | {name} |"
-        rows.append(f"{where} {len(position)} | {inside.sum()} | {100 * lost:.2f} |")
+        position = scatterers.image_positions(heart.positions(frame), heart.cells, plane)
+        inside = limited.matrix.in_beam(position)
+        echoes = endless.matrix(position, seeded["amplitude"])
+        lost = np.linalg.norm(limited.matrix(position, seeded["amplitude"]) - echoes) / np.linalg.norm(echoes)
+        case = f"| {config.probe.preset} | {job.view_name} | {name} |"
+        rows.append(f"{case} {len(position)} | {inside.sum()} | {100 * lost:.2f} |")
         print(rows[-1], flush=True)
     return rows
 

@@ -18,9 +18,9 @@ from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver import drive
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
-from echotruth.mechanics.solver.newton import Walk
-from echotruth.mechanics.solver.support import of_base
-from echotruth.mechanics.solver.wall import Wall, equilibrium, law, wall
+from echotruth.mechanics.solver.newton import LoadStepper
+from echotruth.mechanics.solver.support import base_support
+from echotruth.mechanics.solver.wall import Wall, equilibrium, wall, wall_law
 
 ELASTIC = Mechanics(viscosity_Pa_s=0.0)
 """The wall that ships, less its viscosity, which the peer's has not."""
@@ -95,9 +95,10 @@ class Ours:
 
     def fill(self, stiffness: float) -> None:
         """Go to end-diastole."""
-        walk, whole = Walk(self._heart, stiffness), read_loop(Loop())
-        drive.end_diastole(walk, _first(whole, 1), stiffness)
-        self._state, self._load = walk.state, replace(walk.load, volume=OFF * walk.load.volume, share=1.0)
+        stepper, whole = LoadStepper(self._heart, stiffness), read_loop(Loop())
+        drive.fill_to_end_diastole(stepper, _first(whole, 1), stiffness)
+        load = stepper.load
+        self._state, self._load = stepper.state, replace(load, volume=OFF * load.volume, tension_fraction=1.0)
 
     def step(self) -> dict[str, dict[str, float]]:
         """Seconds of the parts of a Newton step, and of a whole one, near end-diastole.
@@ -108,11 +109,11 @@ class Ours:
         heart, clock, at = self._heart, Clock(), (self._state, self._load, "tension")
         untimed, heart._solver = heart._solver, _Timed(heart._solver, clock)
         with clock("residual"):
-            imbalance = heart.imbalance(*at)
+            residual = heart.residual(*at)
         with clock("step"):
             tangent = heart.linearize(*at)
-            moved = self._state.moved(tangent.correction(imbalance), 1.0, "tension")
-            heart.imbalance(moved, self._load, "tension")
+            moved = self._state.corrected(tangent.correction(residual), 1.0, "tension")
+            heart.residual(moved, self._load, "tension")
         heart._solver = untimed
         spent = clock.seconds
         parts = ("factor", "solve", "residual")
@@ -130,10 +131,12 @@ class Ours:
             bulk_modulus_kPa=LAND_BULK_KPA,
             viscosity_Pa_s=0.0,
         )
-        self._replace(Equilibrium(mesh, _land_frames(mesh, tetrahedron()[0]), law(section), of_base(mesh, "fixed")))
-        walk = Walk(self._heart, problem["law"]["stiffness"])
-        walk.to(Load(problem["pressure"], 1.0, 0.0, problem["tension"]), None)
-        return land.apex(mesh.nodes, self._heart.positions(walk.state) - mesh.nodes)
+        self._replace(
+            Equilibrium(mesh, _land_frames(mesh, tetrahedron()[0]), wall_law(section), base_support(mesh, "fixed"))
+        )
+        stepper = LoadStepper(self._heart, problem["law"]["stiffness"])
+        stepper.advance(Load(problem["pressure"], 1.0, 0.0, problem["tension"]), None)
+        return land.apex(mesh.nodes, self._heart.positions(stepper.state) - mesh.nodes)
 
 
 class _Timed:

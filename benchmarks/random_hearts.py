@@ -54,16 +54,16 @@ def solved(number: int, elements: tuple[int, int, int]) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits
 
     from echotruth.config import Config
-    from echotruth.config.loading import resolved
+    from echotruth.config.loading import override
     from echotruth.mechanics.beat import beat
-    from echotruth.mechanics.physiology import measures, verdict
+    from echotruth.mechanics.physiology import measures, violated_bound
     from echotruth.mechanics.solver.newton import Diverged
 
     numba.set_num_threads(1)
     names = ("circumferential_elements", "longitudinal_elements", "transmural_elements")
     mesh = {f"geometry.{name}": count for name, count in zip(names, elements, strict=True)}
     values = drawn(number)
-    config = resolved(Config(), values | mesh)
+    config = override(Config(), values | mesh)
     start = time.process_time()
     row: dict[str, Any] = {"heart": number, **values}
     try:
@@ -75,12 +75,12 @@ def solved(number: int, elements: tuple[int, int, int]) -> dict[str, Any]:
     found = measures(arrays["geometry"], mechanics, kinematics)
     return row | {
         "seconds": time.process_time() - start,
-        "loop_error": float(np.abs(mechanics["volume"] / mechanics["volume_asked"] - 1).max()),
-        "pressure_error": float(np.abs(mechanics["pressure"] / mechanics["pressure_asked"] - 1).max()),
+        "loop_error": float(np.abs(mechanics["volume"] / mechanics["volume_target"] - 1).max()),
+        "pressure_error": float(np.abs(mechanics["pressure"] / mechanics["pressure_target"] - 1).max()),
         "det_f": float(kinematics["volume_ratio_min"].min()),
         "residual": float(mechanics["residual"].max()),
         "factorizations": int(mechanics["newton_steps"].sum()),
-        "implausible": verdict(found, config.physiology),
+        "implausible": violated_bound(found, config.physiology),
     }
 
 

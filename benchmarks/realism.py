@@ -24,12 +24,12 @@ from echotruth.config import Config, Rf
 from echotruth.config.loading import load
 from echotruth.fem.location import locate
 from echotruth.heart import Heart
+from echotruth.imaging.acquisition import Acquisition
 from echotruth.imaging.beamforming.scan import imaging_depth
 from echotruth.imaging.beamforming.scanner import Scanner
-from echotruth.imaging.bmode import clip, pixel_centres
-from echotruth.imaging.medium.medium import Medium, seed
-from echotruth.imaging.rf.acquisition import Acquisition
-from echotruth.imaging.view import Plane, plane
+from echotruth.imaging.bmode import bmode_clip, pixel_centres
+from echotruth.imaging.medium.medium import Medium, seed_medium
+from echotruth.imaging.view import Plane, imaging_plane
 
 HERE = Path(__file__).parent
 FRAMES = 27
@@ -126,10 +126,10 @@ def random(name: str) -> np.random.Generator:
 def pictures(config: Config, beating: Heart, time: np.ndarray, where: Plane) -> Iterator[np.ndarray]:
     """Lines of two frames in a row, and so on through the cycle: (2, lines, ranges)."""
     scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
-    seeded = seed(config, beating, where, random, scanner.matrix.in_beam)
+    seeded = seed_medium(config, beating, where, random, scanner.matrix.in_beam)
     medium = Medium(config, beating, where, time=time, seeded=seeded, random=random)
     acquire = Acquisition(config, scanner, medium, random)
-    show = partial(clip, scan=scanner.scan, range_=scanner.range, bmode=config.bmode)
+    show = partial(bmode_clip, scan=scanner.scan, range_=scanner.range, bmode=config.bmode)
     lines = [scanner.beamform(acquire(k + more)) for k in range(0, FRAMES - 1, EVERY) for more in (0, 1)]
     yield from show(np.stack(lines))[SIZE]
 
@@ -142,8 +142,8 @@ def our_places(beating: Heart, where: Plane, centres: tuple[np.ndarray, np.ndarr
             lateral = side * np.linspace(0, 5e-3, 500)
             line = np.stack([lateral, 0 * lateral, 0 * lateral + height], axis=1)
             wall = line[locate(beating.positions(0), beating.cells, line).cell >= 0].mean(axis=0)
-            places[name].append(pixel(where.image(wall), centres))
-        places["blood"].append(pixel(where.image(np.array([0, 0, height])), centres))
+            places[name].append(pixel(where.to_image(wall), centres))
+        places["blood"].append(pixel(where.to_image(np.array([0, 0, height])), centres))
     return places
 
 
@@ -154,7 +154,7 @@ def pixel(place: np.ndarray, centres: tuple[np.ndarray, np.ndarray]) -> tuple[in
 
 def measure_ours(config: Config, beating: Heart, time: np.ndarray, save: Callable[[np.ndarray], None]) -> Measures:
     """The measures of the long-axis view of the default heart."""
-    where = plane(config.views["long_axis"], config.rf, beating.positions(0)[beating.endo.ravel()])
+    where = imaging_plane(config.views["long_axis"], config.rf, beating.positions(0)[beating.endo.ravel()])
     frames = np.stack(list(pictures(config, beating, time, where)))
     save(frames)
     centres = pixel_centres(config.bmode, SIZE)

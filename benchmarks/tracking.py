@@ -1,14 +1,13 @@
 """Trackers on rigid sub-pixel shifts of simulated speckle, and the time that a pair of images takes them.
 
-    python benchmarks/tracking.py out/demo --guest examples.openpiv_tracker:track
+    python benchmarks/tracking.py out/demo --external examples.openpiv_tracker:track
 
 Shifts: scatterers in a block before the default array are moved by 0, 0.1, ... 1 px of the largest image, along both
 axes at once, and imaged by the RF engine; a tracker sees the unmoved and the moved image. Bias is the mean error over
 phantoms and points, noise the standard deviation about it; the largest over the shifts stands in the table. Time: that
 of the clip of the view `mid` of a repository over its pairs, all trackers in turns, one process with as many threads as
-cores, median of the turns. A guest is timed on the wall, and on a whole image full
-of texture. OpenPIV's example needs the extra
-`openpiv`. The results are results/tracking.md, tracking.json and tracking.png.
+cores, median of the turns. An external tracker is timed on the wall, and on a whole image full of texture. The example
+of OpenPIV needs the extra `openpiv`. The results are results/tracking.md, tracking.json and tracking.png.
 """
 
 from __future__ import annotations
@@ -27,10 +26,10 @@ from matplotlib.figure import Figure
 from scipy.ndimage import gaussian_filter
 
 from echotruth.config import Config
-from echotruth.config.tracking import Guest, standard_trackers
+from echotruth.config.tracking import External, default_trackers
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.imaging.beamforming.scanner import Scanner
-from echotruth.imaging.bmode import clip
+from echotruth.imaging.bmode import bmode_clip
 from echotruth.repository import ledger
 from echotruth.tracking import grid, track
 from echotruth.workflow.job import Job
@@ -48,7 +47,7 @@ STEP = 10
 TURNS = 2
 """How often the time of a clip is taken."""
 WHOLE = ", whole image"
-"""Added to the name of a guest that is given an image full of texture: otherwise it sees what is about the wall."""
+"""Added to the name of an external tracker that is given an image full of texture, not only what is about the wall."""
 
 Clips = dict[int, np.ndarray]
 
@@ -62,7 +61,7 @@ def blocks(config: Config, seed: int) -> Clips:
     pixel = config.bmode.si().field_of_view / config.bmode.sizes[0]
     moved = [position + shift * pixel * np.array([1.0, 1.0, 0.0]) for shift in SHIFTS]
     lines = np.stack([scanner.lines(each, amplitude) for each in moved])
-    return clip(lines, scanner.scan, scanner.range, config.bmode)
+    return bmode_clip(lines, scanner.scan, scanner.range, config.bmode)
 
 
 def wall(config: Config, size: int) -> np.ndarray:
@@ -107,17 +106,17 @@ def full(clip: Clip) -> Clip:
     return replace(clip, frames=frames, mask=np.ones_like(clip.mask))
 
 
-def pace(folder: Path, trackers: dict[str, Any], guest: str) -> dict[str, list[float]]:
+def pace(folder: Path, trackers: dict[str, Any], external: str) -> dict[str, list[float]]:
     """Time of a pair of the largest images, s, of each tracker at every turn: that of the clip over its pairs."""
     case = next(iter(ledger.rows(folder / "registry.txt")))
     clip = next(iter(clips(Job(folder, "tracking", case, "mid")).values()))
     entries = [(name, settings, clip) for name, settings in trackers.items()]
-    if guest:
-        entries.append((guest + WHOLE, trackers[guest], full(clip)))
+    if external:
+        entries.append((external + WHOLE, trackers[external], full(clip)))
     taken: dict[str, list[float]] = {name: [] for name, *_ in entries}
     for turn in range(TURNS + 1):
         for name, settings, given in entries:
-            frames, *rest = given.given
+            frames, *rest = given.tracker_arguments
             count = len(frames) if turn else 3  # the first compiles
             start = time.perf_counter()
             track(frames[:count], *rest[:3], rest[3][:count], rest[4], settings)
@@ -132,10 +131,10 @@ def page(found: dict[str, Any]) -> str:
     sizes = sorted({row["size"] for row in found["shifts"]}, reverse=True)
     rows = {(row["tracker"], row["size"]): row for row in found["shifts"]}
     paces = {name: 1e3 * median(taken) for name, taken in found["pace"].items()}
-    guest = paces.get(found["guest"] + WHOLE, float("nan"))
-    head = ["tracker", *(f"{size}: bias, noise (px)" for size in sizes), "ms a pair", "guest's whole image / this"]
+    external = paces.get(found["external"] + WHOLE, float("nan"))
+    head = ["tracker", *(f"{size}: bias, noise (px)" for size in sizes), "ms a pair", "external, whole image / this"]
     body = [
-        [name, *(_greatest(rows.get((name, size))) for size in sizes), f"{pace:.0f}", f"{guest / pace:.2f}"]
+        [name, *(_greatest(rows.get((name, size))) for size in sizes), f"{pace:.0f}", f"{external / pace:.2f}"]
         for name, pace in paces.items()
     ]
     lines = [
@@ -175,17 +174,17 @@ def chart(found: dict[str, Any]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("repository", type=Path, help="folder of a repository with a view mid, as out/demo")
-    parser.add_argument("--guest", help="package.module:function of a tracker to measure against")
+    parser.add_argument("--external", help="package.module:function of a tracker to measure against")
     parser.add_argument("--phantoms", type=int, default=4)
     arguments = parser.parse_args()
-    trackers, guest = standard_trackers(), ""
-    if arguments.guest:
-        guest = arguments.guest.partition(":")[0].rpartition(".")[2]
-        trackers[guest] = Guest(track=arguments.guest)
+    trackers, external = default_trackers(), ""
+    if arguments.external:
+        external = arguments.external.partition(":")[0].rpartition(".")[2]
+        trackers[external] = External(track=arguments.external)
     found = {
         "phantoms": arguments.phantoms,
-        "guest": guest,
-        "pace": pace(arguments.repository, trackers, guest),
+        "external": external,
+        "pace": pace(arguments.repository, trackers, external),
         "shifts": shifts(Config(), trackers, arguments.phantoms),
     }
     (RESULTS / "tracking.json").write_text(json.dumps(found, indent=1) + "\n")

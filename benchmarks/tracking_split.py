@@ -31,7 +31,7 @@ from scipy.ndimage import map_coordinates
 
 from echotruth.config.tracking import BsplineDic
 from echotruth.evaluation.clip import Clip, clips
-from echotruth.evaluation.scoring import Truth, ground_truth, row, score
+from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import MaterialPoints, interpolate
 from echotruth.imaging.bmode import downsample
@@ -65,10 +65,10 @@ def in_plane(job: Job, plane: Plane, truth: Truth, order: Sequence[int]) -> np.n
     found = np.zeros_like(truth.displacement)
     for before, now in pairwise(order):
         flat = np.column_stack([np.nan_to_num(here, nan=1.0), np.zeros(len(here))])  # 1 m away is no tissue
-        points = locate(heart.positions(before), heart.cells, plane.heart(flat))
+        points = locate(heart.positions(before), heart.cells, plane.to_heart(flat))
         inside = points.cell >= 0
         tissue = MaterialPoints(points.cell[inside], points.xi[inside])
-        moved = plane.image(interpolate(heart.positions(now), heart.cells, tissue))
+        moved = plane.to_image(interpolate(heart.positions(now), heart.cells, tissue))
         here = np.full_like(here, np.nan)
         here[inside] = moved[:, :2]
         found[now] = here - truth.wall.position
@@ -79,9 +79,9 @@ def blobs(job: Job, plane: Plane, clip: Clip) -> np.ndarray:
     """Images, uint8, of the shape of the clip's, of blobs that move in the plane with their tissue."""
     heart, side = job.heart, clip.size * clip.spacing
     random = np.random.default_rng(1)
-    low, high = (extreme(plane.image(heart.positions(0))[:, :2], axis=0) for extreme in (np.min, np.max))
+    low, high = (extreme(plane.to_image(heart.positions(0))[:, :2], axis=0) for extreme in (np.min, np.max))
     place = random.uniform(low, high, (int(np.prod((high - low) / SPACING)), 2))
-    points = locate(heart.positions(0), heart.cells, plane.heart(np.column_stack([place, np.zeros(len(place))])))
+    points = locate(heart.positions(0), heart.cells, plane.to_heart(np.column_stack([place, np.zeros(len(place))])))
     inside = points.cell >= 0
     tissue = MaterialPoints(points.cell[inside], points.xi[inside])
     weight = random.standard_normal((2, inside.sum()))
@@ -120,7 +120,7 @@ def alike(clip: Clip, truth: Truth) -> list[float]:
 
 def halved(clip: Clip, truth: Truth) -> float:
     """RMS error over RMS displacement (%) of a track by every other frame, in the one at end-systole or before it."""
-    frames, points, mask, spacing, time, seed = clip.given
+    frames, points, mask, spacing, time, seed = clip.tracker_arguments
     found = track(frames[::2], points, mask, spacing, time[::2], seed, TRACKER)[0][truth.es // 2] * spacing
     return nrmse(found, truth.displacement[2 * (truth.es // 2)])
 
@@ -130,15 +130,16 @@ def rows(job: Job, view: str) -> list[list[str]]:
     truth, plane = ground_truth(job), Plane(**job.read("phantom", "origin", "axes"))
     true, found = truth.displacement[truth.es], []
     forward, backward = (
-        nrmse(in_plane(job, plane, truth, way)[truth.es], true) for way in bidirectional.ways(len(truth.displacement))
+        nrmse(in_plane(job, plane, truth, order)[truth.es], true)
+        for order in bidirectional.forward_backward(len(truth.displacement))
     )
     given = clips(job)
     free = blobs(job, plane, next(iter(given.values())))
     for size, clip in given.items():
         cells = [view, str(size), f"{forward:.1f}", f"{backward:.1f}"]
         for frames in (downsample(free, free.shape[-1] // size), clip.frames):
-            answer = clip.on_grid(*track(frames, *clip.given[1:], TRACKER))[0]
-            figures = row(score(answer, truth), truth.wall.plane)
+            answer = clip.on_grid(*track(frames, *clip.tracker_arguments[1:], TRACKER))[0]
+            figures = metrics(score(answer, truth), truth.wall.plane)
             tangential = "ecc" if truth.wall.plane == "short_axis" else "ell"
             shown = "nrmse_percent", f"tracker_{tangential}_rms_points", "tracker_err_bias_points"
             cells += [f"{figures[name]:.1f}" for name in shown]

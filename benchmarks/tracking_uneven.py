@@ -20,9 +20,9 @@ import report
 from echotruth.config import Config
 from echotruth.config.tracking import BsplineDic
 from echotruth.evaluation.clip import clips
-from echotruth.evaluation.scoring import ground_truth, row, score
+from echotruth.evaluation.scoring import ground_truth, metrics, score
 from echotruth.imaging.beamforming.scanner import Scanner
-from echotruth.imaging.bmode import clip
+from echotruth.imaging.bmode import bmode_clip
 from echotruth.repository import ledger
 from echotruth.tracking import track
 from echotruth.workflow.job import Job
@@ -60,7 +60,7 @@ def ring(config: Config, harmonic: int) -> dict[int, np.ndarray]:
         now = radius + np.sin(phase) ** 2 * inwards
         position = np.stack([now * np.cos(angle), DEPTH + now * np.sin(angle), height], axis=1)
         lines.append(scanner.lines(position, amplitude))
-    return clip(np.stack(lines), scanner.scan, scanner.range, config.bmode)
+    return bmode_clip(np.stack(lines), scanner.scan, scanner.range, config.bmode)
 
 
 def recovered(frames: np.ndarray, config: Config, harmonic: int, tracker: BsplineDic) -> tuple[float, np.ndarray]:
@@ -83,8 +83,8 @@ def heart(job: Job, tracker: BsplineDic) -> list[str]:
     """NRMSE (%) of a repository's view, one an image size."""
     truth, cells = ground_truth(job), []
     for one in clips(job).values():
-        answer = one.on_grid(*track(*one.given, tracker))[0]
-        cells.append(f"{row(score(answer, truth), truth.wall.plane)['nrmse_percent']:.1f}")
+        answer = one.on_grid(*track(*one.tracker_arguments, tracker))[0]
+        cells.append(f"{metrics(score(answer, truth), truth.wall.plane)['nrmse_percent']:.1f}")
     return cells
 
 

@@ -1,27 +1,28 @@
-"""Functions compiled once: one cache a group of stages and version of their code, filled before their first jobs.
+"""Compile functions once: one cache per group of stages and version of their code, filled before their first jobs.
 
-The jobs that fill it are nobody's input. Snakemake looks no further below a rule that is to run again, and runs again
-what has another input than before; so a job looks for the mark itself, and fills the cache where it is the first.
+The jobs that fill the caches are not inputs of other rules: Snakemake does not check the inputs of a rule that it runs
+again, and runs again whatever has other inputs than before. Instead, every job checks the mark of its cache itself, and
+fills the cache if the mark does not exist.
 """
 
-CACHE = {group: f".snakemake/numba/{folder(group, SCRIPTS)}" for group in GROUPS}
-SMALL = miniature(next(iter(CASES.values())).config)
-KINDS = {
-    "imaging": (*SMALL.views.values(), SMALL.phantom, SMALL.probe, SMALL.rf, SMALL.realism, SMALL.bmode, SMALL.motion),
-    "tracking": (SMALL.tracking, SMALL.bmode),
+CACHE = {group: f".snakemake/numba/{cache_folder(group, SCRIPTS)}" for group in CACHE_GROUPS}
+MINI = miniature(next(iter(CASES.values())).config)
+COMPILE_SETTINGS = {
+    "imaging": (*MINI.views.values(), MINI.phantom, MINI.probe, MINI.rf, MINI.realism, MINI.bmode, MINI.motion),
+    "tracking": (MINI.tracking, MINI.bmode),
 }
-MARKS = {group: f"{CACHE[group]}/{settings_version(*kinds)}" for group, kinds in KINDS.items()}
+MARKS = {group: f"{CACHE[group]}/{settings_version(*sections)}" for group, sections in COMPILE_SETTINGS.items()}
 
 
-def compiled(group):
-    """Shell commands that let what follows find its compiled functions, and compile them where nobody has."""
+def compile_command(group):
+    """Shell commands that set the cache for the following commands, and fill it if it is not filled yet."""
     variable = f"export NUMBA_CACHE_DIR={quote(str(Path(CACHE[group]).absolute()))}"
     if group not in MARKS:
         return variable
     return f"{variable}; [ -e {MARKS[group]} ] || {RUN}/compile.py {FOLDER} {group} {MARKS[group]}"
 
 
-COMPILED = {group: compiled(group) for group in GROUPS}
+COMPILE = {group: compile_command(group) for group in CACHE_GROUPS}
 
 
 rule compile_imaging:
@@ -31,7 +32,7 @@ rule compile_imaging:
         FOLDER / "logs/compile_imaging.log",
     priority: 2
     shell:
-        "{{ {COMPILED[imaging]}; }} &> {log}"
+        "{{ {COMPILE[imaging]}; }} &> {log}"
 
 
 rule compile_tracking:
@@ -41,4 +42,4 @@ rule compile_tracking:
         FOLDER / "logs/compile_tracking.log",
     priority: 1
     shell:
-        "{{ {COMPILED[tracking]}; }} &> {log}"
+        "{{ {COMPILE[tracking]}; }} &> {log}"

@@ -1,6 +1,6 @@
-"""One job a heart and view: phantom, truth, RF and B-mode, all frames and image sizes in one go.
+"""One job per heart and view: phantom, truth, RF and B-mode of all frames and image sizes.
 
-The stages stand in one job because a job's start costs more than handing arrays on through a scratch folder.
+The stages are one job because starting a job takes longer than passing arrays through a scratch folder.
 """
 
 
@@ -13,7 +13,7 @@ rule imaging:
         rf=record("rf", view="{view}"),
         bmode=record("bmode", view="{view}"),
     params:
-        # A string, for Snakemake fills in wildcards in strings alone.
+        # A string, because Snakemake replaces wildcards only in strings.
         scratch=str(FOLDER / "scratch/{case}/{view}"),
         code=code("phantom", "truth", "rf", "bmode"),
         settings=lambda wildcards: imaging_settings(CASES[wildcards.case].config, wildcards.view),
@@ -23,7 +23,7 @@ rule imaging:
         """
         {{
             rm -rf {params.scratch}
-            {COMPILED[imaging]}
+            {COMPILE[imaging]}
             {RUN}/series.py {FOLDER} {wildcards.case} {wildcards.view} phantom truth rf bmode --threads {threads}
             rm -rf {params.scratch}
         }} &> {log}
@@ -31,6 +31,6 @@ rule imaging:
 
 
 def imaging_settings(config, view):
-    place = list(config.views).index(view)
-    stages = (config.phantom, config.probe.settled(), config.rf, config.realism, config.bmode)
-    return settings_version(config.seed, config.views[view], place, *stages)
+    index = list(config.views).index(view)
+    stages = (config.phantom, config.probe.resolved(), config.rf, config.realism, config.bmode)
+    return settings_version(config.seed, config.views[view], index, *stages)

@@ -1,4 +1,4 @@
-"""One job a heart: its measures, and whether they are those of a heart; a changed bound solves nothing again."""
+"""One job per heart: its measures, and whether they are within bounds; changed bounds do not run mechanics again."""
 
 
 rule physiology:

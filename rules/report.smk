@@ -1,11 +1,11 @@
-"""Figures of a repository, gathered in one page by `snakemake --report`."""
+"""Figures of a repository, for the page that `snakemake --report` writes."""
 
 FIGURES = FOLDER / "figures"
 CAPTIONS = Path(workflow.basedir) / "workflow/report"
 
 
 def figure(name, category, title):
-    """A figure with its caption, which stands under the name of the figure in workflow/report."""
+    """Figure with its caption, the file of the same name in workflow/report."""
     caption = CAPTIONS / f"{Path(name).stem}.rst"
     return report(FIGURES / name, caption=str(caption), category=category, labels={"figure": title})
 
@@ -13,7 +13,7 @@ def figure(name, category, title):
 rule report:
     input:
         rules.repository.output,
-        guests=sorted(FOLDER.glob("guests/*.csv")),
+        external=sorted(FOLDER.glob("external/*.csv")),
     output:
         heart=figure("heart.png", "1 Heart", "Heart at ED and ES"),
         loop=figure("loop.png", "1 Heart", "Pressure-volume loop and active tension"),
@@ -27,7 +27,7 @@ rule report:
     log:
         FOLDER / "logs/report.log",
     shell:
-        "{{ {COMPILED[report]}; {RUN}/report.py {FOLDER} motion; }} &> {log}"
+        "{{ {COMPILE[report]}; {RUN}/report.py {FOLDER} motion; }} &> {log}"
 
 
 rule report_images:
@@ -43,4 +43,4 @@ rule report_images:
     log:
         FOLDER / "logs/report_images.log",
     shell:
-        "{{ {COMPILED[report]}; {RUN}/report.py {FOLDER} images; }} &> {log}"
+        "{{ {COMPILE[report]}; {RUN}/report.py {FOLDER} images; }} &> {log}"

@@ -1,14 +1,14 @@
-"""Cases and arrays before the first job; verification, verdicts and attributes after the last."""
+"""Create cases and arrays before the first job; verify files and write attributes after the last."""
 
 
-# Not a rule: every heart would hang on it, and Snakemake looks no further below a rule that is to run again
-# (not even where its output is `ancient`), so that a changed tracker would be overlooked. What is there already stays.
+# Not a rule: every heart would depend on it, and Snakemake does not check the inputs of a rule that it runs again
+# (even if they are `ancient`), so that it would miss a changed tracker. Existing values stay.
 onstart:
     command = [sys.executable, str(SCRIPTS / "cases.py"), str(FOLDER), "-"]
     subprocess.run(command, input=CONFIG.model_dump_json(), text=True, check=True)
 
 
-# Every record by name: one that a failed job lost is asked for even where what was made from it is there.
+# All records are named, so that one that a failed job lost is made again even if its dependants exist.
 RECORDS = [
     *(record(stage, case) for stage in GATES for case in CASES),
     *(record(stage, case, view) for stage in VIEW_STAGES for case in CASES for view in CONFIG.views),

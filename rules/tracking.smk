@@ -1,4 +1,4 @@
-"""One job a heart and view: every tracker at every image size, scored against the truth."""
+"""One job per heart and view: every tracker at every image size, scored against the truth."""
 
 
 rule tracking:
@@ -15,7 +15,7 @@ rule tracking:
     shell:
         """
         {{
-            {COMPILED[tracking]}
+            {COMPILE[tracking]}
             {RUN}/series.py {FOLDER} {wildcards.case} {wildcards.view} tracking evaluation --threads {threads}
         }} &> {log}
         """

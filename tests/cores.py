@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from echotruth.repository.provenance import code_version
-from echotruth.workflow.compiled import GROUPS, folder, share
+from echotruth.workflow.compiled import CACHE_GROUPS, cache_folder, lock_cache_writes
 
 ROOT = Path(__file__).parents[1]
 SCRIPTS = ROOT / "workflow/scripts"
@@ -19,8 +19,8 @@ def lend(caches):
     """Let jobs that look for their caches in a folder find, and fill, that of the tests."""
     CACHE.mkdir(parents=True, exist_ok=True)
     caches.mkdir(parents=True)
-    for group in GROUPS:
-        (caches / folder(group, SCRIPTS)).symlink_to(CACHE)
+    for group in CACHE_GROUPS:
+        (caches / cache_folder(group, SCRIPTS)).symlink_to(CACHE)
 
 
-share()
+lock_cache_writes()

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from echotruth.aha import NAMES, RINGS, segment
+from echotruth.aha import BULLSEYE, SEGMENT_NAMES, segment
 
 APEX = -6e-3
 
@@ -23,13 +23,13 @@ def at(degrees, z):
     ],
 )
 def test_six_sectors_of_base_and_mid(degrees, name):
-    assert NAMES[segment(at(degrees, -1e-3), APEX) - 1] == f"basal {name}"
-    assert NAMES[segment(at(degrees, -3e-3), APEX) - 1] == f"mid {name}"
+    assert SEGMENT_NAMES[segment(at(degrees, -1e-3), APEX) - 1] == f"basal {name}"
+    assert SEGMENT_NAMES[segment(at(degrees, -3e-3), APEX) - 1] == f"mid {name}"
 
 
 @pytest.mark.parametrize("degrees, name", [(90, "anterior"), (0, "septal"), (-90, "inferior"), (180, "lateral")])
 def test_four_sectors_of_the_apex(degrees, name):
-    assert NAMES[segment(at(degrees, -5e-3), APEX) - 1] == f"apical {name}"
+    assert SEGMENT_NAMES[segment(at(degrees, -5e-3), APEX) - 1] == f"apical {name}"
 
 
 def test_edges_between_neighbours():
@@ -59,18 +59,18 @@ def test_apex_above_the_base_is_refused():
         segment(np.zeros(3), 0.0)
 
 
-def test_rings_fill_the_disc_once():
-    inner, outer, start, stop = np.array(RINGS).T
-    assert len(RINGS) == len(NAMES) == 17
+def test_bullseye_fills_the_disc_once():
+    inner, outer, start, stop = np.array(BULLSEYE).T
+    assert len(BULLSEYE) == len(SEGMENT_NAMES) == 17
     assert np.sum((stop - start) * (outer**2 - inner**2) / 2) == pytest.approx(np.pi)
 
 
-def test_rings_lie_as_seen_from_the_apex():
+def test_bullseye_is_that_seen_from_the_apex():
     """Anterior (+y) up and septal (+x) on the left: the page is the short-axis image."""
     degrees = np.arange(0.5, 360)
     for z, ring in ((-1e-3, range(1, 7)), (-3e-3, range(7, 13)), (-5e-3, range(13, 17))):
         for angle in degrees:
             number = int(segment(at(angle, z), APEX))
             page = np.radians(180 - angle)
-            _, _, start, stop = RINGS[number - 1]
+            _, _, start, stop = BULLSEYE[number - 1]
             assert number in ring and (page - start) % (2 * np.pi) < stop - start

@@ -1,9 +1,9 @@
-"""Cases: ids that never change, seeds that depend on nothing else, a table with a column a parameter."""
+"""Cases: stable ids, independent seeds, and a table with one column per parameter."""
 
 import numpy as np
 import pytest
 
-from echotruth.cases import case_id, expand, find, generator, table
+from echotruth.cases import case_id, expand, find_case, generator, table
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError
 
@@ -33,7 +33,7 @@ def test_order_of_axes_and_spelling_of_numbers_do_not_enter_the_id():
 def test_every_case_has_its_values():
     cases = expand(Config(cases=SWEEP))
     assert [(case.config.fibres.endo_deg, case.config.seed) for case in cases] == [(60, 1), (60, 2), (84, 1), (84, 2)]
-    assert find(Config(cases=SWEEP), cases[2].id) == cases[2]
+    assert find_case(Config(cases=SWEEP), cases[2].id) == cases[2]
 
 
 def test_random_numbers_differ_between_views_and_repeat_in_any_order():
@@ -61,7 +61,7 @@ def test_table_has_a_row_a_case_and_a_column_a_parameter():
         ({"fibres": [1]}, "fibres is a section"),
         ({"loop.frames": [20, 40]}, "loop.frames cannot be swept"),
         ({"geometry.transmural_elements": [2, 3]}, "cannot be swept"),
-        ({"seed": [1, 1]}, "holds a value twice"),
+        ({"seed": [1, 1]}, "gives a value twice"),
         ({"fibres.endo_deg": [60.0, 99.0]}, "fibres.endo_deg = 99.0: should be less than or equal to 90"),
         ({"loop.file": ["nowhere.csv"]}, "nowhere.csv"),
     ],

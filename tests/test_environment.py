@@ -1,4 +1,4 @@
-"""What is installed, by pip or by conda, is one list; and nothing in the repository belongs to one machine."""
+"""Requirements of pip and conda agree, and no file depends on a particular machine."""
 
 import re
 import subprocess
@@ -24,13 +24,13 @@ def requirements(*extras):
 
 
 def conda():
-    """Name to bounds of every conda package."""
+    """Name -> version bounds of every conda package."""
     entries = yaml.safe_load((ROOT / "environment.yml").read_text())["dependencies"]
     return {name: bounds.strip() for name, _, bounds in (entry.partition(" ") for entry in entries)}
 
 
 def lock():
-    """Name to the entries of requirements.lock: version, marker, number of hashes."""
+    """Name -> pinned versions in requirements.lock."""
     text = (ROOT / "requirements.lock").read_text().replace("\\\n", " ")
     found = {}
     for line in filter(str.strip, text.splitlines()):
@@ -41,7 +41,7 @@ def lock():
 
 
 def tracked():
-    """Path to text of the files that git keeps."""
+    """Path -> text of the files that git tracks."""
     try:
         listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True).stdout
     except (OSError, subprocess.CalledProcessError):

@@ -1,4 +1,4 @@
-"""Generated pages are those the models would make now."""
+"""Generated pages are up to date."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The whole workflow on coarse hearts: what it makes, what it reruns, and that a killed run ends in the same bytes."""
+"""The whole workflow on coarse hearts: results, reruns, and that a continued run gives the same bytes."""
 
 import json
 import os
@@ -31,41 +31,41 @@ rf: {lines: 64, keep: [lines, channels]}
 bmode: {size_px: 128, downsampling: [1, 2]}
 tracking:
   trackers:
-    faithful: {window_px: 16}
+    as_published: {window_px: 16}
     corrected: {window_px: 16, taper: hann, reference: previous}
     wall: {method: bspline_dic}
-    absent: {method: guest, track: "absent:track"}
+    absent: {method: external, track: "absent:track"}
 cases:
   seed: [1, 2]
 """
 RUN = "from echotruth.cli import main; main()"
-"""What the command `echotruth` does, without its entry point."""
+"""The command `echotruth`, without its entry point."""
 
 
 class Checkout:
-    """A copy of what the workflow runs from, with the package of this checkout.
+    """Copy of the workflow, run with the package of this checkout.
 
-    Its compiled functions are those of the tests, unless it is to compile them itself.
+    It uses the compiled functions of the tests, unless `share_cache` is false.
     """
 
-    def __init__(self, folder, lent=True):
+    def __init__(self, folder, share_cache=True):
         self.folder = folder
         for name in ("Snakefile", "rules", "workflow", "profiles"):
             copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
             folder.mkdir(exist_ok=True)
             copy(ROOT / name, folder / name)
-        if lent:
+        if share_cache:
             cores.lend(folder / ".snakemake/numba")
         (folder / "tiny.yaml").write_text(CONFIG)
         self.out = folder / "out/tiny"
 
     def start(self, *command):
-        """A process of its own group."""
-        surroundings = os.environ | {"PYTHONPATH": str(ROOT / "src"), "MPLBACKEND": "agg"}
+        """Start a process in its own process group."""
+        environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "MPLBACKEND": "agg"}
         return subprocess.Popen(
             [sys.executable, *command],
             cwd=self.folder,
-            env=surroundings,
+            env=environment,
             start_new_session=True,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -73,18 +73,18 @@ class Checkout:
         )
 
     def run(self, *command):
-        """What the process says, once it has ended well."""
+        """Output of a process that must succeed."""
         process = self.start(*command)
-        said, _ = process.communicate()
-        assert process.returncode == 0, said
-        return said
+        output, _ = process.communicate()
+        assert process.returncode == 0, output
+        return output
 
     def snakemake(self, *options):
         return self.run("-m", "snakemake", "--configfile", "tiny.yaml", *options)
 
     @property
     def bytes(self):
-        """Path below the store to hash, of every file in it."""
+        """Path in the store -> hash, of every file."""
         root = self.out / "tiny.zarr"
         files = [path for path in root.rglob("*") if path.is_file()]
         return {path.relative_to(root).as_posix(): sha256(path.read_bytes()).hexdigest() for path in files}
@@ -105,7 +105,7 @@ def tree(made):
 
 
 def documented():
-    """Heading of docs/schema.md to the rows of its table, by array: dimensions, type and units."""
+    """Heading in docs/schema.md -> array -> dimensions, type, units and long name."""
     groups, heading = {}, None
     for line in (ROOT / "docs/schema.md").read_text().splitlines():
         if line.startswith("## "):
@@ -123,7 +123,7 @@ def found(variable):
 
 
 def expected(coordinates, arrays):
-    """Arrays of a group and the coordinates that stand beside them."""
+    """Arrays of a group and the coordinates of their dimensions."""
     dims = {dim for array in arrays.values() for dim in array[0]}
     return {name: row for name, row in coordinates.items() if dims >= set(row[0])} | arrays
 
@@ -158,7 +158,7 @@ def test_root_says_what_the_repository_is(tree):
 def test_loop_is_met_at_every_frame_without_loss_of_volume(tree):
     mechanics, kinematics = tree["mechanics"], tree["kinematics"]
     for name in ("pressure", "volume"):
-        np.testing.assert_allclose(mechanics[name], mechanics[f"{name}_asked"], rtol=5e-3)
+        np.testing.assert_allclose(mechanics[name], mechanics[f"{name}_target"], rtol=5e-3)
     assert float(kinematics["volume_ratio_min"].min()) > 0
     assert float(abs(kinematics["volume_ratio_mean"] - 1).max()) < 0.02
 
@@ -173,7 +173,7 @@ def test_every_view_shows_wall_and_speckle_and_is_tracked(tree):
     for size in (128, 64):
         assert tree[f"truth/{size}/mask"].any(("axial", "lateral")).all()
         assert (tree[f"bmode/{size}/image"].std(("axial", "lateral")) > 5).all()
-        assert (tree[f"evaluation/{size}/coverage"].sel(tracker=["faithful", "corrected", "wall"]) > 0.5).all()
+        assert (tree[f"evaluation/{size}/coverage"].sel(tracker=["as_published", "corrected", "wall"]) > 0.5).all()
 
 
 def test_a_tracker_that_fails_is_a_row_of_the_leaderboard_and_not_the_end_of_the_run(made, tree):
@@ -194,13 +194,13 @@ def test_figures_stand_beside_the_repository_and_scratch_does_not(made):
 
 @pytest.mark.slow
 def test_jobs_of_a_view_find_all_that_they_call_compiled(tmp_path):
-    """What is compiled on a miniature, before them, is what they call: function by function and type by type."""
-    made = Checkout(tmp_path / "echotruth", lent=False)
+    """The miniature compiles all functions that the jobs call, with the same types."""
+    made = Checkout(tmp_path / "echotruth", share_cache=False)
     made.snakemake("--cores", "2", "--until", "tracking")
     records = [json.loads(path.read_text()) for path in made.out.glob("ledger/*/*/*.json")]
     assert {record["stage"] for record in records} == {"phantom", "truth", "rf", "bmode", "tracking", "evaluation"}
     assert {record["stage"]: record["compile_seconds"] for record in records if record["compile_seconds"]} == {}
-    assert "miniature fails" not in "".join(path.read_text() for path in made.out.glob("logs/compile_*.log"))
+    assert "miniature failed" not in "".join(path.read_text() for path in made.out.glob("logs/compile_*.log"))
 
 
 def test_second_run_has_nothing_to_do(made):
@@ -208,14 +208,14 @@ def test_second_run_has_nothing_to_do(made):
 
 
 def planned(made, text):
-    """Rule to number of jobs that a configuration would run."""
+    """Rule -> number of jobs that a configuration would run."""
     (made.folder / "changed.yaml").write_text(text)
-    said = made.run("-m", "snakemake", "-n", "--configfile", "changed.yaml", "--cores", "2")
-    return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", said, re.MULTILINE)}
+    output = made.run("-m", "snakemake", "-n", "--configfile", "changed.yaml", "--cores", "2")
+    return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", output, re.MULTILINE)}
 
 
 def test_changed_tracker_reruns_tracking_and_what_follows_it(made):
-    jobs = planned(made, CONFIG.replace("faithful: {window_px: 16}", "faithful: {window_px: 32}"))
+    jobs = planned(made, CONFIG.replace("as_published: {window_px: 16}", "as_published: {window_px: 32}"))
     assert jobs["tracking"] == 4 and jobs["repository"] == jobs["report"] == 1
     assert not {"mechanics", "imaging"} & set(jobs)
 
@@ -253,7 +253,7 @@ def test_record_that_a_failed_job_lost_is_made_again(made, stage, rule):
 
 @pytest.fixture(scope="module")
 def killed(made, tmp_path_factory):
-    """A checkout whose run on one core was killed amid imaging and then taken up again; mechanics done before it."""
+    """Checkout whose run on one core was killed during imaging, after mechanics, and then continued."""
     checkout = Checkout(tmp_path_factory.mktemp("second") / "echotruth")
     process = checkout.start("-m", "snakemake", "--configfile", "tiny.yaml", "--cores", "1")
     end = time.monotonic() + 600

@@ -1,7 +1,4 @@
-"""The energies of the wall written down anew, for numbers of any type: a complex step differentiates them exactly.
-
-Nothing here is shared with the laws that the heart is solved with.
-"""
+"""Strain energies of the wall, implemented independently of the solver, and their derivatives by a complex step."""
 
 from __future__ import annotations
 
@@ -16,8 +13,8 @@ from echotruth.fem.tetrahedra import Floats
 from echotruth.materials import LAWS, Material, compiled
 from echotruth.mechanics.solver import element
 
-_STEP = 1e-30
-"""Imaginary part added to an argument: far below round-off, as the derivative has no cancellation."""
+COMPLEX_STEP = 1e-30
+"""Imaginary part h added to an argument, f'(x) = Im f(x + ih) / h: far below round-off, for nothing cancels."""
 
 
 def _fung(e: NDArray, law: Any) -> NDArray:
@@ -46,7 +43,7 @@ def _neo_hooke(e: NDArray, _: Any) -> NDArray:
     return e[0, 0] + e[1, 1] + e[2, 2]
 
 
-PASSIVE: dict[str, Callable[[NDArray, Any], NDArray]] = {
+PASSIVE_ENERGIES: dict[str, Callable[[NDArray, Any], NDArray]] = {
     "fung": _fung,
     "guccione": _guccione,
     "holzapfel_ogden": _holzapfel_ogden,
@@ -56,8 +53,8 @@ PASSIVE: dict[str, Callable[[NDArray, Any], NDArray]] = {
 
 
 @dataclass(frozen=True)
-class Wall:
-    """A wall whose energy is known.
+class ConstitutiveModel:
+    """Passive and active law of a wall.
 
     Attributes
     ----------
@@ -80,11 +77,11 @@ class Wall:
     bulk: float = 2e6
     local_bulk: float = 20.0
 
-    def law(self) -> element.Law:
-        """The same for the solver."""
+    def law(self) -> element.WallLaw:
+        """The same model for the solver."""
         active = np.array([self.beta, self.power])
         energy = compiled(name(self.material))
-        return element.Law(energy, self.material.constants(), active, self.bulk, local_bulk=self.local_bulk)
+        return element.WallLaw(energy, self.material.constants(), active, self.bulk, local_bulk=self.local_bulk)
 
     def density(self, f: NDArray) -> NDArray:
         """Energy per unloaded volume, shape (...), Pa, of F (..., 3, 3) whose columns belong to the fibre axes."""
@@ -106,7 +103,7 @@ def passive(f: NDArray, material: Material) -> NDArray:
     """Passive energy over C, shape (...), of F (..., 3, 3) whose columns belong to the fibre axes."""
     c = np.einsum("...ki,...kj->ij...", f, f)
     e = (c * determinant(f) ** (-2 / 3) - np.eye(3).reshape(3, 3, *[1] * (f.ndim - 2))) / 2
-    return PASSIVE[name(material)](e, material)
+    return PASSIVE_ENERGIES[name(material)](e, material)
 
 
 def active(f: NDArray, beta: float, power: float) -> NDArray:
@@ -117,7 +114,7 @@ def active(f: NDArray, beta: float, power: float) -> NDArray:
     return (1 - beta) * stretch ** (2 - power) / (2 - power) + beta * stretch ** (3 - power) / (3 - power)
 
 
-def first_stress(f: Floats, density: Callable[[NDArray], NDArray]) -> Floats:
+def first_piola_kirchhoff(f: Floats, density: Callable[[NDArray], NDArray]) -> Floats:
     """First Piola-Kirchhoff stress dW/dF by a complex step, exact to round-off.
 
     Parameters
@@ -136,6 +133,6 @@ def first_stress(f: Floats, density: Callable[[NDArray], NDArray]) -> Floats:
     for i in range(3):
         for k in range(3):
             step = np.zeros((3, 3), dtype=complex)
-            step[i, k] = 1j * _STEP
-            stress[..., i, k] = density(f + step).imag / _STEP
+            step[i, k] = 1j * COMPLEX_STEP
+            stress[..., i, k] = density(f + step).imag / COMPLEX_STEP
     return stress

@@ -1,4 +1,4 @@
-"""The heart that ships, solved on a mesh of any fineness, with all that its equations held at every frame."""
+"""The default heart, solved on a mesh of any size, with the states that its viscous stress depends on."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics import fibres, kinematics
-from echotruth.mechanics.fibres import gradients
+from echotruth.mechanics.fibres import material_gradients
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver import drive
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.checkpoint import Frame
-from echotruth.mechanics.solver.equilibrium import Equilibrium, Past
+from echotruth.mechanics.solver.checkpoint import SolvedFrame
+from echotruth.mechanics.solver.equilibrium import Equilibrium, PreviousState
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
-SHIPPED = (24, 12, 3)
-"""Elements around, along and through the wall of the mesh that ships."""
+DEFAULT_MESH = (24, 12, 3)
+"""Elements around, along and through the wall."""
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedBeat:
     """A solved beat.
 
     Attributes
@@ -34,22 +34,22 @@ class Solved:
     config : Config
     wall : Wall
     beat : drive.Beat
-    pasts : tuple of Past
-        The state against which each frame was viscous; of the frame before, or of a part of the way from it.
+    previous_states : tuple of PreviousState
+        The state relative to which each frame was viscous: that of the frame before, or of a substep from it.
     es : int
         Frame of end-systole.
     period : float, s
-    spread : callable
-        Solution of a state to the displacement (n_nodes, 3) of its nodes, m.
+    displacement : callable
+        Map of the solution of a state to the displacement (n_nodes, 3) of its nodes, m.
     """
 
     config: Config
     wall: Wall
     beat: drive.Beat
-    pasts: tuple[Past, ...]
+    previous_states: tuple[PreviousState, ...]
     es: int
     period: float
-    spread: Callable[[Floats], Floats]
+    displacement: Callable[[Floats], Floats]
 
     def strain(self) -> tuple[Floats, Floats]:
         """Mean and standard deviation (6,) of the strain of the wall at end-systole, RR, CC, LL, RC, RL, CL."""
@@ -57,39 +57,39 @@ class Solved:
         at_ed, at_es = (
             kinematics.deformation_gradient(mesh, self.beat.displacement[frame], xi) for frame in (0, self.es)
         )
-        axes = kinematics.carried_axes(fibres.wall_axes(mesh, self.wall.depth, xi), at_ed)
-        strains = kinematics.strain(at_es @ np.linalg.inv(at_ed), axes, kinematics.RCL)
-        volume = gradients(mesh, xi)[1] * weight
-        mean, sd = kinematics.weighted(strains.reshape(1, -1, 6), volume.ravel())
+        axes = kinematics.deformed_wall_axes(fibres.wall_axes(mesh, self.wall.depth, xi), at_ed)
+        strains = kinematics.strain(at_es @ np.linalg.inv(at_ed), axes, kinematics.RCL_COMPONENTS)
+        volume = material_gradients(mesh, xi)[1] * weight
+        mean, sd = kinematics.weighted_mean_sd(strains.reshape(1, -1, 6), volume.ravel())
         return mean[0], sd[0]
 
 
-class _Record:
-    """Stands in for the folder of an unfinished beat and keeps what the equations held at every frame."""
+class _PreviousStates:
+    """Stands in for the checkpoints of a beat and keeps the previous state of every frame."""
 
-    def __init__(self, heart: Equilibrium) -> None:
-        self._heart, self.pasts = heart, []
+    def __init__(self, equations: Equilibrium) -> None:
+        self._equilibrium, self.previous_states = equations, []
 
-    def frames(self) -> list[Frame]:
+    def load(self) -> list[SolvedFrame]:
         """None: the beat is solved from its start."""
         return []
 
-    def add(self, _: Frame) -> None:
-        """Keep what the last frame was solved against."""
-        self.pasts.append(self._heart.past)
+    def add(self, _: SolvedFrame) -> None:
+        """Keep the state before the last frame."""
+        self.previous_states.append(self._equilibrium.previous)
 
 
 @cache
-def solved(around: int, along: int, through: int) -> Solved:
-    """The default heart on a mesh of some elements; solved once in a run."""
+def solved(around: int, along: int, through: int) -> SolvedBeat:
+    """The default heart on a mesh of elements around, along and through the wall; solved once in a run."""
     counts = {"circumferential_elements": around, "longitudinal_elements": along, "transmural_elements": through}
     config = Config(geometry=Geometry(**counts))
-    cycle, body = read_loop(config.loop), wall(config, left_ventricle(config.geometry))
-    heart = equilibrium(config, body)
-    record = _Record(heart)
-    tissue = body.tissue
+    cycle, unloaded = read_loop(config.loop), wall(config, left_ventricle(config.geometry))
+    equations = equilibrium(config, unloaded)
+    record = _PreviousStates(equations)
+    tissue = unloaded.tissue
     activation = Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
-    beat = drive.solve(heart, cycle, activation, progress=record)
-    heart.close()
-    es = int(np.argmax(cycle.pressure / cycle.volume))
-    return Solved(config, body, beat, tuple(record.pasts), es, cycle.period, heart.assembly.spread)
+    beat = drive.solve(equations, cycle, activation, checkpoints=record)
+    equations.close()
+    es, previous = int(np.argmax(cycle.pressure / cycle.volume)), tuple(record.previous_states)
+    return SolvedBeat(config, unloaded, beat, previous, es, cycle.period, equations.assembly.displacement)

@@ -1,4 +1,4 @@
-"""What must not matter: where the heart points, and how its mesh is numbered."""
+"""Invariance of the solution under rotation of the heart and renumbering of its mesh."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from echotruth.fem.tetrahedra import EDGES, Floats, Integers, Mesh
 from echotruth.mechanics.fibres import fibre_frames, wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
-from echotruth.mechanics.solver.newton import Walk
-from echotruth.mechanics.solver.support import Support, of_base
-from echotruth.mechanics.solver.wall import law
+from echotruth.mechanics.solver.newton import LoadStepper
+from echotruth.mechanics.solver.support import Support, base_support
+from echotruth.mechanics.solver.wall import wall_law
 from validation.report import Report, Row
 
 LOAD = Load(8e3, 1.0, tension=2e4)
@@ -23,57 +23,56 @@ LOAD = Load(8e3, 1.0, tension=2e4)
 STIFFNESS = 1.1e3
 """Pa."""
 
-EVEN = np.array([(0, 1, 2, 3), (1, 2, 0, 3), (3, 0, 2, 1), (1, 0, 3, 2)])
-"""Orders of the vertices of a tetrahedron that keep its hand."""
+EVEN_PERMUTATIONS = np.array([(0, 1, 2, 3), (1, 2, 0, 3), (3, 0, 2, 1), (1, 0, 3, 2)])
+"""Of the vertices of a tetrahedron: they keep it right-handed."""
 
 
 @dataclass(frozen=True)
-class Numbers:
-    """Largest differences of the motion, over the largest motion.
+class Results:
+    """Largest differences of the displacement, over the largest displacement.
 
     Attributes
     ----------
-    turned, renumbered, reordered : float
-        Of a heart that is turned, one whose nodes and cells are shuffled, and one whose cells name their vertices in
+    rotated, renumbered, reordered : float
+        Of a heart that is rotated, one whose nodes and cells are shuffled, and one whose cells list their vertices in
         another order.
     cells : int
     """
 
-    turned: float
+    rotated: float
     renumbered: float
     reordered: float
     cells: int
 
 
-def measure(quick: bool = False) -> Numbers:
-    """Differences from one heart, solved as it is, of 720 cells or of 360 where it is to be quick."""
+def measure(quick: bool = False) -> Results:
+    """Differences from one heart, solved as it is, of 720 cells or of 360 if `quick`."""
     counts = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1 if quick else 2}
     mesh, rng = left_ventricle(Geometry(**counts)), np.random.default_rng(6)
     frames = fibre_frames(mesh, wall_depth(mesh), Fibres(), tetrahedron()[0])
-    support = of_base(mesh, "radial_free")
-    moved = _solved(mesh, frames, support)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    turn *= np.sign(np.linalg.det(turn))
-    turned = _solved(
-        replace(mesh, nodes=mesh.nodes @ turn.T), frames @ turn.T, replace(support, frames=support.frames @ turn.T)
-    )
+    support = base_support(mesh, "radial_free")
+    reference = _solve(mesh, frames, support)
+    rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    rotation *= np.sign(np.linalg.det(rotation))
+    rotated_support = replace(support, directions=support.directions @ rotation.T)
+    rotated = _solve(replace(mesh, nodes=mesh.nodes @ rotation.T), frames @ rotation.T, rotated_support)
     order, cells = rng.permutation(len(mesh.nodes)), rng.permutation(len(mesh.cells))
-    shuffled = replace(support, frames=support.frames[order], free=support.free[order])
-    renumbered = _solved(_renumbered(mesh, order, cells), frames[cells], shuffled)
-    reordered = _solved(*_reordered(mesh, frames, rng), support)
-    return Numbers(
-        _difference(turned @ turn, moved),
-        _difference(renumbered, moved[order]),
-        _difference(reordered, moved),
+    shuffled = replace(support, directions=support.directions[order], free=support.free[order])
+    renumbered = _solve(_renumbered(mesh, order, cells), frames[cells], shuffled)
+    reordered = _solve(*_reordered(mesh, frames, rng), support)
+    return Results(
+        _difference(rotated @ rotation, reference),
+        _difference(renumbered, reference[order]),
+        _difference(reordered, reference),
         len(mesh.cells),
     )
 
 
-def _solved(mesh: Mesh, frames: Floats, support: Support) -> Floats:
+def _solve(mesh: Mesh, frames: Floats, support: Support) -> Floats:
     """Displacement (n_nodes, 3), m."""
-    heart = Equilibrium(mesh, frames, law(Mechanics()), support)
-    positions = heart.positions(Walk(heart, STIFFNESS).to(LOAD, None))
-    heart.close()
+    equilibrium = Equilibrium(mesh, frames, wall_law(Mechanics()), support)
+    positions = equilibrium.positions(LoadStepper(equilibrium, STIFFNESS).advance(LOAD, None))
+    equilibrium.close()
     return positions - mesh.nodes
 
 
@@ -89,31 +88,31 @@ def _renumbered(mesh: Mesh, order: Integers, cells: Integers) -> Mesh:
 
 
 def _reordered(mesh: Mesh, frames: Floats, rng: np.random.Generator) -> tuple[Mesh, Floats]:
-    """The mesh with the vertices of its cells in another order, and its fibres at the points where these then lie."""
+    """The mesh with the vertices of its cells in another order, and the fibres at its quadrature points."""
     edge = {frozenset(pair): 4 + k for k, pair in enumerate(EDGES.tolist())}
     xi = np.column_stack([1 - tetrahedron()[0].sum(axis=1), tetrahedron()[0]])
-    cells, fibres = mesh.cells.copy(), frames.copy()
-    for cell, pick in enumerate(rng.integers(len(EVEN), size=len(cells))):
-        vertices = EVEN[pick]
-        whole = [*vertices, *(edge[frozenset(vertices[pair].tolist())] for pair in EDGES)]
-        cells[cell] = mesh.cells[cell, whole]
+    cells, reordered = mesh.cells.copy(), frames.copy()
+    for cell, pick in enumerate(rng.integers(len(EVEN_PERMUTATIONS), size=len(cells))):
+        vertices = EVEN_PERMUTATIONS[pick]
+        nodes = [*vertices, *(edge[frozenset(vertices[pair].tolist())] for pair in EDGES)]
+        cells[cell] = mesh.cells[cell, nodes]
         # The point with coordinate xi_k at the new vertex k is the old one with it at the old vertex.
         back = xi[:, np.argsort(vertices)]
         same = np.argmin(np.linalg.norm(xi[None] - back[:, None], axis=-1), axis=1)
-        fibres[cell] = frames[cell, same]
-    return replace(mesh, cells=cells), fibres
+        reordered[cell] = frames[cell, same]
+    return replace(mesh, cells=cells), reordered
 
 
-def report(numbers: Numbers) -> Report:
+def report(results: Results) -> Report:
     """Rows of the page."""
-    source = f"the same heart, {numbers.cells} cells, as it is; solved to a relative imbalance of 1e-8"
+    source = f"the same heart, {results.cells} cells, as it is; solved to a relative residual of 1e-8"
     rows = tuple(
         Row(f"largest difference of the motion, {name}", value, None, 1e-7, source, ".1e")
         for name, value in (
-            ("turned in space", numbers.turned),
-            ("nodes and cells shuffled", numbers.renumbered),
-            ("vertices of the cells in another order", numbers.reordered),
+            ("rotated in space", results.rotated),
+            ("nodes and cells shuffled", results.renumbered),
+            ("vertices of the cells in another order", results.reordered),
         )
     )
-    text = "A heart that contracts against a pressure, turned in space and numbered in other ways; over its motion."
-    return Report("What must not matter", text, rows)
+    text = "A heart that contracts against a pressure, rotated in space and numbered in other ways; over its motion."
+    return Report("Invariance under rotation and renumbering", text, rows)

@@ -1,4 +1,4 @@
-"""All checks, run one after the other, and the page they make."""
+"""Runs all checks and writes the page of their results."""
 
 from __future__ import annotations
 
@@ -25,44 +25,44 @@ by itself, and [tracking.md](tracking.md) tells how the paper's tracker fares.
 _QUICK = "This page was made with `--quick`: on coarse meshes.\n\n"
 
 
-def write(folder: Path, quick: bool, tell: Callable[[str], None] = print) -> bool:
+def write(folder: Path, quick: bool, log: Callable[[str], None] = print) -> bool:
     """Run all checks and write the page with its pictures.
 
     Parameters
     ----------
     folder : Path
-        `validation.md` and the folder `validation` are put there.
+        Of `validation.md` and of the folder `validation` with the pictures.
     quick : bool
-        Whether to take coarse meshes.
-    tell : callable
-        What happens is said to it.
+        Whether to use coarse meshes.
+    log : callable
+        Receives the progress, line by line.
 
     Returns
     -------
     bool
         Whether every number is within its tolerance.
     """
-    parts, met = [], True
+    sections, met = [], True
     for check in CHECKS:
         start = perf_counter()
-        said, picture = _run(check, folder, quick)
-        parts.append(said.page(picture))
-        missed = [row.quantity for row in said.rows if not row.met]
+        report, picture = _run(check, folder, quick)
+        sections.append(report.section(picture))
+        missed = [row.quantity for row in report.rows if not row.met]
         met = met and not missed
-        tell(f"{said.title}: {len(said.rows)} numbers, {perf_counter() - start:.0f} s")
+        log(f"{report.title}: {len(report.rows)} numbers, {perf_counter() - start:.0f} s")
         for quantity in missed:
-            tell(f"  missed: {quantity}")
+            log(f"  missed: {quantity}")
     page = folder / "validation.md"
     page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text(_HEAD + (_QUICK if quick else "") + "\n".join(parts), encoding="utf-8")
+    page.write_text(_HEAD + (_QUICK if quick else "") + "\n".join(sections), encoding="utf-8")
     return met
 
 
 def _run(check: ModuleType, folder: Path, quick: bool) -> tuple[Report, str | None]:
     """Report of a check and, where it has one, the path of its picture as seen from the page."""
-    numbers = check.measure(quick)
+    results = check.measure(quick)
     if not hasattr(check, "draw"):
-        return check.report(numbers), None
+        return check.report(results), None
     picture = f"validation/{check.__name__.rsplit('.', 1)[-1]}.png"
-    style.save(check.draw(numbers), folder / picture, dpi=110)
-    return check.report(numbers), picture
+    style.save(check.draw(results), folder / picture, dpi=110)
+    return check.report(results), picture

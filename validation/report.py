@@ -1,4 +1,4 @@
-"""What a check says: rows of numbers, beside what was expected and where that comes from."""
+"""Report of a check: rows of numbers with the expected values and their sources."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ class Row:
     Attributes
     ----------
     quantity : str
-        What it is, with its unit.
+        Name of the quantity, with its unit.
     found : float
     expected : float or None
-        None where the number itself is the error, or is shown and not judged.
+        None where the number itself is the error, or is only shown.
     tolerance : float or None
-        Largest difference allowed; None for a number that is shown and not judged.
+        Largest difference allowed; None for a number that is only shown.
     source : str
         Of the expectation.
     form : str
@@ -38,8 +38,8 @@ class Row:
 
     def line(self) -> str:
         """Row of the table."""
-        nothing = "" if self.tolerance is None else "0"
-        expected = nothing if self.expected is None else format(self.expected, self.form)
+        zero = "" if self.tolerance is None else "0"
+        expected = zero if self.expected is None else format(self.expected, self.form)
         allowed = "" if self.tolerance is None else f"{self.tolerance:.2g}"
         mark = "" if self.met else " **missed**"
         return f"| {self.quantity} | {self.found:{self.form}}{mark} | {expected} | {allowed} | {self.source} |"
@@ -47,7 +47,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Report:
-    """A part of the page.
+    """A section of the page.
 
     Attributes
     ----------
@@ -64,8 +64,8 @@ class Report:
     rows: tuple[Row, ...]
     caption: str = ""
 
-    def page(self, picture: str | None) -> str:
-        """The part in Markdown, with the path of its picture."""
+    def section(self, picture: str | None) -> str:
+        """The section in Markdown, with the path of its picture."""
         head = "| quantity | found | expected | allowed | source |\n|---|---|---|---|---|"
         shown = f"\n![{self.caption}]({picture})\n\n{self.caption}\n" if picture else ""
         return "\n".join([f"## {self.title}\n", self.text, "", head, *(row.line() for row in self.rows), shown])

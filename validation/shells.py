@@ -1,4 +1,4 @@
-"""Thick tubes and spheres, incompressible, of which the motion is known exactly but for one quadrature.
+"""Exact solutions of incompressible thick tubes and spheres, up to one quadrature.
 
 Green & Zerna, Theoretical Elasticity, chapter 3; Holzapfel et al., J Elast 61 (2000) 1, section 5.
 """
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echotruth.fem.tetrahedra import Floats
-from validation.energies import Wall, first_stress
+from validation.energies import ConstitutiveModel, first_piola_kirchhoff
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(80)
 
@@ -23,7 +23,7 @@ class Tube:
 
     Attributes
     ----------
-    wall : Wall
+    model : ConstitutiveModel
     inner, outer : float, m
         Unloaded radii A and B.
     inflated : float, m
@@ -36,7 +36,7 @@ class Tube:
         Angle of the fibres at the inner and at the outer radius, between which it is linear.
     """
 
-    wall: Wall
+    model: ConstitutiveModel
     inner: float
     outer: float
     inflated: float
@@ -52,35 +52,35 @@ class Tube:
         """Fibre axes (..., 3, 3) at an unloaded radius: rows f, s, n, radial, circumferential and axial parts."""
         depth = (unloaded - self.inner) / (self.outer - self.inner)
         angle = self.helix[0] + (self.helix[1] - self.helix[0]) * depth
-        cos, sin, nought = np.cos(angle), np.sin(angle), np.zeros_like(angle)
-        rows = ([nought, cos, sin], [nought, -sin, cos], [nought + 1, nought, nought])
+        cos, sin, zero = np.cos(angle), np.sin(angle), np.zeros_like(angle)
+        rows = ([zero, cos, sin], [zero, -sin, cos], [zero + 1, zero, zero])
         return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
     def stress(self, unloaded: Floats) -> Floats:
-        """Cauchy stress (..., 3, 3), Pa, but for the pressure that keeps the volume."""
+        """Cauchy stress (..., 3, 3), Pa, up to the hydrostatic pressure that keeps the volume."""
         r = self.radius(unloaded)
         f = np.zeros((*unloaded.shape, 3, 3))
         f[..., 0, 0], f[..., 1, 1], f[..., 2, 2] = unloaded / (self.stretch * r), r / unloaded, self.stretch
         f[..., 1, 2] = r * self.twist
         axes = self.axes(unloaded)
-        along = f @ np.swapaxes(axes, -1, -2)
-        return first_stress(along, self.wall.density) @ np.swapaxes(along, -1, -2)
+        f = f @ np.swapaxes(axes, -1, -2)
+        return first_piola_kirchhoff(f, self.model.density) @ np.swapaxes(f, -1, -2)
 
-    def _difference(self, unloaded: Floats) -> Floats:
-        """Circumferential less radial stress over the radius, by the unloaded radius: the radial equilibrium."""
+    def _pressure_gradient(self, unloaded: Floats) -> Floats:
+        """(sigma_CC - sigma_RR) / r dr/dR, of which the integral over R is the pressure (radial equilibrium)."""
         stress = self.stress(unloaded)
         return (stress[..., 1, 1] - stress[..., 0, 0]) * unloaded / (self.stretch * self.radius(unloaded) ** 2)
 
     def pressure(self) -> float:
         """Pressure in the tube, Pa."""
-        return integral(self._difference, self.inner, self.outer)
+        return integral(self._pressure_gradient, self.inner, self.outer)
 
     def force_and_torque(self) -> tuple[float, float]:
         """Axial force on the wall, N, and torque, N m, at an end."""
 
         def density(unloaded: Floats) -> Floats:
             r, stress = self.radius(unloaded), self.stress(unloaded)
-            radial = -np.array([integral(self._difference, each, self.outer) for each in unloaded])
+            radial = -np.array([integral(self._pressure_gradient, radius, self.outer) for radius in unloaded])
             area = 2 * np.pi * unloaded / self.stretch
             axial = (stress[..., 2, 2] - stress[..., 0, 0] + radial) * area
             return np.stack([axial, stress[..., 1, 2] * r * area])
@@ -88,12 +88,12 @@ class Tube:
         force, torque = integral(density, self.inner, self.outer)
         return float(force), float(torque)
 
-    def displacement(self, places: Floats) -> Floats:
-        """Exact displacement, m, of unloaded places (..., 3), m; the end at z = 0 does not turn."""
-        x, y, z = np.moveaxis(places, -1, 0)
+    def displacement(self, positions: Floats) -> Floats:
+        """Exact displacement, m, of unloaded positions (..., 3), m; the end at z = 0 does not turn."""
+        x, y, z = np.moveaxis(positions, -1, 0)
         unloaded = np.hypot(x, y)
         angle, r = np.arctan2(y, x) + self.twist * z, self.radius(unloaded)
-        return np.stack([r * np.cos(angle), r * np.sin(angle), self.stretch * z], axis=-1) - places
+        return np.stack([r * np.cos(angle), r * np.sin(angle), self.stretch * z], axis=-1) - positions
 
 
 @dataclass(frozen=True)
@@ -102,14 +102,14 @@ class Sphere:
 
     Attributes
     ----------
-    wall : Wall
+    model : ConstitutiveModel
     inner, outer : float, m
         Unloaded radii A and B.
     inflated : float, m
         Inner radius a that the pressure holds.
     """
 
-    wall: Wall
+    model: ConstitutiveModel
     inner: float
     outer: float
     inflated: float
@@ -126,15 +126,15 @@ class Sphere:
             f = np.zeros((*unloaded.shape, 3, 3))
             f[..., 0, 0], f[..., 1, 1] = (unloaded / r) ** 2, r / unloaded
             f[..., 2, 2] = f[..., 1, 1]
-            stress = first_stress(f, self.wall.density) @ np.swapaxes(f, -1, -2)
+            stress = first_piola_kirchhoff(f, self.model.density) @ np.swapaxes(f, -1, -2)
             return 2 * (stress[..., 1, 1] - stress[..., 0, 0]) * unloaded**2 / r**3
 
         return integral(density, self.inner, self.outer)
 
-    def displacement(self, places: Floats) -> Floats:
-        """Exact displacement, m, of unloaded places (..., 3), m, from the centre."""
-        unloaded = np.linalg.norm(places, axis=-1, keepdims=True)
-        return places * (self.radius(unloaded) / unloaded - 1)
+    def displacement(self, positions: Floats) -> Floats:
+        """Exact displacement, m, of unloaded positions (..., 3), m, from the centre."""
+        unloaded = np.linalg.norm(positions, axis=-1, keepdims=True)
+        return positions * (self.radius(unloaded) / unloaded - 1)
 
 
 def integral(density, first: float, last: float):
@@ -150,5 +150,5 @@ def integral(density, first: float, last: float):
     -------
     float or ndarray of shape (...)
     """
-    at = (first + last) / 2 + (last - first) / 2 * _POINTS
-    return np.sum(density(at) * _WEIGHTS, axis=-1) * (last - first) / 2
+    points = (first + last) / 2 + (last - first) / 2 * _POINTS
+    return np.sum(density(points) * _WEIGHTS, axis=-1) * (last - first) / 2

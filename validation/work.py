@@ -1,4 +1,4 @@
-"""The work of the blood against that of the wall, at every frame and over the beat."""
+"""Virtual work of the blood against that of the wall, at every frame and over the beat."""
 
 from __future__ import annotations
 
@@ -9,19 +9,16 @@ from matplotlib.figure import Figure
 
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats
-from echotruth.mechanics.fibres import fibre_frames, gradients
+from echotruth.mechanics.fibres import fibre_frames, material_gradients
 from echotruth.mechanics.solver.cavity import cavity_volume
 from echotruth.report import style
 from validation import energies, heart
 from validation.report import Report, Row
 
-_STEP = 1e-30
-"""Imaginary part of a share of a motion: the rate of an energy by a complex step has no cancellation."""
-
 
 @dataclass(frozen=True)
-class Numbers:
-    """Powers and works.
+class Results:
+    """Works of blood and wall.
 
     Attributes
     ----------
@@ -47,55 +44,57 @@ class Numbers:
         return float(np.abs(self.wall.sum(axis=1) - self.blood).max() / np.abs(self.blood).max())
 
 
-def measure(quick: bool = False) -> Numbers:
-    """Works of the heart that ships, or of a coarse one where it is to be quick."""
-    solved = heart.solved(*((12, 6, 1) if quick else heart.SHIPPED))
-    parts, beat = _Parts(solved), solved.beat
-    ways = np.roll(beat.displacement, -1, axis=0) - np.roll(beat.displacement, 1, axis=0)
-    works = np.array([parts.works(frame, way) for frame, way in enumerate(ways)])
-    # Half of each: a way leads over two frames.
+def measure(quick: bool = False) -> Results:
+    """Works of the default heart, or of a coarse one if `quick`."""
+    solved = heart.solved(*((12, 6, 1) if quick else heart.DEFAULT_MESH))
+    virtual_work, displacement = _VirtualWork(solved), solved.beat.displacement
+    changes = np.roll(displacement, -1, axis=0) - np.roll(displacement, 1, axis=0)
+    works = np.array([virtual_work.of_frame(frame, change) for frame, change in enumerate(changes)])
+    # Half of the sum, for each change leads over two frames.
     loop = np.array([-works[:, 0].sum(), *works[:, 1:].sum(axis=0)]) / 2
-    return Numbers(len(solved.wall.mesh.cells), parts.time, works[:, 0], works[:, 1:], loop)
+    return Results(len(solved.wall.mesh.cells), virtual_work.time, works[:, 0], works[:, 1:], loop)
 
 
-class _Parts:
-    """The energies of a solved heart by formulas that its solver does not know."""
+class _VirtualWork:
+    """Virtual work of a solved heart, by energies implemented independently of its solver."""
 
-    def __init__(self, solved: heart.Solved) -> None:
-        self.mesh, self.beat, self.pasts = solved.wall.mesh, solved.beat, solved.pasts
+    def __init__(self, solved: heart.SolvedBeat) -> None:
+        self.mesh, self.beat, self.previous_states = solved.wall.mesh, solved.beat, solved.previous_states
         self.section, xi = solved.config.mechanics, tetrahedron()[0]
-        slope, volume = gradients(self.mesh, xi)
+        dN_dX, volume = material_gradients(self.mesh, xi)
         self.volume = volume * tetrahedron()[1]
         frames = fibre_frames(self.mesh, solved.wall.depth, solved.config.fibres, xi, solved.config.seed)
-        self.slope = np.einsum("cqai,cqji->cqaj", slope, frames)
+        self.dN_dX = np.einsum("cqai,cqji->cqaj", dN_dX, frames)
         self.time = np.arange(len(self.beat.displacement)) * solved.period / len(self.beat.displacement)
-        self.frames, self.spread = frames, solved.spread
+        self.frames, self.displacement = frames, solved.displacement
 
     def gradient(self, displacement: Floats) -> Floats:
         """F - I, its columns along the fibre axes."""
-        return np.einsum("cai,cqaj->cqij", displacement[self.mesh.cells], self.slope)
+        return np.einsum("cai,cqaj->cqij", displacement[self.mesh.cells], self.dN_dX)
 
-    def works(self, frame: int, way: Floats) -> tuple[float, ...]:
-        """Work of the blood, and of the passive, active, volumetric and viscous stress, for a motion at a frame, J."""
-        here, beat = self.beat.displacement[frame], self.beat
-        f = np.swapaxes(self.frames, -1, -2) + self.gradient(here) + 1j * _STEP * self.gradient(way)
-        stiffness = beat.stiffness
+    def of_frame(self, frame: int, change: Floats) -> tuple[float, ...]:
+        """Work of the blood, and of the passive, active, volumetric and viscous stress, for a change (n_nodes, 3), m,
+        of the displacement of a frame, J."""
+        u, beat = self.beat.displacement[frame], self.beat
+        step = 1j * energies.COMPLEX_STEP
+        f = np.swapaxes(self.frames, -1, -2) + self.gradient(u) + step * self.gradient(change)
         parts = (
-            stiffness * self._passive(f),
+            beat.stiffness * self._passive(f),
             beat.tension[frame] * self._active(f),
             self._volumetric(f),
             self._viscous(f, frame),
         )
-        return self._blood(here, way, beat.pressure[frame]), *(float(part.imag / _STEP) for part in parts)
+        of_wall = (float(part.imag / energies.COMPLEX_STEP) for part in parts)
+        return self._blood(u, change, beat.pressure[frame]), *of_wall
 
-    def _blood(self, here: Floats, way: Floats, pressure: float) -> float:
-        """Pressure times the growth of the volume, which is a cubic function of the share of the way."""
+    def _blood(self, u: Floats, change: Floats, pressure: float) -> float:
+        """Pressure times the derivative of the volume V(u + s change) by s, by differences: V is cubic in s."""
 
-        def growth(share: float) -> float:
-            ends = (cavity_volume(self.mesh.nodes + here + side * share * way, self.mesh.endo) for side in (1, -1))
+        def difference(s: float) -> float:
+            ends = (cavity_volume(self.mesh.nodes + u + side * s * change, self.mesh.endo) for side in (1, -1))
             return next(ends) - next(ends)
 
-        return pressure * (8 * growth(1.0) - growth(2.0)) / 12
+        return pressure * (8 * difference(1.0) - difference(2.0)) / 12
 
     def _passive(self, f: Floats) -> complex:
         local = self.section.local_bulk / 2 * (energies.determinant(f) - 1) ** 2
@@ -106,43 +105,38 @@ class _Parts:
         return np.sum(energies.active(f, self.section.active.length_dependence, power) * self.volume)
 
     def _volumetric(self, f: Floats) -> complex:
-        """Of the mean volume of each cell."""
+        """Energy of the mean dilatation of each cell."""
         unloaded = self.volume.sum(axis=1)
-        growth = np.sum(energies.determinant(f) * self.volume, axis=1) / unloaded - 1
-        return self.section.si().bulk_modulus / 2 * np.sum(growth**2 * unloaded)
+        dilatation = np.sum(energies.determinant(f) * self.volume, axis=1) / unloaded - 1
+        return self.section.si().bulk_modulus / 2 * np.sum(dilatation**2 * unloaded)
 
     def _viscous(self, f: Floats, frame: int) -> complex:
-        """Potential of the viscous stress: half of viscosity over time, times the growth of strain squared."""
-        past = self.pasts[frame]
-        if past.time <= 0:
+        """Potential of the viscous stress, viscosity / (2 dt) |E - E_previous|^2."""
+        previous = self.previous_states[frame]
+        if previous.time <= 0:
             return 0j
-        before = np.swapaxes(self.frames, -1, -2) + self.gradient(self.spread(past.state.solution))
-        growth = (_square(f) - _square(before)) / 2
-        return self.section.si().viscosity / (2 * past.time) * np.sum(np.sum(growth**2, axis=(-2, -1)) * self.volume)
+        before = np.swapaxes(self.frames, -1, -2) + self.gradient(self.displacement(previous.state.solution))
+        strain = (_right_cauchy_green(f) - _right_cauchy_green(before)) / 2
+        viscosity = self.section.si().viscosity
+        return viscosity / (2 * previous.time) * np.sum(np.sum(strain**2, axis=(-2, -1)) * self.volume)
 
 
-def _square(f: Floats) -> Floats:
-    """F^T F of F of shape (..., 3, 3), complex too."""
+def _right_cauchy_green(f: Floats) -> Floats:
+    """C = F^T F of F of shape (..., 3, 3), real or complex."""
     return np.swapaxes(f, -1, -2) @ f
 
 
-def report(numbers: Numbers) -> Report:
+def report(results: Results) -> Report:
     """Rows of the page."""
-    blood, passive, active, volumetric, viscous = numbers.loop * 1e6
-    source = "virtual work, with energies written down anew"
+    blood, passive, active, volumetric, viscous = results.loop * 1e6
+    source = "virtual work, with independently implemented energies"
     exact = "a closed loop of an elastic energy; what is left is the step of the frames"
-    taken, allowed = -1e6 * float(numbers.loop[1:].sum()), abs(blood)
-    name = f"imbalance of a frame, {numbers.cells} cells, over the largest work"
+    by_wall, allowed = -1e6 * float(results.loop[1:].sum()), abs(blood)
+    loop = "work on the blood over the beat, and that of all stresses (uJ)"
+    name = f"imbalance of a frame, {results.cells} cells, over the largest work"
     rows = (
-        Row(name, numbers.error, None, 1e-6, source, ".1e"),
-        Row(
-            "work on the blood over the beat, and that of all stresses (uJ)",
-            blood,
-            taken,
-            1e-5 * allowed,
-            source,
-            ".2f",
-        ),
+        Row(name, results.error, None, 1e-6, source, ".1e"),
+        Row(loop, blood, by_wall, 1e-5 * allowed, source, ".2f"),
         Row("of it, work of the fibres (uJ)", -active, None, None, "", ".2f"),
         Row("lost to viscosity (uJ)", viscous, None, None, "", ".2f"),
         Row("left in the passive wall (uJ)", passive, None, 0.03 * allowed, exact, ".2f"),
@@ -158,18 +152,18 @@ def report(numbers: Numbers) -> Report:
 
 
 @style.styled
-def draw(numbers: Numbers) -> Figure:
+def draw(results: Results) -> Figure:
     """Works of each frame."""
-    sheet = style.figure(7.2, 3.2)
-    axes = sheet.add_subplot()
-    colours = (style.LONGITUDINAL, style.RADIAL, style.ASKED, style.CIRCUMFERENTIAL)
-    names, width = ("passive", "active", "volume", "viscous"), np.diff(numbers.time[:2])[0] * 1e3 * 0.8
-    low, high = np.zeros((2, len(numbers.time)))
-    for part, name, colour in zip(numbers.wall.T * 1e6, names, colours, strict=True):
-        foot = np.where(part > 0, high, low)
-        axes.bar(numbers.time * 1e3, part, width, foot, color=colour, label=name)
+    figure = style.figure(7.2, 3.2)
+    axes = figure.add_subplot()
+    colours = (style.LONGITUDINAL, style.RADIAL, style.TARGET, style.CIRCUMFERENTIAL)
+    names, width = ("passive", "active", "volume", "viscous"), np.diff(results.time[:2])[0] * 1e3 * 0.8
+    low, high = np.zeros((2, len(results.time)))
+    for part, name, colour in zip(results.wall.T * 1e6, names, colours, strict=True):
+        bottom = np.where(part > 0, high, low)
+        axes.bar(results.time * 1e3, part, width, bottom, color=colour, label=name)
         low, high = low + np.minimum(part, 0), high + np.maximum(part, 0)
-    axes.plot(numbers.time * 1e3, numbers.blood * 1e6, color=style.MET, label="blood")
+    axes.plot(results.time * 1e3, results.blood * 1e6, color=style.SOLVED, label="blood")
     axes.set(xlabel="time (ms)", ylabel="work (uJ)")
     axes.legend(loc="lower right")
-    return sheet
+    return figure

@@ -1,4 +1,4 @@
-"""The seventeen segments of the left ventricle (Cerqueira 2002, Circulation 105:539) and their bullseye."""
+"""AHA segments of the left ventricle (Cerqueira 2002, Circulation 105:539) and their bullseye plot."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from math import pi
 
 import numpy as np
 
-NAMES = (
+SEGMENT_NAMES = (
     "basal anterior",
     "basal anteroseptal",
     "basal inferoseptal",
@@ -27,7 +27,7 @@ NAMES = (
 )
 """Names of segments 1..17."""
 
-APEX = 17
+APEX_SEGMENT = 17
 
 
 def segment(position: np.ndarray, apex_z: float) -> np.ndarray:
@@ -53,18 +53,18 @@ def segment(position: np.ndarray, apex_z: float) -> np.ndarray:
     if not apex_z < 0:
         raise ValueError(f"The endocardial apex must lie below the base plane (z < 0), not at z = {apex_z} m.")
     x, y, z = np.moveaxis(np.asarray(position, float), -1, 0)
-    depth = 3 * z / apex_z
-    # Turn from anterior through the septum, the way the numbers run.
-    turn = pi / 2 - np.arctan2(y, x)
-    result = np.full(z.shape, APEX, float)
+    third = 3 * z / apex_z
+    # From anterior through the septum, as the numbers run.
+    azimuth = pi / 2 - np.arctan2(y, x)
+    number = np.full(z.shape, APEX_SEGMENT, float)
     for ring, count, first in ((2, 4, 13), (1, 6, 7), (0, 6, 1)):
-        sector = np.floor(turn / (2 * pi / count) + 0.5) % count
+        sector = np.floor(azimuth / (2 * pi / count) + 0.5) % count
         # The base plane itself moves within rounding, so the basal ring has no upper end.
-        result = np.where(depth < ring + 1, first + sector, result)
-    return np.where(np.isfinite(turn + depth), result, 0).astype(np.uint8)
+        number = np.where(third < ring + 1, first + sector, number)
+    return np.where(np.isfinite(azimuth + third), number, 0).astype(np.uint8)
 
 
-def _rings() -> tuple[tuple[float, float, float, float], ...]:
+def _bullseye() -> tuple[tuple[float, float, float, float], ...]:
     """Sectors counter-clockwise from segment 1 at the top of the page, base outermost."""
     sectors = []
     for count, inner in ((6, 0.75), (6, 0.5), (4, 0.25)):
@@ -75,6 +75,6 @@ def _rings() -> tuple[tuple[float, float, float, float], ...]:
     return (*sectors, (0.0, 0.25, 0.0, 2 * pi))
 
 
-RINGS = _rings()
-"""Bullseye of segments 1..17: inner radius, outer radius (of a unit disc), start and stop angle, rad,
+BULLSEYE = _bullseye()
+"""Sectors of segments 1..17 in the bullseye plot: inner and outer radius (of a unit disc), start and stop angle, rad,
 counter-clockwise on the page from its right. Seen from the apex: anterior at the top, septum on the left."""

@@ -1,4 +1,4 @@
-"""The sweep: a configuration expanded into cases, one heart each, with ids that never change."""
+"""Expand the sweep of a configuration into cases, one heart each, with stable ids."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echotruth.config import Config, Loop, Section
-from echotruth.config.loading import ConfigError, resolved
+from echotruth.config.loading import ConfigError, override
 from echotruth.section import unit_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SHAPES = (
+NOT_SWEPT = (
     *("name", "cases", "views", "tracking", "geometry.shape", "fibres.layers", "loop.frames", "rf.keep"),
     *("bmode.field_of_view_mm", "bmode.size_px", "bmode.downsampling"),
 )
-"""Keys that may not be swept, nor `geometry.*_elements`: they shape the arrays that all cases share."""
+"""Keys that cannot be swept (nor can `geometry.*_elements`), because they set the sizes of arrays over all cases."""
 
-FREE_OF_RF = ("probe.width_um", "probe.height_mm", "probe.elevation_focus_mm", "probe.attenuation_dB_per_cm_MHz")
-"""Keys of the array that may be swept where its RF is kept: they change neither its length nor where a line is."""
+RF_INDEPENDENT = ("probe.width_um", "probe.height_mm", "probe.elevation_focus_mm", "probe.attenuation_dB_per_cm_MHz")
+"""Keys of the probe that can be swept even if RF is kept: they change neither its length nor the scan lines."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,11 @@ class Case:
     Attributes
     ----------
     id : str
-        Readable and stable: made of the swept keys and this case's values alone.
+        Readable and stable: it depends only on the swept keys and their values in this case.
     parameters : dict
-        Swept key (dotted) to value.
+        Swept dotted key -> value.
     config : Config
-        The whole configuration of this case, its sweep resolved.
+        Configuration of this case, without a sweep.
     """
 
     id: str
@@ -49,57 +49,57 @@ class Case:
 
 
 def expand(config: Config, source: str = "configuration") -> list[Case]:
-    """All combinations of the values under `cases`, checked, in the order written.
+    """Cases for all combinations of the values under `cases`, in their order.
 
     Raises
     ------
     ConfigError
-        Where a key cannot be swept or a combination cannot be run.
+        If a key cannot be swept or a combination is not valid.
     """
     for key in config.cases:
-        _check(config, key, source)
+        _check_swept_key(config, key, source)
     cases = [_case(config, parameters, source) for parameters in _combinations(config)]
     if len({case.id for case in cases}) < len(cases):
-        raise ConfigError(f"{source}: cases holds a value twice under one key: list each value once")
+        raise ConfigError(f"{source}: cases gives a value twice for one key: list each value once")
     for loop in {case.config.loop for case in cases}:
         _check_loop(loop, source)
-    for file in {case.config.geometry.file for case in cases} - {None}:
-        if not Path(file).is_file():
-            raise ConfigError(f"{source}: geometry.file = {file!r}: there is no such file: give its path from here")
+    for file in {case.config.geometry.file for case in cases}:
+        if file is not None and not Path(file).is_file():
+            raise ConfigError(f"{source}: geometry.file = {file!r}: file not found: give its path from this folder")
     return cases
 
 
-def find(config: Config, id: str) -> Case:
-    """The case of that id."""
+def find_case(config: Config, id: str) -> Case:
+    """Case with an id."""
     for parameters in _combinations(config):
         if case_id(parameters) == id:
             return _case(config, parameters, config.name)
-    raise ConfigError(f"{id} is not a case of {config.name}: see out/{config.name}/cases.csv for the ids")
+    raise ConfigError(f"{id} is not a case of {config.name}: the ids are in out/{config.name}/cases.csv")
 
 
 def case_id(parameters: dict[str, Any]) -> str:
-    """Readable values of the swept keys, and a hash that settles what the readable part leaves open.
+    """Id of a case: readable values of the swept keys, and a hash of the exact ones.
 
     >>> case_id({"fibres.endo_deg": 70.0, "seed": 2})
     'endo70_seed2_17059c'
     """
     if not parameters:
         return "heart"
-    exact = {key: _plain(value) for key, value in sorted(parameters.items())}
-    words = "_".join(f"{_leaf(key)}{_word(value)}" for key, value in exact.items())
-    return f"{words[:80]}_{sha256(json.dumps(exact).encode()).hexdigest()[:6]}"
+    exact = {key: _integer_if_whole(value) for key, value in sorted(parameters.items())}
+    readable = "_".join(f"{_short_key(key)}{_short_value(value)}" for key, value in exact.items())
+    return f"{readable[:80]}_{sha256(json.dumps(exact).encode()).hexdigest()[:6]}"
 
 
 def table(cases: list[Case]) -> pd.DataFrame:
-    """One row a case: its id, its seed, and a column for every key that any case could vary."""
+    """Table with one row per case: its id, its seed, and every key that can be swept."""
     import pandas as pd
 
-    rows = [{"case": case.id, "seed": case.config.seed, **_flat(case.config)} for case in cases]
+    rows = [{"case": case.id, "seed": case.config.seed, **_sweepable(case.config)} for case in cases]
     return pd.DataFrame(rows)
 
 
 def generator(case: Case, view: str, stage: str) -> np.random.Generator:
-    """Random numbers of one stage, the same whatever else is run, in whatever order."""
+    """Random generator of one stage, seeded by case, view and stage alone."""
     key = json.dumps([case.config.seed, case.id, view, stage]).encode()
     return np.random.default_rng(np.frombuffer(sha256(key).digest(), np.uint32))
 
@@ -111,23 +111,23 @@ def _combinations(config: Config) -> Iterator[dict[str, Any]]:
 
 def _case(config: Config, parameters: dict[str, Any], source: str) -> Case:
     single = config.model_copy(update={"cases": {}})
-    return Case(case_id(parameters), parameters, resolved(single, parameters, f"{source}: cases"))
+    return Case(case_id(parameters), parameters, override(single, parameters, f"{source}: cases"))
 
 
-def _check(config: Config, key: str, source: str) -> None:
-    section: Any = config
+def _check_swept_key(config: Config, key: str, source: str) -> None:
+    value: Any = config
     for part in key.split("."):
-        if not isinstance(section, Section) or part not in type(section).model_fields:
-            raise ConfigError(f"{source}: cases.{key}: {key} is not a key: write it as fibres.endo_deg is written")
-        section = getattr(section, part)
-    if isinstance(section, Section | dict):
+        if not isinstance(value, Section) or part not in type(value).model_fields:
+            raise ConfigError(f"{source}: cases.{key}: {key} is not a key: write it in full, such as fibres.endo_deg")
+        value = getattr(value, part)
+    if isinstance(value, Section | dict):
         raise ConfigError(f"{source}: cases.{key}: {key} is a section: sweep one of its keys")
     if key == "geometry.file" and not config.geometry.remesh:
-        raise ConfigError(f"{source}: cases.{key}: meshes of two sizes share no arrays: set geometry.remesh: true")
-    if key.startswith(SHAPES) or key.endswith("_elements"):
-        raise ConfigError(f"{source}: cases.{key}: {key} cannot be swept, it is common to a repository: set it once")
-    if config.rf.keep and key.startswith(("probe.", "rf.")) and key not in FREE_OF_RF:
-        raise ConfigError(f"{source}: cases.{key}: {key} cannot be swept where RF is kept: leave rf.keep empty")
+        raise ConfigError(f"{source}: cases.{key}: the meshes may differ in size: set geometry.remesh: true")
+    if key.startswith(NOT_SWEPT) or key.endswith("_elements"):
+        raise ConfigError(f"{source}: cases.{key}: {key} cannot be swept, all cases share it: set it once")
+    if config.rf.keep and key.startswith(("probe.", "rf.")) and key not in RF_INDEPENDENT:
+        raise ConfigError(f"{source}: cases.{key}: {key} cannot be swept if RF is kept: leave rf.keep empty")
 
 
 def _check_loop(loop: Loop, source: str) -> None:
@@ -139,29 +139,29 @@ def _check_loop(loop: Loop, source: str) -> None:
         raise ConfigError(f"{source}: loop: {error}") from None
 
 
-def _flat(section: Section, prefix: str = "") -> dict[str, Any]:
-    """Dotted key to value of all keys that may be swept."""
-    flat: dict[str, Any] = {}
-    section = section.settled()
+def _sweepable(section: Section, prefix: str = "") -> dict[str, Any]:
+    """Dotted key -> value of all keys that can be swept."""
+    values: dict[str, Any] = {}
+    section = section.resolved()
     for key in type(section).model_fields:
         dotted, value = f"{prefix}{key}", getattr(section, key)
         if isinstance(value, Section):
-            flat |= _flat(value, f"{dotted}.")
-        elif not (isinstance(value, dict) or dotted.startswith((*SHAPES, "seed")) or dotted.endswith("_elements")):
+            values |= _sweepable(value, f"{dotted}.")
+        elif not (isinstance(value, dict) or dotted.startswith((*NOT_SWEPT, "seed")) or dotted.endswith("_elements")):
             # A list is one entry of the table.
-            flat[dotted] = " ".join(map(str, value)) if isinstance(value, list) else value
-    return flat
+            values[dotted] = " ".join(map(str, value)) if isinstance(value, list) else value
+    return values
 
 
-def _plain(value: Any) -> Any:
-    """84 and 84.0 are one angle."""
+def _integer_if_whole(value: Any) -> Any:
+    """Convert 84.0 to 84, so that both spellings give the same id."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _leaf(key: str) -> str:
-    leaf = key.rsplit(".", 1)[-1]
-    return leaf.removesuffix(f"_{unit_of(leaf)}").replace("_", "")
+def _short_key(key: str) -> str:
+    name = key.rsplit(".", 1)[-1]
+    return name.removesuffix(f"_{unit_of(name)}").replace("_", "")
 
 
-def _word(value: Any) -> str:
-    return "".join(letter if letter.isalnum() or letter in ".-" else "" for letter in str(value))
+def _short_value(value: Any) -> str:
+    return "".join(letter for letter in str(value) if letter.isalnum() or letter in ".-")

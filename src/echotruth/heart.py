@@ -1,13 +1,14 @@
-"""The beating heart as imaging and evaluation see it: a mesh, its labels and its motion."""
+"""The beating heart as imaging and evaluation use it: a mesh, its labels and its motion."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
+from echotruth.config import Config
 
 SHORT_AXIS = np.array([[-1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
 """Rows: lateral, axial and elevation axis of all short-axis views, in the heart frame."""
@@ -15,7 +16,7 @@ SHORT_AXIS = np.array([[-1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
 
 @dataclass(frozen=True)
 class Heart:
-    """A mesh that moves.
+    """A beating heart: a mesh and its displacement in every frame.
 
     Attributes
     ----------
@@ -33,6 +34,10 @@ class Heart:
         Frame of end-systole.
     region : ndarray of shape (n_cells,), uint8, optional
         Region of disease of each cell: 0 healthy, 1 infarct, 2 border zone, 3 late activation.
+    config : Config, optional
+        The configuration it was made by.
+    arrays : dict of dict of ndarray
+        All that was computed of it, by the groups of docs/schema.md.
     """
 
     nodes: Floats
@@ -43,6 +48,25 @@ class Heart:
     layers: int
     es: int
     region: NDArray[np.uint8] | None = None
+    config: Config | None = field(default=None, repr=False)
+    arrays: dict[str, dict[str, NDArray]] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, arrays: dict[str, dict[str, NDArray]], config: Config) -> Heart:
+        """Make the heart from its groups `geometry`, `fibres`, `pathology` and `mechanics` (docs/schema.md)."""
+        geometry, mechanics = arrays["geometry"], arrays["mechanics"]
+        return cls(
+            nodes=geometry["node_position"],
+            cells=geometry["cell_node"],
+            displacement=mechanics["displacement"],
+            wall_depth=arrays["fibres"]["wall_depth"],
+            endo=geometry["endo"],
+            layers=config.fibres.layers,
+            es=int(mechanics["es_frame"]),
+            region=arrays["pathology"]["region"],
+            config=config,
+            arrays=arrays,
+        )
 
     @property
     def apex(self) -> float:

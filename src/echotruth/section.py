@@ -1,7 +1,4 @@
-"""A part of the configuration.
-
-Keys carry their unit; :meth:`Section.si` gives the values in SI units.
-"""
+"""Base class of the sections of the configuration, and the units that their keys carry."""
 
 from __future__ import annotations
 
@@ -33,47 +30,47 @@ UNITS: dict[str, float] = {
     "deg": pi / 180,
     "dB": 1.0,
 }
-"""Suffix of a key to the factor that makes its value SI (mmHg: NIST SP 811, appendix B.8; dB: to nepers)."""
+"""Unit suffix of a key -> factor to SI (mmHg: NIST SP 811, appendix B.8)."""
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
+Fraction = Annotated[FiniteFloat, Field(ge=0, le=1)]
 Angle = Annotated[FiniteFloat, Field(ge=-90, le=90)]
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=40)]
 
 
-def impossible(key: str, value: object, remedy: str) -> PydanticCustomError:
-    """An error about one key of a section whose value cannot stand beside its neighbours."""
-    return PydanticCustomError("impossible", "{remedy}", {"key": key, "value": value, "remedy": remedy})
+def invalid(key: str, value: object, remedy: str) -> PydanticCustomError:
+    """Validation error of a key whose value conflicts with other keys of its section."""
+    return PydanticCustomError("invalid", "{remedy}", {"key": key, "value": value, "remedy": remedy})
 
 
 def unit_of(key: str) -> str:
-    """Unit suffix of a configuration key, or an empty string."""
+    """Unit suffix of a configuration key; empty if it has none."""
     return max((unit for unit in UNITS if key.endswith(f"_{unit}")), key=len, default="")
 
 
-def kinds(annotation: Any) -> dict[str, type[Section]]:
-    """Name to section of the kinds of which a key takes one, as the laws of a material, or each entry of a mapping,
-    as the methods of trackers; empty for any other key."""
+def variants(annotation: Any) -> dict[str, type[Section]]:
+    """Name -> section of the variants in a tagged union (laws of a material) or in a mapping to one (trackers)."""
     if get_origin(annotation) is dict:
-        return kinds(get_args(annotation)[1])
+        return variants(get_args(annotation)[1])
     if get_origin(annotation) is Annotated:
-        return kinds(annotation.__origin__)
-    choices = [choice for choice in get_args(annotation) if hasattr(choice, "__metadata__")]
-    return {note.tag: each.__origin__ for each in choices for note in each.__metadata__ if isinstance(note, Tag)}
+        return variants(annotation.__origin__)
+    members = [member for member in get_args(annotation) if hasattr(member, "__metadata__")]
+    return {tag.tag: member.__origin__ for member in members for tag in member.__metadata__ if isinstance(tag, Tag)}
 
 
-def chooser(choices: dict[str, type[Section]]) -> str:
-    """The key that names the kind, as `law` or `method`: in every kind its default is the name of that kind."""
-    name, section = next(iter(choices.items()))
+def discriminator(sections: dict[str, type[Section]]) -> str:
+    """Key that selects the variant, such as `law` or `method`; its default in every variant is the variant's name."""
+    name, section = next(iter(sections.items()))
     return next(key for key, field in section.model_fields.items() if field.default == name)
 
 
 class Section(BaseModel):
-    """A part of the configuration: unknown keys are refused, values do not change."""
+    """A section of the configuration; it is immutable and refuses unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
 
     def si(self) -> SimpleNamespace:
-        """Values in SI units under their names without the unit (`pitch_um` becomes `pitch`, m)."""
+        """Values in SI units, named without the unit suffix (`pitch_um` becomes `pitch`, m)."""
         values: dict[str, Any] = {}
         for key in type(self).model_fields:
             value, unit = getattr(self, key), unit_of(key)
@@ -84,12 +81,12 @@ class Section(BaseModel):
             values[key.removesuffix(f"_{unit}")] = value
         return SimpleNamespace(**values)
 
-    def settled(self) -> Section:
-        """The same with every value written out that another key of the section decides."""
+    def resolved(self) -> Section:
+        """The section with every value filled in that follows from a preset."""
         return self
 
 
 def _scaled(value: Any, factor: float) -> Any:
     if isinstance(value, dict):
-        return {key: each * factor for key, each in value.items()}
-    return [each * factor for each in value] if isinstance(value, list) else value * factor
+        return {key: item * factor for key, item in value.items()}
+    return [item * factor for item in value] if isinstance(value, list) else value * factor

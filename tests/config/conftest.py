@@ -1,4 +1,4 @@
-"""What is wrong with a configuration, in the words a user reads."""
+"""Error messages of invalid configurations."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from echotruth.config.loading import ConfigError, load
 
 @pytest.fixture
 def refusal(tmp_path):
-    """The one sentence in which a configuration, given as YAML, is refused."""
+    """Function from the YAML of an invalid configuration to the error message, which is one sentence."""
 
     def refused(text):
         file = tmp_path / "bad.yaml"

@@ -1,10 +1,10 @@
-"""Presets against the volumes they stand for."""
+"""Presets of the heart against published volumes."""
 
 import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.config.anatomy import PRESETS
+from echotruth.config.anatomy import HEART_PRESETS
 
 
 def cap(radius, length, base):
@@ -17,10 +17,10 @@ VOLUMES = {
     "rat": (230 * (0.6 - 0.006 * 4), 435 / 1.05),
     "human": (150e3 * (0.6 - 0.006 * 7), 150e3 * (64.7 / 82.3 + 52.0 / 77.7) / 2 / 1.05),
 }
-"""Cavity and wall, uL, from the sources that the module names."""
+"""Volumes of cavity and wall, uL, from the sources that the module names."""
 
 
-@pytest.mark.parametrize("species", PRESETS)
+@pytest.mark.parametrize("species", HEART_PRESETS)
 def test_cavity_and_wall_have_the_published_volumes(species):
     size = Geometry(preset=species).lengths()
     radius, length, base = (size[key] for key in ("endo_radius_mm", "endo_length_mm", "base_mm"))

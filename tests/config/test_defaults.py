@@ -1,20 +1,20 @@
-"""Who names a heart gets an array, a scan and a loop that suit it."""
+"""Defaults of array, scan, loop and trackers follow from the heart."""
 
 from math import log, pi
 
 import pytest
 
 from echotruth.config import Bmode, Config, Geometry, Probe, Rf, anatomy
-from echotruth.config.defaults import ARRAYS
+from echotruth.config.defaults import ARRAY_DEFAULTS
 from echotruth.config.loading import ConfigError, validate
-from echotruth.config.transducers import PRESETS
+from echotruth.config.transducers import ARRAY_PRESETS
 
 
 def configured(**sections):
     return validate(sections, "a.yaml")
 
 
-@pytest.mark.parametrize("species", anatomy.PRESETS)
+@pytest.mark.parametrize("species", anatomy.HEART_PRESETS)
 def test_heart_stands_within_the_field_of_view_and_the_sector(species):
     """The ellipsoid a fifth larger, as at end-diastole, in the short axis and along its axis."""
     config = configured(geometry={"preset": species})
@@ -26,7 +26,7 @@ def test_heart_stands_within_the_field_of_view_and_the_sector(species):
     assert across < focus * config.rf.si().sector / 2
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", ARRAY_PRESETS)
 def test_scan_of_a_preset_has_ten_scatterers_in_its_resolution_cell(name):
     """-6 dB widths of two ways: 4 ln 2 / (pi B) c / 2 in depth, 1.38 wavelengths F# of two Hann apertures, 0.886 in
     elevation, where sinc^2 is one half."""
@@ -39,7 +39,7 @@ def test_scan_of_a_preset_has_ten_scatterers_in_its_resolution_cell(name):
     assert config.phantom.si().density * axial * lateral * elevation > 10
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", ARRAY_PRESETS)
 def test_focal_zones_of_a_preset_lie_within_each_others_depth_of_field(name):
     config = configured(probe={"preset": name})
     probe, rf = config.probe.si(), config.rf.si()
@@ -65,8 +65,8 @@ def test_lengths_of_trackers_follow_the_field_of_view():
     assert set(trackers) == set(Config().tracking.trackers)
     assert (trackers["bspline_dic"].knots_mm, trackers["affine_dic"].subset_mm) == (0.4 * 12.5, 12.5)
     assert trackers["window_deformation"].windows_mm == [1.5 * 12.5, 0.75 * 12.5]
-    assert (trackers["corrected"].window_mm, trackers["corrected"].reference) == (1.5 * 12.5, "cycle")
-    assert trackers["faithful"].window_px == 64
+    assert (trackers["corrected"].window_mm, trackers["corrected"].reference) == (1.5 * 12.5, "bidirectional")
+    assert trackers["as_published"].window_px == 64
     given = configured(bmode={"field_of_view_mm": 24.0}, tracking={"trackers": {"one": {"method": "bspline_dic"}}})
     assert given.tracking.trackers["one"].knots_mm == 0.8
     fixed = {"one": {"method": "bspline_dic", "knots_mm": 0.3}}
@@ -76,7 +76,7 @@ def test_lengths_of_trackers_follow_the_field_of_view():
 
 
 def test_scans_there_are_for_all_arrays():
-    assert set(ARRAYS) == set(PRESETS)
+    assert set(ARRAY_DEFAULTS) == set(ARRAY_PRESETS)
 
 
 @pytest.mark.parametrize("sections", [{"probe": {"preset": "mouse_25MHz"}}, {"rf": {"focus_mm": 31.0}}])

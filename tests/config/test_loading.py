@@ -1,19 +1,19 @@
-"""A configuration that cannot be run is refused in one sentence with file, key, value and remedy."""
+"""An invalid configuration is refused in one sentence with file, key, value and remedy."""
 
 from pathlib import Path
 
 import pytest
 
 from echotruth.config import Config, Mechanics
-from echotruth.config.loading import ConfigError, load, resolved
+from echotruth.config.loading import ConfigError, load, override
 from echotruth.materials import LAWS
 
 ROOT = Path(__file__).parents[2]
 
 BAD = {
     "geometry: {base_mm: 6}": "geometry.base_mm = 6.0: must lie within +-endo_length_mm = 5.4",
-    "geometry: {remesh: true}": "geometry.remesh = True: belongs to a wall read from a file: give geometry.file",
-    "geometry: {file: a.vtu, wall_mm: 1}": "geometry.wall_mm = 1.0: belongs to the ellipsoid: leave it out",
+    "geometry: {remesh: true}": "geometry.remesh = True: applies to a wall read from a file: give geometry.file",
+    "geometry: {file: a.vtu, wall_mm: 1}": "geometry.wall_mm = 1.0: applies to the ellipsoid: leave it out",
     "geometry: {file: a.vtu, dilation: 2}": "geometry.dilation = 2.0: needs remesh: true",
     "geometry: {file: a.vtu, sheet: s}": "geometry.sheet = 's': needs the fibre directions too",
     "geometry: {file: a.vtu, keep: {values: [1]}}": "geometry.keep.array = ",
@@ -27,7 +27,7 @@ BAD = {
     "geometri: {}": "geometri is not a key: did you mean geometry?",
     "views: {mid: {positon: 0.5}}": "views.mid.positon is not a key: did you mean views.mid.position?",
     "views: {mid: {plane: sagittal}}": "views.mid.plane = 'sagittal': should be 'short_axis' or 'long_axis'",
-    "views: {all: {position: 0.4}}": "views = 'all': stands for all views in the leaderboard, so give the view another",
+    "views: {all: {position: 0.4}}": "views = 'all': is the name of the mean over all views in the lead",
     "bmode: {downsampling: [1, 3]}": "bmode.downsampling = [1, 3]: every entry must divide size_px = 512",
     "tracking: {trackers: {wide: {window_px: 256}}}": "window_px = 256: must not exceed the smallest image, 128 px",
     "tracking: {trackers: {both: {window_mm: 1.0}}}": "give either window_px or window_mm",
@@ -35,7 +35,7 @@ BAD = {
     "tracking: {trackers: {dis: {method: dis, presett: fast}}}": "tracking.trackers.dis.presett is not a key of the "
     "method dis (others: phase_correlation, ",
     "tracking: {trackers: {one: {method: affine_dic, subset_mm: 1000}}}": "subset_mm = 1000.0: must not exceed bmode",
-    "tracking: {trackers: {one: {method: guest}}}": "tracking.trackers.one.track = null: give either track or command",
+    "tracking: {trackers: {one: {method: external}}}": "trackers.one.track = null: give either track or command",
     "tracking: {grid_px: 100, }\nbmode: {size_px: 64, downsampling: [1]}": "grid_px = 100: must not exceed the largest",
     "rf: {focus_mm: 12}": "rf.focus_mm = 12.0: must be smaller than bmode.field_of_view_mm = 12",
     "rf: {focus_mm: 10}": "rf.focus_mm = 10.0: must be smaller than 10, so that its zones = 5 foci, zone_mm = 1 apart",
@@ -52,8 +52,8 @@ BAD = {
     "mechanics: {material: {shear: -1.0}}": "mechanics.material.shear = -1.0: should be greater than 0",
     "name: a/b": "name = 'a/b': use letters, digits",
     "a: [": "line 1: expected the node content",
-    "seed: 1\nseed: 2": "key 'seed' stands twice",
-    "- 3": "holds list, where a mapping",
+    "seed: 1\nseed: 2": "key 'seed' is given twice",
+    "- 3": "contains a list: write a mapping",
 }
 
 
@@ -91,5 +91,5 @@ def test_dumped_configuration_reads_back_the_same(tmp_path):
 def test_law_that_is_swept_takes_its_own_moduli_and_keeps_the_stiffness():
     config = Config(mechanics=Mechanics(material=LAWS["fung"].Law(stiffness_kPa=2.0, fibre=12.0)))
     changes = {"mechanics.material.fibre": 7.0, "mechanics.material.law": "guccione"}
-    material = resolved(config, changes).mechanics.material
+    material = override(config, changes).mechanics.material
     assert material == LAWS["guccione"].Law(stiffness_kPa=2.0, fibre=7.0)

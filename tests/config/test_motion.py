@@ -1,4 +1,4 @@
-"""Which motions a configuration may prescribe; the others are refused in one sentence."""
+"""Section `motion`: invalid prescribed motions are refused in one sentence."""
 
 import pytest
 
@@ -13,18 +13,18 @@ BAD = {
     "motion: {kind: still}": "motion.kind = 'still': should be 'beat', 'rigid', 'affine' or 'cylinder'",
     "motion: {kind: rigid, rigid: {lateral_mm: 1}}": "motion.rigid.lateral_mm is not a key: did you mean "
     "motion.rigid.lateral_um?",
-    TUBE: "geometry.shape = 'tube': is open and holds no pressure, so set motion.kind to rigid, affine or cylinder",
+    TUBE: "geometry.shape = 'tube': has no closed cavity and cannot beat: set motion.kind to rigid, affine or cylinder",
     TUBE + "motion: {kind: cylinder, cylinder: {contraction: 1}}": "motion.cylinder.contraction = 1: should be less "
     "than 1",
     TUBE
     + "motion: {kind: cylinder, cylinder: {shortening: 1}}": "motion.cylinder.shortening = 1: should be less than 1",
     TUBE + "motion: {kind: rigid}\nrealism: {blood: {level_dB: -20}}": "realism.blood.level_dB = -20.0: must be null "
-    "where geometry.shape is tube",
+    "if geometry.shape is tube",
     TUBE + "motion: {kind: rigid}\nrealism: {surroundings: {level_dB: 0}}": "realism.surroundings.level_dB = 0.0: must "
-    "be null where geometry.shape is tube",
-    "geometry: {shape: tube, apex_wall_mm: 1}\nmotion: {kind: rigid}": "geometry.apex_wall_mm = 1.0: belongs to the "
-    "ellipsoid, for a tube has no apex: leave it out",
-    "geometry: {shape: tube, file: a.vtu}\nmotion: {kind: rigid}": "geometry.shape = 'tube': belongs to the ellipsoid",
+    "be null if geometry.shape is tube",
+    "geometry: {shape: tube, apex_wall_mm: 1}\nmotion: {kind: rigid}": "geometry.apex_wall_mm = 1.0: applies to the "
+    "ellipsoid, because a tube has no apex: leave it out",
+    "geometry: {shape: tube, file: a.vtu}\nmotion: {kind: rigid}": "geometry.shape = 'tube': applies to the ellipsoid",
     "motion: {kind: affine, affine: {gradient: [[1, 0, 0], [0, 1, 0]]}}": "motion.affine.gradient = ",
     # A mirror image, what is flat, and half a turn, which is a reflection halfway.
     "motion: {affine: {gradient: [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]}}": "has the eigenvalue -1 and would flatten",

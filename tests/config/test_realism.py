@@ -1,4 +1,4 @@
-"""Realism: off by default, refused where it cannot be, levels whatever the density."""
+"""Section `realism`: off by default, invalid combinations are refused, and power does not depend on density."""
 
 import pytest
 
@@ -17,14 +17,14 @@ def test_nothing_is_on_by_default():
 def test_what_fills_a_space_is_refused_beside_a_phantom_in_a_plane(tissue, tmp_path):
     file = tmp_path / "flat.yaml"
     file.write_text(f"phantom: {{in_plane_only: true}}\nrealism: {{{tissue}: {{level_dB: -20}}}}\n")
-    with pytest.raises(ConfigError, match=f"realism.{tissue}.level_dB.*must be null where phantom.in_plane_only"):
+    with pytest.raises(ConfigError, match=f"realism.{tissue}.level_dB.*must be null if phantom.in_plane_only"):
         load(file)
 
 
 @pytest.mark.parametrize("density", [0.1, 1.0])
 def test_the_power_in_a_volume_does_not_depend_on_the_density(density):
     blood = Config.model_validate({"realism": {"blood": {"level_dB": -20.0, "density": density}}}).realism.blood
-    assert blood.strength**2 * density == pytest.approx(0.01)
+    assert blood.amplitude_std**2 * density == pytest.approx(0.01)
 
 
 def test_the_realistic_preset_is_the_demo_with_all_of_it_on():

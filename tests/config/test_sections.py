@@ -1,4 +1,4 @@
-"""Units: what the configuration calls by the unit in its key is SI inside."""
+"""Conversion of values to SI units."""
 
 from math import pi
 

@@ -1,28 +1,28 @@
-"""Arrays by name: complete, sampled, and as their sources print them."""
+"""Presets of arrays: complete, sufficiently sampled, and equal to their sources."""
 
 import numpy as np
 import pytest
 
 from echotruth.cases import expand, table
 from echotruth.config import Config, Probe
-from echotruth.config.loading import ConfigError, resolved, validate
-from echotruth.config.transducers import OPEN, PRESETS
-from echotruth.imaging.rf.probe import HIGHEST, pulse_band
+from echotruth.config.loading import ConfigError, override, validate
+from echotruth.config.transducers import ARRAY_PRESETS, PRESET_KEYS
+from echotruth.imaging.rf.probe import MAX_FREQUENCY, pulse_band
 
 
-@pytest.mark.parametrize("name", PRESETS)
-def test_preset_settles_every_key_that_is_left_open(name):
+@pytest.mark.parametrize("name", ARRAY_PRESETS)
+def test_preset_gives_every_key_a_value(name):
     probe = Probe(preset=name)
-    assert all(getattr(probe, key) is not None for key in OPEN)
-    assert {key: getattr(probe, key) for key in PRESETS[name]} == PRESETS[name]
+    assert all(getattr(probe, key) is not None for key in PRESET_KEYS)
+    assert {key: getattr(probe, key) for key in ARRAY_PRESETS[name]} == ARRAY_PRESETS[name]
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", ARRAY_PRESETS)
 def test_preset_is_sampled_to_the_faint_edge_of_its_pulse(name):
     """The Gaussian spectrum is below 1 % at sqrt(ln 100 / ln 2) times its -6 dB half-width."""
     probe = Probe(preset=name)
     edge = probe.frequency_MHz * (1 + probe.bandwidth * np.sqrt(np.log(100) / np.log(2)) / 2)
-    assert probe.sampling_MHz * HIGHEST > edge
+    assert probe.sampling_MHz * MAX_FREQUENCY > edge
     assert pulse_band(probe)[1] == pytest.approx(edge * 1e6, rel=1e-3)
 
 
@@ -41,7 +41,7 @@ def test_a_key_given_stands_on_top_of_the_preset():
 
 def test_sampling_follows_a_band_that_is_given():
     assert Probe(frequency_MHz=50.0).sampling_MHz == 200
-    assert Probe(bandwidth=1.0).sampling_MHz * HIGHEST > 25 * (1 + np.sqrt(np.log(100) / np.log(2)) / 2)
+    assert Probe(bandwidth=1.0).sampling_MHz * MAX_FREQUENCY > 25 * (1 + np.sqrt(np.log(100) / np.log(2)) / 2)
     assert Probe(frequency_MHz=20.0, sampling_MHz=70.0).sampling_MHz == 70
 
 
@@ -70,10 +70,10 @@ def test_a_configuration_written_and_read_is_the_same():
     config = validate({"probe": {"preset": "human_2_7MHz", "elements": 96}}, "a.yaml")
     again = validate(config.model_dump(), "b.yaml")
     assert again == config
-    assert resolved(again, {"probe.preset": "mouse_30MHz"}).probe.pitch_um == 50
+    assert override(again, {"probe.preset": "mouse_30MHz"}).probe.pitch_um == 50
 
 
-def test_settled_probe_says_every_value():
-    written = Probe(preset="rat_15MHz").settled().model_dump()
+def test_resolved_probe_has_every_value():
+    written = Probe(preset="rat_15MHz").resolved().model_dump()
     assert written["pitch_um"] == 77 and written["sampling_MHz"] == 60
     assert Probe(**written) == Probe(preset="rat_15MHz")

@@ -1,15 +1,15 @@
-"""Strains compared: figures worked by hand, and by another library."""
+"""Comparison of strains: values worked by hand, and by another library."""
 
 import numpy as np
 import pytest
 from scipy.stats import pearsonr
 
-from echotruth.evaluation.agreement import compare, limits
-from echotruth.evaluation.displacement import Wall
+from echotruth.evaluation.agreement import compare, limits_of_agreement
+from echotruth.evaluation.displacement import WallPoints
 
 COUNT = 60
 LAYER, SEGMENT = np.tile(np.arange(1, 7), 10), np.repeat(np.arange(7, 12), 12)
-WALL = Wall(np.zeros((COUNT, 2)), LAYER, SEGMENT, np.zeros(2), "short_axis")
+WALL = WallPoints(np.zeros((COUNT, 2)), LAYER, SEGMENT, np.zeros(2), "short_axis")
 
 
 def column(*values):
@@ -18,15 +18,15 @@ def column(*values):
 
 def test_limits_of_agreement_are_those_worked_by_hand():
     # Differences -0.01, -0.03, +0.03: mean -1/300, standard deviation sqrt(0.0014 / 1.5).
-    found = limits(column(-0.18, -0.20, -0.14), column(-0.17, -0.17, -0.17))[:, 0]
+    found = limits_of_agreement(column(-0.18, -0.20, -0.14), column(-0.17, -0.17, -0.17))[:, 0]
     np.testing.assert_allclose(found[:3], [-0.0033333, -0.0632123, 0.0565456], atol=1e-6)
     assert np.isnan(found[3])
 
 
 def test_segments_that_are_not_there_count_for_nothing():
-    whole = limits(column(1.0, 2.0, 4.0), column(1.0, 3.0, 4.0))
-    np.testing.assert_array_equal(limits(column(1.0, np.nan, 2.0, 4.0), column(1.0, 7.0, 3.0, 4.0)), whole)
-    assert np.isnan(limits(column(1.0, np.nan), column(2.0, 3.0))[1:]).all()
+    whole = limits_of_agreement(column(1.0, 2.0, 4.0), column(1.0, 3.0, 4.0))
+    np.testing.assert_array_equal(limits_of_agreement(column(1.0, np.nan, 2.0, 4.0), column(1.0, 7.0, 3.0, 4.0)), whole)
+    assert np.isnan(limits_of_agreement(column(1.0, np.nan), column(2.0, 3.0))[1:]).all()
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from echotruth.evaluation.displacement import Wall, evaluate, spread_change
+from echotruth.evaluation.displacement import WallPoints, evaluate, transmural_gradient
 from echotruth.evaluation.polar import directions, resolve
 
 ORIGIN = np.array([1e-3, 6e-3])
@@ -13,7 +13,7 @@ def ring(points=24, layers=6):
     layer = np.tile(np.arange(1, layers + 1), points)
     arm = (1.5e-3 + 0.15e-3 * layer)[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1)
     segment = np.where(arm[:, 1] < 0, 1, 4)
-    return Wall(ORIGIN + arm, layer, segment, ORIGIN, "short_axis", layers), arm
+    return WallPoints(ORIGIN + arm, layer, segment, ORIGIN, "short_axis", layers), arm
 
 
 def clip(displacement):
@@ -48,9 +48,9 @@ def test_rotation_is_tangential_and_scaling_radial():
     turned = 0.1 * np.stack([arm[:, 1], -arm[:, 0]], -1)
     found = evaluate(clip(-0.2 * arm), clip(turned), wall, 1)
     radius = np.hypot(*arm.T)
-    for moved, along in ((turned, (0 * radius, 0.1 * radius)), (-0.2 * arm, (-0.2 * radius, 0 * radius))):
+    for moved, components in ((turned, (0 * radius, 0.1 * radius)), (-0.2 * arm, (-0.2 * radius, 0 * radius))):
         polar = resolve(moved, wall.position, ORIGIN, "short_axis")
-        np.testing.assert_allclose(polar, np.stack(along, -1), atol=1e-12)
+        np.testing.assert_allclose(polar, np.stack(components, -1), atol=1e-12)
     np.testing.assert_allclose(found["rms_error"][1] / 1.65e-3, [0.2, 0.1, np.sqrt(0.05)])
     np.testing.assert_allclose(found["nrmse"][1, 1:], [1, np.sqrt(5)])
 
@@ -68,24 +68,24 @@ def test_true_estimate_has_no_error():
     true = np.random.default_rng(0).normal(size=(2, len(arm), 2))
     found = evaluate(true, true, wall, 1)
     assert (found["rms_error"] == 0).all()
-    assert found["tracked_spread_change"] == found["true_spread_change"]
+    assert found["tracked_transmural_gradient"] == found["true_transmural_gradient"]
 
 
-def test_spread_of_a_layer_and_its_fall():
+def test_spread_of_a_layer_and_its_transmural_gradient():
     wall, arm = ring()
     # Half the points of a layer turn by +a and half by -a: the standard deviation is a.
     size = np.array([8, 7, 6, 5, 4.5, 4])[wall.layer - 1] * 1e-5 * np.where(arm[:, 1] < 0, 1, -1)
     tangential = directions(wall.position, ORIGIN, "short_axis")[:, 1]
     found = evaluate(clip(0 * arm), clip(size[:, None] * tangential), wall, 1)
     np.testing.assert_allclose(found["true_spread"][[1, 6], 1], [8e-5, 4e-5])
-    assert found["true_spread_change"] == pytest.approx(50)
-    assert np.isnan(found["tracked_spread_change"]).all()
+    assert found["true_transmural_gradient"] == pytest.approx(50)
+    assert np.isnan(found["tracked_transmural_gradient"]).all()
     np.testing.assert_allclose(found["true_segment"][[0, 3], 1], np.array([1, -1]) * 5.75e-5)
     assert np.isnan(found["true_segment"][1]).all()
 
 
-def test_spread_may_grow_outwards():
-    assert spread_change(4e-5, 5e-5) == pytest.approx(-25)
+def test_transmural_gradient_is_negative_where_the_spread_grows_outwards():
+    assert transmural_gradient(4e-5, 5e-5) == pytest.approx(-25)
 
 
 def test_points_without_estimate_count_only_in_the_coverage():
@@ -104,7 +104,7 @@ def test_points_outside_the_wall_do_not_count():
     layer = np.where(arm[:, 0] > 0, wall.layer, 0)
     true = clip(arm)
     tracked = clip(np.where(arm[:, :1] > 0, arm, 99.0))
-    found = evaluate(tracked, true, Wall(wall.position, layer, wall.segment, ORIGIN, "short_axis"), 1)
+    found = evaluate(tracked, true, WallPoints(wall.position, layer, wall.segment, ORIGIN, "short_axis"), 1)
     assert (found["rms_error"] == 0).all() and found["coverage"] == 1
 
 
@@ -118,4 +118,4 @@ def test_one_point_has_no_spread():
     wall, arm = ring(points=1)
     found = evaluate(clip(arm), clip(arm), wall, 1)
     assert np.isfinite(found["nrmse"]).all()
-    assert np.isnan(found["tracked_spread"][1:]).all() and np.isnan(found["tracked_spread_change"]).all()
+    assert np.isnan(found["tracked_spread"][1:]).all() and np.isnan(found["tracked_transmural_gradient"]).all()

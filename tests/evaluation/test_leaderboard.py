@@ -42,7 +42,7 @@ def test_interval_of_many_hearts_is_that_of_normal_theory():
     np.testing.assert_allclose([low[0], high[0]], expected, atol=0.02)
 
 
-def test_trackers_alike_share_a_rank():
+def test_equal_trackers_share_a_rank():
     np.testing.assert_array_equal(ranks(np.array([3.0, 1.0, 1.0, 2.0, np.nan])), [4, 1, 1, 3, np.nan])
     table = overall(standings(scores({"a": [5, 7, 9], "b": [5, 7, 9], "c": [6, 8, 10]}), 1))
     assert list(table["rank"]) == [1, 1, 3]
@@ -73,7 +73,7 @@ def test_a_tracker_not_tried_on_every_clip_has_no_rank():
 
 @pytest.mark.parametrize("failure", ["b: no motion found", ""])
 def test_losing_the_hard_clip_does_not_pay(failure):
-    """Of two trackers alike, one has no answer on the clip with the largest errors, and says so or not."""
+    """Of two equal trackers, one has no answer on the clip with the largest errors, and says so or not."""
     whole = scores({"a": [5, 5], "b": [5, 5]}, views=("mid", "apex"))
     hard = (whole["case"] == "heart1") & (whole["view"] == "apex")
     whole = whole.assign(epe_um=np.where(hard, 40.0, 10.0), coverage_percent=100.0)
@@ -142,7 +142,7 @@ def test_rows_are_of_the_hearts_that_count(tree, tmp_path):
     assert table["ecc_rms_points"].isna().tolist() == [False, False, True, True] * 2
 
 
-def test_a_failure_is_told_from_the_ledger(tree, tmp_path):
+def test_a_failure_is_read_from_the_ledger(tree, tmp_path):
     (tmp_path / "ledger/tracking/b").mkdir(parents=True)
     record = {"failures": {"two/64": "two: no motion found"}}
     (tmp_path / "ledger/tracking/b/mid.json").write_text(json.dumps(record))
@@ -151,20 +151,20 @@ def test_a_failure_is_told_from_the_ledger(tree, tmp_path):
     assert overall(standings(table, 1)).loc["two", "failures"] == 1
 
 
-def test_guests_stand_beside_the_others_on_the_clips_that_count(tree, tmp_path):
-    (tmp_path / "guests").mkdir()
+def test_external_trackers_stand_beside_the_others_on_the_clips_that_count(tree, tmp_path):
+    (tmp_path / "external").mkdir()
     own = rows(tree, CONFIG, np.arange(3), tmp_path)
-    guest = own[own["tracker"] == "one"].assign(tracker="mine", nrmse_all_percent=1.0, failure=np.nan)
-    guest.to_csv(tmp_path / "guests/mine.csv", index=False)
-    own.assign(nrmse_all_percent=0.0).to_csv(tmp_path / "guests/one.csv", index=False)
+    external = own[own["tracker"] == "one"].assign(tracker="mine", nrmse_all_percent=1.0, failure=np.nan)
+    external.to_csv(tmp_path / "external/mine.csv", index=False)
+    own.assign(nrmse_all_percent=0.0).to_csv(tmp_path / "external/one.csv", index=False)
     table = rows(tree, CONFIG, np.arange(2), tmp_path)
     assert len(table) == 12 and set(table["case"]) == {"a", "b"}
     assert best(standings(table, 1)) == ["mine", "one", "two"]
     assert (table["failure"] == "").all()
 
 
-def test_a_table_of_a_guest_without_a_column_is_refused(tree, tmp_path):
-    (tmp_path / "guests").mkdir()
-    pd.DataFrame({"case": ["a"]}).to_csv(tmp_path / "guests/mine.csv", index=False)
+def test_a_table_of_an_external_tracker_without_a_column_is_refused(tree, tmp_path):
+    (tmp_path / "external").mkdir()
+    pd.DataFrame({"case": ["a"]}).to_csv(tmp_path / "external/mine.csv", index=False)
     with pytest.raises(ValueError, match=r"mine\.csv: has no column view: evaluate that tracker again"):
         rows(tree, CONFIG, np.arange(3), tmp_path)

@@ -14,14 +14,14 @@ import zarr
 from echotruth.cases import expand
 from echotruth.cli import main
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tracking, View
-from echotruth.config.tracking import Guest
+from echotruth.config.tracking import External
 from echotruth.evaluation import scoring
 from echotruth.evaluation.digest import digest
-from echotruth.evaluation.tracker_options import entrant
+from echotruth.evaluation.tracker_options import parse_tracker
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.truth import truth
-from echotruth.imaging.view import plane
+from echotruth.imaging.truth import pixel_truth
+from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
@@ -44,20 +44,20 @@ CONFIG = Config(
         grid_px=2,
         trackers={
             "ours": PhaseCorrelation(window_px=32),
-            "lot": Guest(track="guests:drawn"),
-            "poor": Guest(track="guests:small_only"),
+            "lot": External(track="custom:drawn"),
+            "poor": External(track="custom:small_only"),
         },
     ),
     cases={"seed": [1, 2]},
 )
 
-GUESTS = """
+CUSTOM = """
 import os
 import numpy as np
 
 def exact(frames, points, mask, spacing, frame_time, seed, course, gradient, shift):
-    place = (points + 0.5) * spacing
-    return np.multiply.outer(course, place @ np.transpose(gradient) + shift) / spacing
+    position = (points + 0.5) * spacing
+    return np.multiply.outer(course, position @ np.transpose(gradient) + shift) / spacing
 
 def still(frames, points, mask, spacing, frame_time, seed):
     return np.zeros((len(frames), *points.shape))
@@ -89,24 +89,24 @@ def heart(affine):
     return Heart(mesh.nodes, mesh.cells, motion, wall_depth(mesh), mesh.endo, layers=6, es=2), mesh
 
 
-def write(store, group, place, **values):
+def write(store, group, index, **values):
     """What one job writes of a group; arrays not given are zero."""
     opened = zarr.open_group(store.path, path=group, mode="r")
     shapes = {array.name: opened[array.name].shape[array.leading :] for array in schema.ALL[group.partition("/")[0]]}
-    store.write(group, {name: np.zeros(shape) for name, shape in shapes.items()} | values, *place)
+    store.write(group, {name: np.zeros(shape) for name, shape in shapes.items()} | values, *index)
 
 
-def write_clip(folder, store, case, place, beating, view):
+def write_clip(folder, store, case, index, beating, view):
     """Phantom, truth, images of noise and their records."""
-    where = plane(CONFIG.views[view], CONFIG.rf, beating.positions(0)[beating.endo.ravel()])
-    write(store, "phantom", place, origin=where.origin, axes=where.axes, centre=[0, CONFIG.rf.si().focus])
-    random = np.random.default_rng(place)
+    where = imaging_plane(CONFIG.views[view], CONFIG.rf, beating.positions(0)[beating.endo.ravel()])
+    write(store, "phantom", index, origin=where.origin, axes=where.axes, centre=[0, CONFIG.rf.si().focus])
+    random = np.random.default_rng(index)
     for size in CONFIG.bmode.sizes:
-        mask = truth(beating, where, *pixel_centres(CONFIG.bmode, size))["mask"][0]
-        store.write(f"truth/{size}", {"mask": np.broadcast_to(mask, (len(COURSE), size, size))}, *place)
-        store.write(f"bmode/{size}", {"image": random.integers(0, 256, (len(COURSE), size, size))}, *place)
+        mask = pixel_truth(beating, where, *pixel_centres(CONFIG.bmode, size))["mask"][0]
+        store.write(f"truth/{size}", {"mask": np.broadcast_to(mask, (len(COURSE), size, size))}, *index)
+        store.write(f"bmode/{size}", {"image": random.integers(0, 256, (len(COURSE), size, size))}, *index)
     for stage in ("truth", "bmode"):
-        files = [file for size in CONFIG.bmode.sizes for file in store.files(f"{stage}/{size}", *place)]
+        files = [file for size in CONFIG.bmode.sizes for file in store.files(f"{stage}/{size}", *index)]
         record = {"status": "complete", "sha256": ledger.checksums(files, store.path)}
         ledger.commit(record_path(folder, stage, case, view), record)
 
@@ -135,11 +135,11 @@ def made(affine, tmp_path_factory):
 
 @pytest.fixture
 def evaluate(made, tmp_path, monkeypatch, capsys):
-    """Run the command where the guests are; its status, output and errors."""
+    """Run the command where the trackers are; its status, output and errors."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", sys.path[:])
-    monkeypatch.delitem(sys.modules, "guests", raising=False)
-    Path("guests.py").write_text(GUESTS)
+    monkeypatch.delitem(sys.modules, "custom", raising=False)
+    Path("custom.py").write_text(CUSTOM)
 
     def run(*arguments, repository=made):
         monkeypatch.setattr(sys, "argv", ["echotruth", "evaluate", str(repository), *map(str, arguments)])
@@ -151,14 +151,14 @@ def evaluate(made, tmp_path, monkeypatch, capsys):
 
 
 def scores(made, name):
-    return pd.read_csv(made / f"guests/{name}.csv")
+    return pd.read_csv(made / f"external/{name}.csv")
 
 
 def in_image(affine, view):
     """The affine map in the image: its gradient less one, and the shift of the corner of the first pixel (m)."""
     matrix, shift = affine[0] - np.eye(3), affine[1]
     beating, _ = heart(affine)
-    where = plane(CONFIG.views[view], CONFIG.rf, beating.positions(0)[beating.endo.ravel()])
+    where = imaging_plane(CONFIG.views[view], CONFIG.rf, beating.positions(0)[beating.endo.ravel()])
     axial, lateral = pixel_centres(CONFIG.bmode, 128)
     corner = np.array([lateral[0], axial[0]]) - CONFIG.bmode.si().field_of_view / 128 / 2
     axes = where.axes[:2]
@@ -169,46 +169,46 @@ def test_tracker_that_knows_the_motion_has_no_error_at_any_size(made, evaluate, 
     gradient, shift = in_image(affine, "mid")
     options = {"course": COURSE.tolist(), "gradient": gradient.tolist(), "shift": shift.tolist()}
     given = [word for key, value in options.items() for word in ("--option", f"{key}={value}")]
-    status, said, complaint = evaluate("--tracker", "guests:exact", "--view", "mid", *given)
-    assert (status, complaint) == (0, "")
-    table = scores(made, "guests_exact")
-    assert str(made / "guests/guests_exact.csv") in said
+    status, output, errors = evaluate("--tracker", "custom:exact", "--view", "mid", *given)
+    assert (status, errors) == (0, "")
+    table = scores(made, "custom_exact")
+    assert str(made / "external/custom_exact.csv") in output
     assert list(table["size_px"]) == [128, 64, 128, 64]
     assert (table["nrmse_percent"] < 1e-3).all() and (table["coverage_percent"] == 100).all()
 
 
 def test_tracker_that_sees_no_motion_is_off_by_all_of_it(made, evaluate):
-    assert evaluate("--tracker", "guests:still")[0] == 0
-    table = scores(made, "guests_still")
+    assert evaluate("--tracker", "custom:still")[0] == 0
+    table = scores(made, "custom_still")
     np.testing.assert_allclose(table["nrmse_percent"], 100)
     assert list(table.columns[:4]) == ["case", "view", "size_px", "tracker"] and table.columns[-1] == "failure"
-    assert set(table["tracker"]) == {"guests_still"} and table["failure"].isna().all()
+    assert set(table["tracker"]) == {"custom_still"} and table["failure"].isna().all()
 
 
 def test_every_complete_clip_is_tried_and_no_other(made, evaluate):
     first, second = (case.id for case in expand(CONFIG))
-    evaluate("--tracker", "guests:still", "--name", "all")
+    evaluate("--tracker", "custom:still", "--name", "all")
     tried = list(scores(made, "all")[["case", "view", "size_px"]].itertuples(index=False, name=None))
     assert tried == [
-        (*place, size) for place in ((first, "mid"), (first, "apex"), (second, "mid")) for size in (128, 64)
+        (*case_view, size) for case_view in ((first, "mid"), (first, "apex"), (second, "mid")) for size in (128, 64)
     ]
-    evaluate("--tracker", "guests:still", "--name", "few", "--case", first, "--view", "apex", "--size", "64")
+    evaluate("--tracker", "custom:still", "--name", "few", "--case", first, "--view", "apex", "--size", "64")
     assert list(scores(made, "few")[["case", "view", "size_px"]].iloc[0]) == [first, "apex", 64]
     assert len(scores(made, "few")) == 1
 
 
 def test_failure_on_one_clip_is_a_row_and_the_others_go_on(made, evaluate):
-    status, said, _ = evaluate("--tracker", "guests:small_only", "--view", "mid")
-    table = scores(made, "guests_small_only").set_index("size_px")
-    assert status == 0 and "no room" in said
-    assert table.loc[128, "failure"].str.startswith("guests:small_only raised MemoryError: no room").all()
+    status, output, _ = evaluate("--tracker", "custom:small_only", "--view", "mid")
+    table = scores(made, "custom_small_only").set_index("size_px")
+    assert status == 0 and "no room" in output
+    assert table.loc[128, "failure"].str.startswith("custom:small_only raised MemoryError: no room").all()
     assert table.loc[128, "nrmse_percent"].isna().all() and (table.loc[128, "coverage_percent"] == 0).all()
     assert table.loc[64, "failure"].isna().all() and np.allclose(table.loc[64, "nrmse_percent"], 100)
 
 
 def test_tracker_that_fails_everywhere_ends_with_status_1(made, evaluate):
-    status, said, complaint = evaluate("--tracker", "guests:nothing", "--name", "nothing")
-    assert (status, complaint) == (1, "") and said.count("cannot be imported: AttributeError") == 6
+    status, output, errors = evaluate("--tracker", "custom:nothing", "--name", "nothing")
+    assert (status, errors) == (1, "") and output.count("cannot be imported: AttributeError") == 6
     assert scores(made, "nothing")["failure"].notna().all()
 
 
@@ -226,8 +226,8 @@ def test_program_and_method_of_ours_are_tried_too(made, evaluate):
 def test_scores_are_the_same_bytes_whatever_the_number_of_processes(made, evaluate):
     read = [
         (
-            evaluate("--tracker", "guests:drawn", "--view", "mid", "--jobs", jobs),
-            (made / "guests/guests_drawn.csv").read_bytes(),
+            evaluate("--tracker", "custom:drawn", "--view", "mid", "--jobs", jobs),
+            (made / "external/custom_drawn.csv").read_bytes(),
         )
         for jobs in (1, 2)
     ]
@@ -235,20 +235,20 @@ def test_scores_are_the_same_bytes_whatever_the_number_of_processes(made, evalua
     assert read[0] == read[1]
 
 
-def test_later_trial_replaces_its_own_scores_and_no_others(made, evaluate):
+def test_later_run_replaces_its_own_scores_and_no_others(made, evaluate):
     for name in ("one", "two"):
-        evaluate("--tracker", "guests:still", "--name", name, "--view", "mid")
+        evaluate("--tracker", "custom:still", "--name", name, "--view", "mid")
     before = {path.name: path.read_bytes() for path in made.rglob("*") if path.is_file()}
-    evaluate("--tracker", "guests:still", "--name", "two", "--view", "apex")
+    evaluate("--tracker", "custom:still", "--name", "two", "--view", "apex")
     after = {path.name: path.read_bytes() for path in made.rglob("*") if path.is_file()}
     assert {name for name in {*before, *after} if before.get(name) != after.get(name)} == {"two.csv"}
 
 
 def test_scores_of_images_made_anew_are_of_another_clip(made, evaluate, tmp_path):
     again = tmp_path / "again"
-    shutil.copytree(made, again, ignore=shutil.ignore_patterns("guests"))
-    evaluate("--tracker", "guests:still", "--view", "mid", "--size", "64", repository=again)
-    before = scores(again, "guests_still")
+    shutil.copytree(made, again, ignore=shutil.ignore_patterns("external"))
+    evaluate("--tracker", "custom:still", "--view", "mid", "--size", "64", repository=again)
+    before = scores(again, "custom_still")
     path = record_path(again, "bmode", before["case"][0], "mid")
     record = ledger.read(path)
     ledger.commit(path, record | {"seconds": 7})
@@ -259,16 +259,16 @@ def test_scores_of_images_made_anew_are_of_another_clip(made, evaluate, tmp_path
 
 
 def test_scores_that_could_not_be_written_are_refused_before_the_first_clip(made, evaluate, tmp_path):
-    shutil.copytree(made, tmp_path / "taken", ignore=shutil.ignore_patterns("guests"))
-    (tmp_path / "taken/guests").write_text("")
-    status, said, complaint = evaluate("--tracker", "guests:still", repository=tmp_path / "taken")
-    assert (status, said, complaint.count("\n")) == (2, "", 1) and "taken/guests cannot hold the scores" in complaint
+    shutil.copytree(made, tmp_path / "taken", ignore=shutil.ignore_patterns("external"))
+    (tmp_path / "taken/external").write_text("")
+    status, output, errors = evaluate("--tracker", "custom:still", repository=tmp_path / "taken")
+    assert (status, output, errors.count("\n")) == (2, "", 1) and "taken/external cannot hold the scores" in errors
 
 
 def test_tracker_that_ends_its_process_is_told_in_one_sentence(made, evaluate):
-    status, _, complaint = evaluate("--tracker", "guests:crash", "--view", "apex", "--jobs", "2")
-    assert status == 2 and complaint.count("\n") == 1 and "--command" in complaint
-    assert not (made / "guests/guests_crash.csv").exists()
+    status, _, errors = evaluate("--tracker", "custom:crash", "--view", "apex", "--jobs", "2")
+    assert status == 2 and errors.count("\n") == 1 and "--command" in errors
+    assert not (made / "external/custom_crash.csv").exists()
 
 
 def test_repository_with_a_damaged_clip_is_refused_in_one_sentence(made, evaluate, tmp_path):
@@ -277,15 +277,15 @@ def test_repository_with_a_damaged_clip_is_refused_in_one_sentence(made, evaluat
     content = bytearray(shard.read_bytes())
     content[len(content) // 3] ^= 1
     shard.write_bytes(content)
-    status, _, complaint = evaluate("--tracker", "guests:still", repository=tmp_path / "damaged")
-    assert (status, complaint.count("\n")) == (2, 1) and "cannot be read at" in complaint
+    status, _, errors = evaluate("--tracker", "custom:still", repository=tmp_path / "damaged")
+    assert (status, errors.count("\n")) == (2, 1) and "cannot be read at" in errors
 
 
 @pytest.mark.parametrize(
     "tracker, name", [("a:track", "a"), ("a.b:track", "a_b"), ("a:other", "a_other"), ("a-b", "a_b"), ("dis", "dis")]
 )
 def test_scores_stand_under_a_name_made_of_that_of_the_tracker(tracker, name):
-    assert entrant(tracker, None, [])[0] == name
+    assert parse_tracker(tracker, None, [])[0] == name
 
 
 @pytest.mark.parametrize(
@@ -295,12 +295,12 @@ def test_scores_stand_under_a_name_made_of_that_of_the_tracker(tracker, name):
         ("python3 code/network.py {input} {output}", "network"),
         ("julia -t 4 --project=. flow.jl {input} {output}", "flow"),
         ("Rscript warp.R {input} {output}", "warp"),
-        ("matlab -batch \"follow('{input}', '{output}')\"", "matlab"),
+        ("matlab -batch \"material_truth('{input}', '{output}')\"", "matlab"),
         ("track --config settings.yaml {input} {output}", "track"),
     ],
 )
 def test_scores_of_a_program_stand_under_the_name_of_its_script_or_its_own(command, name):
-    assert entrant(None, command, [])[0] == name
+    assert parse_tracker(None, command, [])[0] == name
 
 
 @pytest.mark.parametrize(
@@ -309,7 +309,7 @@ def test_scores_of_a_program_stand_under_the_name_of_its_script_or_its_own(comma
 )
 @pytest.mark.parametrize("tracker", ["a:b", "dis"])
 def test_option_that_looks_like_a_number_is_one(tracker, text, value):
-    settings = entrant(tracker, None, [f"a={text}"])[1]
+    settings = parse_tracker(tracker, None, [f"a={text}"])[1]
     assert settings.get("options", settings)["a"] == value
 
 
@@ -320,17 +320,17 @@ def worked(made, evaluate):
     return job, runpy.run_path(str(ROOT / "workflow/scripts/tracking.py"))["work"](job)
 
 
-def test_guest_of_the_configuration_gets_the_scores_it_gets_on_the_command_line(made, worked, evaluate):
+def test_external_tracker_of_the_configuration_gets_the_scores_it_gets_on_the_command_line(made, worked, evaluate):
     job, result = worked
-    evaluate("--tracker", "guests:drawn", "--case", job.case.id, "--view", "mid")
+    evaluate("--tracker", "custom:drawn", "--case", job.case.id, "--view", "mid")
     truth = scoring.ground_truth(job)
-    for _, found in scores(made, "guests_drawn").iterrows():
+    for _, found in scores(made, "custom_drawn").iterrows():
         tracked = result[f"tracking/{found['size_px']}"]["displacement"][1]
-        for name, value in scoring.row(scoring.score(tracked, truth), "short_axis").items():
+        for name, value in scoring.metrics(scoring.score(tracked, truth), "short_axis").items():
             np.testing.assert_allclose(found[name], value, rtol=1e-9, err_msg=name)
 
 
-def test_guest_of_the_configuration_that_fails_leaves_the_others_their_motion(worked):
+def test_external_tracker_of_the_configuration_that_fails_leaves_the_others_their_motion(worked):
     job, result = worked
     assert list(job.verdict["failures"]) == ["poor/128"] and "no room" in job.verdict["failures"]["poor/128"]
     large, small = (result[f"tracking/{size}"]["displacement"] for size in (128, 64))
@@ -340,7 +340,7 @@ def test_guest_of_the_configuration_that_fails_leaves_the_others_their_motion(wo
 
 
 REFUSED = {
-    "ours": (["--tracker", "a:b", "--name", "ours"], "ours is a tracker of {made} already"),
+    "ours": (["--tracker", "a:b", "--name", "ours"], "ours is already a tracker of {made}"),
     "name": (["--tracker", "a:b", "--name", "my tracker"], "'my tracker' cannot be the name of a tracker: use letters"),
     "its own name": (["--command", "./2d {input} {output}"], "'2d' cannot be the name of a tracker: use letters"),
     "path": (["--tracker", "code/own.py:track"], "write package.module:function (dots, no path, no .py)"),
@@ -356,7 +356,7 @@ REFUSED = {
         "window_px = 128: must not exceed the smallest image, 64 px",
     ),
     "quotes": (["--command", "'a {input} {output}"], "no closing quotation"),
-    "places": (["--command", "a {input}"], "must say where the path of the output goes: {{output}}"),
+    "places": (["--command", "a {input}"], "must contain {{output}} where the path of that file belongs"),
     "timeout": (["--command", "a {input} {output}", "--timeout", "0"], "timeout_s = 0.0: should be greater than 0"),
     "untimed": (["--tracker", "a:b", "--timeout", "5"], "--timeout 5: a:b is not timed"),
     "jobs": (["--tracker", "a:b", "--jobs", "0"], "--jobs 0: must be 1 or more"),
@@ -364,21 +364,21 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_trial_that_cannot_be_held_is_refused_in_one_sentence(made, evaluate, case):
+def test_invalid_evaluation_is_refused_in_one_sentence(made, evaluate, case):
     arguments, expected = REFUSED[case]
-    status, said, complaint = evaluate(*arguments)
-    assert (status, said) == (2, "") and complaint.count("\n") == 1
-    assert expected.format(made=made) in complaint
+    status, output, errors = evaluate(*arguments)
+    assert (status, output) == (2, "") and errors.count("\n") == 1
+    assert expected.format(made=made) in errors
 
 
 @pytest.mark.parametrize("name", ["nowhere", "."])
 def test_folder_that_is_no_repository_is_refused_in_one_sentence(evaluate, name):
-    status, said, complaint = evaluate("--tracker", "a:b", repository=name)
-    assert (status, said, complaint.count("\n")) == (2, "", 1) and f"{name} is not a repository" in complaint
+    status, output, errors = evaluate("--tracker", "a:b", repository=name)
+    assert (status, output, errors.count("\n")) == (2, "", 1) and f"{name} is not a repository" in errors
 
 
 def test_repository_that_was_not_run_is_refused_in_one_sentence(made, evaluate, tmp_path):
     for name in ("config.yaml", "registry.txt"):
         (tmp_path / name).write_text((made / name).read_text())
-    status, _, complaint = evaluate("--tracker", "guests:still", repository=tmp_path)
-    assert (status, complaint.count("\n")) == (2, 1) and "no complete clip" in complaint
+    status, _, errors = evaluate("--tracker", "custom:still", repository=tmp_path)
+    assert (status, errors.count("\n")) == (2, 1) and "no complete clip" in errors

@@ -1,4 +1,4 @@
-"""What a guest was scored on is what it stands for, and a table that cannot be read is told of in one sentence."""
+"""Scores of external trackers count for unchanged clips only, and a table that cannot be read gives one sentence."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def board(tmp_path):
     lengths = LENGTHS | {name: len(labels) for name, labels in LABELS.items()}
     data = {array.name: (array.dims, np.full([lengths[dim] for dim in array.dims], 0.1)) for array in EVALUATION}
     tree = xr.DataTree.from_dict({"/evaluation/64": xr.Dataset(data, coords={"case": ["a"]})})
-    (tmp_path / "guests").mkdir()
+    (tmp_path / "external").mkdir()
     for view in CONFIG.views:
         for stage in ("bmode", "truth"):
             commit(tmp_path, stage, view, "0")
@@ -39,10 +39,10 @@ def board(tmp_path):
 
 @pytest.fixture
 def file(board, tmp_path):
-    """Table of a guest that was scored on both clips."""
+    """Table of an external tracker that was scored on both clips."""
     table = board().assign(tracker="mine", clip=[digest(tmp_path, "a", view) for view in CONFIG.views])
-    table.to_csv(tmp_path / "guests/mine.csv", index=False)
-    return tmp_path / "guests/mine.csv"
+    table.to_csv(tmp_path / "external/mine.csv", index=False)
+    return tmp_path / "external/mine.csv"
 
 
 def views(board):
@@ -50,7 +50,7 @@ def views(board):
     return list(table["view"][table["tracker"] == "mine"])
 
 
-def test_guest_stands_under_the_name_of_its_file_on_clips_that_are_what_they_were(board, file, caplog):
+def test_external_tracker_stands_under_the_name_of_its_file_on_clips_that_are_what_they_were(board, file, caplog):
     assert views(board) == ["mid", "null"] and not caplog.messages
     assert board()["size_px"].tolist() == [64] * 4 and board()["failure"].eq("").all()
 
@@ -59,7 +59,7 @@ def test_guest_stands_under_the_name_of_its_file_on_clips_that_are_what_they_wer
 def test_scores_of_older_images_are_left_out_and_told_of(board, file, tmp_path, stage, caplog):
     commit(tmp_path, stage, "mid", "1")
     assert views(board) == ["null"]
-    assert caplog.messages == ["guests/mine.csv: 1 of 2 rows are of older images: evaluate that tracker again"]
+    assert caplog.messages == ["external/mine.csv: 1 of 2 rows are of older images: evaluate that tracker again"]
 
 
 def test_scores_of_unknown_images_are_left_out(board, file):

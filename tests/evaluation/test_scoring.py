@@ -1,35 +1,35 @@
-"""What is told of one clip, in units that its names say."""
+"""Score of one clip, and its metrics in the units that their names give."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from echotruth.evaluation.displacement import Wall
+from echotruth.evaluation.displacement import WallPoints
 from echotruth.evaluation.polar import directions
-from echotruth.evaluation.scoring import Truth, row, score
-from echotruth.evaluation.strain import Operator
+from echotruth.evaluation.scoring import Truth, metrics, score
+from echotruth.evaluation.strain import StrainOperator
 
 STEP = 0.117e-3
 
 
 def ventricle(plane="short_axis"):
     """A short-axis slice that shrinks to 0.9 by the middle of five frames and is back in the last."""
-    place = STEP * (np.arange(45) - 22)
-    grid = np.stack(np.meshgrid(place, place), -1)
+    x = STEP * (np.arange(45) - 22)
+    grid = np.stack(np.meshgrid(x, x), -1)
     distance = np.hypot(*np.moveaxis(grid, -1, 0))
     inside = (distance > 1.4e-3) & (distance < 2.4e-3)
     position = grid[inside]
     layer = np.ceil(6 * (distance[inside] - 1.4e-3) / 1e-3).astype(np.uint8)
     segment = (7 + np.floor((np.arctan2(*position.T) + np.pi) / (np.pi / 3)) % 6).astype(np.uint8)
     axes = directions(position, np.zeros(2), "short_axis")
-    operator = Operator(position, axes, 0.45e-3)
-    share = np.array([0, -0.05, -0.1, -0.05, 0])[:, None, None]
-    strain = ((1 + share) ** 2 - 1) / 2 * np.array([1.0, 1.0, 0.0])
-    wall = Wall(position, layer, segment, np.zeros(2), plane)
+    operator = StrainOperator(position, axes, 0.45e-3)
+    fraction = np.array([0, -0.05, -0.1, -0.05, 0])[:, None, None]
+    strain = ((1 + fraction) ** 2 - 1) / 2 * np.array([1.0, 1.0, 0.0])
+    wall = WallPoints(position, layer, segment, np.zeros(2), plane)
     out = 1e-4 * np.sin(np.arange(5))[:, None] * np.ones(len(position))
     everywhere = np.broadcast_to(strain, (3, 5, len(position), 3))
-    return Truth(inside, wall, operator, share * position, out, everywhere, 2)
+    return Truth(inside, wall, operator, fraction * position, out, everywhere, 2)
 
 
 @pytest.fixture(scope="module")
@@ -42,11 +42,11 @@ def tracked(truth, displacement):
 
 
 def test_the_truth_itself_has_no_error(truth):
-    found = row(score(tracked(truth, truth.displacement), truth), "short_axis")
+    found = metrics(score(tracked(truth, truth.displacement), truth), "short_axis")
     for name, value in found.items():
         # What is the same at every point correlates with nothing: the error, and the strain of this slice.
         perfect = np.nan if name.endswith("correlation") else {"coverage_percent": 100}.get(name, 0)
-        if "ell_" in name or "spread" in name:
+        if "ell_" in name or "transmural_gradient" in name:
             continue
         assert value == pytest.approx(perfect, abs=1e-6, nan_ok=True), name
 
@@ -69,14 +69,14 @@ def test_a_rigid_shift_kept_in_single_precision_has_no_correlations(truth):
 
 
 def test_a_tracker_that_sees_nine_tenths_is_off_by_a_tenth(truth):
-    found = row(score(tracked(truth, 0.9 * truth.displacement), truth), "short_axis")
+    found = metrics(score(tracked(truth, 0.9 * truth.displacement), truth), "short_axis")
     radius = np.hypot(*truth.wall.position.T)
     assert found["nrmse_percent"] == pytest.approx(10) and found["nrmse_cycle_percent"] == pytest.approx(10)
     assert found["rms_error_um"] == pytest.approx(1e6 * 0.01 * np.sqrt(np.mean(radius**2)))
     assert found["epe_um"] == pytest.approx(1e6 * 0.01 * radius.mean())
     assert found["epe_median_um"] == pytest.approx(1e6 * 0.01 * np.median(radius))
     assert found["drift_um"] == 0
-    # Stretches of 0.91 in place of 0.90, in every direction.
+    # Stretches of 0.91 instead of 0.90, in every direction.
     bias = 100 * (0.91**2 - 0.9**2) / 2
     for name in ("global_ecc_bias_points", "ecc_rms_points", "segment_err_error_points", "tracker_err_rms_points"):
         assert found[name] == pytest.approx(bias), name
@@ -84,12 +84,12 @@ def test_a_tracker_that_sees_nine_tenths_is_off_by_a_tenth(truth):
 
 
 def test_long_axis_tells_the_longitudinal_strain_alone(truth):
-    found = row(score(tracked(truth, 0.9 * truth.displacement), ventricle("long_axis")), "long_axis")
+    found = metrics(score(tracked(truth, 0.9 * truth.displacement), ventricle("long_axis")), "long_axis")
     assert np.isnan(found["ecc_rms_points"]) and found["ell_rms_points"] == pytest.approx(100 * (0.91**2 - 0.9**2) / 2)
 
 
 def test_no_answer_is_an_error_of_all_there_is(truth):
-    found = row(score(tracked(truth, np.nan * truth.displacement), truth), "short_axis")
+    found = metrics(score(tracked(truth, np.nan * truth.displacement), truth), "short_axis")
     assert found["coverage_percent"] == 0 and found["nrmse_all_percent"] == pytest.approx(100)
     assert np.isnan(found["nrmse_percent"]) and np.isnan(found["ecc_rms_points"]) and np.isnan(found["epe_um"])
 
@@ -97,7 +97,7 @@ def test_no_answer_is_an_error_of_all_there_is(truth):
 def test_leaving_points_out_does_not_pay(truth):
     moved = 0.9 * truth.displacement
     moved[:, ::2] = np.nan
-    found = row(score(tracked(truth, moved), truth), "short_axis")
+    found = metrics(score(tracked(truth, moved), truth), "short_axis")
     squares = np.sum(truth.wall.position**2, axis=1)
     left_out = squares[::2].sum() / squares.sum()
     assert found["nrmse_percent"] == pytest.approx(10) and found["coverage_percent"] == pytest.approx(50, abs=0.1)
@@ -135,13 +135,13 @@ def test_a_grid_too_coarse_for_strain_still_has_an_error_of_displacement(truth, 
     few = Truth(
         inside=truth.inside & (np.cumsum(truth.inside).reshape(truth.inside.shape) <= count),
         wall=wall,
-        operator=Operator(wall.position, truth.operator.axes[kept], truth.operator.radius),
+        operator=StrainOperator(wall.position, truth.operator.axes[kept], truth.operator.radius),
         displacement=truth.displacement[:, kept],
         through_plane=truth.through_plane[:, kept],
         strain=truth.strain[:, :, kept],
         es=truth.es,
     )
-    found = row(score(tracked(few, 0.9 * few.displacement), few), "short_axis")
+    found = metrics(score(tracked(few, 0.9 * few.displacement), few), "short_axis")
     np.testing.assert_allclose(found["nrmse_percent"], 10 if count else np.nan)
     assert np.isnan(found["ecc_rms_points"]) and np.isnan(found["global_err_bias_points"])
     assert np.isnan(few.arrays["true_strain"]).sum() >= few.arrays["true_strain"].size - 3 * 5 * 3 * count

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from echotruth.evaluation.strain import Operator
+from echotruth.evaluation.strain import StrainOperator
 
 INNER, OUTER = 1.45e-3, 2.45e-3
 
 
 def annulus(step, radius):
     """The operator on a grid in the cross-section of a ventricle; radial outwards, tangential counter-clockwise."""
-    place = np.arange(-OUTER, OUTER, step) + step / 3
-    position = np.stack(np.meshgrid(place, place), -1).reshape(-1, 2)
+    x = np.arange(-OUTER, OUTER, step) + step / 3
+    position = np.stack(np.meshgrid(x, x), -1).reshape(-1, 2)
     position = position[np.abs(np.hypot(*position.T) - (INNER + OUTER) / 2) < (OUTER - INNER) / 2]
     outwards = position / np.hypot(*position.T)[:, None]
     axes = np.stack([outwards, np.stack([-outwards[:, 1], outwards[:, 0]], -1)], 1)
-    return Operator(position, axes, radius)
+    return StrainOperator(position, axes, radius)
 
 
 @pytest.fixture(scope="module")
@@ -44,13 +44,13 @@ def twisting(wall):
 
     From F_rR = R / r, F_tR = r a', F_tT = r / R in polar coordinates.
     """
-    place = np.hypot(*wall.position.T)
-    turn, slope = 0.15 - 120 * (place - INNER), -120.0
-    now = np.sqrt(place**2 - INNER**2 + 1.1e-3**2)
+    undeformed = np.hypot(*wall.position.T)
+    turn, slope = 0.15 - 120 * (undeformed - INNER), -120.0
+    deformed = np.sqrt(undeformed**2 - INNER**2 + 1.1e-3**2)
     angle = np.arctan2(wall.position[:, 1], wall.position[:, 0]) + turn
-    moved = now[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1) - wall.position
-    radial = ((place / now) ** 2 + (now * slope) ** 2 - 1) / 2
-    return moved, np.stack([radial, ((now / place) ** 2 - 1) / 2, now**2 * slope / place / 2], -1)
+    moved = deformed[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1) - wall.position
+    radial = ((undeformed / deformed) ** 2 + (deformed * slope) ** 2 - 1) / 2
+    return moved, np.stack([radial, ((deformed / undeformed) ** 2 - 1) / 2, deformed**2 * slope / undeformed / 2], -1)
 
 
 def test_contraction_with_twist_has_the_strain_of_its_closed_form(wall):
@@ -92,21 +92,23 @@ def test_lost_points_have_no_strain_and_leave_that_of_the_others(wall):
 def test_strain_where_points_are_lost_is_that_of_a_wall_without_them(wall):
     moved = np.repeat(twisting(wall)[0][None], 4, axis=0)
     random = np.random.default_rng(5)
-    for frame, share in ((1, 0.01), (2, 0.1), (3, 0.6)):
-        moved[frame, random.random(len(wall.position)) < share] = np.nan
+    for frame, fraction in ((1, 0.01), (2, 0.1), (3, 0.6)):
+        moved[frame, random.random(len(wall.position)) < fraction] = np.nan
     found = wall.strain(moved)
     for frame in range(4):
         known = np.isfinite(moved[frame]).all(-1)
-        without = Operator(wall.position[known], wall.axes[known], wall.radius).strain(moved[frame : frame + 1, known])
+        without = StrainOperator(wall.position[known], wall.axes[known], wall.radius).strain(
+            moved[frame : frame + 1, known]
+        )
         np.testing.assert_allclose(found[frame, known], without[0], atol=1e-11)
 
 
 def test_too_few_points_or_all_on_a_line_have_no_strain():
     line = np.stack([np.linspace(0, 1e-3, 30), np.zeros(30)], -1)
     axes = np.broadcast_to(np.eye(2), (30, 2, 2))
-    assert np.isnan(Operator(line, axes, 0.45e-3).strain(line[None])).all()
+    assert np.isnan(StrainOperator(line, axes, 0.45e-3).strain(line[None])).all()
     scattered = np.random.default_rng(0).uniform(0, 3e-4, (9, 2))
-    assert np.isnan(Operator(scattered, axes[:9], 0.45e-3).strain(scattered[None])).all()
+    assert np.isnan(StrainOperator(scattered, axes[:9], 0.45e-3).strain(scattered[None])).all()
 
 
 def test_the_wall_across_a_narrow_cavity_is_no_neighbour():
@@ -114,6 +116,6 @@ def test_the_wall_across_a_narrow_cavity_is_no_neighbour():
     position = np.concatenate([place + [0, 1e-4], place * [1, -1] - [0, 1e-4]])
     upper = np.arange(len(position)) < len(place)
     normal = np.where(upper[:, None], [0.0, 1.0], [0.0, -1.0])
-    operator = Operator(position, np.stack([normal, np.tile([1.0, 0.0], (len(position), 1))], 1), 0.45e-3)
+    operator = StrainOperator(position, np.stack([normal, np.tile([1.0, 0.0], (len(position), 1))], 1), 0.45e-3)
     shifted = np.where(upper[:, None], [0.0, -5e-5], [0.0, 5e-5])
     assert np.abs(operator.strain(shifted[None])).max() < 1e-12

@@ -1,11 +1,11 @@
-"""The finding of points is the inverse of interpolation."""
+"""Location of points is the inverse of interpolation."""
 
 import numpy as np
 
 from echotruth.config import Phantom
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import EDGES, MaterialPoints, interpolate, jacobian
-from echotruth.imaging.medium.phantom import seed
+from echotruth.imaging.medium.phantom import seed_volume
 
 
 def _bent(nodes):
@@ -14,7 +14,7 @@ def _bent(nodes):
 
 
 def test_every_point_of_the_wall_is_found_where_it_is(coarse_mesh):
-    scattered = seed(
+    scattered = seed_volume(
         Phantom(density_per_mm3=300.0), coarse_mesh.nodes, coarse_mesh.cells, np.random.default_rng(0)
     ).points
     bent = _bent(coarse_mesh.nodes)
@@ -37,7 +37,7 @@ def test_nodes_are_found_although_they_lie_on_faces(coarse_mesh):
         assert np.abs(interpolate(coarse_mesh.nodes, coarse_mesh.cells, found) - nodes).max() < 1e-15
 
 
-def test_no_points_make_no_trouble(coarse_mesh):
+def test_no_points_are_located_in_no_cells(coarse_mesh):
     assert isinstance(locate(coarse_mesh.nodes, coarse_mesh.cells, np.empty((0, 3))), MaterialPoints)
 
 
@@ -53,13 +53,13 @@ def _search(positions, cells, points):
     cell = np.tile(np.arange(len(cells), dtype=np.int32), len(points))
     xi, points = np.full((len(cell), 3), 0.25), np.repeat(points, len(cells), axis=0)
     for _ in range(25):
-        here = MaterialPoints(cell, xi)
-        off = points - interpolate(positions, cells, here)
-        step = np.linalg.solve(jacobian(positions, cells, here), off[..., None])[..., 0]
+        guess = MaterialPoints(cell, xi)
+        residual = points - interpolate(positions, cells, guess)
+        step = np.linalg.solve(jacobian(positions, cells, guess), residual[..., None])[..., 0]
         xi = xi + step * np.minimum(1, 0.3 / np.abs(step).max(axis=1, initial=1e-30, keepdims=True))
-    there = np.abs(points - interpolate(positions, cells, MaterialPoints(cell, xi))).max(axis=1) < 1e-12
-    there &= (xi.min(axis=1) > -1e-9) & (xi.sum(axis=1) < 1 + 1e-9)
-    return [np.flatnonzero(row) for row in there.reshape(-1, len(cells))]
+    inside = np.abs(points - interpolate(positions, cells, MaterialPoints(cell, xi))).max(axis=1) < 1e-12
+    inside &= (xi.min(axis=1) > -1e-9) & (xi.sum(axis=1) < 1 + 1e-9)
+    return [np.flatnonzero(row) for row in inside.reshape(-1, len(cells))]
 
 
 def test_a_point_is_found_just_where_a_search_of_all_cells_finds_it(coarse_mesh):
@@ -71,29 +71,29 @@ def test_a_point_is_found_just_where_a_search_of_all_cells_finds_it(coarse_mesh)
         points = np.vstack([anywhere, close])
         expected = _search(nodes, cells, points)
         assert 15 < sum(len(holding) > 0 for holding in expected) < 65
-        assert list(locate(nodes, cells, points).cell) == [each[0] if len(each) else -1 for each in expected]
+        assert list(locate(nodes, cells, points).cell) == [holding[0] if len(holding) else -1 for holding in expected]
 
 
 def test_where_bodies_overlap_a_point_is_in_the_first_cell_and_every_body_is_searched(coarse_mesh):
     nodes, cells = coarse_mesh.nodes, coarse_mesh.cells
     beside = nodes + [20e-3, 0, 0]
-    both, twice = np.vstack([nodes, beside]), np.vstack([cells, cells + len(nodes)]).astype(np.int32)
+    all_nodes, all_cells = np.vstack([nodes, beside]), np.vstack([cells, cells + len(nodes)]).astype(np.int32)
     middle = MaterialPoints(np.arange(len(cells), dtype=np.int32), np.full((len(cells), 3), 0.25))
     for body in (nodes, beside):
-        places = interpolate(body, cells, middle)
-        assert np.array_equal(locate(both, twice, places).cell % len(cells), middle.cell)
-    over = np.vstack([cells, cells])
-    assert np.array_equal(locate(nodes, over, interpolate(nodes, cells, middle)).cell, middle.cell)
+        positions = interpolate(body, cells, middle)
+        assert np.array_equal(locate(all_nodes, all_cells, positions).cell % len(cells), middle.cell)
+    overlapping = np.vstack([cells, cells])
+    assert np.array_equal(locate(nodes, overlapping, interpolate(nodes, cells, middle)).cell, middle.cell)
 
 
 def test_points_are_found_alike_alone_in_a_plane_and_among_others(coarse_mesh):
     bent = _bent(coarse_mesh.nodes)
     random = np.random.default_rng(3)
-    places = bent.min(axis=0) + np.ptp(bent, axis=0) * random.random((2000, 3))
-    places[:, 2] = -2e-3
-    together = locate(bent, coarse_mesh.cells, places)
-    among = locate(bent, coarse_mesh.cells, np.vstack([places, bent, np.full((1, 3), np.nan)]))
-    alone = [locate(bent, coarse_mesh.cells, place[None]) for place in places[:200]]
+    positions = bent.min(axis=0) + np.ptp(bent, axis=0) * random.random((2000, 3))
+    positions[:, 2] = -2e-3
+    together = locate(bent, coarse_mesh.cells, positions)
+    among = locate(bent, coarse_mesh.cells, np.vstack([positions, bent, np.full((1, 3), np.nan)]))
+    alone = [locate(bent, coarse_mesh.cells, position[None]) for position in positions[:200]]
     assert (together.cell >= 0).any() and among.cell[-1] == -1
     for part in (MaterialPoints(among.cell[:2000], among.xi[:2000]), together):
         assert np.array_equal(part.cell[:200], [each.cell[0] for each in alone])

@@ -33,10 +33,10 @@ def test_gradients_are_those_of_the_shape_functions(points):
 
 
 def test_a_linear_field_is_interpolated_exactly_though_the_cells_are_curved(coarse_mesh, points):
-    place = interpolate(coarse_mesh.nodes, coarse_mesh.cells, points)
+    position = interpolate(coarse_mesh.nodes, coarse_mesh.cells, points)
     matrix, shift = np.array([[1.0, 2, 3], [0, -1, 4], [2, 0, 1]]), np.array([1e-3, 0, 0])
     field = interpolate(coarse_mesh.nodes @ matrix.T + shift, coarse_mesh.cells, points)
-    assert np.allclose(field, place @ matrix.T + shift, atol=1e-17)
+    assert np.allclose(field, position @ matrix.T + shift, atol=1e-17)
 
 
 def test_the_gradient_of_an_affine_motion_is_its_matrix(coarse_mesh, points):
@@ -46,7 +46,7 @@ def test_the_gradient_of_an_affine_motion_is_its_matrix(coarse_mesh, points):
     assert np.allclose(gradient(coarse_mesh.nodes, moved, coarse_mesh.cells, points), np.linalg.inv(matrix), atol=1e-12)
 
 
-def test_values_of_any_shape_are_carried_by_the_shape_functions(coarse_mesh, points):
+def test_values_of_any_shape_are_interpolated_by_the_shape_functions(coarse_mesh, points):
     random = np.random.default_rng(2)
     for shape_of_one in ((), (2,), (3, 4)):
         values = random.standard_normal((len(coarse_mesh.nodes), *shape_of_one))
@@ -54,15 +54,15 @@ def test_values_of_any_shape_are_carried_by_the_shape_functions(coarse_mesh, poi
         assert np.allclose(interpolate(values, coarse_mesh.cells, points), expected, rtol=0, atol=1e-14)
 
 
-def test_the_gradient_of_a_field_is_its_slope_along_any_way(coarse_mesh, points):
+def test_the_gradient_of_a_field_is_its_derivative_along_any_direction(coarse_mesh, points):
     # Of squares and products, which curved cells do not hold exactly: what is interpolated is differentiated.
     x, y, z = coarse_mesh.nodes.T
     values, step = np.stack([x * y, y * z - x**2], axis=-1), 1e-6
-    slope = gradient(values, coarse_mesh.nodes, coarse_mesh.cells, points)
+    gradients = gradient(values, coarse_mesh.nodes, coarse_mesh.cells, points)
     for axis in np.eye(3):
-        ends = [MaterialPoints(points.cell, points.xi + way * step * axis) for way in (-1, 1)]
-        places, there = (
-            [interpolate(each, coarse_mesh.cells, end) for end in ends] for each in (coarse_mesh.nodes, values)
+        ends = [MaterialPoints(points.cell, points.xi + sign * step * axis) for sign in (-1, 1)]
+        positions, fields = (
+            [interpolate(nodal, coarse_mesh.cells, end) for end in ends] for nodal in (coarse_mesh.nodes, values)
         )
-        along = np.einsum("pki,pi->pk", slope, places[1] - places[0])
-        assert np.allclose(along, there[1] - there[0], rtol=1e-6, atol=1e-6 * np.abs(along).max())
+        along = np.einsum("pki,pi->pk", gradients, positions[1] - positions[0])
+        assert np.allclose(along, fields[1] - fields[0], rtol=1e-6, atol=1e-6 * np.abs(along).max())

@@ -21,7 +21,7 @@ class ExactRecord:
         half_band = 1.289 * p.bandwidth * p.frequency
         bins = np.arange(self.samples // 2) / self.samples * p.sampling
         bins = np.flatnonzero(np.abs(bins - p.frequency) < half_band)
-        self.first, self.frequency = int(bins[0]), bins / self.samples * p.sampling
+        self.first_bin, self.frequency = int(bins[0]), bins / self.samples * p.sampling
         width = p.bandwidth * p.frequency / np.sqrt(8 * np.log(2))
         self.pulse = np.exp(-((self.frequency - p.frequency) ** 2) / (2 * width**2))
 

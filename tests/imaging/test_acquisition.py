@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config
-from echotruth.imaging.beamforming.scan import imaging_depth, points
+from echotruth.imaging.acquisition import Acquisition
+from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner
-from echotruth.imaging.medium.medium import Medium, seed
-from echotruth.imaging.rf.acquisition import Acquisition
-from echotruth.imaging.rf.haze import response, reverberation
+from echotruth.imaging.medium.medium import Medium, seed_medium
+from echotruth.imaging.rf.haze import reverberation, reverberation_filter
 from echotruth.imaging.rf.shadow import Rib
-from echotruth.imaging.view import plane
+from echotruth.imaging.view import imaging_plane
 
 SMALL = {"probe": {"elements": 16, "pitch_um": 90.0}, "rf": {"lines": 16}, "phantom": {"density_per_mm3": 300.0}}
 ALL = {
@@ -36,12 +36,12 @@ def scanner():
 
 @pytest.fixture(scope="module")
 def acquire(twisting_heart, scanner):
-    """A view of the heart with what is asked for."""
+    """Make the acquisition and the medium of a view of the heart."""
 
     def made(**realism):
         config = Config.model_validate(SMALL | {"realism": realism})
-        where = plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
-        seeded = seed(config, twisting_heart, where, random, scanner.matrix.in_beam)
+        where = imaging_plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+        seeded = seed_medium(config, twisting_heart, where, random, scanner.matrix.in_beam)
         medium = Medium(config, twisting_heart, where, time=TIME, seeded=seeded, random=random)
         return Acquisition(config, scanner, medium, random), medium
 
@@ -49,14 +49,14 @@ def acquire(twisting_heart, scanner):
 
 
 @pytest.mark.slow
-def test_nothing_asked_for_leaves_the_bytes_as_they_were(acquire, scanner, twisting_heart):
-    from echotruth.imaging.medium.phantom import scatter
+def test_without_realism_the_bytes_are_those_of_the_matrix(acquire, scanner, twisting_heart):
+    from echotruth.imaging.medium.phantom import seed_wall
 
     acquisition, _ = acquire()
     config = Config.model_validate(SMALL)
-    where = plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
-    bare = scatter(config, twisting_heart, where, random("phantom"))
-    places = bare.image(twisting_heart.positions(1), twisting_heart.cells, where)
+    where = imaging_plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+    bare = seed_wall(config, twisting_heart, where, random("phantom"))
+    places = bare.image_positions(twisting_heart.positions(1), twisting_heart.cells, where)
     assert acquisition(1).tobytes() == scanner.matrix(places, bare.amplitude).tobytes()
 
 
@@ -78,7 +78,7 @@ def test_the_scatterers_of_the_wall_are_the_same_whatever_is_around_them(acquire
 @pytest.mark.parametrize("snr", [10.0, 30.0])
 def test_the_lines_have_the_ratio_of_signal_to_noise_asked_for(acquire, scanner, snr):
     acquisition, medium = acquire(noise={"snr_dB": snr})
-    muscle = medium.in_wall(0, *points(scanner.scan, scanner.range))
+    muscle = medium.in_wall(0, *sample_positions(scanner.scan, scanner.range))
     echo = scanner.lines(*medium.wall(0))
     noise = scanner.beamform(np.float32(acquisition.noise) * acquisition.unit_noise(1))
     ratio = np.linalg.norm(echo[muscle]) / np.linalg.norm(noise[muscle])
@@ -108,16 +108,16 @@ def test_a_later_echo_is_the_first_one_shifted(scanner):
     matrix, samples = scanner.matrix, 300
     deeper = samples / matrix.sampling * 1540 / 2
     echo = matrix(np.array([[0.4e-3, 3e-3, 0.0]]), np.ones(1))
-    later = response(np.array([[deeper, 0.25]]), matrix.frequency, 1540.0)[:, None, None] * echo
+    later = reverberation_filter(np.array([[deeper, 0.25]]), matrix.frequency, 1540.0)[:, None, None] * echo
     traces = []
     for spectra in (echo, later):
         whole = np.zeros((matrix.samples // 2 + 1, 16, 16), complex)
-        whole[matrix.first : matrix.first + len(matrix.frequency)] = spectra
+        whole[matrix.first_bin : matrix.first_bin + len(matrix.frequency)] = spectra
         traces.append(np.fft.irfft(whole, matrix.samples, axis=0))
     assert np.abs(traces[1] - 0.25 * np.roll(traces[0], samples, axis=0)).max() < 1e-6 * np.abs(traces[0]).max()
 
 
-def test_only_what_is_near_comes_again(acquire):
+def test_only_near_echoes_are_repeated(acquire):
     hazy, clear = (acquire(**what)[0] for what in ({"haze": {"level_dB": -10.0, "near_mm": 3.0}}, {}))
     near, far = np.array([[0.2e-3, 2.5e-3, 0.0]]), np.array([[0.2e-3, 3.5e-3, 0.0]])
     one = np.ones(1)
@@ -143,7 +143,7 @@ def test_no_later_echo_seems_to_lie_beyond_the_image():
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_an_element_hears_what_its_ray_does_not_cross_the_rib_to_reach(acquire, scanner, side):
+def test_an_echo_is_faint_where_its_ray_crosses_the_rib(acquire, scanner, side):
     config = {"side": side, "edge_deg": 8.0, "depth_mm": 1.5, "softness_mm": 0.4, "level_dB": -30.0}
     acquisition, _ = acquire(shadow=config)
     draw = np.random.default_rng(7)
@@ -154,19 +154,19 @@ def test_an_element_hears_what_its_ray_does_not_cross_the_rib_to_reach(acquire, 
         x, z = sign * place[k, 0], place[k, 1]
         rib = 1.5e-3 * np.tan(np.radians(8))
         # The line from the scatterer through the rib's edge meets the array here.
-        horizon = x + (rib - x) * z / (z - 1.5e-3)
-        ramp = np.clip((horizon - sign * scanner.matrix.centres) / 0.4e-3 + 0.5, 0, 1)
+        projection = x + (rib - x) * z / (z - 1.5e-3)
+        ramp = np.clip((projection - sign * scanner.matrix.centres) / 0.4e-3 + 0.5, 0, 1)
         passes = 10**-1.5 + (1 - 10**-1.5) * np.sin(np.pi / 2 * ramp) ** 2
         exact += passes[:, None] * passes * scanner.matrix(place[k : k + 1], amplitude[k : k + 1])
     found = acquisition.direct(place, amplitude)
     assert np.linalg.norm(found - exact) < 0.03 * np.linalg.norm(exact)
 
 
-def test_what_lies_before_the_rib_is_not_shaded_and_what_lies_deep_behind_it_is(acquire, scanner):
+def test_scatterers_before_the_rib_are_not_shaded_and_those_deep_behind_it_are(acquire, scanner):
     rib = Rib(Config.model_validate({"realism": {"shadow": {"side": "right"}}}).realism.shadow, np.zeros(1))
     before, behind = np.array([[2e-3, 1.4e-3, 0]]), np.array([[5e-3, 6e-3, 0]])
     acquisition, _ = acquire(shadow={"side": "right", "level_dB": -40.0})
     one = np.ones(1)
-    assert np.isinf(rib.horizon(before)).all()
+    assert np.isinf(rib.projected_edge(before)).all()
     assert np.allclose(acquisition.direct(before, one), scanner.matrix(before, one), rtol=1e-6)
     assert np.allclose(acquisition.direct(behind, one), 1e-4 * scanner.matrix(behind, one), rtol=1e-4, atol=1e-12)

@@ -7,13 +7,13 @@ from echotruth.config import Bmode, Probe
 from echotruth.imaging.beamforming.scan import Linear, Sector
 from echotruth.imaging.bmode import (
     ScanConversion,
-    clip,
+    bmode_clip,
     downsample,
     envelope,
-    envelopes,
+    envelope_images,
     log_compress,
     pixel_centres,
-    time_gain,
+    time_gain_compensation,
 )
 
 BMODE = Bmode(size_px=128, downsampling=(1, 2, 4))
@@ -62,21 +62,21 @@ def test_small_pixels_share_centres_with_their_blocks():
 def test_gain_undoes_what_attenuation_takes_both_ways(decibels):
     """0.5 dB/cm/MHz at 25 MHz over 1 cm and back is 25 dB; with 0.7 given, 35 dB."""
     probe = Probe(attenuation_dB_per_cm_MHz=0.5)
-    gain = time_gain(probe, Bmode(tgc_dB_per_cm_MHz=decibels), np.array([0, 1e-2]))
+    gain = time_gain_compensation(probe, Bmode(tgc_dB_per_cm_MHz=decibels), np.array([0, 1e-2]))
     assert np.allclose(20 * np.log10(gain), [0, 25 if decibels is None else 35], atol=1e-4)
     assert np.allclose(envelope(np.array([3 + 4j, 3 + 4j], np.complex64), gain), 5 * gain)
 
 
 def test_without_attenuation_there_is_no_gain():
-    assert (time_gain(Probe(), Bmode(), RANGE) == 1).all()
+    assert (time_gain_compensation(Probe(), Bmode(), RANGE) == 1).all()
 
 
 def test_a_gain_beyond_all_numbers_is_refused():
     probe = Probe(preset="mouse_40MHz", attenuation_dB_per_cm_MHz=3.0)
-    reach = np.linspace(1e-3, 0.1, len(RANGE))
+    range_ = np.linspace(1e-3, 0.1, len(RANGE))
     lines = np.ones((1, len(ANGLE), len(RANGE)), np.complex64)
     with pytest.raises(ValueError, match="no echo"):
-        clip(lines, SECTOR, reach, BMODE, time_gain(probe, BMODE, reach))
+        bmode_clip(lines, SECTOR, range_, BMODE, time_gain_compensation(probe, BMODE, range_))
 
 
 def pixel_grid(size):
@@ -91,16 +91,16 @@ def test_scan_conversion_puts_a_smooth_field_on_its_place():
     polar = field(RANGE * np.sin(ANGLE)[:, None], RANGE * np.cos(ANGLE)[:, None])
     image = ScanConversion(SECTOR, RANGE, BMODE)(polar)
     axial, lateral = pixel_grid(128)
-    angle, reach = np.abs(np.arctan2(lateral, axial)), np.hypot(lateral, axial)
+    angle, range_ = np.abs(np.arctan2(lateral, axial)), np.hypot(lateral, axial)
     # Splines feel the edge of the sector for a few lines and samples.
-    inside = (angle < np.radians(29)) & (reach > 0.3e-3) & (reach < 13.2e-3)
+    inside = (angle < np.radians(29)) & (range_ > 0.3e-3) & (range_ < 13.2e-3)
     assert np.abs(image - field(lateral, axial))[inside].max() < 1e-4
     assert (image[angle > np.radians(32)] == 0).all()
 
 
 def test_parallel_lines_are_put_on_their_place():
-    foot = np.linspace(-3e-3, 3e-3, 129)
-    image = ScanConversion(Linear(foot), RANGE, BMODE)(2 + np.outer(np.sin(900 * foot), np.cos(700 * RANGE)))
+    origin = np.linspace(-3e-3, 3e-3, 129)
+    image = ScanConversion(Linear(origin), RANGE, BMODE)(2 + np.outer(np.sin(900 * origin), np.cos(700 * RANGE)))
     axial, lateral = pixel_grid(128)
     expected = 2 + np.sin(900 * lateral) * np.cos(700 * axial)
     inside = (np.abs(lateral) < 2.7e-3) & (axial > 0.3e-3)
@@ -119,7 +119,7 @@ def test_scan_conversion_turns_the_smallest_angle_to_the_first_columns():
 def test_scan_converted_envelope_is_never_negative():
     lines = np.zeros((2, len(ANGLE), len(RANGE)), np.complex64)
     lines[:, 60:64, 400:410] = 1j
-    images = envelopes(lines, SECTOR, RANGE, BMODE)
+    images = envelope_images(lines, SECTOR, RANGE, BMODE)
     assert images.shape == (2, 128, 128)
     assert images.dtype == np.float32
     assert images.min() == 0
@@ -144,7 +144,7 @@ def test_clip_holds_every_size():
     random = np.random.default_rng(1)
     shape = (2, len(ANGLE), len(RANGE))
     lines = (random.standard_normal(shape) + 1j * random.standard_normal(shape)).astype(np.complex64)
-    images = clip(lines, SECTOR, RANGE, BMODE)
+    images = bmode_clip(lines, SECTOR, RANGE, BMODE)
     assert {size: frames.shape for size, frames in images.items()} == {n: (2, n, n) for n in (128, 64, 32)}
     assert all(frames.dtype == np.uint8 for frames in images.values())
     assert images[128].max() == 255

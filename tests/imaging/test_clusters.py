@@ -1,55 +1,55 @@
-"""Echoes that follow from those to a few elements against the echoes themselves."""
+"""Echoes interpolated from those of skeleton elements against the echoes themselves."""
 
 import numpy as np
 import pytest
 
 from echotruth.config import Probe
-from echotruth.imaging.rf.clusters import Clusters, Spread
+from echotruth.imaging.rf.clusters import Clusters, Expansion
 from echotruth.imaging.rf.kernel import Band, Grid
 from echotruth.imaging.rf.probe import element_centres, pulse_band, pulse_spectrum
 
 SPEED = 1540.0
 
 
-def clusters(probe, reach, tolerance):
+def clusters(probe, max_range, tolerance):
     low, high = pulse_band(probe)
-    node, share = np.polynomial.legendre.leggauss(24)
+    node, weight = np.polynomial.legendre.leggauss(24)
     frequency = (low + high) / 2 + node * (high - low) / 2
-    energy = share * pulse_spectrum(probe, frequency) ** 2
+    energy = weight * pulse_spectrum(probe, frequency) ** 2
     band = Band(frequency, energy / energy.sum(), Grid(4 * high, 15.0), np.zeros(24))
-    return Clusters(element_centres(probe), SPEED, band, reach, tolerance), band
+    return Clusters(element_centres(probe), SPEED, band, max_range, tolerance), band
 
 
-def ways(probe, position):
+def distances(probe, position):
     """Distances (elements, scatterers), m."""
     return np.hypot(position[:, 0] - element_centres(probe)[:, None], position[:, 1])
 
 
 def in_a_sector(number, nearest, farthest, seed=0):
     random = np.random.default_rng(seed)
-    angle, reach = random.uniform(-0.6, 0.6, number), random.uniform(nearest, farthest, number)
-    return np.stack([reach * np.sin(angle), reach * np.cos(angle), np.zeros(number)], axis=1)
+    angle, range_ = random.uniform(-0.6, 0.6, number), random.uniform(nearest, farthest, number)
+    return np.stack([range_ * np.sin(angle), range_ * np.cos(angle), np.zeros(number)], axis=1)
 
 
 @pytest.mark.parametrize("preset, scale", [("mouse_25MHz", 1), ("mouse_40MHz", 1), ("human_2_7MHz", 12)])
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
-def test_the_echoes_of_scatterers_at_random_follow_from_a_few_elements(preset, scale, tolerance):
+def test_echoes_of_random_scatterers_are_interpolated_from_skeleton_elements(preset, scale, tolerance):
     probe = Probe(preset=preset)
     found, band = clusters(probe, 13e-3 * scale, tolerance)
     position = in_a_sector(300, 3e-3 * scale, 12e-3 * scale)
     error, few = [], []
     for number in np.unique(numbers := found.numbers(position)):
         cluster = found[number]
-        late = ways(probe, position[numbers == number]) / SPEED - cluster.delay[:, None]
+        late = distances(probe, position[numbers == number]) / SPEED - cluster.delay[:, None]
         echoes = np.exp(-2j * np.pi * np.multiply.outer(late, band.frequency))
-        left = echoes - np.einsum("fe,fsk->esk", cluster.weights, echoes[cluster.elements])
-        error.append(np.abs(left) ** 2 @ band.weight)
-        few.append(len(cluster.elements))
+        residual = echoes - np.einsum("fe,fsk->esk", cluster.weights, echoes[cluster.skeleton])
+        error.append(np.abs(residual) ** 2 @ band.weight)
+        few.append(len(cluster.skeleton))
     assert np.sqrt(np.concatenate(error, axis=1).mean()) < 2 * tolerance
     assert max(few) < 32
 
 
-def test_scatterers_nearer_than_half_the_array_have_echoes_of_all_elements():
+def test_nearer_than_half_the_array_all_elements_are_the_skeleton():
     probe = Probe()
     found, _ = clusters(probe, 13e-3, 1e-3)
     number = found.numbers(np.array([[0.0, 1e-3, 0.0], [0.5e-3, 0.5e-3, 0.0]]))
@@ -57,28 +57,28 @@ def test_scatterers_nearer_than_half_the_array_have_echoes_of_all_elements():
     assert (found[number[0]].weights == np.eye(probe.elements)).all()
 
 
-def test_a_scatterer_at_the_reach_or_beside_the_array_has_a_cluster():
+def test_a_scatterer_at_the_greatest_range_or_beside_the_array_has_a_cluster():
     found, _ = clusters(Probe(), 13e-3, 1e-3)
     edge = np.array([[0.0, 13e-3, 0.0], [13e-3, 1e-9, 0.0], [-13e-3, 1e-9, 0.0]])
-    assert all(len(found[number].elements) for number in found.numbers(edge))
+    assert all(len(found[number].skeleton) for number in found.numbers(edge))
 
 
 @pytest.mark.parametrize("elements", [64, 33, 5])
-def test_the_spread_of_clusters_is_the_sum_of_their_weighted_and_delayed_echoes(elements):
+def test_the_expansion_of_clusters_is_the_sum_of_their_weighted_and_delayed_echoes(elements):
     probe = Probe(elements=elements)
     found, band = clusters(probe, 13e-3, 1e-3)
     chosen = [found[number] for number in np.unique(found.numbers(in_a_sector(20, 4e-3, 12e-3)))][:3]
     frequency, random = band.frequency[:4], np.random.default_rng(1)
     spectra, exact = [], 0
     for cluster in chosen:
-        few = len(cluster.elements)
-        one, other = np.triu_indices(few)
+        few = len(cluster.skeleton)
+        i, j = np.triu_indices(few)
         echoes = np.zeros((4, few, few), complex)
-        echoes[:, one, other] = random.standard_normal((4, len(one))) + 1j * random.standard_normal((4, len(one)))
-        spectra.append(echoes[:, one, other])
-        echoes[:, other, one] = echoes[:, one, other]
-        turn = np.exp(-2j * np.pi * np.multiply.outer(frequency, cluster.delay))
-        carry = turn[:, None] * cluster.weights * turn[:, cluster.elements, None].conj()
+        echoes[:, i, j] = random.standard_normal((4, len(i))) + 1j * random.standard_normal((4, len(i)))
+        spectra.append(echoes[:, i, j])
+        echoes[:, j, i] = echoes[:, i, j]
+        phasor = np.exp(-2j * np.pi * np.multiply.outer(frequency, cluster.delay))
+        carry = phasor[:, None] * cluster.weights * phasor[:, cluster.skeleton, None].conj()
         exact = exact + np.einsum("kfi,kfg,kgj->kij", carry, echoes, carry)
-    matrix = Spread(chosen, frequency)(np.concatenate(spectra, axis=1).astype(np.complex64))
+    matrix = Expansion(chosen, frequency)(np.concatenate(spectra, axis=1).astype(np.complex64))
     assert np.linalg.norm(matrix - exact) < 1e-6 * np.linalg.norm(exact)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from imaging.exact import fresnel
 from scipy.optimize import brentq
 
 from echotruth.config import Probe
-from echotruth.imaging.rf.elevation import LEFT_OUT, Lens, bounds
+from echotruth.imaging.rf.elevation import BEAM_TAIL_ENERGY, Lens, subaperture_bounds
+from echotruth.imaging.rf.exact import fresnel
 from echotruth.imaging.rf.kernel import Band, Grid
 
 WAVELENGTH = 1540 / 25e6
@@ -14,9 +14,9 @@ WAVELENGTH = 1540 / 25e6
 
 @pytest.fixture(scope="module")
 def band():
-    node, share = np.polynomial.legendre.leggauss(16)
+    node, weight = np.polynomial.legendre.leggauss(16)
     frequency = 25e6 + 16e6 * node
-    energy = share * np.exp(-(((frequency - 25e6) / 5.3e6) ** 2))
+    energy = weight * np.exp(-(((frequency - 25e6) / 5.3e6) ** 2))
     return Band(frequency, energy / energy.sum(), Grid(100e6, 15.0), np.zeros(16))
 
 
@@ -51,53 +51,55 @@ def test_width_in_the_focus_is_that_of_a_squared_sinc():
 
 def test_integral_agrees_with_plain_summation_over_the_height():
     height = (np.arange(20000) + 0.5) / 20000 * 1e-3 - 0.5e-3
-    reach, y = 4e-3, 0.23e-3
-    path = (y - height) ** 2 / (2 * reach) - y**2 / (2 * reach) - height**2 / (2 * 6.5e-3)
+    range_, y = 4e-3, 0.23e-3
+    path = (y - height) ** 2 / (2 * range_) - y**2 / (2 * range_) - height**2 / (2 * 6.5e-3)
     summed = np.exp(-2j * np.pi * path / WAVELENGTH).mean()
-    assert fresnel(Probe(elements=3), at(np.array([y]), reach), 25e6)[1, 0] == pytest.approx(summed, abs=1e-6)
+    assert fresnel(Probe(elements=3), at(np.array([y]), range_), 25e6)[1, 0] == pytest.approx(summed, abs=1e-6)
 
 
-def test_growth_is_the_change_of_the_integral_with_range(lens, band):
+def test_log_derivative_is_the_change_of_the_integral_with_range(lens, band):
     """Of a thin pulse, whose mean over the band is its value at the centre."""
     thin = Band(np.linspace(24.9e6, 25.1e6, 16), np.full(16, 1 / 16), band.grid, band.loss)
     lens = Lens(Probe(), 13e-3, thin)
     row, column, step = 60, 12, 0.05
     curvature, y = lens.curvature[row], lens.slope[12] / lens.curvature[60]
     low, high = (fresnel(Probe(elements=3), at(np.array([y]), 1 / (curvature + s)), 25e6)[1, 0] for s in (-step, step))
-    assert lens.growth[row, column] == pytest.approx(np.log(high / low) / (2 * step), rel=1e-3)
+    assert lens.log_derivative[row, column] == pytest.approx(np.log(high / low) / (2 * step), rel=1e-3)
 
 
 def test_scatterers_far_beside_the_plane_are_out_of_the_beam_and_those_in_it_take_one_block(lens):
     beside = at(np.array([0.0, 6e-3, -7e-3]), 6.5e-3)
     assert lens.in_beam(beside).tolist() == [True, False, False]
-    assert lens.blocks_at(lens.places(beside[:1])).tolist() == [1]
+    assert lens.blocks_at(lens.lens_terms(beside[:1], 1540.0)[0]).tolist() == [[1]]
 
 
 @pytest.mark.parametrize("depth", [3e-3, 5e-3, 6.5e-3, 10e-3])
-def test_echoes_beyond_the_edge_of_the_beam_have_the_share_of_the_energy_that_may_be_left_out(lens, band, depth):
+def test_echoes_beyond_the_edge_of_the_beam_have_the_energy_that_may_be_left_out(lens, band, depth):
     """Summed over evenly spread elevations with the integral itself, a nearer tail than the tables'."""
-    edge = depth * np.interp(1 / depth, lens.curvature, lens.edge)
+    edge = depth * np.interp(1 / depth, lens.curvature, lens.edge_slope)
     beside = (np.arange(3000) + 0.5) / 3000 * depth
-    heard = np.array([fresnel(Probe(elements=3), at(beside, depth), frequency)[1] for frequency in band.frequency])
-    energy = band.weight @ np.abs(heard) ** 4
-    assert 0.8 * LEFT_OUT < energy[beside > edge].sum() / energy.sum() < 1.2 * LEFT_OUT
+    response = np.array([fresnel(Probe(elements=3), at(beside, depth), frequency)[1] for frequency in band.frequency])
+    energy = band.weight @ np.abs(response) ** 4
+    assert 0.8 * BEAM_TAIL_ENERGY < energy[beside > edge].sum() / energy.sum() < 1.2 * BEAM_TAIL_ENERGY
 
 
 def test_either_side_of_the_plane_is_alike(lens):
     beside = np.linspace(0, 1e-3, 50)
-    np.testing.assert_array_equal(lens.places(at(beside, 5e-3)), lens.places(at(-beside, 5e-3)))
+    one, other = (lens.lens_terms(at(side * beside, 5e-3), 1540.0) for side in (1, -1))
+    np.testing.assert_array_equal(one[0], other[0])
 
 
-def test_near_the_array_it_is_looked_up_from_its_parts(lens):
-    assert lens.parts(np.array([3e-3, 6.5e-3])).tolist() == [2, 1]
+def test_near_the_array_it_is_looked_up_from_subapertures(lens):
+    assert lens.subapertures(np.array([3e-3, 6.5e-3])).tolist() == [2, 1]
     position = at(np.linspace(0, 3e-4, 5), 3e-3)
-    _, told = lens.lean(position, 1540.0, 2)
+    _, terms = lens.lens_terms(position, 1540.0, 2)
     quarter = 16 * Probe().si().pitch
-    np.testing.assert_allclose(told[..., 0], 1 / np.hypot(quarter, 3e-3), rtol=1e-9)
+    np.testing.assert_allclose(terms[..., 0], 1 / np.hypot(quarter, 3e-3), rtol=1e-9)
 
 
-def test_parts_of_an_array_share_all_its_elements():
-    assert bounds(64, 2).tolist() == [0, 32, 64]
-    for elements, parts in ((65, 2), (17, 3)):
-        part = np.arange(elements) * parts // elements
-        np.testing.assert_array_equal(np.searchsorted(part, np.arange(parts + 1)), bounds(elements, parts))
+def test_every_element_is_in_one_subaperture():
+    assert subaperture_bounds(64, 2).tolist() == [0, 32, 64]
+    for elements, number in ((65, 2), (17, 3)):
+        own = np.arange(elements) * number // elements
+        first = np.searchsorted(own, np.arange(number + 1))
+        np.testing.assert_array_equal(first, subaperture_bounds(elements, number))

@@ -3,9 +3,9 @@
 import numba
 import numpy as np
 import pytest
-from imaging.exact import exact_matrix
 
 from echotruth.config import Probe
+from echotruth.imaging.rf.exact import exact_matrix
 from echotruth.imaging.rf.full_matrix import FullMatrix
 
 CENTRE = 25e6
@@ -19,12 +19,12 @@ def matrix():
 
 
 def sector(number, seed=0, elevation=0.0, nearest=3e-3, farthest=10e-3, half_angle=32.0):
-    """Scatterers at random in a sector, their positions (m) and amplitudes."""
+    """Positions (m) and amplitudes of scatterers at random in a sector."""
     random = np.random.default_rng(seed)
     angle = np.radians(random.uniform(-half_angle, half_angle, number))
-    reach = random.uniform(nearest, farthest, number)
+    range_ = random.uniform(nearest, farthest, number)
     beside = random.uniform(-elevation, elevation, number)
-    return np.stack([reach * np.sin(angle), reach * np.cos(angle), beside], axis=1), random.standard_normal(number)
+    return np.stack([range_ * np.sin(angle), range_ * np.cos(angle), beside], axis=1), random.standard_normal(number)
 
 
 def relative(estimate, exact):
@@ -32,10 +32,10 @@ def relative(estimate, exact):
 
 
 def error(probe, position, amplitude, lens=False, **options):
-    """Of every sixth frequency against the exact sum."""
+    """Relative L2 error against the exact sum, of every sixth frequency."""
     matrix = FullMatrix(probe, options.pop("depth", DEPTH), elevation=lens, **options)
     found = matrix(position, amplitude)[::6]
-    return relative(found, exact_matrix(probe, position, amplitude, matrix.frequency[::6], lens))
+    return relative(found, exact_matrix(probe, position, amplitude, matrix.frequency[::6], elevation=lens))
 
 
 @pytest.mark.parametrize("attenuation", [0.0, 0.5, 1.0])
@@ -52,22 +52,21 @@ def test_in_the_plane_the_rf_is_the_exact_sum_with_directivity_and_attenuation(a
 def test_other_arrays_come_as_near_to_the_exact_sum(preset, scale, half_angle):
     """Elements of 0.88 wavelengths only within 24 degrees: further out their echoes are longer than a kernel."""
     probe = Probe(preset=preset, attenuation_dB_per_cm_MHz=0.5)
-    place = {"nearest": 4e-3 * scale, "farthest": 10e-3 * scale, "half_angle": half_angle}
-    position, amplitude = sector(40, **place)
+    position, amplitude = sector(40, nearest=4e-3 * scale, farthest=10e-3 * scale, half_angle=half_angle)
     assert error(probe, position, amplitude, depth=11e-3 * scale, accuracy=2e-5) < 2e-5
     assert error(probe, position, amplitude, depth=11e-3 * scale, accuracy=1e-3) < 1e-3
 
 
 def lens_errors(probe, depth, beside, bands):
-    """Of scatterers in the beam at ranges between two, mm, for every such band, at every 24th frequency."""
-    matrix, found = FullMatrix(probe, depth), []
+    """Relative L2 error of scatterers in the beam for each band of ranges, mm, of every 24th frequency."""
+    matrix, errors = FullMatrix(probe, depth), []
     for nearest, farthest in bands:
         position, amplitude = sector(60, elevation=beside, nearest=nearest * 1e-3, farthest=farthest * 1e-3)
         inside = matrix.in_beam(position)
-        place = position[inside], amplitude[inside]
-        exact = exact_matrix(probe, *place, matrix.frequency[::24], True)
-        found.append(relative(matrix(*place)[::24], exact))
-    return np.array(found)
+        scatterers = position[inside], amplitude[inside]
+        exact = exact_matrix(probe, *scatterers, matrix.frequency[::24])
+        errors.append(relative(matrix(*scatterers)[::24], exact))
+    return np.array(errors)
 
 
 @pytest.mark.parametrize("attenuation", [0.0, 0.5])
@@ -147,7 +146,7 @@ def test_every_pair_is_filled_whatever_the_number_of_elements(elements):
     assert error(Probe(elements=elements), position, amplitude) < 2e-5
 
 
-def test_a_record_beyond_the_clock_is_refused():
+def test_a_record_too_long_for_integer_times_is_refused():
     with pytest.raises(ValueError, match="too long"):
         FullMatrix(Probe(), 0.4)
 

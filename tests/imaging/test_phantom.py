@@ -5,8 +5,8 @@ import pytest
 
 from echotruth.config import Config, Phantom
 from echotruth.fem.tetrahedra import interpolate
-from echotruth.imaging.medium.phantom import scatter, seed
-from echotruth.imaging.view import plane
+from echotruth.imaging.medium.phantom import seed_volume, seed_wall
+from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.geometry import cell_volumes
 
 CONFIG = Config(phantom=Phantom(density_per_mm3=1500.0))
@@ -14,12 +14,12 @@ CONFIG = Config(phantom=Phantom(density_per_mm3=1500.0))
 
 @pytest.fixture(scope="module")
 def scatterers(coarse_mesh):
-    return seed(CONFIG.phantom, coarse_mesh.nodes, coarse_mesh.cells, np.random.default_rng(2))
+    return seed_volume(CONFIG.phantom, coarse_mesh.nodes, coarse_mesh.cells, np.random.default_rng(2))
 
 
 @pytest.fixture(scope="module")
 def mid(twisting_heart):
-    return plane(CONFIG.views["mid"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+    return imaging_plane(CONFIG.views["mid"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
 
 
 def test_their_number_is_density_times_volume(scatterers, coarse_mesh):
@@ -36,9 +36,9 @@ def test_every_cell_has_its_share(scatterers, coarse_mesh):
 
 def test_density_is_even_within_the_curved_cells(scatterers, coarse_mesh):
     # The first moment of evenly spread points is that of the wall: here of the azimuthally symmetric ellipsoid.
-    place = interpolate(coarse_mesh.nodes, coarse_mesh.cells, scatterers.points)
-    error = place[:, :2].std() / np.sqrt(len(place))
-    assert np.all(np.abs(place[:, :2].mean(axis=0)) < 4 * error)
+    position = interpolate(coarse_mesh.nodes, coarse_mesh.cells, scatterers.points)
+    error = position[:, :2].std() / np.sqrt(len(position))
+    assert np.all(np.abs(position[:, :2].mean(axis=0)) < 4 * error)
 
 
 def test_amplitudes_are_normal(scatterers):
@@ -49,21 +49,25 @@ def test_amplitudes_are_normal(scatterers):
 
 def test_scatterers_follow_an_affine_motion_exactly(scatterers, twisting_heart, mid, affine):
     heart, (matrix, shift) = twisting_heart, affine
-    before, after = (mid.heart(scatterers.image(heart.positions(frame), heart.cells, mid)) for frame in (0, 1))
+    before, after = (
+        mid.to_heart(scatterers.image_positions(heart.positions(frame), heart.cells, mid)) for frame in (0, 1)
+    )
     assert np.abs(after - (before @ matrix.T + shift)).max() < 1e-16
 
 
 def test_in_plane_only_scatterers_start_in_the_plane_and_stay_there(twisting_heart, mid):
     heart = twisting_heart
     config = CONFIG.model_copy(update={"phantom": Phantom(in_plane_only=True)})
-    flat = scatter(config, heart, mid, np.random.default_rng(0))
+    flat = seed_wall(config, heart, mid, np.random.default_rng(0))
     assert len(flat.points) > 1000
-    assert (flat.image(heart.positions(1), heart.cells, mid)[:, 2] == 0).all()
-    started = mid.image(interpolate(heart.positions(0), heart.cells, flat.points))
+    assert (flat.image_positions(heart.positions(1), heart.cells, mid)[:, 2] == 0).all()
+    started = mid.to_image(interpolate(heart.positions(0), heart.cells, flat.points))
     assert np.abs(started[:, 2]).max() < 1e-15
 
 
 def test_the_same_seed_gives_the_same_scatterers_and_another_others(coarse_mesh):
-    draws = [seed(CONFIG.phantom, coarse_mesh.nodes, coarse_mesh.cells, np.random.default_rng(k)) for k in (5, 5, 6)]
+    draws = [
+        seed_volume(CONFIG.phantom, coarse_mesh.nodes, coarse_mesh.cells, np.random.default_rng(k)) for k in (5, 5, 6)
+    ]
     assert np.array_equal(draws[0].points.xi, draws[1].points.xi)
     assert len(draws[0].points) != len(draws[2].points) or not np.array_equal(draws[0].points.xi, draws[2].points.xi)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Probe
-from echotruth.imaging.rf.probe import apodization, element_centres, pulse, pulse_spectrum
+from echotruth.imaging.rf.probe import element_centres, pulse, pulse_spectrum
 
 
 def test_elements_are_a_pitch_apart_and_centred():
@@ -12,19 +12,6 @@ def test_elements_are_a_pitch_apart_and_centred():
     assert np.allclose(np.diff(centres), 46e-6)
     assert centres.sum() == pytest.approx(0, abs=1e-12)
     assert len(centres) == 64
-
-
-def test_hann_weights_fall_from_one_to_nearly_zero():
-    weights = apodization(Probe(), "hann")
-    assert np.allclose(weights, weights[::-1])
-    assert weights[31] == pytest.approx(np.cos(np.pi / 128) ** 2)
-    assert 0 < weights[0] < 1e-3
-    assert (apodization(Probe(), "none") == 1).all()
-
-
-def test_unknown_apodization_is_refused():
-    with pytest.raises(ValueError, match="not known"):
-        apodization(Probe(), "boxcar")
 
 
 @pytest.mark.parametrize("bandwidth", [0.4, 0.7])

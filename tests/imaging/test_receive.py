@@ -7,7 +7,7 @@ import pytest
 from echotruth.config import Probe, Rf
 from echotruth.imaging.beamforming.aperture import Aperture
 from echotruth.imaging.beamforming.interpolation import PHASE_BITS
-from echotruth.imaging.beamforming.receive import RANGES, echo_times
+from echotruth.imaging.beamforming.receive import BLOCK_RANGES, echo_times
 from echotruth.imaging.beamforming.scanner import Scanner
 
 SPEED, LENGTH = 1540.0, 64 * 46e-6
@@ -29,53 +29,53 @@ def matrix(phantom, record):
     return record(Probe(), 10e-3, 0.0, 2e-5)(*phantom)
 
 
-def receive_weights(rf, foot, ranges):
-    """Weights (ranges, elements) of the aperture: centred on the foot, moved in where it sticks out of the array."""
+def receive_weights(rf, origin, ranges):
+    """Weights (ranges, elements) of the aperture: centred on the line origin, shifted to stay in the array."""
     width = np.minimum(ranges / rf.f_number, LENGTH) if rf.f_number else np.full(len(ranges), LENGTH)
-    middle = np.array([min(max(foot, (w - LENGTH) / 2), (LENGTH - w) / 2) for w in width])
-    share = (X - middle[:, None]) / width[:, None]
-    return np.where(np.abs(share) <= 0.5, np.cos(np.pi * share) ** 2 if rf.apodization == "hann" else 1, 0)
+    middle = np.array([min(max(origin, (w - LENGTH) / 2), (LENGTH - w) / 2) for w in width])
+    offset = (X - middle[:, None]) / width[:, None]
+    return np.where(np.abs(offset) <= 0.5, np.cos(np.pi * offset) ** 2 if rf.apodization == "hann" else 1, 0)
 
 
-def waves(scanner, rf, line, place):
+def waves(scanner, rf, line, points):
     """Delays (s) and weights (transmits, elements) of the waves that serve a line; their paths to points (n, 2), m, and
     their shares there, each (transmits, n)."""
     direction = np.radians(rf.tilt_deg / 2) * np.linspace(-1, 1, rf.transmits)[:, None]
     direction = np.concatenate([np.sin(direction), np.cos(direction)], axis=1)
     if rf.transmit == "plane":
-        return direction[:, :1] * X / SPEED, np.ones((len(direction), 64)), direction @ place.T, 1.0
+        return direction[:, :1] * X / SPEED, np.ones((len(direction), 64)), direction @ points.T, 1.0
     if rf.transmit == "diverging":
-        away = LENGTH / 2 / np.tan(np.radians(32))
-        delay = np.hypot(X + away * direction[:, :1], away * direction[:, 1:]) - away
-        path = np.linalg.norm(place + away * direction[:, None], axis=2) - away
+        source = LENGTH / 2 / np.tan(np.radians(32))
+        delay = np.hypot(X + source * direction[:, :1], source * direction[:, 1:]) - source
+        path = np.linalg.norm(points + source * direction[:, None], axis=2) - source
         return delay / SPEED, np.ones(delay.shape), path, 1.0
     if rf.transmit == "synthetic_aperture":
-        path = np.hypot(place[:, 0] - X[:, None], place[:, 1])
+        path = np.hypot(points[:, 0] - X[:, None], points[:, 1])
         return np.zeros((64, 64)), np.diag(np.cos(np.pi * X / LENGTH) ** 2), path, 1.0
-    foot, angle = scanner.scan.foot[line], scanner.scan.angle[line]
+    origin, angle = scanner.scan.line_origin[line], scanner.scan.angle[line]
     step = 1e-3 * rf.zone_mm
     foci = 6.5e-3 + step * (np.arange(rf.zones)[:, None] - (rf.zones - 1) / 2)
-    way = np.hypot(foot + foci * np.sin(angle) - X, foci * np.cos(angle))
-    weight = receive_weights(rf, foot, foci[:, 0])
-    path = np.tile(np.hypot(place[:, 0] - foot, place[:, 1]), (rf.zones, 1))
-    share = np.maximum(0, 1 - np.abs(np.clip(path, foci[0], foci[-1]) - foci) / step)
-    return (foci - way) / SPEED, weight, path, share
+    distance = np.hypot(origin + foci * np.sin(angle) - X, foci * np.cos(angle))
+    weight = receive_weights(rf, origin, foci[:, 0])
+    path = np.tile(np.hypot(points[:, 0] - origin, points[:, 1]), (rf.zones, 1))
+    blending = np.maximum(0, 1 - np.abs(np.clip(path, foci[0], foci[-1]) - foci) / step)
+    return (foci - distance) / SPEED, weight, path, blending
 
 
 def exact_line(scanner, matrix, rf, line, ranges):
     """Float64 sum over all pairs of the echoes of a full matrix, delayed and weighted, at points of a line."""
-    foot, angle = scanner.scan.foot[line], scanner.scan.angle[line]
-    place = np.stack([foot + ranges * np.sin(angle), ranges * np.cos(angle)], axis=1)
+    origin, angle = scanner.scan.line_origin[line], scanner.scan.angle[line]
+    points = np.stack([origin + ranges * np.sin(angle), ranges * np.cos(angle)], axis=1)
     frequency = scanner.matrix.frequency
-    back = np.hypot(place[:, :1] - X, place[:, 1:])
-    turn = np.exp(2j * np.pi / SPEED * np.multiply.outer(frequency, back)) * receive_weights(rf, foot, ranges)
-    delay, weight, path, share = waves(scanner, rf, line, place)
-    share = np.broadcast_to(share, path.shape)
-    heard = matrix @ (weight * np.exp(-2j * np.pi * frequency[:, None, None] * delay)).transpose(0, 2, 1)
+    distance = np.hypot(points[:, :1] - X, points[:, 1:])
+    turn = np.exp(2j * np.pi / SPEED * np.multiply.outer(frequency, distance)) * receive_weights(rf, origin, ranges)
+    delay, weight, path, blending = waves(scanner, rf, line, points)
+    blending = np.broadcast_to(blending, path.shape)
+    received = matrix @ (weight * np.exp(-2j * np.pi * frequency[:, None, None] * delay)).transpose(0, 2, 1)
     total = np.empty(len(ranges), complex)
     for k in range(len(ranges)):
-        sent = share[:, k] * np.exp(2j * np.pi / SPEED * np.multiply.outer(frequency, path[:, k]))
-        total[k] = np.einsum("fit,fi,ft", heard, turn[:, k], sent, optimize=True)
+        sent = blending[:, k] * np.exp(2j * np.pi / SPEED * np.multiply.outer(frequency, path[:, k]))
+        total[k] = np.einsum("fit,fi,ft", received, turn[:, k], sent, optimize=True)
     # Twice the positive frequencies, by the inverse transform of a record; then demodulated.
     return 2 * total / scanner.matrix.samples * np.exp(-4j * np.pi * scanner.frequency * ranges / SPEED)
 
@@ -122,11 +122,11 @@ def test_it_holds_for_other_arrays(preset):
     aim = (6.5e-3 - np.hypot(6.5e-3 * np.sin(angle) - position, 6.5e-3 * np.cos(angle))) / SPEED
     weight = np.cos(np.pi * position / (64 * probe.si().pitch)) ** 2
     frequency = scanner.matrix.frequency[:, None]
-    heard = np.einsum("fij,fj->fi", matrix.astype(complex), weight * np.exp(-2j * np.pi * frequency * aim))
+    received = np.einsum("fij,fj->fi", matrix.astype(complex), weight * np.exp(-2j * np.pi * frequency * aim))
     exact = np.empty(len(ranges), complex)
-    for k, reach in enumerate(ranges):
-        time = (reach + np.hypot(reach * np.sin(angle) - position, reach * np.cos(angle))) / SPEED
-        exact[k] = (heard * np.exp(2j * np.pi * frequency * time) * weight).sum()
+    for k, range_ in enumerate(ranges):
+        time = (range_ + np.hypot(range_ * np.sin(angle) - position, range_ * np.cos(angle))) / SPEED
+        exact[k] = (received * np.exp(2j * np.pi * frequency * time) * weight).sum()
     exact *= 2 / scanner.matrix.samples * np.exp(-4j * np.pi * scanner.frequency * ranges / SPEED)
     assert np.linalg.norm(lines[4, 200:900:97] - exact) < 3e-5 * np.linalg.norm(exact)
 
@@ -142,20 +142,20 @@ def test_line_bytes_do_not_depend_on_threads(matrix, keys):
 
 
 def test_a_line_of_two_zones_is_that_of_two_foci_faded_over(matrix):
-    both = Scanner(Probe(), Rf(lines=16, zones=2, zone_mm=2.0), 10e-3)
+    blended = Scanner(Probe(), Rf(lines=16, zones=2, zone_mm=2.0), 10e-3)
     near, far = (Scanner(Probe(), Rf(lines=16, zones=1, focus_mm=mm), 10e-3).beamform(matrix) for mm in (5.5, 7.5))
-    share = np.clip((both.range - 5.5e-3) / 2e-3, 0, 1)
-    found = both.beamform(matrix)
-    assert np.abs(found - (near + share * (far - near))).max() < 2e-6 * np.abs(found).max()
+    weight = np.clip((blended.range - 5.5e-3) / 2e-3, 0, 1)
+    found = blended.beamform(matrix)
+    assert np.abs(found - (near + weight * (far - near))).max() < 2e-6 * np.abs(found).max()
 
 
 def test_times_just_before_a_sample_belong_to_the_sample_before():
     """Right to the last bit: rounded up, they would ask for an interpolator beyond the table."""
-    early = np.nextafter(np.arange(1.0, RANGES + 1), 0)
-    geometry = np.zeros((4, RANGES))
-    times = np.empty(RANGES), *np.empty((2, RANGES), np.int32), *np.empty((3, RANGES), np.float32)
-    echo_times(early, geometry, (0, RANGES), 0.0, (1.0, 10**6, 0.25), False, times)
-    assert (times[1] == np.arange(RANGES)).all()
+    early = np.nextafter(np.arange(1.0, BLOCK_RANGES + 1), 0)
+    geometry = np.zeros((4, BLOCK_RANGES))
+    times = np.empty(BLOCK_RANGES), *np.empty((2, BLOCK_RANGES), np.int32), *np.empty((3, BLOCK_RANGES), np.float32)
+    echo_times(early, geometry, (0, BLOCK_RANGES), 0.0, (1.0, 10**6, 0.25), False, times)
+    assert (times[1] == np.arange(BLOCK_RANGES)).all()
     assert (times[2] == 2**PHASE_BITS - 1).all()
 
 
@@ -174,16 +174,18 @@ def test_lines_of_a_frame_do_not_depend_on_how_many_there_are(matrix):
 
 @pytest.mark.parametrize("lines", [16, 200])
 def test_the_echoes_of_a_frame_are_made_once_however_many_lines(phantom, lines):
-    scanner, asked = Scanner(Probe(), Rf(lines=lines), 10e-3), []
+    scanner, calls = Scanner(Probe(), Rf(lines=lines), 10e-3), []
     matrix = np.zeros((len(scanner.matrix.frequency), 64, 64), np.complex64)
-    scanner.matrix = lambda *scatterers: asked.append(scatterers) or matrix
+    scanner.matrix = lambda *scatterers: calls.append(scatterers) or matrix
     assert scanner.lines(*phantom).shape[0] == lines
-    assert len(asked) == 1
+    assert len(calls) == 1
 
 
 def test_a_whole_aperture_is_the_array_and_one_of_an_f_number_stays_within_it():
-    whole = Aperture(Probe(), Rf()).bounds(np.array([0.0, 1e-3]), np.array([1e-3, 9e-3]))
-    assert np.allclose(whole, [[0, 0], [LENGTH, LENGTH]])
-    middle, width = Aperture(Probe(), Rf(f_number=2.0)).bounds(np.array([0, 1.4e-3, 1.4e-3]), np.array([2e-3, 2e-3, 9]))
+    full = Aperture(Probe(), Rf()).centre_and_width(np.array([0.0, 1e-3]), np.array([1e-3, 9e-3]))
+    assert np.allclose(full, [[0, 0], [LENGTH, LENGTH]])
+    middle, width = Aperture(Probe(), Rf(f_number=2.0)).centre_and_width(
+        np.array([0, 1.4e-3, 1.4e-3]), np.array([2e-3, 2e-3, 9])
+    )
     assert np.allclose(width, [1e-3, 1e-3, LENGTH])
     assert np.allclose(middle, [0, LENGTH / 2 - 0.5e-3, 0])

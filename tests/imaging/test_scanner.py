@@ -33,18 +33,18 @@ def at(depth, angle=0.0):
     return np.array([[depth * np.sin(angle), depth * np.cos(angle), 0.0]])
 
 
-def place_of_peak(place, profile):
+def peak_position(position, profile):
     """By the parabola through the largest value and its neighbours."""
     k = profile.argmax()
     below, top, above = profile[k - 1 : k + 2]
-    return place[k] + (place[1] - place[0]) * (below - above) / (2 * (below - 2 * top + above))
+    return position[k] + (position[1] - position[0]) * (below - above) / (2 * (below - 2 * top + above))
 
 
-def full_width(place, profile):
+def full_width(position, profile):
     """Full width at half of the maximum, by linear interpolation."""
     peak, half = profile.argmax(), profile.max() / 2
-    left = np.interp(half, profile[: peak + 1], place[: peak + 1])
-    return np.interp(-half, -profile[peak:], place[peak:]) - left
+    left = np.interp(half, profile[: peak + 1], position[: peak + 1])
+    return np.interp(-half, -profile[peak:], position[peak:]) - left
 
 
 def exact(point, angle, ranges):
@@ -61,9 +61,9 @@ def exact(point, angle, ranges):
     focus = 6.5e-3 - np.hypot(6.5e-3 * np.sin(angle) - X, 6.5e-3 * np.cos(angle))
     pulse = np.exp(-((frequency - CENTRE) ** 2) / (2 * DEVIATION**2)) * (wave * np.exp(turn * focus)).sum(axis=1)
     line = np.empty(len(ranges), complex)
-    for k, reach in enumerate(ranges):
-        back = reach + np.hypot(reach * np.sin(angle) - X, reach * np.cos(angle))
-        line[k] = pulse @ (wave * np.exp(-turn * back)).sum(axis=1)
+    for k, range_ in enumerate(ranges):
+        path = range_ + np.hypot(range_ * np.sin(angle) - X, range_ * np.cos(angle))
+        line[k] = pulse @ (wave * np.exp(-turn * path)).sum(axis=1)
     return line
 
 
@@ -95,7 +95,7 @@ def test_a_point_lands_where_it_is(wide, depth, degrees):
     line = np.abs(wide.angle - np.radians(degrees)).argmin()
     image = np.abs(wide.lines(at(depth, wide.angle[line]), np.ones(1)))
     assert np.unravel_index(image.argmax(), image.shape)[0] == line
-    assert place_of_peak(wide.range, image[line]) == pytest.approx(depth, abs=WAVELENGTH / 20)
+    assert peak_position(wide.range, image[line]) == pytest.approx(depth, abs=WAVELENGTH / 20)
 
 
 @pytest.mark.parametrize(
@@ -116,8 +116,8 @@ def test_every_transmit_puts_a_point_where_it_is(keys):
     image = np.abs(scanner.lines(at(5e-3, angle), np.ones(1)))
     line, sample = np.unravel_index(image.argmax(), image.shape)
     assert line == 20
-    assert place_of_peak(scanner.range, image[line]) == pytest.approx(5e-3, abs=WAVELENGTH / 20)
-    assert place_of_peak(scanner.angle, image[:, sample]) == pytest.approx(angle, abs=WAVELENGTH / 20 / 5e-3)
+    assert peak_position(scanner.range, image[line]) == pytest.approx(5e-3, abs=WAVELENGTH / 20)
+    assert peak_position(scanner.angle, image[:, sample]) == pytest.approx(angle, abs=WAVELENGTH / 20 / 5e-3)
 
 
 @pytest.mark.parametrize("transmit", ["focused", "plane", "synthetic_aperture"])
@@ -126,12 +126,12 @@ def test_a_linear_scan_puts_a_point_where_it_is(transmit):
     probe = Probe(elements=128)
     rf = Rf(lines=25, width_mm=1.0, scan="linear", f_number=2.0, transmit=transmit, focus_mm=4.0, tilt_deg=16.0)
     scanner = Scanner(probe, rf, 4.3e-3)
-    lateral = scanner.scan.foot[15] + 5e-6
+    lateral = scanner.scan.line_origin[15] + 5e-6
     image = np.abs(scanner.lines(np.array([[lateral, 4e-3, 0]]), np.ones(1)))
     line, sample = np.unravel_index(image.argmax(), image.shape)
     assert line == 15
-    assert place_of_peak(scanner.range, image[line]) == pytest.approx(4e-3, abs=WAVELENGTH / 20)
-    assert place_of_peak(scanner.scan.foot, image[:, sample]) == pytest.approx(lateral, abs=WAVELENGTH / 20)
+    assert peak_position(scanner.range, image[line]) == pytest.approx(4e-3, abs=WAVELENGTH / 20)
+    assert peak_position(scanner.scan.line_origin, image[:, sample]) == pytest.approx(lateral, abs=WAVELENGTH / 20)
 
 
 @pytest.mark.usefixtures("exact_record")
@@ -176,20 +176,20 @@ TURN_LINES, TURN_LAGS, TURN_HALF = 61, np.arange(-2, 9), 16
 def turned(seed, depth, pivot, shift):
     """A block of scatterers about a depth, turned about a pivot on the axis so that its middle moves by shift."""
     random = np.random.default_rng(seed)
-    place = random.uniform([-1.5e-3, depth - 0.45e-3, 0], [1.5e-3, depth + 0.45e-3, 0], (1600, 3)) - [0, pivot, 0]
+    position = random.uniform([-1.5e-3, depth - 0.45e-3, 0], [1.5e-3, depth + 0.45e-3, 0], (1600, 3)) - [0, pivot, 0]
     angle = shift / (depth - pivot)
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-    return place @ turn + [0, pivot, 0], random.standard_normal(len(place))
+    return position @ turn + [0, pivot, 0], random.standard_normal(len(position))
 
 
-def alike(still, moved, lag):
+def correlation(still, moved, lag):
     """Correlation of the middle lines of two images (lines, ranges), a number of lines apart."""
     first = TURN_LINES // 2 - TURN_HALF - lag // 2
     parts = (image[k : k + 2 * TURN_HALF + 1] for image, k in ((still, first), (moved, first + lag)))
     return np.corrcoef(*(part.ravel() for part in parts))[0, 1]
 
 
-def seen(depth, pivot, shift, **keys):
+def recovered_shift(depth, pivot, shift, **keys):
     """Lateral motion of speckle over that of its scatterers, by the correlation of the images of 24 blocks."""
     rf = Rf(lines=TURN_LINES, sector_deg=18, elevation=False, accuracy=1e-3, **keys)
     scanner = Scanner(Probe(elements=32, pitch_um=92.0), rf, depth + 1e-3)
@@ -197,16 +197,16 @@ def seen(depth, pivot, shift, **keys):
     match = np.zeros(len(TURN_LAGS))
     for seed in range(24):
         pair = [np.abs(scanner.lines(*turned(seed, depth, pivot, s)))[:, near] for s in (-shift / 2, shift / 2)]
-        match += [alike(*pair, lag) for lag in TURN_LAGS]
-    return place_of_peak(TURN_LAGS * (scanner.angle[1] - scanner.angle[0]) * depth, match) / shift
+        match += [correlation(*pair, lag) for lag in TURN_LAGS]
+    return peak_position(TURN_LAGS * (scanner.angle[1] - scanner.angle[0]) * depth, match) / shift
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("depth", "pivot"), [(4.5e-3, 6.5e-3), (8.5e-3, 6.5e-3)])
 def test_speckle_that_turns_off_the_middle_focus_moves_as_its_tissue_with_zones_and_slips_with_one(depth, pivot):
     """Blocks turned by 70 um about a point 2 mm away (Kallel, Bertrand & Meunier 1994, IEEE Trans UFFC 41:105)."""
-    assert seen(depth, pivot, 70e-6) == pytest.approx(1, abs=0.05)
-    assert seen(depth, pivot, 70e-6, zones=1) < 0.85
+    assert recovered_shift(depth, pivot, 70e-6) == pytest.approx(1, abs=0.05)
+    assert recovered_shift(depth, pivot, 70e-6, zones=1) < 0.85
 
 
 def test_a_shift_of_the_phantom_shifts_the_speckle(narrow):
@@ -260,13 +260,13 @@ FRAME = """
 import numpy as np
 from hashlib import sha256
 from echotruth.config import Bmode, Probe, Rf
-from echotruth.imaging.bmode import clip
+from echotruth.imaging.bmode import bmode_clip
 from echotruth.imaging.beamforming.scanner import Scanner
 random = np.random.default_rng(0)
 scanner = Scanner(Probe(elements=12), Rf(lines=24), 9e-3)
 position = random.uniform([-3e-3, 3e-3, -3e-4], [3e-3, 9e-3, 3e-4], (400, 3))
 lines = scanner.lines(position, random.standard_normal(400))
-images = clip(lines[None], scanner.scan, scanner.range, Bmode(size_px=64, downsampling=(1,)))
+images = bmode_clip(lines[None], scanner.scan, scanner.range, Bmode(size_px=64, downsampling=(1,)))
 print(sha256(lines.tobytes() + images[64].tobytes()).hexdigest())
 """
 

@@ -10,7 +10,7 @@ from echotruth.imaging import spline
 
 def interpolated(samples, row, column):
     values = np.empty(len(row), np.float32)
-    spline.at_points(spline.coefficients(samples), row, column, values)
+    spline.evaluate(spline.coefficients(samples), row, column, values)
     return values
 
 

@@ -8,9 +8,9 @@ import pytest
 from echotruth.config import Config, Phantom
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import interpolate
-from echotruth.imaging.medium.phantom import seed
-from echotruth.imaging.truth import cavity_centre, displacement, follow, truth
-from echotruth.imaging.view import plane
+from echotruth.imaging.medium.phantom import seed_volume
+from echotruth.imaging.truth import cavity_centroid, displacement, material_truth, pixel_truth
+from echotruth.imaging.view import imaging_plane
 
 CONFIG = Config()
 AXIS = (np.arange(96) + 0.5) / 96 * 12e-3
@@ -18,26 +18,26 @@ AXIS = (np.arange(96) + 0.5) / 96 * 12e-3
 
 @pytest.fixture(scope="module")
 def mid(twisting_heart):
-    return plane(CONFIG.views["mid"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+    return imaging_plane(CONFIG.views["mid"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
 
 
 @pytest.fixture(scope="module")
 def moved(twisting_heart, mid):
-    return _frame(truth(twisting_heart, mid, AXIS, AXIS - 6e-3), 1)
+    return _frame(pixel_truth(twisting_heart, mid, AXIS, AXIS - 6e-3), 1)
 
 
 def _frame(clip, number):
     return {name: each[number] for name, each in clip.items()}
 
 
-def _places(mask, mid):
+def _positions(mask, mid):
     axial, lateral = AXIS[np.nonzero(mask)[0]], AXIS[np.nonzero(mask)[1]] - 6e-3
-    return mid.heart(np.column_stack([lateral, axial, np.zeros(len(axial))]))
+    return mid.to_heart(np.column_stack([lateral, axial, np.zeros(len(axial))]))
 
 
 def test_displacement_of_an_affine_motion_is_the_formula(moved, mid, affine):
     matrix, shift = affine
-    now = _places(moved["mask"], mid)
+    now = _positions(moved["mask"], mid)
     before = (now - shift) @ np.linalg.inv(matrix).T
     expected = (now - before) @ mid.axes.T
     assert np.abs(moved["displacement"][moved["mask"]] - expected).max() < 1e-10  # stored in single precision
@@ -54,14 +54,14 @@ def test_strain_of_an_affine_motion_is_the_formula(moved, affine):
 
 def test_a_scatterer_and_the_pixel_at_its_place_agree_to_round_off(twisting_heart):
     heart = twisting_heart
-    scattered = seed(Phantom(density_per_mm3=200.0), heart.nodes, heart.cells, np.random.default_rng(0)).points
+    scattered = seed_volume(Phantom(density_per_mm3=200.0), heart.nodes, heart.cells, np.random.default_rng(0)).points
     at_pixel = locate(heart.positions(1), heart.cells, interpolate(heart.positions(1), heart.cells, scattered))
     difference = displacement(heart, 1, scattered) - displacement(heart, 1, at_pixel)
     assert np.abs(difference).max() < 1e-16
 
 
 def test_nothing_moves_at_end_diastole(twisting_heart, mid):
-    still = _frame(truth(twisting_heart, mid, AXIS, AXIS - 6e-3), 0)
+    still = _frame(pixel_truth(twisting_heart, mid, AXIS, AXIS - 6e-3), 0)
     assert np.all(still["displacement"][still["mask"]] == 0)
     assert np.abs(still["strain"][still["mask"]]).max() < 1e-12
 
@@ -79,7 +79,7 @@ def test_labels_are_of_the_wall_and_nothing_is_known_outside(moved):
 def test_the_wall_in_the_image_has_the_area_of_the_wall_in_the_plane(twisting_heart, mid):
     # The unloaded wall's cut is an annulus between two ellipses of revolution.
     fine = (np.arange(512) + 0.5) / 512 * 12e-3
-    still = _frame(truth(twisting_heart, mid, fine, fine - 6e-3), 0)
+    still = _frame(pixel_truth(twisting_heart, mid, fine, fine - 6e-3), 0)
     height = mid.origin[2] + 1.40e-3  # above the equator
     radii = [r * np.sqrt(1 - (height / length) ** 2) for r, length in ((1.45e-3, 5.40e-3), (2.45e-3, 6.20e-3))]
     expected = np.pi * (radii[1] ** 2 - radii[0] ** 2)
@@ -88,10 +88,10 @@ def test_the_wall_in_the_image_has_the_area_of_the_wall_in_the_plane(twisting_he
 
 def test_tracked_points_are_followed_from_where_they_were_at_end_diastole(twisting_heart, mid, affine):
     matrix, shift = affine
-    places = np.stack(np.meshgrid(AXIS[::8] - 6e-3, AXIS[::8]), axis=-1)
-    motion = follow(twisting_heart, mid, places, "short_axis")
+    points = np.stack(np.meshgrid(AXIS[::8] - 6e-3, AXIS[::8]), axis=-1)
+    motion = material_truth(twisting_heart, mid, points, "short_axis")
     inside = motion["layer"] > 0
-    start = mid.heart(np.column_stack([places[inside], np.zeros(inside.sum())]))
+    start = mid.to_heart(np.column_stack([points[inside], np.zeros(inside.sum())]))
     expected = (start @ (matrix - np.eye(3)).T + shift) @ mid.axes.T
     assert np.allclose(motion["true_displacement"][1][inside], expected[:, :2], atol=1e-10)
     assert np.allclose(motion["through_plane"][1][inside], expected[:, 2], atol=1e-10)
@@ -100,12 +100,12 @@ def test_tracked_points_are_followed_from_where_they_were_at_end_diastole(twisti
 
 @pytest.fixture(scope="module")
 def followed(twisting_heart, mid):
-    """Motion of points in the wall by name, and their places from the long axis, lateral, axial."""
-    places = np.stack(np.meshgrid(AXIS[::4] - 6e-3, AXIS[::4]), axis=-1)
-    motion = follow(twisting_heart, mid, places, "short_axis")
+    """Motion of points in the wall by name, and their positions from the long axis, lateral, axial."""
+    points = np.stack(np.meshgrid(AXIS[::4] - 6e-3, AXIS[::4]), axis=-1)
+    motion = material_truth(twisting_heart, mid, points, "short_axis")
     inside = motion["layer"] > 0
     frames = {name: motion[name][1][inside] for name in ("heart_strain", "plane_strain")}
-    return frames | {"axes": motion["wall_axes"][inside], "arm": places[inside] - [0, 6.5e-3]}
+    return frames | {"axes": motion["wall_axes"][inside], "arm": points[inside] - [0, 6.5e-3]}
 
 
 def test_axes_of_the_wall_in_a_short_axis_image_are_those_of_its_circle(followed):
@@ -124,8 +124,8 @@ def test_axes_of_the_wall_in_a_short_axis_image_are_those_of_its_circle(followed
 def test_strain_in_the_plane_of_an_affine_motion_is_the_formula(twisting_heart, mid):
     sheared = np.array([[1.1, 0.2, 0.05], [-0.1, 0.8, 0.1], [0.02, -0.07, 0.95]])
     moved = np.stack([0 * twisting_heart.nodes, twisting_heart.nodes @ (sheared - np.eye(3)).T])
-    places = np.stack(np.meshgrid(AXIS[::4] - 6e-3, AXIS[::4]), axis=-1)
-    motion = follow(replace(twisting_heart, displacement=moved), mid, places, "short_axis")
+    points = np.stack(np.meshgrid(AXIS[::4] - 6e-3, AXIS[::4]), axis=-1)
+    motion = material_truth(replace(twisting_heart, displacement=moved), mid, points, "short_axis")
     inside = motion["layer"] > 0
     matrix, axes = (mid.axes @ sheared @ mid.axes.T)[:2, :2], motion["wall_axes"][inside]
     green = (matrix.T @ matrix - np.eye(2)) / 2
@@ -143,9 +143,11 @@ def test_strain_of_the_heart_at_followed_points_is_that_along_the_walls_axes_in_
 
 
 def test_along_the_long_axis_the_tangential_strain_is_the_longitudinal(twisting_heart, affine):
-    where = plane(CONFIG.views["long_axis"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
-    places = np.stack(np.meshgrid(AXIS[::6] - 6e-3, AXIS[::6]), axis=-1)
-    motion = follow(twisting_heart, where, places, "long_axis")
+    where = imaging_plane(
+        CONFIG.views["long_axis"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()]
+    )
+    points = np.stack(np.meshgrid(AXIS[::6] - 6e-3, AXIS[::6]), axis=-1)
+    motion = material_truth(twisting_heart, where, points, "long_axis")
     inside = motion["layer"] > 0
     space = motion["heart_strain"][1][inside]
     # R, C and L are orthogonal: the trace of E, less the constant E_CC, is left for the other two.
@@ -156,18 +158,18 @@ def test_along_the_long_axis_the_tangential_strain_is_the_longitudinal(twisting_
 
 
 def test_the_cavity_centre_is_on_the_axis_and_moves_with_a_shifted_heart(twisting_heart, mid):
-    assert np.allclose(cavity_centre(twisting_heart, mid), [0, 6.5e-3], atol=1e-6)
+    assert np.allclose(cavity_centroid(twisting_heart, mid), [0, 6.5e-3], atol=1e-6)
     shifted = twisting_heart.__class__(**{**vars(twisting_heart), "nodes": twisting_heart.nodes + [0.3e-3, 0.2e-3, 0]})
-    assert np.allclose(cavity_centre(shifted, mid), [-0.3e-3, 6.3e-3], atol=1e-6)
+    assert np.allclose(cavity_centroid(shifted, mid), [-0.3e-3, 6.3e-3], atol=1e-6)
 
 
 def test_the_region_of_disease_is_that_of_the_tissue_at_the_pixel(twisting_heart, mid, moved, affine):
     assert not moved["region"].any()
     corners = twisting_heart.nodes[twisting_heart.cells[:, :4]]
     septal = (corners[..., 0].mean(axis=1) > 0).astype(np.uint8)
-    ill = _frame(truth(replace(twisting_heart, region=septal), mid, AXIS, AXIS - 6e-3), 1)
+    ill = _frame(pixel_truth(replace(twisting_heart, region=septal), mid, AXIS, AXIS - 6e-3), 1)
     matrix, shift = affine
-    before = (_places(ill["mask"], mid) - shift) @ np.linalg.inv(matrix).T
+    before = (_positions(ill["mask"], mid) - shift) @ np.linalg.inv(matrix).T
     # A cell of this coarse mesh is 1 mm wide, and the seam runs along its faces.
     clear = np.abs(before[:, 0]) > 0.6e-3
     assert np.array_equal(ill["region"][ill["mask"]][clear], (before[clear, 0] > 0).astype(np.uint8))

@@ -1,4 +1,4 @@
-"""The shipped cycles, what each drive takes, their sampling, and what is said about files that hold none."""
+"""The shipped cycles, the columns of each drive, the sampling, and the errors about invalid files."""
 
 import numpy as np
 import pytest
@@ -43,8 +43,8 @@ def test_other_shipped_loops_have_the_values_at_their_head(name, period, pressur
     slope = np.gradient(loop.pressure, loop.time) / MMHG
     es = es_frame(loop.pressure, loop.volume)
     assert loop.period == pytest.approx(period)
-    found = (loop.pressure[0], loop.pressure[es], loop.pressure.max())
-    assert np.array(found) / MMHG == pytest.approx(pressures, rel=0.01)
+    measured = (loop.pressure[0], loop.pressure[es], loop.pressure.max())
+    assert np.array(measured) / MMHG == pytest.approx(pressures, rel=0.01)
     assert np.array([loop.volume[0], loop.volume.min()]) / UL == pytest.approx(volumes, rel=1e-6)
     assert (slope.max(), slope.min()) == pytest.approx(slopes, rel=0.03)
 
@@ -98,7 +98,7 @@ def test_sampling_goes_through_the_rows_without_overshoot(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("rows", "message"),
     [
         (["0,4,50", "30,x,40", *GOOD[2:]], "line 4: pressure_mmHg is 'x'; give a finite number"),
         (["0,4,50", "30,nan,40", *GOOD[2:]], "line 4: pressure_mmHg is 'nan'"),
@@ -113,10 +113,10 @@ def test_sampling_goes_through_the_rows_without_overshoot(tmp_path):
         (["0,4,30", "30,100,50", "60,100,20", "90,5,25", "120,4,30"], "begin the loop at end-diastole"),
     ],
 )
-def test_what_is_no_loop_is_refused_in_one_sentence(tmp_path, rows, said):
+def test_an_invalid_loop_is_refused_in_one_sentence(tmp_path, rows, message):
     with pytest.raises(LoopError) as caught:
         read_loop(written(tmp_path, rows))
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert "loop.csv" in str(caught.value)
     assert str(caught.value).endswith(".")
 
@@ -138,18 +138,18 @@ ALL = "time_ms,pressure_mmHg,tension_kPa,volume_uL\n"
 
 
 @pytest.mark.parametrize(
-    ("drive", "given"),
+    ("drive", "expected"),
     [
         ("pressure_volume", {"pressure", "volume"}),
         ("pressure", {"pressure", "tension"}),
         ("volume", {"volume", "tension"}),
     ],
 )
-def test_a_drive_takes_its_own_columns_and_leaves_the_rest_open(tmp_path, drive, given):
+def test_a_drive_takes_its_own_columns_and_leaves_the_rest_open(tmp_path, drive, expected):
     loop = written(tmp_path, TWITCH, head=ALL).model_copy(update={"drive": drive})
     cycle = read_loop(loop)
     assert cycle.drive == drive
-    assert {name for name in ("pressure", "volume", "tension") if getattr(cycle, name) is not None} == given
+    assert {name for name in ("pressure", "volume", "tension") if getattr(cycle, name) is not None} == expected
     if drive != "pressure_volume":
         np.testing.assert_allclose(cycle.tension[::2], [0, 40e3, 45e3, 1e3])
 
@@ -169,7 +169,7 @@ def test_scaling_keeps_the_ejection_fraction_and_all_else():
 
 
 @pytest.mark.parametrize(
-    ("drive", "head", "row", "said"),
+    ("drive", "head", "row", "message"),
     [
         (
             "pressure_volume",
@@ -187,25 +187,25 @@ def test_scaling_keeps_the_ejection_fraction_and_all_else():
         ("volume", "time_ms,time_s,volume_uL", "0,0,50", "time_ms and time_s both give the time; keep one of them"),
     ],
 )
-def test_missing_column_and_one_given_twice_are_named(tmp_path, drive, head, row, said):
+def test_missing_column_and_one_given_twice_are_named(tmp_path, drive, head, row, message):
     with pytest.raises(LoopError) as caught:
         read_loop(written(tmp_path, [row] * 5, head=head + "\n").model_copy(update={"drive": drive}))
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert str(caught.value).endswith(".") and "loop.csv" in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("rows", "message"),
     [
         (["0,4,0,50", "30,100,-1,40", *TWITCH[2:]], "row 2: tension_kPa is -1 and must not be negative"),
         (["0,4,9,50", *TWITCH[1:-1], "120,4,9,50"], "the first row has tension_kPa 9 of 1 to 45; begin"),
         ([*TWITCH[:4], "120,4,9,50"], "tension_kPa begins at 0 and ends at 9"),
     ],
 )
-def test_tension_that_no_beat_has_is_refused(tmp_path, rows, said):
+def test_tension_that_no_beat_has_is_refused(tmp_path, rows, message):
     with pytest.raises(LoopError) as caught:
         read_loop(written(tmp_path, rows, head=ALL).model_copy(update={"drive": "pressure"}))
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_missing_file_is_named_with_what_there_is(tmp_path):

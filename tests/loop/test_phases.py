@@ -9,7 +9,7 @@ from echotruth.loop.phases import CONTRACTION, EJECTION, FILLING, RELAXATION, es
 
 
 def beat(frames, opens=0.1, closes=0.45, fills=0.65):
-    """Pressure (Pa) and volume (m^3) of a cycle whose valves move at given shares of it; straight in between."""
+    """Pressure (Pa) and volume (m^3) of a cycle whose valves move at given fractions of it; linear in between."""
     time = np.arange(frames) / frames
     volume = np.interp(time, [0, opens, closes, fills, 1], [50e-9, 50e-9, 20e-9, 20e-9, 50e-9])
     pressure = np.interp(time, [0, opens, closes, fills, 1], [500, 12e3, 13e3, 600, 500])
@@ -36,8 +36,8 @@ def test_noise_of_a_catheter_moves_them_by_few_frames():
     rng = np.random.default_rng(3)
     for _ in range(50):
         noisy = volume + 0.01 * np.ptp(volume) * rng.normal(size=100)
-        found = ends(phases(pressure * (1 + 0.01 * rng.normal(size=100)), noisy))
-        np.testing.assert_allclose(found, [10, 45, 65], atol=5)
+        last_frames = ends(phases(pressure * (1 + 0.01 * rng.normal(size=100)), noisy))
+        np.testing.assert_allclose(last_frames, [10, 45, 65], atol=5)
 
 
 def test_noise_is_read_off_the_curve():

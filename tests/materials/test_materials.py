@@ -1,4 +1,4 @@
-"""Each law against its formula written down anew, hand-derived stresses, and the rules that all laws keep."""
+"""Each law against an independent formula, hand-derived stresses, and the rules common to all laws."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ import pytest
 
 from echotruth.materials import LAWS
 from echotruth.mechanics.solver import stress as material
-from validation.energies import PASSIVE
+from validation.energies import PASSIVE_ENERGIES
 
 STEP = 1e-30
 """Imaginary part of an argument: the derivative by a complex step has no cancellation."""
@@ -29,29 +29,29 @@ def strained(seed):
 
 def energy(c, name):
     """W / C of C of shape (6,), complex or real, by the law's formula and the isochoric split."""
-    whole = tensor(c)
-    return PASSIVE[name]((np.linalg.det(whole) ** (-1 / 3) * whole - np.eye(3)) / 2, LAWS[name].Law())
+    full = tensor(c)
+    return PASSIVE_ENERGIES[name]((np.linalg.det(full) ** (-1 / 3) * full - np.eye(3)) / 2, LAWS[name].Law())
 
 
 def respond(c, name):
     """W, S and dS/dE of the element's chain, each over C."""
     inverse, e, stress, tangent = np.empty(6), np.empty(6), np.empty(6), np.empty((6, 6))
     scale = material.isochoric_strain(c, material.invert(c, inverse), e)
-    found = LAWS[name].energy(e, LAWS[name].Law().constants(), stress, tangent)
+    energy = LAWS[name].energy(e, LAWS[name].Law().constants(), stress, tangent)
     trace = material.isochoric_stress(c, inverse, scale, stress)
     material.isochoric_tangent(c, inverse, scale, trace, stress, tangent)
-    return found, stress, np.triu(tangent) + np.triu(tangent, 1).T
+    return energy, stress, np.triu(tangent) + np.triu(tangent, 1).T
 
 
 def complex_step(c, name):
     """S = 2 dW/dC, exact to round-off."""
     steps = 1j * STEP * np.eye(6)
     slope = np.array([energy(c + step, name).imag / STEP for step in steps])
-    return 2 * slope / material.SHEAR
+    return 2 * slope / material.MULTIPLICITY
 
 
-def test_every_law_is_written_down_anew():
-    assert set(PASSIVE) == set(LAWS)
+def test_every_law_has_an_independent_formula():
+    assert set(PASSIVE_ENERGIES) == set(LAWS)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -59,8 +59,8 @@ def test_every_law_is_written_down_anew():
 def test_energy_and_stress_are_those_of_the_formula(name, seed):
     f = strained(seed)
     c = voigt(f.T @ f)
-    found, stress, _ = respond(c, name)
-    assert found == pytest.approx(energy(c, name), rel=1e-13)
+    w, stress, _ = respond(c, name)
+    assert w == pytest.approx(energy(c, name), rel=1e-13)
     np.testing.assert_allclose(stress, complex_step(c, name), rtol=1e-12, atol=1e-12 * np.abs(stress).max())
 
 
@@ -71,14 +71,14 @@ def test_tangent_is_the_symmetric_derivative_of_the_stress(name, seed):
     c = voigt(f.T @ f)
     _, _, tangent = respond(c, name)
     slope = np.empty((6, 6))
-    for k, d in enumerate(np.diag(2 * step / material.SHEAR)):
+    for k, d in enumerate(np.diag(2 * step / material.MULTIPLICITY)):
         slope[:, k] = (complex_step(c + d, name) - complex_step(c - d, name)) / (2 * step)
     np.testing.assert_allclose(tangent, slope, atol=3e-8 * np.abs(slope).max())
     np.testing.assert_allclose(slope, slope.T, atol=3e-8 * np.abs(slope).max())
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_stress_turns_with_the_body(name):
+def test_stress_rotates_with_the_body(name):
     """sigma = F S F^T / J of R F is R sigma R^T, and S does not see R at all."""
     f, turn = strained(1), np.linalg.qr(np.random.default_rng(9).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
@@ -93,8 +93,8 @@ def test_stress_turns_with_the_body(name):
 @pytest.mark.parametrize("name", LAWS)
 def test_nothing_is_stressed_by_a_change_of_volume_or_at_rest(name):
     for swollen in (1.0, 1.3):
-        found, stress, _ = respond(np.array([swollen, swollen, swollen, 0, 0, 0]), name)
-        assert found == pytest.approx(0, abs=1e-14)
+        w, stress, _ = respond(np.array([swollen, swollen, swollen, 0, 0, 0]), name)
+        assert w == pytest.approx(0, abs=1e-14)
         np.testing.assert_allclose(stress, 0, atol=1e-13)
 
 
@@ -208,22 +208,22 @@ INFLATE = """
     import numpy as np
     from echotruth.config import Geometry
     from echotruth.config.loading import validate
-    from echotruth.mechanics import element
+    from echotruth.mechanics.solver import element
     from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
     from echotruth.mechanics.geometry import left_ventricle
-    from echotruth.mechanics.solver.newton import Walk
-    from echotruth.mechanics.solver.support import of_base
+    from echotruth.mechanics.solver.newton import LoadStepper
+    from echotruth.mechanics.solver.support import base_support
 
     config = validate({"mechanics": {"material": {"law": "dropped", "exponent": 3.0}}}, "test")
     material = config.mechanics.material
-    law = element.Law(package.compiled(material.law), material.constants(), np.array([0.0, 2.0]), 2e6)
+    law = element.WallLaw(package.compiled(material.law), material.constants(), np.array([0.0, 2.0]), 2e6)
     mesh = left_ventricle(Geometry(circumferential_elements=6, longitudinal_elements=4, transmural_elements=1))
     frames = np.tile(np.eye(3), (len(mesh.cells), 14, 1, 1))
-    heart = Equilibrium(mesh, frames, law, of_base(mesh, "fixed"))
-    walk = Walk(heart, 1e3)
-    empty = walk.load.volume
-    walk.to(Load(200.0, 1.0), None)
-    print(material.exponent, walk.load.volume / empty)
+    heart = Equilibrium(mesh, frames, law, base_support(mesh, "fixed"))
+    stepper = LoadStepper(heart, 1e3)
+    empty = stepper.load.volume
+    stepper.advance(Load(200.0, 1.0), None)
+    print(material.exponent, stepper.load.volume / empty)
 """
 
 

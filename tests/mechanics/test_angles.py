@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from echotruth.mechanics import angles
-from echotruth.mechanics.fibres import axes_about
+from echotruth.mechanics.fibres import axes_from_normal
 
 INNER, OUTER = 1.0e-3, 2.0e-3
 
@@ -23,7 +23,7 @@ def tube():
     outwards = np.column_stack([np.cos(azimuth), np.sin(azimuth), np.zeros(500)])
     return SimpleNamespace(
         outwards=outwards,
-        axes=axes_about(outwards),
+        axes=axes_from_normal(outwards),
         upwards=np.tile([0, 0, 1.0], (500, 1)),
         depth=(radius - INNER) / (OUTER - INNER),
         potential=np.log(radius / INNER) / np.log(OUTER / INNER),
@@ -52,13 +52,13 @@ def orient(frame, alpha, beta):
 
 
 def test_helix_and_sheet_angle_are_alpha_and_beta_of_bayer(tube):
-    ours = angles.frames(tube.axes, tube.alpha, np.zeros(500), tube.beta)
+    ours = angles.frames_from_angles(tube.axes, tube.alpha, np.zeros(500), tube.beta)
     theirs = orient(axis(tube.upwards, tube.outwards), tube.alpha, tube.beta)
     np.testing.assert_allclose(ours, theirs.swapaxes(-1, -2), atol=1e-14)
 
 
 def test_transverse_angle_is_that_of_the_fibre_seen_along_the_long_axis(tube):
-    frames = angles.frames(tube.axes, tube.alpha, tube.transverse, tube.beta)
+    frames = angles.frames_from_angles(tube.axes, tube.alpha, tube.transverse, tube.beta)
     np.testing.assert_allclose(np.linalg.det(frames), 1)
     fibre = frames[:, 0]
     around = np.cross([0, 0, 1.0], tube.outwards)
@@ -68,15 +68,19 @@ def test_transverse_angle_is_that_of_the_fibre_seen_along_the_long_axis(tube):
 
 
 def test_angles_come_back(tube):
-    frames = angles.frames(tube.axes, tube.alpha, tube.transverse, tube.beta)
-    np.testing.assert_allclose(angles.read(frames, tube.axes), [tube.alpha, tube.transverse, tube.beta], atol=1e-9)
+    frames = angles.frames_from_angles(tube.axes, tube.alpha, tube.transverse, tube.beta)
+    np.testing.assert_allclose(
+        angles.angles_from_frames(frames, tube.axes), [tube.alpha, tube.transverse, tube.beta], atol=1e-9
+    )
 
 
 def test_neither_fibre_nor_sheet_has_a_head(tube):
-    frames = angles.frames(tube.axes, tube.alpha, tube.transverse, tube.beta)
+    frames = angles.frames_from_angles(tube.axes, tube.alpha, tube.transverse, tube.beta)
     for head in ([-1.0, -1, 1], [-1, 1, -1], [1, -1, -1]):
         flipped = frames * np.array(head)[:, None]
-        np.testing.assert_allclose(angles.read(flipped, tube.axes), angles.read(frames, tube.axes), atol=1e-9)
+        np.testing.assert_allclose(
+            angles.angles_from_frames(flipped, tube.axes), angles.angles_from_frames(frames, tube.axes), atol=1e-9
+        )
 
 
 @pytest.mark.parametrize("epi", [-20.0, -60.0])
@@ -95,13 +99,13 @@ def test_our_rule_and_ldrb_part_where_the_conventions_say(tube, epi):
         return found.reshape(3, n, 3).swapaxes(0, 1)
 
     def rule(helix, sheet):
-        return angles.frames(tube.axes, np.radians(helix), np.zeros(500), np.radians(sheet))
+        return angles.frames_from_angles(tube.axes, np.radians(helix), np.zeros(500), np.radians(sheet))
 
     at = tube.potential
     linear = rule(60 + (epi - 60) * at, -65 + 90 * at)
     np.testing.assert_allclose(ldrb((-65.0, 25.0), epi_only=True), linear, atol=1e-12)
     # The whole of it blends in the endocardial frame once more; beyond a right angle, the other way round.
-    helix = angles.read(ldrb((0.0, 0.0), epi_only=False), tube.axes)[0]
+    helix = angles.angles_from_frames(ldrb((0.0, 0.0), epi_only=False), tube.axes)[0]
     span = (epi - 60) * at
     blended = 60 + at * np.where(span < -90, span + 180, span)
     np.testing.assert_allclose(np.sin(2 * helix), np.sin(2 * np.radians(blended)), atol=1e-4)

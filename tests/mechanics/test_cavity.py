@@ -5,7 +5,7 @@ import pytest
 
 from echotruth.config import Geometry
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver.cavity import cavity_volume, load, stiffness
+from echotruth.mechanics.solver.cavity import cavity_volume, volume_gradient, volume_hessian
 
 
 @pytest.fixture(scope="module")
@@ -15,8 +15,8 @@ def mesh():
 
 def derivatives(nodes, endo):
     hessian = np.empty((len(endo), 18, 18))
-    stiffness(nodes, endo, hessian)
-    return load(nodes, endo), hessian
+    volume_hessian(nodes, endo, hessian)
+    return volume_gradient(nodes, endo), hessian
 
 
 def shaken(mesh, seed=0, size=2e-5):

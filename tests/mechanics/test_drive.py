@@ -1,4 +1,4 @@
-"""Hearts driven three ways, stopped and taken up, ill and well."""
+"""Hearts with each drive, interrupted and resumed, diseased and healthy."""
 
 import logging
 from dataclasses import replace
@@ -12,19 +12,19 @@ from echotruth.mechanics.beat import beat
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver import drive
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.checkpoint import Progress
+from echotruth.mechanics.solver.checkpoint import Checkpoints
 from echotruth.mechanics.solver.wall import equilibrium, wall
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
 CONFIG = Config(geometry=COARSE, loop=Loop(frames=12), mechanics=Mechanics(viscosity_Pa_s=0.0))
 
 
-def solved(cycle, config=CONFIG, stiffness=None, progress=None):
-    heart = wall(config, left_ventricle(config.geometry))
-    activation = Activation(heart.tissue.tension_scale, heart.tissue.activation_delay, cycle.period / len(cycle.time))
-    equations = equilibrium(config, heart)
+def solved(cycle, config=CONFIG, stiffness=None, checkpoints=None):
+    body = wall(config, left_ventricle(config.geometry))
+    activation = Activation(body.tissue.tension_scale, body.tissue.activation_delay, cycle.period / len(cycle.time))
+    equations = equilibrium(config, body)
     try:
-        return drive.solve(equations, cycle, activation, stiffness, progress)
+        return drive.solve(equations, cycle, activation, stiffness, checkpoints)
     finally:
         equations.close()
 
@@ -43,30 +43,30 @@ def test_volume_and_tension_give_back_the_pressure(cycle, driven):
     other = replace(cycle, drive="volume", pressure=None, tension=driven.tension)
     back = solved(other, stiffness=driven.stiffness)
     np.testing.assert_allclose(back.pressure, cycle.pressure, rtol=1e-4)
-    assert np.all(np.isnan(back.pressure_asked))
-    apart = np.abs(back.displacement - driven.displacement).max()
-    assert apart < 1e-4 * np.abs(driven.displacement).max()
+    assert np.all(np.isnan(back.pressure_target))
+    difference = np.abs(back.displacement - driven.displacement).max()
+    assert difference < 1e-4 * np.abs(driven.displacement).max()
 
 
 def test_pressure_alone_fills_the_passive_heart_as_its_volume_does(cycle, driven):
     """Without tension the volume that bears a pressure is the only one."""
-    nothing, pressure = np.zeros(4), cycle.pressure[0] * np.array([1.0, 1.5, 1.2, 0.5])
-    slack = replace(cycle, time=cycle.time[:4], tension=nothing)
+    none, pressure = np.zeros(4), cycle.pressure[0] * np.array([1.0, 1.5, 1.2, 0.5])
+    slack = replace(cycle, time=cycle.time[:4], tension=none)
     filled = solved(replace(slack, drive="pressure", pressure=pressure, volume=None), stiffness=driven.stiffness)
     assert filled.volume[0] == pytest.approx(driven.volume[0], rel=1e-7)
     back = solved(replace(slack, drive="volume", pressure=None, volume=filled.volume), stiffness=driven.stiffness)
     np.testing.assert_allclose(back.pressure, pressure, rtol=1e-6)
 
 
-def test_stopped_beat_goes_on_and_ends_in_the_same_bytes(cycle, driven, tmp_path, caplog):
-    whole = solved(cycle, progress=Progress(tmp_path))
+def test_interrupted_beat_resumes_and_ends_in_the_same_bytes(cycle, driven, tmp_path, caplog):
+    uninterrupted = solved(cycle, checkpoints=Checkpoints(tmp_path))
     for late in sorted(tmp_path.glob("*.frame"))[5:]:
         late.unlink()
     with caplog.at_level(logging.INFO, "echotruth.mechanics"):
-        resumed = solved(cycle, progress=Progress(tmp_path))
-    assert "goes on after 5 of 12 frames" in caplog.text
+        resumed = solved(cycle, checkpoints=Checkpoints(tmp_path))
+    assert "resuming after 5 of 12 frames" in caplog.text
     for name in vars(driven):
-        assert np.asarray(getattr(driven, name)).tobytes() == np.asarray(getattr(whole, name)).tobytes(), name
+        assert np.asarray(getattr(driven, name)).tobytes() == np.asarray(getattr(uninterrupted, name)).tobytes(), name
         assert np.asarray(getattr(driven, name)).tobytes() == np.asarray(getattr(resumed, name)).tobytes(), name
 
 
@@ -75,13 +75,13 @@ def test_viscosity_lets_a_wall_that_weakens_as_it_shortens_go_on(cycle):
     """With a tension that does not fall with length (beta = 0) no equilibrium neighbours that of early ejection."""
     constant = Mechanics(active={"length_dependence": 0.0})  # and the viscosity that stands by default
     config = CONFIG.model_copy(update={"mechanics": constant, "loop": Loop()})
-    found = solved(read_loop(config.loop), config)
-    np.testing.assert_allclose(found.volume, found.volume_asked, rtol=1e-7)
+    beta_zero = solved(read_loop(config.loop), config)
+    np.testing.assert_allclose(beta_zero.volume, beta_zero.volume_target, rtol=1e-7)
 
 
 def test_infarct_stretches_where_healthy_wall_shortens():
-    ill = CONFIG.model_copy(update={"pathology": Pathology(infarct={"segments": [7, 12], "stiffness_scale": 2.0})})
-    arrays = beat(ill)
+    diseased = CONFIG.model_copy(update={"pathology": Pathology(infarct={"segments": [7, 12], "stiffness_scale": 2.0})})
+    arrays = beat(diseased)
     es = int(arrays["mechanics"]["es_frame"])
     fibre = arrays["kinematics"]["fibre_strain"][es, :, 0]
     region = arrays["pathology"]["region"]

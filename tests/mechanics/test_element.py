@@ -9,7 +9,7 @@ from echotruth.fem.tetrahedra import Mesh
 from echotruth.materials import LAWS, compiled
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver import element
-from echotruth.mechanics.solver.stress_point import WHOLE
+from echotruth.mechanics.solver.stress_point import TOTAL
 
 
 @pytest.fixture(scope="module")
@@ -18,25 +18,25 @@ def mesh() -> Mesh:
 
 
 def law(name="fung", power=2.0):
-    return element.Law(compiled(name), LAWS[name].Law().constants(), np.array([1.4, power]), 2e6, local_bulk=20.0)
+    return element.WallLaw(compiled(name), LAWS[name].Law().constants(), np.array([1.4, power]), 2e6, local_bulk=20.0)
 
 
-def load(mesh, pressure=0.0, stiffness=1.1e3, tension=4e4, viscosity=0.0):
-    parts = (values * np.ones(len(mesh.cells)) for values in (stiffness, tension, pressure, viscosity))
-    before = np.empty((len(mesh.cells), 14, 6))
-    element.stretch(1.05 * mesh.nodes, body(mesh), before)
-    return element.Load(*parts, before)
+def cell_state(mesh, pressure=0.0, stiffness=1.1e3, tension=4e4, viscosity=0.0):
+    fields = (values * np.ones(len(mesh.cells)) for values in (stiffness, tension, pressure, viscosity))
+    previous_c = np.empty((len(mesh.cells), 14, 6))
+    element.right_cauchy_green(1.05 * mesh.nodes, elements(mesh), previous_c)
+    return element.CellState(*fields, previous_c)
 
 
-def body(mesh, frame=None):
+def elements(mesh, directions=None):
     fibres = np.broadcast_to(np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0], (len(mesh.cells), 14, 3, 3))
-    frame = np.tile(np.eye(3), (len(mesh.nodes), 1, 1)) if frame is None else frame
-    return element.elements(mesh, fibres, frame)
+    directions = np.tile(np.eye(3), (len(mesh.nodes), 1, 1)) if directions is None else directions
+    return element.build_elements(mesh, fibres, directions)
 
 
-def respond(mesh, nodes, scale, frame=None, laws=None):
-    out = element.blocks(len(mesh.cells), with_tangent=True)
-    element.respond(nodes, body(mesh, frame), laws or law(), scale, out)
+def response(mesh, nodes, state, directions=None, laws=None):
+    out = element.allocate_response(len(mesh.cells), with_tangent=True)
+    element.evaluate(nodes, elements(mesh, directions), laws or law(), state, out)
     return out
 
 
@@ -48,13 +48,13 @@ def summed(mesh, forces):
 
 def test_homogeneous_deformation_leaves_the_inside_in_balance(mesh):
     gradient = np.array([[1.1, 0.2, 0.0], [-0.1, 0.95, 0.1], [0.05, 0.0, 1.02]])
-    scale = load(mesh, pressure=1e4)
-    out = respond(mesh, mesh.nodes @ gradient.T, scale)
-    total = summed(mesh, out.force[:, WHOLE])
+    state = cell_state(mesh, pressure=1e4)
+    out = response(mesh, mesh.nodes @ gradient.T, state)
+    total = summed(mesh, out.force[:, TOTAL])
     inside = np.setdiff1d(mesh.cells, np.concatenate([side.ravel() for side in (mesh.endo, mesh.epi, mesh.base)]))
     assert len(inside) > 50
     assert np.abs(total[inside]).max() < 1e-10 * np.abs(total).max()
-    unloaded = np.sum(body(mesh).weight, axis=1)
+    unloaded = np.sum(elements(mesh).weight, axis=1)
     np.testing.assert_allclose(out.volume, np.linalg.det(gradient) * unloaded, rtol=1e-12)
 
 
@@ -62,54 +62,56 @@ def test_homogeneous_deformation_leaves_the_inside_in_balance(mesh):
 def test_rigid_rotation_needs_no_passive_force(mesh, name):
     turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    out = respond(mesh, mesh.nodes @ turn.T + 1e-3, load(mesh), laws=law(name))
-    stretched = respond(mesh, 1.01 * mesh.nodes * [1, 1, 0.9], load(mesh), laws=law(name))
+    out = response(mesh, mesh.nodes @ turn.T + 1e-3, cell_state(mesh), laws=law(name))
+    stretched = response(mesh, 1.01 * mesh.nodes * [1, 1, 0.9], cell_state(mesh), laws=law(name))
     assert np.abs(out.force[:, 0]).max() < 1e-10 * np.abs(stretched.force[:, 0]).max()
 
 
 def test_cell_that_is_inside_out_has_no_volume(mesh):
-    assert np.all(np.isnan(respond(mesh, mesh.nodes * [1, 1, -1], load(mesh)).volume))
+    assert np.all(np.isnan(response(mesh, mesh.nodes * [1, 1, -1], cell_state(mesh)).volume))
 
 
 @pytest.mark.parametrize(("name", "power"), [*((name, 2.0) for name in LAWS), ("fung", 0.0)])
 def test_tangent_is_the_derivative_of_the_condensed_force(mesh, name, power):
     rng, laws = np.random.default_rng(5), law(name, power)
-    frame = np.linalg.qr(rng.normal(size=(len(mesh.nodes), 3, 3)))[0]
-    frame[::2] = np.eye(3)
+    directions = np.linalg.qr(rng.normal(size=(len(mesh.nodes), 3, 3)))[0]
+    directions[::2] = np.eye(3)
     nodes, change = mesh.nodes + 1e-5 * rng.normal(size=mesh.nodes.shape), rng.normal(size=mesh.nodes.shape)
-    scale, step = load(mesh, pressure=1e4 * rng.normal(size=len(mesh.cells)), viscosity=1e3), 1e-9
-    here = respond(mesh, nodes, scale, frame, laws)
-    ends = [respond(mesh, nodes + side * step * change, scale, frame, laws) for side in (1, -1)]
-    forces = [out.force[:, WHOLE] for out in ends]
-    growth = (ends[0].volume - ends[1].volume) / np.sum(body(mesh).weight, axis=1)
+    state, step = cell_state(mesh, pressure=1e4 * rng.normal(size=len(mesh.cells)), viscosity=1e3), 1e-9
+    here = response(mesh, nodes, state, directions, laws)
+    ends = [response(mesh, nodes + side * step * change, state, directions, laws) for side in (1, -1)]
+    forces = [out.force[:, TOTAL] for out in ends]
+    growth = (ends[0].volume - ends[1].volume) / np.sum(elements(mesh).weight, axis=1)
     slope = (forces[0] - forces[1] + laws.bulk_modulus * growth[:, None] * here.force[:, 2]) / (2 * step)
     tangent = np.zeros((len(mesh.cells), 30, 30))
     tangent[:, *np.triu_indices(30)] = here.tangent
     tangent += np.triu(tangent, 1).swapaxes(1, 2)
-    turned = np.einsum("nij,nj->ni", frame, change)[mesh.cells].reshape(-1, 30)
+    turned = np.einsum("nij,nj->ni", directions, change)[mesh.cells].reshape(-1, 30)
     predicted = np.einsum("crs,cs->cr", tangent, turned)
     assert np.abs(predicted - slope).max() < 1e-6 * np.abs(slope).max()
 
 
 def test_each_cell_bears_its_own_stiffness_tension_pressure_and_viscosity(mesh):
-    nodes, share = mesh.nodes * [1.1, 1.05, 0.95], np.random.default_rng(7).uniform(0.5, 2, size=(4, len(mesh.cells)))
-    same = load(mesh, pressure=1e4, viscosity=1e3)
-    scale = element.Load(*(values * part for values, part in zip(same[:4], share, strict=True)), same.before)
-    one, each = respond(mesh, nodes, load(mesh, 1.0, 1.0, 1.0, 1.0)), respond(mesh, nodes, scale)
-    np.testing.assert_array_equal(each.force[:, :WHOLE], one.force[:, :WHOLE])
-    parts = np.einsum("pc,cpr->cr", scale[:3], each.force[:, :WHOLE])
-    still = respond(mesh, nodes, scale._replace(viscosity=0 * scale.viscosity)).force[:, WHOLE]
-    np.testing.assert_allclose(still, parts, atol=1e-10 * np.abs(parts).max())
-    viscous = respond(mesh, nodes, load(mesh, 0.0, 0.0, 0.0, 1.0)).force[:, WHOLE]
-    expected = parts + scale.viscosity[:, None] * viscous
-    np.testing.assert_allclose(each.force[:, WHOLE], expected, atol=1e-10 * np.abs(parts).max())
-    assert not np.allclose(each.tangent, respond(mesh, nodes, same).tangent)
+    nodes, factors = mesh.nodes * [1.1, 1.05, 0.95], np.random.default_rng(7).uniform(0.5, 2, size=(4, len(mesh.cells)))
+    same = cell_state(mesh, pressure=1e4, viscosity=1e3)
+    state = element.CellState(
+        *(values * factor for values, factor in zip(same[:4], factors, strict=True)), same.previous_c
+    )
+    unit, mixed = response(mesh, nodes, cell_state(mesh, 1.0, 1.0, 1.0, 1.0)), response(mesh, nodes, state)
+    np.testing.assert_array_equal(mixed.force[:, :TOTAL], unit.force[:, :TOTAL])
+    parts = np.einsum("pc,cpr->cr", state[:3], mixed.force[:, :TOTAL])
+    elastic = response(mesh, nodes, state._replace(viscous_modulus=0 * state.viscous_modulus)).force[:, TOTAL]
+    np.testing.assert_allclose(elastic, parts, atol=1e-10 * np.abs(parts).max())
+    viscous = response(mesh, nodes, cell_state(mesh, 0.0, 0.0, 0.0, 1.0)).force[:, TOTAL]
+    expected = parts + state.viscous_modulus[:, None] * viscous
+    np.testing.assert_allclose(mixed.force[:, TOTAL], expected, atol=1e-10 * np.abs(parts).max())
+    assert not np.allclose(mixed.tangent, response(mesh, nodes, same).tangent)
 
 
-def test_viscous_force_does_the_work_of_the_growth_of_strain(mesh):
-    """A wall that swells from 1.05 to 1.1 times its size: S is the growth of E, and its work by the way on 3 S l dl."""
-    scale, wall = load(mesh, 0.0, 0.0, 0.0, viscosity=1.0), np.sum(body(mesh).weight)
-    work = np.sum(summed(mesh, respond(mesh, 1.1 * mesh.nodes, scale).force[:, WHOLE]) * mesh.nodes)
+def test_viscous_force_does_the_work_of_the_strain_increment(mesh):
+    """A wall that swells from 1.05 to 1.1 times its size: S is the increment of E, and its virtual work 3 S l dl."""
+    state, wall = cell_state(mesh, 0.0, 0.0, 0.0, viscosity=1.0), np.sum(elements(mesh).weight)
+    work = np.sum(summed(mesh, response(mesh, 1.1 * mesh.nodes, state).force[:, TOTAL]) * mesh.nodes)
     assert work == pytest.approx(3 * (1.1**2 - 1.05**2) / 2 * 1.1 * wall, rel=1e-12)
 
 
@@ -118,6 +120,6 @@ def test_bytes_do_not_depend_on_the_number_of_threads(mesh):
     before, results = numba.get_num_threads(), []
     for threads in {1, before}:
         numba.set_num_threads(threads)
-        results.append(respond(mesh, nodes, load(mesh, pressure=1e3)))
+        results.append(response(mesh, nodes, cell_state(mesh, pressure=1e3)))
     numba.set_num_threads(before)
     assert all(a.tobytes() == b.tobytes() for a, b in zip(results[0], results[-1], strict=True))

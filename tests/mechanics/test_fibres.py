@@ -34,7 +34,7 @@ def assert_right_handed(frames):
     np.testing.assert_allclose(np.linalg.det(frames), 1)
 
 
-def test_depth_is_the_share_of_the_radius_in_a_hemisphere():
+def test_depth_is_linear_in_the_radius_of_a_hemisphere():
     sphere = Geometry(endo_radius_mm=2.0, endo_length_mm=2.0, wall_mm=2.0, apex_wall_mm=2.0, base_mm=0.0, **COARSE)
     mesh = left_ventricle(sphere)
     radius = np.linalg.norm(mesh.nodes, axis=1)
@@ -61,7 +61,7 @@ def test_axes_are_orthonormal_right_handed_and_point_as_named(wall):
 
 
 def test_axes_stand_where_no_direction_is_circumferential_or_there_is_no_normal():
-    axes = fibres.axes_about(np.array([[0, 0, -2.0], [0, 0, 1e-300], [0, 0, 0]]))
+    axes = fibres.axes_from_normal(np.array([[0, 0, -2.0], [0, 0, 1e-300], [0, 0, 0]]))
     assert_right_handed(axes)
     np.testing.assert_array_equal(axes[0, 0], [0, 0, -1])
     np.testing.assert_array_equal(axes[2], np.eye(3))
@@ -92,7 +92,7 @@ def test_default_fibres_are_those_of_a_helix_in_the_wall(wall):
     mesh, depth = wall
     xi, _ = tetrahedron()
     frames, axes = fibres.fibre_frames(mesh, depth, Fibres(), xi), fibres.wall_axes(mesh, depth, xi)
-    helix = np.radians(84 - 126 * fibres.at_points(mesh, depth, xi))[..., None]
+    helix = np.radians(84 - 126 * fibres.interpolate_in_cells(mesh, depth, xi))[..., None]
     along = np.cos(helix) * axes[..., 1, :] + np.sin(helix) * axes[..., 2, :]
     np.testing.assert_allclose(frames[..., 0, :], along, atol=1e-14)
     # What is off leaves no trace, not even of rounding.
@@ -104,8 +104,8 @@ def test_angles_of_both_sides_come_back(wall):
     mesh, depth = wall
     frames, axes = fibres.fibre_frames(mesh, depth, ORTHOTROPIC, VERTICES), fibres.wall_axes(mesh, depth, VERTICES)
     assert_right_handed(frames)
-    at = fibres.at_points(mesh, depth, VERTICES)
-    helix, transverse, sheet = (np.degrees(angle) for angle in angles.read(frames, axes))
+    at = fibres.interpolate_in_cells(mesh, depth, VERTICES)
+    helix, transverse, sheet = (np.degrees(angle) for angle in angles.angles_from_frames(frames, axes))
     np.testing.assert_allclose(helix, 70 - 110 * at, atol=1e-9)
     np.testing.assert_allclose(transverse, -12 + 32 * at, atol=1e-9)
     np.testing.assert_allclose(sheet, -65 + 90 * at, atol=1e-9)
@@ -114,7 +114,7 @@ def test_angles_of_both_sides_come_back(wall):
 
 def test_stepwise_rule_gives_one_angle_a_layer():
     depth = np.linspace(0, 1, 601)
-    helix, transverse, sheet = fibres.angles_at(Fibres(stepwise=True, sheet_epi_deg=60.0), depth)
+    helix, transverse, sheet = fibres.rule_angles(Fibres(stepwise=True, sheet_epi_deg=60.0), depth)
     np.testing.assert_allclose(np.degrees(np.unique(helix)), np.arange(-31.5, 74, 21))
     np.testing.assert_allclose(np.degrees(np.unique(sheet)), np.arange(5, 60, 10))
     assert not transverse.any()
@@ -124,33 +124,33 @@ def test_stepwise_rule_gives_one_angle_a_layer():
 def test_fibres_of_a_file_stand_at_every_point_of_their_cell_in_a_right_handed_frame(wall):
     mesh, depth = wall
     random = np.random.default_rng(0)
-    given, lean = random.normal(size=(2, len(mesh.cells), 3))
-    carried = replace(mesh, fibre=given, sheet=lean)
-    frames = fibres.fibre_frames(carried, depth, Fibres(source="file"), VERTICES)
+    fibre, sheet = random.normal(size=(2, len(mesh.cells), 3))
+    with_fibres = replace(mesh, fibre=fibre, sheet=sheet)
+    frames = fibres.fibre_frames(with_fibres, depth, Fibres(source="file"), VERTICES)
     assert_right_handed(frames)
     assert np.ptp(frames, axis=1).max() == 0
-    np.testing.assert_allclose(np.cross(frames[:, 0, 0], given), 0, atol=1e-12)
+    np.testing.assert_allclose(np.cross(frames[:, 0, 0], fibre), 0, atol=1e-12)
     # The sheet stays in the plane of the two, on its own side.
-    np.testing.assert_allclose(np.sum(frames[:, 0, 2] * lean, axis=-1), 0, atol=1e-12)
-    assert np.all(np.sum(frames[:, 0, 1] * lean, axis=-1) > 0)
+    np.testing.assert_allclose(np.sum(frames[:, 0, 2] * sheet, axis=-1), 0, atol=1e-12)
+    assert np.all(np.sum(frames[:, 0, 1] * sheet, axis=-1) > 0)
 
 
 def test_without_sheets_those_of_a_file_lie_in_the_wall(wall):
     mesh, depth = wall
     rule = fibres.fibre_frames(mesh, depth, Fibres(), fibres.CENTROID)
-    carried = replace(mesh, fibre=3 * rule[:, 0, 0])
+    with_fibres = replace(mesh, fibre=3 * rule[:, 0, 0])
     np.testing.assert_allclose(
-        fibres.fibre_frames(carried, depth, Fibres(source="file"), fibres.CENTROID), rule, atol=1e-12
+        fibres.fibre_frames(with_fibres, depth, Fibres(source="file"), fibres.CENTROID), rule, atol=1e-12
     )
 
 
 @pytest.mark.parametrize(
     ("fibre", "sheet", "sentence"),
     [
-        (None, None, "the mesh carries no fibre directions: name them"),
-        ([0.0, 0, 0], None, "1 of 720 cells have no fibre direction: mend the file"),
+        (None, None, "the mesh has no fibre directions: name them"),
+        ([0.0, 0, 0], None, "1 of 720 cells have no fibre direction: repair the file"),
         ([np.nan, 0, 0], None, "1 of 720 cells have no fibre direction"),
-        ([0, 1.0, 0], [0, 2.0, 0], "1 of 720 cells have no sheet direction across its fibre"),
+        ([0, 1.0, 0], [0, 2.0, 0], "1 of 720 cells have no sheet direction across the fibre"),
     ],
 )
 def test_a_file_that_lacks_directions_is_refused(wall, fibre, sheet, sentence):
@@ -168,17 +168,17 @@ def test_disarray_turns_the_fibres_in_the_wall_by_as_much_as_asked_for(wall, sou
     mesh, depth = wall
     mesh = replace(mesh, fibre=fibres.fibre_frames(mesh, depth, Fibres(), fibres.CENTROID)[:, 0, 0])
     straight = Fibres(source=source)
-    messy = straight.model_copy(update={"disarray_deg": 12.0, "disarray_length_mm": 0.2})
+    disarrayed = straight.model_copy(update={"disarray_deg": 12.0, "disarray_length_mm": 0.2})
     xi, _ = tetrahedron()
     axes, before = fibres.wall_axes(mesh, depth, xi), fibres.fibre_frames(mesh, depth, straight, xi)
-    after = fibres.fibre_frames(mesh, depth, messy, xi, seed=4)
+    after = fibres.fibre_frames(mesh, depth, disarrayed, xi, seed=4)
     assert_right_handed(after)
-    (helix, *rest), (turned, *still) = angles.read(before, axes), angles.read(after, axes)
+    (helix, *rest), (turned, *still) = angles.angles_from_frames(before, axes), angles.angles_from_frames(after, axes)
     turn = np.degrees((turned - helix + np.pi / 2) % np.pi - np.pi / 2)
     assert np.std(turn) == pytest.approx(12, rel=0.05)
     assert abs(np.mean(turn)) < 1
     if source == "rule":
         np.testing.assert_allclose(still, rest, atol=1e-9)
-    same = fibres.fibre_frames(mesh, depth, messy, xi, seed=4)
+    same = fibres.fibre_frames(mesh, depth, disarrayed, xi, seed=4)
     assert same.tobytes() == after.tobytes()
-    assert np.abs(fibres.fibre_frames(mesh, depth, messy, xi, seed=5) - after).max() > 0.1
+    assert np.abs(fibres.fibre_frames(mesh, depth, disarrayed, xi, seed=5) - after).max() > 0.1

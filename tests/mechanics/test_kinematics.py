@@ -27,7 +27,7 @@ def turn(angle):
 
 def test_rotation_is_no_strain(wall):
     mesh, axes, frames = wall
-    motion = kinematics.motion(mesh, moved(mesh, turn(0.4), turn(2.0)), axes, frames)
+    motion = kinematics.centroid_strains(mesh, moved(mesh, turn(0.4), turn(2.0)), axes, frames)
     for name, values in motion.items():
         np.testing.assert_allclose(values if "strain" in name else 0, 0, atol=1e-12)
 
@@ -36,7 +36,7 @@ def test_widening_is_circumferential_and_lengthening_longitudinal(wall):
     mesh, axes, frames = wall
     wide, long = 1.2, 0.9
     stretched = moved(mesh, np.diag([wide, wide, long]))
-    strains = kinematics.motion(mesh, stretched, axes, frames)["strain_unloaded"][0]
+    strains = kinematics.centroid_strains(mesh, stretched, axes, frames)["strain_unloaded"][0]
     np.testing.assert_allclose(strains[:, 1], (wide**2 - 1) / 2, atol=1e-12)
     np.testing.assert_allclose(strains[:, [3, 5]], 0, atol=1e-12)
     slope = axes[:, 2, 2] ** 2
@@ -48,29 +48,29 @@ def test_strain_since_ed_forgets_what_came_before(wall):
     mesh, axes, frames = wall
     before = np.array([[1.1, 0.1, 0], [0, 0.9, 0.2], [0, 0.1, 1.05]])
     after = np.diag([1.1, 1.0, 0.8]) @ before
-    motion = kinematics.motion(mesh, moved(mesh, before, after), axes, frames)
+    motion = kinematics.centroid_strains(mesh, moved(mesh, before, after), axes, frames)
     np.testing.assert_allclose(motion["strain"][0], 0, atol=1e-12)
     np.testing.assert_allclose(motion["strain"][1][:, :3].sum(axis=1), (1.21 + 1 + 0.64 - 3) / 2, atol=1e-12)
     np.testing.assert_allclose(motion["fibre_strain"][1][:, :3].sum(axis=1), (1.21 + 1 + 0.64 - 3) / 2, atol=1e-12)
 
 
-def test_carried_axes_stay_orthonormal_and_follow_the_material(wall):
+def test_deformed_axes_stay_orthonormal_and_follow_the_material(wall):
     _, axes, frames = wall
     gradient = np.broadcast_to(np.array([[1.1, 0.1, 0], [0, 0.9, 0.2], [0, 0.1, 1.05]]), axes.shape)
-    for carried in (kinematics.carried_axes(axes, gradient), kinematics.carried_fibres(frames, gradient)):
+    for deformed in (kinematics.deformed_wall_axes(axes, gradient), kinematics.deformed_fibre_frames(frames, gradient)):
         np.testing.assert_allclose(
-            carried @ carried.swapaxes(-1, -2), np.broadcast_to(np.eye(3), axes.shape), atol=1e-12
+            deformed @ deformed.swapaxes(-1, -2), np.broadcast_to(np.eye(3), axes.shape), atol=1e-12
         )
-        np.testing.assert_allclose(np.linalg.det(carried), 1)
+        np.testing.assert_allclose(np.linalg.det(deformed), 1)
     fibre = np.einsum("cij,cj->ci", gradient, frames[:, 0])
-    followed = kinematics.carried_fibres(frames, gradient)[:, 0]
+    followed = kinematics.deformed_fibre_frames(frames, gradient)[:, 0]
     np.testing.assert_allclose(np.cross(fibre, followed), 0, atol=1e-12)
 
 
 def test_fibre_strain_is_the_change_of_length_along_the_fibre(wall):
     mesh, axes, frames = wall
     gradient = np.array([[1.1, 0.1, 0], [0, 0.9, 0.2], [0, 0.1, 1.05]])
-    strains = kinematics.motion(mesh, moved(mesh, gradient), axes, frames)["fibre_strain_unloaded"][0]
+    strains = kinematics.centroid_strains(mesh, moved(mesh, gradient), axes, frames)["fibre_strain_unloaded"][0]
     length = np.linalg.norm(frames[:, 0] @ gradient.T, axis=1)
     np.testing.assert_allclose(strains[:, 0], (length**2 - 1) / 2)
     sheet, normal = gradient @ frames[:, 1, :, None], gradient @ frames[:, 2, :, None]
@@ -92,6 +92,6 @@ def test_layers_add_up_to_the_wall(wall):
     layers = kinematics.layer_strain(values, weight, layer, 6)
     assert np.isnan(layers[:, 5]).all()
     share = np.array([weight[layer == k].sum() for k in range(1, 6)]) / weight.sum()
-    mean, sd = kinematics.weighted(values, weight)
+    mean, sd = kinematics.weighted_mean_sd(values, weight)
     np.testing.assert_allclose(np.einsum("l,flc->fc", share, layers[:, :5]), mean)
     assert sd == pytest.approx(np.ones((2, 6)), abs=0.2)

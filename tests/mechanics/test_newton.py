@@ -1,4 +1,4 @@
-"""Inflation against the exact sphere, and what is said when there is no equilibrium."""
+"""Inflation against the exact sphere, and the errors when there is no equilibrium."""
 
 import logging
 
@@ -14,8 +14,8 @@ from echotruth.mechanics.beat import beat
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver import element
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
-from echotruth.mechanics.solver.newton import Diverged, Walk
-from echotruth.mechanics.solver.support import of_base
+from echotruth.mechanics.solver.newton import Diverged, LoadStepper
+from echotruth.mechanics.solver.support import base_support
 
 INNER, OUTER, B, C = 2e-3, 3e-3, 3.0, 1.5e3
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 2}
@@ -31,8 +31,8 @@ def sphere_pressure(inner):
     def difference(stretch):
         """Tangential less radial Cauchy stress at the stretches stretch^-2, stretch, stretch."""
         radial, tangential = (stretch**-4 - 1) / 2, (stretch**2 - 1) / 2
-        growth = C * B * np.exp(B * (radial**2 + 2 * tangential**2))
-        return growth * (stretch**2 * tangential - stretch**-4 * radial)
+        factor = C * B * np.exp(B * (radial**2 + 2 * tangential**2))
+        return factor * (stretch**2 * tangential - stretch**-4 * radial)
 
     def integrand(r):
         return 2 * difference(r / (r**3 - inner**3 + INNER**3) ** (1 / 3)) / r
@@ -46,28 +46,28 @@ def hemisphere():
     mesh = left_ventricle(Geometry(**size, **COARSE))
     frames = fibres.fibre_frames(mesh, fibres.wall_depth(mesh), Fibres(), tetrahedron()[0])
     constants = LAWS["fung"].Law(fibre=B, transverse=B, shear=B).constants()
-    law = element.Law(compiled("fung"), constants, np.array([0.0, 2.0]), 1e8)
-    heart = Equilibrium(mesh, frames, law, of_base(mesh, "radial_free"))
-    yield heart
-    heart.close()
+    law = element.WallLaw(compiled("fung"), constants, np.array([0.0, 2.0]), 1e8)
+    equations = Equilibrium(mesh, frames, law, base_support(mesh, "radial_free"))
+    yield equations
+    equations.close()
 
 
 def test_half_a_sphere_inflates_as_the_exact_one(hemisphere):
-    walk = Walk(hemisphere, C)
+    stepper = LoadStepper(hemisphere, C)
     for inner in (2.2e-3, 2.5e-3):
-        state = walk.to(Load(sphere_pressure(inner), 1.0), None)
+        state = stepper.advance(Load(sphere_pressure(inner), 1.0), None)
         radius = (3 * hemisphere.volume(state) / (2 * np.pi)) ** (1 / 3)
         assert radius == pytest.approx(inner, rel=3e-3)
 
 
 def test_stiffness_is_found_from_pressure_and_volume(hemisphere):
-    walk = Walk(hemisphere, 0.7 * C)
+    stepper = LoadStepper(hemisphere, 0.7 * C)
     pressure, volume = sphere_pressure(2.3e-3), 2 / 3 * np.pi * 2.3e-3**3
-    walk.to(Load(pressure, volume), None)
-    state = walk.to(Load(pressure, volume), "stiffness")
+    stepper.advance(Load(pressure, volume), None)
+    state = stepper.advance(Load(pressure, volume), "stiffness")
     assert state.stiffness == pytest.approx(C, rel=0.01)
     assert hemisphere.volume(state) == pytest.approx(volume, rel=1e-7)
-    assert hemisphere.imbalance(state, Load(pressure, volume), "stiffness").force_error < 1e-7
+    assert hemisphere.residual(state, Load(pressure, volume), "stiffness").force_error < 1e-7
 
 
 def test_heart_that_cannot_be_filled_says_what_to_change():
@@ -77,10 +77,10 @@ def test_heart_that_cannot_be_filled_says_what_to_change():
 
 
 def test_load_without_equilibrium_ends_in_one_sentence(hemisphere, caplog):
-    walk = Walk(hemisphere, C)
+    stepper = LoadStepper(hemisphere, C)
     with (
         caplog.at_level(logging.DEBUG, "echotruth.mechanics"),
         pytest.raises(Diverged, match=r"kPa and a volume of .* uL"),
     ):
-        walk.to(Load(1e3, 1e-12), "tension")
+        stepper.advance(Load(1e3, 1e-12), "tension")
     assert any("step of the load halved" in message for message in caplog.messages)

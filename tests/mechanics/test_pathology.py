@@ -6,7 +6,7 @@ import pytest
 from echotruth.config import Geometry, Pathology
 from echotruth.config.pathology import Infarct, LateActivation
 from echotruth.mechanics.geometry import cell_volumes, left_ventricle
-from echotruth.mechanics.pathology import PathologyError, centre_of_ball, tissue
+from echotruth.mechanics.pathology import PathologyError, infarct_centre, tissue
 
 CONTRACTING, STIFF = {"tension_scale": 0.2}, {"stiffness_scale": 8.0}
 
@@ -44,7 +44,7 @@ def test_nothing_ails_a_heart_by_default(hemisphere):
 
 def test_a_ball_is_centred_in_the_wall_and_has_the_volume_of_a_ball(hemisphere):
     infarct = Infarct(radius_mm=0.95, position=0.5, azimuth_deg=-120.0)
-    centre = centre_of_ball(hemisphere.mesh, hemisphere.depth, infarct)
+    centre = infarct_centre(hemisphere.mesh, hemisphere.depth, infarct)
     assert np.linalg.norm(centre) == pytest.approx(3e-3, abs=3e-6)
     assert centre[2] == pytest.approx(-1e-3)
     assert np.degrees(np.arctan2(centre[1], centre[0])) == pytest.approx(-120)
@@ -79,17 +79,17 @@ def test_a_subendocardial_infarct_keeps_to_the_depth(hemisphere):
 def test_the_border_zone_fades_linearly_with_the_distance(hemisphere):
     ball = {"radius_mm": 0.7, "position": 0.6, "azimuth_deg": 180.0}
     ill = hemisphere.with_(**ball, border_mm=0.8, **CONTRACTING, **STIFF)
-    centre = centre_of_ball(hemisphere.mesh, hemisphere.depth, Infarct(**ball))
+    centre = infarct_centre(hemisphere.mesh, hemisphere.depth, Infarct(**ball))
     beyond = np.linalg.norm(hemisphere.centre - centre, axis=1) - 0.7e-3
-    share = np.clip(1 - beyond / 0.8e-3, 0, 1)
+    weight = np.clip(1 - beyond / 0.8e-3, 0, 1)
     # The samples of the infarct are a quarter of an edge apart.
-    np.testing.assert_allclose(ill.stiffness_scale, 1 + 7 * share, atol=7 * 0.15)
+    np.testing.assert_allclose(ill.stiffness_scale, 1 + 7 * weight, atol=7 * 0.15)
     np.testing.assert_allclose(ill.stiffness_scale - 1, (1 - ill.tension_scale) * 7 / 0.8, atol=1e-12)
     border = ill.region == 2
     assert np.all(beyond[border] > -0.02e-3) and np.all(beyond[border] < 0.8e-3)
     assert np.all((ill.tension_scale[border] > 0.2) & (ill.tension_scale[border] < 1))
     assert np.all(ill.region[beyond > 0.81e-3] == 0)
-    assert np.std(ill.stiffness_scale[border] - 1 - 7 * share[border]) < 0.15
+    assert np.std(ill.stiffness_scale[border] - 1 - 7 * weight[border]) < 0.15
 
 
 def test_without_a_border_the_edge_is_sharp(hemisphere):

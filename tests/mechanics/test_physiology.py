@@ -1,11 +1,19 @@
-"""Measures of motions made by formula, and the verdict on hearts within and out of bounds."""
+"""Measures of motions made by formula, and the bounds on hearts."""
 
 import numpy as np
 import pytest
 
 from echotruth.config import Config, Fibres, Geometry, Loop, Physiology
 from echotruth.mechanics.beat import beat
-from echotruth.mechanics.physiology import APEX, BASE, BOUNDS, measures, rotation, twist, verdict
+from echotruth.mechanics.physiology import (
+    APICAL_SLICE,
+    BASAL_SLICE,
+    BOUNDS,
+    measures,
+    slice_rotation,
+    twist,
+    violated_bound,
+)
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
 WELL = {
@@ -26,34 +34,34 @@ def turned(mesh, degrees):
     return np.stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, z], axis=-1)
 
 
-def place(mesh):
-    """Share of the way from the base to the endocardial apex, of every node."""
+def relative_height(mesh):
+    """Distance from the base, over that of the endocardial apex, of every node."""
     return mesh.nodes[:, 2] / mesh.nodes[mesh.endo, 2].min()
 
 
 def test_twist_is_what_was_imposed_and_positive_as_in_health(coarse_mesh):
     steps = [(0, 0), (-10, 3), (-25, 5), (4, -6)]
-    frames = np.stack([turned(coarse_mesh, np.where(place(coarse_mesh) > 0.5, *step)) for step in steps])
+    frames = np.stack([turned(coarse_mesh, np.where(relative_height(coarse_mesh) > 0.5, *step)) for step in steps])
     found = twist(coarse_mesh.nodes, coarse_mesh.endo, frames)
     np.testing.assert_allclose(np.degrees(found), [base - apex for apex, base in steps], atol=1e-9)
 
 
 def test_even_twist_counts_between_the_slices(coarse_mesh):
-    frames = np.stack([turned(coarse_mesh, -rate * place(coarse_mesh)) for rate in (0, 20)])
+    frames = np.stack([turned(coarse_mesh, -rate * relative_height(coarse_mesh)) for rate in (0, 20)])
     found = np.degrees(twist(coarse_mesh.nodes, coarse_mesh.endo, frames))
-    assert found[1] == pytest.approx(20 * (APEX - BASE), rel=0.1)
+    assert found[1] == pytest.approx(20 * (APICAL_SLICE - BASAL_SLICE), rel=0.1)
 
 
 def test_twist_beyond_half_a_turn_goes_on(coarse_mesh):
     rates = np.linspace(0, 260, 6)
-    frames = np.stack([turned(coarse_mesh, np.where(place(coarse_mesh) > 0.5, -rate, 0)) for rate in rates])
+    frames = np.stack([turned(coarse_mesh, np.where(relative_height(coarse_mesh) > 0.5, -rate, 0)) for rate in rates])
     np.testing.assert_allclose(np.degrees(twist(coarse_mesh.nodes, coarse_mesh.endo, frames)), rates, atol=1e-9)
 
 
 def test_shift_and_squeeze_are_no_rotation():
     points = np.random.default_rng(0).normal(size=(200, 2))
     squeezed = points @ np.diag([0.8, 0.8]) + [3.0, -1.0]
-    np.testing.assert_allclose(rotation(np.stack([points, squeezed])), 0, atol=1e-12)
+    np.testing.assert_allclose(slice_rotation(np.stack([points, squeezed])), 0, atol=1e-12)
 
 
 def test_measures_are_those_of_the_arrays(coarse_mesh):
@@ -64,8 +72,8 @@ def test_measures_are_those_of_the_arrays(coarse_mesh):
         "displacement": still,
         "pressure": np.array([500.0, 9e3, 13e3, 600.0]),
         "volume": np.array([50e-9, 45e-9, 20e-9, 30e-9]),
-        "pressure_asked": np.full(4, np.nan),
-        "volume_asked": np.array([50e-9, 45e-9, 20e-9, 30.3e-9]),
+        "pressure_target": np.full(4, np.nan),
+        "volume_target": np.array([50e-9, 45e-9, 20e-9, 30.3e-9]),
         "active_tension": np.array([0.0, 30e3, 40e3, -200.0]),
         "es_frame": np.array(2),
     }
@@ -87,12 +95,12 @@ def test_measures_are_those_of_the_arrays(coarse_mesh):
     np.testing.assert_array_equal(found["twist"], np.zeros(4))
 
 
-def test_a_heart_within_all_bounds_has_no_reason():
-    assert verdict(WELL, Physiology()) == ""
+def test_a_heart_within_all_bounds_violates_none():
+    assert violated_bound(WELL, Physiology()) == ""
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "part"),
     [
         (
             {"longitudinal_strain": 0.036},
@@ -109,18 +117,18 @@ def test_a_heart_within_all_bounds_has_no_reason():
         ({"ejection_fraction": 0.95}, "must be at most 0.9"),
     ],
 )
-def test_what_is_out_of_bounds_is_said_in_one_sentence(change, said):
-    reason = verdict(WELL | change, Physiology())
-    assert said in reason
+def test_a_violated_bound_is_reported_in_one_sentence(change, part):
+    reason = violated_bound(WELL | change, Physiology())
+    assert part in reason
     assert reason.endswith(".") and "\n" not in reason
 
 
 def test_a_bound_that_is_null_is_not_used():
     everything = Physiology(**{bound.key: None for bound in BOUNDS})
-    assert verdict({name: np.nan for name in WELL}, everything) == ""
+    assert violated_bound({name: np.nan for name in WELL}, everything) == ""
 
 
-def test_every_bound_of_the_section_is_looked_at():
+def test_every_bound_of_the_section_is_checked():
     assert {bound.key for bound in BOUNDS} == set(Physiology.model_fields) - {"exclude"}
 
 
@@ -130,5 +138,5 @@ def test_every_bound_of_the_section_is_looked_at():
 )
 def test_default_heart_is_plausible_and_one_whose_fibres_make_it_lengthen_is_not(fibres, said):
     case = beat(Config(geometry=COARSE, loop=Loop(frames=10), fibres=fibres))
-    reason = verdict(measures(*(case[name] for name in ("geometry", "mechanics", "kinematics"))), Physiology())
+    reason = violated_bound(measures(*(case[name] for name in ("geometry", "mechanics", "kinematics"))), Physiology())
     assert reason.startswith(said) and bool(reason) == bool(said)

@@ -12,13 +12,13 @@ from echotruth.config.loading import load
 from echotruth.fem.tetrahedra import Mesh, shape
 from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
-from echotruth.imaging.bmode import clip, time_gain
-from echotruth.imaging.medium.phantom import scatter
-from echotruth.imaging.view import plane
+from echotruth.imaging.bmode import bmode_clip, time_gain_compensation
+from echotruth.imaging.medium.phantom import seed_wall
+from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.fibres import CENTROID
 from echotruth.mechanics.geometry import cell_volumes, left_ventricle
 from echotruth.mechanics.physiology import measures
-from echotruth.mechanics.prescribed import MotionError, course, move, prescribed
+from echotruth.mechanics.prescribed import MotionError, displacement_at, motion_amplitude, prescribed_motion
 
 INNER, OUTER, LENGTH = 1.45e-3, 2.45e-3, 6.8e-3
 """Of the default tube, m."""
@@ -34,7 +34,7 @@ def config(kind, elements=(12, 4, 1), frames=2, **section):
 
 
 def heart(config, arrays=None):
-    arrays = arrays or prescribed(config)
+    arrays = arrays or prescribed_motion(config)
     geometry, mechanics = arrays["geometry"], arrays["mechanics"]
     return Heart(
         geometry["node_position"],
@@ -67,21 +67,27 @@ def cylinder_strain(section, radius):
 @pytest.mark.parametrize("name", ["cosine", "triangle"])
 @pytest.mark.parametrize("frames", [2, 5, 20])
 def test_cycles_begin_at_rest_and_are_whole_at_mid_cycle(name, frames):
-    share = course(name, frames)
-    assert share[0] == 0 and share[frames // 2] == pytest.approx(1, abs=1e-15) and share.argmax() == frames // 2
+    amplitude = motion_amplitude(name, frames)
+    assert (
+        amplitude[0] == 0
+        and amplitude[frames // 2] == pytest.approx(1, abs=1e-15)
+        and amplitude.argmax() == frames // 2
+    )
     if frames == 20:
-        np.testing.assert_allclose(share[1:10], share[:10:-1], atol=1e-15)
+        np.testing.assert_allclose(amplitude[1:10], amplitude[:10:-1], atol=1e-15)
 
 
 def test_triangle_and_ramp_go_in_equal_steps_and_the_cosine_is_smooth():
-    np.testing.assert_allclose(course("triangle", 20)[:11], np.arange(11) / 10)
-    np.testing.assert_allclose(course("ramp", 11), np.arange(11) / 10)
-    np.testing.assert_allclose(course("cosine", 40), (1 - np.cos(2 * np.pi * np.arange(40) / 40)) / 2, atol=1e-15)
+    np.testing.assert_allclose(motion_amplitude("triangle", 20)[:11], np.arange(11) / 10)
+    np.testing.assert_allclose(motion_amplitude("ramp", 11), np.arange(11) / 10)
+    np.testing.assert_allclose(
+        motion_amplitude("cosine", 40), (1 - np.cos(2 * np.pi * np.arange(40) / 40)) / 2, atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("kind", ["rigid", "affine", "cylinder"])
 def test_nothing_has_moved_at_end_diastole_and_most_at_end_systole(kind):
-    mechanics = prescribed(config(kind, frames=3))["mechanics"]
+    mechanics = prescribed_motion(config(kind, frames=3))["mechanics"]
     assert not mechanics["displacement"][0].any()
     assert np.linalg.norm(mechanics["displacement"], axis=-1).max(axis=1).argmax() == mechanics["es_frame"] == 2
 
@@ -105,42 +111,44 @@ def test_the_ventricle_of_a_file_or_preset_can_be_shifted_as_well():
         loop={"file": "mouse", "frames": 2},
         motion=section,
     )
-    np.testing.assert_allclose(prescribed(setting)["mechanics"]["displacement"][1] - [-50e-6, 0, 0], 0, atol=1e-18)
+    np.testing.assert_allclose(
+        prescribed_motion(setting)["mechanics"]["displacement"][1] - [-50e-6, 0, 0], 0, atol=1e-18
+    )
 
 
 def test_a_shift_has_its_components_in_the_short_axis_image_and_no_strain():
     setting = config("rigid", lateral_um=30.0, axial_um=-20.0, elevation_um=10.0)
-    arrays = prescribed(setting)
+    arrays = prescribed_motion(setting)
     moving = heart(setting, arrays)
-    view = plane(setting.views["mid"], setting.rf, moving.positions(0)[moving.endo.ravel()])
-    shift = view.image(moving.positions(1)) - view.image(moving.positions(0))
+    view = imaging_plane(setting.views["mid"], setting.rf, moving.positions(0)[moving.endo.ravel()])
+    shift = view.to_image(moving.positions(1)) - view.to_image(moving.positions(0))
     np.testing.assert_allclose(shift, np.tile([30e-6, -20e-6, 10e-6], (len(shift), 1)), atol=1e-17)
     assert np.abs(arrays["kinematics"]["strain"]).max() < 1e-7
 
 
 def test_a_turn_is_counter_clockwise_in_the_image_and_no_strain():
     setting = config("rigid", lateral_um=0.0, axial_um=0.0, turn_deg=30.0)
-    arrays = prescribed(setting)
+    arrays = prescribed_motion(setting)
     moving = heart(setting, arrays)
-    view = plane(setting.views["mid"], setting.rf, moving.positions(0)[moving.endo.ravel()])
-    x, depth, _ = (view.image(moving.positions(0)) - [0, 6.5e-3, 0]).T
+    view = imaging_plane(setting.views["mid"], setting.rf, moving.positions(0)[moving.endo.ravel()])
+    x, depth, _ = (view.to_image(moving.positions(0)) - [0, 6.5e-3, 0]).T
     expected = x * np.cos(np.radians(30)) + depth * np.sin(np.radians(30))  # depth points down in the image
-    np.testing.assert_allclose(view.image(moving.positions(1))[:, 0], expected, atol=1e-17)
+    np.testing.assert_allclose(view.to_image(moving.positions(1))[:, 0], expected, atol=1e-17)
     assert np.abs(arrays["kinematics"]["strain"]).max() < 1e-7
 
 
 def test_an_affine_motion_has_its_gradient_in_the_image_in_every_frame_and_element():
     gradient = np.array([[0.8, 0.1, 0.05], [-0.2, 1.2, 0.1], [0.03, -0.04, 0.9]])
     setting = config("affine", frames=3, gradient=gradient.tolist(), position=0.5)
-    arrays = prescribed(setting)
+    arrays = prescribed_motion(setting)
     moving = heart(setting, arrays)
-    turn = plane(setting.views["mid"], setting.rf, moving.positions(0)[moving.endo.ravel()]).axes
-    for frame, share in enumerate((0, 0.5, 1)):
-        expected = turn.T @ (np.eye(3) + share * (gradient - np.eye(3))) @ turn
+    turn = imaging_plane(setting.views["mid"], setting.rf, moving.positions(0)[moving.endo.ravel()]).axes
+    for frame, amplitude in enumerate((0, 0.5, 1)):
+        expected = turn.T @ (np.eye(3) + amplitude * (gradient - np.eye(3))) @ turn
         found = arrays["kinematics"]["deformation_gradient"][frame]
         np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=1e-6)
     mesh = left_ventricle(setting.geometry)
-    np.testing.assert_allclose(move(setting, mesh, np.array([0, 0, -LENGTH / 2]), 1.0), 0, atol=1e-18)
+    np.testing.assert_allclose(displacement_at(setting, mesh, np.array([0, 0, -LENGTH / 2]), 1.0), 0, atol=1e-18)
 
 
 def test_the_cylinder_has_the_gradient_of_its_formula():
@@ -149,7 +157,7 @@ def test_the_cylinder_has_the_gradient_of_its_formula():
     mesh, random = left_ventricle(setting.geometry), np.random.default_rng(1)
     radius, turn = random.uniform(INNER, OUTER, 50), random.uniform(0, 2 * np.pi, 50)
     place = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), random.uniform(-LENGTH, 0, 50)])
-    by = partial(move, setting, mesh, share=1.0)
+    by = partial(displacement_at, setting, mesh, amplitude=1.0)
     slopes = [(by(place + step * axis) - by(place - step * axis)) / (2 * step) for axis in np.eye(3)]
     gradient = np.eye(3) + np.stack(slopes, axis=-1)
     np.testing.assert_allclose(np.linalg.det(gradient), 1, atol=1e-7)
@@ -168,7 +176,7 @@ def test_strain_of_the_cylinder_converges_to_its_closed_form():
         mesh = left_ventricle(setting.geometry)
         radius = np.hypot(*(shape(CENTROID) @ mesh.nodes[mesh.cells])[:, 0, :2].T)
         exact = cylinder_strain(setting.motion.cylinder, radius)
-        found = prescribed(setting)["kinematics"]["strain"][1]
+        found = prescribed_motion(setting)["kinematics"]["strain"][1]
         errors.append(np.sqrt(np.mean((found - exact) ** 2, axis=0)))
     assert errors[1].max() < 0.005
     assert (errors[1] < errors[0] / 2.5).all(), "of second order, 4, where the mesh is fine"
@@ -178,9 +186,9 @@ def test_strain_of_the_cylinder_converges_to_its_closed_form():
 def test_elements_carry_the_tissue_of_the_cylinder_as_the_formula_says(setting, off):
     """Elements of the default mesh, and of config/phantoms.yaml: what carries the scatterers is the truth."""
     mesh = left_ventricle(setting.geometry)
-    displacement = move(setting, mesh, mesh.nodes, 1.0)
+    displacement = displacement_at(setting, mesh, mesh.nodes, 1.0)
     place, found = in_elements(mesh, displacement, np.random.default_rng(1))
-    exact = move(setting, mesh, place, 1.0)
+    exact = displacement_at(setting, mesh, place, 1.0)
     assert np.sqrt(np.sum((found - exact) ** 2) / np.sum(exact**2)) < off
 
 
@@ -188,13 +196,13 @@ def test_elements_carry_the_tissue_of_the_cylinder_as_the_formula_says(setting, 
 def test_elements_carry_rigid_and_affine_motion_to_the_last_bits(kind):
     setting = config(kind, elements=(12, 4, 1))
     mesh = left_ventricle(setting.geometry)
-    place, found = in_elements(mesh, move(setting, mesh, mesh.nodes, 1.0), np.random.default_rng(1))
-    np.testing.assert_allclose(found, move(setting, mesh, place, 1.0), rtol=0, atol=1e-17)
+    place, found = in_elements(mesh, displacement_at(setting, mesh, mesh.nodes, 1.0), np.random.default_rng(1))
+    np.testing.assert_allclose(found, displacement_at(setting, mesh, place, 1.0), rtol=0, atol=1e-17)
 
 
 def test_torsion_twists_as_a_healthy_heart_does_and_there_is_no_loop():
     """The nodes of the slices at 0.2 and 0.8 lie about 5/24 and 19/24; there is nothing else to measure."""
-    arrays = prescribed(config("cylinder", (24, 12, 1), torsion_deg=20.0, endo_turn_deg=0.0))
+    arrays = prescribed_motion(config("cylinder", (24, 12, 1), torsion_deg=20.0, endo_turn_deg=0.0))
     found = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"])
     assert np.degrees(found["twist"][1]) == pytest.approx(20 * 14 / 24)
     assert np.isnan([found["ejection_fraction"], found["tension_min"], found["tension_es"]]).all()
@@ -203,7 +211,7 @@ def test_torsion_twists_as_a_healthy_heart_does_and_there_is_no_loop():
 
 def test_a_motion_into_the_array_is_refused_in_one_sentence():
     with pytest.raises(MotionError) as caught:
-        prescribed(config("rigid", axial_um=-4000.0))
+        prescribed_motion(config("rigid", axial_um=-4000.0))
     assert "motion.rigid moves the wall by up to 4 mm, and it is 3.1 mm from the array" in str(caught.value)
 
 
@@ -213,12 +221,12 @@ def test_the_image_moves_as_asked():
     imaging = {"phantom": {"density_per_mm3": 300.0}, "probe": {"elements": 32}, "rf": {"lines": 128}}
     setting = Config(**{**setting.model_dump(include={"geometry", "loop", "motion"}), **imaging})
     moving = heart(setting)
-    view = plane(setting.views["mid"], setting.rf, moving.positions(0)[moving.endo.ravel()])
-    scatterers = scatter(setting, moving, view, np.random.default_rng(1))
+    view = imaging_plane(setting.views["mid"], setting.rf, moving.positions(0)[moving.endo.ravel()])
+    scatterers = seed_wall(setting, moving, view, np.random.default_rng(1))
     scanner = Scanner(setting.probe, setting.rf, imaging_depth(setting.rf, setting.bmode))
-    places = [scatterers.image(moving.positions(frame), moving.cells, view) for frame in (0, 1)]
+    places = [scatterers.image_positions(moving.positions(frame), moving.cells, view) for frame in (0, 1)]
     lines = np.stack([scanner.lines(place, scatterers.amplitude) for place in places])
-    gain = time_gain(setting.probe, setting.bmode, scanner.range)
-    before, after = clip(lines, scanner.scan, scanner.range, setting.bmode, gain)[512].astype(float)
+    gain = time_gain_compensation(setting.probe, setting.bmode, scanner.range)
+    before, after = bmode_clip(lines, scanner.scan, scanner.range, setting.bmode, gain)[512].astype(float)
     shift = phase_cross_correlation(after, before, upsample_factor=100, normalization=None)[0]
     np.testing.assert_allclose(shift, [-4, 5], atol=0.15)

@@ -34,9 +34,9 @@ def isochoric(c):
     inverse, e, tangent = np.empty(6), np.empty(6), np.empty((6, 6))
     scale = material.isochoric_strain(c, material.invert(c, inverse), e)
     trace, stress = e[:3].sum(), np.array([2.0, 1.0, 3.0, 0.5, 0.7, 0.2]) * e
-    energy = np.sum(material.SHEAR * stress * e) / 2 + trace**3
+    energy = np.sum(material.MULTIPLICITY * stress * e) / 2 + trace**3
     stress[:3] += 3 * trace**2
-    tangent[:] = np.diag(np.array([2.0, 1.0, 3.0, 0.5, 0.7, 0.2]) / material.SHEAR)
+    tangent[:] = np.diag(np.array([2.0, 1.0, 3.0, 0.5, 0.7, 0.2]) / material.MULTIPLICITY)
     tangent[:3, :3] += 6 * trace
     contraction = material.isochoric_stress(c, inverse, scale, stress)
     material.isochoric_tangent(c, inverse, scale, contraction, stress, tangent)

@@ -6,7 +6,7 @@ import pytest
 from echotruth.config import Config, Geometry, Loop, Mechanics
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver.support import of_base, springs
+from echotruth.mechanics.solver.support import base_support, spring_stiffness
 
 HEMISPHERE = Geometry(
     endo_radius_mm=2.0,
@@ -24,7 +24,7 @@ RADIUS, STIFFNESS = 3e-3, 1e6
 def test_springs_push_back_by_the_normal_part_of_a_shift():
     """Over half a sphere the mean square of any component of the normal is a third: force = k 2 pi R^2 / 3."""
     mesh = left_ventricle(HEMISPHERE)
-    matrix = springs(mesh, STIFFNESS)
+    matrix = spring_stiffness(mesh, STIFFNESS)
     np.testing.assert_allclose(matrix, matrix.transpose(0, 2, 1), atol=1e-12)
     for axis in range(3):
         shift = np.tile(np.eye(3)[axis], 6)
@@ -35,9 +35,9 @@ def test_springs_push_back_by_the_normal_part_of_a_shift():
 def test_base_moves_along_its_radius_alone_or_not_at_all():
     mesh = left_ventricle(HEMISPHERE)
     rim = np.unique(mesh.base)
-    free, fixed = (of_base(mesh, base) for base in ("radial_free", "fixed"))
+    free, fixed = (base_support(mesh, base) for base in ("radial_free", "fixed"))
     assert free.free.sum() == fixed.free.sum() + len(rim)
-    np.testing.assert_allclose(np.cross(free.frames[rim, 0], mesh.nodes[rim]), 0, atol=1e-12)
+    np.testing.assert_allclose(np.cross(free.directions[rim, 0], mesh.nodes[rim]), 0, atol=1e-12)
     assert free.free[rim].tolist() == [[True, False, False]] * len(rim)
 
 

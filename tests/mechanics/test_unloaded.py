@@ -28,12 +28,12 @@ def test_heart_imaged_at_end_diastole_is_met_there():
 
 
 def test_loop_is_scaled_to_the_image_and_keeps_its_ejection_fraction():
-    volume = beat(config())["mechanics"]["volume_asked"]
-    asked = beat(Config(geometry=IMAGE.model_copy(update={"state": "unloaded"}), loop=Loop(frames=2)))["mechanics"]
-    assert volume[1] / volume[0] == pytest.approx(asked["volume_asked"][1] / asked["volume_asked"][0])
+    volume = beat(config())["mechanics"]["volume_target"]
+    unscaled = beat(Config(geometry=IMAGE.model_copy(update={"state": "unloaded"}), loop=Loop(frames=2)))["mechanics"]
+    assert volume[1] / volume[0] == pytest.approx(unscaled["volume_target"][1] / unscaled["volume_target"][0])
 
 
 def test_image_for_which_none_is_found_is_refused_in_one_sentence(monkeypatch):
-    monkeypatch.setattr(unloaded, "_MOST_ROUNDS", 2)
+    monkeypatch.setattr(unloaded, "_MAX_ITERATIONS", 2)
     with pytest.raises(Diverged, match=r"fills to the image at 0\.533 kPa: raise stiffness_kPa"):
         beat(config())

@@ -11,7 +11,7 @@ def made():
     image = np.random.default_rng(0).integers(0, 120, (4, 96, 96)).astype(np.uint8)
     position = np.stack(np.meshgrid([40.0, 56.0], [40.0, 56.0]), -1).reshape(-1, 2)
     motion = np.arange(4)[:, None, None] * np.array([2.0, 1.0]) * 1e-4
-    return clip.Clip(image, 1e-4, np.arange(4) * 3e-3, position, np.broadcast_to(motion, (4, 4, 2)).copy())
+    return clip.ClipWithMotion(image, 1e-4, np.arange(4) * 3e-3, position, np.broadcast_to(motion, (4, 4, 2)).copy())
 
 
 def test_thin_keeps_its_distance():
@@ -33,14 +33,14 @@ def test_lost_points_do_not_stop_the_clip(made):
     assert clip.render(made, 120).std() > 5
 
 
-def test_gif_and_film(made, tmp_path):
+def test_gif_and_video(made, tmp_path):
     frames = clip.render(made, 120)
     picture = Image.open(clip.gif(tmp_path / "clip.gif", frames))
     assert picture.n_frames == 4 and picture.size == (120, 120) and picture.info["duration"] == 50
-    film = clip.mp4(tmp_path / "clip.mp4", frames).read_bytes()
-    assert film[4:8] == b"ftyp" and len(film) > 1000
+    video = clip.mp4(tmp_path / "clip.mp4", frames).read_bytes()
+    assert video[4:8] == b"ftyp" and len(video) > 1000
 
 
 def test_gif_of_noise_stays_small(tmp_path):
     frames = np.random.default_rng(0).integers(0, 256, (40, 400, 400, 1)).astype(np.uint8).repeat(3, -1)
-    assert clip.gif(tmp_path / "clip.gif", frames).stat().st_size < 1.3 * clip.LARGEST
+    assert clip.gif(tmp_path / "clip.gif", frames).stat().st_size < 1.3 * clip.MAX_GIF_BYTES

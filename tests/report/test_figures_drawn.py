@@ -20,8 +20,8 @@ def seen(path):
 
 def test_loop(tmp_path):
     pressure, volume = 500 + 13000 * WAVE, 50e-9 - 30e-9 * WAVE
-    asked = np.stack([pressure, volume])
-    seen(loop.draw(tmp_path / "loop.png", TIME, 5, 4e4 * WAVE, 1.01 * asked, asked))
+    target = np.stack([pressure, volume])
+    seen(loop.draw(tmp_path / "loop.png", TIME, 5, 4e4 * WAVE, 1.01 * target, target))
 
 
 def test_without_pressures_there_are_words_in_place_of_the_loop(tmp_path):
@@ -53,16 +53,16 @@ def test_views(tmp_path):
 
 
 def test_error(tmp_path):
-    curves = {"faithful": {64: np.full(6, 3e-5), 32: np.full(6, np.nan)}, "corrected": {64: np.full(6, 1e-5)}}
+    curves = {"as_published": {64: np.full(6, 3e-5), 32: np.full(6, np.nan)}, "corrected": {64: np.full(6, 1e-5)}}
     seen(error.draw(tmp_path / "error.png", {"mid": curves, "long_axis": curves}, ["long_axis"]))
 
 
 @pytest.mark.parametrize("hearts", [1, 5])
 def test_leaderboard(tmp_path, hearts):
     random = np.random.default_rng(0)
-    places = [(f"h{k}", view, size, name) for k in range(hearts) for view in ("mid", "apex") for size in (64, 32)
+    keys = [(f"h{k}", view, size, name) for k in range(hearts) for view in ("mid", "apex") for size in (64, 32)
               for name in ("one", "two", "failing")]  # fmt: skip
-    table = pd.DataFrame(places, columns=["case", "view", "size_px", "tracker"])
+    table = pd.DataFrame(keys, columns=["case", "view", "size_px", "tracker"])
     for figure in ("nrmse_all_percent", "ecc_rms_points", "ell_rms_points", "err_rms_points"):
         table[figure] = random.uniform(1, 30, len(table))
     failing = table["tracker"] == "failing"
@@ -80,21 +80,21 @@ def test_bullseye_without_data_is_hatched_throughout(tmp_path):
     seen(bullseye.draw(tmp_path / "bullseye.png", nothing, nothing, "none"))
 
 
-@pytest.mark.parametrize("number, place", [(1, (0, 0.85)), (2, (-0.74, 0.43)), (10, (0, -0.6)), (16, (0.38, 0.1))])
-def test_segments_lie_where_they_should(number, place):
+@pytest.mark.parametrize("number, position", [(1, (0, 0.85)), (2, (-0.74, 0.43)), (10, (0, -0.6)), (16, (0.38, 0.1))])
+def test_segments_lie_where_they_should(number, position):
     """One segment red, the others blue: anterior at the top, septum on the left, base outermost."""
-    sheet = Figure()
-    axes = sheet.subplots()
+    figure = Figure()
+    axes = figure.subplots()
     values = np.full(17, -1.0)
     values[number - 1] = 1.0
     bullseye.disc(axes, values, bullseye.TwoSlopeNorm(0, -1, 1))
-    hit = [wedge for wedge in axes.patches if wedge.get_path().contains_point(place)]
+    hit = [wedge for wedge in axes.patches if wedge.get_path().contains_point(position)]
     assert len(hit) == 1
     red, _, blue, _ = hit[0].get_facecolor()
     assert red > blue
 
 
 def test_same_figure_same_bytes(tmp_path):
-    curves = {"mid": {"faithful": {64: np.full(6, 3e-5)}}}
+    curves = {"mid": {"as_published": {64: np.full(6, 3e-5)}}}
     first, second = (error.draw(tmp_path / name, curves).read_bytes() for name in ("a.png", "b.png"))
     assert first == second

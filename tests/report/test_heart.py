@@ -20,12 +20,12 @@ def test_nearest_surface_is_seen():
     joined = [np.concatenate([a, b]) for a, b in zip(near, far, strict=True)]
     joined[2][2:] += 4
     camera = Camera(np.array([0, 1.0, 0]), np.zeros(3), 2.0, (80, 80))
-    image, cover = render(Surface(*joined), camera)
+    image, alpha = render(Surface(*joined), camera)
     # From +y, with z up, +x is on the left.
     np.testing.assert_allclose(image[40, 30], [1, 0, 0])
     np.testing.assert_allclose(image[40, 55], [0, 1, 0])
-    assert cover[40, 75] == 0 and cover[5, 40] == 0
-    assert cover.sum() == pytest.approx(40 * 60, rel=0.02)
+    assert alpha[40, 75] == 0 and alpha[5, 40] == 0
+    assert alpha.sum() == pytest.approx(40 * 60, rel=0.02)
 
 
 def test_centroid_of_straight_cells_is_the_mean_of_the_vertices():

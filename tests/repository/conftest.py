@@ -9,7 +9,7 @@ import yaml
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Probe, Rf, Tracking, View
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.rf.recorder import Kept, described
+from echotruth.imaging.recorder import RfRecorder, metadata
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, schema
 from echotruth.repository.store import Store
@@ -39,7 +39,7 @@ def scanner(**rf):
 
 
 def lay_out(store, config, **rf):
-    arrays, sizes, settings = described(config, scanner(**rf)) if config.rf.keep else ({}, {}, {})
+    arrays, sizes, settings = metadata(config, scanner(**rf)) if config.rf.keep else ({}, {}, {})
     labels = layout.labels(config, ["heart"], np.zeros((1, FRAMES))) | layout.positions(config, pixel_centres, grid)
     labels |= {f"rf:{name}": value for name, value in arrays.items()}
     sizes |= layout.sizes(left_ventricle(config.geometry))
@@ -69,7 +69,7 @@ def rf_repository(tmp_path_factory):
         store = Store(folder / "small.zarr")
         lay_out(store, config, **rf)
         scan = scanner(**rf)
-        kept, lines = Kept(config.rf.keep, scan.matrix, FRAMES), []
+        kept, lines = RfRecorder(config.rf.keep, scan.matrix, FRAMES), []
         for frame in range(FRAMES):
             matrix = scan.matrix(*scatterers(frame))
             kept.add(frame, matrix)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from echotruth.repository.export import FORMATS, CannotExport, export
+from echotruth.repository.export import FORMATS, ExportError, export
 
 ELEMENTS, FRAMES, SPEED = 24, 2, 1540.0
 
@@ -182,7 +182,7 @@ REFUSED = {
 def test_what_is_not_there_is_said_in_one_sentence(folder, tmp_path, asked):
     pytest.importorskip("h5py")
     place, case, view = asked
-    with pytest.raises(CannotExport, match=REFUSED[asked]):
+    with pytest.raises(ExportError, match=REFUSED[asked]):
         export(folder if place == "small" else tmp_path, "uff", case, view)
 
 
@@ -192,7 +192,7 @@ def test_repository_without_rf_is_said_so(rf_repository, rf_layout):
     pytest.importorskip("h5py")
     folder = rf_repository(["lines"])
     rf_layout(Store(folder / "small.zarr"), [])
-    with pytest.raises(CannotExport, match=r"keeps no RF: set rf\.keep to \[lines, channels\]"):
+    with pytest.raises(ExportError, match=r"keeps no RF: set rf\.keep to \[lines, channels\]"):
         export(folder, "zea", "heart", "mid")
 
 

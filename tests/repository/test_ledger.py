@@ -1,4 +1,4 @@
-"""Records are whole or absent, and rows are for ever."""
+"""Records are complete or absent, and rows never change."""
 
 import json
 import os

@@ -7,7 +7,15 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from echotruth.config import Bmode, PhaseCorrelation
-from echotruth.repository.provenance import _closure, _imports, _plain, _tree, code_version, packages, settings_version
+from echotruth.repository.provenance import (
+    _canonical_source,
+    _dependencies,
+    _imports,
+    _tree,
+    code_version,
+    packages,
+    settings_version,
+)
 
 ROOT = Path(__file__).parents[2]
 
@@ -15,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 def _version(tmp_path, text):
     script = tmp_path / "script.py"
     script.write_text(text)
-    for cached in (code_version, _imports, _plain, _tree):  # one file, two texts
+    for cached in (code_version, _imports, _canonical_source, _tree):  # one file, two texts
         cached.cache_clear()
     return code_version(str(script))
 
@@ -31,13 +39,13 @@ def test_another_statement_changes_the_version(tmp_path):
 
 
 def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_path):
-    def closure(stage):
-        return _closure((str(ROOT / f"workflow/scripts/{stage}.py"),))
+    def dependencies(stage):
+        return _dependencies((str(ROOT / f"workflow/scripts/{stage}.py"),))
 
-    assert "echotruth.mechanics.solver.newton" in closure("mechanics")
-    assert "echotruth.materials.neo_hooke" in closure("mechanics"), "found in its folder, not by an import"
-    assert "echotruth.mechanics.solver.newton" not in closure("tracking")
-    assert "echotruth.tracking.trackers.phase_correlation" not in closure("mechanics") | closure("rf")
+    assert "echotruth.mechanics.solver.newton" in dependencies("mechanics")
+    assert "echotruth.materials.neo_hooke" in dependencies("mechanics"), "found in its folder, not by an import"
+    assert "echotruth.mechanics.solver.newton" not in dependencies("tracking")
+    assert "echotruth.tracking.trackers.phase_correlation" not in dependencies("mechanics") | dependencies("rf")
 
 
 def test_cache_of_compiled_functions_has_the_version_of_all_modules_that_compile():
@@ -46,7 +54,7 @@ def test_cache_of_compiled_functions_has_the_version_of_all_modules_that_compile
     files = [path.relative_to(ROOT / "src") for path, text in texts.items() if "njit(" in text or "intrinsic" in text]
     compiled = {".".join(file.with_suffix("").parts).removesuffix(".__init__") for file in files}
     assert len(compiled) > 20
-    assert compiled <= _closure(scripts)
+    assert compiled <= _dependencies(scripts)
     assert os.environ["NUMBA_CACHE_DIR"].endswith(code_version(*scripts))
 
 

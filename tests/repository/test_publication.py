@@ -17,7 +17,7 @@ from echotruth.imaging.bmode import pixel_centres
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
 from echotruth.repository.ledger import GATES, VIEW_STAGES
-from echotruth.repository.publication import Damaged, publish
+from echotruth.repository.publication import ChecksumError, publish
 from echotruth.repository.store import Store, schema_of
 from echotruth.tracking import grid
 from echotruth.workflow.cost import Cost
@@ -114,7 +114,7 @@ def test_damaged_file_and_its_record_are_named(folder, group, row, harm):
     file.write_bytes(content if harm == "changed" else content[:-1])
     if harm == "missing":
         file.unlink()
-    with pytest.raises(Damaged) as caught:
+    with pytest.raises(ChecksumError) as caught:
         publish(folder)
     assert str(file) in str(caught.value)
     assert f"ledger/{group.partition('/')[0]}/{CASES[row[0]].id}" in str(caught.value)
@@ -124,7 +124,9 @@ def test_damaged_file_and_its_record_are_named(folder, group, row, harm):
 def test_heart_without_a_solution_is_told_with_its_reason(folder):
     for stage, view in JOBS:
         job = Job(folder, stage, CASES[1].id, view)
-        job.give_up("failed" if stage == "mechanics" else "skipped", job.left_out() or "no equilibrium at frame 3")
+        job.record_without_result(
+            "failed" if stage == "mechanics" else "skipped", job.skip_reason() or "no equilibrium at frame 3"
+        )
     assert publish(folder)["failed"] == 1
     cases = xr.open_datatree(folder / "small.zarr")["cases"]
     assert list(cases["status"].values) == ["complete", "failed"]
@@ -134,7 +136,7 @@ def test_heart_without_a_solution_is_told_with_its_reason(folder):
 def doubt(folder):
     """The second heart measured again, and found out of bounds."""
     job = Job(folder, "physiology", CASES[1].id)
-    job.mark("implausible", LENGTHENS)
+    job.set_verdict("implausible", LENGTHENS)
     job.commit({"physiology": blank(job.store, "physiology")}, Cost())
 
 
@@ -152,12 +154,12 @@ def test_heart_out_of_bounds_keeps_its_arrays_and_is_marked(folder):
 @pytest.mark.parametrize("stage, view", [("phantom", "mid"), ("evaluation", "long_axis")])
 def test_heart_out_of_bounds_is_imaged_only_where_the_configuration_says_so(folder, stage, view):
     doubt(folder)
-    assert Job(folder, stage, CASES[0].id, view).left_out() == ""
-    assert Job(folder, stage, CASES[1].id, view).left_out() == LENGTHENS
-    assert Job(folder, "physiology", CASES[1].id).left_out() == ""
+    assert Job(folder, stage, CASES[0].id, view).skip_reason() == ""
+    assert Job(folder, stage, CASES[1].id, view).skip_reason() == LENGTHENS
+    assert Job(folder, "physiology", CASES[1].id).skip_reason() == ""
     kept = CONFIG.model_copy(update={"physiology": Physiology(exclude=False)})
     (folder / "config.yaml").write_text(yaml.safe_dump(kept.model_dump(mode="json")))
-    assert Job(folder, stage, CASES[1].id, view).left_out() == ""
+    assert Job(folder, stage, CASES[1].id, view).skip_reason() == ""
     assert publish(folder)["implausible"] == 1
 
 
@@ -165,21 +167,21 @@ def test_heart_out_of_bounds_is_imaged_only_where_the_configuration_says_so(fold
 def test_heart_without_a_solution_is_never_measured_nor_imaged(folder, exclude):
     kept = CONFIG.model_copy(update={"physiology": Physiology(exclude=exclude)})
     (folder / "config.yaml").write_text(yaml.safe_dump(kept.model_dump(mode="json")))
-    Job(folder, "mechanics", CASES[1].id).give_up("failed", "no equilibrium")
+    Job(folder, "mechanics", CASES[1].id).record_without_result("failed", "no equilibrium")
     for stage, view in JOBS[1:]:
-        assert Job(folder, stage, CASES[1].id, view).left_out() == "no equilibrium"
+        assert Job(folder, stage, CASES[1].id, view).skip_reason() == "no equilibrium"
 
 
 @pytest.mark.parametrize("stage, view", [("bmode", "mid"), ("mechanics", None)])
 def test_what_is_skipped_leaves_nothing_of_an_earlier_run(folder, stage, view):
     other, job = (Job(folder, stage, case.id, view) for case in CASES)
-    job.give_up("skipped", LENGTHENS)
+    job.record_without_result("skipped", LENGTHENS)
     for group in GROUPS[stage]:
-        assert not job.store.files(group, *job.place)
-        assert other.store.files(group, *other.place)
+        assert not job.store.files(group, *job.index)
+        assert other.store.files(group, *other.index)
 
 
-def test_case_no_longer_asked_for_is_retired(folder):
+def test_case_that_left_the_configuration_is_retired(folder):
     fewer = CONFIG.model_copy(update={"cases": {"seed": [1]}})
     (folder / "config.yaml").write_text(yaml.safe_dump(fewer.model_dump(mode="json")))
     assert publish(folder)["complete"] == 1

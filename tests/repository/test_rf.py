@@ -8,8 +8,8 @@ import zarr
 from echotruth.cases import expand
 from echotruth.config import Config, Probe, Rf
 from echotruth.config.loading import ConfigError, validate
+from echotruth.imaging.recorder import channels, decimated_samples, quantise
 from echotruth.imaging.rf.full_matrix import FullMatrix
-from echotruth.imaging.rf.recorder import channels, digitised, samples_kept
 from echotruth.repository import schema
 from echotruth.repository.store import Store
 
@@ -32,7 +32,7 @@ def way_out(rf, wave, lateral, axial):
     x, z = rf.transmit_origin[wave].values
     if rf.attrs["transmit"] == "plane":
         return x * lateral + z * axial
-    return np.hypot(lateral - x, axial - z) - float(rf.transmit_lead[wave])
+    return np.hypot(lateral - x, axial - z) - float(rf.transmit_t0_distance[wave])
 
 
 def turn(rf, time, cycles):
@@ -45,22 +45,22 @@ def focused_again(rf, frame, line, along):
     cycles = np.fft.rfftfreq(echoes.shape[-1])[1:-1]
     spectra = 2 * np.fft.rfft(echoes)[..., 1:-1] / echoes.shape[-1]
     element, angle, speed = rf.element.values, float(rf.line_angle[line]), rf.attrs["sound_speed"]
-    lateral, axial = float(rf.line_foot[line]) + along * np.sin(angle), along * np.cos(angle)
+    lateral, axial = float(rf.line_origin[line]) + along * np.sin(angle), along * np.cos(angle)
     back = np.hypot(lateral[:, None] - element, axial[:, None])
     weight = np.cos(np.pi * element / (len(element) * (element[1] - element[0]))) ** 2
     total = np.zeros(len(along), complex)
     foci = np.array(rf.attrs["foci"])
     for wave in range(rf.sizes["transmit"]):
-        share = 1.0
+        zone_weight = 1.0
         if len(foci):
             zone, served = divmod(wave, rf.sizes["line"])
-            share = np.interp(along, foci, np.eye(len(foci))[zone]) * (served == line)
-        if not np.any(share):
+            zone_weight = np.interp(along, foci, np.eye(len(foci))[zone]) * (served == line)
+        if not np.any(zone_weight):
             continue
         delay, strength = rf.transmit_delay[wave].values, rf.transmit_weight[wave].values
         sent = np.einsum("tf,trf->rf", strength[:, None] * turn(rf, -delay, cycles), spectra)
         arrival = (way_out(rf, wave, lateral, axial)[:, None] + back) / speed
-        total += share * sum(weight[r] * (turn(rf, arrival[:, r], cycles) @ sent[r]) for r in range(len(element)))
+        total += zone_weight * sum(weight[r] * (turn(rf, arrival[:, r], cycles) @ sent[r]) for r in range(len(element)))
     return total * np.exp(-4j * np.pi * rf.attrs["demodulation_frequency"] * along / speed)
 
 
@@ -83,7 +83,7 @@ def test_channel_of_a_point_is_its_pulse_at_the_time_of_both_ways():
     spectrum[..., found.shape[-1] // 2 :] = 0
     envelope = np.abs(np.fft.ifft(spectrum))
     way = np.hypot(full.centres - 1e-3, axial)
-    sampling = full.sampling * samples_kept(full) / full.samples
+    sampling = full.sampling * decimated_samples(full) / full.samples
     for transmitter, receiver in ((0, 0), (0, 7), (5, 2)):
         trace = envelope[transmitter, receiver]
         top = trace.argmax()
@@ -94,17 +94,17 @@ def test_channel_of_a_point_is_its_pulse_at_the_time_of_both_ways():
 
 def test_whole_numbers_are_half_a_step_off_at_most():
     echoes = np.random.default_rng(0).standard_normal((4, 4, 1000)).astype(np.float32)
-    kept, step = digitised(echoes)
+    kept, step = quantise(echoes)
     assert kept.dtype == np.int16 and np.abs(kept).max() == 32767
     assert np.abs(kept * step - echoes).max() <= 0.51 * step
-    assert digitised(np.zeros((1, 1, 4), np.float32))[0].max() == 0
+    assert quantise(np.zeros((1, 1, 4), np.float32))[0].max() == 0
 
 
 @pytest.mark.parametrize("keep", [["lines"], ["channels"]])
-def test_only_what_is_asked_for_is_laid_out(rf_repository, keep):
+def test_only_what_is_kept_is_laid_out(rf_repository, keep):
     rf = opened(rf_repository(keep))
-    asked = {"lines": {"lines"}, "channels": {"channels", "channels_step"}}[keep[0]]
-    assert set(rf) == asked | {array.name for array in schema.TRANSMITS}
+    expected = {"lines": {"lines"}, "channels": {"channels", "channels_step"}}[keep[0]]
+    assert set(rf) == expected | {array.name for array in schema.TRANSMITS}
 
 
 def test_repository_without_rf_has_no_group_for_it():
@@ -112,7 +112,7 @@ def test_repository_without_rf_has_no_group_for_it():
     assert schema.written_by("rf", Config()) == []
 
 
-def test_what_is_no_longer_asked_for_goes(rf_repository, rf_layout):
+def test_what_is_no_longer_kept_is_removed(rf_repository, rf_layout):
     store = Store(rf_repository() / "small.zarr")
     lines = store.read("rf", 0, 0, names=("lines",))["lines"]
     rf_layout(store, ["lines"])

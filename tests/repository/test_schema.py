@@ -1,4 +1,4 @@
-"""The schema says one thing of every array, in units that readers know."""
+"""The schema describes every array once, in known units."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Made speckle whose scatterers move exactly as asked."""
+"""Synthetic speckle whose scatterers have a known motion."""
 
 import numpy as np
 import pytest
@@ -8,12 +8,12 @@ def make_speckle(size, motion, blur=2.5, margin=40):
     """Log-compressed 8-bit envelope of random scatterers after a motion of lateral, axial positions in px."""
     random = np.random.default_rng(7)
     wide = size + 2 * margin
-    place = random.uniform(-margin, size + margin, (wide**2 // 20, 2))
-    weight = random.normal(size=len(place)) + 1j * random.normal(size=len(place))
-    lateral, axial = motion(place).T
+    position = random.uniform(-margin, size + margin, (wide**2 // 20, 2))
+    weight = random.normal(size=len(position)) + 1j * random.normal(size=len(position))
+    lateral, axial = motion(position).T
     pixel = np.arange(size)[:, None]
-    across, down = (np.exp(-((pixel - x) ** 2) / 2 / blur**2) for x in (lateral, axial))
-    envelope = np.abs((down * weight) @ across.T)
+    profile_x, profile_y = (np.exp(-((pixel - x) ** 2) / 2 / blur**2) for x in (lateral, axial))
+    envelope = np.abs((profile_y * weight) @ profile_x.T)
     decibel = 20 * np.log10(envelope / envelope.max() + 1e-12)
     return np.clip(255 * (1 + decibel / 50), 0, 255).round().astype(np.uint8)
 
@@ -27,12 +27,12 @@ def speckle():
 @pytest.fixture
 def shifted():
     """Image of a given size after a lateral and an axial shift in px."""
-    return lambda size, lateral, axial: make_speckle(size, lambda place: place + np.array([lateral, axial]))
+    return lambda size, lateral, axial: make_speckle(size, lambda position: position + np.array([lateral, axial]))
 
 
 @pytest.fixture
 def clip():
-    """Clip of square images whose motion is a function of place and frame."""
+    """Clip of square images whose motion is a function of position and frame."""
     return lambda motion, frames, size=160: np.stack(
-        [make_speckle(size, lambda place, t=t: motion(place, t)) for t in range(frames)]
+        [make_speckle(size, lambda position, t=t: motion(position, t)) for t in range(frames)]
     )

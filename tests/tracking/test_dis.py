@@ -4,7 +4,7 @@ import pytest
 
 from echotruth.config.tracking import Dis
 from echotruth.tracking import track
-from echotruth.tracking.trackers.dis import SMALLEST, flow
+from echotruth.tracking.trackers.dis import MIN_IMAGE_SIDE, optical_flow
 
 SHIFT = np.array([3.0, -1.5])
 
@@ -24,25 +24,25 @@ def test_motion_at_whole_pixels_is_the_library_s_own(pair, preset):
 
 
 def test_shift_of_speckle_is_found(pair):
-    found = flow(*(pair / np.float32(255)))
-    assert found.shape == (160, 160, 2)
-    np.testing.assert_allclose(found[30:-30, 30:-30].mean((0, 1)), SHIFT, atol=0.05)
+    flow = optical_flow(*(pair / np.float32(255)))
+    assert flow.shape == (160, 160, 2)
+    np.testing.assert_allclose(flow[30:-30, 30:-30].mean((0, 1)), SHIFT, atol=0.05)
 
 
 def test_bytes_do_not_depend_on_the_threads_of_the_library(pair):
     images = pair / np.float32(255)
-    answers = []
+    results = []
     for threads in (1, 4):
         cv2.setNumThreads(threads)
-        answers.append(flow(*images).tobytes())
-    assert answers[0] == answers[1]
+        results.append(optical_flow(*images).tobytes())
+    assert results[0] == results[1]
 
 
-@pytest.mark.parametrize("shape", [(SMALLEST, SMALLEST), (SMALLEST, 300), (300, SMALLEST)])
+@pytest.mark.parametrize("shape", [(MIN_IMAGE_SIDE, MIN_IMAGE_SIDE), (MIN_IMAGE_SIDE, 300), (300, MIN_IMAGE_SIDE)])
 def test_smallest_image_is_taken(shape):
-    assert (flow(*np.zeros((2, *shape), np.float32)) == 0).all()
+    assert (optical_flow(*np.zeros((2, *shape), np.float32)) == 0).all()
 
 
 def test_smaller_image_is_refused_in_a_sentence():
     with pytest.raises(ValueError, match=r"32 px or more, not \(31, 40\)"):
-        flow(*np.zeros((2, 31, 40), np.float32))
+        optical_flow(*np.zeros((2, 31, 40), np.float32))

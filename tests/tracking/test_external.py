@@ -1,4 +1,4 @@
-"""Anyone's tracker is called as it is, and whatever is wrong with it becomes one sentence."""
+"""External trackers: what they receive, and one sentence for every way in which they fail."""
 
 import inspect
 import re
@@ -12,16 +12,16 @@ import pytest
 import yaml
 
 from echotruth.config.loading import ConfigError, validate
-from echotruth.config.tracking import GIVEN, Guest
+from echotruth.config.tracking import TRACKER_ARGUMENTS, External
 from echotruth.tracking import TrackerFailed
-from echotruth.tracking import track as protocol
+from echotruth.tracking import track as track_any
 from echotruth.tracking.trackers.external import track
 
 TIMES, POINTS = 3, 4
 
 
 @pytest.fixture
-def given():
+def arguments():
     """Clip, points, mask, spacing, times and seed."""
     frames = np.random.default_rng(1).integers(0, 256, (TIMES, 20, 24)).astype(np.uint8)
     points = np.array([[3.0, 4.0], [5.5, 4.25], [10.0, 12.0], [20.0, 7.0]])
@@ -36,109 +36,109 @@ def module(tmp_path, monkeypatch):
 
     def write(name, body):
         monkeypatch.delitem(sys.modules, name, raising=False)
-        Path(f"{name}.py").write_text(f"import numpy as np\n\ndef track(*given, **options):\n    {body}\n")
+        Path(f"{name}.py").write_text(f"import numpy as np\n\ndef track(*arguments, **options):\n    {body}\n")
         return f"{name}:track"
 
     return write
 
 
 @pytest.fixture
-def answering(monkeypatch):
-    """Settings of a guest that is a function of this process."""
+def external(monkeypatch):
+    """Settings of an external tracker that is a function of this process."""
 
-    def answer(function, **options):
-        monkeypatch.setitem(sys.modules, "guesthouse", type(sys)("guesthouse"))
-        sys.modules["guesthouse"].guest = function
-        return Guest(track="guesthouse:guest", options=options)
+    def settings(function, **options):
+        monkeypatch.setitem(sys.modules, "tracker_module", type(sys)("tracker_module"))
+        sys.modules["tracker_module"].track = function
+        return External(track="tracker_module:track", options=options)
 
-    return answer
+    return settings
 
 
-def program(folder, body, *arguments, **settings):
-    """Settings of a guest that is a program of Python."""
+def program(folder, body, *words, **settings):
+    """Settings of an external tracker that is a Python program."""
     path = folder / "program.py"
     path.write_text(f"import sys\nimport numpy as np\ninput, output = sys.argv[1:3]\n{body}\n")
-    return Guest(command=[sys.executable, str(path), "{input}", "{output}", *arguments], **settings)
+    return External(command=[sys.executable, str(path), "{input}", "{output}", *words], **settings)
 
 
-def complaint(given, settings):
-    """The one sentence of a guest that fails."""
-    with pytest.raises(TrackerFailed) as failure:
-        track(*given, settings)
-    sentence = str(failure.value)
+def failure(arguments, settings):
+    """The sentence with which a tracker fails, without its name."""
+    with pytest.raises(TrackerFailed) as raised:
+        track(*arguments, settings)
+    sentence = str(raised.value)
     assert sentence.startswith(settings.track or " ".join(settings.command))
     assert "\n" not in sentence
     return sentence.removeprefix(settings.track or " ".join(settings.command)).strip()
 
 
-def test_callable_gets_the_clip_and_its_options_and_nothing_else(given, answering):
+def test_callable_gets_the_clip_and_its_options_and_nothing_else(arguments, external):
     seen = {}
 
-    def guest(*arguments, **options):
-        seen.update(zip(GIVEN, arguments, strict=True), options=options)
+    def tracker(*received, **options):
+        seen.update(zip(TRACKER_ARGUMENTS, received, strict=True), options=options)
         return np.zeros((TIMES, POINTS, 2))
 
-    track(*given, answering(guest, window=[3, 4], name="a"))
+    track(*arguments, external(tracker, window=[3, 4], name="a"))
     assert seen["options"] == {"window": [3, 4], "name": "a"}
-    for name, value in zip(GIVEN, given, strict=True):
+    for name, value in zip(TRACKER_ARGUMENTS, arguments, strict=True):
         np.testing.assert_array_equal(seen[name], value)
         assert np.asarray(seen[name]).dtype == np.asarray(value).dtype
 
 
-def test_order_of_what_is_given_is_that_of_the_protocol():
-    assert tuple(inspect.signature(protocol).parameters) == (*GIVEN, "settings")
+def test_order_of_the_arguments_is_that_of_every_tracker():
+    assert tuple(inspect.signature(track_any).parameters) == (*TRACKER_ARGUMENTS, "settings")
 
 
-def test_guest_cannot_spoil_what_others_are_given(given, answering):
-    def guest(*arrays):
+def test_tracker_cannot_change_the_arguments_of_others(arguments, external):
+    def tracker(*arrays):
         for array in arrays:
             if isinstance(array, np.ndarray):
                 array[...] = 0
         return np.zeros((TIMES, POINTS, 2))
 
-    before = [np.copy(each) for each in given]
-    track(*given, answering(guest))
-    for array, kept in zip(given, before, strict=True):
+    before = [np.copy(each) for each in arguments]
+    track(*arguments, external(tracker))
+    for array, kept in zip(arguments, before, strict=True):
         np.testing.assert_array_equal(array, kept)
 
 
-def test_answer_is_not_an_array_that_the_guest_keeps(given, answering):
+def test_result_is_not_an_array_that_the_tracker_keeps(arguments, external):
     kept = (np.zeros((TIMES, POINTS, 2)), np.ones((TIMES, POINTS)))
-    displacement, quality = track(*given, answering(lambda *_: kept))
+    displacement, quality = track(*arguments, external(lambda *_: kept))
     kept[0][...], kept[1][...] = 7, 7
     assert not displacement.any() and (quality == 1).all()
 
 
-def test_quality_left_out_is_one_where_there_is_a_displacement(given, answering):
+def test_quality_left_out_is_one_where_there_is_a_displacement(arguments, external):
     moved = np.zeros((TIMES, POINTS, 2), np.float32)
     moved[1:, 2, 0] = np.nan
-    displacement, quality = track(*given, answering(lambda *_: moved))
+    displacement, quality = track(*arguments, external(lambda *_: moved))
     np.testing.assert_array_equal(displacement, moved)
     np.testing.assert_array_equal(quality, [[1, 1, 1, 1], *[[1, 1, np.nan, 1]] * 2])
 
 
 @pytest.mark.parametrize("nested", [False, True])
-def test_what_a_guest_masks_is_no_displacement(given, answering, nested):
+def test_masked_value_is_no_displacement(arguments, external, nested):
     moved = np.ma.array(np.full((TIMES, POINTS, 2), 0.5), mask=False)
     moved[1:, 2] = np.ma.masked
-    displacement, quality = track(*given, answering(lambda *_: list(moved) if nested else moved))
+    displacement, quality = track(*arguments, external(lambda *_: list(moved) if nested else moved))
     assert np.isnan(displacement[1:, 2]).all() and np.isnan(displacement).sum() == 4
     np.testing.assert_array_equal(np.isnan(quality), np.isnan(displacement).any(-1))
 
 
-def test_point_lost_by_a_guest_has_neither_displacement_nor_quality(given, answering):
+def test_point_lost_by_a_tracker_has_neither_displacement_nor_quality(arguments, external):
     moved = np.zeros((TIMES, POINTS, 2))
     moved[1, 3, 1] = np.inf
-    displacement, quality = protocol(*given, answering(lambda *_: (moved, np.full((TIMES, POINTS), 0.5))))
+    displacement, quality = track_any(*arguments, external(lambda *_: (moved, np.full((TIMES, POINTS), 0.5))))
     assert np.isnan(displacement[1, 3]).all() and np.isnan(quality[1, 3])
     assert np.isfinite(quality).sum() == TIMES * POINTS - 1
 
 
 def raising(error):
-    def guest(*_):
+    def tracker(*_):
         raise error
 
-    return guest
+    return tracker
 
 
 def filled(value, *shape, dtype=float):
@@ -146,14 +146,14 @@ def filled(value, *shape, dtype=float):
 
 
 BAD = {
-    "exception": (raising(ValueError("no\nwall")), r"^raised ValueError: no wall \(test_guest.py, line \d+\)$"),
+    "exception": (raising(ValueError("no\nwall")), r"^raised ValueError: no wall \(test_external.py, line \d+\)$"),
     "end of the interpreter": (raising(SystemExit(3)), "raised SystemExit: 3"),
     "too few arguments": (lambda frames, points: None, r"raised TypeError: .* positional arguments .* were given$"),
-    "nothing": (lambda *_: None, "displacement of NoneType, where real numbers"),
-    "other shape": (filled(0, POINTS, TIMES, 2), r"shape \(4, 3, 2\), where \(3, 4, 2\) is due"),
-    "ragged": (lambda *_: [[1, 2], [3]], "displacement that is no array"),
-    "complex": (filled(0, dtype=complex), "displacement of complex128, where real numbers"),
-    "words": (filled("a", dtype=str), "displacement of <U1, where real numbers"),
+    "nothing": (lambda *_: None, "displacement of NoneType, not of real numbers"),
+    "other shape": (filled(0, POINTS, TIMES, 2), r"shape \(4, 3, 2\), not \(3, 4, 2\)"),
+    "ragged": (lambda *_: [[1, 2], [3]], "displacement that is not an array of shape"),
+    "complex": (filled(0, dtype=complex), "displacement of complex128, not of real numbers"),
+    "words": (filled("a", dtype=str), "displacement of <U1, not of real numbers"),
     "nowhere finite": (filled(np.nan), "no finite displacement after frame 0"),
     "positions": (filled(12.0), r"displacement of 17.0 px in frame 0.*not positions"),
     "three parts": (lambda *_: (1, 2, 3), "tuple of 3"),
@@ -163,28 +163,28 @@ BAD = {
     ),
     "quality in percent": (
         lambda *_: (np.zeros((TIMES, POINTS, 2)), np.full((TIMES, POINTS), 90)),
-        "quality from 90 to 90, where it goes from 0 to 1",
+        "quality from 90 to 90, not from 0 to 1",
     ),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_what_is_wrong_with_an_answer_is_said_in_one_sentence(given, answering, case):
-    guest, expected = BAD[case]
-    assert re.search(expected, complaint(given, answering(guest)))
+def test_invalid_result_is_explained_in_one_sentence(arguments, external, case):
+    tracker, expected = BAD[case]
+    assert re.search(expected, failure(arguments, external(tracker)))
 
 
-def test_interrupt_is_not_swallowed(given, answering):
+def test_interrupt_is_not_swallowed(arguments, external):
     with pytest.raises(KeyboardInterrupt):
-        track(*given, answering(raising(KeyboardInterrupt())))
+        track(*arguments, external(raising(KeyboardInterrupt())))
 
 
-def test_module_of_the_current_directory_is_found(given, module):
-    settings = Guest(
-        track=module("lodger", "return np.zeros((3, 4, 2)) + options['shift'] * np.arange(3)[:, None, None]"),
+def test_module_of_the_current_directory_is_found(arguments, module):
+    settings = External(
+        track=module("mypackage", "return np.zeros((3, 4, 2)) + options['shift'] * np.arange(3)[:, None, None]"),
         options={"shift": 2},
     )
-    assert (track(*given, settings)[0] == 2 * np.arange(3)[:, None, None]).all()
+    assert (track(*arguments, settings)[0] == 2 * np.arange(3)[:, None, None]).all()
 
 
 @pytest.mark.parametrize(
@@ -192,80 +192,80 @@ def test_module_of_the_current_directory_is_found(given, module):
     [
         ("nowhere_at_all:track", "cannot be imported: ModuleNotFoundError"),
         ("numpy:no_such_function", "cannot be imported: AttributeError"),
-        ("numpy:pi", "is a float, where a function is needed"),
+        ("numpy:pi", "raised TypeError: 'float' object is not callable"),
         ("nobody", "not an entry point of the group echotruth.trackers .*write package.module:function"),
     ],
 )
-def test_name_that_leads_nowhere_is_told_in_one_sentence(given, name, expected):
-    assert re.search(expected, complaint(given, Guest(track=name)))
+def test_unknown_name_is_explained_in_one_sentence(arguments, name, expected):
+    assert re.search(expected, failure(arguments, External(track=name)))
 
 
-def test_module_that_fails_on_import_is_told_in_one_sentence(given, module):
+def test_module_that_fails_on_import_is_explained_in_one_sentence(arguments, module):
     name = module("broken", "return )")
-    assert complaint(given, Guest(track=name)).startswith("cannot be imported: SyntaxError")
+    assert failure(arguments, External(track=name)).startswith("cannot be imported: SyntaxError")
 
 
-def test_installed_package_brings_a_tracker_as_an_entry_point(given, module, tmp_path):
-    module("lodger", "return np.zeros((3, 4, 2))")
-    metadata = tmp_path / "lodger-1.dist-info"
+def test_installed_package_brings_a_tracker_as_an_entry_point(arguments, module, tmp_path):
+    module("mypackage", "return np.zeros((3, 4, 2))")
+    metadata = tmp_path / "mypackage-1.dist-info"
     metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: lodger\nVersion: 1\n")
-    (metadata / "entry_points.txt").write_text("[echotruth.trackers]\nat-rest = lodger:track\n")
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: mypackage\nVersion: 1\n")
+    (metadata / "entry_points.txt").write_text("[echotruth.trackers]\nat-rest = mypackage:track\n")
     sys.path.insert(0, str(tmp_path))
-    assert not track(*given, Guest(track="at-rest"))[0].any()
-    assert "(there is at-rest)" in complaint(given, Guest(track="atrest"))
+    assert not track(*arguments, External(track="at-rest"))[0].any()
+    assert "(installed: at-rest)" in failure(arguments, External(track="atrest"))
 
 
 WRITES = "np.savez(output, displacement=np.zeros((3, 4, 2)), quality=np.full((3, 4), 0.25))"
 
 
-def test_program_reads_the_clip_and_its_options_and_writes_its_answer(given, tmp_path):
+def test_program_reads_the_clip_and_its_options_and_writes_its_result(arguments, tmp_path):
     body = f"""
 import shutil
 shutil.copy(input, sys.argv[3])
 {WRITES}"""
     options = {"window": 7, "scales": [1.0, 0.5], "norm": "l1", "file": True}
-    displacement, quality = track(*given, program(tmp_path, body, str(tmp_path / "seen.npz"), options=options))
+    displacement, quality = track(*arguments, program(tmp_path, body, str(tmp_path / "seen.npz"), options=options))
     seen = dict(np.load(tmp_path / "seen.npz"))
-    assert set(seen) == {*GIVEN, *options}
-    for name, value in (*zip(GIVEN, given, strict=True), *options.items()):
+    assert set(seen) == {*TRACKER_ARGUMENTS, *options}
+    for name, value in (*zip(TRACKER_ARGUMENTS, arguments, strict=True), *options.items()):
         np.testing.assert_array_equal(seen[name], value)
     assert not displacement.any() and (quality == 0.25).all()
 
 
-def test_program_may_leave_the_quality_out(given, tmp_path):
+def test_program_may_leave_the_quality_out(arguments, tmp_path):
     settings = program(tmp_path, "np.savez(output, displacement=np.zeros((3, 4, 2)))")
-    assert (track(*given, settings)[1] == 1).all()
+    assert (track(*arguments, settings)[1] == 1).all()
 
 
 @pytest.mark.parametrize(
     "body, expected",
     [
         ("print('first'); raise ValueError('no wall')", "ended with status 1: ValueError: no wall"),
-        ("sys.exit(4)", "ended with status 4: it said nothing on stderr"),
+        ("sys.exit(4)", "ended with status 4: nothing on stderr"),
         ("import os; os.kill(os.getpid(), 9)", "was ended by signal 9"),
-        ("pass", "wrote no {output}, an .npz that holds displacement and quality"),
+        ("pass", "wrote no {output}, an .npz file with displacement"),
         ("open(output, 'w').write('hello')", "wrote an {output} that cannot be read as .npz"),
-        ("np.savez(output, motion=np.zeros(3))", "wrote an {output} that does not hold displacement"),
+        ("np.savez(output, motion=np.zeros(3))", "wrote an {output} without displacement"),
         ("np.savez(output, displacement=np.array([None]))", "wrote an {output} that cannot be read as .npz"),
-        ("np.savez(output, displacement=np.zeros((4, 2)))", "displacement of shape (4, 2), where (3, 4, 2) is due"),
+        ("np.savez(output, displacement=np.zeros((4, 2)))", "displacement of shape (4, 2), not (3, 4, 2)"),
     ],
 )
-def test_what_is_wrong_with_a_program_is_said_in_one_sentence(given, tmp_path, body, expected):
-    assert expected in complaint(given, program(tmp_path, body))
+def test_failure_of_a_program_is_explained_in_one_sentence(arguments, tmp_path, body, expected):
+    assert expected in failure(arguments, program(tmp_path, body))
 
 
-def test_program_that_is_not_there_is_told_in_one_sentence(given):
-    settings = Guest(command=["no_such_program", "{input}", "{output}"])
-    assert complaint(given, settings) == "did not start: no_such_program: No such file or directory"
+def test_missing_program_is_explained_in_one_sentence(arguments):
+    settings = External(command=["no_such_program", "{input}", "{output}"])
+    assert failure(arguments, settings) == "did not start: no_such_program: No such file or directory"
 
 
-def test_program_that_takes_too_long_is_ended_with_all_it_started(given, tmp_path):
+def test_program_that_takes_too_long_is_ended_with_all_it_started(arguments, tmp_path):
     beat = tmp_path / "beat"
     child = f"import time\nwhile True: open({str(beat)!r}, 'a').write('.'); time.sleep(0.02)"
     body = f"import subprocess, time\nsubprocess.Popen([sys.executable, '-c', {child!r}])\ntime.sleep(60)"
     start = time.monotonic()
-    assert complaint(given, program(tmp_path, body, timeout_s=2.0)) == "took longer than timeout_s = 2"
+    assert failure(arguments, program(tmp_path, body, timeout_s=2.0)) == "took longer than timeout_s = 2"
     assert time.monotonic() - start < 10
     beats = beat.stat().st_size
     time.sleep(0.2)
@@ -273,11 +273,11 @@ def test_program_that_takes_too_long_is_ended_with_all_it_started(given, tmp_pat
 
 
 @pytest.mark.parametrize(
-    "guest, expected",
+    "settings, expected",
     [
         ({}, "track = null: give either track or command"),
         ({"track": "a:b", "command": ["c"]}, "track = 'a:b': give either track or command"),
-        ({"command": ["prog", "{input}"]}, "must say where the path of the output goes: {output}"),
+        ({"command": ["prog", "{input}"]}, "must contain {output} where the path of that file belongs"),
         ({"track": "a:b", "options": {"frames": 3}}, "options.frames = 3: must have another name"),
         (
             {"command": ["p", "{input}", "{output}"], "options": {"a": {"b": 1}}},
@@ -306,22 +306,24 @@ def test_program_that_takes_too_long_is_ended_with_all_it_started(given, tmp_pat
         ({"track": "a:b", "timeout_s": 0}, "timeout_s = 0: should be greater than 0"),
     ],
 )
-def test_settings_that_cannot_be_are_refused_in_one_sentence(guest, expected):
+def test_invalid_settings_are_refused_in_one_sentence(settings, expected):
     with pytest.raises(ConfigError) as refusal:
-        validate({"tracking": {"trackers": {"mine": {"method": "guest"} | guest}}}, "a.yaml")
+        validate({"tracking": {"trackers": {"mine": {"method": "external"} | settings}}}, "a.yaml")
     assert str(refusal.value).startswith("a.yaml: tracking.trackers.mine.") and expected in str(refusal.value)
 
 
-def test_callable_takes_options_that_are_no_arrays():
+def test_callable_takes_options_that_are_not_arrays():
     options = {"weights": None, "layers": {"first": [1, "a"]}}
-    config = validate({"tracking": {"trackers": {"mine": {"method": "guest", "track": "a:b", "options": options}}}}, "")
+    config = validate(
+        {"tracking": {"trackers": {"mine": {"method": "external", "track": "a:b", "options": options}}}}, ""
+    )
     assert config.tracking.trackers["mine"].options == options
 
 
 def test_option_without_a_dot_is_a_number_in_a_configuration_too():
     options = yaml.safe_load("{rate: 1e-3, steps: [2e2, .5E+1], name: e-3, word: 0x1e5g}")
     assert options["rate"] == "1e-3"
-    assert Guest(track="a:b", options=options).options == {
+    assert External(track="a:b", options=options).options == {
         "rate": 0.001,
         "steps": [200.0, 5.0],
         "name": "e-3",
@@ -330,16 +332,16 @@ def test_option_without_a_dot_is_a_number_in_a_configuration_too():
 
 
 @pytest.mark.parametrize("name", ["a.b.c:d.e", "lucas-kanade", "lab.flow_2"])
-def test_callable_and_entry_point_may_be_named_so(name):
-    assert Guest(track=name).track == name
+def test_valid_names_of_callables_and_entry_points(name):
+    assert External(track=name).track == name
 
 
-def test_what_a_guest_prints_does_not_mix_with_the_output(given, answering, tmp_path, capfd):
-    def guest(*_):
+def test_output_of_a_tracker_goes_to_stderr(arguments, external, tmp_path, capfd):
+    def tracker(*_):
         print("chatter")
         return np.zeros((TIMES, POINTS, 2))
 
-    track(*given, answering(guest))
-    track(*given, program(tmp_path, f"print('prattle')\n{WRITES}"))
-    said, complaints = capfd.readouterr()
-    assert said == "" and "chatter" in complaints and "prattle" in complaints
+    track(*arguments, external(tracker))
+    track(*arguments, program(tmp_path, f"print('prattle')\n{WRITES}"))
+    stdout, stderr = capfd.readouterr()
+    assert stdout == "" and "chatter" in stderr and "prattle" in stderr

@@ -1,28 +1,28 @@
 import numpy as np
 import pytest
 
-from echotruth.tracking.grey import FAINTEST, amplitudes, levels, similarity
+from echotruth.tracking.grey import MIN_STD, decompress, grey_levels, local_ncc
 
 
-def test_similarity_is_pearson_s_correlation_of_the_two_squares():
+def test_local_ncc_is_pearson_s_correlation_of_the_two_squares():
     first, second = np.random.default_rng(2).uniform(size=(2, 30, 40))
     second += 0.8 * first
-    found = similarity(first, second, 7)
+    found = local_ncc(first, second, 7)
     for row, column in ((3, 3), (15, 20), (26, 36)):
         squares = (image[row - 3 : row + 4, column - 3 : column + 4].ravel() for image in (first, second))
         assert found[row, column] == pytest.approx(np.corrcoef(*squares)[0, 1], abs=1e-9)
 
 
-def test_similarity_is_blind_to_gain_and_offset():
+def test_local_ncc_is_blind_to_gain_and_offset():
     image = np.random.default_rng(2).uniform(size=(20, 20))
-    np.testing.assert_allclose(similarity(image, 0.3 + 0.5 * image, 5), 1, atol=1e-9)
+    np.testing.assert_allclose(local_ncc(image, 0.3 + 0.5 * image, 5), 1, atol=1e-9)
 
 
-def test_square_that_holds_no_texture_or_an_unknown_pixel_has_no_similarity():
+def test_square_that_holds_no_texture_or_an_unknown_pixel_has_no_ncc():
     image = np.random.default_rng(2).uniform(size=(20, 40))
-    image[:, 20:] = 0.5 + 0.9 * FAINTEST * np.where(np.indices((20, 20)).sum(0) % 2, 1, -1)
+    image[:, 20:] = 0.5 + 0.9 * MIN_STD * np.where(np.indices((20, 20)).sum(0) % 2, 1, -1)
     image[4, 4] = np.nan
-    known = np.isfinite(similarity(image, image, 5))
+    known = np.isfinite(local_ncc(image, image, 5))
     np.testing.assert_array_equal(known[4, 7:18], True)
     assert not known[2:7, 2:7].any() and not known[:, 23:].any()
 
@@ -30,23 +30,23 @@ def test_square_that_holds_no_texture_or_an_unknown_pixel_has_no_similarity():
 @pytest.mark.parametrize("kind", [np.uint16, np.int32, float])
 def test_any_type_is_brought_to_the_range_from_0_to_1(kind):
     frames = np.array([[[20, 120], [70, 20]]], kind)
-    np.testing.assert_allclose(levels(frames), [[[0, 1], [0.5, 0]]], atol=1e-7)
+    np.testing.assert_allclose(grey_levels(frames), [[[0, 1], [0.5, 0]]], atol=1e-7)
 
 
 def test_eight_bits_keep_their_levels():
-    np.testing.assert_allclose(levels(np.array([[[51, 102]]], np.uint8)), [[[0.2, 0.4]]], atol=1e-7)
+    np.testing.assert_allclose(grey_levels(np.array([[[51, 102]]], np.uint8)), [[[0.2, 0.4]]], atol=1e-7)
 
 
 def test_what_is_not_finite_is_unknown_and_does_not_set_the_range():
-    frames = levels(np.array([[[0, 5.0, np.inf, np.nan]]]))
+    frames = grey_levels(np.array([[[0, 5.0, np.inf, np.nan]]]))
     np.testing.assert_array_equal(frames, [[[0, 1, np.nan, np.nan]]])
-    assert np.isnan(levels(np.full((1, 2, 2), np.nan))).all() and (levels(np.full((1, 2, 2), 3.0)) == 0).all()
+    assert np.isnan(grey_levels(np.full((1, 2, 2), np.nan))).all() and (grey_levels(np.full((1, 2, 2), 3.0)) == 0).all()
 
 
-def test_amplitudes_undo_the_logarithm():
+def test_decompression_inverts_the_log_compression():
     echo = np.array([0.01, 0.1, 1.0])
     shown = 1 + 20 * np.log10(echo) / 40
-    found = amplitudes(shown, 40.0)
+    found = decompress(shown, 40.0)
     np.testing.assert_allclose(np.diff(found) / np.diff(echo), np.diff(found)[0] / np.diff(echo)[0], rtol=1e-12)
-    assert amplitudes(np.array(1e-6), 40.0) == pytest.approx(1e-6, rel=1e-5)
-    np.testing.assert_array_equal(amplitudes(shown, 0.0), shown)
+    assert decompress(np.array(1e-6), 40.0) == pytest.approx(1e-6, rel=1e-5)
+    np.testing.assert_array_equal(decompress(shown, 0.0), shown)

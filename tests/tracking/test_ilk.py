@@ -4,7 +4,7 @@ from skimage.registration import optical_flow_ilk
 
 from echotruth.config.tracking import Ilk
 from echotruth.tracking import track
-from echotruth.tracking.trackers.ilk import flow
+from echotruth.tracking.trackers.ilk import optical_flow
 
 SHIFT = np.array([3.0, -1.5])
 
@@ -18,11 +18,11 @@ def pair(clip):
 def test_motion_at_whole_pixels_is_the_library_s_own(pair, radius):
     points = np.array([[40.0, 60.0], [70.0, 31.0]])
     moved, _ = track(pair, points, np.ones((96, 96), bool), 3e-5, np.arange(2.0), 0, Ilk(radius_px=radius))
-    down, across = optical_flow_ilk(*pair, radius=radius)
-    np.testing.assert_allclose(moved[1], np.stack([across, down], -1)[[60, 31], [40, 70]], atol=1e-4)
+    axial, lateral = optical_flow_ilk(*pair, radius=radius)
+    np.testing.assert_allclose(moved[1], np.stack([lateral, axial], -1)[[60, 31], [40, 70]], atol=1e-4)
 
 
 def test_shift_of_speckle_is_found(pair):
-    found = flow(*(pair / np.float32(255)))
-    assert found.shape == (96, 96, 2)
-    np.testing.assert_allclose(found[25:-25, 25:-25].mean((0, 1)), SHIFT, atol=0.05)
+    flow = optical_flow(*(pair / np.float32(255)))
+    assert flow.shape == (96, 96, 2)
+    np.testing.assert_allclose(flow[25:-25, 25:-25].mean((0, 1)), SHIFT, atol=0.05)

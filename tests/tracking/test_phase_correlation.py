@@ -4,13 +4,15 @@ from scipy.ndimage import gaussian_filter
 
 from echotruth.config import PhaseCorrelation
 from echotruth.tracking import grid, track
-from echotruth.tracking.trackers.phase_correlation import displacement, fraction, phases, window_side
+from echotruth.tracking.trackers import phase_correlation
 from echotruth.tracking.windows import arrange
 
 
 def match(first, second, side, taper="none"):
     windows = arrange(first.shape, side, 0.5)
-    return displacement(*(phases(image, windows, taper, 255) for image in (first, second)), side)
+    return phase_correlation.window_shifts(
+        *(phase_correlation.phase_spectra(image, windows, taper, 255) for image in (first, second)), side
+    )
 
 
 @pytest.mark.parametrize("shift", [(0, 0), (5, 0), (0, -7), (-3, 11)])
@@ -37,14 +39,16 @@ def test_bias_of_sub_pixel_shifts_is_below_a_tenth_of_a_pixel(shifted, shift, ta
     assert np.abs(error.mean((0, 1))).max() < 0.12
 
 
-def test_fraction_is_exact_for_the_peak_of_a_shifted_texture():
+def test_subpixel_offset_is_exact_for_the_peak_of_a_shifted_texture():
     shift = np.linspace(-0.49, 0.49, 21)
-    np.testing.assert_allclose(fraction(*(np.sinc(k - shift) for k in (-1, 0, 1))), shift, atol=1e-12)
+    np.testing.assert_allclose(
+        phase_correlation.subpixel_offset(*(np.sinc(k - shift) for k in (-1, 0, 1))), shift, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("floor, found", [(0.0, False), (0.05, True)])
-def test_shift_of_coarse_speckle_under_noise_is_found_by_the_frequencies_above_a_floor(floor, found):
-    """Phase-only correlation makes frequencies that hold nothing but noise as loud as those of the speckle."""
+def test_shift_of_noisy_coarse_speckle_is_found_by_the_frequencies_above_a_floor(floor, found):
+    """Phase-only correlation gives frequencies that contain only noise the same weight as those of the speckle."""
     rng = np.random.default_rng(3)
     speckle = gaussian_filter(rng.standard_normal((160, 160)), 3, mode="wrap")
     speckle *= 60 / speckle.std()
@@ -64,13 +68,14 @@ def test_window_without_texture_has_no_displacement(shifted):
 
 def test_window_in_tissue_keeps_its_size():
     tracker = PhaseCorrelation(window_px=None, window_mm=1.5)
-    assert [window_side(tracker, 12e-3 / n) for n in (512, 256, 128)] == [64, 32, 16]
-    assert window_side(tracker, 1e-3) == 8
-    assert window_side(PhaseCorrelation(), 1.0) == 64
+    assert [phase_correlation.window_side(tracker, 12e-3 / n) for n in (512, 256, 128)] == [64, 32, 16]
+    assert phase_correlation.window_side(tracker, 1e-3) == 8
+    assert phase_correlation.window_side(PhaseCorrelation(), 1.0) == 64
 
 
 @pytest.mark.parametrize(
-    "options", [{}, {"taper": "hann", "reference": "previous"}, {"taper": "hann", "reference": "cycle", "floor": 0.01}]
+    "options",
+    [{}, {"taper": "hann", "reference": "previous"}, {"taper": "hann", "reference": "bidirectional", "floor": 0.01}],
 )
 def test_rigid_shift_is_followed_to_half_a_pixel(clip, options):
     frames = clip(lambda place, t: place + np.array([2 * t, -3 * t]), 5)

@@ -1,19 +1,19 @@
-"""What is asked of every tracker."""
+"""Requirements of every tracker."""
 
 import numpy as np
 import pytest
 
-from echotruth.config.tracking import METHODS, Guest, PhaseCorrelation, name_of
+from echotruth.config.tracking import METHODS, External, PhaseCorrelation, name_of
 from echotruth.tracking import track
 
 SPACING = 3e-5
 SHAPE = (160, 120)
 CENTRE = np.array([59.5, 79.5])
 CORRECTED = {"window_px": 48, "taper": "hann", "reference": "previous"}
-"""Options without which phase correlation is not up to motion that varies in space."""
+"""Options that phase correlation needs for motion that varies in space."""
 
 
-@pytest.fixture(params=[method for method in METHODS if method is not Guest], ids=name_of)
+@pytest.fixture(params=[method for method in METHODS if method is not External], ids=name_of)
 def tracker(request):
     return request.param(**CORRECTED if request.param is PhaseCorrelation else {})
 
@@ -25,7 +25,7 @@ def tall(clip):
 
 
 def points():
-    """Away from the border by more than a window."""
+    """Points farther from the border than a window."""
     lateral, axial = np.meshgrid(np.arange(30.0, 91, 12.5), np.arange(30.0, 131, 12.5))
     return np.stack([lateral, axial], -1).reshape(-1, 2)
 
@@ -54,7 +54,7 @@ def test_shift_is_lateral_then_axial_and_positive_for_motion_of_the_tissue(tall,
 
 
 def test_turn_and_stretch_are_found_and_read_where_the_tissue_is(tall, tracker):
-    """Steps of a turn added up where a point was at first would lie along the tangent, and never lead inwards."""
+    """Steps of a rotation measured at the initial position of a point would add up along the tangent."""
 
     def gradient(t):
         angle, stretch = 0.36 * beat(t, 10), np.diag([1, 1 + 0.1 * beat(t, 10)])
@@ -63,7 +63,7 @@ def test_turn_and_stretch_are_found_and_read_where_the_tissue_is(tall, tracker):
     arm = points() - CENTRE
     arm = arm[np.hypot(*arm.T) < 45]
     moved, _ = found(tall(lambda place, t: CENTRE + (place - CENTRE) @ gradient(t), 10), tracker, CENTRE + arm)
-    # Windows that hold enough speckle for a phase correlation are too wide for more than the sense of so fast a turn.
+    # Windows with enough speckle for phase correlation are too wide to resolve so fast a rotation.
     tolerance = 0.15 if tracker.method == "phase_correlation" else 0.02
     np.testing.assert_allclose(np.linalg.lstsq(arm, moved[5])[0], gradient(5) - np.eye(2), atol=tolerance)
 
@@ -77,7 +77,7 @@ def test_clip_without_texture_has_no_displacement(tracker, value):
 
 @pytest.mark.parametrize("patch", ["black", "constant", "faint", "nan"])
 def test_place_without_texture_has_no_displacement_and_the_rest_has(tall, tracker, patch):
-    """Half a grey level is what rounding leaves of a signal too weak to be seen."""
+    """Rounding leaves noise of half a grey level of a signal below the resolution of 8 bits (faint)."""
     frames = tall(lambda place, t: place + t * np.array([1.5, 0.5]), 2).astype(float)
     random = np.random.default_rng(3)
     frames[:, :80] = {"black": 0, "constant": 90, "nan": np.nan}.get(
@@ -100,7 +100,7 @@ def test_no_points_are_no_displacement(tall, tracker):
     assert moved.shape == (2, 0, 2) and quality.shape == (2, 0)
 
 
-def test_one_frame_is_refused_in_a_sentence(tall, tracker):
+def test_one_frame_is_refused(tall, tracker):
     with pytest.raises(ValueError, match="two or more frames"):
         found(tall(lambda place, t: place, 1), tracker)
 
@@ -112,11 +112,11 @@ def test_one_frame_is_refused_in_a_sentence(tall, tracker):
         ({"points": np.zeros((1, 3))}, r"shape \(point, 2\), not \(1, 3\)"),
         ({"mask": np.ones((80, 70), bool)}, "shape of a frame"),
         ({"spacing": 0.0}, "positive length in metres, not 0.0"),
-        ({"frame_time": np.array([1.0, 1.0])}, "2 rising times"),
+        ({"frame_time": np.array([1.0, 1.0])}, "2 increasing times"),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_a_sentence(changed, message):
-    given = {
+def test_invalid_input_is_refused(changed, message):
+    arguments = {
         "frames": np.zeros((2, 80, 80)),
         "points": np.zeros((1, 2)),
         "mask": np.ones((80, 80), bool),
@@ -125,7 +125,7 @@ def test_what_makes_no_sense_is_refused_in_a_sentence(changed, message):
         "seed": 0,
     }
     with pytest.raises(ValueError, match=message):
-        track(**given | changed, settings=PhaseCorrelation())
+        track(**arguments | changed, settings=PhaseCorrelation())
 
 
 @pytest.mark.parametrize("kind", [np.int16, np.float32])
@@ -135,11 +135,11 @@ def test_any_real_type_of_grey_value_gives_the_same_motion(tall, tracker, kind):
     np.testing.assert_allclose(found(frames.astype(kind), tracker)[0], found(frames, tracker)[0], atol=2e-3)
 
 
-def test_same_input_gives_the_same_bytes_and_stays_as_it_is(tall, tracker):
+def test_same_input_gives_the_same_bytes_and_is_not_changed(tall, tracker):
     frames, places = tall(lambda place, t: place + t * np.array([1.5, 0.5]), 3), points()
     before = frames.copy()
     frames.setflags(write=False)
     places.setflags(write=False)
-    answers = [b"".join(each.tobytes() for each in found(frames, tracker, places)) for _ in range(2)]
-    assert answers[0] == answers[1]
+    results = [b"".join(array.tobytes() for array in found(frames, tracker, places)) for _ in range(2)]
+    assert results[0] == results[1]
     np.testing.assert_array_equal(frames, before)

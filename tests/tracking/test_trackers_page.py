@@ -1,4 +1,4 @@
-"""What docs/trackers.md says is so."""
+"""The examples of docs/trackers.md run."""
 
 import inspect
 import re
@@ -12,9 +12,9 @@ import yaml
 
 from echotruth.config import Config
 from echotruth.config.loading import validate
-from echotruth.config.tracking import GIVEN, Guest
+from echotruth.config.tracking import TRACKER_ARGUMENTS, External
 from echotruth.tracking import track
-from echotruth.tracking.trackers.external import GROUP
+from echotruth.tracking.trackers.external import ENTRY_POINT_GROUP
 
 PAGE = (Path(__file__).parents[2] / "docs/trackers.md").read_text()
 TRACKER, PROGRAM = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
@@ -26,7 +26,7 @@ SHIFT = np.array([1.3, -0.6])
 
 @pytest.fixture
 def speckle(clip, tmp_path, monkeypatch):
-    """What a tracker is given of speckle that moves so; the page's code lies in the current folder."""
+    """Arguments of a tracker for speckle that moves by SHIFT; the code of the page is in the current folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", sys.path[:])
     monkeypatch.delitem(sys.modules, "mypackage", raising=False)
@@ -39,26 +39,26 @@ def speckle(clip, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("options", [{}, {"window_mm": 0.5}])
 def test_tracker_of_the_page_follows_shifted_speckle_to_a_tenth_of_a_pixel(speckle, options):
-    displacement, quality = track(*speckle, Guest(track="mypackage:track", options=options))
+    displacement, quality = track(*speckle, External(track="mypackage:track", options=options))
     error = displacement - np.multiply.outer(np.arange(5), SHIFT)[:, None]
     assert np.linalg.norm(error, axis=-1).max() < 0.1
     assert (quality == 1).all()
 
 
 def test_program_of_the_page_runs(speckle):
-    displacement, _ = track(*speckle, Guest(command=[sys.executable, "network.py", "{input}", "{output}"]))
+    displacement, _ = track(*speckle, External(command=[sys.executable, "network.py", "{input}", "{output}"]))
     assert displacement.shape == (5, len(speckle[1]), 2) and not displacement.any()
 
 
-def test_order_on_the_page_is_that_of_the_arguments():
+def test_table_of_the_page_is_in_the_order_of_the_arguments():
     rows = re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE)
-    assert tuple(rows) == (*GIVEN, "displacement", "quality")
+    assert tuple(rows) == (*TRACKER_ARGUMENTS, "displacement", "quality")
     scope = {}
     exec(TRACKER, scope)
-    assert tuple(inspect.signature(scope["track"]).parameters) == (*GIVEN, "window_mm")
+    assert tuple(inspect.signature(scope["track"]).parameters) == (*TRACKER_ARGUMENTS, "window_mm")
 
 
-def test_configuration_and_entry_point_of_the_page_can_be():
+def test_configuration_and_entry_point_of_the_page_are_valid():
     config = validate(yaml.safe_load(CONFIGURATION), "docs/trackers.md")
-    assert isinstance(config, Config) and isinstance(config.tracking.trackers["network"], Guest)
-    assert list(tomllib.loads(PACKAGE)["project"]["entry-points"]) == [GROUP]
+    assert isinstance(config, Config) and isinstance(config.tracking.trackers["network"], External)
+    assert list(tomllib.loads(PACKAGE)["project"]["entry-points"]) == [ENTRY_POINT_GROUP]

@@ -4,9 +4,9 @@ from scipy import ndimage
 
 from echotruth.config.tracking import WindowDeformation
 from echotruth.tracking import track
-from echotruth.tracking.correlation import match, peaks, textured
-from echotruth.tracking.field import motion, smooth, validated
-from echotruth.tracking.trackers.window_deformation import WindowPairs, arranged, carry, sides
+from echotruth.tracking.correlation import has_texture, match_windows, subpixel_peaks
+from echotruth.tracking.field import displacement_field, replace_outliers, smooth
+from echotruth.tracking.trackers import window_deformation
 from echotruth.tracking.windows import Windows, arrange
 
 SPACING = 3e-5
@@ -49,25 +49,25 @@ def test_correlation_of_a_window_at_a_lag_is_pearson_s():
     first = ndimage.gaussian_filter(noise[0], 1.5).astype(np.float32)
     second = (np.roll(first, (1, 1), (0, 1)) + 0.02 * noise[1]).astype(np.float32)
     windows = Windows(8, np.array([12]), np.array([20]))
-    shift, peak = match(first, second, windows, textured(first, windows), 3)
+    shift, peak = match_windows(first, second, windows, has_texture(first, windows), 3)
     np.testing.assert_allclose(shift[0, 0], [1, 1], atol=0.5)
     expected = np.corrcoef(first[12:20, 20:28].ravel(), second[13:21, 21:29].ravel())[0, 1]
     assert peak[0, 0] == pytest.approx(expected, abs=1e-6)
 
 
-def test_place_of_a_gaussian_peak_is_exact():
+def test_position_of_a_gaussian_peak_is_exact():
     lag = np.arange(-3, 4)
     lateral, axial = np.meshgrid(lag - 0.37, lag + 1.21)
-    shift, peak = peaks(np.exp(-(lateral**2) / 3 - axial**2 / 5)[None])
+    shift, peak = subpixel_peaks(np.exp(-(lateral**2) / 3 - axial**2 / 5)[None])
     np.testing.assert_allclose(shift[0], [0.37, -1.21], atol=1e-12)
     assert 0.9 < peak[0] < 1
 
 
-def test_peak_at_the_border_or_beside_what_is_not_alike_is_none():
+def test_peak_at_the_border_or_beside_negative_correlation_is_unknown():
     edge, lone, unknown = np.full((3, 5, 5), -0.2)
     edge[2, 0], lone[2, 2] = 0.9, 0.9
     unknown[:] = np.nan
-    shift, peak = peaks(np.stack([edge, lone, unknown]))
+    shift, peak = subpixel_peaks(np.stack([edge, lone, unknown]))
     assert np.isnan(shift).all()
     np.testing.assert_allclose(peak, [0.9, 0.9, np.nan])
 
@@ -77,38 +77,38 @@ def test_outliers_become_the_median_of_their_neighbours_and_linear_motion_stays(
     field = np.stack([0.03 * column - 0.01 * row, 0.02 * row], -1)
     spoilt = field.copy()
     spoilt[3, 4], spoilt[1, 6, 1] = [9, -9], np.nan
-    np.testing.assert_allclose(validated(spoilt), field, atol=0.021)
-    np.testing.assert_array_equal(validated(field), field)
+    np.testing.assert_allclose(replace_outliers(spoilt), field, atol=0.021)
+    np.testing.assert_array_equal(replace_outliers(field), field)
 
 
 def test_missing_vectors_are_the_nearest_there_are_and_none_are_none():
     field = np.full((6, 6, 2), np.nan)
     field[:, :2] = [1.5, -2]
-    np.testing.assert_array_equal(validated(field), np.broadcast_to([1.5, -2], field.shape))
-    assert (validated(np.full((6, 6, 2), np.nan)) == 0).all()
+    np.testing.assert_array_equal(replace_outliers(field), np.broadcast_to([1.5, -2], field.shape))
+    assert (replace_outliers(np.full((6, 6, 2), np.nan)) == 0).all()
 
 
 def test_field_between_windows_is_a_cubic_spline_through_their_centres():
     windows = arrange((96, 128), 16, 0.5)
     field = np.random.default_rng(5).normal(size=(len(windows.top), len(windows.left), 2))
-    moved = motion(field, windows, (96, 128))
+    moved = displacement_field(field, windows, (96, 128))
     lateral, axial = np.meshgrid(windows.left + 7.5, windows.top + 7.5)
     np.testing.assert_allclose(
         moved.at(np.stack([lateral, axial], -1).reshape(-1, 2)).reshape(field.shape), field, atol=1e-5
     )
     between = ndimage.map_coordinates(field[..., 0], [[3.3, 0], [5.9, 4]], order=3, mode="mirror")
-    places = np.array([[windows.left[5] + 7.5 + 0.9 * 8, windows.top[3] + 7.5 + 0.3 * 8], [windows.left[4] + 7.5, 2]])
-    np.testing.assert_allclose(moved.at(places)[:, 0], between, atol=1e-5)
+    points = np.array([[windows.left[5] + 7.5 + 0.9 * 8, windows.top[3] + 7.5 + 0.3 * 8], [windows.left[4] + 7.5, 2]])
+    np.testing.assert_allclose(moved.at(points)[:, 0], between, atol=1e-5)
     assert np.isnan(moved.at(np.array([[-0.1, 5.0], [5.0, 95.1], [np.nan, 5.0]]))).all()
 
 
 def test_mean_motion_under_other_windows_is_that_of_their_pixels():
     windows, smaller = arrange((90, 128), 16, 0.5), arrange((90, 128), 10, 0.5)
     field = np.random.default_rng(6).normal(size=(len(windows.top), len(windows.left), 2))
-    moved = motion(field, windows, (90, 128))
+    moved = displacement_field(field, windows, (90, 128))
     pixels = np.stack(np.meshgrid(np.arange(128.0), np.arange(90.0)), -1)
-    every = moved.at(pixels.reshape(-1, 2)).reshape(pixels.shape)
-    expected = np.stack([smaller.cut(each).mean((-2, -1)) for each in np.moveaxis(every, -1, 0)], -1)
+    dense = moved.at(pixels.reshape(-1, 2)).reshape(pixels.shape)
+    expected = np.stack([smaller.extract(component).mean((-2, -1)) for component in np.moveaxis(dense, -1, 0)], -1)
     np.testing.assert_allclose(moved.mean(smaller), expected, atol=1e-6)
 
 
@@ -119,22 +119,22 @@ def test_smoothing_keeps_linear_motion_and_removes_what_alternates():
     np.testing.assert_allclose(smooth(linear + ripple)[2:-2, 2:-2], linear[2:-2, 2:-2], atol=1e-12)
 
 
-def test_image_carried_back_by_its_motion_is_the_first(shifted):
+def test_image_warped_back_by_its_displacement_is_the_first(shifted):
     first, second = shifted(96, 0, 0), shifted(96, 2.5, -1.25)
     windows = arrange((96, 96), 16, 0.5)
     field = np.broadcast_to([2.5, -1.25], (len(windows.top), len(windows.left), 2))
-    image = WindowPairs([windows]).prepare(second.astype(np.float32))
-    back = carry(image, motion(field, windows, (96, 96)), np.ones((96, 96), bool))
+    image = window_deformation.WindowDeformationTracker([windows]).prepare(second.astype(np.float32))
+    warped = window_deformation.warp(image, displacement_field(field, windows, (96, 96)), np.ones((96, 96), bool))
     # Dark seams of speckle, cut off at black, are no smooth function.
-    assert np.median(np.abs(back - first.astype(float))[5:-5, 5:-5]) < 1
+    assert np.median(np.abs(warped - first.astype(float))[5:-5, 5:-5]) < 1
 
 
 def test_windows_are_the_same_tissue_at_every_size_but_eight_pixels_at_least():
     settings = WindowDeformation(windows_mm=[1.5, 0.75, 0.375], sweeps=2)
-    found = [sides(settings, 12e-3 / n) for n in (512, 256, 128)]
+    found = [window_deformation.window_sides(settings, 12e-3 / n) for n in (512, 256, 128)]
     assert found == [[64, 32, 16, 16], [32, 16, 8, 8], [16, 8, 8, 8]]
 
 
-def test_image_without_room_for_two_windows_is_refused_in_a_sentence():
-    with pytest.raises(ValueError, match="60 x 200 px holds no two windows of 50 px"):
-        arranged(WindowDeformation(), (60, 200), SPACING)
+def test_image_without_room_for_two_windows_is_refused():
+    with pytest.raises(ValueError, match="60 x 200 px has no room for two windows of 50 px"):
+        window_deformation.window_passes(WindowDeformation(), (60, 200), SPACING)

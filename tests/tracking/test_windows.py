@@ -21,12 +21,12 @@ def test_window_larger_than_the_image_is_refused():
         arrange((100, 32), 64, 0.5)
 
 
-def test_cut_has_the_right_pixels():
+def test_extracted_windows_have_the_right_pixels():
     image = np.arange(30 * 45).reshape(30, 45)
     windows = arrange(image.shape, 8, 0.5)
-    cut = windows.cut(image)
+    extracted = windows.extract(image)
     row, column = windows.top[2], windows.left[3]
-    np.testing.assert_array_equal(cut[2, 3], image[row : row + 8, column : column + 8])
+    np.testing.assert_array_equal(extracted[2, 3], image[row : row + 8, column : column + 8])
 
 
 def test_interpolation_is_exact_for_linear_fields_and_nearest_outside():

@@ -15,10 +15,10 @@ def named(check):
 
 @pytest.mark.parametrize("check", [named(check) for check in CHECKS])
 def test_numbers_are_within_their_tolerances(check):
-    numbers = check.measure(quick=True)
-    missed = {row.quantity: row.found for row in check.report(numbers).rows if not row.met}
+    results = check.measure(quick=True)
+    missed = {row.quantity: row.found for row in check.report(results).rows if not row.met}
     assert not missed
     if hasattr(check, "draw"):
-        sheet = check.draw(numbers)
-        sheet.canvas.draw()
-        assert np.asarray(sheet.canvas.buffer_rgba())[..., :3].min() < 128
+        figure = check.draw(results)
+        figure.canvas.draw()
+        assert np.asarray(figure.canvas.buffer_rgba())[..., :3].min() < 128

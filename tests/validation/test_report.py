@@ -34,19 +34,19 @@ def sums(found):
     return SimpleNamespace(
         __name__="validation.sums",
         measure=lambda quick: found,
-        report=lambda numbers: Report("Sums", "One and one.", (Row("error", numbers, None, 0.5, "counting"),)),
+        report=lambda results: Report("Sums", "One and one.", (Row("error", results, None, 0.5, "counting"),)),
     )
 
 
 @pytest.mark.parametrize("found", [0.0, 1.0])
 def test_page_holds_every_check_and_says_whether_all_is_met(tmp_path, monkeypatch, found):
     monkeypatch.setattr(page, "CHECKS", (sums(found),))
-    told = []
-    assert page.write(tmp_path, quick=True, tell=told.append) is (found == 0)
+    log = []
+    assert page.write(tmp_path, quick=True, log=log.append) is (found == 0)
     text = (tmp_path / "validation.md").read_text()
     assert "## Sums\n\nOne and one." in text
     assert "made with `--quick`" in text
-    assert any("missed: error" in said for said in told) is (found == 1)
+    assert any("missed: error" in line for line in log) is (found == 1)
 
 
 @pytest.mark.parametrize("found", [0, 1])

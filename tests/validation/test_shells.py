@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from echotruth.materials import LAWS
-from validation.energies import Wall
+from validation.energies import ConstitutiveModel
 from validation.shells import Sphere, Tube, integral
 
-RUBBER = Wall(LAWS["neo_hooke"].Law(), 2e3)
+RUBBER = ConstitutiveModel(LAWS["neo_hooke"].Law(), 2e3)
 
 
 def test_pressure_in_a_sphere_of_rubber_is_the_closed_formula():
@@ -31,8 +31,8 @@ def test_pressure_in_a_tube_of_rubber_is_the_closed_formula():
 
 def test_loads_of_a_tube_are_the_rates_of_its_energy():
     """By twist and by stretch: the pressure does no work where the inner radius stays."""
-    wall = Wall(LAWS["guccione"].Law(), 880.0, tension=1e4)
-    tube, step = Tube(wall, 1.5e-3, 2.5e-3, 1.8e-3, 1.1, 150.0, (1.0, -0.7)), 1e-5
+    model = ConstitutiveModel(LAWS["guccione"].Law(), 880.0, tension=1e4)
+    tube, step = Tube(model, 1.5e-3, 2.5e-3, 1.8e-3, 1.1, 150.0, (1.0, -0.7)), 1e-5
     force, torque = tube.force_and_torque()
     by_twist = [_energy(replace(tube, twist=150 + side * step)) for side in (1, -1)]
     by_stretch = [_energy(replace(tube, stretch=1.1 + side * step)) for side in (1, -1)]
@@ -47,7 +47,7 @@ def _energy(tube):
         r, f = tube.radius(unloaded), np.zeros((*unloaded.shape, 3, 3))
         f[..., 0, 0], f[..., 1, 1], f[..., 2, 2] = unloaded / (tube.stretch * r), r / unloaded, tube.stretch
         f[..., 1, 2] = r * tube.twist
-        return tube.wall.density(f @ np.swapaxes(tube.axes(unloaded), -1, -2)) * 2 * np.pi * unloaded
+        return tube.model.density(f @ np.swapaxes(tube.axes(unloaded), -1, -2)) * 2 * np.pi * unloaded
 
     return integral(density, tube.inner, tube.outer)
 
@@ -57,6 +57,6 @@ def test_motion_keeps_the_volume():
     place, step = np.array([1.2e-3, 1.4e-3, 0.9e-3]), 1e-9
     for shell in (tube, sphere):
         ends = [np.eye(3) * side * step + place for side in (1, -1)]
-        ends = [each + shell.displacement(each) for each in ends]
+        ends = [point + shell.displacement(point) for point in ends]
         gradient = (ends[0] - ends[1]) / (2 * step)
         assert np.linalg.det(gradient) == pytest.approx(1, rel=1e-5)

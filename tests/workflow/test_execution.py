@@ -1,4 +1,4 @@
-"""A run says what failed, and nothing that it has started outlives it."""
+"""A run reports what failed, and ends all processes that it started."""
 
 import os
 import signal
@@ -9,7 +9,7 @@ import time
 import psutil
 import pytest
 
-from echotruth.workflow.execution import LAST, execute
+from echotruth.workflow.execution import LOG_LINES, execute
 
 
 def python(code):
@@ -23,24 +23,24 @@ def test_words_of_snakemake_are_in_the_log_and_not_on_the_terminal(tmp_path, cap
     assert capfd.readouterr() == ("", "")
 
 
-def test_failed_job_is_told_by_the_end_of_its_log_and_the_status(tmp_path, capfd):
+def test_failed_job_is_reported_by_the_end_of_its_log_and_the_status(tmp_path, capfd):
     job = tmp_path / "mid.log"
     job.write_text("\n".join(f"line {number}" for number in range(100)))
-    said = f"Error in rule imaging:\n    jobid: 3\n    log: {job} (check log file(s) for error details)\n"
-    assert execute(python(f"print({said!r}); exit(1)"), tmp_path / "snakemake.log", "demo", {}) == 1
-    told = capfd.readouterr().err
-    assert f"The last lines of {job}" in told and "line 99" in told
-    assert f"line {100 - LAST}\n" in told and f"line {99 - LAST}\n" not in told
+    output = f"Error in rule imaging:\n    jobid: 3\n    log: {job} (check log file(s) for error details)\n"
+    assert execute(python(f"print({output!r}); exit(1)"), tmp_path / "snakemake.log", "demo", {}) == 1
+    message = capfd.readouterr().err
+    assert f"The last lines of {job}" in message and "line 99" in message
+    assert f"line {100 - LOG_LINES}\n" in message and f"line {99 - LOG_LINES}\n" not in message
 
 
-def test_failure_before_any_job_is_told_by_snakemakes_own_log(tmp_path, capfd):
+def test_failure_before_any_job_is_reported_by_snakemakes_own_log(tmp_path, capfd):
     log = tmp_path / "snakemake.log"
     assert execute(python("print('no such rule'); exit(2)"), log, "demo", {}) == 2
-    told = capfd.readouterr().err
-    assert str(log) in told and "no such rule" in told
+    message = capfd.readouterr().err
+    assert str(log) in message and "no such rule" in message
 
 
-def at_work(number):
+def is_running(number):
     """Whether a process has not ended; one that has may stay in the table until its new parent asks for its status."""
     return psutil.pid_exists(number) and psutil.Process(number).status() != psutil.STATUS_ZOMBIE
 
@@ -55,10 +55,10 @@ time.sleep(60)
 RUN = """
 import signal, sys
 from pathlib import Path
-from echotruth import execution
-# Tests that run in the background may have been told to ignore it.
+from echotruth.workflow import execution
+# A shell may start background processes with SIGINT ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-execution.PATIENCE = 0.5
+execution.TERMINATION_SECONDS = 0.5
 execution.execute([sys.executable, "-c", sys.argv[1]], Path(sys.argv[2]), "demo", {})
 """
 
@@ -75,4 +75,4 @@ def test_signal_ends_all_jobs(tmp_path, number):
     os.kill(run.pid, number)
     run.communicate(timeout=30)
     assert run.returncode != 0
-    assert not at_work(job)
+    assert not is_running(job)

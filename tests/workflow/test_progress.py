@@ -1,12 +1,12 @@
-"""How far a run is: told from Snakemake's words, by what jobs have taken."""
+"""Progress of a run, from Snakemake's log and the durations of jobs."""
 
 import io
 import json
 
 import pytest
 
-from echotruth.workflow.execution import Line
-from echotruth.workflow.progress import Progress, measured, words
+from echotruth.workflow.execution import ProgressLine
+from echotruth.workflow.progress import Progress, format_duration, measured_seconds
 
 PLAN = """\
 Provided cores: 2
@@ -35,60 +35,60 @@ class Run:
         self.now = 0.0
         self.progress = Progress(weights, lambda: self.now)
 
-    def hear(self, text):
+    def read(self, text):
         for line in text.splitlines():
-            self.progress.hear(line)
+            self.progress.read_line(line)
         return self.progress
 
 
 def test_time_left_is_that_of_stage_after_stage_on_the_cores_there_are():
-    progress = Run(mechanics=40, imaging=100).hear(PLAN)
-    assert progress.share == 0
-    assert progress.left == pytest.approx(40 + 4 * 100 / 2)
+    progress = Run(mechanics=40, imaging=100).read(PLAN)
+    assert progress.fraction_done == 0
+    assert progress.seconds_left == pytest.approx(40 + 4 * 100 / 2)
 
 
 def test_running_jobs_count_as_far_as_they_are():
     run = Run(mechanics=40, imaging=100)
-    run.hear(PLAN + began("mechanics", 5))
+    run.read(PLAN + began("mechanics", 5))
     run.now = 10
-    assert run.progress.stage == "mechanics (1 of 1)"
-    assert run.progress.share == pytest.approx(10 / 440)
-    assert run.progress.left == pytest.approx(30 + 200)
+    assert run.progress.running == "mechanics (1 of 1)"
+    assert run.progress.fraction_done == pytest.approx(10 / 440)
+    assert run.progress.seconds_left == pytest.approx(30 + 200)
 
 
 def test_a_slow_machine_is_known_by_the_first_job_and_a_stage_by_its_own():
     run = Run(mechanics=40, imaging=100)
-    run.hear(PLAN + began("mechanics", 5))
+    run.read(PLAN + began("mechanics", 5))
     run.now = 80
-    run.hear(ended("mechanics", 5))
-    assert run.progress.left == pytest.approx(2 * 200), "twice as slow as thought"
-    run.hear(began("imaging", 1) + began("imaging", 2))
+    run.read(ended("mechanics", 5))
+    assert run.progress.seconds_left == pytest.approx(2 * 200), "twice as slow as thought"
+    run.read(began("imaging", 1) + began("imaging", 2))
     run.now = 130
-    run.hear(ended("imaging", 1) + ended("imaging", 2))
-    assert run.progress.left == pytest.approx(50)
-    assert run.progress.share == pytest.approx((80 + 100) / (80 + 200))
+    run.read(ended("imaging", 1) + ended("imaging", 2))
+    assert run.progress.seconds_left == pytest.approx(50)
+    assert run.progress.fraction_done == pytest.approx((80 + 100) / (80 + 200))
 
 
 def test_share_never_falls_and_ends_at_one():
     run, before = Run(mechanics=40, imaging=1), 0.0
-    run.hear(PLAN)
+    run.read(PLAN)
     for number, rule in enumerate(["mechanics", *["imaging"] * 4]):
-        run.hear(began(rule, number))
+        run.read(began(rule, number))
         for _ in range(3):
             run.now += 30
-            assert run.progress.share >= before
-            before = run.progress.share
-        run.hear(ended(rule, number))
-    assert run.progress.share == 1
-    assert run.progress.left == 0
+            assert run.progress.fraction_done >= before
+            before = run.progress.fraction_done
+        run.read(ended(rule, number))
+    assert run.progress.fraction_done == 1
+    assert run.progress.seconds_left == 0
 
 
 def test_failed_job_is_done_with_and_its_log_is_known():
     run = Run(mechanics=40, imaging=100)
     failed = "Error in rule imaging:\n    message: None\n    jobid: 1\n    log: out/mid.log (check log file(s))\n"
-    run.hear(PLAN + began("imaging", 1) + failed)
+    run.read(PLAN + began("imaging", 1) + failed)
     assert [str(log) for log in run.progress.logs] == ["out/mid.log"]
-    assert run.progress.left == pytest.approx(40 + 3 * 100 / 2)
+    assert run.progress.seconds_left == pytest.approx(40 + 3 * 100 / 2)
 
 
 def test_records_tell_what_the_jobs_of_a_rule_take(tmp_path):
@@ -98,10 +98,10 @@ def test_records_tell_what_the_jobs_of_a_rule_take(tmp_path):
 
     record("tracking/heart/mid.json", seconds=10, start_seconds=1)
     record("tracking/heart/base.json", seconds=20, start_seconds=1)
-    assert measured(tmp_path) == {}, "of evaluation there is nothing yet"
+    assert measured_seconds(tmp_path) == {}, "of evaluation there is nothing yet"
     record("evaluation/heart/mid.json", seconds=2, start_seconds=1)
     record("evaluation/heart/base.json", status="skipped")
-    assert measured(tmp_path) == {"tracking": 16 + 3}
+    assert measured_seconds(tmp_path) == {"tracking": 16 + 3}
 
 
 class Terminal(io.StringIO):
@@ -112,16 +112,16 @@ class Terminal(io.StringIO):
 def test_line_is_rewritten_on_a_terminal_and_comes_once_in_a_while_elsewhere():
     for stream, expected in ((Terminal(), 4), (io.StringIO(), 2)):
         run = Run(mechanics=40, imaging=100)
-        line = Line("demo", stream, lambda run=run: run.now)
-        run.hear(PLAN + began("mechanics", 5))
+        line = ProgressLine("demo", stream, lambda run=run: run.now)
+        run.read(PLAN + began("mechanics", 5))
         for _ in range(4):
             line.show(run.progress)
             run.now += 10
-        said = stream.getvalue()
-        assert said.count("demo: ") == expected
-        assert ("\n" in said) != stream.isatty()
+        output = stream.getvalue()
+        assert output.count("demo: ") == expected
+        assert ("\n" in output) != stream.isatty()
 
 
-@pytest.mark.parametrize("seconds, told", [(3, "10 s"), (42, "40 s"), (70, "1 min"), (1000, "17 min"), (9000, "2.5 h")])
-def test_time_in_words(seconds, told):
-    assert words(seconds) == told
+@pytest.mark.parametrize("seconds, text", [(3, "10 s"), (42, "40 s"), (70, "1 min"), (1000, "17 min"), (9000, "2.5 h")])
+def test_time_in_words(seconds, text):
+    assert format_duration(seconds) == text

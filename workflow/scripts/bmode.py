@@ -1,14 +1,14 @@
-"""Envelope, gain, log compression, scan conversion and downsampling of one clip."""
+"""Convert the RF lines of one clip to B-mode: envelope, gain, log compression, scan conversion, downsampling."""
 
 from echotruth.imaging.beamforming.scan import scan_lines
-from echotruth.imaging.bmode import clip, time_gain
+from echotruth.imaging.bmode import bmode_clip, time_gain_compensation
 from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
-    rf, config = job.take("rf"), job.case.config
-    gain = time_gain(config.probe, config.bmode, rf["range"])
-    images = clip(rf["lines"], scan_lines(config.probe, config.rf), rf["range"], config.bmode, gain)
+    rf, config = job.load_scratch("rf"), job.case.config
+    gain = time_gain_compensation(config.probe, config.bmode, rf["range"])
+    images = bmode_clip(rf["lines"], scan_lines(config.probe, config.rf), rf["range"], config.bmode, gain)
     return {f"bmode/{size}": {"image": image} for size, image in images.items()}
 
 

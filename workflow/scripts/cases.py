@@ -1,4 +1,4 @@
-"""Expand the sweep into cases and lay out the repository for them."""
+"""Expand the sweep into cases and create the arrays of the repository."""
 
 import argparse
 import sys
@@ -12,7 +12,7 @@ from echotruth.config import Config
 from echotruth.config.loading import ConfigError, validate
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.rf.recorder import described
+from echotruth.imaging.recorder import metadata
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.geometry import GeometryError, left_ventricle
 from echotruth.repository import layout, ledger, schema
@@ -21,15 +21,15 @@ from echotruth.tracking import grid
 
 
 def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
-    """Write the table of the cases and the arrays of all jobs, without values; what is there already stays.
+    """Write the table of the cases and the empty arrays of all jobs; existing values stay.
 
     Parameters
     ----------
     folder : Path
-        Of the repository.
+        Folder of the repository.
     config : Config
     cases : list of Case
-        Those of the configuration.
+        Cases of the configuration.
     """
     mesh = left_ventricle(config.geometry)
     folder.mkdir(parents=True, exist_ok=True)
@@ -38,22 +38,22 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     loops = {loop: read_loop(loop) for loop in {case.config.loop for case in cases}}
     for case in cases:
         times[rows[case.id]] = loops[case.config.loop].time
-    frame = table(cases)
-    columns = layout.columns(frame, list(rows))
+    case_table = table(cases)
+    columns = layout.columns(case_table, list(rows))
     scanner = config.rf.keep and Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
-    values, lengths, settings = described(config, scanner) if scanner else ({}, {}, {})
+    values, lengths, settings = metadata(config, scanner) if scanner else ({}, {}, {})
     sizes = layout.sizes(mesh) | lengths
     labels = layout.labels(config, list(rows), times) | layout.positions(config, pixel_centres, grid) | columns
     labels |= {f"rf:{name}": value for name, value in values.items()}
     arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
     Store(folder / f"{config.name}.zarr").lay_out(arrays, sizes, labels, {"rf": settings})
-    frame.to_csv(folder / "cases.csv", index=False)
+    case_table.to_csv(folder / "cases.csv", index=False)
     (folder / "config.yaml").write_text(yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
+    parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     parser.add_argument("config", type=argparse.FileType("r"), help="YAML file, or - for standard input")
     arguments = parser.parse_args()
     try:

@@ -10,9 +10,9 @@ def work(job: Job) -> Result:
     truth, result = ground_truth(job), {}
     for size in job.case.config.bmode.sizes:
         tracked = job.read(f"tracking/{size}", "displacement")["displacement"]
-        scores = [score(each, truth) for each in tracked]
-        gathered = {name: np.stack([each[name] for each in scores]) for name in scores[0]}
-        result[f"evaluation/{size}"] = truth.arrays | gathered
+        scores = [score(displacement, truth) for displacement in tracked]
+        stacked = {name: np.stack([arrays[name] for arrays in scores]) for name in scores[0]}
+        result[f"evaluation/{size}"] = truth.arrays | stacked
     return result
 
 

@@ -1,24 +1,23 @@
-"""Scatterer seeding: place the probe, and scatterers in the wall."""
+"""Place the imaging plane, and seed scatterers."""
 
 from functools import partial
 
 from echotruth.cases import generator
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
-from echotruth.imaging.medium.medium import seed
-from echotruth.imaging.truth import cavity_centre
-from echotruth.imaging.view import plane
+from echotruth.imaging.medium.medium import seed_medium
+from echotruth.imaging.truth import cavity_centroid
+from echotruth.imaging.view import imaging_plane
 from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
     heart, config = job.heart, job.case.config
-    where = plane(job.view, config.rf, heart.positions(0)[heart.endo.ravel()])
+    plane = imaging_plane(job.view, config.rf, heart.positions(0)[heart.endo.ravel()])
     scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
-    seeded = seed(config, heart, where, partial(generator, job.case, job.view_name), scanner.matrix.in_beam)
-    job.hand_on(**seeded)
-    centre = cavity_centre(heart, where)
-    phantom = {"scatterers": len(seeded["amplitude"]), "origin": where.origin, "axes": where.axes, "centre": centre}
-    return {"phantom": phantom}
+    scatterers = seed_medium(config, heart, plane, partial(generator, job.case, job.view_name), scanner.matrix.in_beam)
+    job.save_scratch(**scatterers)
+    centre, number = cavity_centroid(heart, plane), len(scatterers["amplitude"])
+    return {"phantom": {"scatterers": number, "origin": plane.origin, "axes": plane.axes, "centre": centre}}
 
 
 if __name__ == "__main__":

@@ -1,20 +1,20 @@
-"""Measure a heart, and mark a solved one where it is out of bounds."""
+"""Measure a heart, and mark a solved heart that is outside the bounds."""
 
 import logging
 
-from echotruth.mechanics.physiology import measures, verdict
+from echotruth.mechanics.physiology import measures, violated_bound
 from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
     geometry = job.read("geometry", "node_position", "endo")
     kinematics = job.read("kinematics", "strain_mean", "volume_ratio_min")
-    found = measures(geometry, job.read("mechanics"), kinematics)
-    solved = job.case.config.motion.kind == "beat"  # what moves by a formula is no heart, and need not behave like one
-    if solved and (reason := verdict(found, job.case.config.physiology)):
-        job.mark("implausible", reason)
+    measured = measures(geometry, job.read("mechanics"), kinematics)
+    solved = job.case.config.motion.kind == "beat"  # the bounds do not apply to prescribed motions
+    if solved and (reason := violated_bound(measured, job.case.config.physiology)):
+        job.set_verdict("implausible", reason)
         logging.getLogger("echotruth").warning("implausible: %s", reason)
-    return {"physiology": found}
+    return {"physiology": measured}
 
 
 if __name__ == "__main__":

@@ -6,15 +6,16 @@ from pathlib import Path
 
 from echotruth.config.loading import load
 from echotruth.report.figures import PARTS, Figures
-from echotruth.workflow.compiled import share
+from echotruth.workflow.compiled import lock_cache_writes
 
 parser = argparse.ArgumentParser(description=__doc__)
-parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
-parser.add_argument("part", choices=PARTS, help="which figures")
-given = parser.parse_args()
-share()
-config = load(given.repository / "config.yaml")
+parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
+parser.add_argument("part", choices=PARTS, help="figures to draw")
+arguments = parser.parse_args()
+lock_cache_writes()
+folder = arguments.repository
+config = load(folder / "config.yaml")
 try:
-    Figures(given.repository / f"{config.name}.zarr", config, given.repository / "figures").draw(given.part)
+    Figures(folder / f"{config.name}.zarr", config, folder / "figures").draw(arguments.part)
 except ValueError as error:
     sys.exit(f"report: {error}")

@@ -1,18 +1,18 @@
-"""Verify what all jobs wrote, and publish the repository as one hierarchy."""
+"""Verify the files of all jobs, and publish the repository as one hierarchy."""
 
 import argparse
 import sys
 from pathlib import Path
 
 from echotruth.repository import ledger
-from echotruth.repository.publication import Damaged, publish
+from echotruth.repository.publication import ChecksumError, publish
 
 parser = argparse.ArgumentParser(description=__doc__)
-parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
+parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
 folder = parser.parse_args().repository
 try:
     summary = publish(folder)
-except Damaged as error:
+except ChecksumError as error:
     sys.exit(str(error))
 ledger.commit(folder / "ledger/repository.json", summary)
 files = summary.pop("files")

@@ -1,4 +1,4 @@
-"""Run stages of one heart and view one after the other in one process, which loads what they need once."""
+"""Run several stages of one heart and view in one process, so that modules are loaded only once."""
 
 from importlib import import_module
 
@@ -6,7 +6,7 @@ from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import parser, run
 
 command = parser("series", __doc__)
-command.add_argument("stages", nargs="+", help="names of scripts beside this one, as phantom truth rf bmode")
+command.add_argument("stages", nargs="+", help="names of scripts in this folder, such as phantom truth rf bmode")
 arguments, cost = command.parse_args(), Cost()
 for stage in arguments.stages:
     run(stage, import_module(stage).work, arguments, cost)

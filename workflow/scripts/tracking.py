@@ -13,21 +13,21 @@ from echotruth.workflow.job import Job, Result, main
 def work(job: Job) -> Result:
     result: Result = {}
     for size, clip in clips(job).items():
-        answers = {name: _answer(job, name, clip) for name in job.case.config.tracking.trackers}
-        displacement, quality = zip(*answers.values(), strict=True)
+        estimates = [_track(job, name, clip) for name in job.case.config.tracking.trackers]
+        displacement, quality = zip(*estimates, strict=True)
         result[f"tracking/{size}"] = {"displacement": np.stack(displacement), "quality": np.stack(quality)}
         logging.getLogger("echotruth").info("%d px", size)
     return result
 
 
-def _answer(job: Job, name: str, clip: Clip) -> tuple[np.ndarray, np.ndarray]:
-    """What one tracker finds; nothing, and a word in the record, where it fails."""
+def _track(job: Job, name: str, clip: Clip) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and quality of one tracker; if it fails, no estimate, and the reason in the record."""
     try:
-        return clip.on_grid(*track(*clip.given, job.case.config.tracking.trackers[name]))
+        return clip.on_grid(*track(*clip.tracker_arguments, job.case.config.tracking.trackers[name]))
     except TrackerFailed as error:
         logging.getLogger("echotruth").warning("%s at %d px: %s", name, clip.size, error)
         job.verdict.setdefault("failures", {})[f"{name}/{clip.size}"] = str(error)
-        return clip.on_grid(*clip.nothing)
+        return clip.on_grid(*clip.no_estimate)
 
 
 if __name__ == "__main__":

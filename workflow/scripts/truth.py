@@ -1,9 +1,9 @@
-"""The true motion, strain and labels at every pixel of every frame and image size."""
+"""True motion, strain and labels at every pixel of every frame and image size."""
 
 import logging
 
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.truth import truth
+from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import Plane
 from echotruth.workflow.job import Job, Result, main
 
@@ -14,7 +14,7 @@ def work(job: Job) -> Result:
     result: Result = {}
     for size in bmode.sizes:
         axial, lateral = pixel_centres(bmode, size)
-        result[f"truth/{size}"] = truth(heart, plane, axial, lateral)
+        result[f"truth/{size}"] = pixel_truth(heart, plane, axial, lateral)
         logging.getLogger("echotruth").info("%d px", size)
     return result
 

@@ -1,4 +1,4 @@
-"""The loop that drives the heart."""
+"""Section of the configuration: the pressure-volume loop, or the other cycle, that drives the heart."""
 
 from __future__ import annotations
 
@@ -6,30 +6,30 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat, model_validator
 
-from echotruth.section import Positive, Section, impossible
+from echotruth.section import Positive, Section, invalid
 
 Drive = Literal["pressure_volume", "pressure", "volume"]
 
 
 class Loop(Section):
-    """The cycle that drives the heart: what is prescribed, and its course in time."""
+    """The cycle that drives the heart: what is prescribed over time."""
 
     drive: Drive = "pressure_volume"
-    """What is prescribed: `pressure_volume` (the active tension is solved); `volume` with active tension, none where
-    the file has none (the pressure is solved); or `pressure` with active tension (the volume follows, and is not the
-    only one that would while the heart ejects)."""
+    """What is prescribed: `pressure_volume` (the active tension is solved); `volume` with active tension, zero if
+    the file has none (the pressure is solved); or `pressure` with active tension (the volume is solved, and is not
+    unique during ejection)."""
     file: str = "mouse"
-    """A shipped cycle (`mouse`, `rat`, `human`; `twitch` for the drive `volume`) or a CSV with a column of time and
-    those of the drive, each named with its unit: time_ms or _s; pressure_mmHg, _kPa or _Pa; volume_uL, _mL or _m3;
-    tension_kPa or _Pa."""
+    """A shipped cycle (`mouse`, `rat`, `human`; `twitch` for the drive `volume`) or a CSV file with columns of time and
+    of the prescribed quantities, each named with its unit: time_ms or _s; pressure_mmHg, _kPa or _Pa; volume_uL, _mL
+    or _m3; tension_kPa or _Pa."""
     heart_rate_per_min: Annotated[FiniteFloat, Field(gt=0)] | None = None
-    """Heart rate; the cycle's time is scaled to it. Default: as in the file."""
+    """Heart rate; the cycle's time is scaled to it. Default: that of the file."""
     edv_uL: Positive | None = None
-    """End-diastolic volume; the cycle's volumes are mapped linearly to it. Default: as in the file."""
+    """End-diastolic volume; the cycle's volumes are mapped linearly to it. Default: that of the file."""
     esv_uL: Positive | None = None
     """End-systolic volume, likewise."""
     edp_mmHg: Positive | None = None
-    """End-diastolic pressure; pressures up to it are scaled, those above mapped linearly. Default: as in the file."""
+    """End-diastolic pressure; pressures up to it are scaled, those above mapped linearly. Default: that of the file."""
     esp_mmHg: Positive | None = None
     """End-systolic pressure, likewise."""
     frames: Annotated[int, Field(ge=2, le=1000)] = 40
@@ -38,9 +38,9 @@ class Loop(Section):
     @model_validator(mode="after")
     def _ejects(self) -> Loop:
         if self.edv_uL is not None and self.esv_uL is not None and self.esv_uL >= self.edv_uL:
-            raise impossible("esv_uL", self.esv_uL, f"must be smaller than edv_uL = {self.edv_uL}")
+            raise invalid("esv_uL", self.esv_uL, f"must be smaller than edv_uL = {self.edv_uL}")
         if self.edp_mmHg is not None and self.esp_mmHg is not None and self.esp_mmHg <= self.edp_mmHg:
-            raise impossible("esp_mmHg", self.esp_mmHg, f"must be greater than edp_mmHg = {self.edp_mmHg}")
+            raise invalid("esp_mmHg", self.esp_mmHg, f"must be greater than edp_mmHg = {self.edp_mmHg}")
         return self
 
     @model_validator(mode="after")
@@ -49,5 +49,5 @@ class Loop(Section):
             missing = "volume" if key.endswith("uL") else "pressure"
             value, drive = getattr(self, key), {"volume": "pressure", "pressure": "volume"}[missing]
             if self.drive == drive and value is not None:
-                raise impossible(key, value, f"the drive {drive} prescribes no {missing}: leave it out")
+                raise invalid(key, value, f"the drive {drive} prescribes no {missing}: leave it out")
         return self

@@ -1,75 +1,78 @@
-"""The probe: the array that sends and listens."""
+"""Section `probe`: the transducer array."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, TypeVar
 
 from pydantic import Field, FiniteFloat, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from echotruth.config.transducers import OPEN, PRESETS, sampling
-from echotruth.section import Positive, Section, impossible
+from echotruth.config.transducers import ARRAY_PRESETS, PRESET_KEYS, sampling_frequency
+from echotruth.section import Positive, Section, invalid
+
+T = TypeVar("T")
+if TYPE_CHECKING:
+    Filled = Annotated[T, "never None once validated"]
+else:
+    Filled = Optional[T]  # noqa: UP045
+
+FROM_PRESET: Any = None
 
 
 class Probe(Section):
-    """A phased array: a preset, and what is to differ from it."""
+    """Phased array: a preset, and values that replace those of the preset."""
 
     preset: Literal["mouse_25MHz", "mouse_30MHz", "mouse_40MHz", "rat_15MHz", "human_2_7MHz"] = "mouse_25MHz"
-    """Array whose values stand wherever a key below is not given. Default: the one for `geometry.preset`."""
-    elements: Annotated[int, Field(ge=2, le=512)] | None = None
-    """Number of elements. Default: of the preset."""
-    frequency_MHz: Positive | None = None
-    """Centre frequency. Default: of the preset."""
-    bandwidth: Annotated[FiniteFloat, Field(gt=0.05, lt=1.5)] | None = None
-    """Two-way -6 dB bandwidth of burst and array over centre frequency. Default: of the preset."""
-    pitch_um: Positive | None = None
-    """Distance of element centres. Default: of the preset."""
-    width_um: Positive | None = None
-    """Width of an element. Default: of the preset."""
-    height_mm: Positive | None = None
-    """Height of the elements (elevation). Default: of the preset."""
-    elevation_focus_mm: Positive | None = None
-    """Focus of the lens in elevation. Default: of the preset."""
+    """Array whose values are the defaults of the keys below. Default: the array for `geometry.preset`."""
+    elements: Filled[Annotated[int, Field(ge=2, le=512)]] = FROM_PRESET
+    """Number of elements. Default: from `preset`."""
+    frequency_MHz: Filled[Positive] = FROM_PRESET
+    """Centre frequency. Default: from `preset`."""
+    bandwidth: Filled[Annotated[FiniteFloat, Field(gt=0.05, lt=1.5)]] = FROM_PRESET
+    """Two-way -6 dB bandwidth of burst and array over centre frequency. Default: from `preset`."""
+    pitch_um: Filled[Positive] = FROM_PRESET
+    """Distance of element centres. Default: from `preset`."""
+    width_um: Filled[Positive] = FROM_PRESET
+    """Width of an element. Default: from `preset`."""
+    height_mm: Filled[Positive] = FROM_PRESET
+    """Height of the elements (elevation). Default: from `preset`."""
+    elevation_focus_mm: Filled[Positive] = FROM_PRESET
+    """Range of the lens's focus in elevation. Default: from `preset`."""
     sound_speed_m_per_s: Annotated[FiniteFloat, Field(ge=300, le=6000)] = 1540.0
     """Speed of sound."""
     attenuation_dB_per_cm_MHz: Annotated[FiniteFloat, Field(ge=0, le=3)] = 0.0
-    """Loss of the tissue on each way, proportional to frequency; 0.5 is common for muscle."""
-    sampling_MHz: Positive | None = None
-    """Sampling frequency of the RF. Default: four times the centre frequency, or as much more as the band asks for."""
+    """Attenuation of the tissue on each way, proportional to frequency; 0.5 is common for muscle."""
+    sampling_MHz: Filled[Positive] = FROM_PRESET
+    """Sampling frequency of the RF. Default: four times the centre frequency, or more if the bandwidth requires it."""
 
-    def settled(self) -> Probe:
-        """The same with the preset's values written out."""
-        return self.model_copy(update={key: getattr(self, key) for key in OPEN})
+    def resolved(self) -> Probe:
+        """The section with the values of the preset filled in."""
+        return self.model_copy(update={key: getattr(self, key) for key in PRESET_KEYS})
 
     @model_validator(mode="after")
-    def _complete(self) -> Probe:
-        found = self._left_open()
-        # Whoever asks for a value gets a number, yet what was left open follows the preset when a case changes it.
-        self.__dict__.update(found)
-        self.__pydantic_fields_set__.difference_update(found)
+    def _fill_from_preset(self) -> Probe:
+        values = {key: value for key, value in ARRAY_PRESETS[self.preset].items() if getattr(self, key) is None}
+        if self.sampling_MHz is None:
+            frequency, bandwidth = (values.get(key, getattr(self, key)) for key in ("frequency_MHz", "bandwidth"))
+            values["sampling_MHz"] = sampling_frequency(frequency, bandwidth)
+        # Attributes are numbers, but the keys stay unset, so that they follow the preset when a case changes it.
+        self.__dict__.update(values)
+        self.__pydantic_fields_set__.difference_update(values)
         return self
 
-    def _left_open(self) -> dict[str, Any]:
-        """Values of the keys that were left open: the preset's, and the sampling that suits the band."""
-        found = {key: value for key, value in PRESETS[self.preset].items() if getattr(self, key) is None}
-        if self.sampling_MHz is None:
-            frequency, bandwidth = (found.get(key, getattr(self, key)) for key in ("frequency_MHz", "bandwidth"))
-            found["sampling_MHz"] = sampling(frequency, bandwidth)
-        return found
-
     @model_serializer(mode="wrap")
-    def _as_given(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        left_open = set(OPEN) - self.model_fields_set
-        return {key: None if key in left_open else value for key, value in dump(self).items()}
+    def _dump_unset_as_none(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        unset = set(PRESET_KEYS) - self.model_fields_set
+        return {key: None if key in unset else value for key, value in dump(self).items()}
 
     @model_validator(mode="after")
-    def _can_be_sampled(self) -> Probe:
-        top = self.frequency_MHz * (1 + self.bandwidth)
-        if self.sampling_MHz < 2 * top:
+    def _check_sampling(self) -> Probe:
+        highest = self.frequency_MHz * (1 + self.bandwidth)
+        if self.sampling_MHz < 2 * highest:
             remedy = (
-                f"its band reaches {top:g} MHz, above the Nyquist frequency of sampling_MHz = {self.sampling_MHz:g}: "
-                f"lower it, or sample at {2 * top:g} MHz or more"
+                f"its band reaches {highest:g} MHz, above the Nyquist frequency of sampling_MHz = "
+                f"{self.sampling_MHz:g}: lower it, or sample at {2 * highest:g} MHz or more"
             )
-            raise impossible("frequency_MHz", self.frequency_MHz, remedy)
+            raise invalid("frequency_MHz", self.frequency_MHz, remedy)
         if self.width_um > self.pitch_um:
-            raise impossible("width_um", self.width_um, f"must not exceed pitch_um = {self.pitch_um}")
+            raise invalid("width_um", self.width_um, f"must not exceed pitch_um = {self.pitch_um}")
         return self

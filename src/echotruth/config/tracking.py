@@ -1,181 +1,180 @@
-"""Trackers: one section a method, the method's name being that of its module in `tracking`."""
+"""Settings of the trackers: one section per method, which has the name of its module in `tracking.trackers`."""
 
 from __future__ import annotations
 
 import re
 from math import isfinite
-from typing import Annotated, Any, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import BeforeValidator, Discriminator, Field, FiniteFloat, Tag, model_validator
 
-from echotruth.section import Name, Positive, Section, impossible
+from echotruth.section import Name, Positive, Section, invalid
 
 Reference = Annotated[
-    Literal["ED", "previous", "cycle"],
+    Literal["ED", "previous", "bidirectional"],
     Field(
-        description="Each frame against `ED`; or against the `previous` one, the steps added along the tissue's path; "
-        "or likewise from ED both forwards and, as the cycle closes, backwards, averaged by how alike the frames were."
+        description="Frame with which each frame is compared: `ED`; or the `previous` one, with the steps added along "
+        "the path of the tissue; or `bidirectional`, likewise from ED both forwards and, as the cycle closes, "
+        "backwards, and both averaged with weights from the correlation of the frames."
     ),
 ]
-"""How the motion of pairs of frames makes that of a clip."""
 
 
 class PhaseCorrelation(Section):
-    """Phase-only correlation of windows, the paper's."""
+    """Phase-only correlation of windows, the method of the paper."""
 
     method: Literal["phase_correlation"] = "phase_correlation"
     """Name of the method."""
     window_px: Annotated[int, Field(ge=8, le=512)] | None = 64
-    """Side of a window at every image size; or null, and `window_mm` holds."""
+    """Side of a window at every image size; null to give `window_mm` instead."""
     window_mm: Positive | None = None
     """Side of a window in tissue, the same at every image size."""
     stride: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.5
-    """Step between windows over the side of a window."""
+    """Step between windows, as a fraction of the side of a window."""
     taper: Literal["none", "hann"] = "none"
-    """Weights over a window before its transform."""
+    """Weights of the pixels of a window before the Fourier transform."""
     floor: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.0
-    """Magnitude over the greatest below which a frequency does not count: there is only noise, and phase-only
-    correlation makes it as loud as the speckle."""
+    """Magnitude, relative to the largest, below which a frequency is left out: it holds only noise, to which
+    phase-only correlation would give the same weight as to speckle."""
     reference: Reference = "ED"
 
     @model_validator(mode="after")
     def _one_window(self) -> PhaseCorrelation:
         if (self.window_px is None) == (self.window_mm is None):
-            raise impossible(
-                "window_mm", self.window_mm, "give either window_px or window_mm and set the other to null"
-            )
+            raise invalid("window_mm", self.window_mm, "give either window_px or window_mm and set the other to null")
         return self
 
 
 class WindowDeformation(Section):
-    """Normalised cross-correlation of windows that shrink from pass to pass and deform with the field found so far."""
+    """Normalised cross-correlation of windows that shrink from pass to pass and deform with the motion."""
 
     method: Literal["window_deformation"] = "window_deformation"
     """Name of the method."""
     windows_mm: Annotated[list[Positive], Field(min_length=1, max_length=6)] = Field(default=[1.5, 0.75])
-    """Sides of the windows, one a pass; 8 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
+    """Side of the windows in each pass; 8 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
     sweeps: Annotated[int, Field(ge=1, le=20)] = 3
-    """Passes at the last size."""
-    reference: Reference = "cycle"
+    """Number of passes with the last size."""
+    reference: Reference = "bidirectional"
 
 
 class AffineDic(Section):
-    """Digital image correlation of one subset about every point, affine, by inverse compositional Gauss-Newton."""
+    """Affine digital image correlation of one subset about every point, by inverse compositional Gauss-Newton."""
 
     method: Literal["affine_dic"] = "affine_dic"
     """Name of the method."""
     subset_mm: Positive = 1.0
     """Side of a subset; 17 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
-    reference: Reference = "cycle"
+    reference: Reference = "bidirectional"
 
 
 class BsplineDic(Section):
-    """Digital image correlation of the whole wall at once, its motion a B-spline."""
+    """Digital image correlation of the whole wall at once; the motion is a cubic B-spline."""
 
     method: Literal["bspline_dic"] = "bspline_dic"
     """Name of the method."""
     knots_mm: Positive = 0.4
-    """Distance of the knots, five pixels at least. Default: as suits `bmode.field_of_view_mm`."""
+    """Distance between knots; 5 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
     margin_um: Annotated[FiniteFloat, Field(ge=0)] = 180.0
-    """How far around the wall pixels count; its edge shows how it thickens. Default: as suits
-    `bmode.field_of_view_mm`."""
+    """Pixels up to this distance from the wall are used too; the edge of the wall shows how it thickens. Default: as
+    suits `bmode.field_of_view_mm`."""
     range_dB: Annotated[FiniteFloat, Field(ge=0, le=120)] = 45.0
-    """Decibels from black to white, by which grey values are made amplitudes again: dark gaps between speckles change
-    more than the bright speckles do. 0 takes the grey values."""
+    """Dynamic range of the images, by which log compression is undone: dark gaps between speckles change more than the
+    bright speckles do. 0 uses the grey values."""
     blur_px: Annotated[FiniteFloat, Field(ge=0, le=5)] = 0.6
-    """Standard deviation of the Gaussian that blurs images of pixels much larger than `resolved_um`, against their
-    aliasing; of pixels of that size, none."""
+    """Standard deviation of the Gaussian blur of images with pixels much larger than `resolved_um`, against aliasing;
+    images with pixels of that size are not blurred."""
     resolved_um: Annotated[FiniteFloat, Field(ge=0)] = 16.0
-    """Size of pixels that show all of the speckle: a sixth of the speed of sound over the bandwidth. Default: as suits
+    """Size of pixels that resolve the speckle fully: speed of sound / (6 bandwidth). Default: as suits
     `bmode.field_of_view_mm`."""
     smoothness: Positive = 3000.0
-    """Weight of the roughness of a step from one frame to the next over that of the images, were noise as strong as the
-    speckle and speckle as long as the knots are apart."""
-    across: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2
-    """Length of a unit through the wall where roughness is measured; of one along it, 1."""
+    """Weight of the bending energy of a step from one frame to the next relative to the images, if noise were as strong
+    as speckle and the speckle length equal to the distance between knots."""
+    transmural_scale: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2
+    """Scale of lengths through the wall in the bending energy; lengths along the wall have the scale 1."""
     tolerance: Positive = 4.0
-    """Difference of grey values at which a pixel has a quarter of its weight, over their standard deviation."""
-    renewal: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.75
-    """Correlation of image and template below which the frame before becomes the template."""
+    """Residual, in standard deviations, at which the robust weight of a pixel is 1/4."""
+    template_update_ncc: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.75
+    """Correlation of image and template below which the previous frame becomes the template."""
 
 
 class Dis(Section):
-    """Dense inverse search of OpenCV as it is."""
+    """Dense inverse search of OpenCV, unmodified."""
 
     method: Literal["dis"] = "dis"
     """Name of the method."""
     preset: Literal["ultrafast", "fast", "medium"] = "medium"
     """Preset of OpenCV."""
-    reference: Reference = "cycle"
+    reference: Reference = "bidirectional"
 
 
 class Ilk(Section):
-    """Iterative Lucas-Kanade of scikit-image as it is."""
+    """Iterative Lucas-Kanade of scikit-image, unmodified."""
 
     method: Literal["ilk"] = "ilk"
     """Name of the method."""
     radius_px: Annotated[int, Field(ge=1, le=64)] = 7
     """Radius of the window about a pixel."""
-    reference: Reference = "cycle"
+    reference: Reference = "bidirectional"
 
 
-GIVEN = ("frames", "points", "mask", "spacing", "frame_time", "seed")
-"""Names of what every tracker is given, in their order."""
+TRACKER_ARGUMENTS = ("frames", "points", "mask", "spacing", "frame_time", "seed")
+"""Names of the arguments of every tracker, in order."""
 
 
-def numbers(value: Any) -> Any:
-    """The same with numbers where YAML took them for text: it wants dot and sign in 1.0e-3."""
+def parse_numbers(value: Any) -> Any:
+    """The value with text such as 1e-3 as numbers; YAML reads a number in that form only with dot and sign, 1.0e-3."""
     if isinstance(value, dict):
-        return {key: numbers(each) for key, each in value.items()}
+        return {key: parse_numbers(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [numbers(each) for each in value]
-    written = isinstance(value, str) and re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+", value, re.ASCII)
-    return float(value) if written else value
+        return [parse_numbers(item) for item in value]
+    is_number = isinstance(value, str) and re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+", value, re.ASCII)
+    return float(value) if is_number else value
 
 
-class Guest(Section):
-    """A tracker from elsewhere: a Python callable, an entry point, or a program."""
+class External(Section):
+    """A tracker from outside the package: a Python callable, an entry point, or a program."""
 
-    method: Literal["guest"] = "guest"
+    method: Literal["external"] = "external"
     """Name of the method."""
     track: Annotated[str, Field(min_length=1)] | None = None
     """A callable as `package.module:function`, or the name of an entry point in the group `echotruth.trackers`."""
     command: Annotated[list[str], Field(min_length=1)] | None = None
-    """A program and its arguments, in which {input} and {output} stand for the .npz files it reads and writes."""
+    """A program and its arguments; {input} and {output} stand for the .npz files that it reads and writes."""
     timeout_s: Positive = 3600.0
-    """Longest time a program may take over one clip; a callable is not timed."""
-    options: Annotated[dict[str, Any], BeforeValidator(numbers)] = Field(default={})
+    """Longest time that a program may take for one clip; a callable has no limit."""
+    options: Annotated[dict[str, Any], BeforeValidator(parse_numbers)] = Field(default={})
     """Keyword arguments of the callable, or entries of the program's .npz; text such as 1e-3 is a number."""
 
     @model_validator(mode="after")
-    def _one_way_in(self) -> Guest:
+    def _track_or_command(self) -> External:
         if (self.track is None) == (self.command is None):
-            raise impossible("track", self.track, "give either track or command")
-        if self.track is not None and not _is_name(self.track):
-            raise impossible("track", self.track, "write package.module:function (dots, no path, no .py)")
-        for place in ("{input}", "{output}") if self.command else ():
-            if not any(place in part for part in self.command or ()):
-                raise impossible("command", self.command, f"must say where the path of the {place[1:-1]} goes: {place}")
+            raise invalid("track", self.track, "give either track or command")
+        if self.track is not None and not _is_callable_name(self.track):
+            raise invalid("track", self.track, "write package.module:function (dots, no path, no .py)")
+        for file in ("{input}", "{output}") if self.command else ():
+            if not any(file in word for word in self.command or ()):
+                raise invalid("command", self.command, f"must contain {file} where the path of that file belongs")
         return self
 
     @model_validator(mode="after")
-    def _options_fit(self) -> Guest:
+    def _valid_options(self) -> External:
         for key, value in self.options.items():
-            if key in GIVEN:
-                raise impossible(f"options.{key}", value, f"must have another name, for every tracker is given {key}")
-            if not _is_plain(value):
+            remedy = ""
+            if key in TRACKER_ARGUMENTS:
+                remedy = f"must have another name, because {key} is an argument of every tracker"
+            elif not _is_json(value):
                 remedy = "must be finite numbers, text, true, false, null, lists of them, or mappings with text as keys"
-                raise impossible(f"options.{key}", value, remedy)
-            if self.command and not _is_array(value):
+            elif self.command and not _is_array(value):
                 remedy = (
-                    "must be a number of 64 bits, a text or a list of one kind: it is an array in the program's .npz"
+                    "must be a number of 64 bits, text or a list of one kind: the program's .npz holds it as an array"
                 )
-                raise impossible(f"options.{key}", value, remedy)
+            if remedy:
+                raise invalid(f"options.{key}", value, remedy)
         return self
 
 
-def _is_name(track: str) -> bool:
-    """Whether that may be `package.module:function` or the name of an entry point."""
+def _is_callable_name(track: str) -> bool:
+    """Whether the text has the form `package.module:function` or that of an entry point."""
     module, colon, function = track.partition(":")
     if module.endswith(".py"):
         return False
@@ -184,59 +183,62 @@ def _is_name(track: str) -> bool:
     return all(part.isidentifier() for part in (*module.split("."), *function.split(".")))
 
 
-def _is_plain(value: Any) -> bool:
-    """Whether JSON, as which the workflow hands a configuration on, can say it."""
+def _is_json(value: Any) -> bool:
+    """Whether JSON, in which the workflow passes on a configuration, can hold the value."""
     if isinstance(value, dict):
-        return all(isinstance(key, str) and _is_plain(each) for key, each in value.items())
+        return all(isinstance(key, str) and _is_json(item) for key, item in value.items())
     if isinstance(value, list):
-        return all(map(_is_plain, value))
+        return all(map(_is_json, value))
     return isfinite(value) if isinstance(value, float) else value is None or isinstance(value, int | str)
 
 
 def _is_array(value: Any) -> bool:
-    """Whether a value of YAML is an array without being made an object."""
+    """Whether NumPy makes an array of the value that does not hold Python objects."""
     values = value if isinstance(value, list) else [value]
-    if all(isinstance(each, str) for each in values):
+    if all(isinstance(item, str) for item in values):
         return True
     # An integer of more than 64 bits would be an object.
-    return all(isinstance(each, float) or (isinstance(each, int) and abs(each) < 2**63) for each in values)
+    return all(isinstance(item, float) or (isinstance(item, int) and abs(item) < 2**63) for item in values)
 
 
-METHODS: tuple[type[Section], ...] = (PhaseCorrelation, WindowDeformation, AffineDic, BsplineDic, Dis, Ilk, Guest)
-"""Sections of all methods."""
+METHODS: tuple[type[Section], ...] = (PhaseCorrelation, WindowDeformation, AffineDic, BsplineDic, Dis, Ilk, External)
+"""Sections of all methods of tracking."""
 
 DEFAULT = "phase_correlation"
-"""The method where none is named."""
+"""Method of a tracker that names none."""
 
 
 def name_of(method: type[Section]) -> str:
-    """What `method` says in a section of that kind."""
+    """Name of a method: the default of its key `method`."""
     return method.model_fields["method"].default
 
 
-def _named(values: Any) -> Any:
+def _method_of(values: Any) -> Any:
     return values.get("method", DEFAULT) if isinstance(values, dict) else getattr(values, "method", DEFAULT)
 
 
-Tracker = Annotated[
-    Union[tuple(Annotated[method, Tag(name_of(method))] for method in METHODS)],  # noqa: UP007
-    Discriminator(_named),
-]
-"""Section of any of the methods."""
+if TYPE_CHECKING:
+    Tracker = Section
+else:
+    Tracker = Annotated[
+        Union[tuple(Annotated[method, Tag(name_of(method))] for method in METHODS)],  # noqa: UP007
+        Discriminator(_method_of),
+    ]
+"""Section of one of the methods."""
 
 
-def standard_trackers(scale: float = 1.0) -> dict[str, Any]:
-    """The paper's as printed and as corrected, stronger ones, and one of a library.
+def default_trackers(scale: float = 1.0) -> dict[str, Any]:
+    """The default trackers: the paper's as published and as corrected, stronger ones, and one of a library.
 
     Parameters
     ----------
     scale : float
-        Side of the field of view over the 12 mm at which 64 pixels of 512, the paper's window, are 1.5 mm.
+        Side of the field of view over 12 mm, at which 64 pixels of 512, the paper's window, are 1.5 mm.
     """
-    window = {"window_px": None, "window_mm": 1.5 * scale}
+    window: dict[str, Any] = {"window_px": None, "window_mm": 1.5 * scale}
     return {
-        "faithful": PhaseCorrelation(),
-        "corrected": PhaseCorrelation(**window, taper="hann", floor=0.01, reference="cycle"),
+        "as_published": PhaseCorrelation(),
+        "corrected": PhaseCorrelation(**window, taper="hann", floor=0.01, reference="bidirectional"),
         "window_deformation": WindowDeformation(),
         "affine_dic": AffineDic(),
         "dis": Dis(),
@@ -249,7 +251,7 @@ class Tracking(Section):
 
     grid_px: Annotated[int, Field(ge=1, le=128)] = 5
     """Spacing of the points at which displacement is reported, in pixels of the largest image; the points are the same
-    at all sizes, and lie in the wall at end-diastole."""
-    trackers: Annotated[dict[Name, Tracker], Field(min_length=1)] = Field(default_factory=standard_trackers)
-    """Name to settings: `faithful` is the paper as printed, `corrected` has tapered windows of the same
-    tissue at every image size, leaves out frequencies without speckle, and goes frame to frame around the cycle."""
+    at all image sizes and lie in the wall at end-diastole."""
+    trackers: Annotated[dict[Name, Tracker], Field(min_length=1)] = Field(default_factory=default_trackers)
+    """Settings by name: `as_published` is the tracker as the paper prints it; `corrected` has tapered windows with the
+    same size in tissue for every image size, leaves out frequencies without speckle, and is bidirectional."""

@@ -1,23 +1,23 @@
-"""Phased arrays by name.
+"""Presets of phased arrays.
 
 mouse_25MHz
-    Pitch 0.75 wavelengths: at 20 degrees the worst lobe is 36 dB below the main one. Beam and pulse (-6 dB, in focus)
-    measure 0.20 x 0.06 mm.
+    Pitch 0.75 wavelengths: steered by 20 degrees, the highest lobe is 36 dB below the main one. Beam and pulse (-6 dB,
+    at the focus) measure 0.20 x 0.06 mm.
 mouse_30MHz
-    The pitch is that of the 64-element array for mouse hearts of Zhang et al., IEEE Trans Ultrason Ferroelectr Freq
+    Pitch of the 64-element array for mouse hearts of Zhang et al., IEEE Trans Ultrason Ferroelectr Freq
     Control 57 (2010) 1548 (PMC2908919), whose two-way beams were 0.165 to 0.26 mm wide at 5 to 10 mm. One wavelength:
     a beam steered by 32 degrees has a grating lobe at -30 degrees.
 mouse_40MHz
     Frequency, elements and pitch of the phased array of Bezanson, Adamson and Brown, IEEE Trans Ultrason Ferroelectr
-    Freq Control 61 (2014) 33. One wavelength likewise.
+    Freq Control 61 (2014) 33. The pitch is also one wavelength.
 rat_15MHz
-    mouse_25MHz with all lengths 5/3 as large, as the rat's heart is.
+    mouse_25MHz with all lengths multiplied by 5/3, the relative size of the rat's heart.
 human_2_7MHz
     Frequency, bandwidth, elements and lengths of the cardiac phased array P4-2v, as the simulator PyMUST gives them
     (Garcia, Comput Methods Programs Biomed 218 (2022) 106726).
 
-Width, height and focus in elevation of the arrays for rodents are ours, and a bandwidth of one half is usual at such
-frequencies.
+Element width and height and elevation focus of the arrays for rodents are our choice; a bandwidth of one half is usual
+at these frequencies.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ _ARRAYS = {
     "rat_15MHz": (64, 15.0, 0.5, 77.0, 68.0, 1.67, 10.8),
     "human_2_7MHz": (64, 2.72, 0.74, 300.0, 250.0, 14.0, 60.0),
 }
-PRESETS: dict[str, dict[str, Any]] = {name: dict(zip(_KEYS, row, strict=True)) for name, row in _ARRAYS.items()}
-"""Name of an array to the keys of the section `probe` that it settles."""
+ARRAY_PRESETS: dict[str, dict[str, Any]] = {name: dict(zip(_KEYS, row, strict=True)) for name, row in _ARRAYS.items()}
+"""Name of an array -> values of the section `probe`."""
 
-OPEN = (*_KEYS, "sampling_MHz")
-"""Keys of the section `probe` that another one settles where they are not given."""
+PRESET_KEYS = (*_KEYS, "sampling_MHz")
+"""Keys of the section `probe` whose defaults follow from the preset."""
 
 
-def sampling(frequency: float, bandwidth: float) -> float:
-    """Sampling frequency for a pulse, in the unit of its centre frequency.
+def sampling_frequency(frequency: float, bandwidth: float) -> float:
+    """Default sampling frequency, in the unit of the centre frequency f: max(4 f, 2.2 f (1 + 1.29 B)).
 
-    Four times the latter, or 2.2 times the highest frequency of the pulse where that is more. A Gaussian spectrum
-    that is down to one half at half the bandwidth is down to 1 % at sqrt(ln 100 / ln 2) / 2 = 1.29 of it.
+    The bandwidth B is relative to f. A Gaussian spectrum that falls to 1/2 at B / 2 falls to 1 % at
+    sqrt(ln 100 / ln 2) / 2 B = 1.29 B.
     """
     return round(frequency * max(4, 2.2 * (1 + 1.29 * bandwidth)), 3)

@@ -1,1 +1,1 @@
-"""How far tracked motion is from the truth: displacement, strain, statistics and the leaderboard."""
+"""Comparison of tracked motion with the truth: displacement, strain, statistics and the leaderboard."""

@@ -1,4 +1,4 @@
-"""A clip as it is given to a tracker, and the grid on which the answer is kept."""
+"""B-mode clips as trackers receive them, and the grid on which their displacement is stored."""
 
 from __future__ import annotations
 
@@ -26,14 +26,15 @@ class Clip:
     mask : ndarray of shape (axial, lateral), bool
         The wall at end-diastole.
     inside : ndarray of shape (grid rows, grid columns), bool
-        Points of the grid that are in the wall at end-diastole.
+        Whether a point of the grid is in the wall at end-diastole.
     points : ndarray of shape (n, 2)
-        Those points: lateral, axial, px of this size.
+        Points inside: lateral, axial, px of this size.
     spacing : float
         Distance of pixel centres, m.
     frame_time : ndarray of shape (frame,)
         Time since end-diastole, s.
     seed : int
+        Of the tracker's random numbers.
     """
 
     frames: np.ndarray
@@ -50,18 +51,18 @@ class Clip:
         return self.frames.shape[-1]
 
     @property
-    def given(self) -> tuple:
-        """What a tracker gets, in the order of :func:`echotruth.tracking.tracker.track`."""
+    def tracker_arguments(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray, int]:
+        """Arguments of a tracker, in the order of :func:`echotruth.tracking.tracker.track`."""
         return self.frames, self.points, self.mask, self.spacing, self.frame_time, self.seed
 
     @property
-    def nothing(self) -> tuple[np.ndarray, np.ndarray]:
-        """The answer of a tracker that finds none: displacement (frame, n, 2) and quality (frame, n), all NaN."""
+    def no_estimate(self) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement (frame, n, 2) and quality (frame, n) of a tracker that failed, all NaN."""
         shape = len(self.frames), len(self.points)
         return np.full((*shape, 2), np.nan), np.full(shape, np.nan)
 
     def on_grid(self, displacement: np.ndarray, quality: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Answer of a tracker on the whole grid.
+        """Displacement and quality on the whole grid.
 
         Parameters
         ----------
@@ -75,20 +76,20 @@ class Clip:
             Lateral, axial, m; NaN outside the wall.
         quality : ndarray of shape (frame, grid rows, grid columns)
         """
-        both = np.full((len(self.frames), *self.inside.shape, 3), np.nan)
-        both[:, self.inside, :2] = displacement * self.spacing
-        both[:, self.inside, 2] = quality
-        return both[..., :2], both[..., 2]
+        gridded = np.full((len(self.frames), *self.inside.shape, 3), np.nan)
+        gridded[:, self.inside, :2] = displacement * self.spacing
+        gridded[:, self.inside, 2] = quality
+        return gridded[..., :2], gridded[..., 2]
 
 
-def places(config: Config, size: int) -> np.ndarray:
-    """The grid, the same in the tissue at every image size.
+def grid_points(config: Config, size: int) -> np.ndarray:
+    """Points of the grid, at the same positions in the tissue for every image size.
 
     Parameters
     ----------
     config : Config
     size : int
-        Image size in whose pixels the places are told.
+        Image size in whose pixels the positions are given.
 
     Returns
     -------
@@ -96,15 +97,15 @@ def places(config: Config, size: int) -> np.ndarray:
         Lateral, axial, px; pixel centres of the largest image.
     """
     largest = config.bmode.sizes[0]
-    # Pixels of a smaller image are blocks of the largest, and their centres lie between those of the block.
+    # A pixel of a smaller image is the mean of a block of pixels: x_small + 1/2 = (x_largest + 1/2) size / largest.
     return (grid((largest, largest), config.tracking.grid_px) + 0.5) * (size / largest) - 0.5
 
 
 def clips(job: Job) -> dict[int, Clip]:
-    """The clips of a job's heart and view by their size."""
+    """Clips of the heart and view of a job, by image size."""
     config, largest = job.case.config, job.case.config.bmode.sizes[0]
     masks = {size: job.read(f"truth/{size}", "mask")["mask"][0] for size in config.bmode.sizes}
-    lateral, axial = np.moveaxis(places(config, largest).round().astype(int), -1, 0)
+    lateral, axial = np.moveaxis(grid_points(config, largest).round().astype(int), -1, 0)
     inside = masks[largest][axial, lateral]
     seed, time = int(job.random.integers(2**31)), read_loop(config.loop).time
     return {
@@ -112,7 +113,7 @@ def clips(job: Job) -> dict[int, Clip]:
             frames=job.read(f"bmode/{size}", "image")["image"],
             mask=mask,
             inside=inside,
-            points=places(config, size)[inside],
+            points=grid_points(config, size)[inside],
             spacing=config.bmode.si().field_of_view / size,
             frame_time=time,
             seed=seed,

@@ -1,4 +1,4 @@
-"""What a clip was when it was scored, in a word."""
+"""Digest of a clip, by which scores of older images are recognised."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ def digest(folder: Path, case: str, view: str) -> str:
     folder : Path
         Of the repository.
     case, view : str
-        Case id and name of the view.
 
     Returns
     -------
     str
-        Twelve hexadecimal digits of the SHA-256 of what the ledger says of their files; empty where it says nothing.
+        Twelve hexadecimal digits of the SHA-256 of their checksums in the ledger; empty if it has none.
     """
     records = [record_path(folder, stage, case, view) for stage in ("bmode", "truth")]
     files = [ledger.read(path).get("sha256", {}) for path in records if path.is_file()]

@@ -1,4 +1,4 @@
-"""In-plane vectors along the directions of the ventricle."""
+"""Polar components of in-plane vectors: radial and tangential to the ventricle."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 
 
 def directions(position: np.ndarray, origin: np.ndarray, plane: str) -> np.ndarray:
-    """Unit vectors at every point.
+    """Radial and tangential unit vectors at every point.
 
-    Short axis: away from the origin, and counter-clockwise as seen in the image, whose axial axis points down.
-    Long axis: away from the line of the long axis, and from apex to base, which is down.
+    Short axis: e_r = (x, z) / r away from the origin and e_t = (z, -x) / r, counter-clockwise as seen in the image,
+    whose axial axis z points down. Long axis: away from the line of the long axis, and down, from apex to base.
 
     Parameters
     ----------
@@ -24,14 +24,14 @@ def directions(position: np.ndarray, origin: np.ndarray, plane: str) -> np.ndarr
     ndarray of shape (point, 2, 2)
         Component (radial, tangential) by axis (lateral, axial); NaN at the origin of a short-axis view.
     """
-    arm = np.asarray(position, float) - np.asarray(origin, float)
+    offset = np.asarray(position, float) - np.asarray(origin, float)
     if plane == "short_axis":
-        length = np.hypot(arm[:, 0], arm[:, 1])
-        lateral, axial = (arm / np.where(length > 0, length, np.nan)[:, None]).T
+        radius = np.hypot(offset[:, 0], offset[:, 1])
+        lateral, axial = (offset / np.where(radius > 0, radius, np.nan)[:, None]).T
         return np.stack([np.stack([lateral, axial], -1), np.stack([axial, -lateral], -1)], -2)
     if plane == "long_axis":
-        away, zero = np.where(arm[:, 0] >= 0, 1.0, -1.0), np.zeros(len(arm))
-        return np.stack([np.stack([away, zero], -1), np.stack([zero, zero + 1], -1)], -2)
+        sign, zero = np.where(offset[:, 0] >= 0, 1.0, -1.0), np.zeros(len(offset))
+        return np.stack([np.stack([sign, zero], -1), np.stack([zero, zero + 1], -1)], -2)
     raise ValueError(f"The plane must be short_axis or long_axis, not {plane}.")
 
 

@@ -1,6 +1,6 @@
-"""A trial: one tracker over the clips of a published repository, scored as the workflow scores its own.
+"""Evaluation of one tracker on the clips of a published repository, scored as the workflow scores its own trackers.
 
-Its scores stand in `guests/NAME.csv` in the folder of the repository, one row a clip; nothing else there is touched.
+The scores are written to `external/NAME.csv` in the folder of the repository, one row per clip; nothing else changes.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from echotruth.config import Config
 from echotruth.config.loading import load, validate
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.digest import digest
-from echotruth.evaluation.scoring import Truth, ground_truth, row, score
-from echotruth.evaluation.tracker_options import CannotTry
+from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
+from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import ledger
 from echotruth.repository.ledger import record_path
 from echotruth.section import Name, Section
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Row = dict[str, Any]
-"""A clip's case, view, size_px, tracker and digest (`clip`), its measures, and why the tracker failed (else empty)."""
+"""Case, view, size_px, tracker and digest (`clip`) of a clip, its metrics, and why the tracker failed (or "")."""
 
 
 @dataclass(frozen=True)
-class Trial:
-    """One tracker and the repository on which it is tried.
+class EvaluationRun:
+    """One tracker and the repository on which it is evaluated.
 
     Attributes
     ----------
@@ -64,75 +64,75 @@ class Trial:
 
     @property
     def file(self) -> Path:
-        """Where the scores are written."""
-        return self.folder / "guests" / f"{self.name}.csv"
+        """File of the scores."""
+        return self.folder / "external" / f"{self.name}.csv"
 
-    def places(self, cases: list[str], views: list[str]) -> list[tuple[str, str]]:
-        """Case and view of every clip there is.
+    def case_views(self, cases: list[str], views: list[str]) -> list[tuple[str, str]]:
+        """Case and view of every complete clip.
 
         Parameters
         ----------
         cases, views : list of str
-            These alone; all where it is empty.
+            Those to include; all if empty.
 
         Raises
         ------
-        CannotTry
-            If one of them is not of the repository, or there is no clip.
+        EvaluationError
+            If the repository does not have one of them, or has no complete clip.
         """
-        cases = self._chosen("case", cases, [case.id for case in expand(self.config)])
-        views = self._chosen("view", views, list(self.config.views))
-        found = [(case, view) for case in cases for view in views if self._is_complete(case, view)]
-        if not found:
-            raise CannotTry(f"{self.folder} has no complete clip of what was asked: run it to its end")
-        return found
+        cases = self._selected("case", cases, [case.id for case in expand(self.config)])
+        views = self._selected("view", views, list(self.config.views))
+        case_views = [(case, view) for case in cases for view in views if self._is_complete(case, view)]
+        if not case_views:
+            raise EvaluationError(f"{self.folder} has no complete clip of these cases and views: run it to its end")
+        return case_views
 
     def sizes(self, sizes: list[int]) -> list[int]:
-        """Image sizes: these alone, or all where the list is empty."""
-        return self._chosen("size", sizes, list(self.config.bmode.sizes))
+        """Image sizes to include; all if the list is empty."""
+        return self._selected("size", sizes, list(self.config.bmode.sizes))
 
-    def rows(self, places: list[tuple[str, str]], sizes: list[int], jobs: int = 1) -> Iterator[Row]:
-        """Score the clips, one row each, in the order of `places` and of the image sizes whatever the number of jobs.
+    def rows(self, case_views: list[tuple[str, str]], sizes: list[int], jobs: int = 1) -> Iterator[Row]:
+        """Score the clips, one row each, in the order of `case_views` and image sizes for any number of jobs.
 
         Parameters
         ----------
-        places : list of (case, view)
+        case_views : list of (case, view)
         sizes : list of int
         jobs : int
             Number of processes.
 
         Raises
         ------
-        CannotTry
-            If there is to be no process, or the tracker ends one otherwise than by an exception.
+        EvaluationError
+            If `jobs` is less than 1, or the tracker ends its process without an exception.
         """
         if jobs < 1:
-            raise CannotTry(f"--jobs {jobs}: must be 1 or more")
-        work = partial(_rows, self, sizes)
+            raise EvaluationError(f"--jobs {jobs}: must be 1 or more")
+        score_view = partial(_score_view, self, sizes)
         if jobs == 1:
-            for place in places:
-                yield from work(place)
+            for case_view in case_views:
+                yield from score_view(case_view)
             return
         threads = max(1, (os.cpu_count() or 1) // jobs)
-        with ProcessPoolExecutor(jobs, get_context("spawn"), _limit, (threads,)) as pool:
+        with ProcessPoolExecutor(jobs, get_context("spawn"), _limit_threads, (threads,)) as pool:
             try:
-                for rows in pool.map(work, places):
+                for rows in pool.map(score_view, case_views):
                     yield from rows
             except BrokenProcessPool:
-                remedy = "make it a program, with --command"
-                raise CannotTry(f"{self.name} ended its process, so that nothing is known of it: {remedy}") from None
+                remedy = "run it as a program, with --command"
+                raise EvaluationError(f"{self.name} ended its process and cannot be scored: {remedy}") from None
             finally:
                 pool.shutdown(cancel_futures=True)
 
-    def make_room(self) -> None:
-        """Make the folder of the scores; CannotTry, before there are any, where they could not be written."""
+    def check_writable(self) -> None:
+        """Make the folder of the scores; EvaluationError if they cannot be written there."""
         with self._writing():
             self.file.parent.mkdir(exist_ok=True)
             with TemporaryFile(dir=self.file.parent):
                 pass
 
     def write(self, rows: list[Row]) -> pd.DataFrame:
-        """Write the scores, whole or not at all, in place of those of an earlier trial of that name."""
+        """Write the scores atomically; they replace earlier ones of the same name."""
         import pandas as pd
 
         table = pd.DataFrame(rows)
@@ -148,22 +148,22 @@ class Trial:
             yield
         except OSError as error:
             remedy = f"it must be a folder that you may write to ({error.strerror})"
-            raise CannotTry(f"{self.file.parent} cannot hold the scores: {remedy}") from error
+            raise EvaluationError(f"{self.file.parent} cannot hold the scores: {remedy}") from error
 
-    def _chosen(self, what: str, asked: list[Any], known: list[Any]) -> list[Any]:
-        for each in asked:
-            if each not in known:
-                there = ", ".join(map(str, known[:20]))
-                raise CannotTry(f"{each} is not a {what} of {self.folder}: use {there}")
-        return [each for each in known if each in asked or not asked]
+    def _selected(self, what: str, chosen: list[Any], known: list[Any]) -> list[Any]:
+        for item in chosen:
+            if item not in known:
+                choices = ", ".join(map(str, known[:20]))
+                raise EvaluationError(f"{item} is not a {what} of {self.folder}: use {choices}")
+        return [item for item in known if item in chosen or not chosen]
 
     def _is_complete(self, case: str, view: str) -> bool:
         records = [record_path(self.folder, stage, case, view) for stage in ("truth", "bmode")]
         return all(path.is_file() and ledger.read(path)["status"] == "complete" for path in records)
 
 
-def trial(repository: Path, name: str, values: dict[str, Any]) -> Trial:
-    """A trial of a tracker that is not one of the repository's.
+def prepare(repository: Path, name: str, values: dict[str, Any]) -> EvaluationRun:
+    """Prepare the evaluation of a tracker that is not one of the repository's.
 
     Parameters
     ----------
@@ -172,76 +172,75 @@ def trial(repository: Path, name: str, values: dict[str, Any]) -> Trial:
     name : str
         Of the tracker; letters, digits and underscores.
     values : dict
-        Its settings, as they would stand in the configuration.
+        Its settings, as in a configuration.
 
     Raises
     ------
-    CannotTry
-        If there is no such repository, or it has a tracker of that name, or the name cannot be.
+    EvaluationError
+        If there is no such repository, it has a tracker of that name, or the name is invalid.
     ConfigError
-        If the settings cannot be.
+        If the settings are invalid.
     """
     folder = repository.parent if repository.suffix == ".zarr" else repository
     if not (folder / "config.yaml").is_file() or not (folder / "registry.txt").is_file():
-        raise CannotTry(f"{repository} is not a repository: give the folder that a run made, as out/demo")
+        raise EvaluationError(f"{repository} is not a repository: give the folder that a run made, as out/demo")
     config = load(folder / "config.yaml")
     try:
         TypeAdapter(Name).validate_python(name)
     except ValidationError:
-        remedy = "use letters, digits and underscores only, a letter first and 40 at most, with --name"
-        raise CannotTry(f"{name!r} cannot be the name of a tracker: {remedy}") from None
+        remedy = "use letters, digits and underscores, 40 at most and a letter first, with --name"
+        raise EvaluationError(f"{name!r} cannot be the name of a tracker: {remedy}") from None
     if name in config.tracking.trackers:
-        raise CannotTry(f"{name} is a tracker of {folder} already: give this one another name with --name")
+        raise EvaluationError(f"{name} is already a tracker of {folder}: give this one another name with --name")
     tracking = {"grid_px": config.tracking.grid_px, "trackers": {name: values}}
     checked = validate(config.model_dump() | {"tracking": tracking}, f"tracker {name}")
-    return Trial(folder, config, name, checked.tracking.trackers[name])
+    return EvaluationRun(folder, config, name, checked.tracking.trackers[name])
 
 
-def _limit(threads: int) -> None:
+def _limit_threads(threads: int) -> None:
     import numba
 
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]  # set at run time
 
 
-def _rows(trial: Trial, sizes: list[int], place: tuple[str, str]) -> list[Row]:
+def _score_view(run: EvaluationRun, sizes: list[int], case_view: tuple[str, str]) -> list[Row]:
     """Scores of the clips of one view of one heart."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
-        # As the stage of that name, so that a tracker draws the same random numbers.
-        job = Job(trial.folder, "tracking", *place)
+        # The random numbers of a job depend on its stage: a tracker is to draw the same as in the workflow.
+        job = Job(run.folder, "tracking", *case_view)
         try:
-            truth, found = ground_truth(job), clips(job)
+            truth, clip_of_size = ground_truth(job), clips(job)
         except (ValueError, KeyError, OSError) as error:
             remedy = f"run it again ({in_one_line(str(error))})"
-            raise CannotTry(f"{trial.folder} cannot be read at {' '.join(place)}: {remedy}") from error
-        return [_row(trial, place, clip, truth) for size, clip in found.items() if size in sizes]
+            raise EvaluationError(f"{run.folder} cannot be read at {' '.join(case_view)}: {remedy}") from error
+        return [_score_clip(run, case_view, clip, truth) for size, clip in clip_of_size.items() if size in sizes]
 
 
-def _row(trial: Trial, place: tuple[str, str], clip: Clip, truth: Truth) -> Row:
+def _score_clip(run: EvaluationRun, case_view: tuple[str, str], clip: Clip, truth: Truth) -> Row:
     try:
-        answer, failure = track(*clip.given, trial.settings), ""
+        estimate, failure = track(*clip.tracker_arguments, run.settings), ""
     except TrackerFailed as error:
-        answer, failure = clip.nothing, str(error)
-    named = {"case": place[0], "view": place[1], "size_px": clip.size, "tracker": trial.name}
-    named["clip"] = digest(trial.folder, *place)
-    measures = row(score(clip.on_grid(*answer)[0], truth), truth.wall.plane)
-    return named | measures | {"failure": failure}
+        estimate, failure = clip.no_estimate, str(error)
+    keys = {"case": case_view[0], "view": case_view[1], "size_px": clip.size, "tracker": run.name}
+    keys["clip"] = digest(run.folder, *case_view)
+    return keys | metrics(score(clip.on_grid(*estimate)[0], truth), truth.wall.plane) | {"failure": failure}
 
 
-def told(row: Row) -> str:
-    """A row in one line, for those who wait."""
+def format_row(row: Row) -> str:
+    """One line of text on a row, to show progress."""
     outcome = row["failure"] or f"NRMSE {row['nrmse_percent']:.1f} %"
     return f"{row['case']} {row['view']} {row['size_px']} px: {outcome}"
 
 
 def summary(table: pd.DataFrame) -> str:
-    """Means over the cases, one line a view and image size, as text.
+    """Means over the cases as text, one line per view and image size.
 
     Parameters
     ----------
     table : DataFrame
-        Of the rows of a trial.
+        As :meth:`EvaluationRun.write` returns it.
     """
     groups = table.assign(failed=table["failure"] != "").groupby(["view", "size_px"], sort=False)
     counts = {"clips": groups.size(), "failed": groups["failed"].sum()}

@@ -1,4 +1,4 @@
-"""The score of one clip, the same for every tracker."""
+"""Score of a tracker on one clip, and the metrics of the leaderboard made from it."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ import numpy as np
 
 from echotruth.evaluation import statistics
 from echotruth.evaluation.agreement import REFERENCES, compare
-from echotruth.evaluation.clip import places
-from echotruth.evaluation.displacement import Wall, evaluate
-from echotruth.evaluation.strain import RADIUS, Operator
+from echotruth.evaluation.clip import grid_points
+from echotruth.evaluation.displacement import WallPoints, evaluate
+from echotruth.evaluation.strain import RADIUS, StrainOperator
+from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.truth import follow
+from echotruth.imaging.truth import cavity_centroid, material_truth
 from echotruth.imaging.view import Plane
 
 if TYPE_CHECKING:
     from echotruth.workflow.job import Job
 
-ALIKE = 1e-9
-"""Standard deviation of distances that are alike, m: what rounding in single precision makes of 20 mm moved."""
+DISTANCE_ROUNDING = 1e-9
+"""Standard deviation of distances that rounding can cause, m: that of a motion of 20 mm in single precision."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What the tissue at the points of one view of one heart has done; the same for all image sizes.
+    """True motion of the tissue at the grid points of one view of one heart; the same for all image sizes.
 
     Attributes
     ----------
     inside : ndarray of shape (grid rows, grid columns), bool
-        Points of the grid in the wall at end-diastole; the other arrays hold these alone.
-    wall : Wall
-    operator : Operator
-        The strain operator at the points.
+        Points of the grid in the wall at end-diastole; the other arrays hold only these.
+    wall : WallPoints
+    operator : StrainOperator
     displacement : ndarray of shape (frame, point, 2)
         Since end-diastole: lateral, axial, m.
     through_plane : ndarray of shape (frame, point)
@@ -45,24 +45,28 @@ class Truth:
     """
 
     inside: np.ndarray
-    wall: Wall
-    operator: Operator
+    wall: WallPoints
+    operator: StrainOperator
     displacement: np.ndarray
     through_plane: np.ndarray
     strain: np.ndarray
     es: int
 
     def on_grid(self, values: np.ndarray, axis: int) -> np.ndarray:
-        """Values at the points on the whole grid, whose two axes take the place of one; NaN or 0 outside."""
+        """Values of the points on the whole grid: (..., point, ...) to (..., grid rows, grid columns, ...).
+
+        Outside the wall they are NaN, or 0 if they are integers.
+        """
         values = np.moveaxis(np.asarray(values), axis, 0)
-        filled = np.full((*self.inside.shape, *values.shape[1:]), _nothing(values), values.dtype)
+        fill = np.nan if values.dtype.kind == "f" else 0
+        filled = np.full((*self.inside.shape, *values.shape[1:]), fill, values.dtype)
         filled[self.inside] = values
         return np.moveaxis(filled, (0, 1), (axis, axis + 1))
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """What the store keeps of it, on the grid."""
-        es, reach = self.es, compare(self.strain[-1], self.strain, self.wall, self.es)
+        """Arrays of the truth in the group `evaluation` of the store, on the grid."""
+        operator = compare(self.strain[-1], self.strain, self.wall, self.es)
         return {
             "true_displacement": self.on_grid(self.displacement, 1),
             "through_plane": self.on_grid(self.through_plane, 1),
@@ -70,14 +74,14 @@ class Truth:
             "wall_axes": self.on_grid(self.operator.axes, 0),
             "layer": self.on_grid(self.wall.layer, 0),
             "segment": self.on_grid(self.wall.segment, 0),
-            "through_plane_rms": statistics.rms(self.through_plane[es][:, None], self.wall.regions[:1])[0, 0],
-            "operator_bias": reach["strain_bias"],
-            "operator_rms": reach["strain_rms"],
+            "through_plane_rms": statistics.rms(self.through_plane[self.es][:, None], self.wall.regions[:1])[0, 0],
+            "operator_bias": operator["strain_bias"],
+            "operator_rms": operator["strain_rms"],
         }
 
 
 def ground_truth(job: Job) -> Truth:
-    """The truth of a job's heart and view.
+    """True motion of the heart and view of a job.
 
     Parameters
     ----------
@@ -89,15 +93,33 @@ def ground_truth(job: Job) -> Truth:
     Truth
     """
     heart, config = job.heart, job.case.config
-    phantom, largest = job.read("phantom", "origin", "axes", "centre"), config.bmode.sizes[0]
+    phantom, largest = job.read("phantom", "origin", "axes"), config.bmode.sizes[0]
     axial, lateral = pixel_centres(config.bmode, largest)
-    points = places(config, largest).round().astype(int)
+    points = grid_points(config, largest).round().astype(int)
     position = np.stack([lateral[points[..., 0]], axial[points[..., 1]]], axis=-1)
-    motion = follow(heart, Plane(phantom["origin"], phantom["axes"]), position, job.view.plane)
+    plane = Plane(phantom["origin"], phantom["axes"])
+    return truth_at(heart, plane, job.view.plane, position, config.bmode.si().field_of_view)
+
+
+def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, field_of_view: float) -> Truth:
+    """True motion of the tissue at points of the image.
+
+    Parameters
+    ----------
+    heart : Heart
+    plane : Plane
+    kind : {"short_axis", "long_axis"}
+        Of the plane.
+    position : ndarray of shape (grid rows, grid columns, 2), m
+        Lateral, axial, at end-diastole.
+    field_of_view : float
+        Side of the image, m.
+    """
+    motion = material_truth(heart, plane, position, kind)
     inside = motion["layer"] > 0
-    labels = (motion[name][inside] for name in ("layer", "segment"))
-    wall = Wall(position[inside], *labels, phantom["centre"], job.view.plane, heart.layers)
-    operator = Operator(wall.position, motion["wall_axes"][inside], RADIUS * config.bmode.si().field_of_view)
+    layer, segment = (motion[name][inside] for name in ("layer", "segment"))
+    wall = WallPoints(position[inside], layer, segment, cavity_centroid(heart, plane), kind, heart.layers)
+    operator = StrainOperator(wall.position, motion["wall_axes"][inside], RADIUS * field_of_view)
     displacement = motion["true_displacement"][:, inside]
     strain = [motion[f"{name}_strain"][:, inside] for name in REFERENCES[:2]]
     strain.append(operator.strain(displacement))
@@ -105,56 +127,55 @@ def ground_truth(job: Job) -> Truth:
 
 
 def score(tracked: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
-    """Everything that is told of one tracker on one clip.
+    """Compare the displacement of one tracker on one clip with the truth.
 
     Parameters
     ----------
     tracked : ndarray of shape (frame, grid rows, grid columns, 2)
-        Displacement since end-diastole: lateral, axial, m; NaN where there is none.
+        Displacement since end-diastole: lateral, axial, m; NaN where unknown.
     truth : Truth
         Of the view.
 
     Returns
     -------
     dict of ndarray
-        What :func:`.displacement.evaluate` and :func:`.agreement.compare`
-        return, and tracked_strain (frame, grid rows, grid columns, 3: radial, tangential, shear) and
-        through_plane_correlation (): of the error's length with the distance moved out of the plane, at ES; NaN where
-        either is the same at all points.
+        The results of :func:`.displacement.evaluate` and :func:`.agreement.compare`, and tracked_strain (frame, grid
+        rows, grid columns, 3: radial, tangential, shear) and through_plane_correlation (): of the length of the error
+        with the displacement out of the plane, at ES; NaN where either is the same at all points.
     """
-    moved = np.asarray(tracked, float)[:, truth.inside]
-    strain, es = truth.operator.strain(moved), truth.es
-    away = np.linalg.norm(moved[es] - truth.displacement[es], axis=-1)
-    out = np.abs(truth.through_plane[es])
-    together = statistics.correlation(away[:, None], out[:, None], truth.wall.regions[:1], ALIKE)
+    displacement = np.asarray(tracked, float)[:, truth.inside]
+    strain, es = truth.operator.strain(displacement), truth.es
+    error = np.linalg.norm(displacement[es] - truth.displacement[es], axis=-1)[:, None]
+    through_plane = np.abs(truth.through_plane[es])[:, None]
+    correlation = statistics.correlation(error, through_plane, truth.wall.regions[:1], DISTANCE_ROUNDING)
     return {
-        **evaluate(moved, truth.displacement, truth.wall, es),
+        **evaluate(displacement, truth.displacement, truth.wall, es),
         **compare(strain, truth.strain, truth.wall, es),
         "tracked_strain": truth.on_grid(strain, 1),
-        "through_plane_correlation": together[0, 0],
+        "through_plane_correlation": correlation[0, 0],
     }
 
 
-def row(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
-    """The figures of one line of the leaderboard.
+def metrics(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
+    """Metrics of one row of the leaderboard.
 
     Parameters
     ----------
     score : dict of ndarray
-        As of :func:`score`.
+        As :func:`score` returns it.
     plane : {"short_axis", "long_axis"}
-        Of the view: its tangential strain is the circumferential (`ecc`) or the longitudinal one (`ell`).
+        Of the view: its tangential strain is circumferential (`ecc`) or longitudinal (`ell`).
 
     Returns
     -------
     dict
-        Figure to value, its unit at the end of its name; NaN for the strain that the plane does not show. All at ES but
-        `nrmse_cycle_percent` and `drift_um`.
+        Name of a metric, which ends in its unit, to its value; NaN for the strain that the plane does not show. All at
+        ES except `nrmse_cycle_percent` and `drift_um`.
     """
     tangential = {"short_axis": "ecc", "long_axis": "ell"}[plane]
-    tracked_change, true_change = (score[f"{name}_spread_change"] for name in ("tracked", "true"))
-    strains = {"err": 0, "ecc": None, "ell": None, tangential: 1}
-    figures = {
+    tracked_gradient, true_gradient = (score[f"{name}_transmural_gradient"] for name in ("tracked", "true"))
+    components = {"err": 0, "ecc": None, "ell": None, tangential: 1}
+    values = {
         "nrmse_percent": 100 * score["nrmse"][0, 2],
         "nrmse_all_percent": 100 * score["nrmse_all"],
         "nrmse_cycle_percent": 100 * score["nrmse_cycle"],
@@ -165,31 +186,28 @@ def row(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
         "epe_median_um": 1e6 * score["end_point_error"][0, 1],
         "epe_p95_um": 1e6 * score["end_point_error"][0, 2],
         "drift_um": 1e6 * score["drift"],
-        "spread_change_percent": tracked_change,
-        "true_spread_change_percent": true_change,
-        "spread_returned_percent": 100 * tracked_change / true_change if true_change else np.nan,
+        "transmural_gradient_percent": tracked_gradient,
+        "true_transmural_gradient_percent": true_gradient,
+        "transmural_gradient_recovered_percent": 100 * tracked_gradient / true_gradient if true_gradient else np.nan,
         "through_plane_correlation": score["through_plane_correlation"],
         "coverage_percent": 100 * score["coverage"],
     }
-    for name, axis in strains.items():
-        figures |= {key: np.nan if axis is None else value for key, value in _strain(score, name, axis or 0).items()}
-    return {name: float(value) for name, value in figures.items()}
+    for name, component in components.items():
+        strain = _strain_metrics(score, name, component or 0)
+        values |= dict.fromkeys(strain, np.nan) if component is None else strain
+    return {name: float(value) for name, value in values.items()}
 
 
-def _strain(score: dict[str, np.ndarray], name: str, axis: int) -> dict[str, float]:
-    """Figures of one strain, in points (hundredths of strain)."""
-    heart, operator = (REFERENCES.index(each) for each in ("heart", "operator"))
-    _, lower, upper, _ = score["segment_agreement"][heart, :, axis]
+def _strain_metrics(score: dict[str, np.ndarray], name: str, component: int) -> dict[str, float]:
+    """Metrics of one strain component, in points (hundredths of strain)."""
+    heart, operator = REFERENCES.index("heart"), REFERENCES.index("operator")
+    _, lower, upper, _ = score["segment_agreement"][heart, :, component]
     return {
-        f"global_{name}_bias_points": 100 * score["strain_bias"][heart, 0, axis],
-        f"{name}_rms_points": 100 * score["strain_rms"][heart, 0, axis],
-        f"{name}_correlation": score["strain_correlation"][heart, 0, axis],
-        f"segment_{name}_error_points": 100 * score["segment_strain_error"][heart, axis],
+        f"global_{name}_bias_points": 100 * score["strain_bias"][heart, 0, component],
+        f"{name}_rms_points": 100 * score["strain_rms"][heart, 0, component],
+        f"{name}_correlation": score["strain_correlation"][heart, 0, component],
+        f"segment_{name}_error_points": 100 * score["segment_strain_error"][heart, component],
         f"segment_{name}_limits_points": 100 * (upper - lower) / 2,
-        f"tracker_{name}_bias_points": 100 * score["strain_bias"][operator, 0, axis],
-        f"tracker_{name}_rms_points": 100 * score["strain_rms"][operator, 0, axis],
+        f"tracker_{name}_bias_points": 100 * score["strain_bias"][operator, 0, component],
+        f"tracker_{name}_rms_points": 100 * score["strain_rms"][operator, 0, component],
     }
-
-
-def _nothing(values: np.ndarray) -> float:
-    return np.nan if values.dtype.kind == "f" else 0

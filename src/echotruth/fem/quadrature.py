@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import permutations
 
 import numpy as np
 
 from echotruth.arrays import Floats
 
-# Barycentric coordinates of one point of each orbit and its weight, as a share of the volume or area.
+# Barycentric coordinates of one point of each orbit, and its weight as a fraction of the volume or area.
 _TETRAHEDRON = [
     (
         (0.0673422422100981705, 0.3108859192633006098, 0.3108859192633006098, 0.3108859192633006098),
@@ -59,7 +60,7 @@ def triangle() -> tuple[Floats, Floats]:
     return xi, weight / 2
 
 
-def _points(orbits: list[tuple[tuple[float, ...], float]]) -> tuple[Floats, Floats]:
+def _points(orbits: Iterable[tuple[tuple[float, ...], float]]) -> tuple[Floats, Floats]:
     rows = [(point, weight) for corner, weight in orbits for point in sorted(set(permutations(corner)))]
     xi = np.array([point[1:] for point, _ in rows])
     weight = np.array([weight for _, weight in rows])

@@ -1,7 +1,7 @@
 """Direct solution of symmetric sparse systems, behind one small interface.
 
 MKL Pardiso factors A = L D L^T without regard to the signs of D (the tangent of an
-active wall is indefinite); where it is missing, SuperLU does, several times slower.
+active wall is indefinite); where it is missing, SuperLU takes its place, several times slower.
 Both run on one thread: sums in another order would change the last bytes of the result.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from importlib.metadata import PackageNotFoundError, files
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,22 +21,22 @@ _SYMMETRIC_INDEFINITE = -2
 _ANALYSE, _FACTOR, _SOLVE = 11, 22, 33
 
 _PARAMETERS = {1: 1, 2: 2, 8: 0, 10: 8, 21: 1}
-"""Pardiso's iparm: own values, nested dissection, no iterative refinement (Newton's method does that),
+"""Pardiso's iparm: not its defaults, nested dissection, no iterative refinement (Newton's method does that),
 pivots raised to 1e-8, Bunch-Kaufman pivoting."""
 
-_PRECISIONS = {np.float64: {28: 0}, np.float32: {28: 1}}
-"""Precision of the factors, as Pardiso is told."""
+_PRECISIONS: dict[type, dict[int, int]] = {np.float64: {28: 0}, np.float32: {28: 1}}
+"""Pardiso's iparm for the precision of the factors."""
 
-ENOUGH = 2e-2
-"""Residual over right-hand side at which a solution with factors of single precision is left: Newton's method,
-which takes its corrections from them, mends the rest."""
+SINGLE_TOLERANCE = 2e-2
+"""Residual over right-hand side at which the refinement of a solution with factors of single precision stops: it is a
+Newton correction, and the next one makes up for the rest."""
 
-_MOST_ROUNDS = 5
+_MAX_REFINEMENTS = 5
 
 _CBWR_AUTO = 2
-"""MKL's name for sums in one order on one kind of processor (conditional numerical reproducibility)."""
+"""MKL's constant for sums in one order on one kind of processor (conditional numerical reproducibility)."""
 _ALIGNMENT = 64
-"""Bytes at whose multiples arrays must begin for it: elsewhere MKL splits its loops otherwise, and rounds otherwise."""
+"""Bytes at whose multiples arrays must begin for that: elsewhere MKL splits its loops, and rounds, differently."""
 
 
 class SingularMatrix(ArithmeticError):
@@ -53,16 +53,16 @@ class Factorization(Protocol):
         """Solutions, shape (n, n_right), for right-hand sides of that shape."""
 
     def close(self) -> None:
-        """Give the memory back."""
+        """Free the memory."""
 
 
 def factorization(single: bool = False) -> Factorization:
-    """The fastest direct solver at hand.
+    """The fastest direct solver available.
 
     Parameters
     ----------
     single : bool
-        Single precision will do for the factors.
+        Whether factors in single precision suffice.
 
     Returns
     -------
@@ -81,65 +81,65 @@ class Pardiso:
     Parameters
     ----------
     single : bool
-        Factor in single precision, in two thirds of the time; solutions are refined in double precision
-        until what is left is `ENOUGH` of the right-hand side. A matrix for which that fails is factored anew.
+        Factor in single precision, in two thirds of the time; solutions are refined in double precision until
+        |b - A x| <= `SINGLE_TOLERANCE` |b|. A matrix for which that fails is factored again in double precision.
     """
 
     def __init__(self, single: bool = False) -> None:
-        _point_at_mkl()
+        _set_mkl_path()
         from pypardiso import PyPardisoSolver
 
         self._solvers = {precision: PyPardisoSolver(mtype=_SYMMETRIC_INDEFINITE) for precision in _PRECISIONS}
         self._solvers[np.float64].libmkl.MKL_CBWR_Set(_CBWR_AUTO)
         for precision, solver in self._solvers.items():
-            for place, value in (_PARAMETERS | _PRECISIONS[precision]).items():
-                solver.set_iparm(place, value)
-        self._wanted = np.float32 if single else np.float64
+            for index, value in (_PARAMETERS | _PRECISIONS[precision]).items():
+                solver.set_iparm(index, value)
+        self._first_precision = np.float32 if single else np.float64
         self._analysed: set[type] = set()
 
     def factor(self, upper: csr_matrix) -> None:
         """Factor the matrix whose upper triangle is given, every diagonal entry present."""
         self._upper, self._diagonal = upper, upper.diagonal()
-        self._factor(self._wanted)
+        self._factor(self._first_precision)
 
     def solve(self, right: Floats) -> Floats:
         """Solutions, shape (n, n_right), for right-hand sides of that shape."""
         solution = self._solution(right)
         if self._precision is np.float64:
             return solution
-        left, size = right - self._times(solution), _norm(right)
-        for _ in range(_MOST_ROUNDS):
-            if _norm(left) <= ENOUGH * size:
+        residual, size = right - self._times(solution), _norm(right)
+        for _ in range(_MAX_REFINEMENTS):
+            if _norm(residual) <= SINGLE_TOLERANCE * size:
                 return solution
-            solution = solution + self._solution(left)
-            left = right - self._times(solution)
+            solution = solution + self._solution(residual)
+            residual = right - self._times(solution)
         self._factor(np.float64)
         return self._solution(right)
 
     def close(self) -> None:
-        """Give the memory back."""
+        """Free the memory."""
         for precision in self._analysed:
             self._solvers[precision].free_memory(everything=True)
         self._analysed = set()
 
-    # What overflows in single precision leaves no solution, and is factored anew in double.
+    # A matrix that overflows in single precision gives no solution, and is factored again in double.
     @np.errstate(over="ignore")
     def _factor(self, precision: type) -> None:
         self._precision = precision
         values = _aligned(self._upper.data, precision)
         self._values = csr_matrix((values, self._upper.indices, self._upper.indptr), self._upper.shape)
-        nothing = np.zeros((self._upper.shape[0], 1))
+        unused = np.zeros((self._upper.shape[0], 1))
         if precision not in self._analysed:
-            self._call(_ANALYSE, nothing)
+            self._call(_ANALYSE, unused)
             self._analysed.add(precision)
-        self._call(_FACTOR, nothing)
+        self._call(_FACTOR, unused)
 
     def _solution(self, right: Floats) -> Floats:
-        size = float(np.abs(right).max()) or 1.0  # a vector of any size has room in single precision
+        size = float(np.abs(right).max()) or 1.0  # scaled, so that no right-hand side overflows in single precision
         return size * self._call(_SOLVE, right / size).astype(np.float64)
 
     def _times(self, vector: Floats) -> Floats:
-        """The whole symmetric matrix times vectors."""
+        """The symmetric matrix times vectors."""
         return self._upper @ vector + self._upper.T @ vector - self._diagonal[:, None] * vector
 
     def _call(self, phase: int, right: Floats) -> Floats:
@@ -149,28 +149,28 @@ class Pardiso:
         solver.libmkl.MKL_Set_Num_Threads(1)
         solver.set_phase(phase)
         try:
-            # The public methods analyse every matrix anew, although the pattern stays.
+            # The public methods analyse every matrix again, although the pattern stays.
             return solver._call_pardiso(self._values, _aligned(right, self._precision))
         except PyPardisoError as error:
             raise SingularMatrix(f"MKL Pardiso could not factor the matrix ({error}).") from None
 
 
-def _point_at_mkl() -> None:
-    """Name MKL's library to pypardiso, which for each solver would look for it in every folder of the environment."""
+def _set_mkl_path() -> None:
+    """Set the path of MKL for pypardiso, which would search all folders of the environment for each solver."""
     try:
-        shipped = [str(file.locate()) for file in files("mkl") or [] if "mkl_rt" in file.name]
+        libraries = [str(file.locate()) for file in files("mkl") or [] if "mkl_rt" in file.name]
     except PackageNotFoundError:
         return
-    for path in filter(os.path.exists, shipped):
+    for path in filter(os.path.exists, libraries):
         os.environ.setdefault("PYPARDISO_MKL_RT", path)
 
 
-def _aligned(values: Floats, precision: type) -> NDArray:
-    """A copy in Fortran's order that begins at a multiple of `_ALIGNMENT` bytes."""
+def _aligned(values: Floats, precision: type) -> NDArray[Any]:
+    """A copy in Fortran order that begins at a multiple of `_ALIGNMENT` bytes."""
     size = values.size * np.dtype(precision).itemsize
     memory = np.empty(size + _ALIGNMENT, np.uint8)
     start = -memory.ctypes.data % _ALIGNMENT
-    copy = memory[start : start + size].view(precision).reshape(values.shape, order="F")
+    copy: NDArray[Any] = memory[start : start + size].view(precision).reshape(values.shape, order="F")
     copy[...] = values
     return copy
 
@@ -186,10 +186,10 @@ class SuperLU:
         """Factor the matrix whose upper triangle is given, every diagonal entry present."""
         from scipy.sparse.linalg import splu
 
-        whole = csc_matrix(upper + triu(upper, 1).T)
-        # Equal scales of rows and columns stand in for the pivoting that symmetric ordering leaves out.
-        self._scale = 1 / np.sqrt(np.abs(whole.diagonal()))
-        scaled = (diags(self._scale) @ whole @ diags(self._scale)).tocsc()
+        full = csc_matrix(upper + triu(upper, 1).T)
+        # Scaling rows and columns alike replaces the pivoting that symmetric ordering leaves out.
+        self._scale = 1 / np.sqrt(np.abs(full.diagonal()))
+        scaled = (diags(self._scale) @ full @ diags(self._scale)).tocsc()
         options = {"SymmetricMode": True}
         try:
             self._factors = splu(scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options=options)
@@ -201,5 +201,5 @@ class SuperLU:
         return self._scale[:, None] * self._factors.solve(self._scale[:, None] * right)
 
     def close(self) -> None:
-        """Give the memory back."""
+        """Free the memory."""
         self._factors = None

@@ -1,8 +1,8 @@
 """Quadratic tetrahedra: shape functions, interpolation and gradients.
 
 Everything that moves with the wall - scatterers, pixels, tracked points - is a
-material point, named by a tetrahedron and local coordinates in it, and carried
-by the shape functions here.
+material point, given by a tetrahedron and local coordinates xi in it; the shape functions N
+carry it to x(xi) = sum_a N_a(xi) x_a.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from echotruth.arrays import Floats
 Integers = NDArray[np.int32]
 
 EDGES = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])
-"""Vertices beside each mid-edge node 4..9; the order is VTK's."""
+"""Vertices of the edge of each mid-edge node 4..9, in VTK's order."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,9 @@ class Mesh:
     ----------
     nodes : ndarray of shape (n_nodes, 3), m
     cells : ndarray of shape (n_cells, 10)
-        Nodes of each tetrahedron: four vertices, then the middles of `EDGES`; positively oriented.
+        Nodes of each tetrahedron: four vertices, then the mid-edge nodes of `EDGES`; positively oriented.
     endo, epi, base : ndarray of shape (n_facets, 6)
-        Quadratic triangles of the boundary: three vertices, then the middles of edges 01, 12, 20;
+        Quadratic triangles of the boundary: three vertices, then the mid-edge nodes of 01, 12, 20;
         their normals point out of the wall.
     fibre, sheet : ndarray of shape (n_cells, 3), optional
         Directions of fibres and sheets that came with the mesh, of any length.
@@ -68,6 +68,8 @@ class MaterialPoints:
 def shape(xi: Floats) -> Floats:
     """Quadratic shape functions at local coordinates.
 
+    With barycentric coordinates L: N_a = L_a (2 L_a - 1) of a vertex, 4 L_a L_b of the node between a and b.
+
     Parameters
     ----------
     xi : ndarray of shape (n, 3)
@@ -83,7 +85,7 @@ def shape(xi: Floats) -> Floats:
 
 
 def shape_gradient(xi: Floats) -> Floats:
-    """Derivatives of the shape functions by the local coordinates.
+    """dN/dxi, derivatives of the shape functions by the local coordinates.
 
     Parameters
     ----------
@@ -94,10 +96,10 @@ def shape_gradient(xi: Floats) -> Floats:
     ndarray of shape (n, 10, 3)
     """
     corner = _barycentric(xi)[..., None]
-    slope = np.vstack([-np.ones(3), np.eye(3)])
+    dcorner_dxi = np.vstack([-np.ones(3), np.eye(3)])
     a, b = EDGES.T
-    middle = 4 * (corner[:, a] * slope[b] + corner[:, b] * slope[a])
-    return np.concatenate([(4 * corner - 1) * slope, middle], axis=1)
+    middle = 4 * (corner[:, a] * dcorner_dxi[b] + corner[:, b] * dcorner_dxi[a])
+    return np.concatenate([(4 * corner - 1) * dcorner_dxi, middle], axis=1)
 
 
 def _barycentric(xi: Floats) -> Floats:
@@ -105,7 +107,7 @@ def _barycentric(xi: Floats) -> Floats:
 
 
 def interpolate(values: Floats, cells: Integers, points: MaterialPoints) -> Floats:
-    """Nodal values carried to material points by the shape functions.
+    """Nodal values interpolated to material points by the shape functions.
 
     Parameters
     ----------
@@ -119,11 +121,11 @@ def interpolate(values: Floats, cells: Integers, points: MaterialPoints) -> Floa
     ndarray of shape (n, ...), in the unit of `values`
     """
     columns = np.ascontiguousarray(values, float).reshape(len(values), -1)
-    return _interpolate(columns, *_plain(cells, points)).reshape(len(points), *values.shape[1:])
+    return _interpolate(columns, *_contiguous(cells, points)).reshape(len(points), *values.shape[1:])
 
 
 def gradient(values: Floats, positions: Floats, cells: Integers, points: MaterialPoints) -> Floats:
-    """Gradient of nodal values by position at material points.
+    """Gradient of nodal values by position at material points, dv/dx = dv/dxi (dx/dxi)^-1.
 
     Parameters
     ----------
@@ -139,12 +141,12 @@ def gradient(values: Floats, positions: Floats, cells: Integers, points: Materia
         The deformation gradient, where `values` are the nodes' deformed positions.
     """
     columns = np.ascontiguousarray(values, float).reshape(len(values), -1)
-    slopes = _gradient(columns, np.ascontiguousarray(positions, float), *_plain(cells, points))
-    return slopes.reshape(len(points), *values.shape[1:], 3)
+    gradients = _gradient(columns, np.ascontiguousarray(positions, float), *_contiguous(cells, points))
+    return gradients.reshape(len(points), *values.shape[1:], 3)
 
 
 def jacobian(positions: Floats, cells: Integers, points: MaterialPoints) -> Floats:
-    """Derivative of position by local coordinates at material points.
+    """dx/dxi, derivative of position by local coordinates, at material points.
 
     Parameters
     ----------
@@ -160,10 +162,10 @@ def jacobian(positions: Floats, cells: Integers, points: MaterialPoints) -> Floa
     return np.swapaxes(positions[cells[points.cell]], 1, 2) @ shape_gradient(points.xi)
 
 
-def _plain(cells: Integers, points: MaterialPoints) -> tuple[Integers, Integers, Floats]:
-    """Cells, and cell and local coordinates of points, of one type each, so that little is compiled."""
-    whole = (np.ascontiguousarray(each, np.int32) for each in (cells, points.cell))
-    return (*whole, np.ascontiguousarray(points.xi, float))
+def _contiguous(cells: Integers, points: MaterialPoints) -> tuple[Integers, Integers, Floats]:
+    """Cells, and cell and local coordinates of points, each of one type, so that kernels are compiled once."""
+    cell = np.ascontiguousarray(points.cell, np.int32)
+    return np.ascontiguousarray(cells, np.int32), cell, np.ascontiguousarray(points.xi, float)
 
 
 @numba.njit(cache=True)
@@ -185,61 +187,61 @@ def _interpolate(values, cells, cell, xi):  # pragma: no cover - compiled
 
 @numba.njit(cache=True, error_model="numpy")
 def _gradient(values, positions, cells, cell, xi):  # pragma: no cover - compiled
-    result, corner, slope = np.empty((len(cell), values.shape[1], 3)), np.empty(4), np.empty((3, 10))
-    place, inverse, local = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    result, corner, dN_dxi = np.empty((len(cell), values.shape[1], 3)), np.empty(4), np.empty((3, 10))
+    dx_dxi, inverse, dv_dxi = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     for p in range(len(cell)):
         nodes = cells[cell[p]]
         _corners(xi[p], corner)
-        _slopes(corner, slope)
+        _shape_gradient(corner, dN_dxi)
         for i in range(3):
-            _sum(slope, positions, nodes, i, local)
+            _derivative(dN_dxi, positions, nodes, i, dv_dxi)
             for m in range(3):
-                place[m, i] = local[m]
-        _invert(place, inverse)
+                dx_dxi[m, i] = dv_dxi[m]
+        _invert(dx_dxi, inverse)
         for k in range(values.shape[1]):
-            _sum(slope, values, nodes, k, local)
+            _derivative(dN_dxi, values, nodes, k, dv_dxi)
             for j in range(3):
-                result[p, k, j] = local[0] * inverse[0, j] + local[1] * inverse[1, j] + local[2] * inverse[2, j]
+                result[p, k, j] = dv_dxi[0] * inverse[0, j] + dv_dxi[1] * inverse[1, j] + dv_dxi[2] * inverse[2, j]
     return result
 
 
 @numba.njit(cache=True)
 def _corners(xi, corner):  # pragma: no cover - compiled
-    """Barycentric coordinates, into (4,)."""
+    """Fill the barycentric coordinates (4,)."""
     corner[0] = 1 - (xi[0] + xi[1] + xi[2])
     for k in range(3):
         corner[1 + k] = xi[k]
 
 
 @numba.njit(cache=True)
-def _slopes(corner, slope):  # pragma: no cover - compiled
-    """Derivatives of the shape functions by the local coordinates, into (3, 10)."""
+def _shape_gradient(corner, dN_dxi):  # pragma: no cover - compiled
+    """Fill the derivatives of the shape functions by the local coordinates, (3, 10)."""
     for m in range(3):
         for a in range(4):
-            slope[m, a] = (4 * corner[a] - 1) * ((a == m + 1) - (a == 0))
+            dN_dxi[m, a] = (4 * corner[a] - 1) * ((a == m + 1) - (a == 0))
         for e in range(6):
             a, b = EDGES[e, 0], EDGES[e, 1]
-            slope[m, 4 + e] = 4 * (corner[b] * ((a == m + 1) - (a == 0)) + corner[a] * ((b == m + 1) - (b == 0)))
+            dN_dxi[m, 4 + e] = 4 * (corner[b] * ((a == m + 1) - (a == 0)) + corner[a] * ((b == m + 1) - (b == 0)))
 
 
 @numba.njit(cache=True)
-def _sum(slope, values, nodes, column, local):  # pragma: no cover - compiled
-    """Derivatives of a column of nodal values by the local coordinates, into (3,)."""
+def _derivative(dN_dxi, values, nodes, column, dv_dxi):  # pragma: no cover - compiled
+    """Fill the derivatives of a column of nodal values by the local coordinates, (3,)."""
     for m in range(3):
-        local[m] = 0.0
+        dv_dxi[m] = 0.0
         for a in range(10):
-            local[m] += slope[m, a] * values[nodes[a], column]
+            dv_dxi[m] += dN_dxi[m, a] * values[nodes[a], column]
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _invert(matrix, inverse):  # pragma: no cover - compiled
-    """Inverse of the transpose of a matrix (3, 3), by its cofactors."""
+    """Fill the inverse of the transpose of a matrix (3, 3), by its cofactors."""
     for m in range(3):
         a, b = (m + 1) % 3, (m + 2) % 3
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
             inverse[m, i] = matrix[a, j] * matrix[b, k] - matrix[a, k] * matrix[b, j]
-    whole = matrix[0, 0] * inverse[0, 0] + matrix[0, 1] * inverse[0, 1] + matrix[0, 2] * inverse[0, 2]
+    determinant = matrix[0, 0] * inverse[0, 0] + matrix[0, 1] * inverse[0, 1] + matrix[0, 2] * inverse[0, 2]
     for m in range(3):
         for i in range(3):
-            inverse[m, i] /= whole
+            inverse[m, i] /= determinant

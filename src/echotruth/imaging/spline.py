@@ -1,7 +1,6 @@
 """Cubic splines through samples on an even grid (Unser, Aldroubi, Eden 1993, IEEE Trans Signal Process 41:821).
 
-Beyond the first and last sample the data are mirrored about it. One thread makes all coefficients, and one a point, so
-the bytes do not depend on the number of threads.
+Beyond the first and last sample the data are mirrored about it. The bytes do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -10,19 +9,19 @@ import numba
 import numpy as np
 
 POLE = np.float32(np.sqrt(3) - 2)
-"""Pole of the filter that turns samples into coefficients; its gain is 6."""
-MEMORY = 14
-"""Samples after which the filter has forgotten: POLE^14 is 1e-8."""
-SQUARE = 32
-"""Samples along a side of what is turned at a time."""
+"""Pole z of the recursive filter 6 / (z^-1 + 4 + z) that turns samples into coefficients; its gain is 6."""
+HORIZON = 14
+"""Samples after which the impulse response of the filter is negligible: POLE^14 is 1e-8."""
+TRANSPOSE_BLOCK = 32
+"""Side of the square blocks that are transposed at a time, samples."""
 
 
 @numba.njit(cache=True, nogil=True)
-def filter_rows(values):
+def prefilter(values):
     """Turn samples along the first axis into spline coefficients, in place; (n, columns), float32, n of 2 or more."""
     n, columns = values.shape
     power = POLE
-    for k in range(1, min(n, MEMORY)):
+    for k in range(1, min(n, HORIZON)):
         for column in range(columns):
             values[0, column] += power * values[k, column]
         power *= POLE
@@ -38,14 +37,14 @@ def filter_rows(values):
 
 
 @numba.njit(cache=True, nogil=True)
-def turned(values, factor):
-    """Values (n, m) times a factor as (m, n), square by square, for a processor holds no more of lines far apart."""
+def scaled_transpose(values, factor):
+    """Transpose of values (n, m) times a factor, (m, n), block by block to stay in the cache."""
     rows, columns = values.shape
     result = np.empty((columns, rows), np.float32)
-    for top in range(0, rows, SQUARE):
-        for left in range(0, columns, SQUARE):
-            for i in range(top, min(top + SQUARE, rows)):
-                for j in range(left, min(left + SQUARE, columns)):
+    for top in range(0, rows, TRANSPOSE_BLOCK):
+        for left in range(0, columns, TRANSPOSE_BLOCK):
+            for i in range(top, min(top + TRANSPOSE_BLOCK, rows)):
+                for j in range(left, min(left + TRANSPOSE_BLOCK, columns)):
                     result[j, i] = factor * values[i, j]
     return result
 
@@ -56,28 +55,28 @@ def coefficients(samples):
     rows, columns = samples.shape
     gain = np.float32(6)
     values = samples.copy()
-    filter_rows(values)
-    # Turned, so that many rows go through the recursion at a time.
-    across = turned(values, gain)
-    filter_rows(across)
-    values = turned(across, gain)
+    prefilter(values)
+    # Transposed, so that the recursion runs over many rows at a time.
+    transposed = scaled_transpose(values, gain)
+    prefilter(transposed)
+    values = scaled_transpose(transposed, gain)
     padded = np.empty((rows + 3, columns + 3), np.float32)
     for i in range(rows + 3):
-        line = values[mirrored(i - 1, rows)]
+        row = values[mirrored_index(i - 1, rows)]
         for j in range(columns + 3):
-            padded[i, j] = line[mirrored(j - 1, columns)]
+            padded[i, j] = row[mirrored_index(j - 1, columns)]
     return padded
 
 
 @numba.njit(cache=True, nogil=True)
-def mirrored(index, size):
-    """Index of the sample that stands at a place up to two samples outside."""
+def mirrored_index(index, size):
+    """Index of the sample whose mirror image is at an index up to two samples outside."""
     return size - 1 - abs(size - 1 - abs(index))
 
 
 @numba.njit(cache=True)
-def shares(u):
-    """Shares of four neighbouring coefficients at a fraction u (float32) between the middle two: the cubic B-spline."""
+def bspline_weights(u):
+    """Cubic B-spline: weights of four neighbouring coefficients at a fraction u (float32) between the middle two."""
     one, sixth = np.float32(1), np.float32(1 / 6)
     v = one - u
     return (
@@ -90,30 +89,30 @@ def shares(u):
 
 @numba.njit(cache=True, nogil=True)
 def value(padded, row, column):
-    """Value of a spline, as :func:`coefficients` makes it, at one point (float32), from 0 to the last sample."""
+    """Value of a spline, from its :func:`coefficients`, at one point (float32), from 0 to the last sample."""
     i = min(np.int32(row), padded.shape[0] - 5)
     j = min(np.int32(column), padded.shape[1] - 5)
-    down, across = shares(row - np.float32(i)), shares(column - np.float32(j))
+    row_weights, column_weights = bspline_weights(row - np.float32(i)), bspline_weights(column - np.float32(j))
     total = np.float32(0)
     for a in range(4):
         line = padded[i + a]
-        part = np.float32(0)
+        row_sum = np.float32(0)
         for b in range(4):
-            part += across[b] * line[j + b]
-        total += down[a] * part
+            row_sum += column_weights[b] * line[j + b]
+        total += row_weights[a] * row_sum
     return total
 
 
 @numba.njit(parallel=True, cache=True)
-def at_points(padded, row, column, values):
+def evaluate(padded, row, column, values):
     """Values of a spline at points.
 
     Parameters
     ----------
     padded
-        As :func:`coefficients` makes it.
+        The :func:`coefficients`.
     row, column
-        Of the points, shape (points,), float32, from 0 to the last sample.
+        Coordinates of the points, shape (points,), float32, from 0 to the last sample.
     values
         Written: shape (points,), float32.
     """

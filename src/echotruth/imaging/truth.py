@@ -1,6 +1,8 @@
-"""The truth in the image: the motion of the tissue at every pixel, by the interpolation that carries the scatterers."""
+"""The truth in the image: motion of the tissue at every pixel, interpolated as that of the scatterers."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +14,14 @@ from echotruth.fem.tetrahedra import MaterialPoints, gradient, interpolate
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
 from echotruth.mechanics import kinematics
-from echotruth.mechanics.fibres import axes_about, layer, unit
+from echotruth.mechanics.fibres import axes_from_normal, layer, unit
 
-ORDER = {"short_axis": (0, 1, 2), "long_axis": (0, 2, 1)}
-"""R, C, L in the order radial, tangential in an image, across it."""
+IMAGE_AXES = {"short_axis": (0, 1, 2), "long_axis": (0, 2, 1)}
+"""Kind of plane to the indices of R, C, L in the order radial, tangential in the image, through-plane."""
 
 
-def truth(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> dict[str, NDArray[np.generic]]:
-    """What the tissue at each pixel of each frame has done since end-diastole.
+def pixel_truth(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> dict[str, NDArray[np.generic]]:
+    """Motion since end-diastole and labels of the tissue at each pixel of each frame.
 
     Parameters
     ----------
@@ -34,42 +36,39 @@ def truth(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> dict[st
         displacement (3; lateral, axial, elevation; m), strain (6; RR, CC, LL, RC, RL, CL), mask, layer,
         segment, region, wall_depth. Outside the wall: NaN, False or 0.
     """
-    pixels = plane.heart(np.stack(np.broadcast_arrays(lateral, axial[:, None], 0.0), axis=-1).reshape(-1, 3))
+    pixels = plane.to_heart(np.stack(np.broadcast_arrays(lateral, axial[:, None], 0.0), axis=-1).reshape(-1, 3))
     frames, clip = len(heart.displacement), {}
     for frame in range(frames):
-        inside, wall = _in_wall(heart, frame, pixels)
-        for name, value in _motion(heart, frame, plane, wall).items():
+        inside, points = _locate_in_wall(heart, frame, pixels)
+        arrays = {
+            "displacement": displacement(heart, frame, points) @ plane.axes.T,
+            "strain": strain(heart, frame, points),
+            "mask": np.ones(len(points), bool),
+            **labels(heart, points),
+        }
+        for name, values in arrays.items():
             if name not in clip:
-                clip[name] = _nothing((frames, len(pixels), *value.shape[1:]), value.dtype)
-            clip[name][frame, inside] = value
-    return {name: each.reshape(frames, len(axial), len(lateral), *each.shape[2:]) for name, each in clip.items()}
+                clip[name] = _empty((frames, len(pixels), *values.shape[1:]), values.dtype)
+            clip[name][frame, inside] = values
+    shape = frames, len(axial), len(lateral)
+    return {name: values.reshape(*shape, *values.shape[2:]) for name, values in clip.items()}
 
 
-def _in_wall(heart: Heart, frame: int, places: Floats) -> tuple[NDArray[np.int64], MaterialPoints]:
-    """Which of the places (n, 3), m, are in the wall in a frame, and what is there."""
-    points = locate(heart.positions(frame), heart.cells, places)
+def _locate_in_wall(heart: Heart, frame: int, positions: Floats) -> tuple[NDArray[np.int64], MaterialPoints]:
+    """Indices of the positions (n, 3), m, that are in the wall in a frame, and the material points there."""
+    points = locate(heart.positions(frame), heart.cells, positions)
     inside = np.flatnonzero(points.cell >= 0)
     return inside, MaterialPoints(points.cell[inside], points.xi[inside])
 
 
-def _motion(heart: Heart, frame: int, plane: Plane, wall: MaterialPoints) -> dict[str, NDArray[np.generic]]:
-    """Motion since end-diastole and labels of points of the wall."""
-    return {
-        "displacement": displacement(heart, frame, wall) @ plane.axes.T,
-        "strain": strain(heart, frame, wall),
-        "mask": np.ones(len(wall), bool),
-        **labels(heart, wall),
-    }
-
-
-def follow(heart: Heart, plane: Plane, places: Floats, kind: str) -> dict[str, NDArray[np.generic]]:
-    """The true motion of the tissue that is at given places of the image at end-diastole.
+def material_truth(heart: Heart, plane: Plane, positions: Floats, kind: str) -> dict[str, NDArray[Any]]:
+    """Motion of the tissue that is at given positions of the image at end-diastole.
 
     Parameters
     ----------
     heart : Heart
     plane : Plane
-    places : ndarray of shape (n_axial, n_lateral, 2), m
+    positions : ndarray of shape (n_axial, n_lateral, 2), m
         Lateral, axial.
     kind : {"short_axis", "long_axis"}
         Of the plane: tangential is circumferential or longitudinal in it.
@@ -80,36 +79,37 @@ def follow(heart: Heart, plane: Plane, places: Floats, kind: str) -> dict[str, N
         true_displacement (frame, n_axial, n_lateral, 2; lateral, axial; m) and through_plane
         (frame, n_axial, n_lateral; m) since end-diastole; wall_axes (n_axial, n_lateral, 2, 2), rows radial and
         tangential in the image at end-diastole; heart_strain and plane_strain (frame, n_axial, n_lateral, 3: radial,
-        tangential, shear) since end-diastole, along the wall's axes in space and, of the part of F in the plane, along
+        tangential, shear) since end-diastole, of F along the wall's axes in space and of the in-plane part of F along
         those in the image; layer and segment (n_axial, n_lateral) at end-diastole. Outside the wall: NaN or 0.
     """
-    shape = places.shape[:2]
-    flat = np.column_stack([places.reshape(-1, 2), np.zeros(shape[0] * shape[1])])
-    inside, wall = _in_wall(heart, 0, plane.heart(flat))
+    shape = positions.shape[:2]
+    in_plane = np.column_stack([positions.reshape(-1, 2), np.zeros(shape[0] * shape[1])])
+    inside, points = _locate_in_wall(heart, 0, plane.to_heart(in_plane))
     frames = range(len(heart.displacement))
-    motion = np.stack([displacement(heart, frame, wall) @ plane.axes.T for frame in frames])
-    deformation = np.stack([_deformation(heart, frame, wall) for frame in frames])
-    seen = np.einsum("ai,...ij,bj->...ab", plane.axes[:2], deformation, plane.axes[:2])
-    in_space, at_ed = _axes(heart, wall)[:, ORDER[kind]], labels(heart, wall)
-    in_plane = wall_axes(in_space, plane)
-    values = {
+    motion = np.stack([displacement(heart, frame, points) @ plane.axes.T for frame in frames])
+    start = heart.positions(0)
+    f = np.stack([gradient(heart.positions(frame), start, heart.cells, points) for frame in frames])
+    f_in_plane = np.einsum("ai,...ij,bj->...ab", plane.axes[:2], f, plane.axes[:2])
+    axes = axes_from_normal(gradient(heart.wall_depth, start, heart.cells, points))[:, IMAGE_AXES[kind]]
+    axes_in_plane, at_ed = wall_axes(axes, plane), labels(heart, points)
+    by_frame = {
         "true_displacement": motion[..., :2],
         "through_plane": motion[..., 2],
-        "heart_strain": kinematics.strain(deformation, in_space, kinematics.IMAGE),
-        "plane_strain": kinematics.strain(seen, in_plane, kinematics.IMAGE),
+        "heart_strain": kinematics.strain(f, axes, kinematics.IMAGE_COMPONENTS),
+        "plane_strain": kinematics.strain(f_in_plane, axes_in_plane, kinematics.IMAGE_COMPONENTS),
     }
-    images = {name: np.stack([_on_pixels(each, inside, shape) for each in value]) for name, value in values.items()}
-    images["wall_axes"] = _on_pixels(in_plane, inside, shape)
-    return images | {name: _on_pixels(at_ed[name], inside, shape) for name in ("layer", "segment")}
+    images = {name: np.stack([_to_image(one, inside, shape) for one in values]) for name, values in by_frame.items()}
+    once = {"wall_axes": axes_in_plane, "layer": at_ed["layer"], "segment": at_ed["segment"]}
+    return images | {name: _to_image(values, inside, shape) for name, values in once.items()}
 
 
-def wall_axes(in_space: Floats, plane: Plane) -> Floats:
-    """The wall's own axes in the image.
+def wall_axes(axes: Floats, plane: Plane) -> Floats:
+    """Axes of the wall in the image.
 
     Parameters
     ----------
-    in_space : ndarray of shape (n, 3, 3)
-        Axes of the wall in the heart frame: radial, tangential, across; unit vectors.
+    axes : ndarray of shape (n, 3, 3)
+        Axes of the wall in the heart frame: radial, tangential, through-plane; unit vectors.
     plane : Plane
 
     Returns
@@ -118,11 +118,11 @@ def wall_axes(in_space: Floats, plane: Plane) -> Floats:
         Rows are radial, the part of R in the plane, and tangential, orthogonal to it on the side of C (short axis) or
         L (long axis); columns lateral, axial.
     """
-    radial, tangent = (in_space[:, axis] @ plane.axes.T for axis in (0, 1))
+    radial, tangent = (axes[:, axis] @ plane.axes.T for axis in (0, 1))
     radial = unit(radial[:, :2])
-    across = np.stack([-radial[:, 1], radial[:, 0]], axis=-1)
-    side = np.where(np.sum(across * tangent[:, :2], axis=1) < 0, -1.0, 1.0)
-    return np.stack([radial, across * side[:, None]], axis=1)
+    normal = np.stack([-radial[:, 1], radial[:, 0]], axis=-1)
+    sign = np.where(np.sum(normal * tangent[:, :2], axis=1) < 0, -1.0, 1.0)
+    return np.stack([radial, normal * sign[:, None]], axis=1)
 
 
 def displacement(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
@@ -131,20 +131,10 @@ def displacement(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
 
 
 def strain(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
-    """Green-Lagrange strain of material points since end-diastole along the wall's axes there, (n, 6)."""
+    """Green-Lagrange strain of material points since end-diastole along the axes of the wall there, (n, 6)."""
     values = np.column_stack([heart.positions(frame), heart.wall_depth])
-    slopes = gradient(values, heart.positions(0), heart.cells, points)
-    return kinematics.strain(slopes[:, :3], axes_about(slopes[:, 3]), kinematics.RCL)
-
-
-def _axes(heart: Heart, points: MaterialPoints) -> Floats:
-    """R, C, L at end-diastole, (n, 3, 3)."""
-    return axes_about(gradient(heart.wall_depth, heart.positions(0), heart.cells, points))
-
-
-def _deformation(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
-    """F since end-diastole, (n, 3, 3)."""
-    return gradient(heart.positions(frame), heart.positions(0), heart.cells, points)
+    gradients = gradient(values, heart.positions(0), heart.cells, points)
+    return kinematics.strain(gradients[:, :3], axes_from_normal(gradients[:, 3]), kinematics.RCL_COMPONENTS)
 
 
 def labels(heart: Heart, points: MaterialPoints) -> dict[str, NDArray[np.generic]]:
@@ -159,29 +149,29 @@ def labels(heart: Heart, points: MaterialPoints) -> dict[str, NDArray[np.generic
     }
 
 
-def cavity_centre(heart: Heart, plane: Plane) -> Floats:
+def cavity_centroid(heart: Heart, plane: Plane) -> Floats:
     """Centroid of the cavity in a short-axis plane at end-diastole: lateral, axial, m.
 
-    The plane cuts the endocardial triangles in segments; the centroid is that of the polygon they enclose,
-    summed from its middle by Green's theorem.
+    The plane cuts the endocardial triangles in segments a b. With m the mean of their ends, the polygon that they
+    enclose consists of triangles m a b: centroid = sum(area (m + a + b) / 3) / sum(area).
     """
-    corners = plane.image(heart.positions(0)[_quarters(heart.endo)])
-    pieces = np.array([cut for triangle in corners if (cut := _cut(triangle)) is not None])
-    if not len(pieces):
+    triangles = plane.to_image(heart.positions(0)[_straight_triangles(heart.endo)])
+    segments = np.array([cut for triangle in triangles if (cut := _intersection(triangle)) is not None])
+    if not len(segments):
         return np.full(2, np.nan)
-    middle = pieces.mean(axis=(0, 1))
-    a, b = (pieces - middle).transpose(1, 0, 2)
+    mean = segments.mean(axis=(0, 1))
+    a, b = (segments - mean).transpose(1, 0, 2)
     area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
-    return middle + (area[:, None] * (a + b) / 3).sum(axis=0) / area.sum()
+    return mean + (area[:, None] * (a + b) / 3).sum(axis=0) / area.sum()
 
 
-def _quarters(facets: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Each quadratic triangle as four straight ones, through the middles of its edges."""
+def _straight_triangles(facets: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Split each quadratic triangle into four straight ones, through the middles of its edges."""
     return facets[:, [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)]].reshape(-1, 3)
 
 
-def _cut(triangle: Floats) -> Floats | None:
-    """Where the image plane (elevation 0) cuts a triangle: its two ends, or None."""
+def _intersection(triangle: Floats) -> Floats | None:
+    """Ends of the segment in which the image plane (elevation 0) cuts a triangle, or None."""
     ends = []
     for a, b in ((0, 1), (1, 2), (2, 0)):
         low, high = triangle[a], triangle[b]
@@ -190,13 +180,13 @@ def _cut(triangle: Floats) -> Floats | None:
     return np.array(ends) if len(ends) == 2 else None
 
 
-def _on_pixels(values: NDArray[np.generic], inside: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.generic]:
-    """An image of values at some of its pixels (flat numbers), with nothing at the others."""
-    image = _nothing((shape[0] * shape[1], *values.shape[1:]), values.dtype)
+def _to_image(values: NDArray[np.generic], inside: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.generic]:
+    """Image of values at the pixels of indices `inside`, empty at the others."""
+    image = _empty((shape[0] * shape[1], *values.shape[1:]), values.dtype)
     image[inside] = values
     return image.reshape(*shape, *values.shape[1:])
 
 
-def _nothing(shape: tuple[int, ...], dtype: np.dtype) -> NDArray[np.generic]:
+def _empty(shape: tuple[int, ...], dtype: np.dtype) -> NDArray[np.generic]:
     """An array of NaN, in single precision, or of 0."""
     return np.full(shape, np.nan, np.float32) if dtype.kind == "f" else np.zeros(shape, dtype)

@@ -1,4 +1,4 @@
-"""Views: where the probe stands and which plane it images."""
+"""Views: the pose of the probe and the plane it images."""
 
 from __future__ import annotations
 
@@ -26,19 +26,17 @@ class Plane:
     origin: Floats
     axes: Floats
 
-    def image(self, positions: Floats) -> Floats:
-        """Positions in the heart frame to lateral, axial, elevation; (..., 3) to (..., 3), m."""
+    def to_image(self, positions: Floats) -> Floats:
+        """Transform positions in the heart frame to lateral, axial, elevation; (..., 3) to (..., 3), m."""
         return (positions - self.origin) @ self.axes.T
 
-    def heart(self, positions: Floats) -> Floats:
-        """Lateral, axial, elevation to positions in the heart frame; (..., 3) to (..., 3), m."""
+    def to_heart(self, positions: Floats) -> Floats:
+        """Transform lateral, axial, elevation to positions in the heart frame; (..., 3) to (..., 3), m."""
         return positions @ self.axes + self.origin
 
 
-def plane(view: View, rf: Rf, endo_ed: Floats) -> Plane:
-    """Place the probe before the heart at end-diastole.
-
-    The heart stands at the transmit focus, where the beam is narrowest.
+def imaging_plane(view: View, rf: Rf, endo_ed: Floats) -> Plane:
+    """Plane of a view, with the heart at the transmit focus at end-diastole, where the beam is narrowest.
 
     Parameters
     ----------
@@ -52,12 +50,11 @@ def plane(view: View, rf: Rf, endo_ed: Floats) -> Plane:
     Plane
     """
     apex = endo_ed[:, 2].min()
-    depth = rf.si().focus
     if view.plane == "short_axis":
         axes = SHORT_AXIS
-        middle = np.array([0, 0, view.position * apex])
+        centre = np.array([0, 0, view.position * apex])
     else:
-        turn = view.si().rotation
-        axes = np.array([[-np.cos(turn), -np.sin(turn), 0], [0, 0, 1.0], [-np.sin(turn), np.cos(turn), 0]])
-        middle = np.array([0, 0, apex / 2])
-    return Plane(middle - depth * axes[1], axes)
+        angle = view.si().rotation
+        axes = np.array([[-np.cos(angle), -np.sin(angle), 0], [0, 0, 1.0], [-np.sin(angle), np.cos(angle), 0]])
+        centre = np.array([0, 0, apex / 2])
+    return Plane(centre - rf.si().focus * axes[1], axes)

@@ -1,4 +1,4 @@
-"""End-systole and the phases of the beat, found from the curves of pressure and volume."""
+"""End-systole and the phases of the beat, from the curves of pressure and volume."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from echotruth.arrays import Floats
 FILLING, CONTRACTION, EJECTION, RELAXATION = 0, 1, 2, 3
 """Labels of the phases: filling, isovolumic contraction, ejection, isovolumic relaxation."""
 
-_LEAK = (0.01, 0.1)
-"""Least and largest share of the stroke volume that may pass a valve that counts as closed; the noise decides."""
+_MAX_LEAK = (0.01, 0.1)
+"""Bounds of the volume, over the stroke volume, that may pass a closed valve; the noise decides between them."""
 
-_NOISE = 4.0
+_NOISE_SDS = 4.0
 """Standard deviations of the noise that count as no change of volume."""
 
 
 def es_frame(pressure: Floats, volume: Floats) -> int:
-    """Frame of end-systole, the largest P/V (time-varying elastance, Suga & Sagawa 1974).
+    """Frame of end-systole, argmax P/V (time-varying elastance, Suga & Sagawa 1974).
 
     Parameters
     ----------
@@ -31,10 +31,9 @@ def es_frame(pressure: Floats, volume: Floats) -> int:
 def phases(pressure: Floats, volume: Floats) -> NDArray[np.uint8]:
     """Phase of every frame of a cycle that begins at end-diastole.
 
-    The aortic valve opens after the last frame, before half of the stroke volume is out, that still has the
-    end-diastolic volume; the mitral valve after the last one, before half of it is in again, that still has the
-    end-systolic volume. Walking back from the steep middle of the curve keeps noise on its flat parts from
-    opening a valve.
+    The aortic valve opens after the last frame at end-diastolic volume before half of the stroke volume is out, the
+    mitral valve after the last frame at end-systolic volume before half of it is in again. Searching back from the
+    steep middle of the curve keeps noise on its flat parts from opening a valve.
 
     Parameters
     ----------
@@ -47,37 +46,37 @@ def phases(pressure: Floats, volume: Floats) -> NDArray[np.uint8]:
         0 filling, 1 isovolumic contraction (from end-diastole), 2 ejection (to end-systole), 3 isovolumic relaxation.
     """
     es = es_frame(pressure, volume)
-    full, empty = volume[0], np.quantile(volume, 0.05)
-    margin = np.clip(_NOISE * noise(volume), *(share * abs(full - empty) for share in _LEAK))
-    out = volume < (full + empty) / 2
-    aortic = _last(volume >= full - margin, 0, _first(out, 0, es))
-    mitral = _last(volume <= empty + margin, es, _first(~out, es, len(volume)))
+    edv, esv = volume[0], np.quantile(volume, 0.05)
+    margin = np.clip(_NOISE_SDS * noise(volume), *(leak * abs(edv - esv) for leak in _MAX_LEAK))
+    half_empty = volume < (edv + esv) / 2
+    aortic = _last(volume >= edv - margin, 0, _first(half_empty, 0, es))
+    mitral = _last(volume <= esv + margin, es, _first(~half_empty, es, len(volume)))
     frame = np.arange(len(volume))
-    of_systole = np.where(frame <= aortic, CONTRACTION, np.where(frame <= es, EJECTION, RELAXATION))
-    return np.where(frame <= max(mitral, es), of_systole, FILLING).astype(np.uint8)
+    systole = np.where(frame <= aortic, CONTRACTION, np.where(frame <= es, EJECTION, RELAXATION))
+    return np.where(frame <= max(mitral, es), systole, FILLING).astype(np.uint8)
 
 
 def noise(volume: Floats) -> float:
     """Standard deviation of white noise on a periodic curve that is flat for a quarter of the time.
 
-    From the lower quartile of the second differences, which vanish where a curve without noise is straight;
-    0.319 is that quartile for a normal deviate, and 6 the sum of the squared weights 1, -2, 1.
+    sd = q_25(|V_(i-1) - 2 V_i + V_(i+1)|) / (0.319 sqrt(6)): the second differences vanish where a curve without
+    noise is straight; 0.319 is that quartile for a normal deviate, and 6 the sum of the squared weights 1, -2, 1.
 
     Parameters
     ----------
     volume : ndarray of shape (n_frames,)
     """
-    bend = np.roll(volume, 1) - 2 * volume + np.roll(volume, -1)
-    return float(np.quantile(np.abs(bend), 0.25) / (0.319 * np.sqrt(6)))
+    difference = np.roll(volume, 1) - 2 * volume + np.roll(volume, -1)
+    return float(np.quantile(np.abs(difference), 0.25) / (0.319 * np.sqrt(6)))
 
 
-def _first(true: NDArray[np.bool_], start: int, end: int) -> int:
-    """First true frame from `start` up to `end`, which stands where there is none."""
-    found = np.flatnonzero(true[start:end])
-    return start + int(found[0]) if len(found) else end
+def _first(condition: NDArray[np.bool_], start: int, end: int) -> int:
+    """First frame from `start` up to `end` of which a condition is true; `end` if there is none."""
+    frames = np.flatnonzero(condition[start:end])
+    return start + int(frames[0]) if len(frames) else end
 
 
-def _last(true: NDArray[np.bool_], start: int, end: int) -> int:
-    """Last true frame from `start` on and before `end`; `start` where there is none."""
-    found = np.flatnonzero(true[start:end])
-    return start + int(found[-1]) if len(found) else start
+def _last(condition: NDArray[np.bool_], start: int, end: int) -> int:
+    """Last frame from `start` on and before `end` of which a condition is true; `start` if there is none."""
+    frames = np.flatnonzero(condition[start:end])
+    return start + int(frames[-1]) if len(frames) else start

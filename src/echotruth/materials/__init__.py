@@ -4,8 +4,8 @@ A module here is a law if it has two names. `Law` is its section of the configur
 with a key `law` that is the name of the module. `energy(e, constants, stress, tangent)` is a plain
 function that Numba can compile: given the isochoric Green-Lagrange strain e, shape (6,), in the
 order ff, ss, nn, fs, fn, sn (tensor components), and the numbers of `Law.constants`, it returns
-W / C, and fills `stress`, dW/dE / C of shape (6,), and `tangent`, shape (6, 6), which turns a strain
-with doubled shear into a stress. Whoever adds a law adds such a file and nothing else.
+W / C, and fills `stress`, dW/dE / C of shape (6,), and `tangent`, d2W/dE2 / C of shape (6, 6), which turns a
+strain with doubled shear into a stress. To add a law, add such a file and nothing else.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 from types import ModuleType
-from typing import Annotated, Any, Union
+from typing import TYPE_CHECKING, Annotated, Any, Union
 
 from pydantic import Discriminator, Tag
 
 from echotruth.materials.material import Material
 
 DEFAULT = "fung"
-"""The law where none is named."""
+"""Name of the default law."""
 
 
 def _laws() -> dict[str, ModuleType]:
@@ -34,21 +34,27 @@ LAWS = _laws()
 """Name to module of each law."""
 
 
-def _named(values: Any) -> Any:
-    """Name of the law a section of the configuration asks for."""
+def _law_name(values: Any) -> Any:
+    """Name of the law of a section of the configuration."""
     return values.get("law", DEFAULT) if isinstance(values, dict) else getattr(values, "law", DEFAULT)
 
 
-AnyLaw = Annotated[
-    Union[tuple(Annotated[module.Law, Tag(name)] for name, module in LAWS.items())],  # noqa: UP007
-    Discriminator(_named),
-]
-"""Section of any of the laws."""
+if TYPE_CHECKING:
+
+    class AnyLaw(Material):
+        law: str
+
+else:
+    AnyLaw = Annotated[
+        Union[tuple(Annotated[module.Law, Tag(name)] for name, module in LAWS.items())],  # noqa: UP007
+        Discriminator(_law_name),
+    ]
+"""Section of the configuration of any law."""
 
 
 @cache
 def compiled(name: str) -> Callable:
-    """The energy of a law as a function that compiled code calls.
+    """The energy of a law as a function for compiled code.
 
     Parameters
     ----------

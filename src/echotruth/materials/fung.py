@@ -24,22 +24,26 @@ class Law(Material):
     """b_fs."""
 
     def constants(self) -> np.ndarray:
-        """b_f, b_t, b_t, b_fs, b_fs, b_t: the factor of the square of each strain component in Q."""
+        """b_f, b_t, b_t, b_fs, b_fs, b_t: the coefficient of the square of each strain component in Q."""
         b_f, b_t, b_fs = self.fibre, self.transverse, self.shear
         return np.array([b_f, b_t, b_t, b_fs, b_fs, b_t])
 
 
 def energy(e, b, stress, tangent):
-    """W / C of the isochoric strain e; fills stress (6,) and tangent (6, 6)."""
+    """W / C = (exp Q - 1) / 2, Q = sum_i m_i b_i e_i^2, of the isochoric strain e; fills stress (6,), tangent (6, 6).
+
+    m_i is 1 of a normal strain and 2 of a shear, S_i = exp(Q) b_i e_i and the tangent
+    exp(Q) (2 b_i e_i b_k e_k + b_i delta_ik / m_i).
+    """
     q = 0.0
     for i in range(6):
         stress[i] = b[i] * e[i]
         q += stress[i] * e[i] * (1 if i < 3 else 2)
-    growth = exp(q)
+    exp_q = exp(q)
     for i in range(6):
         for k in range(6):
-            tangent[i, k] = 2 * growth * stress[i] * stress[k]
-        tangent[i, i] += growth * b[i] / (1 if i < 3 else 2)
+            tangent[i, k] = 2 * exp_q * stress[i] * stress[k]
+        tangent[i, i] += exp_q * b[i] / (1 if i < 3 else 2)
     for i in range(6):
-        stress[i] *= growth
-    return (growth - 1) / 2
+        stress[i] *= exp_q
+    return (exp_q - 1) / 2

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from math import exp
 from typing import Literal
 
 import numpy as np
 
+from echotruth.materials.fung import energy
 from echotruth.materials.material import Material
 from echotruth.section import Positive
+
+__all__ = ["Law", "energy"]
 
 
 class Law(Material):
@@ -32,22 +34,6 @@ class Law(Material):
     """b_sn."""
 
     def constants(self) -> np.ndarray:
-        """The factor of the square of each strain component in Q."""
-        along = (self.fibre, self.sheet, self.normal)
-        return np.array([*along, self.fibre_sheet, self.fibre_normal, self.sheet_normal])
-
-
-def energy(e, b, stress, tangent):
-    """W / C of the isochoric strain e; fills stress (6,) and tangent (6, 6)."""
-    q = 0.0
-    for i in range(6):
-        stress[i] = b[i] * e[i]
-        q += stress[i] * e[i] * (1 if i < 3 else 2)
-    growth = exp(q)
-    for i in range(6):
-        for k in range(6):
-            tangent[i, k] = 2 * growth * stress[i] * stress[k]
-        tangent[i, i] += growth * b[i] / (1 if i < 3 else 2)
-    for i in range(6):
-        stress[i] *= growth
-    return (growth - 1) / 2
+        """The coefficient of the square of each strain component in Q."""
+        normal = (self.fibre, self.sheet, self.normal)
+        return np.array([*normal, self.fibre_sheet, self.fibre_normal, self.sheet_normal])

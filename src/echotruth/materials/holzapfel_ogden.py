@@ -14,7 +14,7 @@ from echotruth.section import Positive
 class Law(Material):
     """W = a/(2 b) (exp[b (I1 - 3)] - 1) + a_f/(2 b_f) (exp[b_f (I4f - 1)^2] - 1) + the same for the sheet
     + a_fs/(2 b_fs) (exp[b_fs I8fs^2] - 1), of the invariants of the isochoric right Cauchy-Green tensor; fibre and
-    sheet bear tension alone. C is a."""
+    sheet bear only tension. C is a."""
 
     law: Literal["holzapfel_ogden"] = "holzapfel_ogden"
     """Holzapfel & Ogden, Phil Trans R Soc A 367 (2009) 3445; the defaults are its fit to the shear of pig hearts."""
@@ -42,20 +42,20 @@ class Law(Material):
 def energy(e, b, stress, tangent):
     """W / C of the isochoric strain e; fills stress (6,) and tangent (6, 6)."""
     # I1 - 3 = 2 tr e, I4 - 1 = 2 e_ff or 2 e_ss, I8fs = 2 e_fs.
-    growth = exp(2 * b[0] * (e[0] + e[1] + e[2]))
-    energy = (growth - 1) / (2 * b[0])
+    exponential = exp(2 * b[0] * (e[0] + e[1] + e[2]))
+    energy = (exponential - 1) / (2 * b[0])
     tangent[:] = 0.0
     for i in range(3):
-        stress[i], stress[3 + i] = growth, 0.0
+        stress[i], stress[3 + i] = exponential, 0.0
         for k in range(3):
-            tangent[i, k] = 2 * b[0] * growth
+            tangent[i, k] = 2 * b[0] * exponential
     for i, at in ((0, 1), (1, 3), (3, 5)):
         if e[i] <= 0 and i < 3:
             continue
         # A shear component stands twice in a double contraction, so half of the derivative is its stress.
-        modulus, exponent, share = b[at], 4 * b[at + 1] * e[i] * e[i], (1.0 if i < 3 else 0.5)
-        growth = exp(exponent)
-        energy += modulus * (growth - 1) / (2 * b[at + 1])
-        stress[i] += 4 * share * modulus * e[i] * growth
-        tangent[i, i] += 4 * share * share * modulus * (1 + 2 * exponent) * growth
+        modulus, exponent, half = b[at], 4 * b[at + 1] * e[i] * e[i], (1.0 if i < 3 else 0.5)
+        exponential = exp(exponent)
+        energy += modulus * (exponential - 1) / (2 * b[at + 1])
+        stress[i] += 4 * half * modulus * e[i] * exponential
+        tangent[i, i] += 4 * half * half * modulus * (1 + 2 * exponent) * exponential
     return energy

@@ -1,4 +1,4 @@
-"""What every passive law has in common."""
+"""Base class of the passive laws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Material axes of the wall from the angles of its fibres and sheets, and back."""
+"""Conversion between the material axes of the wall and the angles of its fibres and sheets."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from echotruth.fem.tetrahedra import Floats
 
 
-def frames(axes: Floats, helix: Floats, transverse: Floats, sheet: Floats) -> Floats:
+def frames_from_angles(axes: Floats, helix: Floats, transverse: Floats, sheet: Floats) -> Floats:
     """Material axes with given angles to the axes of the wall.
 
     Parameters
@@ -15,7 +15,7 @@ def frames(axes: Floats, helix: Floats, transverse: Floats, sheet: Floats) -> Fl
     axes : ndarray of shape (..., 3, 3)
         Rows R, C and L.
     helix, transverse, sheet : ndarray of shape (...), rad
-        As docs/conventions.md has them.
+        As defined in docs/conventions.md.
 
     Returns
     -------
@@ -24,18 +24,18 @@ def frames(axes: Floats, helix: Floats, transverse: Floats, sheet: Floats) -> Fl
     """
     radial, circumferential, longitudinal = np.moveaxis(axes, -2, 0)
     fibre = np.cos(helix)[..., None] * circumferential + np.sin(helix)[..., None] * longitudinal
-    material = np.stack([fibre, np.cross(radial, fibre), radial], axis=-2)
+    frames = np.stack([fibre, np.cross(radial, fibre), radial], axis=-2)
     # The transverse angle is seen along the long axis, so that a steep fibre leaves the wall by less.
-    lift = np.arctan(np.cos(helix) * np.tan(transverse))
-    for angle, first, second in ((lift, 0, 2), (-sheet, 1, 2)):
-        # Off is off, without rounding.
+    out_of_wall = np.arctan(np.cos(helix) * np.tan(transverse))
+    for angle, first, second in ((out_of_wall, 0, 2), (-sheet, 1, 2)):
+        # Zero angles are left out, so that they add no rounding.
         if np.any(angle):
-            material = _swung(material, angle[..., None], first, second)
-    return material
+            frames = _rotate_in_plane(frames, angle[..., None], first, second)
+    return frames
 
 
-def read(frames: Floats, axes: Floats) -> tuple[Floats, Floats, Floats]:
-    """Angles read back from material axes.
+def angles_from_frames(frames: Floats, axes: Floats) -> tuple[Floats, Floats, Floats]:
+    """Angles of material axes.
 
     Parameters
     ----------
@@ -48,22 +48,22 @@ def read(frames: Floats, axes: Floats) -> tuple[Floats, Floats, Floats]:
         Between -pi/2 and pi/2: neither fibre nor sheet has a head. A fibre along L has no transverse angle.
     """
     fibre, sheet, _ = np.moveaxis(frames, -2, 0)
-    outwards, around, along = np.moveaxis(np.einsum("...j,...ij->...i", fibre, axes), -1, 0)
-    # The sheet turns about the fibre that points along C, wherever the head of the one given is.
-    fibre = fibre * np.where(around < 0, -1.0, 1.0)[..., None]
-    flat = np.cross(axes[..., 0, :], fibre)
-    turn = _line(np.sum(sheet * flat, axis=-1), np.sum(sheet * np.cross(flat, fibre), axis=-1))
-    return _line(around, along), _line(around, outwards), turn
+    f_r, f_c, f_l = np.moveaxis(np.einsum("...j,...ij->...i", fibre, axes), -1, 0)
+    # The sheet angle is that about the fibre that points along C, wherever the head of this one is.
+    fibre = fibre * np.where(f_c < 0, -1.0, 1.0)[..., None]
+    in_wall = np.cross(axes[..., 0, :], fibre)
+    sheet_angle = _line_angle(np.sum(sheet * in_wall, axis=-1), np.sum(sheet * np.cross(in_wall, fibre), axis=-1))
+    return _line_angle(f_c, f_l), _line_angle(f_c, f_r), sheet_angle
 
 
-def _line(along: Floats, aside: Floats) -> Floats:
-    """Angle of a line, between -pi/2 and pi/2, rad, by its components."""
-    return np.arctan2(aside * np.where(along < 0, -1.0, 1.0), np.abs(along))
+def _line_angle(x: Floats, y: Floats) -> Floats:
+    """Angle of a line without a head, between -pi/2 and pi/2, rad, by its components."""
+    return np.arctan2(y * np.where(x < 0, -1.0, 1.0), np.abs(x))
 
 
-def _swung(material: Floats, angle: Floats, first: int, second: int) -> Floats:
-    """Frames with one axis swung towards another, and that away from it."""
-    swung = material.copy()
-    swung[..., first, :] = np.cos(angle) * material[..., first, :] + np.sin(angle) * material[..., second, :]
-    swung[..., second, :] = np.cos(angle) * material[..., second, :] - np.sin(angle) * material[..., first, :]
-    return swung
+def _rotate_in_plane(frames: Floats, angle: Floats, first: int, second: int) -> Floats:
+    """Frames with the first axis rotated towards the second, and that away from it."""
+    rotated = frames.copy()
+    rotated[..., first, :] = np.cos(angle) * frames[..., first, :] + np.sin(angle) * frames[..., second, :]
+    rotated[..., second, :] = np.cos(angle) * frames[..., second, :] - np.sin(angle) * frames[..., first, :]
+    return rotated

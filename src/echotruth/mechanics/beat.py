@@ -1,4 +1,4 @@
-"""One beat of one heart: geometry, fibres, mechanics and kinematics."""
+"""Simulation of one heart over one cycle: geometry, fibres, mechanics and kinematics."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from echotruth.config import Config
 from echotruth.loop import phases
 from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.history import Arrays, history
+from echotruth.mechanics.history import Arrays, collect_outputs
+from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver import drive
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.checkpoint import Progress
-from echotruth.mechanics.solver.unloaded import unloaded
+from echotruth.mechanics.solver.checkpoint import Checkpoints
+from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
 logger = logging.getLogger("echotruth.mechanics")
@@ -31,7 +32,7 @@ def beat(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
     config : Config
         Of which the seed and the sections geometry, fibres, pathology, loop and mechanics are used.
     scratch : Path, optional
-        Folder in which solved frames are kept until the beat is whole, so that a stopped run goes on there.
+        Folder in which solved frames are kept until the beat is complete, so that a stopped run continues there.
 
     Returns
     -------
@@ -43,47 +44,54 @@ def beat(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
     Raises
     ------
     GeometryError, FibreError, PathologyError, LoopError, Diverged
-        With one sentence, if there is no such heart, no such loop or no equilibrium.
+        With one sentence, if the heart or the loop is invalid, or there is no equilibrium.
     """
     cycle = read_loop(config.loop)
-    heart = unloaded_wall(config, cycle)
-    return history(config, heart, _course(_solved(config, heart, cycle, scratch), cycle))
+    unloaded = unloaded_wall(config, cycle)
+    solved = _solve(config, unloaded, cycle, scratch)
+    return collect_outputs(config, unloaded, _mechanics_arrays(solved, cycle))
+
+
+def simulate(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
+    """Move the heart of a configuration: by its beat (:func:`beat`), or by a formula (:func:`.prescribed_motion`)."""
+    return beat(config, scratch) if config.motion.kind == "beat" else prescribed_motion(config)
 
 
 def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
-    """The unloaded wall of a configuration, solved where its geometry is that of end-diastole."""
+    """The unloaded wall of a configuration, solved for where its geometry is that of end-diastole."""
     mesh = left_ventricle(config.geometry)
     logger.info("%d tetrahedra, %d nodes", len(mesh.cells), len(mesh.nodes))
     if config.geometry.state == "end_diastole":
+        assert cycle.pressure is not None
         stiffness = config.mechanics.material.si().stiffness
-        mesh = unloaded(mesh, lambda guess: equilibrium(config, wall(config, guess)), cycle.pressure[0], stiffness)
+        mesh = unload(mesh, lambda guess: equilibrium(config, wall(config, guess)), cycle.pressure[0], stiffness)
     return wall(config, mesh)
 
 
-def _solved(config: Config, heart: Wall, cycle: Cycle, scratch: Path | None) -> drive.Beat:
-    tissue = heart.tissue
+def _solve(config: Config, unloaded: Wall, cycle: Cycle, scratch: Path | None) -> drive.Beat:
+    tissue = unloaded.tissue
     activation = Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
-    equations = equilibrium(config, heart)
-    progress = Progress(scratch / _fingerprint(config, heart, cycle)) if scratch else None
+    equations = equilibrium(config, unloaded)
+    checkpoints = Checkpoints(scratch / _fingerprint(config, unloaded, cycle)) if scratch else None
     try:
-        return drive.solve(equations, cycle, activation, config.mechanics.material.si().stiffness, progress)
+        return drive.solve(equations, cycle, activation, config.mechanics.material.si().stiffness, checkpoints)
     finally:
         equations.close()
 
 
-def _fingerprint(config: Config, heart: Wall, cycle: Cycle) -> str:
+def _fingerprint(config: Config, unloaded: Wall, cycle: Cycle) -> str:
     """Hash of all that a solution depends on."""
     settings = config.fibres.model_dump(), config.seed, config.mechanics.model_dump()
-    return sha256(pickle.dumps((settings, heart, cycle))).hexdigest()[:16]
+    return sha256(pickle.dumps((settings, unloaded, cycle))).hexdigest()[:16]
 
 
-def _course(solved: drive.Beat, cycle: Cycle) -> Arrays:
+def _mechanics_arrays(solved: drive.Beat, cycle: Cycle) -> Arrays:
     return {
         "time": cycle.time,
         "pressure": solved.pressure,
         "volume": solved.volume,
-        "pressure_asked": solved.pressure_asked,
-        "volume_asked": solved.volume_asked,
+        "pressure_target": solved.pressure_target,
+        "volume_target": solved.volume_target,
         "active_tension": solved.tension,
         "displacement": solved.displacement,
         "stiffness": np.array(solved.stiffness),

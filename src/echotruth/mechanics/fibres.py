@@ -1,10 +1,9 @@
-"""Fibre directions by a Laplace-Dirichlet rule, or those of the mesh.
+"""Wall depth, wall axes and fibre frames, by a Laplace-Dirichlet rule or from the mesh file.
 
-Laplace's equation between endocardium and epicardium gives the lines through the
-wall; the share of the way along them is the wall depth, its gradient the wall
-normal, and the helix, transverse and sheet angles functions of it. Helix and sheet
-angle are alpha and beta of Bayer et al., Ann Biomed Eng 40 (2012) 2243; docs/conventions.md
-says where the two rules part.
+Laplace's equation between endocardium and epicardium gives the field lines through the wall. The relative distance
+along them is the wall depth, its gradient the wall normal, and helix, transverse and sheet angles are functions of it.
+Helix and sheet angle are alpha and beta of Bayer et al., Ann Biomed Eng 40 (2012) 2243; docs/conventions.md says where
+the two rules differ.
 """
 
 from __future__ import annotations
@@ -21,16 +20,13 @@ from echotruth.mechanics import angles, disarray
 CENTROID = np.full((1, 3), 0.25)
 """Local coordinates of the centroid of a tetrahedron."""
 
-NOWHERE = np.empty(0, dtype=np.int32)
-"""No nodes."""
-
 
 class FibreError(ValueError):
-    """Fibres that are not to be had."""
+    """Fibre directions that the mesh lacks."""
 
 
 def wall_depth(mesh: Mesh) -> Floats:
-    """Share of the way through the wall, along the field lines of Laplace's equation.
+    """Relative distance through the wall, along the field lines of Laplace's equation.
 
     On a tube or a sphere it is linear in the radius, where the potential itself is not.
 
@@ -45,30 +41,30 @@ def wall_depth(mesh: Mesh) -> Floats:
         (depth 1); Yezzi & Prince, IEEE Trans Med Imaging 22 (2003) 1332.
     """
     xi, weight = tetrahedron()
-    slope, volume = gradients(mesh, xi)
+    dN_dX, volume = material_gradients(mesh, xi)
     volume = volume * weight
     endo, epi = np.unique(mesh.endo), np.unique(mesh.epi)
-    laplace = np.einsum("cqai,cqbi,cq->cab", slope, slope, volume)
-    potential = _minimum(mesh, laplace, None, endo, epi)
-    along = np.einsum("cqai,cqi->cqa", slope, unit(_growth(mesh, potential, slope)))
-    # The length grows by one a metre along a field line: least squares of that.
-    squares = np.einsum("cqa,cqb,cq->cab", along, along, volume)
-    source = np.einsum("cqa,cq->ca", along, volume)
-    inner, outer = _minimum(mesh, squares, source, endo), _minimum(mesh, squares, -source, epi)
-    whole = inner + outer
-    return np.clip(np.divide(inner, whole, out=potential, where=whole > 0), 0.0, 1.0)
+    laplace = np.einsum("cqai,cqbi,cq->cab", dN_dX, dN_dX, volume)
+    potential = _minimize(mesh, laplace, None, endo, epi)
+    dN_ds = np.einsum("cqai,cqi->cqa", dN_dX, unit(_gradient(mesh, potential, dN_dX)))
+    # The length L grows by one per metre of field line: least squares of dL/ds - 1, towards either side.
+    matrix = np.einsum("cqa,cqb,cq->cab", dN_ds, dN_ds, volume)
+    source = np.einsum("cqa,cq->ca", dN_ds, volume)
+    to_endo, to_epi = _minimize(mesh, matrix, source, endo), _minimize(mesh, matrix, -source, epi)
+    thickness = to_endo + to_epi
+    return np.clip(np.divide(to_endo, thickness, out=potential, where=thickness > 0), 0.0, 1.0)
 
 
-def _minimum(mesh: Mesh, local: Floats, source: Floats | None, zero: Integers, one: Integers = NOWHERE) -> Floats:
+def _minimize(mesh: Mesh, k: Floats, f: Floats | None, zero: Integers, one: Integers | None = None) -> Floats:
     """Nodal values u that minimise u K u / 2 - u f and are 0 and 1 at given nodes; K, f cell by cell."""
+    n_nodes = len(mesh.nodes)
     row, column = np.repeat(mesh.cells, 10, axis=1), np.tile(mesh.cells, 10)
-    matrix = csr_matrix((local.ravel(), (row.ravel(), column.ravel())), (len(mesh.nodes), len(mesh.nodes)))
-    right = np.zeros(len(mesh.nodes))
-    if source is not None:
-        right = np.bincount(mesh.cells.ravel(), source.ravel(), len(mesh.nodes))
-    values = np.zeros(len(mesh.nodes))
-    values[one] = 1.0
-    free = np.setdiff1d(mesh.cells, np.concatenate([zero, one]))
+    matrix = csr_matrix((k.ravel(), (row.ravel(), column.ravel())), (n_nodes, n_nodes))
+    right = np.zeros(n_nodes) if f is None else np.bincount(mesh.cells.ravel(), f.ravel(), n_nodes)
+    values, fixed = np.zeros(n_nodes), zero
+    if one is not None:
+        values[one], fixed = 1.0, np.concatenate([zero, one])
+    free = np.setdiff1d(mesh.cells, fixed)
     solver = factorization()
     solver.factor(csr_matrix(triu(matrix[free][:, free])))
     values[free] = solver.solve((right - matrix @ values)[free, None])[:, 0]
@@ -76,8 +72,8 @@ def _minimum(mesh: Mesh, local: Floats, source: Floats | None, zero: Integers, o
     return values
 
 
-def gradients(mesh: Mesh, xi: Floats) -> tuple[Floats, Floats]:
-    """Gradients of the shape functions in the unloaded wall.
+def material_gradients(mesh: Mesh, xi: Floats) -> tuple[Floats, Floats]:
+    """Gradients of the shape functions by the position X in the unloaded wall.
 
     Parameters
     ----------
@@ -87,13 +83,13 @@ def gradients(mesh: Mesh, xi: Floats) -> tuple[Floats, Floats]:
 
     Returns
     -------
-    gradient : ndarray of shape (n_cells, n_points, 10, 3), 1/m
+    dN_dX : ndarray of shape (n_cells, n_points, 10, 3), 1/m
     volume : ndarray of shape (n_cells, n_points), m^3
-        Determinant of the map from the reference tetrahedron.
+        Determinant of dX/dxi.
     """
-    local = shape_gradient(xi)
-    jacobian = np.einsum("cai,qaj->cqij", mesh.nodes[mesh.cells], local)
-    return np.einsum("qaj,cqji->cqai", local, np.linalg.inv(jacobian)), np.linalg.det(jacobian)
+    dN_dxi = shape_gradient(xi)
+    jacobian = np.einsum("cai,qaj->cqij", mesh.nodes[mesh.cells], dN_dxi)
+    return np.einsum("qaj,cqji->cqai", dN_dxi, np.linalg.inv(jacobian)), np.linalg.det(jacobian)
 
 
 def wall_axes(mesh: Mesh, depth: Floats, xi: Floats) -> Floats:
@@ -111,24 +107,24 @@ def wall_axes(mesh: Mesh, depth: Floats, xi: Floats) -> Floats:
     ndarray of shape (n_cells, n_points, 3, 3)
         Rows R (gradient of the depth), C = L x R and L (the long axis made orthogonal to R).
     """
-    return axes_about(_growth(mesh, depth, gradients(mesh, xi)[0]))
+    return axes_from_normal(_gradient(mesh, depth, material_gradients(mesh, xi)[0]))
 
 
-def _growth(mesh: Mesh, values: Floats, slope: Floats) -> Floats:
-    """Gradient of nodal values where the shape functions have the gradients (n_cells, n_points, 10, 3)."""
-    growth = np.einsum("cqai,ca->cqi", slope, values[mesh.cells])
-    size = np.linalg.norm(growth, axis=-1)
-    flat = size < 1e-6 * np.median(size)
+def _gradient(mesh: Mesh, values: Floats, dN_dX: Floats) -> Floats:
+    """Gradient (n_cells, n_points, 3) of nodal values."""
+    gradient = np.einsum("cqai,ca->cqi", dN_dX, values[mesh.cells])
+    norm = np.linalg.norm(gradient, axis=-1)
+    flat = norm < 1e-6 * np.median(norm)
     if flat.any():
         # A cell with all its nodes on one side of the wall has no gradient: that of its neighbours stands in.
-        share = np.repeat(growth.mean(axis=1), 10, axis=0)
+        of_cell = np.repeat(gradient.mean(axis=1), 10, axis=0)
         nodes = mesh.cells.ravel()
-        near = np.stack([np.bincount(nodes, part, len(mesh.nodes)) for part in share.T], axis=-1)
-        growth[flat] = near[mesh.cells].mean(axis=1)[np.nonzero(flat)[0]]
-    return growth
+        of_node = np.stack([np.bincount(nodes, part, len(mesh.nodes)) for part in of_cell.T], axis=-1)
+        gradient[flat] = of_node[mesh.cells].mean(axis=1)[np.nonzero(flat)[0]]
+    return gradient
 
 
-def axes_about(normal: Floats) -> Floats:
+def axes_from_normal(normal: Floats) -> Floats:
     """Axes of a wall with a given normal.
 
     Parameters
@@ -143,23 +139,23 @@ def axes_about(normal: Floats) -> Floats:
         Rows R, C and L.
     """
     x, y, z = np.eye(3)
-    radial = unit(_or(normal, x))
+    radial = unit(_unless_zero(normal, x))
     # C is orthogonal to the long axis, so that L lies in the plane of R and z.
-    circumferential = unit(_or(np.cross(z, radial), y))
+    circumferential = unit(_unless_zero(np.cross(z, radial), y))
     return np.stack([radial, circumferential, np.cross(radial, circumferential)], axis=-2)
 
 
-def _or(vector: Floats, other: Floats) -> Floats:
-    """Vectors of shape (..., 3), or another one in place of those of length zero."""
-    return np.where(np.linalg.norm(vector, axis=-1, keepdims=True) == 0, other, vector)
+def _unless_zero(vector: Floats, substitute: Floats) -> Floats:
+    """Vectors of shape (..., 3), with a substitute for those of length zero."""
+    return np.where(np.linalg.norm(vector, axis=-1, keepdims=True) == 0, substitute, vector)
 
 
 def unit(vector: Floats) -> Floats:
-    """Vectors of length one along vectors of shape (..., 3)."""
+    """Vectors of shape (..., 3) divided by their lengths."""
     return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
 
 
-def angles_at(fibres: Fibres, depth: Floats) -> tuple[Floats, Floats, Floats]:
+def rule_angles(fibres: Fibres, depth: Floats) -> tuple[Floats, Floats, Floats]:
     """Angles of the rule at a wall depth.
 
     Parameters
@@ -170,7 +166,7 @@ def angles_at(fibres: Fibres, depth: Floats) -> tuple[Floats, Floats, Floats]:
     Returns
     -------
     helix, transverse, sheet : ndarray of that shape, rad
-        Linear in the depth; with `stepwise`, those of the middle of the layer.
+        endo + (epi - endo) depth; with `stepwise`, with the depth of the middle of the layer.
     """
     si = fibres.si()
     at = (layer(depth, fibres.layers) - 0.5) / fibres.layers if fibres.stepwise else depth
@@ -195,7 +191,7 @@ def fibre_frames(mesh: Mesh, depth: Floats, fibres: Fibres, xi: Floats, seed: in
     xi : ndarray of shape (n_points, 3)
         Local coordinates, the same in every tetrahedron.
     seed : int, optional
-        Start of the random draws of the disarray.
+        Of the random angles of the disarray.
 
     Returns
     -------
@@ -205,44 +201,45 @@ def fibre_frames(mesh: Mesh, depth: Floats, fibres: Fibres, xi: Floats, seed: in
     Raises
     ------
     FibreError
-        If the directions are to come with the mesh and do not.
+        If the directions are to come from the mesh file and it lacks them.
     """
     axes = wall_axes(mesh, depth, xi)
     if fibres.source == "file":
-        frames = np.repeat(_given(mesh, wall_axes(mesh, depth, CENTROID)[:, 0, 0])[:, None], len(xi), axis=1)
+        of_cell = _frames_of_file(mesh, wall_axes(mesh, depth, CENTROID)[:, 0, 0])
+        frames = np.repeat(of_cell[:, None], len(xi), axis=1)
     else:
-        frames = angles.frames(axes, *angles_at(fibres, at_points(mesh, depth, xi)))
-    settings = fibres.si()
-    if settings.disarray:
-        places = np.einsum("qa,cai->cqi", shape(xi), mesh.nodes[mesh.cells])
-        turn = settings.disarray * disarray.field(places, settings.disarray_length, seed)
-        frames = disarray.turned(frames, axes[..., 0, :], turn)
+        frames = angles.frames_from_angles(axes, *rule_angles(fibres, interpolate_in_cells(mesh, depth, xi)))
+    si = fibres.si()
+    if si.disarray:
+        positions = np.einsum("qa,cai->cqi", shape(xi), mesh.nodes[mesh.cells])
+        angle = si.disarray * disarray.random_field(positions, si.disarray_length, seed)
+        frames = disarray.rotate(frames, axes[..., 0, :], angle)
     return frames
 
 
-def _given(mesh: Mesh, normal: Floats) -> Floats:
-    """Frames (n_cells, 3, 3) of the directions that came with the mesh; without sheets, they lie in the wall."""
+def _frames_of_file(mesh: Mesh, normal: Floats) -> Floats:
+    """Frames (n_cells, 3, 3) of the directions of the mesh file; without sheets, they lie in the wall."""
     if mesh.fibre is None:
-        remedy = "name them in the file, or set fibres.source to rule"
-        raise FibreError(f"fibres.source = file: the mesh carries no fibre directions: {remedy}.")
-    fibre = mesh.fibre / _length(mesh.fibre, "fibre direction")
+        remedy = "name them with geometry.fibre, or set fibres.source to rule"
+        raise FibreError(f"fibres.source = file: the mesh has no fibre directions: {remedy}.")
+    fibre = mesh.fibre / _nonzero_lengths(mesh.fibre, "fibre direction")
     sheet = np.cross(normal, fibre) if mesh.sheet is None else mesh.sheet
-    across = sheet - np.sum(sheet * fibre, axis=-1, keepdims=True) * fibre
-    across /= _length(across, "sheet direction across its fibre")
-    # The third axis is made, not read: a left-handed frame turns the sign of det F.
-    return np.stack([fibre, across, np.cross(fibre, across)], axis=-2)
+    orthogonal = sheet - np.sum(sheet * fibre, axis=-1, keepdims=True) * fibre
+    orthogonal /= _nonzero_lengths(orthogonal, "sheet direction across the fibre")
+    # The third axis is computed, not read: a left-handed frame turns the sign of det F.
+    return np.stack([fibre, orthogonal, np.cross(fibre, orthogonal)], axis=-2)
 
 
-def _length(vectors: Floats, name: str) -> Floats:
-    """Lengths (n_cells, 1) of the vectors of the cells, all of which must have one."""
+def _nonzero_lengths(vectors: Floats, name: str) -> Floats:
+    """Lengths (n_cells, 1) of the vectors of the cells, none of which may be zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    lost = np.count_nonzero(~(length > 1e-6))
-    if lost:
-        remedy = "mend the file, or set fibres.source to rule"
-        raise FibreError(f"fibres.source = file: {lost} of {len(vectors)} cells have no {name}: {remedy}.")
+    missing = np.count_nonzero(~(length > 1e-6))
+    if missing:
+        remedy = "repair the file, or set fibres.source to rule"
+        raise FibreError(f"fibres.source = file: {missing} of {len(vectors)} cells have no {name}: {remedy}.")
     return length
 
 
-def at_points(mesh: Mesh, values: Floats, xi: Floats) -> Floats:
+def interpolate_in_cells(mesh: Mesh, values: Floats, xi: Floats) -> Floats:
     """Nodal values, shape (n_nodes,), at local coordinates (n_points, 3) of each cell: (n_cells, n_points)."""
     return np.einsum("qa,ca->cq", shape(xi), values[mesh.cells])

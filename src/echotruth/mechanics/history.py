@@ -1,4 +1,4 @@
-"""The history of a wall: all that is kept of it and of how it moved."""
+"""The output arrays of a heart: geometry, fibres, pathology, mechanics and kinematics."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.aha import segment
-from echotruth.config import Config, Fibres
+from echotruth.config import Config
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats, Mesh, shape
 from echotruth.mechanics import angles, fibres, kinematics
@@ -15,14 +15,14 @@ from echotruth.mechanics.solver.wall import Wall
 Arrays = dict[str, NDArray]
 
 
-def history(config: Config, heart: Wall, mechanics: Arrays) -> dict[str, Arrays]:
-    """Arrays of a heart from its wall and its course.
+def collect_outputs(config: Config, wall: Wall, mechanics: Arrays) -> dict[str, Arrays]:
+    """Collect the output arrays of a heart from its wall and its motion.
 
     Parameters
     ----------
     config : Config
         Of which the seed and the section fibres are used.
-    heart : Wall
+    wall : Wall
         Unloaded.
     mechanics : dict of ndarray
         The group `mechanics`; its `displacement` (frame, n_nodes, 3), m, is from unloaded.
@@ -36,27 +36,35 @@ def history(config: Config, heart: Wall, mechanics: Arrays) -> dict[str, Arrays]
     Raises
     ------
     FibreError
-        If the fibres are to come with the mesh and do not.
+        If the fibres are to come from the mesh file and it lacks them.
     """
-    mesh, depth = heart.mesh, heart.depth
+    mesh, depth = wall.mesh, wall.depth
+    axes = fibres.wall_axes(mesh, depth, fibres.CENTROID)[:, 0]
+    frames = fibres.fibre_frames(mesh, depth, config.fibres, fibres.CENTROID, config.seed)[:, 0]
+    displacement = mechanics["displacement"]
+    smallest, mean = kinematics.volume_ratios(mesh, displacement)
+    strains = kinematics.centroid_strains(mesh, displacement, axes, frames)
     return {
         "geometry": {
             "node_position": mesh.nodes,
             "cell_node": mesh.cells,
             **{side: getattr(mesh, side) for side in ("endo", "epi", "base")},
         },
-        "fibres": _architecture(mesh, depth, config.fibres, config.seed),
-        "pathology": dict(vars(heart.tissue)),
+        "fibres": _fibre_arrays(mesh, depth, axes, frames, config.fibres.layers),
+        "pathology": dict(vars(wall.tissue)),
         "mechanics": mechanics,
-        "kinematics": _kinematics(mesh, mechanics["displacement"], depth, config),
+        "kinematics": {
+            **{name: values.astype(np.float32) for name, values in strains.items()},
+            **_wall_strain_statistics(mesh, displacement, depth, config.fibres.layers),
+            "volume_ratio_min": smallest,
+            "volume_ratio_mean": mean,
+        },
     }
 
 
-def _architecture(mesh: Mesh, depth: Floats, section: Fibres, seed: int) -> Arrays:
-    axes = fibres.wall_axes(mesh, depth, fibres.CENTROID)[:, 0]
-    frames = fibres.fibre_frames(mesh, depth, section, fibres.CENTROID, seed)[:, 0]
-    helix, transverse, sheet = angles.read(frames, axes)
-    centre = shape(fibres.CENTROID)[0] @ mesh.nodes[mesh.cells]
+def _fibre_arrays(mesh: Mesh, depth: Floats, axes: Floats, frames: Floats, layers: int) -> Arrays:
+    helix, transverse, sheet = angles.angles_from_frames(frames, axes)
+    centroid = shape(fibres.CENTROID)[0] @ mesh.nodes[mesh.cells]
     return {
         "wall_depth": depth,
         "fibre": frames[:, 0],
@@ -64,31 +72,18 @@ def _architecture(mesh: Mesh, depth: Floats, section: Fibres, seed: int) -> Arra
         "helix_angle": helix,
         "transverse_angle": transverse,
         "sheet_angle": sheet,
-        "layer": fibres.layer(fibres.at_points(mesh, depth, fibres.CENTROID)[:, 0], section.layers).astype(np.uint8),
-        "segment": segment(centre, mesh.nodes[mesh.endo, 2].min()),
+        "layer": fibres.layer(fibres.interpolate_in_cells(mesh, depth, fibres.CENTROID)[:, 0], layers).astype(np.uint8),
+        "segment": segment(centroid, mesh.nodes[mesh.endo, 2].min()),
     }
 
 
-def _kinematics(mesh: Mesh, displacement: Floats, depth: Floats, config: Config) -> Arrays:
-    axes = fibres.wall_axes(mesh, depth, fibres.CENTROID)[:, 0]
-    frames = fibres.fibre_frames(mesh, depth, config.fibres, fibres.CENTROID, config.seed)[:, 0]
-    motion = kinematics.motion(mesh, displacement, axes, frames)
-    smallest, ratio = kinematics.volume_ratios(mesh, displacement)
-    return {
-        **{name: values.astype(np.float32) for name, values in motion.items()},
-        **_wall_strain(mesh, displacement, depth, config.fibres.layers),
-        "volume_ratio_min": smallest,
-        "volume_ratio_mean": ratio,
-    }
-
-
-def _wall_strain(mesh: Mesh, displacement: Floats, depth: Floats, layers: int) -> Arrays:
-    """Statistics over the quadrature points: a layer may be thinner than a cell and hold no centroid."""
+def _wall_strain_statistics(mesh: Mesh, displacement: Floats, depth: Floats, layers: int) -> Arrays:
+    """Statistics over the quadrature points, for a layer may be thinner than a cell and hold no centroid."""
     xi, weight = tetrahedron()
-    volume = (fibres.gradients(mesh, xi)[1] * weight).ravel()
+    volume = (fibres.material_gradients(mesh, xi)[1] * weight).ravel()
     strains = kinematics.wall_strain(mesh, displacement, fibres.wall_axes(mesh, depth, xi))
-    strains = strains.reshape(len(displacement), -1, len(kinematics.RCL))
-    mean, sd = kinematics.weighted(strains, volume)
-    layer = fibres.layer(fibres.at_points(mesh, depth, xi), layers).ravel()
+    strains = strains.reshape(len(displacement), -1, len(kinematics.RCL_COMPONENTS))
+    mean, sd = kinematics.weighted_mean_sd(strains, volume)
+    layer = fibres.layer(fibres.interpolate_in_cells(mesh, depth, xi), layers).ravel()
     by_layer = kinematics.layer_strain(strains, volume, layer, layers)
     return {"strain_mean": mean, "strain_sd": sd, "layer_strain": by_layer}

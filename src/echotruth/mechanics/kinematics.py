@@ -1,7 +1,6 @@
-"""Deformation and strain of the wall.
+"""Deformation and Green-Lagrange strain of the wall, in wall or fibre axes.
 
-Strains are Green-Lagrange, in the axes of the wall or of the fibre, relative to the
-unloaded state or to end-diastole (F_rel = F F_ED^-1, along axes carried to ED).
+Strains are relative to the unloaded state or to end-diastole (F_rel = F F_ED^-1, along the axes deformed to ED).
 """
 
 from __future__ import annotations
@@ -13,21 +12,21 @@ from numpy.typing import NDArray
 
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats, Mesh
-from echotruth.mechanics.fibres import CENTROID, axes_about, gradients, unit
+from echotruth.mechanics.fibres import CENTROID, axes_from_normal, material_gradients, unit
 from echotruth.mechanics.solver import element
 
-RCL = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+RCL_COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Components RR, CC, LL, RC, RL, CL."""
 
-FIBRE = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (2, 1))
+FIBRE_COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (2, 1))
 """Components ff, ss, nn, fs, fn, sn of axes in the order f, s, n."""
 
-IMAGE = ((0, 0), (1, 1), (0, 1))
+IMAGE_COMPONENTS = ((0, 0), (1, 1), (0, 1))
 """Components RR, TT, RT of axes in the order radial, tangential."""
 
 
 def deformation_gradient(mesh: Mesh, displacement: Floats, xi: Floats = CENTROID) -> Floats:
-    """F from the unloaded state.
+    """Deformation gradient F = I + du/dX from the unloaded state.
 
     Parameters
     ----------
@@ -40,12 +39,12 @@ def deformation_gradient(mesh: Mesh, displacement: Floats, xi: Floats = CENTROID
     -------
     ndarray of shape (..., n_cells, n_points, 3, 3)
     """
-    slope, _ = gradients(mesh, xi)
-    return np.eye(3) + np.einsum("...cai,cqaj->...cqij", displacement[..., mesh.cells, :], slope)
+    dN_dX, _ = material_gradients(mesh, xi)
+    return np.eye(3) + np.einsum("...cai,cqaj->...cqij", displacement[..., mesh.cells, :], dN_dX)
 
 
-def carried_axes(axes: Floats, gradient: Floats) -> Floats:
-    """Wall axes carried along.
+def deformed_wall_axes(axes: Floats, gradient: Floats) -> Floats:
+    """Wall axes of the deformed wall.
 
     Parameters
     ----------
@@ -57,11 +56,11 @@ def carried_axes(axes: Floats, gradient: Floats) -> Floats:
     ndarray of shape (..., 3, 3)
         R along F^-T R, the normal of the deformed surfaces of equal depth; C and L as in the unloaded wall.
     """
-    return axes_about(np.einsum("...ji,...j->...i", np.linalg.inv(gradient), axes[..., 0, :]))
+    return axes_from_normal(np.einsum("...ji,...j->...i", np.linalg.inv(gradient), axes[..., 0, :]))
 
 
-def carried_fibres(frames: Floats, gradient: Floats) -> Floats:
-    """Fibre axes carried along.
+def deformed_fibre_frames(frames: Floats, gradient: Floats) -> Floats:
+    """Fibre axes of the deformed wall.
 
     Parameters
     ----------
@@ -91,11 +90,11 @@ def strain(gradient: Floats, axes: Floats, components: tuple[tuple[int, int], ..
     -------
     ndarray of shape (..., len(components))
     """
-    # Component by component: on matrices this small, Numpy's loops over the points are the faster ones.
-    f, a = (np.ascontiguousarray(np.moveaxis(each, (-2, -1), (0, 1))) for each in (gradient, axes))
-    size = range(len(a))
-    along = [[sum(f[k, j] * a[i, j] for j in size) for k in size] for i in size]
-    return np.stack([(sum(along[i][k] * along[j][k] for k in size) - (i == j)) / 2 for i, j in components], axis=-1)
+    # Component by component: on matrices this small, NumPy's loops over the points are faster.
+    f, a = (np.ascontiguousarray(np.moveaxis(array, (-2, -1), (0, 1))) for array in (gradient, axes))
+    dims = range(len(a))
+    f_a = [[sum(f[k, j] * a[i, j] for j in dims) for k in dims] for i in dims]
+    return np.stack([(sum(f_a[i][k] * f_a[j][k] for k in dims) - (i == j)) / 2 for i, j in components], axis=-1)
 
 
 def wall_strain(mesh: Mesh, displacement: Floats, axes: Floats) -> Floats:
@@ -106,24 +105,24 @@ def wall_strain(mesh: Mesh, displacement: Floats, axes: Floats) -> Floats:
     mesh : Mesh
     displacement : ndarray of shape (n_frames, n_nodes, 3), m
     axes : ndarray of shape (n_cells, n_points, 3, 3)
-        Rows R, C, L of the unloaded wall; the strain is along these, carried to ED.
+        Rows R, C, L of the unloaded wall; the strain is along these, deformed to ED.
 
     Returns
     -------
     ndarray of shape (n_frames, n_cells, n_points, 6)
         RR, CC, LL, RC, RL, CL.
     """
-    carried = carried_axes(axes, deformation_gradient(mesh, displacement[0], tetrahedron()[0]))
-    # The wall at ED takes the place of the unloaded one: F F_ED^-1 is the gradient by its positions.
-    wall = element.elements(replace(mesh, nodes=mesh.nodes + displacement[0]), carried)
-    stretch = np.empty((len(displacement), *wall.weight.shape, 6))
-    for moved, c in zip(displacement, stretch, strict=True):
-        element.stretch(mesh.nodes + moved, wall, c)
-    return (stretch - [1, 1, 1, 0, 0, 0]) / 2
+    at_ed = deformed_wall_axes(axes, deformation_gradient(mesh, displacement[0], tetrahedron()[0]))
+    # With the wall at ED in place of the unloaded one, the gradient by its positions is F F_ED^-1.
+    wall = element.build_elements(replace(mesh, nodes=mesh.nodes + displacement[0]), at_ed)
+    c = np.empty((len(displacement), *wall.weight.shape, 6))
+    for u, c_of_frame in zip(displacement, c, strict=True):
+        element.right_cauchy_green(mesh.nodes + u, wall, c_of_frame)
+    return (c - [1, 1, 1, 0, 0, 0]) / 2
 
 
 def volume_ratios(mesh: Mesh, displacement: Floats) -> tuple[Floats, Floats]:
-    """J at the quadrature points.
+    """Volume ratio J = det F at the quadrature points.
 
     Parameters
     ----------
@@ -135,34 +134,34 @@ def volume_ratios(mesh: Mesh, displacement: Floats) -> tuple[Floats, Floats]:
     smallest, mean : ndarray of shape (n_frames,)
         The mean is weighted by unloaded volume.
     """
-    wall = element.elements(mesh)
+    wall = element.build_elements(mesh)
     volume, c = wall.weight, np.empty((*wall.weight.shape, 6))
     ratio = np.empty((2, len(displacement)))
-    for frame, moved in enumerate(displacement):
-        j = element.stretch(mesh.nodes + moved, wall, c)
+    for frame, u in enumerate(displacement):
+        j = element.right_cauchy_green(mesh.nodes + u, wall, c)
         ratio[:, frame] = j.min(), np.sum(j * volume) / np.sum(volume)
     return ratio[0], ratio[1]
 
 
-def weighted(values: Floats, weight: Floats) -> tuple[Floats, Floats]:
+def weighted_mean_sd(values: Floats, weight: Floats) -> tuple[Floats, Floats]:
     """Mean and standard deviation over cells.
 
     Parameters
     ----------
     values : ndarray of shape (n_frames, n_cells, n_components)
     weight : ndarray of shape (n_cells,)
-        Their volumes.
+        Volumes of the cells.
 
     Returns
     -------
     mean, sd : ndarray of shape (n_frames, n_components)
     """
-    share = weight / np.sum(weight)
-    mean = np.einsum("fci,c->fi", values, share)
-    return mean, np.sqrt(np.einsum("fci,c->fi", (values - mean[:, None]) ** 2, share))
+    weight = weight / np.sum(weight)
+    mean = np.einsum("fci,c->fi", values, weight)
+    return mean, np.sqrt(np.einsum("fci,c->fi", (values - mean[:, None]) ** 2, weight))
 
 
-def motion(mesh: Mesh, displacement: Floats, axes: Floats, frames: Floats) -> dict[str, NDArray]:
+def centroid_strains(mesh: Mesh, displacement: Floats, axes: Floats, frames: Floats) -> dict[str, NDArray]:
     """Deformation and strain at the centroids, relative to the unloaded state and to ED (frame 0).
 
     Parameters
@@ -183,10 +182,10 @@ def motion(mesh: Mesh, displacement: Floats, axes: Floats, frames: Floats) -> di
     relative = gradient @ np.linalg.inv(gradient[0])
     return {
         "deformation_gradient": gradient,
-        "strain_unloaded": strain(gradient, axes, RCL),
-        "strain": strain(relative, carried_axes(axes, gradient[0]), RCL),
-        "fibre_strain_unloaded": strain(gradient, frames, FIBRE),
-        "fibre_strain": strain(relative, carried_fibres(frames, gradient[0]), FIBRE),
+        "strain_unloaded": strain(gradient, axes, RCL_COMPONENTS),
+        "strain": strain(relative, deformed_wall_axes(axes, gradient[0]), RCL_COMPONENTS),
+        "fibre_strain_unloaded": strain(gradient, frames, FIBRE_COMPONENTS),
+        "fibre_strain": strain(relative, deformed_fibre_frames(frames, gradient[0]), FIBRE_COMPONENTS),
     }
 
 
@@ -208,6 +207,6 @@ def layer_strain(strains: Floats, weight: Floats, layer: NDArray[np.integer], la
     """
     means = np.full((len(strains), layers, strains.shape[-1]), np.nan)
     for number in np.unique(layer):
-        share = np.where(layer == number, weight, 0.0)
-        means[:, number - 1] = np.einsum("fci,c->fi", strains, share / np.sum(share))
+        in_layer = np.where(layer == number, weight, 0.0)
+        means[:, number - 1] = np.einsum("fci,c->fi", strains, in_layer / np.sum(in_layer))
     return means

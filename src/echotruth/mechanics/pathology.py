@@ -1,4 +1,4 @@
-"""Regional disease: how stiff, how strong and how late each cell of the wall is."""
+"""Regional pathology: stiffness, active tension and activation delay of every cell of the wall."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, MaterialPoints, Mesh, interpolate, shape
 
 HEALTHY, INFARCT, BORDER, LATE = range(4)
-"""Regions; where two hold, an infarct goes before its border zone and that before late activation."""
+"""Regions; where two overlap, an infarct goes before its border zone and that before late activation."""
 
-LATENESS = {
+ACTIVATION_DELAY = {
     "lbbb": dict.fromkeys((1, 4, 7, 10, 13, 15, 17), 4e-3) | dict.fromkeys((5, 6, 11, 12, 16), 8e-3),
 }
 """AHA segment to delay, s, of each preset.
@@ -28,19 +28,19 @@ Circulation 109 (2004) 1133). The delays are those of a wave that goes along the
 are a third away and the lateral ones two thirds.
 """
 
-_LATTICE = np.array([(i, j, k) for i in range(5) for j in range(5 - i) for k in range(5 - i - j)]) / 4
+_SAMPLES = np.array([(i, j, k) for i in range(5) for j in range(5 - i) for k in range(5 - i - j)]) / 4
 """Local coordinates at which a cell is sampled: corners, quarters of edges, ..., and the centroid."""
 
-_CENTROID = int(np.flatnonzero((_LATTICE == 0.25).all(axis=1))[0])
+_CENTROID = int(np.flatnonzero((_SAMPLES == 0.25).all(axis=1))[0])
 
 
 class PathologyError(ValueError):
-    """A disease that is nowhere in the heart."""
+    """A pathology that no cell of the heart has."""
 
 
 @dataclass(frozen=True)
 class Tissue:
-    """What the cells are like.
+    """Material properties of the cells.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Tissue:
 
 
 def tissue(mesh: Mesh, depth: Floats, pathology: Pathology) -> Tissue:
-    """The cells of a heart, by the place of their centroids.
+    """Properties of the cells of a heart, by the position of their centroids.
 
     Parameters
     ----------
@@ -78,48 +78,48 @@ def tissue(mesh: Mesh, depth: Floats, pathology: Pathology) -> Tissue:
         If no cell has its centroid in the infarct.
     """
     infarct = pathology.infarct
-    centre = shape(_LATTICE)[_CENTROID] @ mesh.nodes[mesh.cells]
-    delay = _delay(segment(centre, _apex(mesh)), pathology.late_activation)
-    share = _share(mesh, depth, infarct)
+    centroid = shape(_SAMPLES)[_CENTROID] @ mesh.nodes[mesh.cells]
+    delay = _delay(segment(centroid, _apex(mesh)), pathology.late_activation)
+    weight = _infarct_weight(mesh, depth, infarct)
     region = np.where(delay > 0, LATE, HEALTHY)
-    region = np.select([share == 1, share > 0], [INFARCT, BORDER], region).astype(np.uint8)
-    stiffness, tension = (1 + (scale - 1) * share for scale in (infarct.stiffness_scale, infarct.tension_scale))
+    region = np.select([weight == 1, weight > 0], [INFARCT, BORDER], region).astype(np.uint8)
+    stiffness, tension = (1 + (scale - 1) * weight for scale in (infarct.stiffness_scale, infarct.tension_scale))
     return Tissue(region, stiffness, tension, delay)
 
 
 def _delay(segments: NDArray[np.uint8], late: LateActivation) -> Floats:
-    """Delay of cells of given segments, s."""
-    delays = LATENESS[late.preset] if late.preset else late.si().delay
+    """Activation delay, s, of cells in the segments (n_cells,)."""
+    delays = ACTIVATION_DELAY[late.preset] if late.preset else late.si().delay
     return late.scale * np.array([delays.get(number, 0.0) for number in range(18)])[segments]
 
 
-def _share(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
-    """Share of the infarct in each cell: 1 in it, falling linearly to 0 through the border zone (Lee 2011)."""
+def _infarct_weight(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
+    """Weight (n_cells,) of the infarct: 1 in it, falling linearly to 0 through the border zone (Lee 2011)."""
     if infarct.segments is None and infarct.radius_mm is None:
         return np.zeros(len(mesh.cells))
-    weights, border = shape(_LATTICE), infarct.si().border
-    places = weights @ mesh.nodes[mesh.cells]
-    deep = np.clip(depth[mesh.cells] @ weights.T, 0, 1) > infarct.transmurality
-    core = _in_place(mesh, depth, infarct, places) & ~deep
-    inside = core[:, _CENTROID]
-    if not inside.any():
-        raise PathologyError(_nowhere(infarct))
+    values, border = shape(_SAMPLES), infarct.si().border
+    positions = values @ mesh.nodes[mesh.cells]
+    too_deep = np.clip(depth[mesh.cells] @ values.T, 0, 1) > infarct.transmurality
+    infarcted = _in_region(mesh, depth, infarct, positions) & ~too_deep
+    core = infarcted[:, _CENTROID]
+    if not core.any():
+        raise PathologyError(_no_cell(infarct))
     if border == 0:
-        return inside.astype(float)
+        return core.astype(float)
     # The nearest of samples a quarter of an edge apart: the distance in a straight line, be it through the cavity.
-    distance, _ = KDTree(places[core]).query(places[:, _CENTROID], distance_upper_bound=border)
-    return np.where(inside, 1.0, np.clip(1 - distance / border, 0, 1))
+    distance, _ = KDTree(positions[infarcted]).query(positions[:, _CENTROID], distance_upper_bound=border)
+    return np.where(core, 1.0, np.clip(1 - distance / border, 0, 1))
 
 
-def _in_place(mesh: Mesh, depth: Floats, infarct: Infarct, places: Floats) -> NDArray[np.bool_]:
-    """Whether places, shape (..., 3), m, are in the segments or the ball, at any depth."""
+def _in_region(mesh: Mesh, depth: Floats, infarct: Infarct, positions: Floats) -> NDArray[np.bool_]:
+    """Whether positions (..., 3), m, are in the segments or the ball of the infarct, at any depth."""
     if infarct.segments is not None:
-        return np.isin(segment(places, _apex(mesh)), infarct.segments)
-    return np.linalg.norm(places - centre_of_ball(mesh, depth, infarct), axis=-1) <= infarct.si().radius
+        return np.isin(segment(positions, _apex(mesh)), infarct.segments)
+    return np.linalg.norm(positions - infarct_centre(mesh, depth, infarct), axis=-1) <= infarct.si().radius
 
 
-def centre_of_ball(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
-    """The middle of the wall in a direction from the long axis.
+def infarct_centre(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
+    """Centre of the ball of an infarct: the middle of the wall in a direction from the long axis.
 
     Parameters
     ----------
@@ -139,15 +139,15 @@ def centre_of_ball(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
         If there is no wall in that direction.
     """
     azimuth = infarct.si().azimuth
-    reach = np.linspace(0, np.hypot(*mesh.nodes[:, :2].T).max(), 2001)
-    height = np.full(len(reach), infarct.position * _apex(mesh))
-    ray = np.column_stack([reach * np.cos(azimuth), reach * np.sin(azimuth), height])
+    radius = np.linspace(0, np.hypot(*mesh.nodes[:, :2].T).max(), 2001)
+    height = np.full(len(radius), infarct.position * _apex(mesh))
+    ray = np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height])
     points = locate(mesh.nodes, mesh.cells, ray)
-    hit = points.cell >= 0
-    if not hit.any():
-        raise PathologyError(_nowhere(infarct))
-    found = interpolate(depth, mesh.cells, MaterialPoints(points.cell[hit], points.xi[hit]))
-    return ray[hit][np.argmin(np.abs(found - 0.5))]
+    in_wall = points.cell >= 0
+    if not in_wall.any():
+        raise PathologyError(_no_cell(infarct))
+    depths = interpolate(depth, mesh.cells, MaterialPoints(points.cell[in_wall], points.xi[in_wall]))
+    return ray[in_wall][np.argmin(np.abs(depths - 0.5))]
 
 
 def _apex(mesh: Mesh) -> float:
@@ -155,10 +155,12 @@ def _apex(mesh: Mesh) -> float:
     return float(mesh.nodes[mesh.endo, 2].min())
 
 
-def _nowhere(infarct: Infarct) -> str:
+def _no_cell(infarct: Infarct) -> str:
+    """Why the infarct is refused, and the remedy."""
     if infarct.segments is not None:
-        asked, remedy = f"segments = {infarct.segments}", "name segments that the mesh has, or raise transmurality"
+        region, remedy = f"segments = {infarct.segments}", "name segments that the mesh has, or raise transmurality"
     else:
-        place = f"radius_mm = {infarct.radius_mm} at position {infarct.position} and azimuth_deg {infarct.azimuth_deg}"
-        asked, remedy = place, "raise it, refine the mesh, or move the ball to where there is wall"
-    return f"pathology.infarct.{asked}: no cell has its centroid in it: {remedy}."
+        where = f"at position {infarct.position} and azimuth_deg {infarct.azimuth_deg}"
+        region = f"radius_mm = {infarct.radius_mm} {where}"
+        remedy = "raise it, refine the mesh, or move the ball to where there is wall"
+    return f"pathology.infarct.{region}: no cell has its centroid in it: {remedy}."

@@ -1,4 +1,4 @@
-"""Whether a solved heart behaves like one: its measures, and the verdict on them."""
+"""Measures of a solved heart, and the bounds within which it is plausible."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from echotruth.config.physiology import Physiology
 
 Arrays = dict[str, NDArray]
 
-BASE, APEX = 0.2, 0.8
-"""Slices whose rotation makes the twist: share of the way from the base plane to the endocardial apex."""
+BASAL_SLICE, APICAL_SLICE = 0.2, 0.8
+"""Slices whose rotation makes the twist: distance from the base plane, over that of the endocardial apex."""
 _HALF_SLICE = 0.1
 
 CC, LL = 1, 2
-"""Places of the circumferential and the longitudinal among the components of strain."""
+"""Index of the circumferential and the longitudinal component of strain."""
 
 
 class Bound(NamedTuple):
-    """A bound and what it is said about.
+    """A bound on a measure.
 
     Attributes
     ----------
     key : str
-        Of the section `physiology`; it ends with what it is, `min` or `max`, and its unit.
+        Of the section `physiology`; it ends in `min` or `max`, and its unit.
     measure : str
-        Array of the group `physiology`; the value that is furthest out counts.
-    words : str
+        Array of the group `physiology`; the most extreme value counts.
+    description : str
     factor : float
         Measure in SI units to the unit of the key.
     """
 
     key: str
     measure: str
-    words: str
+    description: str
     factor: float = 1.0
 
 
@@ -52,11 +52,11 @@ BOUNDS = (
     Bound("tension_es_min_kPa", "tension_es", "the active tension at end-systole (kPa)", 1e-3),
     Bound("tension_es_max_kPa", "tension_es", "the active tension at end-systole (kPa)", 1e-3),
 )
-"""In the order in which they are looked at: first whether there is a solution, then whether it is a heart."""
+"""In the order in which they are checked: first whether there is a solution, then whether it is a heart."""
 
 
 def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays) -> Arrays:
-    """What is looked at in a solved heart.
+    """Measure a solved heart.
 
     Parameters
     ----------
@@ -67,8 +67,8 @@ def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays) -> Arrays:
     -------
     dict of ndarray
         The group `physiology`: `twist` (frame,) in rad, and numbers: strains at end-systole, ejection fraction,
-        smallest det F, largest relative error of the prescribed course, tensions in Pa. Of a heart that moves by a
-        formula ejection fraction and tensions are not a number, and there is no error.
+        smallest det F, largest relative error of the prescribed pressure and volume, tensions in Pa. For a prescribed
+        motion ejection fraction and tensions are not a number, and the error is 0.
     """
     es, volume = int(mechanics["es_frame"]), mechanics["volume"]
     strain, tension = kinematics["strain_mean"][es], mechanics["active_tension"]
@@ -79,7 +79,7 @@ def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays) -> Arrays:
         "circumferential_strain": strain[CC],
         "ejection_fraction": np.asarray(1 - volume.min() / volume[0]),
         "volume_ratio_min": kinematics["volume_ratio_min"].min(),
-        "loop_error": np.asarray(max(_error(mechanics, quantity) for quantity in ("pressure", "volume"))),
+        "loop_error": np.asarray(max(_largest_error(mechanics, quantity) for quantity in ("pressure", "volume"))),
         "tension_min": tension.min(),
         "tension_es": tension[es],
     }
@@ -101,13 +101,14 @@ def twist(unloaded: Floats, endo: NDArray[np.integer], positions: Floats) -> Flo
         Positive where the apex turns counter-clockwise seen from the apex, as it does in health
         (Young & Cowan 2012); between frames it may turn by less than half a turn.
     """
-    place = unloaded[:, 2] / unloaded[endo, 2].min()
-    apex, base = (rotation(positions[:, np.abs(place - slice) <= _HALF_SLICE, :2]) for slice in (APEX, BASE))
-    return base - apex  # the long axis points to the base: seen from the apex, turning about it is clockwise
+    height = unloaded[:, 2] / unloaded[endo, 2].min()
+    slices = (np.abs(height - centre) <= _HALF_SLICE for centre in (APICAL_SLICE, BASAL_SLICE))
+    apex, base = (slice_rotation(positions[:, nodes, :2]) for nodes in slices)
+    return base - apex  # the long axis points to the base: seen from the apex, rotation about it is clockwise
 
 
-def rotation(points: Floats) -> Floats:
-    """Turn of a slice about its centre since the first frame, the one that fits its points best.
+def slice_rotation(points: Floats) -> Floats:
+    """Least-squares rotation of a slice about its centroid since the first frame.
 
     Parameters
     ----------
@@ -116,41 +117,41 @@ def rotation(points: Floats) -> Floats:
     Returns
     -------
     ndarray of shape (n_frames,), rad
-        Counter-clockwise, and going on beyond half a turn.
+        Counter-clockwise, and continuous beyond half a turn.
     """
     arms = points - points.mean(axis=1, keepdims=True)
     first = arms[0]
-    along = np.sum(first * arms, axis=(1, 2))
-    across = np.sum(first[:, 0] * arms[..., 1] - first[:, 1] * arms[..., 0], axis=1)
-    return np.unwrap(np.arctan2(across, along))
+    dot = np.sum(first * arms, axis=(1, 2))
+    cross = np.sum(first[:, 0] * arms[..., 1] - first[:, 1] * arms[..., 0], axis=1)
+    return np.unwrap(np.arctan2(cross, dot))
 
 
-def verdict(found: dict[str, ArrayLike], bounds: Physiology) -> str:
-    """Why a heart is out of bounds, in one sentence; empty where it is within them.
+def violated_bound(measured: dict[str, ArrayLike], bounds: Physiology) -> str:
+    """The first bound that a heart violates, in one sentence; empty where there is none.
 
     Parameters
     ----------
-    found : dict of ndarray
-        As given by `measures`.
+    measured : dict of ndarray
+        As from `measures`.
     bounds : Physiology
     """
     for bound in BOUNDS:
-        limit, values = getattr(bounds, bound.key), bound.factor * np.atleast_1d(found[bound.measure])
+        limit, values = getattr(bounds, bound.key), bound.factor * np.atleast_1d(measured[bound.measure])
         if limit is None:
             continue
         if "_max" in bound.key:
             value = np.max(np.abs(values)) if bound.measure == "twist" else np.max(values)
-            beyond, rule = not value <= limit, "at most"
+            violated, rule = not value <= limit, "at most"
         else:
             value = np.min(values)
-            beyond, rule = not value >= limit, "at least"
-        if beyond:
-            return f"{bound.words} is {value:.3g} and must be {rule} {limit:g} (physiology.{bound.key})."
+            violated, rule = not value >= limit, "at least"
+        if violated:
+            return f"{bound.description} is {value:.3g} and must be {rule} {limit:g} (physiology.{bound.key})."
     return ""
 
 
-def _error(mechanics: Arrays, quantity: str) -> float:
-    """Largest relative difference of what was met from what was asked for; 0 where nothing was."""
-    met, asked = mechanics[quantity], mechanics[f"{quantity}_asked"]
-    given = np.isfinite(asked)
-    return float(np.max(np.abs(met[given] / asked[given] - 1), initial=0.0))
+def _largest_error(mechanics: Arrays, quantity: str) -> float:
+    """Largest relative error of a quantity where it has a target; 0 where it has none."""
+    solved, target = mechanics[quantity], mechanics[f"{quantity}_target"]
+    prescribed = np.isfinite(target)
+    return float(np.max(np.abs(solved[prescribed] / target[prescribed] - 1), initial=0.0))

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from echotruth.config import Config
-from echotruth.config.motion import Affine, Course, Cylinder, Rigid
+from echotruth.config.motion import Affine, Cylinder, Rigid, TimeCourse
 from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.heart import SHORT_AXIS
 from echotruth.loop.cycle import read_loop
 from echotruth.loop.phases import FILLING
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.geometry.tube import Tube, lengths
-from echotruth.mechanics.history import Arrays, history
+from echotruth.mechanics.geometry.tube import Tube, tube_dimensions
+from echotruth.mechanics.history import Arrays, collect_outputs
 from echotruth.mechanics.solver.wall import wall
 
 
@@ -20,7 +20,7 @@ class MotionError(ValueError):
     """A motion that cannot be imaged."""
 
 
-def prescribed(config: Config) -> dict[str, Arrays]:
+def prescribed_motion(config: Config) -> dict[str, Arrays]:
     """Move the heart of a configuration by its formula.
 
     Parameters
@@ -37,28 +37,27 @@ def prescribed(config: Config) -> dict[str, Arrays]:
     Raises
     ------
     GeometryError, FibreError, PathologyError, LoopError, MotionError
-        With one sentence, if there is no such heart, no such period, or the heart would move into the array.
+        With one sentence, if the heart or the period is invalid, or the heart would move into the array.
     """
     mesh = left_ventricle(config.geometry)
-    shares = course(config.motion.course, config.loop.frames)
-    displacement = np.stack([move(config, mesh, mesh.nodes, share) for share in shares])
-    _check_room(config, mesh, displacement)
-    none = np.full(len(shares), np.nan)
-    unknown = ("pressure", "volume", "pressure_asked", "volume_asked", "active_tension", "residual")
+    amplitude = motion_amplitude(config.motion.course, config.loop.frames)
+    displacement = np.stack([displacement_at(config, mesh, mesh.nodes, a) for a in amplitude])
+    _check_clearance(config, mesh, displacement)
+    undefined = ("pressure", "volume", "pressure_target", "volume_target", "active_tension", "residual")
     mechanics = {
         "time": read_loop(config.loop).time,
-        **dict.fromkeys(unknown, none),
+        **dict.fromkeys(undefined, np.full(len(amplitude), np.nan)),
         "displacement": displacement,
         "stiffness": np.array(np.nan),
-        "es_frame": np.array(np.argmax(shares)),
-        "phase": np.full(len(shares), FILLING, np.uint8),
-        "newton_steps": np.zeros(len(shares), np.int32),
+        "es_frame": np.array(np.argmax(amplitude)),
+        "phase": np.full(len(amplitude), FILLING, np.uint8),
+        "newton_steps": np.zeros(len(amplitude), np.int32),
     }
-    return history(config, wall(config, mesh), mechanics)
+    return collect_outputs(config, wall(config, mesh), mechanics)
 
 
-def course(name: Course, frames: int) -> Floats:
-    """Share of the whole motion in every frame.
+def motion_amplitude(name: TimeCourse, frames: int) -> Floats:
+    """Amplitude a of the motion in every frame, from 0 at rest to 1 for the whole motion.
 
     Parameters
     ----------
@@ -79,18 +78,18 @@ def course(name: Course, frames: int) -> Floats:
     return straight if name == "triangle" else np.sin(np.pi / 2 * straight) ** 2
 
 
-def move(config: Config, mesh: Mesh, places: Floats, share: float) -> Floats:
-    """Displacement of any places by the formula of a configuration.
+def displacement_at(config: Config, mesh: Mesh, positions: Floats, amplitude: float) -> Floats:
+    """Displacement of positions by the formula of a configuration.
 
     Parameters
     ----------
     config : Config
     mesh : Mesh
         The heart, of which the endocardial apex is used.
-    places : ndarray of shape (..., 3), m
+    positions : ndarray of shape (..., 3), m
         At end-diastole, in the heart frame.
-    share : float
-        Of the whole motion.
+    amplitude : float
+        Of the motion, a.
 
     Returns
     -------
@@ -98,33 +97,33 @@ def move(config: Config, mesh: Mesh, places: Floats, share: float) -> Floats:
     """
     motion = config.motion
     if motion.kind == "rigid":
-        return rigid(motion.rigid, places, share)
+        return rigid(motion.rigid, positions, amplitude)
     if motion.kind == "affine":
-        centre = np.array([0, 0, motion.affine.position * mesh.nodes[mesh.endo, 2].min()])
-        return affine(motion.affine, places - centre, share)
-    return cylinder(motion.cylinder, lengths(config.geometry), places, share)
+        fixed_point = np.array([0, 0, motion.affine.position * mesh.nodes[mesh.endo, 2].min()])
+        return affine(motion.affine, positions - fixed_point, amplitude)
+    return cylinder(motion.cylinder, tube_dimensions(config.geometry), positions, amplitude)
 
 
-def rigid(section: Rigid, places: Floats, share: float) -> Floats:
-    """Displacement (..., 3), m, of places (..., 3), m, by a share of a shift and of a turn about the long axis."""
+def rigid(section: Rigid, positions: Floats, amplitude: float) -> Floats:
+    """Displacement (Q(a turn) - I) x + a shift of positions x (..., 3), m, with a rotation Q about the long axis."""
     si = section.si()
     shift = np.array([si.lateral, si.axial, si.elevation]) @ SHORT_AXIS
-    # The long axis points to the base: seen from the apex, turning about it is clockwise.
-    return places @ (_turn(-share * si.turn) - np.eye(3)).T + share * shift
+    # The long axis points to the base: seen from the apex, rotation about it is clockwise.
+    return positions @ (_rotation_about_z(-amplitude * si.turn) - np.eye(3)).T + amplitude * shift
 
 
-def affine(section: Affine, arms: Floats, share: float) -> Floats:
-    """Displacement (..., 3), m, by F = I + share (A - I); arms (..., 3), m, are those from the place that stays."""
+def affine(section: Affine, offsets: Floats, amplitude: float) -> Floats:
+    """Displacement a (A - I) x of offsets x (..., 3), m, from the fixed point."""
     gradient = SHORT_AXIS.T @ np.array(section.gradient) @ SHORT_AXIS
-    return share * arms @ (gradient - np.eye(3)).T
+    return amplitude * offsets @ (gradient - np.eye(3)).T
 
 
-def cylinder(section: Cylinder, tube: Tube, places: Floats, share: float) -> Floats:
-    """Displacement of places in a tube that contracts, shortens and twists.
+def cylinder(section: Cylinder, tube: Tube, positions: Floats, amplitude: float) -> Floats:
+    """Displacement in a tube that contracts, shortens and twists.
 
     With capitals at end-diastole, r^2 = r_i^2 + (R^2 - R_i^2) / lambda, theta = Theta + gamma Z + omega(R) and
     z = lambda Z: inflation, extension and torsion of a tube that keeps its volume (Rivlin, Phil Trans R Soc Lond A 242
-    (1949) 173), and a turn of its shells against one another, which keeps it as well. In the directions R, C, L
+    (1949) 173), and a rotation of its shells against one another, which keeps it as well. In the directions R, C, L
 
         F = [[R / (lambda r), 0, 0], [r omega', r / R, r gamma], [0, 0, lambda]].
 
@@ -133,40 +132,40 @@ def cylinder(section: Cylinder, tube: Tube, places: Floats, share: float) -> Flo
     section : Cylinder
     tube : Tube
         At end-diastole, its base in z = 0.
-    places : ndarray of shape (..., 3), m
+    positions : ndarray of shape (..., 3), m
         Not on the axis.
-    share : float
-        Of the contraction, the shortening and both turns.
+    amplitude : float
+        Of the contraction, the shortening and both rotations.
 
     Returns
     -------
     ndarray of shape (..., 3), m
     """
-    si, (x, y, z) = section.si(), np.moveaxis(places, -1, 0)
-    inner, stretch = tube.inner * (1 - share * si.contraction), 1 - share * si.shortening
+    si, (x, y, z) = section.si(), np.moveaxis(positions, -1, 0)
+    inner, stretch = tube.inner * (1 - amplitude * si.contraction), 1 - amplitude * si.shortening
     square = x**2 + y**2
-    # r^2 as R^2 and what is added to it: nothing, to the last bit, where nothing moves.
-    added = inner**2 - tube.inner**2 + (square - tube.inner**2) * (1 / stretch - 1)
-    growth = np.sqrt(1 + added / square)
-    outside = (tube.outer - np.sqrt(square)) / (tube.outer - tube.inner)
-    turn = share * (si.torsion * z / tube.length - si.endo_turn * outside)
-    cos, sin = growth * np.cos(turn), growth * np.sin(turn)
+    # r^2 - R^2, so that r is R to the last bit where nothing moves.
+    difference = inner**2 - tube.inner**2 + (square - tube.inner**2) * (1 / stretch - 1)
+    r_over_R = np.sqrt(1 + difference / square)
+    from_outside = (tube.outer - np.sqrt(square)) / (tube.outer - tube.inner)
+    angle = amplitude * (si.torsion * z / tube.length - si.endo_turn * from_outside)
+    cos, sin = r_over_R * np.cos(angle), r_over_R * np.sin(angle)
     return np.stack([(cos - 1) * x - sin * y, sin * x + (cos - 1) * y, (stretch - 1) * z], axis=-1)
 
 
-def _turn(angle: float) -> Floats:
+def _rotation_about_z(angle: float) -> Floats:
     """Rotation about the long axis, (3, 3), counter-clockwise seen from the base."""
     cos, sin = np.cos(angle), np.sin(angle)
     return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
 
 
-def _check_room(config: Config, mesh: Mesh, displacement: Floats) -> None:
+def _check_clearance(config: Config, mesh: Mesh, displacement: Floats) -> None:
     """Refuse a motion that could bring the wall to an array, which stands at the distance of the focus in all views."""
     apex = mesh.nodes[mesh.endo, 2].min()
-    reach = max(np.hypot(*mesh.nodes[:, :2].T).max(), np.abs(mesh.nodes[:, 2] - apex / 2).max())
-    room, moved = config.rf.si().focus - reach, np.linalg.norm(displacement, axis=-1).max()
-    if moved >= room:
+    extent = max(np.hypot(*mesh.nodes[:, :2].T).max(), np.abs(mesh.nodes[:, 2] - apex / 2).max())
+    clearance, largest = config.rf.si().focus - extent, np.linalg.norm(displacement, axis=-1).max()
+    if largest >= clearance:
         raise MotionError(
-            f"motion.{config.motion.kind} moves the wall by up to {moved * 1e3:.3g} mm, and it is {room * 1e3:.3g} mm "
-            "from the array: make the motion smaller, or raise rf.focus_mm."
+            f"motion.{config.motion.kind} moves the wall by up to {largest * 1e3:.3g} mm, and it is "
+            f"{clearance * 1e3:.3g} mm from the array: make the motion smaller, or raise rf.focus_mm."
         )

@@ -1,1 +1,1 @@
-"""Figures of a repository: each module draws one, from plain arrays in SI units to a file."""
+"""Figures of a repository: each module draws one from arrays in SI units to a file."""

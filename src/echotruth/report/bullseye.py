@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -11,36 +12,36 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.patches import Wedge
 
-from echotruth.aha import RINGS
+from echotruth.aha import BULLSEYE
 from echotruth.report import style
 
 UM = 1e-6
 """m."""
 
-COLOURS = colormaps["RdBu_r"]
+COLOURMAP = colormaps["RdBu_r"]
 """Blue below zero, red above."""
 
 
 @style.styled
 def draw(path: str | Path, true: np.ndarray, tracked: np.ndarray, tracker: str) -> Path:
-    """Draw truth, estimate and their difference, the first two on one scale.
+    """Draw true and tracked displacement on one scale, and their difference.
 
     Parameters
     ----------
     path : str or Path
-        Picture to write.
+        File to write.
     true, tracked : ndarray of shape (17,)
-        Displacement at end-systole since end-diastole of segments 1..17, m; NaN where there is none.
+        Displacement of segments 1..17 from end-diastole to end-systole, m; NaN where unknown.
     tracker : str
-        Name of the one that tracked.
+        Name of the tracker.
 
     Returns
     -------
     Path
-        The picture.
+        The file.
     """
-    sheet = style.figure(9.0, 3.9)
-    panels = sheet.subplots(1, 3)
+    figure = style.figure(9.0, 3.9)
+    panels = figure.subplots(1, 3)
     difference = tracked - true
     common = _scale(np.concatenate([true, tracked]))
     for panel, values, name, scale in zip(
@@ -52,29 +53,29 @@ def draw(path: str | Path, true: np.ndarray, tracked: np.ndarray, tracker: str) 
     ):
         disc(panel, values / UM, scale)
         panel.set_title(name)
-    sheet.colorbar(_bar(common), ax=panels[:2], shrink=0.7, aspect=50, orientation="horizontal", pad=0.06).set_label(
-        "Circumferential displacement at ES (µm)"
-    )
-    sheet.colorbar(
-        _bar(_scale(difference)), ax=panels[2], shrink=0.9, aspect=25, orientation="horizontal", pad=0.06
-    ).set_label("Difference (µm)")
-    return style.save(sheet, path)
+    for scale, axes, shrink, aspect, label in (
+        (common, panels[:2], 0.7, 50, "Circumferential displacement at ES (µm)"),
+        (_scale(difference), panels[2], 0.9, 25, "Difference (µm)"),
+    ):
+        bar: dict[str, Any] = {"shrink": shrink, "aspect": aspect, "orientation": "horizontal", "pad": 0.06}
+        figure.colorbar(ScalarMappable(scale, COLOURMAP), ax=axes, **bar).set_label(label)
+    return style.save(figure, path)
 
 
 def disc(axes: Axes, values: np.ndarray, scale: TwoSlopeNorm) -> None:
-    """Fill one bullseye: the base outermost, anterior at the top and the septum on the left.
+    """Draw one bullseye: the base outermost, anterior at the top and the septum on the left.
 
     Parameters
     ----------
     axes : Axes
     values : ndarray of shape (17,)
-        One number a segment, written into it; segments that are NaN are hatched.
+        One number per segment, written into it; segments that are NaN are hatched.
     scale : TwoSlopeNorm
-        From value to colour.
+        Normalisation of the colour map.
     """
-    for number, (value, (inner, outer, start, stop)) in enumerate(zip(values, RINGS, strict=True), 1):
+    for number, (value, (inner, outer, start, stop)) in enumerate(zip(values, BULLSEYE, strict=True), 1):
         known = np.isfinite(value)
-        colour = COLOURS(scale(value)) if known else "#eeeeee"
+        colour = COLOURMAP(scale(value)) if known else "#eeeeee"
         axes.add_patch(
             Wedge(
                 (0, 0),
@@ -88,11 +89,11 @@ def disc(axes: Axes, values: np.ndarray, scale: TwoSlopeNorm) -> None:
                 hatch=None if known else "////",
             )
         )
-        middle, radius = (start + stop) / 2, (inner + outer) / 2 if inner else 0
-        place = radius * np.cos(middle), radius * np.sin(middle)
+        angle, radius = (start + stop) / 2, (inner + outer) / 2 if inner else 0
+        position = radius * np.cos(angle), radius * np.sin(angle)
         dark = known and np.dot(colour[:3], (0.299, 0.587, 0.114)) < 0.55
         axes.text(
-            *place,
+            *position,
             str(round(value)).replace("-", "−") if known else str(number),
             ha="center",
             va="center",
@@ -103,20 +104,16 @@ def disc(axes: Axes, values: np.ndarray, scale: TwoSlopeNorm) -> None:
 
 
 def _names(axes: Axes) -> None:
-    """Name the walls around the disc."""
-    for angle, name, turn in ((90, "anterior", 0), (180, "septal", 90), (270, "inferior", 0), (0, "lateral", 270)):
+    """Write the names of the walls around the disc."""
+    for angle, name, rotation in ((90, "anterior", 0), (180, "septal", 90), (270, "inferior", 0), (0, "lateral", 270)):
         x, y = 1.09 * np.cos(np.radians(angle)), 1.09 * np.sin(np.radians(angle))
-        axes.text(x, y, name, ha="center", va="center", rotation=turn, fontsize=8, color="#555555")
+        axes.text(x, y, name, ha="center", va="center", rotation=rotation, fontsize=8, color="#555555")
     axes.set(xlim=(-1.18, 1.18), ylim=(-1.18, 1.18), aspect="equal")
     axes.axis("off")
 
 
-def _bar(scale: TwoSlopeNorm) -> ScalarMappable:
-    return ScalarMappable(scale, COLOURS)
-
-
 def _scale(values: np.ndarray) -> TwoSlopeNorm:
-    """Symmetric about zero, so that white is no motion and the sign is the colour."""
-    finite = np.abs(values[np.isfinite(values)]) / UM
-    top = max(float(finite.max()), 1.0) if finite.size else 1.0
-    return TwoSlopeNorm(0, -top, top)
+    """Scale symmetric about zero: white is no motion, the colour shows the sign."""
+    magnitude = np.abs(values[np.isfinite(values)]) / UM
+    limit = max(float(magnitude.max()), 1.0) if magnitude.size else 1.0
+    return TwoSlopeNorm(0, -limit, limit)

@@ -1,4 +1,4 @@
-"""A B-mode clip with the true motion of the wall drawn on it."""
+"""B-mode clip with the true motion of the wall overlaid."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.text import Text
 from PIL import Image
@@ -16,16 +17,16 @@ from echotruth.report import style
 MOTION = "#ffb000"
 """Colour of the true motion."""
 
-LARGEST = 3_000_000
-"""Bytes of a GIF."""
+MAX_GIF_BYTES = 3_000_000
+"""Size that a GIF should not exceed, bytes."""
 
-RATE = 20
-"""Frames a second of the moving picture, a slow motion."""
+FRAME_RATE = 20
+"""Frames per second of the animation, which is in slow motion."""
 
 
 @dataclass(frozen=True)
-class Clip:
-    """A clip and the motion in it.
+class ClipWithMotion:
+    """A clip and the displacement of points in it.
 
     Attributes
     ----------
@@ -36,9 +37,9 @@ class Clip:
     time : ndarray of shape (frame,)
         Since end-diastole, s.
     position : ndarray of shape (point, 2)
-        Lateral, axial place of the points in frame 0, px.
+        Points in frame 0: lateral, axial, px.
     displacement : ndarray of shape (frame, point, 2)
-        Lateral, axial displacement since frame 0, m; NaN where there is none.
+        Displacement since frame 0: lateral, axial, m; NaN where unknown.
     """
 
     image: np.ndarray
@@ -49,12 +50,12 @@ class Clip:
 
     @property
     def path(self) -> np.ndarray:
-        """Places of the points, px, shape (frame, point, 2)."""
+        """Positions of the points in every frame, (frame, point, 2), px."""
         return self.position + self.displacement / self.spacing
 
 
 def thin(position: np.ndarray, distance: float) -> np.ndarray:
-    """Choose points no closer to one another than a distance, in their order.
+    """Choose points at least a given distance apart, in their order.
 
     Parameters
     ----------
@@ -69,19 +70,19 @@ def thin(position: np.ndarray, distance: float) -> np.ndarray:
         Indices of the chosen points.
     """
     chosen: list[int] = []
-    for k, place in enumerate(position):
-        if not chosen or np.linalg.norm(position[chosen] - place, axis=1).min() >= distance:
+    for k, candidate in enumerate(position):
+        if not chosen or np.linalg.norm(position[chosen] - candidate, axis=1).min() >= distance:
             chosen.append(k)
     return np.array(chosen, int)
 
 
 @style.styled
-def render(clip: Clip, side: int) -> np.ndarray:
-    """Draw every frame, cut to the moving wall: grey image, paths so far and arrows from end-diastole.
+def render(clip: ClipWithMotion, side: int) -> np.ndarray:
+    """Draw every frame, cropped to the moving wall: grey image, paths so far and arrows from end-diastole.
 
     Parameters
     ----------
-    clip : Clip
+    clip : ClipWithMotion
     side : int
         Side of the square frames, px; even.
 
@@ -91,12 +92,14 @@ def render(clip: Clip, side: int) -> np.ndarray:
         RGB.
     """
     left, right, bottom, top = _crop(clip)
-    sheet = style.figure(4, 4)
-    sheet.set_layout_engine("none")
-    axes = sheet.add_axes((0, 0, 1, 1))
+    figure = style.figure(4, 4)
+    figure.set_layout_engine("none")
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 1))
     axes.axis("off")
-    shown = axes.imshow(clip.image[0], cmap="gray", vmin=0, vmax=255, interpolation="bilinear")
-    trails = axes.add_collection(LineCollection([], colors=MOTION, linewidths=0.8, alpha=0.45))
+    picture = axes.imshow(clip.image[0], cmap="gray", vmin=0, vmax=255, interpolation="bilinear")
+    trails = LineCollection([], colors=MOTION, linewidths=0.8, alpha=0.45)
+    axes.add_collection(trails)
     arrows = axes.quiver(
         *clip.position.T,
         *np.zeros_like(clip.position.T),
@@ -114,18 +117,18 @@ def render(clip: Clip, side: int) -> np.ndarray:
     label = _scale_bar(axes, clip, (left, bottom))
     frames = []
     for t, image in enumerate(clip.image):
-        shown.set_data(image)
+        picture.set_data(image)
         trails.set_segments(list(clip.path[: t + 1].swapaxes(0, 1)))
         arrows.set_UVC(*np.nan_to_num(clip.path[t] - clip.position).T)
         label.set_text(f"{clip.time[t] * 1e3:.0f} ms")
-        sheet.set_dpi(side / 4)
-        sheet.canvas.draw()
-        frames.append(np.asarray(sheet.canvas.buffer_rgba())[..., :3].copy())
+        figure.set_dpi(side / 4)
+        canvas.draw()
+        frames.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())
     return np.stack(frames)
 
 
-def _crop(clip: Clip) -> tuple[float, float, float, float]:
-    """Square about the wall through the whole cycle, within the image: left, right, bottom, top, px."""
+def _crop(clip: ClipWithMotion) -> tuple[float, float, float, float]:
+    """Square around the wall over the whole cycle, within the image: left, right, bottom, top, px."""
     low, high = np.nanmin(clip.path, (0, 1)), np.nanmax(clip.path, (0, 1))
     half = min(0.5 * (high - low).max() + 0.7e-3 / clip.spacing, (min(clip.image.shape[1:]) - 1) / 2)
     size = np.array(clip.image.shape[:0:-1])
@@ -134,8 +137,8 @@ def _crop(clip: Clip) -> tuple[float, float, float, float]:
     return left, right, lower, upper
 
 
-def _scale_bar(axes: Axes, clip: Clip, corner: tuple[float, float]) -> Text:
-    """A millimetre in the lower left corner; returns the label of the time beside it."""
+def _scale_bar(axes: Axes, clip: ClipWithMotion, corner: tuple[float, float]) -> Text:
+    """Draw a bar of 1 mm in the lower left corner; returns the label of the time in the lower right one."""
     width = axes.get_xlim()[1] - axes.get_xlim()[0]
     length = 1e-3 / clip.spacing
     x, y = corner[0] + 0.05 * width, corner[1] - 0.05 * width
@@ -144,8 +147,8 @@ def _scale_bar(axes: Axes, clip: Clip, corner: tuple[float, float]) -> Text:
     return axes.text(corner[0] + 0.95 * width, y, "", color="white", ha="right", va="baseline", fontsize=10)
 
 
-def gif(path: str | Path, frames: np.ndarray, rate: float = RATE) -> Path:
-    """Write a GIF that loops, with as many greys as its size allows.
+def gif(path: str | Path, frames: np.ndarray, rate: float = FRAME_RATE) -> Path:
+    """Write a looping GIF with as many colours as its size allows.
 
     Parameters
     ----------
@@ -153,7 +156,7 @@ def gif(path: str | Path, frames: np.ndarray, rate: float = RATE) -> Path:
     frames : ndarray of shape (frame, height, width, 3), uint8
         RGB.
     rate : float
-        Frames a second.
+        Frames per second.
 
     Returns
     -------
@@ -167,13 +170,13 @@ def gif(path: str | Path, frames: np.ndarray, rate: float = RATE) -> Path:
         pictures[0].save(
             path, save_all=True, append_images=pictures[1:], duration=round(1000 / rate), loop=0, optimize=False
         )
-        if path.stat().st_size <= LARGEST:
+        if path.stat().st_size <= MAX_GIF_BYTES:
             break
     return path
 
 
-def mp4(path: str | Path, frames: np.ndarray, rate: float = RATE, beats: int = 3) -> Path:
-    """Write an H.264 film that plays in browsers.
+def mp4(path: str | Path, frames: np.ndarray, rate: float = FRAME_RATE, beats: int = 3) -> Path:
+    """Write an H.264 video that browsers play.
 
     Parameters
     ----------
@@ -181,9 +184,9 @@ def mp4(path: str | Path, frames: np.ndarray, rate: float = RATE, beats: int = 3
     frames : ndarray of shape (frame, height, width, 3), uint8
         RGB, height and width even.
     rate : float
-        Frames a second.
+        Frames per second.
     beats : int
-        How often the clip is repeated.
+        Number of repetitions of the clip.
 
     Returns
     -------
@@ -194,11 +197,11 @@ def mp4(path: str | Path, frames: np.ndarray, rate: float = RATE, beats: int = 3
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     size = frames.shape[2], frames.shape[1]
-    film = imageio_ffmpeg.write_frames(
+    video = imageio_ffmpeg.write_frames(
         str(path), size, fps=rate, codec="libx264", pix_fmt_out="yuv420p", quality=6, macro_block_size=2
     )
-    film.send(None)
+    video.send(None)
     for frame in np.concatenate([frames] * beats):
-        film.send(np.ascontiguousarray(frame))
-    film.close()
+        video.send(np.ascontiguousarray(frame))
+    video.close()
     return path

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,33 +16,33 @@ from echotruth.report import style
 SIZES = (("blue", "o"), ("red", "s"), ("#556b2f", "v"))
 """Colour and marker of the image sizes, the largest first, as in the paper."""
 
-TRACKERS = (("--", "none"), ("-", "full"))
-"""Line style and filling of the trackers, in their order."""
+TRACKERS: tuple[tuple[str, Literal["none", "full"]], ...] = (("--", "none"), ("-", "full"))
+"""Line style and marker fill of the trackers, in their order."""
 
 Errors = Mapping[str, Mapping[str, Mapping[int, np.ndarray]]]
 
 
 @style.styled
 def draw(path: str | Path, errors: Errors, longitudinal: Collection[str] = ()) -> Path:
-    """Draw the error by layer, one panel a view.
+    """Draw the error by layer, one panel per view.
 
     Parameters
     ----------
     path : str or Path
-        Picture to write.
+        File to write.
     errors : mapping of view to mapping of tracker to mapping of image size to ndarray of shape (layer,)
-        Of one or two trackers: RMS error of circumferential (long axis: longitudinal) displacement at end-systole, m,
-        the endocardium first; NaN where there is none.
+        RMS error of circumferential (long axis: longitudinal) displacement at end-systole of one or two trackers, m,
+        the endocardium first; NaN where unknown.
     longitudinal : collection of str
-        Long-axis views, in which the component is the longitudinal one.
+        Long-axis views, for which the component is longitudinal.
 
     Returns
     -------
     Path
-        The picture.
+        The file.
     """
-    sheet = style.figure(2.5 * len(errors) + 0.9, 3.9)
-    panels = sheet.subplots(1, len(errors), sharey=True, squeeze=False)[0]
+    figure = style.figure(2.5 * len(errors) + 0.9, 3.9)
+    panels = figure.subplots(1, len(errors), sharey=True, squeeze=False)[0]
     for panel, (view, trackers) in zip(panels, errors.items(), strict=True):
         for (line, fill), sizes in zip(TRACKERS, trackers.values(), strict=False):
             for (colour, marker), values in zip(SIZES, sizes.values(), strict=False):
@@ -50,20 +51,20 @@ def draw(path: str | Path, errors: Errors, longitudinal: Collection[str] = ()) -
         panel.set_title(style.title(view), pad=16)
         panel.text(0.5, 1.02, component, ha="center", color="#555555", transform=panel.transAxes)
         panel.set(xlabel="Layer, endo → epi")
-    # The panels share this axis: set before the others are drawn, it would keep the first panel's upper end.
+    # The panels share this axis: set earlier, it would keep the upper limit of the first panel.
     panels[0].set(ylabel="RMS error of displacement at ES (µm)", ylim=(0, None))
-    _legend(sheet, next(iter(errors.values())))
-    return style.save(sheet, path)
+    _legend(figure, next(iter(errors.values())))
+    return style.save(figure, path)
 
 
-def _curve(axes: Axes, values: np.ndarray, look: dict[str, str]) -> None:
+def _curve(axes: Axes, values: np.ndarray, appearance: dict[str, Any]) -> None:
     layer = np.arange(1, len(values) + 1)
-    axes.plot(layer, values * 1e6, markersize=6, linewidth=1.2, **look)
+    axes.plot(layer, values * 1e6, markersize=6, linewidth=1.2, **appearance)
     axes.set_xticks(layer)
     axes.set_xlim(0.6, len(values) + 0.4)
 
 
-def _legend(sheet: Figure, trackers: Mapping[str, Mapping[int, np.ndarray]]) -> None:
+def _legend(figure: Figure, trackers: Mapping[str, Mapping[int, np.ndarray]]) -> None:
     sizes = next(iter(trackers.values()))
     marks = [
         Line2D([], [], color=colour, marker=marker, ls="none", label=f"{size} × {size} px")
@@ -73,4 +74,4 @@ def _legend(sheet: Figure, trackers: Mapping[str, Mapping[int, np.ndarray]]) -> 
         Line2D([], [], color="#444444", ls=line, marker="D", markersize=5, fillstyle=fill, linewidth=1.2, label=name)
         for (line, fill), name in zip(TRACKERS, trackers, strict=False)
     ]
-    sheet.legend(handles=marks + lines, loc="outside lower center", ncols=len(marks) + len(lines))
+    figure.legend(handles=marks + lines, loc="outside lower center", ncols=len(marks) + len(lines))

@@ -1,4 +1,4 @@
-"""All figures of a repository, drawn from what is in the store."""
+"""All figures of a repository, drawn from its store."""
 
 from __future__ import annotations
 
@@ -16,26 +16,27 @@ from echotruth.report import bullseye, clip, error, heart, leaderboard, loop, re
 if TYPE_CHECKING:
     import pandas as pd
 
-ARROWS = 0.45e-3
-"""Distance between the points whose motion is drawn on a clip, m."""
+ARROW_SPACING = 0.45e-3
+"""Smallest distance between the points whose motion is drawn on a clip, m."""
+
 PARTS = {
     "motion": ("heart", "loop", "strain", "bullseye", "error", "leaderboard"),
     "images": ("clip", "resolutions", "views"),
 }
-"""Figures that are drawn together, one job each part."""
+"""Figures that one job draws together, by the name of the part."""
 
 
 class Figures:
-    """The figures of one repository; one heart stands for all where only one can be shown.
+    """Figures of one repository; the first complete heart is shown where only one can be.
 
     Parameters
     ----------
     store : Path
         The Zarr hierarchy.
     config : Config
-        What it was made from.
+        Of the repository.
     folder : Path
-        Where the figures go.
+        Of the figures.
     """
 
     def __init__(self, store: Path, config: Config, folder: Path) -> None:
@@ -51,13 +52,13 @@ class Figures:
         self.view = next((name for name, view in config.views.items() if name == "mid"), next(iter(config.views)))
 
     def draw(self, part: str) -> None:
-        """Draw the figures of a part of `PARTS`; the leaderboard is written, too."""
+        """Draw the figures of a part of `PARTS`; `motion` also writes the leaderboard as a table."""
         self.folder.mkdir(parents=True, exist_ok=True)
         for name in PARTS[part]:
             getattr(self, name)()
 
     def group(self, path: str) -> xr.Dataset:
-        """A group for the heart that stands for all."""
+        """A group of the store for the heart that is shown."""
         return self.tree[path].to_dataset().isel(case=self.complete[0])
 
     @property
@@ -71,17 +72,18 @@ class Figures:
         nodes, fibre = geometry.node_position.values, fibres.fibre.values
         states = [heart.State("Unloaded", nodes, fibre, np.zeros(len(fibre)))]
         for name, frame in (("End-diastole", 0), ("End-systole", self.es)):
-            moved = nodes + mechanics.displacement.isel(frame=frame).values
-            carried = np.einsum("cij,cj->ci", kinematics.deformation_gradient.isel(frame=frame).values, fibre)
-            tensor = kinematics.strain_unloaded.isel(frame=frame).sel(strain_component="CC").values
-            states.append(heart.State(name, moved, carried, tensor))
+            deformed = nodes + mechanics.displacement.isel(frame=frame).values
+            carried = np.einsum("cij,cj->ci", kinematics.deformation_gradient.isel(frame=frame).values, fibre)  # F f
+            circumferential = kinematics.strain_unloaded.isel(frame=frame).sel(strain_component="CC").values
+            states.append(heart.State(name, deformed, carried, circumferential))
         heart.draw(self.folder / "heart.png", geometry.cell_node.values, fibres.helix_angle.values, states)
 
     def loop(self) -> None:
-        """The loop asked for and met, and the active tension."""
+        """The target and the solved loop, and the active tension."""
         data = self.group("mechanics")
-        met, asked = (np.stack([data[f"pressure{end}"], data[f"volume{end}"]]) for end in ("", "_asked"))
-        loop.draw(self.folder / "loop.png", data.time.values, self.es, data.active_tension.values, met, asked)
+        solved = np.stack([data.pressure, data.volume])
+        target = np.stack([data.pressure_target, data.volume_target])
+        loop.draw(self.folder / "loop.png", data.time.values, self.es, data.active_tension.values, solved, target)
 
     def strain(self) -> None:
         """Strain over the cycle."""
@@ -90,20 +92,20 @@ class Figures:
         strain.draw(self.folder / "strain.png", data.time.values, self.es, *arrays)
 
     def clip(self) -> None:
-        """The clip with its true motion, as a GIF and as a film."""
+        """The clip with its true motion, as a GIF and as a video."""
         size = self.sizes[0]
         images = self.group(f"bmode/{size}").sel(view=self.view)
         truth = self.group(f"evaluation/{size}").sel(view=self.view)
         motion = truth.true_displacement.stack(point=("axial", "lateral")).transpose("frame", "point", "plane")
         motion = motion.isel(point=np.isfinite(motion.isel(frame=0, plane=0).values))
         spacing = float(images.lateral[1] - images.lateral[0])
-        places = np.column_stack([motion.lateral - images.lateral[0], motion.axial - images.axial[0]]) / spacing
-        chosen = clip.thin(places, ARROWS / spacing)
-        shown = clip.Clip(
-            images.image.values, spacing, images.time.values, places[chosen], motion.isel(point=chosen).values
+        points = np.column_stack([motion.lateral - images.lateral[0], motion.axial - images.axial[0]]) / spacing
+        chosen = clip.thin(points, ARROW_SPACING / spacing)
+        overlaid = clip.ClipWithMotion(
+            images.image.values, spacing, images.time.values, points[chosen], motion.isel(point=chosen).values
         )
-        clip.gif(self.folder / "clip.gif", clip.render(shown, 400))
-        clip.mp4(self.folder / "clip.mp4", clip.render(shown, 720))
+        clip.gif(self.folder / "clip.gif", clip.render(overlaid, 400))
+        clip.mp4(self.folder / "clip.mp4", clip.render(overlaid, 720))
 
     def resolutions(self) -> None:
         """One frame at every image size."""
@@ -126,7 +128,7 @@ class Figures:
 
     @cached_property
     def standings(self) -> pd.DataFrame:
-        """The leaderboard, guests among the trackers."""
+        """The leaderboard, including external trackers."""
         return standings(rows(self.tree, self.config, self.complete, self.folder.parent), self.config.seed)
 
     @property
@@ -135,35 +137,33 @@ class Figures:
         return [name for name in best(self.standings) if name in self.config.tracking.trackers]
 
     def leaderboard(self) -> None:
-        """The order of the trackers, as a table and drawn."""
+        """The leaderboard as a table and as a figure."""
         self.standings.round(4).to_csv(self.folder / "leaderboard.csv", index=False)
         leaderboard.draw(self.folder / "leaderboard.png", self.standings, best(self.standings))
 
     def bullseye(self) -> None:
-        """Circumferential displacement of the segments in the short-axis views, true and by the best tracker."""
+        """Circumferential displacement of the segments in the short-axis views, true and of the best tracker."""
         short = [name for name, view in self.config.views.items() if view.plane == "short_axis"]
         data = self.group(f"evaluation/{self.sizes[0]}").sel(tracker=self.order[0], polar="tangential", view=short)
-        # A segment at a boundary may show in two planes; the mean of what each sees stands for it.
+        # A segment at a boundary may be visible in two planes; their mean is shown.
         true, tracked = (data[name].mean("view").values for name in ("true_segment", "tracked_segment"))
         bullseye.draw(self.folder / "bullseye.png", true, tracked, self.order[0])
 
     def error(self) -> None:
         """Error of the tangential displacement by layer, view and image size, mean over the hearts.
 
-        Shown are the first tracker of the configuration and the best.
+        It shows the first tracker of the configuration and the best one.
         """
         first = next(iter(self.config.tracking.trackers))
-        shown = dict.fromkeys((first, self.order[0]))
-        data = {size: self.tree[f"evaluation/{size}"].to_dataset().isel(case=self.complete) for size in self.sizes}
-        curves = {
-            size: each.rms_error.sel(measure="tangential").isel(region=slice(1, None)) for size, each in data.items()
-        }
+        trackers = dict.fromkeys((first, self.order[0]))
+        layers = {}
+        for size in self.sizes:
+            data = self.tree[f"evaluation/{size}"].to_dataset().isel(case=self.complete)
+            layers[size] = data.rms_error.sel(measure="tangential").isel(region=slice(1, None))
         errors = {
             view: {
-                tracker: {
-                    size: curve.sel(view=view, tracker=tracker).mean("case").values for size, curve in curves.items()
-                }
-                for tracker in shown
+                tracker: {size: rms.sel(view=view, tracker=tracker).mean("case").values for size, rms in layers.items()}
+                for tracker in trackers
             }
             for view in self.config.views
         }

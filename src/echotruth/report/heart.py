@@ -1,4 +1,4 @@
-"""The heart in space: its fibres and its circumferential strain, unloaded, at end-diastole and at end-systole."""
+"""The heart in three dimensions: fibres and circumferential strain, unloaded, at end-diastole and at end-systole."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from echotruth.report import style
 from echotruth.report.raster import Camera, Surface, render
 
 VIEWPOINT = (-0.75, 1.6, 0.75)
-"""From where the heart is seen, in the heart frame: from anterior and somewhat above, the septum on the left."""
+"""Direction to the eye in the heart frame: anterior and somewhat above, the septum on the left."""
 
 PIXELS = (490, 760)
-"""Size of the picture of one heart, px."""
+"""Width and height of the picture of one heart, px."""
 
-GLASS = 0.16
-"""Opacity of the wall over its fibres."""
+WALL_OPACITY = 0.16
+"""Opacity of the wall in front of its fibres."""
 
-ROD = 0.075
-"""Length of the rods that stand for fibres, over that of the heart."""
+ROD_LENGTH = 0.075
+"""Length of the rods that show fibres, over that of the heart."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class State:
     ----------
     name : str
     nodes : ndarray of shape (node, 3)
-        Places of the nodes, m.
+        Positions of the nodes, m.
     fibre : ndarray of shape (cell, 3)
         Directions of the fibres at the cell centroids, of any length.
     strain : ndarray of shape (cell,)
@@ -55,7 +55,7 @@ def draw(path: str | Path, cells: np.ndarray, helix: np.ndarray, states: Sequenc
     Parameters
     ----------
     path : str or Path
-        Picture to write.
+        File to write.
     cells : ndarray of shape (cell, 10)
         Nodes of the quadratic tetrahedra, in VTK's order.
     helix : ndarray of shape (cell,)
@@ -66,32 +66,32 @@ def draw(path: str | Path, cells: np.ndarray, helix: np.ndarray, states: Sequenc
     Returns
     -------
     Path
-        The picture.
+        The file.
     """
-    # In a sweep, hearts with fewer elements are filled up with cells of one node and nodes that are nowhere.
+    # In a sweep, hearts with fewer elements are padded with cells of one repeated node and NaN nodes.
     real = cells.min(1) < cells.max(1)
     cells, helix = cells[real], helix[real]
     states = [State(s.name, np.nan_to_num(s.nodes), s.fibre[real], s.strain[real]) for s in states]
-    top = max(100 * float(np.nanmax(np.abs([state.strain for state in states]))), 0.1)
-    scales = ScalarMappable(Normalize(-90, 90), "turbo"), ScalarMappable(Normalize(-top, top), "RdBu_r")
+    limit = max(100 * float(np.nanmax(np.abs([state.strain for state in states]))), 0.1)
+    scales = ScalarMappable(Normalize(-90, 90), "turbo"), ScalarMappable(Normalize(-limit, limit), "RdBu_r")
     camera = _camera(states)
-    sheet = style.figure(7.6, 7.4)
-    panels = sheet.subplots(2, len(states), squeeze=False)
+    figure = style.figure(7.6, 7.4)
+    panels = figure.subplots(2, len(states), squeeze=False)
     for column, state in zip(panels.T, states, strict=True):
         wall = _coloured(_cut(_grid(state.nodes, cells, 100 * state.strain)), scales[1], "strain")
         rods = _coloured(_rods(state, cells, helix), scales[0], "helix")
-        column[0].imshow(_under_glass(rods, wall, camera).clip(0, 1))
+        column[0].imshow(_behind_wall(rods, wall, camera).clip(0, 1))
         column[1].imshow(_opaque(wall, camera).clip(0, 1))
         column[0].set_title(state.name)
     for panel in panels.flat:
         panel.axis("off")
     for row, scale, label in zip(panels, scales, ("Helix angle (°)", "$E_{CC}$ from unloaded (%)"), strict=True):
-        sheet.colorbar(scale, ax=row, shrink=0.75, aspect=25).set_label(label)
-    return style.save(sheet, path)
+        figure.colorbar(scale, ax=row, shrink=0.75, aspect=25).set_label(label)
+    return style.save(figure, path)
 
 
 def centroids(nodes: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Places of the cell centroids.
+    """Positions of the cell centroids.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def centroids(nodes: np.ndarray, cells: np.ndarray) -> np.ndarray:
     ndarray of shape (cell, 3)
         m.
     """
-    # Quadratic shape functions at the middle: -1/8 for a vertex, 1/4 for the middle of an edge.
+    # Quadratic shape functions at the centroid: -1/8 at a vertex, 1/4 at the middle of an edge.
     return np.einsum("k,ckx->cx", np.repeat([-1 / 8, 1 / 4], [4, 6]), nodes[cells])
 
 
@@ -115,22 +115,22 @@ def _grid(nodes: np.ndarray, cells: np.ndarray, strain: np.ndarray) -> pyvista.U
 
 
 def _cut(grid: pyvista.UnstructuredGrid) -> pyvista.PolyData:
-    """Surface of the wall without the anterior lateral quarter; sharp edges stay sharp."""
-    rest = grid.clip("y", origin=(0, 0, 0), invert=False).clip("-x", origin=(0, 0, 0))
-    kept = grid.clip("y", origin=(0, 0, 0)) + rest
-    surface = kept.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2).triangulate()
+    """Surface of the wall without the anterior lateral quarter, with sharp edges."""
+    anterior_septal = grid.clip("y", origin=(0, 0, 0), invert=False).clip("-x", origin=(0, 0, 0))
+    remaining = grid.clip("y", origin=(0, 0, 0)) + anterior_septal
+    surface = remaining.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2).triangulate()
     return surface.compute_normals(cell_normals=False, split_vertices=True, feature_angle=40)
 
 
 def _rods(state: State, cells: np.ndarray, helix: np.ndarray) -> pyvista.PolyData:
     """Short rods along the fibres, outside the quarter that is cut away."""
-    place = centroids(state.nodes, cells)
-    seen = (place[:, 1] <= 0) | (place[:, 0] >= 0)
-    points = pyvista.PolyData(place[seen])
-    points["direction"] = state.fibre[seen]
-    points["helix"] = np.degrees(helix[seen])
+    position = centroids(state.nodes, cells)
+    shown = (position[:, 1] <= 0) | (position[:, 0] >= 0)
+    points = pyvista.PolyData(position[shown])
+    points["direction"] = state.fibre[shown]
+    points["helix"] = np.degrees(helix[shown])
     rod = pyvista.Cylinder(radius=0.055, height=1.0, resolution=6)
-    length = ROD * np.ptp(state.nodes[:, 2])
+    length = ROD_LENGTH * np.ptp(state.nodes[:, 2])
     rods = points.glyph(orient="direction", scale=False, factor=length, geom=rod)
     return rods.triangulate().compute_normals(cell_normals=False, split_vertices=True, feature_angle=70)
 
@@ -145,18 +145,17 @@ def _camera(states: Sequence[State]) -> Camera:
     """One camera for all pictures, so that they share a scale."""
     nodes = np.concatenate([state.nodes for state in states])
     low, high = nodes.min(0), nodes.max(0)
-    half = 0.5 * float(high[2] - low[2]) + 0.17 * float(high[0] - low[0])
-    return Camera(np.array(VIEWPOINT), (low + high) / 2, half, PIXELS)
+    half_height = 0.5 * float(high[2] - low[2]) + 0.17 * float(high[0] - low[0])
+    return Camera(np.array(VIEWPOINT), (low + high) / 2, half_height, PIXELS)
 
 
 def _opaque(surface: Surface, camera: Camera) -> np.ndarray:
-    """Surface on white."""
-    colour, cover = render(surface, camera)
-    return colour + (1 - cover)[..., None]
+    """Surface on a white background."""
+    colour, alpha = render(surface, camera)
+    return colour + (1 - alpha)[..., None]
 
 
-def _under_glass(rods: Surface, wall: Surface, camera: Camera) -> np.ndarray:
-    """Rods under a breath of the wall they lie in."""
-    glass = replace(wall, colours=np.full_like(wall.colours, 0.75))
-    colour, cover = render(glass, camera)
-    return (1 - GLASS * cover)[..., None] * _opaque(rods, camera) + GLASS * colour
+def _behind_wall(rods: Surface, wall: Surface, camera: Camera) -> np.ndarray:
+    """Rods behind a grey translucent wall."""
+    colour, alpha = render(replace(wall, colours=np.full_like(wall.colours, 0.75)), camera)
+    return (1 - WALL_OPACITY * alpha)[..., None] * _opaque(rods, camera) + WALL_OPACITY * colour

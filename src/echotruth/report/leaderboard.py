@@ -1,4 +1,4 @@
-"""The order of the trackers: error of displacement and of strain at every image size and view."""
+"""Leaderboard of the trackers: error of displacement and of strain at every image size and view."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from echotruth.config.imaging import ALL
+from echotruth.config.imaging import ALL_VIEWS
 from echotruth.report import style
 from echotruth.report.error import SIZES
 
@@ -19,67 +19,69 @@ PANELS = (
     ("ecc_rms_points", "RMS error of $E_{CC}$ at ES (points)"),
     ("err_rms_points", "RMS error of $E_{RR}$ at ES (points)"),
 )
-"""Figures that are drawn, and what they are."""
+"""Metrics that are drawn, and their labels."""
 
 
 @style.styled
 def draw(path: str | Path, standings: pd.DataFrame, order: list[str]) -> Path:
-    """Draw one line a tracker, the best at the top.
+    """Draw one row per tracker, the best at the top.
 
     Parameters
     ----------
     path : str or Path
-        Picture to write.
+        File to write.
     standings : DataFrame
-        As of :func:`echotruth.evaluation.leaderboard.standings`.
+        As :func:`echotruth.evaluation.leaderboard.standings` returns it.
     order : list of str
-        Trackers from the top.
+        Trackers from top to bottom.
 
     Returns
     -------
     Path
-        The picture.
+        The file.
     """
-    # A grid too coarse for strain, or no short-axis view, leaves a figure without numbers.
+    # With a grid too coarse for strain, or no short-axis view, a metric has no values.
     shown = [panel for panel in PANELS if standings[panel[0]].notna().any()] or PANELS[:1]
-    sheet = style.figure(2 + 2.8 * len(shown), 1.7 + 0.52 * len(order))
-    panels = sheet.subplots(1, len(shown), sharey=True, squeeze=False)[0]
+    figure = style.figure(2 + 2.8 * len(shown), 1.7 + 0.52 * len(order))
+    panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     sizes = sorted(standings["size_px"].unique(), reverse=True)[: len(SIZES)]
-    for panel, (figure, title) in zip(panels, shown, strict=True):
+    for panel, (metric, title) in zip(panels, shown, strict=True):
         for k, size in enumerate(sizes):
             table = standings[standings["size_px"] == size].set_index("tracker")
-            rows = pd.Series(np.arange(len(order)) + 0.26 * (k - (len(sizes) - 1) / 2), order)
-            _size(panel, table, figure, rows, SIZES[k])
+            rows = dict(zip(order, np.arange(len(order)) + 0.26 * (k - (len(sizes) - 1) / 2), strict=True))
+            _draw_size(panel, table, metric, rows, SIZES[k])
         panel.set(xlabel=title, xlim=(0, None))
         panel.grid(axis="y", visible=False)
-    panels[0].set_yticks(range(len(order)), [_name(standings, tracker) for tracker in order])
+    panels[0].set_yticks(range(len(order)), [_label(standings, tracker) for tracker in order])
     panels[0].set_ylim(len(order) - 0.5, -0.5)
-    _legend(sheet, standings, columns=2 * len(shown))
-    return style.save(sheet, path)
+    _legend(figure, standings, columns=2 * len(shown))
+    return style.save(figure, path)
 
 
-def _size(axes: Axes, table: pd.DataFrame, figure: str, place: pd.Series, look: tuple[str, str]) -> None:
-    """One image size: the views as small rings, their mean as a mark with its interval."""
-    colour, marker = look
-    views, mean = table[table["view"] != ALL], table[table["view"] == ALL]
-    axes.plot(views[figure], views.index.map(place), "o", color=colour, markersize=3, fillstyle="none", alpha=0.5)
-    axes.plot(mean[figure], mean.index.map(place), marker, color=colour, markersize=6)
-    low, high = mean[f"{figure}_low"], mean[f"{figure}_high"]
-    axes.hlines(mean.index.map(place)[low.notna()], low.dropna(), high.dropna(), color=colour, linewidth=1.2)
+def _draw_size(
+    axes: Axes, table: pd.DataFrame, metric: str, rows: dict[str, float], appearance: tuple[str, str]
+) -> None:
+    """Draw one image size: the views as small rings, their mean as a marker with its interval."""
+    colour, marker = appearance
+    views, mean = table[table["view"] != ALL_VIEWS], table[table["view"] == ALL_VIEWS]
+    axes.plot(views[metric], views.index.map(rows), "o", color=colour, markersize=3, fillstyle="none", alpha=0.5)
+    axes.plot(mean[metric], mean.index.map(rows), marker, color=colour, markersize=6)
+    low, high = mean[f"{metric}_low"], mean[f"{metric}_high"]
+    axes.hlines(mean.index.map(rows)[low.notna()], low.dropna(), high.dropna(), color=colour, linewidth=1.2)
 
 
-def _name(standings: pd.DataFrame, tracker: str) -> str:
-    """A tracker with its rank at the largest size, the interval of the rank, and how often it failed."""
-    of_it = standings[standings["tracker"] == tracker]
-    first = of_it[(of_it["view"] == ALL) & (of_it["size_px"] == standings["size_px"].max())].iloc[:1]
-    rank, low, high = (first[name].max() for name in ("rank", "rank_low", "rank_high"))
-    between = f" ({low:.0f}–{high:.0f})" if np.isfinite(low) else ""
-    failed = int(of_it.loc[of_it["view"] == ALL, "failures"].sum())
-    ranked = f"{tracker}   {rank:.0f}{between}" if np.isfinite(rank) else tracker
+def _label(standings: pd.DataFrame, tracker: str) -> str:
+    """Name of a tracker, its rank at the largest size with the interval, and the number of clips that failed."""
+    own = standings[standings["tracker"] == tracker]
+    largest = own[(own["view"] == ALL_VIEWS) & (own["size_px"] == standings["size_px"].max())].iloc[:1]
+    rank, low, high = (largest[name].max() for name in ("rank", "rank_low", "rank_high"))
+    interval = f" ({low:.0f}–{high:.0f})" if np.isfinite(low) else ""
+    failed = int(own.loc[own["view"] == ALL_VIEWS, "failures"].sum())
+    ranked = f"{tracker}   {rank:.0f}{interval}" if np.isfinite(rank) else tracker
     return f"{ranked}\n{failed} clip{'s' * (failed > 1)} failed" if failed else ranked
 
 
-def _legend(sheet: Figure, standings: pd.DataFrame, columns: int) -> None:
+def _legend(figure: Figure, standings: pd.DataFrame, columns: int) -> None:
     sizes = sorted(standings["size_px"].unique(), reverse=True)
     marks = [
         Line2D([], [], color=colour, marker=marker, ls="none", label=f"{size} × {size} px")
@@ -87,6 +89,6 @@ def _legend(sheet: Figure, standings: pd.DataFrame, columns: int) -> None:
     ]
     ring = Line2D([], [], color="#666666", marker="o", ls="none", markersize=3, fillstyle="none", label="a view")
     hearts = int(np.nanmax(standings["hearts"]))
-    many = "one heart: no interval" if hearts < 2 else f"mean of {hearts} hearts and its 95 % interval"
-    line = Line2D([], [], color="#444444", ls="none" if hearts < 2 else "-", linewidth=1.2, label=many)
-    sheet.legend(handles=[*marks, ring, line], loc="outside lower center", ncols=columns)
+    text = "one heart: no interval" if hearts < 2 else f"mean of {hearts} hearts and its 95 % interval"
+    line = Line2D([], [], color="#444444", ls="none" if hearts < 2 else "-", linewidth=1.2, label=text)
+    figure.legend(handles=[*marks, ring, line], loc="outside lower center", ncols=columns)

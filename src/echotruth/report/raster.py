@@ -1,4 +1,4 @@
-"""Shaded pictures of surfaces, drawn triangle by triangle; needs neither a screen nor OpenGL.
+"""Software rasterizer of shaded triangulated surfaces, which needs neither a display nor OpenGL.
 
 A z-buffer and Gouraud shading under parallel projection: Foley, van Dam, Feiner and Hughes,
 Computer Graphics: Principles and Practice, chapters 15 and 16.
@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 AMBIENT = 0.42
-"""Light that reaches every surface, of 1."""
+"""Fraction of the light that is ambient."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Surface:
     points : ndarray of shape (point, 3)
         m.
     normals : ndarray of shape (point, 3)
-        Of unit length, to either side.
+        Unit vectors, to either side.
     triangles : ndarray of shape (triangle, 3), integer
     colours : ndarray of shape (point, 3)
         RGB, 0 to 1.
@@ -43,61 +43,65 @@ class Camera:
     Attributes
     ----------
     direction : ndarray of shape (3,)
-        From the scene to the eye; z is up on the picture.
-    middle : ndarray of shape (3,)
-        What is in the middle of the picture, m.
-    half : float
+        From the scene to the eye; z points up in the picture.
+    centre : ndarray of shape (3,)
+        Point in the middle of the picture, m.
+    half_height : float
         Half the height of the picture, m.
     size : tuple of int
         Width and height, px.
     """
 
     direction: np.ndarray
-    middle: np.ndarray
-    half: float
+    centre: np.ndarray
+    half_height: float
     size: tuple[int, int]
 
     @property
     def axes(self) -> np.ndarray:
-        """Right, up and towards the eye, rows of unit length."""
+        """Unit vectors right, up and towards the eye, as rows."""
         eye = np.asarray(self.direction, float) / np.linalg.norm(self.direction)
         right = np.cross((0, 0, 1), eye)
         right /= np.linalg.norm(right)
         return np.stack([right, np.cross(eye, right), eye])
 
 
-def render(surface: Surface, camera: Camera, finer: int = 2) -> tuple[np.ndarray, np.ndarray]:
-    """Draw a surface.
+def render(surface: Surface, camera: Camera, supersampling: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """Draw a surface with ambient and diffuse light from the eye.
 
     Parameters
     ----------
     surface : Surface
     camera : Camera
-    finer : int
-        Samples along a pixel's side, whose mean is the pixel.
+    supersampling : int
+        Number of samples along the side of a pixel, which are averaged.
 
     Returns
     -------
     colour : ndarray of shape (height, width, 3)
-        RGB, 0 to 1, black where there is no surface; multiplied by the cover.
-    cover : ndarray of shape (height, width)
-        Share of the pixel that the surface covers.
+        RGB, 0 to 1, multiplied by `alpha`.
+    alpha : ndarray of shape (height, width)
+        Fraction of the pixel that the surface covers.
     """
-    width, height = (finer * n for n in camera.size)
-    axes, scale = camera.axes, height / (2 * camera.half)
-    right, up, near = axes @ (surface.points - camera.middle).T * scale
-    screen = np.stack([width / 2 + right, height / 2 - up, near], -1)
-    # The lamp is at the eye; both sides of a surface are lit alike.
+    width, height = (supersampling * n for n in camera.size)
+    axes, scale = camera.axes, height / (2 * camera.half_height)
+    right, up, depth = axes @ (surface.points - camera.centre).T * scale
+    screen = np.stack([width / 2 + right, height / 2 - up, depth], -1)
+    # a + (1 - a) |n . e|: both sides of a surface are lit.
     light = AMBIENT + (1 - AMBIENT) * np.abs(surface.normals @ axes[2])
     image = np.zeros((height, width, 4))
     _fill(screen, surface.triangles.astype(np.int64), surface.colours * light[:, None], image)
-    image = image.reshape(height // finer, finer, width // finer, finer, 4).mean((1, 3))
+    n = supersampling
+    image = image.reshape(height // n, n, width // n, n, 4).mean((1, 3))
     return image[..., :3], image[..., 3]
 
 
 @numba.njit(cache=True)
 def _fill(screen: np.ndarray, triangles: np.ndarray, colours: np.ndarray, image: np.ndarray) -> None:
-    """Keep for every pixel centre the colour of the nearest triangle over it."""
+    """Fill every pixel centre with the interpolated colour of the nearest triangle (z-buffer).
+
+    u and v are the barycentric coordinates of the pixel centre with respect to b and c.
+    """
     height, width = image.shape[:2]
     depth = np.full((height, width), -np.inf)
     for a, b, c in triangles:

@@ -12,12 +12,12 @@ from echotruth.report import style
 
 @style.styled
 def draw(path: str | Path, images: Sequence[np.ndarray], field_of_view: float) -> Path:
-    """Draw one frame at every size.
+    """Draw one frame at every image size.
 
     Parameters
     ----------
     path : str or Path
-        Picture to write.
+        File to write.
     images : sequence of ndarray of shape (axial, lateral)
         8-bit grey levels, the largest first.
     field_of_view : float
@@ -26,10 +26,10 @@ def draw(path: str | Path, images: Sequence[np.ndarray], field_of_view: float) -
     Returns
     -------
     Path
-        The picture.
+        The file.
     """
-    sheet = style.figure(3.1 * len(images) + 0.4, 3.75)
-    panels = sheet.subplots(1, len(images), sharey=True, squeeze=False)[0]
+    figure = style.figure(3.1 * len(images) + 0.4, 3.75)
+    panels = figure.subplots(1, len(images), sharey=True, squeeze=False)[0]
     side = 1e3 * field_of_view
     for panel, image in zip(panels, images, strict=True):
         panel.imshow(
@@ -41,4 +41,4 @@ def draw(path: str | Path, images: Sequence[np.ndarray], field_of_view: float) -
         panel.set_xticks(np.arange(-np.floor(side / 6) * 3, side / 2 + 0.1, 3))
         panel.set_yticks(np.arange(0, side + 0.1, 3))
     panels[0].set_ylabel("Axial (mm)")
-    return style.save(sheet, path)
+    return style.save(figure, path)

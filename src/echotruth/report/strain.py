@@ -1,4 +1,4 @@
-"""Strain of the wall over the cycle: mean and spread, and the circumferential strain of its layers."""
+"""Strain of the wall over the cycle: mean and standard deviation, and circumferential strain of the layers."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from echotruth.report import style
 DIRECTIONS = (("RR", style.RADIAL), ("CC", style.CIRCUMFERENTIAL), ("LL", style.LONGITUDINAL))
 """Normal strains in the order of the arrays."""
 
-LEAST = 0.1
-"""Strain that every axis reaches either way, %."""
+MIN_AXIS_LIMIT = 0.1
+"""Smallest limit of the strain axis to either side, %."""
 
 
 @style.styled
@@ -22,7 +22,7 @@ def draw(path: str | Path, time: np.ndarray, es: int, mean: np.ndarray, sd: np.n
     Parameters
     ----------
     path : str or Path
-        Picture to write.
+        File to write.
     time : ndarray of shape (frame,)
         Since end-diastole, s.
     es : int
@@ -30,25 +30,25 @@ def draw(path: str | Path, time: np.ndarray, es: int, mean: np.ndarray, sd: np.n
     mean, sd : ndarray of shape (frame, strain component)
         Mean and standard deviation over the wall, components RR, CC, LL first.
     layers : ndarray of shape (frame, layer, strain component)
-        Mean of every layer, the endocardium first.
+        Mean over every layer, the endocardium first.
 
     Returns
     -------
     Path
-        The picture.
+        The file.
     """
-    sheet = style.figure(8.6, 4.2)
-    left, right = sheet.subplots(1, 2)
+    figure = style.figure(8.6, 4.2)
+    left, right = figure.subplots(1, 2)
     for k, (name, colour) in enumerate(DIRECTIONS):
-        centre, spread = 100 * mean[:, k], 100 * sd[:, k]
-        label = f"$E_{{{name}}}$ {centre[es]:+.1f} ± {spread[es]:.1f}".replace("-", "−")
-        left.fill_between(time * 1e3, centre - spread, centre + spread, color=colour, alpha=0.18, linewidth=0)
-        left.plot(time * 1e3, centre, color=colour, label=label)
+        average, deviation = 100 * mean[:, k], 100 * sd[:, k]
+        label = f"$E_{{{name}}}$ {average[es]:+.1f} ± {deviation[es]:.1f}".replace("-", "−")
+        left.fill_between(time * 1e3, average - deviation, average + deviation, color=colour, alpha=0.18, linewidth=0)
+        left.plot(time * 1e3, average, color=colour, label=label)
     left.set(title="Wall mean ± standard deviation", ylabel="Strain since ED (%)")
     count = layers.shape[1]
     for k, colour in enumerate(style.layer_colours(count)):
-        place = {0: " endo", count - 1: " epi"}.get(k, "")
-        right.plot(time * 1e3, 100 * layers[:, k, 1], color=colour, label=f"{k + 1}{place}")
+        border = {0: " endo", count - 1: " epi"}.get(k, "")
+        right.plot(time * 1e3, 100 * layers[:, k, 1], color=colour, label=f"{k + 1}{border}")
     right.set(title="Circumferential strain by layer", ylabel="$E_{CC}$ since ED (%)")
     for panel, columns, name in ((left, 3, "at ES (%)"), (right, min(count, 6), "layer")):
         panel.legend(
@@ -65,6 +65,6 @@ def draw(path: str | Path, time: np.ndarray, es: int, mean: np.ndarray, sd: np.n
         panel.text(time[es] * 1e3, 0.99, " ES", color="#555555", va="top", transform=panel.get_xaxis_transform())
         panel.set_xlabel("Time since end-diastole (ms)")
         panel.margins(x=0.01)
-        low, high = panel.get_ylim()  # where nothing is strained, rounding is not worth an axis
-        panel.set_ylim(min(low, -LEAST), max(high, LEAST))
-    return style.save(sheet, path)
+        low, high = panel.get_ylim()  # without strain the axis would show rounding errors
+        panel.set_ylim(min(low, -MIN_AXIS_LIMIT), max(high, MIN_AXIS_LIMIT))
+    return style.save(figure, path)

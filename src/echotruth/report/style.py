@@ -1,4 +1,4 @@
-"""The look all figures share."""
+"""Style shared by all figures."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 RADIAL, CIRCUMFERENTIAL, LONGITUDINAL = "#b5382a", "#1f5fa8", "#2f8550"
 """Colours of the wall directions."""
 
-ASKED, MET = "#9a9a9a", "#1a1a1a"
-"""Colours of what was asked for and of what came out."""
+TARGET, SOLVED = "#9a9a9a", "#1a1a1a"
+"""Colours of prescribed and of solved values."""
 
 MMHG = 133.322387415
 """Pa."""
@@ -39,11 +39,11 @@ styled = matplotlib.rc_context(
         "savefig.facecolor": "white",
     }
 )
-"""Decorator of functions that draw."""
+"""Decorator of functions that draw a figure."""
 
 
 def figure(width: float, height: float) -> Figure:
-    """Empty figure that lays itself out and needs no screen.
+    """Empty figure with automatic layout that needs no display.
 
     Parameters
     ----------
@@ -54,19 +54,19 @@ def figure(width: float, height: float) -> Figure:
     -------
     Figure
     """
-    sheet = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(sheet)
-    return sheet
+    empty = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(empty)
+    return empty
 
 
-def save(sheet: Figure, path: str | Path, dpi: int = 160) -> Path:
-    """Write a figure, the same bytes for the same figure.
+def save(figure: Figure, path: str | Path, dpi: int = 160) -> Path:
+    """Write a figure to a file, without dates, so that the same figure gives the same bytes.
 
     Parameters
     ----------
-    sheet : Figure
+    figure : Figure
     path : str or Path
-        The ending names the format.
+        The suffix determines the format.
     dpi : int
 
     Returns
@@ -76,7 +76,7 @@ def save(sheet: Figure, path: str | Path, dpi: int = 160) -> Path:
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     undated = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    sheet.savefig(path, dpi=dpi, metadata=undated.get(path.suffix))
+    figure.savefig(path, dpi=dpi, metadata=undated.get(path.suffix))
     return path
 
 
@@ -95,31 +95,31 @@ def layer_colours(layers: int) -> np.ndarray:
     return matplotlib.colormaps["plasma"](np.linspace(0.05, 0.85, layers))
 
 
-def mark(axes: Axes, place: tuple[float, float], text: str, offset: tuple[float, float]) -> None:
-    """Mark a point with a dot and a word beside it.
+def mark(axes: Axes, position: tuple[float, float], text: str, offset: tuple[float, float]) -> None:
+    """Mark a point with a dot and a label beside it.
 
     Parameters
     ----------
     axes : Axes
-    place : tuple of float
+    position : tuple of float
         In data units.
     text : str
     offset : tuple of float
-        From the dot to the middle of the word, points.
+        From the dot to the centre of the label, points.
     """
-    axes.plot(*place, "o", color=RADIAL, markersize=5, zorder=5)
+    axes.plot(*position, "o", color=RADIAL, markersize=5, zorder=5)
     axes.annotate(
-        text, place, offset, textcoords="offset points", color=RADIAL, fontweight="bold", ha="center", va="center"
+        text, position, offset, textcoords="offset points", color=RADIAL, fontweight="bold", ha="center", va="center"
     )
 
 
 def title(view: str) -> str:
-    """Name of a view as people write it.
+    """Title of a view.
 
     Parameters
     ----------
     view : str
-        As in the configuration, with underscores.
+        Its name in the configuration, with underscores.
 
     Returns
     -------

@@ -33,12 +33,12 @@ class Picture:
 
 @style.styled
 def draw(path: str | Path, pictures: Mapping[str, Sequence[Picture]], field_of_view: float) -> Path:
-    """Draw one column a view, end-diastole above end-systole.
+    """Draw one column per view, end-diastole above end-systole.
 
     Parameters
     ----------
     path : str or Path
-        Picture to write.
+        File to write.
     pictures : mapping of view to sequence of two Picture
         At ED and ES.
     field_of_view : float
@@ -47,10 +47,10 @@ def draw(path: str | Path, pictures: Mapping[str, Sequence[Picture]], field_of_v
     Returns
     -------
     Path
-        The picture.
+        The file.
     """
-    sheet = style.figure(2.6 * len(pictures) + 0.5, 5.7)
-    panels = sheet.subplots(2, len(pictures), sharex=True, sharey=True, squeeze=False)
+    figure = style.figure(2.6 * len(pictures) + 0.5, 5.7)
+    panels = figure.subplots(2, len(pictures), sharex=True, sharey=True, squeeze=False)
     for column, (view, pair) in zip(panels.T, pictures.items(), strict=True):
         column[0].set_title(style.title(view))
         column[1].set_xlabel("Lateral (mm)")
@@ -59,11 +59,11 @@ def draw(path: str | Path, pictures: Mapping[str, Sequence[Picture]], field_of_v
     for panel, name in zip(panels[:, 0], ("ED", "ES"), strict=True):
         panel.set_ylabel("Axial (mm)")
         panel.text(0.04, 0.96, name, color="white", va="top", fontweight="bold", transform=panel.transAxes)
-    return style.save(sheet, path)
+    return style.save(figure, path)
 
 
 def _image(axes: Axes, picture: Picture, side: float) -> None:
-    """Grey levels and the border of the wall; the side is in mm."""
+    """Draw grey levels and the border of the wall; the side is in mm."""
     extent, mask = (-side / 2, side / 2, side, 0), picture.mask
     axes.imshow(picture.image, cmap="gray", vmin=0, vmax=255, extent=extent)
     if mask.any() and not mask.all():

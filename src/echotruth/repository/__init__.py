@@ -1,1 +1,1 @@
-"""The repository: what arrays there are, where they lie, and the ledger of what was written."""
+"""The repository: its arrays, their store on disk, and the ledger of finished jobs."""

@@ -1,4 +1,4 @@
-"""What is said of one array of the repository."""
+"""Description of one array of the repository."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Array:
-    """One array of the repository.
+    """Description of one array of the repository.
 
     Attributes
     ----------
     name : str
-        Its name in its group.
+        In its group.
     dims : tuple of str
-        Names of its dimensions, in order.
+        Names of the dimensions, in order.
     dtype : str
     units : str
-        SI, as UDUNITS writes them; "1" for numbers without one.
+        SI, as UDUNITS writes them; "1" for dimensionless numbers.
     long_name : str
-        What it holds, for people and for plots.
+        Content, for readers and plots.
     """
 
     name: str
@@ -30,15 +30,16 @@ class Array:
 
     @property
     def leading(self) -> int:
-        """Number of leading dimensions that name the job which owns a shard: case, or case and view."""
+        """Number of leading dimensions that identify the job which writes a shard: case, or case and view."""
         return sum(dim in ("case", "view") for dim in self.dims)
 
     @property
     def fill(self) -> float | int | str:
-        """Value where nothing was written."""
-        return {"f": float("nan"), "s": ""}.get(self.dtype[0], 0)
+        """Value of elements that were not written."""
+        fills: dict[str, float | int | str] = {"f": float("nan"), "s": ""}
+        return fills.get(self.dtype[0], 0)
 
 
 def array(name: str, dims: str, dtype: str, units: str, long_name: str) -> Array:
-    """An array whose dimensions are told in one string."""
+    """Description of an array whose dimensions are given as one string."""
     return Array(name, tuple(dims.split()), dtype, units, long_name)

@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 
 def sizes(mesh: Mesh) -> dict[str, int]:
-    """Lengths of the dimensions that carry no labels.
+    """Lengths of the dimensions without coordinates.
 
     Parameters
     ----------
     mesh : Mesh
-        That of any case: all share their numbering.
+        Of any case: all meshes have the same topology.
     """
     return {
         "node": len(mesh.nodes),
@@ -40,32 +40,32 @@ def sizes(mesh: Mesh) -> dict[str, int]:
 def positions(
     config: Config, pixel_centres: Callable[..., tuple[ArrayLike, ArrayLike]], grid: Callable[..., ArrayLike]
 ) -> dict[str, ArrayLike]:
-    """Where the pixels and the tracked points of every image size are.
+    """Positions of the pixels and the tracked points of every image size.
 
     Parameters
     ----------
     config : Config
     pixel_centres : callable
-        (bmode, size) to axial and lateral pixel centres, m.
+        From (bmode, size) to the axial and lateral pixel centres, m.
     grid : callable
-        (shape, step) to points (axial, lateral, 2), lateral and axial, px.
+        From (shape, step) to points (axial, lateral, 2): lateral, axial, px.
 
     Returns
     -------
     dict
         `group:axial` and `group:lateral`, m.
     """
-    places: dict[str, ArrayLike] = {}
+    coordinates: dict[str, ArrayLike] = {}
     centres = {size: tuple(map(np.asarray, pixel_centres(config.bmode, size))) for size in config.bmode.sizes}
     largest = config.bmode.sizes[0]
     points = np.asarray(grid((largest, largest), config.tracking.grid_px)).astype(int)
     for size, (axial, lateral) in centres.items():
         for stage in ("truth", "bmode"):
-            places |= {f"{stage}/{size}:axial": axial, f"{stage}/{size}:lateral": lateral}
+            coordinates |= {f"{stage}/{size}:axial": axial, f"{stage}/{size}:lateral": lateral}
         for stage in ("tracking", "evaluation"):
-            places[f"{stage}/{size}:axial"] = centres[largest][0][points[:, 0, 1]]
-            places[f"{stage}/{size}:lateral"] = centres[largest][1][points[0, :, 0]]
-    return places
+            coordinates[f"{stage}/{size}:axial"] = centres[largest][0][points[:, 0, 1]]
+            coordinates[f"{stage}/{size}:lateral"] = centres[largest][1][points[0, :, 0]]
+    return coordinates
 
 
 def labels(config: Config, rows: list[str], times: ArrayLike) -> dict[str, ArrayLike]:
@@ -75,11 +75,11 @@ def labels(config: Config, rows: list[str], times: ArrayLike) -> dict[str, Array
     ----------
     config : Config
     rows : list of str
-        Case ids in the order of their rows.
+        Case ids, in the order of the rows.
     times : ndarray of shape (case, frame), s
     """
     layers = np.arange(1, config.fibres.layers + 1)
-    common = {
+    common: dict[str, ArrayLike] = {
         "case": rows,
         "view": list(config.views),
         "frame": np.arange(config.loop.frames),
@@ -93,10 +93,10 @@ def labels(config: Config, rows: list[str], times: ArrayLike) -> dict[str, Array
 
 
 def columns(table: pd.DataFrame, rows: list[str]) -> dict[str, NDArray[Any]]:
-    """Columns of the table of cases by the row each case has, as `cases:KEY`; NaN or "" for retired cases."""
-    found = {}
+    """Columns of the table of cases as `cases:KEY`, one value per row; NaN or "" for retired cases."""
+    arrays = {}
     for key, column in table.set_index("case").reindex(rows).items():
         text = column.map(lambda value: isinstance(value, str)).any()
         values = column.fillna("") if text else column.astype(float)
-        found[f"cases:{key}"] = np.asarray(values, dtype=str if text else float)
-    return found
+        arrays[f"cases:{key}"] = np.asarray(values, dtype=str if text else float)
+    return arrays

@@ -1,4 +1,4 @@
-"""The ledger: one record for every finished job, its commit mark, and the rows given to cases."""
+"""The ledger: one record for every finished job, which commits its results, and the rows of the cases."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from pathlib import Path
 from typing import Any
 
 GATES = ("mechanics", "physiology")
-"""Stages whose verdict on a heart keeps the later ones from it."""
+"""Stages that decide whether the later ones process a heart."""
 
 VIEW_STAGES = ("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
 """Stages with a record for every view of a case."""
 
 
 def record_path(folder: Path, stage: str, case: str, view: str | None = None) -> Path:
-    """Where the record of a job stands: ledger/STAGE/CASE.json or ledger/STAGE/CASE/VIEW.json."""
+    """Path of the record of a job: ledger/STAGE/CASE.json or ledger/STAGE/CASE/VIEW.json."""
     name = f"{case}.json" if view is None else f"{case}/{view}.json"
     return folder / "ledger" / stage / name
 
 
 def commit(path: Path, record: dict[str, Any]) -> None:
-    """Write a record whole or not at all: on disk before it takes its name."""
+    """Write a record atomically: its content is on disk before the file gets its name."""
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     with draft.open("w", encoding="utf-8") as file:
@@ -34,23 +34,23 @@ def commit(path: Path, record: dict[str, Any]) -> None:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """A record."""
+    """Read a record."""
     return json.loads(path.read_text(encoding="utf-8"))
 
 
 def checksums(files: list[Path], root: Path) -> dict[str, str]:
-    """Path below `root` to SHA-256 of each file."""
+    """SHA-256 of each file by its path below `root`."""
     return {file.relative_to(root).as_posix(): sha256(file.read_bytes()).hexdigest() for file in files}
 
 
 def rows(registry: Path) -> dict[str, int]:
-    """Row of every case ever registered: one id a line, its line is its row."""
+    """Row of every case ever registered: the number of the line with its id."""
     known = registry.read_text(encoding="utf-8").split() if registry.exists() else []
     return {id: row for row, id in enumerate(known)}
 
 
 def register(registry: Path, ids: list[str]) -> dict[str, int]:
-    """Give new cases the next rows; none is ever moved.
+    """Append new cases to the registry; the row of a case never changes.
 
     Parameters
     ----------

@@ -1,10 +1,11 @@
-"""What a result was made from: code, settings, packages."""
+"""Versions of the code, settings and packages from which a result was made."""
 
 from __future__ import annotations
 
 import ast
 import json
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
@@ -14,69 +15,63 @@ from typing import Any
 import echotruth
 
 PACKAGES = ("numpy", "scipy", "numba", "scikit-image", "pypardiso", "mkl", "meshio", "vtk", "xarray", "zarr")
-"""Packages whose version may show in the numbers, beside OpenCV, which is installed under several names."""
+"""Packages whose version may affect the numbers, besides OpenCV, which is installed under several names."""
 
-_APART = ("echotruth.config", "echotruth.cases", "echotruth.repository.provenance", "echotruth.repository")
-"""Modules that carry settings and results but make none: their change reruns nothing."""
+_EXCLUDED = ("echotruth.config", "echotruth.cases", "echotruth.repository.provenance", "echotruth.repository")
+"""Modules that pass on settings and results without affecting them: a change of these reruns nothing."""
 
 
 @cache
 def code_version(*modules: str) -> str:
-    """Hash of the parsed source of modules and of all of echotruth that they import.
+    """Hash of the parsed source of modules and of all modules of echotruth that they import.
 
-    Comments, layout and docstrings do not enter it.
+    It does not depend on comments, layout and docstrings.
 
     Parameters
     ----------
     *modules : str
-        As "echotruth.mechanics", or the path of a script.
+        Names such as "echotruth.mechanics", or paths of scripts.
     """
     digest = sha256()
-    for name in sorted(_closure(modules)):
-        digest.update(_plain(name))
+    for name in sorted(_dependencies(modules)):
+        digest.update(_canonical_source(name))
     return digest.hexdigest()[:16]
 
 
 def settings_version(*settings: Any) -> str:
-    """Hash of settings: sections, or plain values."""
-    plain = [item.model_dump(mode="json") if hasattr(item, "model_dump") else item for item in settings]
-    return sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
+    """Hash of settings: sections or plain values."""
+    values = [item.model_dump(mode="json") if hasattr(item, "model_dump") else item for item in settings]
+    return sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def packages() -> dict[str, str]:
-    """Name to version of the packages whose version may show in the numbers, and of echotruth."""
-    found = {"echotruth": echotruth.__version__}
+    """Versions of echotruth and of the packages that may affect the numbers, by name."""
+    versions = {"echotruth": echotruth.__version__}
     for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found | _opencv()
-
-
-def _opencv() -> dict[str, str]:
-    """OpenCV's own version: some packages of it leave no name to ask for."""
-    try:
+        with suppress(PackageNotFoundError):
+            versions[name] = version(name)
+    with suppress(ImportError):  # some distributions of OpenCV carry no metadata: ask the module itself
         import cv2
-    except ImportError:
-        return {}
-    return {"opencv": cv2.__version__}
+
+        versions["opencv"] = cv2.__version__
+    return versions
 
 
-def _closure(modules: tuple[str, ...]) -> set[str]:
-    found: set[str] = set()
-    open_names = list(modules)
-    while open_names:
-        name = open_names.pop()
-        if name not in found and not name.startswith(_APART):
-            found.add(name)
-            open_names.extend(_imports(name))
-    return found
+def _dependencies(modules: tuple[str, ...]) -> set[str]:
+    """The modules and all modules of echotruth that they import, directly or not."""
+    visited: set[str] = set()
+    pending = list(modules)
+    while pending:
+        name = pending.pop()
+        if name not in visited and not name.startswith(_EXCLUDED):
+            visited.add(name)
+            pending.extend(_imports(name))
+    return visited
 
 
 @cache
 def _imports(importer: str) -> list[str]:
-    """Modules of echotruth that a module imports, anywhere in it, their packages included."""
+    """Modules of echotruth, and their packages, that a module imports anywhere in its source."""
     names: set[str] = set()
     for node in _statements(_tree(importer)):
         if isinstance(node, ast.Import):
@@ -88,18 +83,18 @@ def _imports(importer: str) -> list[str]:
 
 
 def _discovered(package: str) -> set[str]:
-    """Modules of a package that imports whatever stands in its folder."""
+    """Modules of a package that imports all modules of its folder."""
     path = _path(package)
     return {f"{package}.{file.stem}" for file in path.parent.glob("*.py")} - {f"{package}.__init__"} if path else set()
 
 
 @cache
 def _path(name: str) -> Path | None:
-    """File of a script or of a module of echotruth, found without importing it."""
+    """File of a script or of a module of echotruth, without importing it."""
     if name.endswith(".py"):
         return Path(name)
-    place = Path(echotruth.__file__).parent.joinpath(*name.split(".")[1:])
-    files = (place.with_suffix(".py"), place / "__init__.py")
+    path = Path(echotruth.__file__).parent.joinpath(*name.split(".")[1:])
+    files = (path.with_suffix(".py"), path / "__init__.py")
     return next((file for file in files if file.is_file()), None)
 
 
@@ -110,25 +105,25 @@ def _tree(name: str) -> ast.Module:
 
 
 @cache
-def _plain(name: str) -> bytes:
-    """The parsed source of a script or module, as text without docstrings."""
+def _canonical_source(name: str) -> bytes:
+    """Syntax tree of a script or module, without docstrings, as text."""
     return ast.dump(_without_docstrings(_tree(name))).encode()
 
 
 def _without_docstrings(tree: ast.Module) -> ast.Module:
     for node in [tree, *_statements(tree)]:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
-            node.body = [line for line in node.body if not _is_text(line)]
+            node.body = [line for line in node.body if not _is_docstring(line)]
     return tree
 
 
 def _statements(node: ast.AST) -> Iterator[Any]:
-    """All statements in a node, however deep, and no expressions, which are most of a tree."""
+    """All statements in a node at any depth; expressions, most of a tree, are skipped."""
     for block in ("body", "orelse", "finalbody", "handlers", "cases"):
         for statement in getattr(node, block, ()):
             yield statement
             yield from _statements(statement)
 
 
-def _is_text(line: ast.stmt) -> bool:
+def _is_docstring(line: ast.stmt) -> bool:
     return isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant) and isinstance(line.value.value, str)

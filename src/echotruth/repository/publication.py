@@ -1,4 +1,4 @@
-"""Publication: verify what the ledger says was written, and describe the whole."""
+"""Publication of a repository: verification of its files against the ledger, verdicts and attributes."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from echotruth.repository.provenance import packages
 from echotruth.repository.store import Store
 
 
-class Damaged(ValueError):
-    """A file that is not what its job wrote."""
+class ChecksumError(ValueError):
+    """A file that is missing or differs from what its job wrote."""
 
 
 def publish(folder: Path) -> dict[str, Any]:
-    """Verify every shard against the ledger, write the verdicts and the attributes of the whole.
+    """Verify every shard against the ledger, then write the verdicts and the attributes of the repository.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def publish(folder: Path) -> dict[str, Any]:
 
     Raises
     ------
-    Damaged
-        Where a file is missing or differs from what its job wrote.
+    ChecksumError
+        If a file is missing or differs from what its job wrote.
     """
     config = load(folder / "config.yaml")
     store = Store(folder / f"{config.name}.zarr")
@@ -52,22 +52,23 @@ def publish(folder: Path) -> dict[str, Any]:
 
 
 def _verdict(paths: list[Path]) -> dict[str, Any]:
-    """The record of the first gate that did not let the heart pass, or of the last."""
+    """Record of the first gate that the heart did not pass, or of the last gate."""
     gates = [ledger.read(path) for path in paths[: len(GATES)]]
     return next((record for record in gates if record["status"] != "complete"), gates[-1])
 
 
 def _records(folder: Path, config: Config, case: str) -> list[Path]:
-    of_views = [record_path(folder, stage, case, view) for stage in VIEW_STAGES for view in config.views]
-    return [*(record_path(folder, stage, case) for stage in GATES), *of_views]
+    """Paths of the records of a case: those of the gates, then those of the views."""
+    gates = [record_path(folder, stage, case) for stage in GATES]
+    return gates + [record_path(folder, stage, case, view) for stage in VIEW_STAGES for view in config.views]
 
 
 def _verify(root: Path, path: Path, record: dict[str, Any]) -> int:
-    """Compare the files of a record with their checksums; how many there are."""
+    """Compare the files of a record with their checksums; returns their number."""
     for name, expected in record.get("sha256", {}).items():
         file = root / name
         if not file.is_file() or sha256(file.read_bytes()).hexdigest() != expected:
-            raise Damaged(f"{file}: is not what its job wrote: delete {path} and run again")
+            raise ChecksumError(f"{file}: is missing or differs from what its job wrote: delete {path} and run again")
     return len(record.get("sha256", {}))
 
 

@@ -1,4 +1,4 @@
-"""The tree on disk, array by array. `docs/schema.md` is made from this module."""
+"""All arrays of a repository, from which `docs/schema.md` is generated."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ FIBRES = (
     _array("wall_depth", "case node", "float64", "1", "wall depth, 0 at the endocardium and 1 at the epicardium"),
     _array("fibre", "case cell xyz", "float64", "1", "unit vector along the fibres at cell centroids, unloaded"),
     _array("sheet", "case cell xyz", "float64", "1", "unit vector along the sheets at cell centroids, unloaded"),
-    _array("helix_angle", "case cell", "float64", "rad", "helix angle at cell centroids, read back from the fibres"),
-    _array("transverse_angle", "case cell", "float64", "rad", "transverse angle, likewise"),
-    _array("sheet_angle", "case cell", "float64", "rad", "sheet angle, likewise"),
+    _array("helix_angle", "case cell", "float64", "rad", "helix angle at cell centroids"),
+    _array("transverse_angle", "case cell", "float64", "rad", "transverse angle at cell centroids"),
+    _array("sheet_angle", "case cell", "float64", "rad", "sheet angle at cell centroids"),
     _array("layer", "case cell", "uint8", "1", "transmural layer of the cell centroid, 1 at the endocardium"),
     _array("segment", "case cell", "uint8", "1", "AHA segment of the cell centroid"),
 )
@@ -40,10 +40,10 @@ PATHOLOGY = (
 )
 
 MECHANICS = (
-    _array("pressure", "case frame", "float64", "Pa", "cavity pressure met"),
-    _array("volume", "case frame", "float64", "m3", "cavity volume met"),
-    _array("pressure_asked", "case frame", "float64", "Pa", "cavity pressure asked for"),
-    _array("volume_asked", "case frame", "float64", "m3", "cavity volume asked for"),
+    _array("pressure", "case frame", "float64", "Pa", "cavity pressure, solved"),
+    _array("volume", "case frame", "float64", "m3", "cavity volume, solved"),
+    _array("pressure_target", "case frame", "float64", "Pa", "cavity pressure prescribed by the loop"),
+    _array("volume_target", "case frame", "float64", "m3", "cavity volume prescribed by the loop"),
     _array("active_tension", "case frame", "float64", "Pa", "active tension T_Ca, solved"),
     _array("displacement", "case frame node xyz", "float64", "m", "displacement of the nodes from unloaded"),
     _array("stiffness", "case", "float64", "Pa", "stiffness C of the healthy wall"),
@@ -52,7 +52,7 @@ MECHANICS = (
         "phase", "case frame", "uint8", "1", "0 filling, 1 isovolumic contraction, 2 ejection, 3 isovolumic relaxation"
     ),
     _array("newton_steps", "case frame", "int32", "1", "tangents factored to reach the frame"),
-    _array("residual", "case frame", "float64", "1", "relative imbalance of force, volume and growth left"),
+    _array("residual", "case frame", "float64", "1", "relative residual of force, cavity volume and cell volume"),
 )
 
 _STRAIN = "case frame cell strain_component"
@@ -71,18 +71,18 @@ KINEMATICS = (
 )
 
 PHYSIOLOGY = (
-    _array("twist", "case frame", "float64", "rad", "turn of apex against base since ED, counter-clockwise from apex"),
+    _array("twist", "case frame", "float64", "rad", "rotation of apex less base since ED, counter-clockwise from apex"),
     _array("longitudinal_strain", "case", "float64", "1", "wall mean of the longitudinal strain from ED at ES"),
     _array("circumferential_strain", "case", "float64", "1", "wall mean of the circumferential strain from ED at ES"),
     _array("ejection_fraction", "case", "float64", "1", "ejection fraction"),
     _array("volume_ratio_min", "case", "float64", "1", "smallest det F of all quadrature points and frames"),
-    _array("loop_error", "case", "float64", "1", "largest relative error of the pressure or volume asked for"),
+    _array("loop_error", "case", "float64", "1", "largest relative error of the prescribed pressure or volume"),
     _array("tension_min", "case", "float64", "Pa", "smallest active tension of all frames"),
     _array("tension_es", "case", "float64", "Pa", "active tension at ES"),
 )
 
 PHANTOM = (
-    _array("scatterers", "case view", "int32", "1", "number of scatterers in the wall that come into the beam"),
+    _array("scatterers", "case view", "int32", "1", "number of scatterers in the wall that enter the beam"),
     _array("origin", "case view xyz", "float64", "m", "centre of the array in the heart frame"),
     _array("axes", "case view vector xyz", "float64", "1", "lateral, axial and elevation axes in the heart frame"),
     _array("centre", "case view plane", "float64", "m", "origin of polar components in the image"),
@@ -106,17 +106,17 @@ LINES = (_array("lines", f"{_FRAME} line range", "complex64", "1", "lines, demod
 CHANNELS = (
     _array(
         *("channels", f"{_FRAME} transmitter receiver sample", "int16", "1"),
-        "RF of every element after each has sent alone, in steps of channels_step",
+        "RF of every receiver for every transmitter alone, in steps of channels_step",
     ),
     _array("channels_step", _FRAME, "float64", "1", "value of one step of channels"),
 )
 TRANSMITS = (
     _array("transmit_delay", "transmit element", "float64", "s", "delay of an element"),
     _array("transmit_weight", "transmit element", "float64", "1", "weight of an element"),
-    _array("transmit_origin", "transmit plane", "float64", "m", "where a wave comes from; of plane ones the direction"),
-    _array("transmit_lead", "transmit", "float64", "m", "distance of a wave from its origin at time 0"),
+    _array("transmit_origin", "transmit plane", "float64", "m", "source of a wave; of a plane wave the direction"),
+    _array("transmit_t0_distance", "transmit", "float64", "m", "distance of a wave from its origin at time 0"),
 )
-"""How the waves were sent of which the lines are made: they stand wherever RF is kept."""
+"""Transmitted waves from which the lines are made; stored wherever RF is kept."""
 RF = (*LINES, *CHANNELS, *TRANSMITS)
 
 COORDINATES = (
@@ -133,21 +133,21 @@ COORDINATES = (
     _array("strain_component", "strain_component", "string", "1", "radial, circumferential, longitudinal"),
     _array("fibre_component", "fibre_component", "string", "1", "fibre, sheet, normal"),
     _array("wall_component", "wall_component", "string", "1", "radial, tangential (CC or LL), shear along the wall"),
-    _array("reference", "reference", "string", "1", "what strain is compared with"),
+    _array("reference", "reference", "string", "1", "reference strain"),
     _array("statistic", "statistic", "string", "1", "mean, median, 95th percentile"),
     _array("agreement", "agreement", "string", "1", "mean difference, limits of agreement, correlation"),
     _array("layer", "layer", "int32", "1", "transmural layer, 1 at the endocardium"),
     _array("region", "region", "int32", "1", "transmural layer, 0 for the whole wall"),
     _array("aha", "aha", "int32", "1", "AHA segment"),
     _array("line_angle", "line", "float64", "rad", "angle of a line from the axial axis"),
-    _array("line_foot", "line", "float64", "m", "lateral position at which a line leaves the array"),
-    _array("range", "range", "float64", "m", "distance along a line from its foot"),
-    _array("sample", "sample", "float64", "s", "time since the element sent"),
+    _array("line_origin", "line", "float64", "m", "lateral position of the origin of a line on the array"),
+    _array("range", "range", "float64", "m", "distance along a line from its origin"),
+    _array("sample", "sample", "float64", "s", "time since the element transmitted"),
     _array("element", "element", "float64", "m", "lateral position of the element"),
-    _array("transmitter", "transmitter", "float64", "m", "lateral position of the element that sends"),
-    _array("receiver", "receiver", "float64", "m", "lateral position of the element that receives"),
+    _array("transmitter", "transmitter", "float64", "m", "lateral position of the transmitting element"),
+    _array("receiver", "receiver", "float64", "m", "lateral position of the receiving element"),
     _array("polar", "polar", "string", "1", "radial, tangential (long axis: transverse, longitudinal)"),
-    _array("measure", "measure", "string", "1", "polar component, or the vector as a whole"),
+    _array("measure", "measure", "string", "1", "polar component, or the whole vector"),
 )
 
 LABELS: dict[str, tuple[str, ...]] = {
@@ -174,16 +174,15 @@ STAGES = {
     "physiology": PHYSIOLOGY,
     "phantom": PHANTOM,
 }
-"""Stages whose arrays stand once."""
+"""Stages whose arrays exist once."""
 
 SIZED = {"truth": TRUTH, "bmode": BMODE, "tracking": TRACKING, "evaluation": EVALUATION}
-"""Stages whose arrays stand once for every image size, in a group named by it."""
+"""Stages whose arrays exist once per image size, in a group named after it."""
 
-ASKED = {"rf": RF}
-"""Stages whose arrays stand only where `rf.keep` asks for them."""
+OPTIONAL = {"rf": RF}
+"""Stages whose arrays exist only as `rf.keep` requests."""
 
-ALL = STAGES | ASKED | SIZED
-
+ALL = STAGES | OPTIONAL | SIZED
 
 CASES = (
     _array(
@@ -192,14 +191,14 @@ CASES = (
     ),
     _array("reason", "case", "string", "1", "why a case is not complete"),
 )
-"""Beside these the group `cases` holds one array for every key that a case could vary, in the key's unit."""
+"""The group `cases` also holds one array for every key that cases can vary, in the unit of the key."""
 
 
 def parameters(columns: dict[str, NDArray[Any]]) -> tuple[Array, ...]:
     """Arrays of the group `cases` for the columns of the table of cases."""
-    kinds = {"f": "float64", "i": "int64", "b": "bool"}
+    types = {"f": "float64", "i": "int64", "b": "bool"}
     arrays = [
-        Array(key, ("case",), kinds.get(values.dtype.kind, "string"), _UNITS.get(unit_of(key), "1"), key)
+        Array(key, ("case",), types.get(values.dtype.kind, "string"), _UNITS.get(unit_of(key), "1"), key)
         for key, values in ((name.removeprefix("cases:"), values) for name, values in columns.items())
     ]
     return (*CASES, *arrays)
@@ -222,27 +221,28 @@ _UNITS = {
 
 
 def groups(config: Config) -> dict[str, tuple[Array, ...]]:
-    """Path of every group below the root to its arrays, coordinates left out."""
+    """Arrays of every group, without coordinates, by the path of the group."""
     sized = {f"{stage}/{size}": arrays for stage, arrays in SIZED.items() for size in config.bmode.sizes}
-    return {"cases": CASES} | STAGES | sized | ({"rf": kept(config)} if config.rf.keep else {})
+    return {"cases": CASES} | STAGES | sized | ({"rf": rf_arrays(config)} if config.rf.keep else {})
 
 
-def kept(config: Config) -> tuple[Array, ...]:
-    """Arrays of the group `rf`: what is kept of the RF, and how it was sent."""
+def rf_arrays(config: Config) -> tuple[Array, ...]:
+    """Arrays of the group `rf`: the RF that is kept, and its transmits."""
     lines, channels = (name in config.rf.keep for name in ("lines", "channels"))
     return (LINES if lines else ()) + (CHANNELS if channels else ()) + TRANSMITS
 
 
 def written_by(stage: str, config: Config) -> list[str]:
-    """Groups that the jobs of a stage write; the job that solves a heart writes all but the measures of the solved."""
+    """Groups that the jobs of a stage write; mechanics writes all groups of a heart except `physiology`."""
     if stage == "mechanics":
         return [group for group, arrays in STAGES.items() if arrays[0].leading == 1 and group != "physiology"]
-    whole = [stage] if stage in STAGES or (stage == "rf" and config.rf.keep) else []
-    return [f"{stage}/{size}" for size in config.bmode.sizes] if stage in SIZED else whole
+    if stage in SIZED:
+        return [f"{stage}/{size}" for size in config.bmode.sizes]
+    return [stage] if stage in STAGES or (stage == "rf" and config.rf.keep) else []
 
 
 def coordinates(arrays: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Coordinates of a group: those along a dimension of its arrays."""
+    """Coordinates of a group: those along the dimensions of its arrays."""
     dims = {dim for array in arrays for dim in array.dims}
-    taken = {array.name for array in arrays}
-    return tuple(array for array in COORDINATES if dims >= set(array.dims) and array.name not in taken)
+    names = {array.name for array in arrays}
+    return tuple(array for array in COORDINATES if dims >= set(array.dims) and array.name not in names)

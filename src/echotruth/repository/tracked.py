@@ -1,4 +1,4 @@
-"""Arrays of the tracked motion and of its scores."""
+"""Arrays of the tracked displacement and of its scores."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ TRACKING = (
     array(
         "displacement", "case view tracker frame axial lateral plane", "float32", "m", "tracked displacement from ED"
     ),
-    array("quality", "case view tracker frame axial lateral", "float32", "1", "how sure the tracker is, 0 to 1"),
+    array("quality", "case view tracker frame axial lateral", "float32", "1", "confidence of the tracker, 0 to 1"),
 )
 
 _POINT = "case view frame axial lateral"
@@ -18,7 +18,7 @@ EVALUATION = (
     array("through_plane", _POINT, "float32", "m", "true displacement out of the plane"),
     array(
         *("true_strain", "case view reference frame axial lateral wall_component", "float32", "1"),
-        "strain from ED: of the heart, of what its plane shows, of the operator on the true displacement",
+        "strain from ED: of the heart, of its motion in the plane, of the operator on the true displacement",
     ),
     array("wall_axes", "case view axial lateral polar plane", "float32", "1", "the wall's axes in the image at ED"),
     array("layer", "case view axial lateral", "uint8", "1", "transmural layer of the point at ED, 0 outside"),
@@ -26,28 +26,28 @@ EVALUATION = (
     array("through_plane_rms", "case view", "float64", "m", "RMS of the displacement out of the plane at ES"),
     array(
         *("operator_bias", "case view reference region wall_component", "float64", "1"),
-        "mean of the operator's strain of the true displacement minus the reference at ES",
+        "mean strain of the operator on the true displacement minus the reference at ES",
     ),
-    array("operator_rms", "case view reference region wall_component", "float64", "1", "RMS of the same"),
+    array("operator_rms", "case view reference region wall_component", "float64", "1", "RMS of that difference"),
     array(
         *("tracked_strain", f"{_TRACKED} frame axial lateral wall_component", "float32", "1"),
         "strain from ED of the tracked displacement, by the operator",
     ),
     array("rms_error", f"{_TRACKED} region measure", "float64", "m", "RMS error of displacement at ES"),
     array("nrmse", f"{_TRACKED} region measure", "float64", "1", "RMS error over RMS of the true displacement at ES"),
-    array("nrmse_all", _TRACKED, "float64", "1", "the same of the whole wall, lost points counted as still"),
-    array("nrmse_cycle", _TRACKED, "float64", "1", "the same of the whole wall and cycle"),
+    array("nrmse_all", _TRACKED, "float64", "1", "NRMSE of the whole wall, displacement 0 where there is no estimate"),
+    array("nrmse_cycle", _TRACKED, "float64", "1", "NRMSE of the whole wall and cycle"),
     array("segment_rms_error", f"{_TRACKED} aha measure", "float64", "m", "RMS error of displacement at ES"),
-    array("segment_nrmse", f"{_TRACKED} aha measure", "float64", "1", "RMS error over RMS truth at ES"),
+    array("segment_nrmse", f"{_TRACKED} aha measure", "float64", "1", "NRMSE of a segment at ES"),
     array("frame_rms_error", f"{_TRACKED} frame measure", "float64", "m", "RMS error of displacement"),
-    array("frame_nrmse", f"{_TRACKED} frame measure", "float64", "1", "RMS error over RMS truth of the frame"),
+    array("frame_nrmse", f"{_TRACKED} frame measure", "float64", "1", "NRMSE of the whole wall"),
     array("end_point_error", f"{_TRACKED} region statistic", "float64", "m", "length of the error at ES"),
     array("drift", _TRACKED, "float64", "m", "RMS error of displacement in the last frame"),
     array("through_plane_correlation", _TRACKED, "float64", "1", "of the error's length with motion out of the plane"),
     array("tracked_spread", f"{_TRACKED} region polar", "float64", "m", "standard deviation of displacement at ES"),
     array("true_spread", f"{_TRACKED} region polar", "float64", "m", "the same of the true displacement"),
-    array("tracked_spread_change", _TRACKED, "float64", "percent", "fall of tangential spread, endo- to epicardium"),
-    array("true_spread_change", _TRACKED, "float64", "percent", "the same of the true displacement"),
+    array("tracked_transmural_gradient", _TRACKED, "float64", "percent", "fall of tangential spread, endo to epi"),
+    array("true_transmural_gradient", _TRACKED, "float64", "percent", "the same of the true displacement"),
     array("tracked_segment", f"{_TRACKED} aha polar", "float64", "m", "mean displacement of a segment at ES"),
     array("true_segment", f"{_TRACKED} aha polar", "float64", "m", "the same of the true displacement"),
     array("strain_bias", f"{_TRACKED} reference region wall_component", "float64", "1", "mean error of strain at ES"),
@@ -60,20 +60,20 @@ EVALUATION = (
     array("tracked_global_strain", f"{_TRACKED} frame wall_component", "float64", "1", "mean strain of the wall"),
     array(
         *("true_global_strain", f"{_TRACKED} reference frame wall_component", "float64", "1"),
-        "the same of the references",
+        "its references",
     ),
     array("tracked_segment_strain", f"{_TRACKED} frame aha wall_component", "float64", "1", "mean strain of a segment"),
     array(
         *("true_segment_strain", f"{_TRACKED} reference frame aha wall_component", "float64", "1"),
-        "the same of the references",
+        "its references",
     ),
     array(
         *("segment_strain_error", f"{_TRACKED} reference wall_component", "float64", "1"),
-        "mean size of the error of a segment's strain at ES",
+        "mean absolute error of the strain of a segment at ES",
     ),
     array(
         *("segment_agreement", f"{_TRACKED} reference agreement wall_component", "float64", "1"),
         "agreement of the strain of segments at ES",
     ),
-    array("coverage", _TRACKED, "float64", "1", "share of the wall's points with an estimate"),
+    array("coverage", _TRACKED, "float64", "1", "fraction of the wall's points with an estimate"),
 )

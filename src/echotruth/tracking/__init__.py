@@ -1,4 +1,4 @@
-"""Motion found in B-mode clips.
+"""Speckle tracking: displacement of the tissue from B-mode clips.
 
 Points and in-plane vectors are in the order lateral, axial throughout; images are stored (axial, lateral).
 """

@@ -1,11 +1,11 @@
-"""How rough a B-spline field is along the wall and, less so, across it.
+"""Bending energy of a B-spline field, anisotropic along and through the wall.
 
-The roughness is the sum over the pixels of |M H M|^2 with H the second derivatives of the field, in a metric M that
-shortens what lies across the wall: a wall thickens unevenly over a millimetre, but what happens at one place of its
-circumference happens beside it too. Derivatives are taken along and across the wall, of the components along and across
-it, so that a ring which contracts or turns evenly is not rough. Where this frame turns by the angle phi and J is the
-quarter turn, D_i u = d_i u - (d_i phi) J u, and the index of a derivative turns likewise; in a straight wall that is
-the thin-plate energy.
+The energy is the sum over the pixels of |M H M|^2, where H are the second derivatives of the field and the metric M
+scales lengths through the wall: a wall thickens unevenly over a millimetre, but neighbouring parts of its circumference
+move alike. Derivatives are taken along and through the wall, of the components along and through it, so that the even
+contraction or rotation of a ring has no energy. Where this frame turns by the angle phi and J is the rotation by 90
+degrees, D_i u = d_i u - (d_i phi) J u, and the index of a derivative turns likewise; in a straight wall that is the
+thin-plate energy.
 """
 
 from __future__ import annotations
@@ -15,118 +15,123 @@ import numpy as np
 from scipy import ndimage
 
 from echotruth.tracking import cubic
-from echotruth.tracking.alignment import add_cell
+from echotruth.tracking.alignment import add_cell_matrices
 from echotruth.tracking.bspline import Cells
 
-VAGUE = 0.3
-"""Share of the directions about a pixel that must agree for its own to be known; with less, it turns less."""
+MIN_COHERENCE = 0.3
+"""Coherence of the wall's direction around a pixel (0 to 1) below which derivatives of its angle are reduced."""
 
 
-def roughness(cells: Cells, metrics: np.ndarray, turns: np.ndarray, size: int) -> np.ndarray:
-    """Band of the matrix of the roughness, its diagonal one in the mean.
+def bending_energy(cells: Cells, metrics: np.ndarray, angle_derivatives: np.ndarray, size: int) -> np.ndarray:
+    """Banded matrix of the bending energy, scaled to a mean diagonal of 1.
 
     Parameters
     ----------
     cells : Cells
-        Of the pixels.
+        The pixels.
     metrics : ndarray of shape (pixel, 3)
         Entries xx, xy, yy of M.
-    turns : ndarray of shape (pixel, 5)
-        Derivatives x, y, xx, xy, yy of the angle of the frame, rad, a unit being the distance of the knots.
+    angle_derivatives : ndarray of shape (pixel, 5)
+        Derivatives x, y, xx, xy, yy of phi, rad per knot spacing (squared).
     size : int
         Number of knots.
 
     Returns
     -------
     ndarray of shape (unknowns, width)
-        See :func:`echotruth.tracking.alignment.add_matrix`.
+        See :func:`echotruth.tracking.alignment.add_normal_matrix`.
     """
     lowest = np.where(cells.knots < 0, size, cells.knots).min(1)
     band = np.zeros((2 * size, 2 * int((cells.knots.max(1) - lowest).max()) + 2))
-    _add(cells.knots, cells.first, *map(derivatives, cells.fraction.T), metrics, turns, band)
+    basis_x, basis_y = map(basis_derivatives, cells.fraction.T)
+    _add(cells.knots, cells.offsets, basis_x, basis_y, metrics, angle_derivatives, band)
     return band / band[:, -1].mean()
 
 
-def frame(mask: np.ndarray, wide: np.ndarray, width: float, across: float) -> tuple[np.ndarray, np.ndarray]:
-    """Metric and turning of the frame of the wall at every pixel.
+def wall_frame(
+    mask: np.ndarray, pixels: np.ndarray, width: float, transmural_scale: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Metric and angle derivatives of the local frame of the wall, from the structure tensor of its distance map.
 
     Parameters
     ----------
-    mask, wide : ndarray of shape (axial, lateral), bool
-        The wall, and the pixels that are wanted.
+    mask, pixels : ndarray of shape (axial, lateral), bool
+        The wall, and the pixels at which the result is wanted.
     width : float
-        Standard deviation of the Gaussian over which directions are averaged, and unit of the derivatives, px.
-    across : float
-        Length of a unit through the wall; one along it is 1, and in between where the wall has no direction.
+        Standard deviation of the Gaussian window of the structure tensor, and unit of the derivatives, px.
+    transmural_scale : float
+        Scale of lengths through the wall; 1 along it, and in between where the wall has no clear direction.
 
     Returns
     -------
     metrics : ndarray of shape (pixel, 3)
-        Entries xx, xy, yy, in the order of the True pixels of `wide`.
-    turns : ndarray of shape (pixel, 5)
-        Derivatives x, y, xx, xy, yy of the angle, rad; less where the wall has no direction.
+        Entries xx, xy, yy of M, in the order of the True entries of `pixels`.
+    angle_derivatives : ndarray of shape (pixel, 5)
+        Derivatives x, y, xx, xy, yy of phi, rad; reduced where the wall has no clear direction.
     """
-    depth = ndimage.distance_transform_edt(~mask) - ndimage.distance_transform_edt(mask)
-    down, right = np.gradient(ndimage.gaussian_filter(depth, 1.0))
-    xx, xy, yy = (ndimage.gaussian_filter(each, width) for each in (right**2, right * down, down**2))
+    distance = ndimage.distance_transform_edt(~mask) - ndimage.distance_transform_edt(mask)
+    gy, gx = np.gradient(ndimage.gaussian_filter(distance, 1.0))
+    xx, xy, yy = (ndimage.gaussian_filter(product, width) for product in (gx**2, gx * gy, gy**2))
     trace = np.maximum(xx + yy, 1e-12)
-    less = 1 - across
-    metrics = np.stack([1 - less * xx / trace, -less * xy / trace, 1 - less * yy / trace], -1)
-    # The direction has no sign, but twice its angle is known.
+    shortening = 1 - transmural_scale
+    metrics = np.stack([1 - shortening * xx / trace, -shortening * xy / trace, 1 - shortening * yy / trace], -1)
+    # A normal has no sign, but 2 phi is unique. d phi = (cos d sin - sin d cos) / (2 (cos^2 + sin^2)), all of 2 phi.
     cosine, sine = (xx - yy) / trace, 2 * xy / trace
-    slopes = zip(np.gradient(cosine, 1 / width), np.gradient(sine, 1 / width), strict=True)
-    known = 2 * np.maximum(cosine**2 + sine**2, VAGUE**2)
-    y, x = ((cosine * each - sine * other) / known for other, each in slopes)
-    bends = [np.gradient(each, 1 / width) for each in (x, y)]
-    turns = np.stack([x, y, bends[0][1], (bends[0][0] + bends[1][1]) / 2, bends[1][0]], -1)
-    return metrics[wide], turns[wide]
+    gradients = zip(np.gradient(cosine, 1 / width), np.gradient(sine, 1 / width), strict=True)
+    denominator = 2 * np.maximum(cosine**2 + sine**2, MIN_COHERENCE**2)
+    y, x = ((cosine * d_sine - sine * d_cosine) / denominator for d_cosine, d_sine in gradients)
+    (dxy, dxx), (dyy, dyx) = (np.gradient(derivative, 1 / width) for derivative in (x, y))
+    angle_derivatives = np.stack([x, y, dxx, (dxy + dyx) / 2, dyy], -1)
+    return metrics[pixels], angle_derivatives[pixels]
 
 
-def derivatives(fraction: np.ndarray) -> np.ndarray:
-    """Shares of cubic B-splines with their first and second derivatives at fractions (point,); (point, 3, 4)."""
-    kinds = (cubic.shares, cubic.slopes, cubic.bends)
-    return np.stack([np.stack(kind(fraction), -1) for kind in kinds], 1)
+def basis_derivatives(fraction: np.ndarray) -> np.ndarray:
+    """Cubic basis functions, their first and second derivatives at fractions (point,) of a cell; (point, 3, 4)."""
+    orders = (cubic.bspline_weights, cubic.first_derivatives, cubic.second_derivatives)
+    return np.stack([np.stack(order(fraction), -1) for order in orders], 1)
 
 
 @numba.njit(cache=True, nogil=True)
-def _add(knots, first, across, down, metrics, turns, band):
-    local, straight, turned = np.zeros((3, 16, 16)), np.empty((16, 4)), np.empty((16, 4))
+def _add(knots, offsets, basis_x, basis_y, metrics, angle_derivatives, band):
+    cell_matrices, parallel, rotated = np.zeros((3, 16, 16)), np.empty((16, 4)), np.empty((16, 4))
     for cell in range(len(knots)):
-        local[:] = 0
-        for point in range(first[cell], first[cell + 1]):
+        cell_matrices[:] = 0
+        for point in range(offsets[cell], offsets[cell + 1]):
             for k in range(16):
                 i, j = k // 4, k % 4
-                _bend(down[point, :, i], across[point, :, j], turns[point], straight[k], turned[k])
-                _stretch(metrics[point], straight[k])
-                _stretch(metrics[point], turned[k])
+                _second_derivatives(
+                    basis_y[point, :, i], basis_x[point, :, j], angle_derivatives[point], parallel[k], rotated[k]
+                )
+                _apply_metric(metrics[point], parallel[k])
+                _apply_metric(metrics[point], rotated[k])
             for k in range(16):
                 for m in range(16):
                     for e in range(4):
-                        local[0, k, m] += straight[k, e] * straight[m, e] + turned[k, e] * turned[m, e]
-                        local[1, k, m] += turned[k, e] * straight[m, e] - straight[k, e] * turned[m, e]
-        local[2] = local[0]
-        add_cell(knots[cell], local, band)
+                        cell_matrices[0, k, m] += parallel[k, e] * parallel[m, e] + rotated[k, e] * rotated[m, e]
+                        cell_matrices[1, k, m] += rotated[k, e] * parallel[m, e] - parallel[k, e] * rotated[m, e]
+        cell_matrices[2] = cell_matrices[0]
+        add_cell_matrices(knots[cell], cell_matrices, band)
 
 
 @numba.njit(cache=True, nogil=True)
-def _bend(down, across, turn, straight, turned):
-    """Entries xx, xy, yx, yy of D D B e for a spline B and a unit vector e: factors of e, and of J e."""
-    value, bx, by = down[0] * across[0], down[0] * across[1], down[1] * across[0]
-    bxx, bxy, byy = down[0] * across[2], down[1] * across[1], down[2] * across[0]
-    x, y, xx, xy, yy = turn
-    straight[0] = bxx - x * x * value + x * by
-    straight[1] = bxy - x * y * value - x * bx
-    straight[2] = bxy - x * y * value + y * by
-    straight[3] = byy - y * y * value - y * bx
-    turned[0] = -xx * value - 2 * x * bx - x * y * value
-    turned[1] = -xy * value - y * bx - x * by + x * x * value
-    turned[2] = -xy * value - x * by - y * bx - y * y * value
-    turned[3] = -yy * value - 2 * y * by + x * y * value
+def _second_derivatives(basis_y, basis_x, angle_derivatives, parallel, rotated):
+    """Write entries xx, xy, yx, yy of D D B e for a basis function B and a unit vector e: factors of e, and of J e."""
+    value, bx, by = basis_y[0] * basis_x[0], basis_y[0] * basis_x[1], basis_y[1] * basis_x[0]
+    bxx, bxy, byy = basis_y[0] * basis_x[2], basis_y[1] * basis_x[1], basis_y[2] * basis_x[0]
+    x, y, xx, xy, yy = angle_derivatives
+    parallel[0] = bxx - x * x * value + x * by
+    parallel[1] = bxy - x * y * value - x * bx
+    parallel[2] = bxy - x * y * value + y * by
+    parallel[3] = byy - y * y * value - y * bx
+    rotated[0] = -xx * value - 2 * x * bx - x * y * value
+    rotated[1] = -xy * value - y * bx - x * by + x * x * value
+    rotated[2] = -xy * value - x * by - y * bx - y * y * value
+    rotated[3] = -yy * value - 2 * y * by + x * y * value
 
 
 @numba.njit(cache=True, nogil=True)
-def _stretch(metric, entries):
-    """M H M in place of the entries xx, xy, yx, yy of H."""
+def _apply_metric(metric, entries):
+    """Replace the entries xx, xy, yx, yy of H by those of M H M."""
     a, b, c = metric
     xx, xy, yx, yy = entries
     px, py, qx, qy = a * xx + b * yx, a * xy + b * yy, b * xx + c * yx, b * xy + c * yy

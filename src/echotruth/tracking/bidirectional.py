@@ -1,35 +1,35 @@
-"""A clip followed from end-diastole forwards and backwards, for after its last frame the first would come again."""
+"""Tracking from end-diastole both forwards and backwards; the last frame of a cycle is followed by the first."""
 
 from __future__ import annotations
 
 import numpy as np
 
 
-def ways(frames: int) -> tuple[list[int], list[int]]:
-    """Numbers of the frames of a clip as they come forwards and as they come backwards, both from end-diastole on."""
+def forward_backward(frames: int) -> tuple[list[int], list[int]]:
+    """Order of the frames of a clip forwards and backwards in time, each starting at end-diastole (frame 0)."""
     return list(range(frames)), [0, *range(frames - 1, 0, -1)]
 
 
-def share(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
-    """Weight of a value in its mean with another that makes the variance of the mean least.
+def inverse_variance_weight(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Weight w = var2 / (var1 + var2) with which the mean w first + (1 - w) second has the least variance.
 
     Parameters
     ----------
-    ours, theirs : ndarray of one shape
-        Variances of the two, of any unit; infinite where there is no value.
+    first, second : ndarray of one shape
+        Variances var1, var2 of the values, any unit; infinite where there is no value.
 
     Returns
     -------
     ndarray of the same shape
-        From 0 to 1; a half where neither value is there, or neither has a variance.
+        From 0 to 1; 1/2 where both values are missing, or both variances are 0.
     """
-    total = ours + theirs
-    result = np.divide(theirs, total, out=np.full(np.shape(total), 0.5), where=np.isfinite(total) & (total > 0))
-    result[np.isinf(ours) & np.isfinite(theirs)] = 0.0
-    result[np.isinf(theirs) & np.isfinite(ours)] = 1.0
-    return result
+    total = first + second
+    weight = np.divide(second, total, out=np.full(np.shape(total), 0.5), where=np.isfinite(total) & (total > 0))
+    weight[np.isinf(first) & np.isfinite(second)] = 0.0
+    weight[np.isinf(second) & np.isfinite(first)] = 1.0
+    return weight
 
 
-def blend(share: np.ndarray, ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
-    """Mean of two arrays of one shape, ours with the weight `share`; what has no weight need not be a number."""
-    return np.where(share > 0, share * ours, 0.0) + np.where(share < 1, (1 - share) * theirs, 0.0)
+def weighted_mean(weight: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """w first + (1 - w) second; a value of weight 0 may be NaN."""
+    return np.where(weight > 0, weight * first, 0.0) + np.where(weight < 1, (1 - weight) * second, 0.0)

@@ -8,53 +8,52 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from echotruth.tracking.grey import FAINTEST
+from echotruth.tracking.grey import MIN_STD
 from echotruth.tracking.windows import Windows
 
 LANES = 8
 """Lags that are summed side by side."""
 
 
-def textured(image: np.ndarray, windows: Windows) -> np.ndarray:
-    """Which windows of an image (axial, lateral) have texture and no pixel without a value: (rows, columns), bool."""
-    seen = np.empty((len(windows.top), len(windows.left)), bool)
-    _textured(image, windows.top, windows.left, windows.side, seen)
-    return seen
+def has_texture(image: np.ndarray, windows: Windows) -> np.ndarray:
+    """Windows (rows, columns), bool, of an image (axial, lateral) that have texture and no pixel without a value."""
+    textured = np.empty((len(windows.top), len(windows.left)), bool)
+    _has_texture(image, windows.top, windows.left, windows.side, textured)
+    return textured
 
 
-def match(
-    first: np.ndarray, second: np.ndarray, windows: Windows, seen: np.ndarray, reach: int
+def match_windows(
+    first: np.ndarray, second: np.ndarray, windows: Windows, textured: np.ndarray, max_lag: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the texture under each window of one image is in another.
+    """Shift of the texture of each window from one image to another.
 
     Parameters
     ----------
     first, second : ndarray of shape (axial, lateral), float32
-        Grey values from 0 to 1; NaN where there are none. Beyond the border, the border's are taken.
+        Grey values from 0 to 1; NaN where unknown. Outside the image its border is taken.
     windows : Windows
-        Where to look.
-    seen : ndarray of shape (rows, columns), bool
-        Windows that are looked for, all of them :func:`textured`.
-    reach : int
+    textured : ndarray of shape (rows, columns), bool
+        Windows to be matched, all of which :func:`has_texture`.
+    max_lag : int
         Largest lag, px.
 
     Returns
     -------
     shift : ndarray of shape (rows, columns, 2)
-        Lateral, axial, px; NaN where a window is not looked for, and where no lag within reach is the best.
+        Lateral, axial, px; NaN for the other windows, and where the maximum is at the largest lag.
     peak : ndarray of shape (rows, columns)
-        Largest correlation, from -1 to 1; NaN where a window is not looked for, or has no texture at any lag.
+        Largest correlation, from -1 to 1; NaN for the other windows, and where the second image has no texture.
     """
-    row, column = np.nonzero(seen)
-    plane = np.empty((len(row), 2 * reach + 1, 2 * reach + 1), np.float32)
-    correlate(first, second, np.stack([windows.top[row], windows.left[column]], -1), windows.side, plane)
-    shift, peak = np.full((*seen.shape, 2), np.nan), np.full(seen.shape, np.nan)
-    shift[seen], peak[seen] = peaks(plane)
+    row, column = np.nonzero(textured)
+    ncc = np.empty((len(row), 2 * max_lag + 1, 2 * max_lag + 1), np.float32)
+    correlate(first, second, np.stack([windows.top[row], windows.left[column]], -1), windows.side, ncc)
+    shift, peak = np.full((*textured.shape, 2), np.nan), np.full(textured.shape, np.nan)
+    shift[textured], peak[textured] = subpixel_peaks(ncc)
     return shift, peak
 
 
 @numba.njit(cache=True, nogil=True)
-def _textured(image, top, left, side, seen):
+def _has_texture(image, top, left, side, textured):
     for i in range(len(top)):
         for j in range(len(left)):
             total, square = 0.0, 0.0
@@ -62,43 +61,43 @@ def _textured(image, top, left, side, seen):
                 for x in range(left[j], left[j] + side):
                     total += image[y, x]
                     square += image[y, x] * image[y, x]
-            seen[i, j] = square / side**2 - (total / side**2) ** 2 > FAINTEST**2
+            textured[i, j] = square / side**2 - (total / side**2) ** 2 > MIN_STD**2
 
 
 @numba.njit(cache=True, nogil=True)
-def correlate(first, second, corners, side, plane):
-    """Correlations of windows of one image with another at all lags.
+def correlate(first, second, corners, side, ncc):
+    """Correlate windows of one image with another at all lags.
 
     Parameters
     ----------
     first, second
-        See :func:`match`.
+        See :func:`match_windows`.
     corners
-        First row and column of every window, shape (n, 2).
+        First row and column of each window, shape (n, 2).
     side
         Of a window, px.
-    plane
-        Written, NaN where either image has no texture or lacks a value: shape (n, lags, lags), axial lag first.
+    ncc
+        Output, shape (n, lags, lags), axial lag first; NaN where either image has no texture or lacks a value.
     """
-    lags = plane.shape[1]
-    reach, lanes = lags // 2, LANES * ((lags + LANES - 1) // LANES)
-    template, wide = np.empty((side, side), np.float32), np.zeros((side + lags - 1, side + lanes), np.float32)
+    lags = ncc.shape[1]
+    max_lag, lanes = lags // 2, LANES * ((lags + LANES - 1) // LANES)
+    template, search = np.empty((side, side), np.float32), np.zeros((side + lags - 1, side + lanes), np.float32)
     products = np.empty((lags, lanes), np.float32)
     for window in range(len(corners)):
         top, left = corners[window]
-        norm = cut(first, top, left, template)
+        norm = extract_zero_mean(first, top, left, template)
         for y in range(side + lags - 1):
             for x in range(side + lags - 1):
-                row, column = top - reach + y, left - reach + x
+                row, column = top - max_lag + y, left - max_lag + x
                 row, column = min(max(row, 0), second.shape[0] - 1), min(max(column, 0), second.shape[1] - 1)
-                wide[y, x] = second[row, column]
-        multiply(template, wide, products)
-        normalise(products, norm, wide, side, plane[window])
+                search[y, x] = second[row, column]
+        sum_products(template, search, products)
+        normalise(products, norm, search, side, ncc[window])
 
 
 @numba.njit(cache=True, nogil=True)
-def cut(image, top, left, template):
-    """Write the grey values of a window less their mean; the root of the sum of their squares."""
+def extract_zero_mean(image, top, left, template):
+    """Write the grey values of a window less their mean; return the root of the sum of their squares."""
     side = len(template)
     mean, square = 0.0, 0.0
     for y in range(side):
@@ -113,41 +112,41 @@ def cut(image, top, left, template):
 
 
 @numba.njit(cache=True, nogil=True)
-def multiply(template, wide, products):
-    """Write the sums of products of a window and a wider one at all lags (lags, lanes), and at more than are wanted."""
+def sum_products(template, search, products):
+    """Write the sums of products of a template and a search area at all lags (lags, lanes); lanes beyond are unused."""
     side = len(template)
     lags, lanes = products.shape
     fours = side - side % 4
-    for down in range(lags):
-        total = products[down]
+    for axial_lag in range(lags):
+        total = products[axial_lag]
         for lane in range(lanes):
             total[lane] = 0
         for y in range(side):
-            line = wide[y + down]
+            line = search[y + axial_lag]
             # Four at a time, so that the totals are not fetched and stored for each.
             for x in range(0, fours, 4):
                 a, b, c, d = template[y, x], template[y, x + 1], template[y, x + 2], template[y, x + 3]
-                near = line[x : x + lanes + 3]
+                part = line[x : x + lanes + 3]
                 for lane in range(lanes):
-                    total[lane] += (a * near[lane] + b * near[lane + 1]) + (c * near[lane + 2] + d * near[lane + 3])
+                    total[lane] += (a * part[lane] + b * part[lane + 1]) + (c * part[lane + 2] + d * part[lane + 3])
             for x in range(fours, side):
-                a, near = template[y, x], line[x : x + lanes]
+                a, part = template[y, x], line[x : x + lanes]
                 for lane in range(lanes):
-                    total[lane] += a * near[lane]
+                    total[lane] += a * part[lane]
 
 
 @numba.njit(cache=True, nogil=True)
-def normalise(products, norm, wide, side, plane):
-    """Divide sums of products by the norms of the window and of what it was compared with, at every lag."""
-    size = side + len(plane) - 1
+def normalise(products, norm, search, side, ncc):
+    """Divide sums of products by the norms of the template and of the part of the search area, at every lag."""
+    size = side + len(ncc) - 1
     value, square = np.zeros(size), np.zeros(size)
     for y in range(size):
-        # What comes in at the bottom and what goes out at the top; the sum of a pixel without a value is NaN already.
+        # Running sums over rows: one enters, one leaves. The products of a pixel without a value are NaN already.
         for x in range(size):
-            new = np.float64(wide[y, x]) if wide[y, x] == wide[y, x] else 0.0
-            gone = np.float64(wide[y - side, x]) if y >= side and wide[y - side, x] == wide[y - side, x] else 0.0
-            value[x] += new - gone
-            square[x] += new * new - gone * gone
+            new = np.float64(search[y, x]) if search[y, x] == search[y, x] else 0.0
+            old = np.float64(search[y - side, x]) if y >= side and search[y - side, x] == search[y - side, x] else 0.0
+            value[x] += new - old
+            square[x] += new * new - old * old
         if y < side - 1:
             continue
         total, power = 0.0, 0.0
@@ -158,40 +157,42 @@ def normalise(products, norm, wide, side, plane):
                 total -= value[x - side]
                 power -= square[x - side]
             if x >= side - 1:
-                down, across = y - side + 1, x - side + 1
+                i, j = y - side + 1, x - side + 1
                 variance = power / side**2 - (total / side**2) ** 2
-                known = variance > FAINTEST**2 and norm > FAINTEST * side
-                plane[down, across] = products[down, across] / (norm * side * np.sqrt(variance)) if known else np.nan
+                textured = variance > MIN_STD**2 and norm > MIN_STD * side
+                ncc[i, j] = products[i, j] / (norm * side * np.sqrt(variance)) if textured else np.nan
 
 
-def peaks(plane: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places and heights of the largest of each plane of correlations.
+def subpixel_peaks(ncc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position and height of the largest value of each correlation map.
 
-    A Gaussian through three neighbours along each axis (Willert and Gharib 1991, Exp Fluids 10:181).
+    Three-point Gaussian fit along each axis, with c the correlation (Willert and Gharib 1991, Exp Fluids 10:181):
+    (ln c_-1 - ln c_+1) / (2 (ln c_-1 - 2 ln c_0 + ln c_+1)).
 
     Parameters
     ----------
-    plane : ndarray of shape (n, lags, lags)
-        Axial lag first; the middle is no lag.
+    ncc : ndarray of shape (n, lags, lags)
+        Axial lag first; lag 0 is in the middle.
 
     Returns
     -------
     shift : ndarray of shape (n, 2)
-        Lateral, axial, px; NaN where the largest lies on the border or a neighbour is not above 0.
+        Lateral, axial, px; NaN where the largest value is on the border or a neighbour is not above 0.
     peak : ndarray of shape (n,)
     """
-    number, lags = plane.shape[:2]
-    flat = np.where(np.isnan(plane), -1, plane).reshape(number, lags**2)
-    place = np.stack(np.divmod(flat.argmax(-1), lags), -1)
-    every = np.arange(number)
-    inner = np.clip(place, 1, lags - 2)
-    shift = []
+    count, lags = ncc.shape[:2]
+    flat = np.where(np.isnan(ncc), -1, ncc).reshape(count, lags**2)
+    largest = np.stack(np.divmod(flat.argmax(-1), lags), -1)
+    maps = np.arange(count)
+    inner = np.clip(largest, 1, lags - 2)
+    shifts = []
     for axis in (1, 0):
-        near = [inner + k * (np.arange(2) == axis) for k in (-1, 0, 1)]
-        value = np.stack([plane[every, each[:, 0], each[:, 1]] for each in near])
+        indices = [inner + k * (np.arange(2) == axis) for k in (-1, 0, 1)]
+        value = np.stack([ncc[maps, index[:, 0], index[:, 1]] for index in indices])
         before, middle, after = np.log(np.where(value > 0, value, np.nan))
-        bend = before - 2 * middle + after
-        shift.append(inner[:, axis] - lags // 2 + (before - after) / 2 / np.where(bend < 0, bend, np.nan))
-    shift = np.stack(shift, -1)
-    shift[(inner != place).any(-1)] = np.nan
-    return shift, np.where(np.isnan(plane).all((-2, -1)), np.nan, flat.max(-1))
+        curvature = before - 2 * middle + after
+        offset = (before - after) / 2 / np.where(curvature < 0, curvature, np.nan)
+        shifts.append(inner[:, axis] - lags // 2 + offset)
+    shift = np.stack(shifts, -1)
+    shift[(inner != largest).any(-1)] = np.nan
+    return shift, np.where(np.isnan(ncc).all((-2, -1)), np.nan, flat.max(-1))

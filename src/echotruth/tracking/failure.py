@@ -1,5 +1,5 @@
-"""What a tracker raises that found no motion."""
+"""Exception of a tracker that found no motion."""
 
 
 class TrackerFailed(ValueError):
-    """A tracker that gave no answer, or none that can be used; the message says why in one sentence."""
+    """A tracker gave no result, or an invalid one; the message says why in one sentence."""

@@ -1,4 +1,4 @@
-"""Motion at the centres of windows: what does not fit its neighbours, what is missing, and what lies between."""
+"""Displacement fields from vectors at the centres of windows: outliers, smoothing, and spline interpolation."""
 
 from __future__ import annotations
 
@@ -11,22 +11,23 @@ from echotruth.imaging import spline
 from echotruth.tracking import cubic
 from echotruth.tracking.windows import Windows
 
-DOUBT = 2.0
-"""Normalised residual above which a vector counts as an outlier (Westerweel and Scarano 2005)."""
-NOISE = 0.1
-"""Scatter of vectors that is there in any case, px (the same)."""
+MAX_RESIDUAL = 2.0
+"""Normalised residual above which a vector is an outlier (Westerweel and Scarano 2005)."""
+NOISE_LEVEL = 0.1
+"""Scatter of vectors from measurement noise alone, px (the same)."""
 
 
-def validated(field: np.ndarray) -> np.ndarray:
-    """A field whose outliers and missing vectors are replaced.
+def replace_outliers(field: np.ndarray) -> np.ndarray:
+    """Replace outliers and missing vectors.
 
-    Normalised median test of Westerweel and Scarano 2005 (Exp Fluids 39:1096), eight neighbours: an outlier becomes
-    their median. What then is missing becomes the nearest vector there is.
+    Normalised median test |u - u_m| / (r_m + 0.1 px) > 2 (Westerweel and Scarano 2005, Exp Fluids 39:1096), where u_m
+    is the median of the eight neighbours and r_m that of their distances from u_m: an outlier is replaced by u_m.
+    Vectors still missing are replaced by the nearest.
 
     Parameters
     ----------
     field : ndarray of shape (rows, columns, 2)
-        px; NaN where there is none.
+        px; NaN where unknown.
 
     Returns
     -------
@@ -35,11 +36,11 @@ def validated(field: np.ndarray) -> np.ndarray:
     """
     rows, columns = field.shape[:2]
     padded = np.pad(field, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan)
-    near = [padded[i : i + rows, j : j + columns] for i, j in np.ndindex(3, 3) if (i, j) != (1, 1)]
-    middle = _median(np.stack(near))
-    scatter = _median(np.abs(near - middle))
-    residual = np.linalg.norm((field - middle) / (scatter + NOISE), axis=-1)
-    result = np.where((residual <= DOUBT)[..., None], field, middle)
+    neighbours = [padded[i : i + rows, j : j + columns] for i, j in np.ndindex(3, 3) if (i, j) != (1, 1)]
+    median = _nanmedian(np.stack(neighbours))
+    scatter = _nanmedian(np.abs(neighbours - median))
+    residual = np.linalg.norm((field - median) / (scatter + NOISE_LEVEL), axis=-1)
+    result = np.where((residual <= MAX_RESIDUAL)[..., None], field, median)
     missing = np.isnan(result).any(-1)
     if missing.all():
         return np.zeros_like(field)
@@ -47,23 +48,23 @@ def validated(field: np.ndarray) -> np.ndarray:
     return result[tuple(nearest)]
 
 
-def _median(values: np.ndarray) -> np.ndarray:
-    """Median along the first axis of what is not NaN; NaN where nothing is."""
+def _nanmedian(values: np.ndarray) -> np.ndarray:
+    """Median along the first axis without NaN; NaN where all are, without the warning of NumPy."""
     last = np.maximum(np.isfinite(values).sum(0, keepdims=True) - 1, 0)
     ranked = np.sort(values, axis=0)
     return sum(np.take_along_axis(ranked, k, axis=0)[0] for k in (last // 2, last - last // 2)) / 2
 
 
 def smooth(field: np.ndarray) -> np.ndarray:
-    """Each vector (rows, columns, 2) averaged with its eight neighbours, with weights of 1/4, 1/2, 1/4 either way."""
+    """Average each vector (rows, columns, 2) with its neighbours, with the weights 1/4, 1/2, 1/4 along both axes."""
     for axis in (0, 1):
         field = ndimage.convolve1d(field, [0.25, 0.5, 0.25], axis=axis, mode="nearest")
     return field
 
 
 @dataclass(frozen=True)
-class Motion:
-    """Cubic spline through the motion at the centres of windows; beyond the outermost centres, theirs.
+class DisplacementField:
+    """Cubic spline through the displacement at the centres of windows; constant beyond the outermost centres.
 
     Attributes
     ----------
@@ -80,41 +81,42 @@ class Motion:
     shape: tuple[int, int]
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Motion (n, 2) at points (n, 2): lateral, axial, px; NaN outside the image."""
-        inside = ((points >= 0) & (points <= np.array(self.shape[::-1]) - 1)).all(1)
-        (column, across), (row, down) = self.cells(*np.where(inside[:, None], points, 0).T)
+        """Displacement (n, 2) at points (n, 2): lateral, axial, px; NaN outside the image."""
+        inside = np.all((points >= 0) & (points <= np.array(self.shape[::-1]) - 1), axis=1)
+        (column, weight_x), (row, weight_y) = self.weights(*np.where(inside[:, None], points, 0).T)
         around = np.arange(4)
-        near = self.coefficients[row[:, None, None] + around[:, None], column[:, None, None] + around]
-        return np.where(inside[:, None], np.einsum("na,nb,nabk->nk", down, across, near), np.nan)
+        local = self.coefficients[row[:, None, None] + around[:, None], column[:, None, None] + around]
+        return np.where(inside[:, None], np.einsum("na,nb,nabk->nk", weight_y, weight_x, local), np.nan)
 
     def mean(self, windows: Windows) -> np.ndarray:
         """Mean over the pixels of other windows, shape (rows, columns, 2)."""
         result = self.coefficients
-        for corners, (first, shares) in zip((windows.left, windows.top), self.pixels, strict=True):
-            each = np.zeros((len(first), result.shape[1]))
-            each[np.arange(len(first))[:, None], first[:, None] + np.arange(4)] = shares
-            part = each[corners[:, None] + np.arange(windows.side)].mean(1)
-            # The axis that is done goes to the front, so that the other one comes next.
-            result = np.einsum("jb,abk->jak", part, result)
+        for corners, (first, weights) in zip((windows.left, windows.top), self.pixel_weights, strict=True):
+            matrix = np.zeros((len(first), result.shape[1]))
+            matrix[np.arange(len(first))[:, None], first[:, None] + np.arange(4)] = weights
+            window_mean = matrix[corners[:, None] + np.arange(windows.side)].mean(1)
+            # The processed axis becomes the first, so that the other one comes next.
+            result = np.einsum("jb,abk->jak", window_mean, result)
         return result
 
     @property
-    def pixels(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-        """:meth:`cells` of all columns and rows of the image."""
-        return self.cells(*(np.arange(size, dtype=float) for size in self.shape[::-1]))
+    def pixel_weights(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """:meth:`weights` of all columns and rows of the image."""
+        return self.weights(*(np.arange(size, dtype=float) for size in self.shape[::-1]))
 
-    def cells(self, lateral: np.ndarray, axial: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-        """First of the four columns and rows of coefficients at places (n,), px, and the shares (n, 4) of these."""
+    def weights(self, lateral: np.ndarray, axial: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """For both coordinates (n,), px: the first of their four coefficients, and their weights (n, 4)."""
         result = []
-        for place, start in ((lateral, self.windows.left), (axial, self.windows.top)):
-            index = (place - start[0] - (self.windows.side - 1) / 2) / (start[1] - start[0])
-            index = np.clip(index, 0, len(start) - 1)
-            first = np.minimum(index.astype(int), len(start) - 2)
-            result.append((first, np.stack(cubic.shares(index - first), -1)))
+        for position, corners in ((lateral, self.windows.left), (axial, self.windows.top)):
+            index = (position - corners[0] - (self.windows.side - 1) / 2) / (corners[1] - corners[0])
+            index = np.clip(index, 0, len(corners) - 1)
+            first = np.minimum(index.astype(int), len(corners) - 2)
+            result.append((first, np.stack(cubic.bspline_weights(index - first), -1)))
         return tuple(result)
 
 
-def motion(field: np.ndarray, windows: Windows, shape: tuple[int, int]) -> Motion:
-    """Motion between the centres of windows, from that at them: (rows, columns, 2), all finite, px."""
-    parts = [spline.coefficients(np.ascontiguousarray(each, np.float32)) for each in np.moveaxis(field, -1, 0)]
-    return Motion(np.stack(parts, -1), windows, shape)
+def displacement_field(vectors: np.ndarray, windows: Windows, shape: tuple[int, int]) -> DisplacementField:
+    """Spline through the vectors (rows, columns, 2), all finite, px, at the centres of windows."""
+    components = np.moveaxis(vectors, -1, 0)
+    parts = [spline.coefficients(np.ascontiguousarray(component, np.float32)) for component in components]
+    return DisplacementField(np.stack(parts, -1), windows, shape)

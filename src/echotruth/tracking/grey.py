@@ -1,4 +1,4 @@
-"""Grey values of clips, and where they tell one place from another."""
+"""Grey values of clips: normalisation, inversion of the log compression, and local correlation of two images."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from math import log
 import cv2
 import numpy as np
 
-FAINTEST = 1 / 255
-"""Standard deviation of a window below which it counts as without texture: a level of an 8-bit image."""
+MIN_STD = 1 / 255
+"""Standard deviation of grey values below which a window has no texture: one level of an 8-bit image."""
 
 
-def levels(frames: np.ndarray) -> np.ndarray:
+def grey_levels(frames: np.ndarray) -> np.ndarray:
     """Grey values from 0 to 1.
 
     Parameters
@@ -22,7 +22,7 @@ def levels(frames: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray of the same shape, float32
-        8-bit values over 255; of any other type, the range of the clip over its width. NaN where not finite.
+        8-bit values over 255; for any other type (value - min) / (max - min) of the clip. NaN where not finite.
     """
     if frames.dtype == np.uint8:
         return frames * np.float32(1 / 255)
@@ -32,56 +32,57 @@ def levels(frames: np.ndarray) -> np.ndarray:
     return ((values - low) / ((high - low) or 1.0)).astype(np.float32)
 
 
-def amplitudes(values: np.ndarray, decibels: float) -> np.ndarray:
-    """Amplitudes of the echoes whose logarithm an image shows.
+def decompress(grey: np.ndarray, decibels: float) -> np.ndarray:
+    """Amplitude of the echoes, from log-compressed grey values.
+
+    a = (exp(k g) - 1) / k with k = decibels ln(10) / 20: 0 for black, and equal to g in the limit of small g.
 
     Parameters
     ----------
-    values : ndarray of any shape
-        Grey values from 0 to 1.
+    grey : ndarray of any shape
+        Grey values g from 0 to 1.
     decibels : float
-        From black to white; 0 leaves the grey values as they are.
+        Dynamic range from black to white, dB; 0 returns the grey values.
 
     Returns
     -------
     ndarray of the same shape and type
-        Less that of black, in such a unit that the faintest are their grey values.
     """
-    nepers = _nepers(decibels)
-    return (np.exp(nepers * values) - 1) / nepers if nepers else values
+    k = _nepers(decibels)
+    return (np.exp(k * grey) - 1) / k if k else grey
 
 
-def steepness(bright: np.ndarray, decibels: float) -> np.ndarray:
-    """Change of :func:`amplitudes` with the grey value, where they are `bright`; of the same shape."""
-    return 1 + _nepers(decibels) * bright
+def decompression_slope(amplitude: np.ndarray, decibels: float) -> np.ndarray:
+    """Derivative da/dg = 1 + k a of :func:`decompress` at amplitudes a; same shape."""
+    return 1 + _nepers(decibels) * amplitude
 
 
 def _nepers(decibels: float) -> float:
     return decibels * log(10) / 20
 
 
-def similarity(first: np.ndarray, second: np.ndarray, side: int) -> np.ndarray:
-    """Zero-normalised cross-correlation of two images about every pixel.
+def local_ncc(first: np.ndarray, second: np.ndarray, side: int) -> np.ndarray:
+    """Zero-normalised cross-correlation of two images in a square around every pixel.
 
     Parameters
     ----------
     first, second : ndarray of shape (axial, lateral)
         Grey values from 0 to 1.
     side : int
-        Side of the square over which they are compared, px, odd; images are mirrored at their borders.
+        Side of the square, px, odd; images are mirrored at their borders.
 
     Returns
     -------
     ndarray of shape (axial, lateral)
-        From -1 to 1; NaN where the square of either image has no texture or holds a pixel without a value.
+        From -1 to 1; NaN where the square has no texture in either image, or contains a pixel without a value.
     """
     known = np.isfinite(first) & np.isfinite(second)
     a, b = (np.where(known, image, 0).astype(float) for image in (first, second))
-    every = (a, b, a * a, b * b, a * b, 1.0 - known)
-    # Running sums, whose rounding depends on where a thread begins.
+    # OpenCV takes running sums, whose rounding depends on where a thread begins.
     cv2.setNumThreads(1)
-    over = [cv2.blur(image, (side, side), borderType=cv2.BORDER_REFLECT) for image in every]
-    variances = over[2] - over[0] ** 2, over[3] - over[1] ** 2
-    told = (np.minimum(*variances) > FAINTEST**2) & (over[5] < 0.5 / side**2)
-    product = np.where(told, variances[0] * variances[1], np.nan)
-    return np.clip((over[4] - over[0] * over[1]) / np.sqrt(product), -1, 1)
+    images = (a, b, a * a, b * b, a * b, 1.0 - known)
+    a, b, aa, bb, ab, unknown = (cv2.blur(image, (side, side), borderType=cv2.BORDER_REFLECT) for image in images)
+    variances = aa - a**2, bb - b**2
+    valid = (np.minimum(*variances) > MIN_STD**2) & (unknown < 0.5 / side**2)
+    product = np.where(valid, variances[0] * variances[1], np.nan)
+    return np.clip((ab - a * b) / np.sqrt(product), -1, 1)

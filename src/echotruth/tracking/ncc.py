@@ -1,37 +1,37 @@
-"""How like two looks at the same tissue are, everywhere and about single points."""
+"""Normalised cross-correlation of two images of the same wall pixels, around single points and over the whole wall."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from echotruth.tracking.bspline import lattice
-from echotruth.tracking.grey import FAINTEST, steepness
+from echotruth.tracking.bspline import lattice_around
+from echotruth.tracking.grey import MIN_STD, decompression_slope
 
 
-class Likeness:
-    """Zero-normalised correlation of amplitudes at the same pixels of the wall.
+class NormalizedCrossCorrelation:
+    """Zero-normalised cross-correlation (NCC) of amplitudes at the pixels of the wall.
 
     Parameters
     ----------
-    places : ndarray of shape (pixel, 2)
+    positions : ndarray of shape (pixel, 2)
         Lateral, axial, px.
     inside : ndarray of shape (pixel,), bool
-        Pixels that count.
+        Pixels that are used.
     points : ndarray of shape (n, 2)
-        Where the correlation is wanted: lateral, axial, px.
-    reach : float
-        Half of the width of the weights about a point, px: two cubic B-splines in a row, knots a fourth of it apart.
+        Points of :meth:`at_points`: lateral, axial, px.
+    radius : float
+        Half-width of the weights around a point, px: two cubic B-splines in succession, knots a quarter of it apart.
     decibels : float
-        As :func:`echotruth.tracking.grey.amplitudes` took it: a grey level is the more, the brighter it is around.
+        Dynamic range that :func:`echotruth.tracking.grey.decompress` removed; it sets the amplitude of a grey level.
     """
 
-    def __init__(self, places: np.ndarray, inside: np.ndarray, points: np.ndarray, reach: float, decibels: float):
+    def __init__(self, positions: np.ndarray, inside: np.ndarray, points: np.ndarray, radius: float, decibels: float):
         self._inside, self._points, self._decibels = inside, points, decibels
-        self._net = lattice(places, reach / 4)
-        self._cells, self._order = self._net.cells(places[inside])
+        self._lattice = lattice_around(positions, radius / 4)
+        self._cells, self._order = self._lattice.sort_points(positions[inside])
 
-    def about_points(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Correlation about the points.
+    def at_points(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Correlation around each point.
 
         Parameters
         ----------
@@ -44,22 +44,21 @@ class Likeness:
             From -1 to 1; NaN where either has no texture, or there is no pixel.
         """
         values = np.stack([np.ones_like(first), first, second, first**2, second**2, first * second], -1)
-        moments = self._cells.gather(values[self._inside][self._order], self._net.size)
-        total, *sums = self._net.at(moments, self._points).T
-        a, b, aa, bb, ab = (np.divide(each, total, out=np.full_like(total, np.nan), where=total > 0) for each in sums)
+        moments = self._cells.adjoint(values[self._inside][self._order], self._lattice.size)
+        total, *sums = self._lattice.evaluate(moments, self._points).T
+        a, b, aa, bb, ab = (np.divide(s, total, out=np.full_like(total, np.nan), where=total > 0) for s in sums)
         variances = aa - a * a, bb - b * b
-        product = np.where(
-            self._textured(a, variances[0]) & self._textured(b, variances[1]), np.prod(variances, 0), np.nan
-        )
+        textured = self._has_texture(a, variances[0]) & self._has_texture(b, variances[1])
+        product = np.where(textured, np.prod(variances, 0), np.nan)
         return np.clip((ab - a * b) / np.sqrt(product), -1, 1)
 
     def overall(self, first: np.ndarray, second: np.ndarray) -> float:
-        """Correlation over all pixels that count; NaN where either has no texture."""
+        """Correlation over all pixels that are used; NaN where either has no texture."""
         a, b = first[self._inside], second[self._inside]
-        if not (self._textured(a.mean(), a.var()) and self._textured(b.mean(), b.var())):
+        if not all(self._has_texture(values.mean(), values.var()) for values in (a, b)):
             return np.nan
         return float(np.mean((a - a.mean()) * (b - b.mean())) / (a.std() * b.std()))
 
-    def _textured(self, mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
-        """Whether amplitudes with such a mean and variance differ by more than a grey level."""
-        return variance > (FAINTEST * steepness(mean, self._decibels)) ** 2
+    def _has_texture(self, mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
+        """Whether the standard deviation exceeds one grey level at that mean amplitude."""
+        return variance > (MIN_STD * decompression_slope(mean, self._decibels)) ** 2

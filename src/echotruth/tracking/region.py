@@ -1,4 +1,4 @@
-"""The wall at end-diastole as pixels and knots, and its alignment with one image after another."""
+"""Pixels of the wall at end-diastole with their B-spline, and the alignment of an image with a template on them."""
 
 from __future__ import annotations
 
@@ -8,202 +8,214 @@ from functools import cached_property
 import numpy as np
 from scipy import ndimage
 
-from echotruth.tracking.alignment import add_matrix, factorise, grey_at, product, solve
-from echotruth.tracking.bending_energy import frame, roughness
-from echotruth.tracking.bspline import Cells, Lattice, lattice
+from echotruth.tracking import alignment
+from echotruth.tracking.bending_energy import bending_energy, wall_frame
+from echotruth.tracking.bspline import Cells, KnotLattice, lattice_around
 
-STEPS = 24
-"""Most iterations."""
-HELD = 8
-"""Iterations for which the normal matrix stays."""
-STILL = 5e-4
-"""Root mean square of the last step over the distance of the knots."""
-FITS = 3
-"""Iterations for a dense flow."""
-LOOSE = 0.1
-"""Weight of the roughness of a dense flow, which is smooth already."""
-FINE = 16
-"""Pixels between knots above which every other one will do."""
-LEAST = 3.0
-"""Least weight of the roughness, which fills what shows no speckle even where there is no noise."""
-ENOUGH = 40
-"""Pixels of a cell that do for its part of a normal matrix, which only sets how fast a field is found, not which."""
-SAMPLE = 4
-"""Of so many residuals one does for their median."""
-DEVIATION = 1.4826
-"""Standard deviation of a Gaussian over the median of its absolute value."""
-ANCHOR = 1e-5
-"""Stiffness of a knot on its own over the mean one, so that none is without an equation."""
+MAX_ITERATIONS = 24
+MATRIX_REUSE = 8
+"""Iterations for which one normal matrix is used."""
+CONVERGENCE = 5e-4
+"""RMS of the last step over the knot spacing."""
+FLOW_ITERATIONS = 3
+"""Iterations of the fit to a dense flow."""
+FLOW_SMOOTHNESS = 0.1
+"""Weight of the bending energy in the fit to a dense flow, which is smooth already."""
+MAX_KNOT_SPACING_ALL_PIXELS = 16
+"""Knot spacing above which every other pixel is used, px."""
+MIN_SMOOTHNESS = 3.0
+"""Least weight of the bending energy, which fills areas without speckle even where there is no noise."""
+PIXELS_PER_CELL = 40
+"""Pixels of a cell that are enough for the normal matrix, which affects the rate of convergence, not the solution."""
+MEDIAN_STRIDE = 4
+"""Every n-th residual is used for their median."""
+MAD_TO_STD = 1.4826
+"""Standard deviation of a Gaussian over its median absolute deviation."""
+REGULARISATION = 1e-5
+"""Added to the diagonal of the normal matrix, over its mean, so that it is not singular."""
 
 
 @dataclass(frozen=True)
-class Region:
-    """Pixels of the wall and around it, and the B-spline on them.
+class WallRegion:
+    """Pixels of the wall and its surroundings, and the B-spline on them.
 
     Attributes
     ----------
-    lattice : Lattice
+    lattice : KnotLattice
     cells : Cells
-        Of the pixels.
-    places : ndarray of shape (pixel, 2)
+        The pixels.
+    positions : ndarray of shape (pixel, 2)
         Lateral, axial, px.
     inside : ndarray of shape (pixel,), bool
         Pixels of the wall itself.
-    roughness : ndarray of shape (unknowns, width)
-        Band of its matrix, see :mod:`echotruth.tracking.bending_energy`.
-    bent : ndarray of shape (unknowns, 6)
-        Its product with the motions of the whole that count as not rough, see :meth:`Lattice.affine`.
-    freed : ndarray of shape (unknowns, 6)
-        By which the product of `bent` with a field is multiplied to take these motions out of the field's own.
+    energy : ndarray of shape (unknowns, width)
+        Banded matrix K of the bending energy, see :mod:`echotruth.tracking.bending_energy`.
+    energy_affine : ndarray of shape (unknowns, 6)
+        K A, where the columns of A are the affine fields of :meth:`KnotLattice.affine_fields`.
+    energy_affine_inverse : ndarray of shape (unknowns, 6)
+        K A (A^T K A)^+.
     """
 
-    lattice: Lattice
+    lattice: KnotLattice
     cells: Cells
-    places: np.ndarray
+    positions: np.ndarray
     inside: np.ndarray
-    roughness: np.ndarray
-    bent: np.ndarray
-    freed: np.ndarray
+    energy: np.ndarray
+    energy_affine: np.ndarray
+    energy_affine_inverse: np.ndarray
 
     def align(
-        self, image: np.ndarray, template: np.ndarray, start: np.ndarray, anchor: np.ndarray, stiffness: tuple
+        self,
+        image: np.ndarray,
+        template: np.ndarray,
+        start: np.ndarray,
+        previous: np.ndarray,
+        smoothness: float,
+        tolerance: float,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Field U that makes sum w (I(X + U) - T)^2 and the roughness of its change smallest.
+        """Displacement U that minimises sum w (I(X + U) - T)^2 plus the weighted bending energy of U - U_previous.
 
         Parameters
         ----------
         image : ndarray
-            Spline coefficients, see :func:`echotruth.imaging.spline.coefficients`.
+            Spline coefficients of I, see :func:`echotruth.imaging.spline.coefficients`.
         template : ndarray of shape (pixel,)
             Grey values T.
-        start, anchor : ndarray of shape (knot, 2)
-            Coefficients to begin with, and those from which the change is counted, px.
-        stiffness : (float, float)
-            Weight of the roughness over that of the image were noise as strong as the speckle and speckle as long as
-            the knots are apart, and residual over its standard deviation at which a pixel has a quarter of its weight.
+        start, previous : ndarray of shape (knot, 2)
+            Coefficients of the initial estimate and of U_previous, px.
+        smoothness : float
+            Weight of the bending energy relative to the image, if noise were as strong as speckle and the speckle
+            length equal to the knot spacing.
+        tolerance : float
+            Residual, in standard deviations, at which the weight w of a pixel is 1/4.
 
         Returns
         -------
         coefficients : ndarray of shape (knot, 2)
             px.
-        grey : ndarray of shape (pixel, 3)
-            Image carried back, and its slopes per px.
+        warped : ndarray of shape (pixel, 3)
+            I(X + U), and its lateral and axial derivative per px.
         """
-        smoothness, tolerance = stiffness
-        found, place = start, self.places + self.cells.evaluate(start)
-        for iteration in range(STEPS):
-            grey = grey_at(image, place)
-            residual = grey[:, 0] - template
-            weight = robust(residual, tolerance)
-            if iteration % HELD == 0:
-                rough = max(LEAST, smoothness * self._noise(template, residual, weight, grey[:, 1:]))
-                normal = self._normal(grey[:, 1:], weight, rough, self._every)
-            change = self._change(normal, (weight * residual)[:, None] * grey[:, 1:], found - anchor)
+        coefficients, position = start, self.positions + self.cells.evaluate(start)
+        for iteration in range(MAX_ITERATIONS):
+            warped = alignment.interpolate_with_gradient(image, position)
+            residual = warped[:, 0] - template
+            weight = geman_mcclure(residual, tolerance)
+            if iteration % MATRIX_REUSE == 0:
+                noise = self._relative_noise(template, residual, weight, warped[:, 1:])
+                stride = max(1, len(self.positions) // (PIXELS_PER_CELL * len(self.cells.knots)))
+                normal = self._normal_matrix(warped[:, 1:], weight, max(MIN_SMOOTHNESS, smoothness * noise), stride)
+            change = self._newton_step(normal, (weight * residual)[:, None] * warped[:, 1:], coefficients - previous)
             step = self.cells.evaluate(change)
-            found, place = found + change, place + step
-            if np.sqrt(np.mean(step**2)) < STILL * self.lattice.step:
+            coefficients, position = coefficients + change, position + step
+            if np.sqrt(np.mean(step**2)) < CONVERGENCE * self.lattice.knot_spacing:
                 break
-        return found, grey_at(image, place)
+        return coefficients, alignment.interpolate_with_gradient(image, position)
 
     def fit(self, flow: np.ndarray) -> np.ndarray:
-        """Coefficients (knot, 2) of the field that is like a flow (pixel, 2), px, without its outliers.
+        """Coefficients (knot, 2) of the field that best fits a dense flow (pixel, 2), px, with outliers down-weighted.
 
-        Weights of one in the mean are in the force alone, so that one matrix does for all flows: modified residuals
-        (Huber 1981, Robust Statistics, section 7.8).
+        The weights, scaled to a mean of 1, enter the right-hand side only, so that all flows share one matrix: modified
+        residuals (Huber 1981, Robust Statistics, section 7.8).
         """
-        found = np.zeros((self.lattice.size, 2))
-        for _ in range(FITS):
-            residual = self.cells.evaluate(found) - flow
-            weight = robust(np.hypot(*residual.T), 2)
-            force = (weight / weight.mean())[:, None] * residual * self._turns
-            found = found + self._change(self._even, force, found)
-        return found
-
-    @property
-    def _every(self) -> int:
-        return max(1, len(self.places) // (ENOUGH * len(self.cells.knots)))
+        coefficients = np.zeros((self.lattice.size, 2))
+        for _ in range(FLOW_ITERATIONS):
+            residual = self.cells.evaluate(coefficients) - flow
+            weight = geman_mcclure(np.hypot(*residual.T), 2)
+            force = (weight / weight.mean())[:, None] * residual * self._flow_component
+            coefficients = coefficients + self._newton_step(self._flow_matrix, force, coefficients)
+        return coefficients
 
     @cached_property
-    def _turns(self) -> np.ndarray:
-        """Lateral and axial motion are taken from every other pixel, so that one matrix does for both."""
-        return np.eye(2)[np.arange(len(self.places)) % 2]
+    def _flow_component(self) -> np.ndarray:
+        """Every other pixel (pixel, 2) gives the lateral and the axial flow, so that both share one matrix."""
+        return np.eye(2)[np.arange(len(self.positions)) % 2]
 
     @cached_property
-    def _even(self) -> tuple[np.ndarray, float]:
-        return self._normal(self._turns, np.ones(len(self.places)), LOOSE)
+    def _flow_matrix(self) -> tuple[np.ndarray, float]:
+        return self._normal_matrix(self._flow_component, np.ones(len(self.positions)), FLOW_SMOOTHNESS, 1)
 
-    def _change(self, normal: tuple[np.ndarray, float], force: np.ndarray, field: np.ndarray) -> np.ndarray:
-        """Change of coefficients (knot, 2) against a force (pixel, 2) and the roughness of a field (knot, 2)."""
-        factor, rough = normal
-        change = -self.cells.gather(force, self.lattice.size).ravel() - rough * self._bend(field.ravel())
-        solve(factor, change)
+    def _newton_step(self, normal: tuple[np.ndarray, float], force: np.ndarray, field: np.ndarray) -> np.ndarray:
+        """Change of coefficients (knot, 2) from the image force (pixel, 2) and the energy of a field (knot, 2)."""
+        factor, energy_weight = normal
+        force = self.cells.adjoint(force, self.lattice.size).ravel()
+        change = -force - energy_weight * self._energy_gradient(field.ravel())
+        alignment.solve_banded(factor, change)
         return change.reshape(-1, 2)
 
-    def _bend(self, change: np.ndarray) -> np.ndarray:
-        """Half the slope of the roughness of a change, both of shape (unknowns,).
+    def _energy_gradient(self, field: np.ndarray) -> np.ndarray:
+        """Half the gradient of the bending energy of a field, both of shape (unknowns,).
 
-        That of the change less the affine motion of all knots that leaves the least of it: a wall that is shifted or
-        stretched as a whole is not rough, though its components along and across the wall are.
+        (K - K A (A^T K A)^+ A^T K) u: the energy of the field less the affine field that leaves the least of it. A
+        shift or stretch of the whole wall costs nothing, although its components along and through the wall vary.
         """
-        whole = np.sum(self.bent * change[:, None], 0)
-        return product(self.roughness, change) - np.sum(self.freed * whole, 1)
+        affine = np.sum(self.energy_affine * field[:, None], 0)
+        return alignment.multiply_banded(self.energy, field) - np.sum(self.energy_affine_inverse * affine, 1)
 
-    def _noise(self, template: np.ndarray, residual: np.ndarray, weight: np.ndarray, slope: np.ndarray) -> float:
-        """Noise over speckle, times the length of speckle over the distance of the knots.
+    def _relative_noise(self, template: np.ndarray, residual: np.ndarray, weight: np.ndarray, gradient: np.ndarray):
+        """(noise power / speckle power) (speckle length / knot spacing), a number.
 
-        Power of the residuals (pixel,) by their weights over that of the template (pixel,); the length is that over
-        which grey values with these slopes (pixel, 2) change by their standard deviation.
+        Noise power is the weighted mean square of the residuals (pixel,), speckle power the variance of the template
+        (pixel,), speckle length its standard deviation over the RMS of the gradient (pixel, 2).
         """
-        power, steepness = np.var(template), np.sqrt(np.mean(slope**2))
+        power, slope = np.var(template), np.sqrt(np.mean(gradient**2))
         noise = np.sum(weight * residual**2) / np.sum(weight)
-        return noise / (np.sqrt(power) * steepness * self.lattice.step or 1.0)
+        return noise / (np.sqrt(power) * slope * self.lattice.knot_spacing or 1.0)
 
-    def _normal(
-        self, slope: np.ndarray, weight: np.ndarray, smoothness: float, every: int = 1
-    ) -> tuple[np.ndarray, float]:
-        """Cholesky factor of the normal matrix of every so many pixels, and the weight that the roughness has in it."""
-        band, cells = np.zeros(self.roughness.shape), self.cells
-        add_matrix(cells.knots, cells.first, cells.across, cells.down, np.ascontiguousarray(slope), weight, every, band)
+    def _normal_matrix(self, gradient: np.ndarray, weight: np.ndarray, smoothness: float, stride: int):
+        """Cholesky factor of the normal matrix of every `stride`-th pixel, and the weight of the energy in it."""
+        band, cells = np.zeros(self.energy.shape), self.cells
+        alignment.add_normal_matrix(
+            cells.knots,
+            cells.offsets,
+            cells.weight_x,
+            cells.weight_y,
+            np.ascontiguousarray(gradient),
+            weight,
+            stride,
+            band,
+        )
         scale = band[:, -1].mean() or 1.0
-        band += scale * smoothness * self.roughness
-        band[:, -1] += scale * ANCHOR
-        factorise(band)
+        band += scale * smoothness * self.energy
+        band[:, -1] += scale * REGULARISATION
+        alignment.cholesky_banded(band)
         return band, scale * smoothness
 
 
-def robust(residual: np.ndarray, tolerance: float) -> np.ndarray:
-    """Weights of Geman and McClure for residuals, with their own scale; a quarter where they are `tolerance` of it."""
-    scale = tolerance * DEVIATION * np.median(np.abs(residual[::SAMPLE]))
+def geman_mcclure(residual: np.ndarray, tolerance: float) -> np.ndarray:
+    """Robust weights 1 / (1 + (r / (tolerance sigma))^2)^2 (Geman and McClure), sigma from the median of |r|."""
+    scale = tolerance * MAD_TO_STD * np.median(np.abs(residual[::MEDIAN_STRIDE]))
     return 1 / (1 + (residual / (scale or 1.0)) ** 2) ** 2
 
 
-def region(mask: np.ndarray, knots: float, margin: float, across: float) -> Region:
-    """The wall and what is around it.
+def wall_region(mask: np.ndarray, knot_spacing: float, margin: float, transmural_scale: float) -> WallRegion:
+    """The wall and its surroundings with their B-spline.
 
     Parameters
     ----------
     mask : ndarray of shape (axial, lateral), bool
-        The wall; True somewhere.
-    knots : float
-        Distance of the knots, px.
+        The wall; not empty.
+    knot_spacing : float
+        px.
     margin : float
-        How far around the wall pixels count, px.
-    across : float
-        Length of a unit through the wall where roughness is measured.
+        Pixels up to this distance from the wall are used, px.
+    transmural_scale : float
+        Scale of lengths through the wall in the bending energy.
 
     Returns
     -------
-    Region
+    WallRegion
     """
-    wide = ndimage.distance_transform_edt(~mask) <= margin
-    thinned = wide & (np.indices(mask.shape).sum(0) % 2 == 0)
-    if knots > FINE and (thinned & mask).any():
-        wide = thinned
-    places = np.argwhere(wide)[:, ::-1].astype(float)
-    net = lattice(places, knots)
-    cells, order = net.cells(places)
-    rough = roughness(cells, *(each[order] for each in frame(mask, wide, knots, across)), net.size)
-    affine = net.affine()
-    bent = np.stack([product(rough, each) for each in affine.T], -1)
-    freed = bent @ np.linalg.pinv(affine.T @ bent)
-    return Region(net, cells, places[order], mask[wide][order], rough, bent, freed)
+    used = ndimage.distance_transform_edt(~mask) <= margin
+    thinned = used & (np.indices(mask.shape).sum(0) % 2 == 0)
+    if knot_spacing > MAX_KNOT_SPACING_ALL_PIXELS and (thinned & mask).any():
+        used = thinned
+    positions = np.argwhere(used)[:, ::-1].astype(float)
+    lattice = lattice_around(positions, knot_spacing)
+    cells, order = lattice.sort_points(positions)
+    metrics, angle_derivatives = wall_frame(mask, used, knot_spacing, transmural_scale)
+    energy = bending_energy(cells, metrics[order], angle_derivatives[order], lattice.size)
+    affine = lattice.affine_fields()
+    energy_affine = np.stack([alignment.multiply_banded(energy, field) for field in affine.T], -1)
+    energy_affine_inverse = energy_affine @ np.linalg.pinv(affine.T @ energy_affine)
+    return WallRegion(lattice, cells, positions[order], mask[used][order], energy, energy_affine, energy_affine_inverse)

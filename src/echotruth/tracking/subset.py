@@ -1,13 +1,12 @@
-"""Affine alignment of square subsets of two images by inverse compositional Gauss-Newton.
+"""Affine alignment of square subsets of two images by inverse compositional Gauss-Newton (IC-GN).
 
-Sought is the affine motion that makes the zero-normalised sum of squared differences smallest, sum ((f - mean f) / |f -
-mean f| - (g - mean g) / |g - mean g|)^2, where f is a subset of the first image and g what the second has at the places
-it moves to (Pan, Li and Tong 2013, Exp Mech 53:1277; Baker and Matthews 2004, Int J Comput Vis 56:221). Slopes and
-Hessian are those of f, once and for all.
+The warp minimises the zero-normalised sum of squared differences, sum ((f - mean f) / |f - mean f| - (g - mean g) /
+|g - mean g|)^2, where f is a subset of the first image and g the second image at the warped positions (Pan, Li and Tong
+2013, Exp Mech 53:1277; Baker and Matthews 2004, Int J Comput Vis 56:221). The Hessian is that of f, computed once.
 
-A motion is (u, u_x, u_y, v, v_x, v_y): what is dx, dy from the middle comes to dx + u + u_x dx + u_y dy, dy + v +
-v_x dx + v_y dy from it. Grey values and slopes of a subset are images (side, side) in single precision. Sums over them
-are gathered column by column, so that the processor adds several at once, though always in the same order.
+A warp is (u, u_x, u_y, v, v_x, v_y): the offset dx, dy from the centre becomes dx + u + u_x dx + u_y dy, dy + v +
+v_x dx + v_y dy. Grey values and gradients of a subset are images (side, side) in single precision. Sums over them are
+gathered column by column, so that the processor adds several at once, though always in the same order.
 """
 
 from __future__ import annotations
@@ -16,95 +15,94 @@ import numba
 import numpy as np
 
 from echotruth.imaging import spline
-from echotruth.tracking.cubic import shares, slopes
+from echotruth.tracking.cubic import bspline_weights, first_derivatives
 
-STEPS = 30
-"""Most iterations."""
-STILL = 1e-3
-"""Largest motion of a corner of the subset in the last iteration, px (Pan, Li and Tong 2013)."""
-STRAY = 0.25
-"""Distance from its start at which a motion is given up, over half the side of a subset."""
+MAX_ITERATIONS = 30
+CONVERGENCE = 1e-3
+"""Largest displacement of a corner of the subset in the last iteration, px (Pan, Li and Tong 2013)."""
+MAX_DEPARTURE = 0.25
+"""Distance from the initial estimate, over half the side of a subset, at which an alignment is rejected."""
 ZERO, ONE, TWO, THREE = np.float32(0), np.uintp(1), np.uintp(2), np.uintp(3)
 
 
 @numba.njit(cache=True, nogil=True)
-def cells(start, half, size):
-    """First of the four coefficients at every pixel of a subset along an axis, and the shares and slopes of these.
+def axis_weights(centre, half, size):
+    """First of the four coefficients at each pixel of a subset along an axis, their weights, and derivatives of these.
 
-    Beyond the image its border is taken.
+    Outside the image its border is taken.
     """
     side = 2 * half + 1
-    first, value, slope = np.empty(side, np.int64), np.empty((side, 4)), np.empty((side, 4))
+    first, weight, derivative = np.empty(side, np.int64), np.empty((side, 4)), np.empty((side, 4))
     for k in range(side):
-        place = min(max(start + k - half, 0.0), size - 4.0)
-        first[k] = min(int(place), size - 5)
-        values, steep = shares(place - first[k]), slopes(place - first[k])
+        position = min(max(centre + k - half, 0.0), size - 4.0)
+        first[k] = min(int(position), size - 5)
+        values, slopes = bspline_weights(position - first[k]), first_derivatives(position - first[k])
         for a in range(4):
-            value[k, a], slope[k, a] = values[a], steep[a]
-    return first, value, slope
+            weight[k, a], derivative[k, a] = values[a], slopes[a]
+    return first, weight, derivative
 
 
 @numba.njit(cache=True, nogil=True)
-def template(padded, place, half, values, along, deep):
-    """Write the centred values of a subset about a place and their slopes per px, lateral and axial; their norm."""
-    column, across, right = cells(place[0], half, padded.shape[1])
-    row, down, below = cells(place[1], half, padded.shape[0])
+def template(padded, centre, half, values, gradient_x, gradient_y):
+    """Write the zero-mean values f - mean f of a subset and the gradient of f per px; return |f - mean f|."""
+    column, weight_x, derivative_x = axis_weights(centre[0], half, padded.shape[1])
+    row, weight_y, derivative_y = axis_weights(centre[1], half, padded.shape[0])
     width = column[-1] + 4 - column[0]
-    middle, slope = np.empty(width), np.empty(width)
+    value_row, slope_row = np.empty(width), np.empty(width)
     for i in range(len(row)):
         for j in range(width):
-            middle[j], slope[j] = 0.0, 0.0
+            value_row[j], slope_row[j] = 0.0, 0.0
         for a in range(4):
-            share, steep, line = down[i, a], below[i, a], padded[row[i] + a, column[0] :]
+            weight, derivative, line = weight_y[i, a], derivative_y[i, a], padded[row[i] + a, column[0] :]
             for j in range(width):
-                middle[j] += share * line[j]
-                slope[j] += steep * line[j]
+                value_row[j] += weight * line[j]
+                slope_row[j] += derivative * line[j]
         for k in range(len(column)):
             value, lateral, axial = 0.0, 0.0, 0.0
             for b in range(4):
                 j = column[k] - column[0] + b
-                value += across[k, b] * middle[j]
-                lateral += right[k, b] * middle[j]
-                axial += across[k, b] * slope[j]
-            values[i, k], along[i, k], deep[i, k] = value, lateral, axial
-    return centre(values)
+                value += weight_x[k, b] * value_row[j]
+                lateral += derivative_x[k, b] * value_row[j]
+                axial += weight_x[k, b] * slope_row[j]
+            values[i, k], gradient_x[i, k], gradient_y[i, k] = value, lateral, axial
+    return subtract_mean(values)
 
 
 @numba.njit(cache=True, nogil=True)
-def carried(padded, place, half, motion, values):
-    """Write the centred values of a subset after a motion; their norm."""
+def warped_subset(padded, centre, half, warp, values):
+    """Write the zero-mean values g - mean g at the warped positions of a subset; return |g - mean g|."""
     side, columns = 2 * half + 1, np.int32(padded.shape[1])
     right, bottom = np.float32(padded.shape[1] - 4.001), np.float32(padded.shape[0] - 4.001)
-    grey, below = padded.reshape(-1), np.uintp(columns)
-    along, across = np.float32(1 + motion[1]), np.float32(motion[4])
+    flat, row_length = padded.reshape(-1), np.uintp(columns)
+    step_x, step_y = np.float32(1 + warp[1]), np.float32(warp[4])
     first, lateral, axial = np.empty(side, np.int32), np.empty(side, np.float32), np.empty(side, np.float32)
     for row in range(side):
         dy = row - half
-        x = np.float32(place[0] + motion[0] + motion[2] * dy)
-        y = np.float32(place[1] + motion[3] + motion[5] * dy + dy)
+        x = np.float32(centre[0] + warp[0] + warp[2] * dy)
+        y = np.float32(centre[1] + warp[3] + warp[5] * dy + dy)
         for k in range(side):
             dx = np.float32(k - half)
-            u, v = min(max(x + along * dx, ZERO), right), min(max(y + across * dx, ZERO), bottom)
+            u, v = min(max(x + step_x * dx, ZERO), right), min(max(y + step_y * dx, ZERO), bottom)
             j, i = np.int32(u), np.int32(v)
             first[k], lateral[k], axial[k] = i * columns + j, u - np.float32(j), v - np.float32(i)
-        # Numbers without a sign, for of others the compiler would ask whether they count from the end.
+        # Unsigned indices: for signed ones the compiler would test whether they count from the end.
         for k in range(side):
             a = np.uintp(first[k])
-            b, c, d = a + below, a + below + below, a + below + below + below
-            p, q, r, s = spline.shares(axial[k])
-            e, f, g, h = spline.shares(lateral[k])
+            b, c, d = a + row_length, a + row_length + row_length, a + row_length + row_length + row_length
+            p, q, r, s = spline.bspline_weights(axial[k])
+            e, f, g, h = spline.bspline_weights(lateral[k])
             values[row, k] = (
-                e * (p * grey[a] + q * grey[b] + r * grey[c] + s * grey[d])
-                + f * (p * grey[a + ONE] + q * grey[b + ONE] + r * grey[c + ONE] + s * grey[d + ONE])
-                + g * (p * grey[a + TWO] + q * grey[b + TWO] + r * grey[c + TWO] + s * grey[d + TWO])
-                + h * (p * grey[a + THREE] + q * grey[b + THREE] + r * grey[c + THREE] + s * grey[d + THREE])
+                e * (p * flat[a] + q * flat[b] + r * flat[c] + s * flat[d])
+                + f * (p * flat[a + ONE] + q * flat[b + ONE] + r * flat[c + ONE] + s * flat[d + ONE])
+                + g * (p * flat[a + TWO] + q * flat[b + TWO] + r * flat[c + TWO] + s * flat[d + TWO])
+                + h * (p * flat[a + THREE] + q * flat[b + THREE] + r * flat[c + THREE] + s * flat[d + THREE])
             )
-    return centre(values)
+    return subtract_mean(values)
 
 
 @numba.njit(cache=True, nogil=True)
-def centre(values):
-    """Take the mean from values; the root of the sum of their squares."""
+def subtract_mean(values):
+    """Subtract the mean from values, in place; return the root of the sum of their squares."""
     columns = np.zeros(values.shape[1])
     for row in values:
         for k in range(len(columns)):
@@ -147,10 +145,11 @@ def moments(first, second):
 
 
 @numba.njit(cache=True, nogil=True)
-def hessian(along, deep):
-    """Sums of the products of all pairs of slopes by the motion (6, 6), of a subset with these slopes per px."""
+def hessian(gradient_x, gradient_y):
+    """Gauss-Newton Hessian sum (df/dp)^T (df/dp) (6, 6), where df/dp is the derivative of f by the warp."""
     result = np.empty((6, 6))
-    xx, xy, yy = moments(along, along), moments(along, deep), moments(deep, deep)
+    xx, xy = moments(gradient_x, gradient_x), moments(gradient_x, gradient_y)
+    yy = moments(gradient_y, gradient_y)
     for i in range(3):
         for j in range(3):
             k = i + j + (i > 0 and j > 0)
@@ -160,18 +159,18 @@ def hessian(along, deep):
 
 
 @numba.njit(cache=True, nogil=True)
-def force(along, deep, values):
-    """Sums of the products of values and their slopes by the motion, (6,)."""
+def project(gradient_x, gradient_y, values):
+    """sum (df/dp)^T values, (6,)."""
     result = np.empty(6)
-    lateral, axial = moments(along, values), moments(deep, values)
+    lateral, axial = moments(gradient_x, values), moments(gradient_y, values)
     for i in range(3):
         result[i], result[i + 3] = lateral[i], axial[i]
     return result
 
 
 @numba.njit(cache=True, nogil=True)
-def factor(lower):
-    """Make a Hessian its lower Cholesky factor, in place; all 0 where it is singular."""
+def cholesky(lower):
+    """Replace a Hessian by its lower Cholesky factor; all 0 where it is singular."""
     floor = 1e-9 * max(lower[0, 0], lower[3, 3])
     for j in range(6):
         for k in range(j):
@@ -186,112 +185,112 @@ def factor(lower):
 
 
 @numba.njit(cache=True, nogil=True)
-def solve(lower, right):
-    """Solve with a lower Cholesky factor, in place of the right side."""
+def solve_cholesky(lower, rhs):
+    """Solve with a lower Cholesky factor, in place of the right-hand side."""
     for i in range(6):
         for j in range(i):
-            right[i] -= lower[i, j] * right[j]
-        right[i] /= lower[i, i]
+            rhs[i] -= lower[i, j] * rhs[j]
+        rhs[i] /= lower[i, i]
     for i in range(5, -1, -1):
         for j in range(i + 1, 6):
-            right[i] -= lower[j, i] * right[j]
-        right[i] /= lower[i, i]
+            rhs[i] -= lower[j, i] * rhs[j]
+        rhs[i] /= lower[i, i]
 
 
 @numba.njit(cache=True, nogil=True)
-def undo(motion, step):
-    """Put the inverse of a step of the template before a motion, in place; False where it has none."""
+def compose_inverse(warp, step):
+    """Replace a warp W by W o S^-1, with S the step; return False if S has no inverse."""
     a, b, c, d = 1 + step[1], step[2], step[4], 1 + step[5]
-    whole = a * d - b * c
-    if not whole > 0:
+    det = a * d - b * c
+    if not det > 0:
         return False
-    back = (d / whole, -b / whole, -c / whole, a / whole)
-    to_x, to_y = -(back[0] * step[0] + back[1] * step[3]), -(back[2] * step[0] + back[3] * step[3])
+    inverse = (d / det, -b / det, -c / det, a / det)
+    x, y = -(inverse[0] * step[0] + inverse[1] * step[3]), -(inverse[2] * step[0] + inverse[3] * step[3])
     for k in range(2):
-        p, q = motion[3 * k + 1] + (k == 0), motion[3 * k + 2] + (k == 1)
-        motion[3 * k] += p * to_x + q * to_y
-        motion[3 * k + 1] = p * back[0] + q * back[2] - (k == 0)
-        motion[3 * k + 2] = p * back[1] + q * back[3] - (k == 1)
+        p, q = warp[3 * k + 1] + (k == 0), warp[3 * k + 2] + (k == 1)
+        warp[3 * k] += p * x + q * y
+        warp[3 * k + 1] = p * inverse[0] + q * inverse[2] - (k == 0)
+        warp[3 * k + 2] = p * inverse[1] + q * inverse[3] - (k == 1)
     return True
 
 
 @numba.njit(cache=True, nogil=True)
-def reach(step, half):
-    """Largest motion of a corner of a subset, px: no less than it."""
+def corner_displacement(step, half):
+    """Upper bound of the displacement of a corner of a subset, px."""
     return abs(step[0]) + abs(step[3]) + half * (abs(step[1]) + abs(step[2]) + abs(step[4]) + abs(step[5]))
 
 
 @numba.njit(cache=True, nogil=True)
-def iterate(padded, place, half, known, motion):
-    """Refine one motion in place; False if it is lost.
+def refine(padded, centre, half, template_terms, warp):
+    """Refine one warp in place; return False if the alignment is rejected.
 
     Parameters
     ----------
     padded
-        Coefficients of the second image.
-    place
-        Middle of the subset: x, y, px.
+        Spline coefficients of the second image.
+    centre
+        Centre of the subset: x, y, px.
     half
         A subset has 2 half + 1 pixels a side.
-    known
-        Of the template: centred values and lateral and axial slopes, each (side, side), norm, and factor of the
-        Hessian (6, 6).
-    motion
-        Start, and then the result.
+    template_terms
+        f - mean f, df/dx, df/dy, each (side, side), |f - mean f|, and the Cholesky factor of the Hessian (6, 6).
+    warp
+        Initial estimate, replaced by the result.
     """
-    values, along, deep, norm, lower = known
-    other, still = np.empty_like(values), force(along, deep, values)
-    start_x, start_y = motion[0], motion[3]
-    for _ in range(STEPS):
-        size = carried(padded, place, half, motion, other)
-        if size == 0:
+    values, gradient_x, gradient_y, norm, lower = template_terms
+    warped, template_projection = np.empty_like(values), project(gradient_x, gradient_y, values)
+    start_x, start_y = warp[0], warp[3]
+    for _ in range(MAX_ITERATIONS):
+        warped_norm = warped_subset(padded, centre, half, warp, warped)
+        if warped_norm == 0:
             return False
-        step = force(along, deep, other)
+        step = project(gradient_x, gradient_y, warped)
         for i in range(6):
-            step[i] = norm / size * step[i] - still[i]
-        solve(lower, step)
-        if not undo(motion, step):
+            step[i] = norm / warped_norm * step[i] - template_projection[i]
+        solve_cholesky(lower, step)
+        if not compose_inverse(warp, step):
             return False
-        if np.hypot(motion[0] - start_x, motion[3] - start_y) > STRAY * half:
+        if np.hypot(warp[0] - start_x, warp[3] - start_y) > MAX_DEPARTURE * half:
             return False
-        if reach(step, half) < STILL:
+        if corner_displacement(step, half) < CONVERGENCE:
             break
     return True
 
 
 @numba.njit(cache=True, nogil=True)
-def align(first, second, points, half, faintest, motion, alike):
-    """Refine motions of subsets; where that leads astray, the start stands.
+def align(first, second, points, half, min_std, warps, ncc):
+    """Refine the warps of subsets; a rejected alignment leaves the initial estimate.
 
     Parameters
     ----------
     first, second
-        Spline coefficients of the images with their margin, as of :func:`echotruth.imaging.spline.coefficients`.
+        Spline coefficients of the images with their margin, see :func:`echotruth.imaging.spline.coefficients`.
     points
-        Middles of the subsets: x, y, px, shape (n, 2).
+        Centres of the subsets: x, y, px, shape (n, 2).
     half
         A subset has 2 half + 1 pixels a side.
-    faintest
+    min_std
         Standard deviation below which a subset has no texture.
-    motion
-        Start, and then the result, shape (n, 6), float64.
-    alike
-        Written: zero-normalised correlation after the motion, shape (n,); NaN where a subset has no texture.
+    warps
+        Initial estimates, replaced by the result, shape (n, 6), float64.
+    ncc
+        Output: zero-normalised cross-correlation at the warp, shape (n,); NaN where a subset has no texture.
     """
     side = 2 * half + 1
-    values, other = np.empty((side, side), np.float32), np.empty((side, side), np.float32)
-    along, deep = np.empty((side, side), np.float32), np.empty((side, side), np.float32)
+    values, warped = np.empty((side, side), np.float32), np.empty((side, side), np.float32)
+    gradient_x, gradient_y = np.empty((side, side), np.float32), np.empty((side, side), np.float32)
     for point in range(len(points)):
-        place = points[point]
-        norm = template(first, place, half, values, along, deep)
-        lower = hessian(along, deep)
-        factor(lower)
-        refined = motion[point].copy()
-        if lower[0, 0] > 0 and iterate(second, place, half, (values, along, deep, norm, lower), refined):
+        centre = points[point]
+        norm = template(first, centre, half, values, gradient_x, gradient_y)
+        lower = hessian(gradient_x, gradient_y)
+        cholesky(lower)
+        refined = warps[point].copy()
+        template_terms = (values, gradient_x, gradient_y, norm, lower)
+        if lower[0, 0] > 0 and refine(second, centre, half, template_terms, refined):
             for i in range(6):
-                motion[point, i] = refined[i]
-        size = carried(second, place, half, motion[point], other)
-        if min(norm, size) > faintest * side:
-            alike[point] = moments(values, other)[0] / (norm * size)
+                warps[point, i] = refined[i]
+        warped_norm = warped_subset(second, centre, half, warps[point], warped)
+        if min(norm, warped_norm) > min_std * side:
+            ncc[point] = moments(values, warped)[0] / (norm * warped_norm)
         else:
-            alike[point] = np.nan
+            ncc[point] = np.nan

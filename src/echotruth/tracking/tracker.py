@@ -1,4 +1,4 @@
-"""The one way to call any tracker, and what is asked of its input and its answer."""
+"""Call of any tracker, with checks of its input."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ import numpy as np
 from echotruth.section import Section
 from echotruth.tracking.failure import TrackerFailed
 
-Track = Callable[..., tuple[np.ndarray, np.ndarray]]
-
 
 def track(
     frames: np.ndarray,
@@ -23,39 +21,39 @@ def track(
     seed: int,
     settings: Section,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement of points since the first frame, as a tracker sees it.
+    """Displacement of points since the first frame, as a tracker estimates it.
 
     Parameters
     ----------
     frames : ndarray of shape (frame, axial, lateral)
-        B-mode clip of one cycle, any real type; frame 0 is end-diastole, and would follow the last.
+        B-mode clip of one cycle, any real type; frame 0 is end-diastole and would follow the last frame.
     points : ndarray of shape (n, 2)
-        Where the points are at end-diastole: lateral, axial, px (0 is the centre of the first pixel).
+        Positions at end-diastole: lateral, axial, px (0 is the centre of the first pixel).
     mask : ndarray of shape (axial, lateral), bool
-        The wall at end-diastole, as one who looks at the image would draw it.
+        The wall at end-diastole, as a reader of the image would draw it.
     spacing : float
         Distance of pixel centres, the same along both axes, m.
     frame_time : ndarray of shape (frame,)
         Time since end-diastole, s.
     seed : int
-        Start of whatever a tracker draws at random.
+        Seed of the tracker's random numbers.
     settings : Section
         One of the sections in `config/tracking.py`; it names the method.
 
     Returns
     -------
     displacement : ndarray of shape (frame, n, 2)
-        Since end-diastole of the tissue that was at the point then: lateral, axial, px, positive for motion of the
-        tissue; NaN where there is none, as for points outside the image.
+        Since end-diastole, of the tissue that was at the point then: lateral, axial, px, positive for motion of the
+        tissue; NaN where unknown, as for points outside the image.
     quality : ndarray of shape (frame, n)
-        How sure the tracker is, from 0 to 1; NaN where there is no displacement.
+        Confidence of the tracker, from 0 to 1; NaN where there is no displacement.
 
     Raises
     ------
     ValueError
-        If there is no pair of frames, or points, mask, spacing or times make no sense.
+        If there are fewer than two frames, or points, mask, spacing or times are invalid.
     TrackerFailed
-        If the method cannot do with such a clip, or a guest raises or does not answer as asked.
+        If the method cannot process the clip, or an external tracker raises or returns an invalid result.
     """
     clip = (np.asarray(frames), np.asarray(points, float), np.asarray(mask, bool), spacing, np.asarray(frame_time))
     _check(*clip)
@@ -70,34 +68,35 @@ def track(
     return displacement, quality
 
 
-def _method(settings: Any) -> Track:
-    """The function of a method; each is imported only where it is used, for some take long to import."""
+def _method(settings: Any) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
+    """Function `track` of a method; its module is imported only here, because some take long to import."""
+    function: Callable[..., tuple[np.ndarray, np.ndarray]]
     match settings.method:
         case "phase_correlation":
-            from echotruth.tracking.trackers import phase_correlation as module
+            from echotruth.tracking.trackers.phase_correlation import track as function
         case "window_deformation":
-            from echotruth.tracking.trackers import window_deformation as module
+            from echotruth.tracking.trackers.window_deformation import track as function
         case "affine_dic":
-            from echotruth.tracking.trackers import affine_dic as module
+            from echotruth.tracking.trackers.affine_dic import track as function
         case "bspline_dic":
-            from echotruth.tracking.trackers import bspline_dic as module
+            from echotruth.tracking.trackers.bspline_dic import track as function
         case "dis":
-            from echotruth.tracking.trackers import dis as module
+            from echotruth.tracking.trackers.dis import track as function
         case "ilk":
-            from echotruth.tracking.trackers import ilk as module
-        case "guest":
-            from echotruth.tracking.trackers import external as module
-    return partial(module.track, settings=settings)
+            from echotruth.tracking.trackers.ilk import track as function
+        case "external":
+            from echotruth.tracking.trackers.external import track as function
+    return partial(function, settings=settings)
 
 
 def _check(frames: np.ndarray, points: np.ndarray, mask: np.ndarray, spacing: float, frame_time: np.ndarray) -> None:
     if frames.ndim != 3 or len(frames) < 2:
-        raise ValueError(f"A clip of two or more frames (frame, axial, lateral) is needed, not one of {frames.shape}.")
+        raise ValueError(f"A clip needs two or more frames, shape (frame, axial, lateral), not {frames.shape}.")
     if points.ndim != 2 or points.shape[1] != 2:
-        raise ValueError(f"Points must be of shape (point, 2), not {points.shape}.")
+        raise ValueError(f"Points must have the shape (point, 2), not {points.shape}.")
     if mask.shape != frames.shape[1:]:
         raise ValueError(f"The mask must have the shape of a frame, {frames.shape[1:]}, not {mask.shape}.")
     if not (np.isfinite(spacing) and spacing > 0):
         raise ValueError(f"The pixel spacing must be a positive length in metres, not {spacing}.")
     if frame_time.shape != frames.shape[:1] or not (np.diff(frame_time) > 0).all():
-        raise ValueError(f"There must be {len(frames)} rising times of frames, not {frame_time}.")
+        raise ValueError(f"The {len(frames)} frames need {len(frames)} increasing times, not {frame_time}.")

@@ -1,4 +1,4 @@
-"""Square windows on an image, the points between them, and linear interpolation from one to the other.
+"""Square windows on an image, interpolation between them, and the grid of points.
 
 Pixel coordinates count pixel centres: 0 is the centre of the first row or column.
 """
@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SMALLEST = 8
-"""Side of the smallest window in pixels; a smaller one holds no speckle to speak of."""
+MIN_WINDOW_SIDE = 8
+"""px; a smaller window holds too little speckle."""
 
 
 @dataclass(frozen=True)
@@ -22,17 +22,17 @@ class Windows:
     side : int
         Side of a window, px.
     top : ndarray of shape (rows,)
-        First image row of every row of windows.
+        First image row of each row of windows.
     left : ndarray of shape (columns,)
-        First image column of every column of windows.
+        First image column of each column of windows.
     """
 
     side: int
     top: np.ndarray
     left: np.ndarray
 
-    def cut(self, image: np.ndarray) -> np.ndarray:
-        """Grey values under the windows.
+    def extract(self, image: np.ndarray) -> np.ndarray:
+        """Pixels of the windows.
 
         Parameters
         ----------
@@ -42,14 +42,14 @@ class Windows:
         -------
         ndarray of shape (rows, columns, side, side), float64
         """
-        every = np.lib.stride_tricks.sliding_window_view(image, (self.side, self.side))
-        return every[np.ix_(self.top, self.left)].astype(float)
+        windows = np.lib.stride_tricks.sliding_window_view(image, (self.side, self.side))
+        return windows[np.ix_(self.top, self.left)].astype(float)
 
     def interpolate(self, field: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Bilinear interpolation between the window centres, nearest value outside them.
+        """Bilinear interpolation between the window centres; outside them the nearest value.
 
-        Windows without a value (NaN) are left out and the weights of the others rescaled to one,
-        so that black background beside the wall does not erase the wall.
+        Windows without a value (NaN) are left out and the weights of the others rescaled to a sum of one, so that the
+        black background does not erase the wall beside it.
 
         Parameters
         ----------
@@ -63,26 +63,26 @@ class Windows:
         ndarray of shape (n, k)
             NaN where no window around the point has a value, or the point itself is NaN.
         """
-        column, right = _cell(points[:, 0] - (self.side - 1) / 2, self.left)
-        row, down = _cell(points[:, 1] - (self.side - 1) / 2, self.top)
-        total, weight = np.zeros((len(points), field.shape[-1])), np.zeros(len(points))
+        column, right = _interval(points[:, 0] - (self.side - 1) / 2, self.left)
+        row, down = _interval(points[:, 1] - (self.side - 1) / 2, self.top)
+        total, total_weight = np.zeros((len(points), field.shape[-1])), np.zeros(len(points))
         for i, j in np.ndindex(2, 2):
             value = field[np.minimum(row + i, len(self.top) - 1), np.minimum(column + j, len(self.left) - 1)]
-            share = np.abs(1 - i - down) * np.abs(1 - j - right) * np.isfinite(value).all(-1)
-            total += np.where(share[:, None] > 0, share[:, None] * value, 0)
-            weight += share
-        known = weight > 1e-9
+            weight = np.abs(1 - i - down) * np.abs(1 - j - right) * np.isfinite(value).all(-1)
+            total += np.where(weight[:, None] > 0, weight[:, None] * value, 0)
+            total_weight += weight
+        known = total_weight > 1e-9
         result = np.full_like(total, np.nan)
-        result[known] = total[known] / weight[known, None]
+        result[known] = total[known] / total_weight[known, None]
         return result
 
 
-def _cell(position: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Index of the interval a coordinate falls into and the fraction (0..1) of the way through it."""
+def _interval(position: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Index of the interval between corners that contains a position, and the fraction (0 to 1) of it passed."""
     step = corners[1] - corners[0] if len(corners) > 1 else 1
-    place = np.clip((position - corners[0]) / step, 0, len(corners) - 1)
-    index = np.minimum(np.nan_to_num(place).astype(int), max(len(corners) - 2, 0))
-    return index, place - index
+    index = np.clip((position - corners[0]) / step, 0, len(corners) - 1)
+    interval = np.minimum(np.nan_to_num(index).astype(int), max(len(corners) - 2, 0))
+    return interval, index - interval
 
 
 def arrange(shape: tuple[int, int], side: int, stride: float) -> Windows:
@@ -95,7 +95,7 @@ def arrange(shape: tuple[int, int], side: int, stride: float) -> Windows:
     side : int
         Side of a window, px.
     stride : float
-        Step between windows over their side, rounded to a pixel.
+        Step between windows over their side; the step is rounded to a pixel.
 
     Returns
     -------
@@ -109,12 +109,12 @@ def arrange(shape: tuple[int, int], side: int, stride: float) -> Windows:
     if side > min(shape):
         raise ValueError(f"The tracking window of {side} px is larger than the image of {shape[0]} x {shape[1]} px.")
     step = max(1, round(side * stride))
-    starts = []
+    corners = []
     for size in shape:
         last = (size - side) // step
-        # What is left over is split between both borders, so that no border is favoured.
-        starts.append((size - side - last * step) // 2 + step * np.arange(last + 1))
-    return Windows(side, *starts)
+        # The remainder is split between both borders, so that neither is favoured.
+        corners.append((size - side - last * step) // 2 + step * np.arange(last + 1))
+    return Windows(side, *corners)
 
 
 def grid(shape: tuple[int, int], step: int) -> np.ndarray:

@@ -1,48 +1,49 @@
-"""Compiled functions on disk: one cache for each group of stages, which processes share.
+"""Caches of compiled functions on disk, one per group of stages and version of the code.
 
-A compiled function is cached by the file it stands in, not by those it calls from, so that there is one cache for each
-version of the code.
+Numba checks only the file of the cached function for changes, not those of the functions that it calls. Therefore each
+version of the code has a cache of its own.
 """
 
 from __future__ import annotations
 
 import fcntl
 from pathlib import Path
+from typing import Any
 
 from echotruth.repository.provenance import code_version
 
-GROUPS = {
+CACHE_GROUPS = {
     "mechanics": ("mechanics", "physiology"),
     "imaging": ("phantom", "truth", "rf", "bmode"),
     "tracking": ("tracking", "evaluation"),
     "report": ("report",),
 }
-"""Stages that share a cache, for they are done by the same jobs or call the same functions."""
+"""Stages that share a cache, because they run in the same jobs or call the same functions."""
 
 
-def folder(group: str, scripts: Path) -> str:
-    """Name of the cache of a group, whose scripts are in a folder."""
-    return f"{group}-{code_version(*(str(scripts / f'{stage}.py') for stage in GROUPS[group]))}"
+def cache_folder(group: str, scripts: Path) -> str:
+    """Name of the cache folder of a group of stages, given the folder of their scripts."""
+    return f"{group}-{code_version(*(str(scripts / f'{stage}.py') for stage in CACHE_GROUPS[group]))}"
 
 
-def share() -> None:
-    """Let this process and others that do the same write to one cache, one at a time.
+def lock_cache_writes() -> None:
+    """Make Numba lock a cache while it writes to it, so that processes can share it.
 
-    Numba numbers the forms of a function as it saves them: two that are saved at once would get the same number, and
-    one of them the code of the other.
+    Numba numbers the specialisations of a function as it saves them. Two processes that save at the same time would use
+    the same number, and one specialisation would load the code of the other.
     """
-    from numba.core.caching import IndexDataCacheFile as File
+    from numba.core.caching import IndexDataCacheFile
 
-    if hasattr(File.save, "alone"):
+    cache: Any = IndexDataCacheFile
+    save = cache.save
+    if save.__name__ == "locked_save":
         return
-    save = File.save
 
-    def locked(self, *given):
-        place = Path(self._cache_path)
-        place.mkdir(parents=True, exist_ok=True)
-        with (place / "lock").open("w") as lock:
+    def locked_save(self, *arguments):
+        folder = Path(self._cache_path)
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / "lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            save(self, *given)
+            save(self, *arguments)
 
-    locked.alone = True
-    File.save = locked
+    cache.save = locked_save

@@ -1,4 +1,4 @@
-"""What a stage costs: seconds of processors and of the clock, how many of them compiling and starting, and memory."""
+"""Cost of a stage: wall-clock, CPU, compilation and start-up time, and memory."""
 
 from __future__ import annotations
 
@@ -14,73 +14,73 @@ PROCESS = Path("/proc/self")
 
 
 class Cost:
-    """What the stages of this process cost, one after the other; the first bears the start of the process."""
+    """Cost of the stages that a process runs one after the other; the first includes the start of the process."""
 
     def __init__(self) -> None:
-        self._compiling, self._ended = _Compiling(), 0.0
-        register("numba:compile", self._compiling)
-        self.begin()
+        self._compilation, self._stop_cpu = _CompilationTime(), 0.0
+        register("numba:compile", self._compilation)
+        self.start()
 
-    def begin(self) -> None:
-        """A stage begins its work."""
-        _forget_peak()
-        self._clock, self._compiled, self._begun = time.perf_counter(), self._compiling.seconds, processor()
+    def start(self) -> None:
+        """Start the measurement of a stage."""
+        _reset_peak_memory()
+        self._start_clock, self._start_cpu = time.perf_counter(), cpu_seconds()
+        self._start_compilation = self._compilation.seconds
 
-    def spent(self) -> dict[str, float]:
-        """What the stage that ends here has cost.
+    def stop(self) -> dict[str, float]:
+        """Cost of the stage since :meth:`start`.
 
         Returns
         -------
         dict
-            seconds : by the clock; cpu_seconds : of processors, of other processes that it called too;
-            compile_seconds : how many of these went into compiling; start_seconds : of processors, before its work
-            began; memory_MB : greatest resident memory.
+            seconds : wall-clock time; cpu_seconds : CPU time, including that of child processes; compile_seconds : CPU
+            time of compilation; start_seconds : CPU time before the stage started; memory_MB : peak resident memory.
         """
-        now = processor()
-        found = {
-            "seconds": time.perf_counter() - self._clock,
-            "cpu_seconds": now - self._begun,
-            "compile_seconds": self._compiling.seconds - self._compiled,
-            "start_seconds": self._begun - self._ended,
-            "memory_MB": _peak(),
+        now = cpu_seconds()
+        cost = {
+            "seconds": time.perf_counter() - self._start_clock,
+            "cpu_seconds": now - self._start_cpu,
+            "compile_seconds": self._compilation.seconds - self._start_compilation,
+            "start_seconds": self._start_cpu - self._stop_cpu,
+            "memory_MB": _peak_memory(),
         }
-        self._ended = now
-        return {name: round(value, 3) for name, value in found.items()}
+        self._stop_cpu = now
+        return {name: round(value, 3) for name, value in cost.items()}
 
 
-class _Compiling(Listener):
-    """Processor seconds spent compiling; what is found in the cache takes none."""
+class _CompilationTime(Listener):
+    """CPU time of compilation, s; functions loaded from the cache take none."""
 
     def __init__(self) -> None:
-        self.seconds, self._depth, self._since = 0.0, 0, 0.0
+        self.seconds, self._depth, self._start = 0.0, 0, 0.0
 
     def on_start(self, event: Event) -> None:
         if not self._depth:
-            self._since = time.thread_time()
+            self._start = time.thread_time()
         self._depth += 1
 
     def on_end(self, event: Event) -> None:
         self._depth -= 1
         if not self._depth:
-            self.seconds += time.thread_time() - self._since
+            self.seconds += time.thread_time() - self._start
 
 
-def processor() -> float:
-    """Processor seconds of this process and of those that it called and that have ended."""
-    # os.times counts in hundredths of a second.
+def cpu_seconds() -> float:
+    """CPU time of this process and of its child processes that have ended, s."""
+    # os.times resolves only hundredths of a second, so it is used for child processes alone.
     return time.process_time() + sum(os.times()[2:4])
 
 
-def _forget_peak() -> None:
-    """Let the greatest memory be counted from here, where the system can (Linux, proc(5))."""
+def _reset_peak_memory() -> None:
+    """Reset the peak resident memory, on systems that support it (Linux, proc(5))."""
     try:
         (PROCESS / "clear_refs").write_text("5")
     except OSError:
         return
 
 
-def _peak() -> float:
-    """Greatest resident memory of this process, MB."""
+def _peak_memory() -> float:
+    """Peak resident memory of this process, MB."""
     try:
         status = (PROCESS / "status").read_text()
     except OSError:

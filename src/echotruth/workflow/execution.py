@@ -1,4 +1,4 @@
-"""Execution of the workflow: Snakemake's words in a file, how far it is in one line, and no job that outlives it."""
+"""Run Snakemake with its output in a log and its progress on one line, and end all jobs with it."""
 
 from __future__ import annotations
 
@@ -8,145 +8,140 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
 import psutil
 
-from echotruth.workflow.progress import Progress, words
+from echotruth.workflow.progress import Progress, format_duration
 
-GLANCE = 0.5
-"""Seconds between two looks at the log."""
-SELDOM = 30.0
-"""Seconds between two lines where they are not rewritten in place."""
-PATIENCE = 10.0
-"""Seconds that jobs have to end when they are asked to."""
-LAST = 15
-"""Lines shown of the log of a job that failed."""
-SHOWN = 3
-"""Most logs shown."""
+POLL_SECONDS = 0.5
+"""Interval at which the log is read."""
+LINE_SECONDS = 30.0
+"""Interval between progress lines on a stream that is not a terminal."""
+TERMINATION_SECONDS = 10.0
+"""Time that jobs have to end after SIGTERM, before they are killed."""
+LOG_LINES = 15
+"""Number of lines shown of the log of a failed job."""
+MAX_LOGS = 3
+"""Largest number of logs shown."""
 
 
-def execute(command: list[str], log: Path, name: str, weights: dict[str, float]) -> int:
-    """Run Snakemake and tell on stderr how far it is, or what failed; its exit status.
+def execute(command: list[str], log: Path, name: str, expected: dict[str, float]) -> int:
+    """Run Snakemake, show its progress or what failed on stderr, and return its exit status.
 
     Parameters
     ----------
     command : list of str
     log : Path
-        Where its words go.
+        File for its output.
     name : str
-        Of the repository.
-    weights : dict
-        Rule to the seconds that its job may take.
+        Name of the repository.
+    expected : dict
+        Rule -> expected duration of its job, s.
     """
     log.parent.mkdir(parents=True, exist_ok=True)
-    progress = Progress(weights)
-    with log.open("w") as said:
-        process = subprocess.Popen(command, stdout=said, stderr=subprocess.STDOUT)
-    with _no_survivors(process), log.open(errors="replace") as said:
-        _follow(process, said, progress, Line(name, sys.stderr))
+    progress = Progress(expected)
+    with log.open("w") as output:
+        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
+    with _terminate_on_exit(process), log.open(errors="replace") as output:
+        _follow(process, output, progress, ProgressLine(name, sys.stderr))
     if process.returncode:
-        _complain(progress.logs or [log])
+        _print_logs(progress.logs or [log])
     return process.returncode
 
 
-class Line:
-    """One line that tells how far a run is, rewritten in place on a terminal, and else once in a while.
+class ProgressLine:
+    """Line with the progress of a run, rewritten in place on a terminal, and printed at intervals elsewhere.
 
     Parameters
     ----------
     name : str
-        What it begins with.
+        Start of the line.
     stream : TextIO
     clock : callable
-        Seconds.
+        Returns the time, s.
     """
 
     def __init__(self, name: str, stream: TextIO, clock=time.monotonic) -> None:
         self._name, self._stream, self._clock = name, stream, clock
-        self._last, self._next = "", clock()
+        self._last_text, self._next_time = "", clock()
 
     def show(self, progress: Progress) -> None:
-        """Tell it, if it is time and there is anything new."""
-        share = progress.share
-        text = f"{self._name}: {100 * share:.0f} % done, {progress.stage}, about {words(progress.left)} left"
-        if text == self._last or self._clock() < self._next or not progress.left:
+        """Print the line if it has changed and the interval has passed."""
+        percent, left = 100 * progress.fraction_done, progress.seconds_left
+        text = f"{self._name}: {percent:.0f} % done, {progress.running}, about {format_duration(left)} left"
+        if text == self._last_text or self._clock() < self._next_time or not left:
             return
-        self._last = text
+        self._last_text = text
         if self._stream.isatty():
             self._stream.write(f"\r\033[K{text[: shutil.get_terminal_size().columns - 1]}")
         else:
-            self._next = self._clock() + SELDOM
+            self._next_time = self._clock() + LINE_SECONDS
             self._stream.write(f"{text}\n")
         self._stream.flush()
 
     def close(self) -> None:
-        """Leave the terminal's line empty."""
+        """Clear the line on a terminal."""
         if self._stream.isatty():
             self._stream.write("\r\033[K")
             self._stream.flush()
 
 
-def _follow(process: subprocess.Popen[bytes], said: TextIO, progress: Progress, line: Line) -> None:
-    rest, ended = "", False
+def _follow(process: subprocess.Popen[bytes], output: TextIO, progress: Progress, line: ProgressLine) -> None:
+    incomplete, ended = "", False
     try:
         while not ended:
             ended = process.poll() is not None
-            *whole, rest = (rest + said.read()).split("\n")
-            for text in whole:
-                progress.hear(text)
+            *complete, incomplete = (incomplete + output.read()).split("\n")
+            for text in complete:
+                progress.read_line(text)
             line.show(progress)
             if not ended:
-                time.sleep(GLANCE)
+                time.sleep(POLL_SECONDS)
     finally:
         line.close()
 
 
 @contextmanager
-def _no_survivors(process: subprocess.Popen[bytes]) -> Iterator[None]:
-    """End a process and all that it has started where this one is interrupted or asked to end."""
-    asked = (signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(number, _leave) for number in asked]
+def _terminate_on_exit(process: subprocess.Popen[bytes]) -> Iterator[None]:
+    """Terminate a process and its descendants if this process is interrupted or terminated."""
+    signals = (signal.SIGTERM, signal.SIGHUP)
+    handlers = [signal.signal(number, _raise_exit) for number in signals]
     try:
         yield
     except (KeyboardInterrupt, SystemExit):
-        _end(process)
+        _terminate(process)
         raise
     finally:
-        for number, handler in zip(asked, before, strict=True):
+        for number, handler in zip(signals, handlers, strict=True):
             signal.signal(number, handler)
 
 
-def _leave(number: int, _: object) -> None:
+def _raise_exit(number: int, _: object) -> None:
     raise SystemExit(128 + number)
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _terminate(process: subprocess.Popen[bytes]) -> None:
     try:
         snakemake = psutil.Process(process.pid)
-        family = [snakemake, *snakemake.children(recursive=True)]
+        processes = [snakemake, *snakemake.children(recursive=True)]
     except psutil.NoSuchProcess:
         return
-    for member in family:
-        _ask(member.terminate)
-    _, left = psutil.wait_procs(family, timeout=PATIENCE)
-    for member in left:
-        _ask(member.kill)
+    for member in processes:
+        with suppress(psutil.NoSuchProcess):
+            member.terminate()
+    _, alive = psutil.wait_procs(processes, timeout=TERMINATION_SECONDS)
+    for member in alive:
+        with suppress(psutil.NoSuchProcess):
+            member.kill()
 
 
-def _ask(end) -> None:
-    try:
-        end()
-    except psutil.NoSuchProcess:
-        return
-
-
-def _complain(logs: list[Path]) -> None:
-    """Show the ends of logs."""
-    for log in logs[:SHOWN]:
+def _print_logs(logs: list[Path]) -> None:
+    """Print the ends of logs."""
+    for log in logs[:MAX_LOGS]:
         lines = log.read_text(errors="replace").splitlines() if log.is_file() else []
-        print(f"\nThe last lines of {log}:", *lines[-LAST:], sep="\n    ", file=sys.stderr)
-    if len(logs) > SHOWN:
-        print(f"\nMore logs of jobs that failed: {', '.join(map(str, logs[SHOWN:]))}", file=sys.stderr)
+        print(f"\nThe last lines of {log}:", *lines[-LOG_LINES:], sep="\n    ", file=sys.stderr)
+    if len(logs) > MAX_LOGS:
+        print(f"\nOther logs of failed jobs: {', '.join(map(str, logs[MAX_LOGS:]))}", file=sys.stderr)

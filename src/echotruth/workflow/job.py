@@ -1,4 +1,4 @@
-"""A job: one script's work on one heart, or one heart and view, and its record in the ledger."""
+"""Job: the work of one stage on one heart (and view), and its record in the ledger."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from shutil import rmtree
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from echotruth.cases import Case, find, generator
+from echotruth.cases import Case, find_case, generator
 from echotruth.config import View
 from echotruth.config.loading import load
 from echotruth.heart import Heart
@@ -22,38 +23,38 @@ from echotruth.repository import ledger, schema
 from echotruth.repository.ledger import GATES, record_path
 from echotruth.repository.provenance import code_version
 from echotruth.repository.store import NotWritten, Store, Values
-from echotruth.workflow.compiled import share
+from echotruth.workflow.compiled import lock_cache_writes
 from echotruth.workflow.cost import Cost
 
 Result = dict[str, Values]
 log = logging.getLogger("echotruth")
 
 
-class CannotBeMade(ValueError):
-    """A heart that has no solution: it is recorded and left out, and the other hearts go on."""
+class CaseFailed(ValueError):
+    """A case has no solution; the failure is recorded and the other cases continue."""
 
 
 class Job:
-    """Where a script finds its inputs and puts its results.
+    """Inputs, results and record of one stage for one case (and view).
 
     Parameters
     ----------
     folder : Path
-        Of the repository, `out/NAME`.
+        Folder of the repository, `out/NAME`.
     stage : str
         Name of the stage.
     case : str
         Case id.
     view : str, optional
-        Name of the view, for stages that work on one.
+        Name of the view, for stages that are run per view.
     script : str, optional
-        Path of the script of the stage (default: the one that runs).
+        Path of the script of the stage (default: the running script).
     """
 
     def __init__(self, folder: Path, stage: str, case: str, view: str | None = None, script: str | None = None) -> None:
         self.folder, self.stage = folder, stage
         self._script = script or sys.argv[0]
-        self.case: Case = find(load(folder / "config.yaml"), case)
+        self.case: Case = find_case(load(folder / "config.yaml"), case)
         self.view_name = view
         self.verdict = {"status": "complete"}
         self.store = Store(folder / f"{self.case.config.name}.zarr")
@@ -70,133 +71,124 @@ class Job:
         return generator(self.case, str(self.view_name), self.stage)
 
     @property
-    def place(self) -> tuple[int, ...]:
-        """Row of the case, and index of the view where there is one."""
+    def index(self) -> tuple[int, ...]:
+        """Row of the case, and index of the view if there is one."""
         views = list(self.case.config.views)
         return (self.row,) if self.view_name is None else (self.row, views.index(self.view_name))
 
     @property
     def scratch(self) -> Path:
-        """Folder for what the stages of one view hand on without keeping it."""
+        """Folder for arrays that one stage of a view passes to the next and that are not kept."""
         return self.folder / "scratch" / self.case.id / str(self.view_name)
 
     @property
-    def unfinished(self) -> Path:
-        """Folder for what a stopped run of this stage leaves to the next, until it is committed."""
+    def checkpoint_folder(self) -> Path:
+        """Folder in which this stage saves its progress until it is committed, so that a stopped run can continue."""
         return self.folder / "scratch" / self.case.id / f"{self.stage}-{code_version(self._script)}"
 
     @property
     def record(self) -> Path:
-        """Where this job's record stands."""
+        """Path of the record of this job."""
         return record_path(self.folder, self.stage, self.case.id, self.view_name)
 
     def read(self, group: str, *names: str) -> dict[str, Any]:
         """Arrays of a group for this case (and view)."""
-        return self.store.read(group, *self.place, names=names or None)
+        return self.store.read(group, *self.index, names=names or None)
 
     @property
     def heart(self) -> Heart:
-        """The heart of this case, as the mechanics left it."""
-        geometry, fibres, pathology, mechanics = (
-            self.store.read(group, self.row) for group in ("geometry", "fibres", "pathology", "mechanics")
-        )
-        return Heart(
-            nodes=geometry["node_position"],
-            cells=geometry["cell_node"],
-            displacement=mechanics["displacement"],
-            wall_depth=fibres["wall_depth"],
-            endo=geometry["endo"],
-            layers=self.case.config.fibres.layers,
-            es=int(mechanics["es_frame"]),
-            region=pathology["region"],
-        )
+        """Solved heart of this case."""
+        groups = ("geometry", "fibres", "pathology", "mechanics")
+        return Heart.of({group: self.store.read(group, self.row) for group in groups}, self.case.config)
 
-    def hand_on(self, **arrays: Any) -> None:
-        """Leave arrays in the scratch folder for the next stage of this view."""
+    def save_scratch(self, **arrays: Any) -> None:
+        """Save arrays for the next stage of this view."""
         self.scratch.mkdir(parents=True, exist_ok=True)
         np.savez(self.scratch / f"{self.stage}.npz", **arrays)
 
-    def take(self, stage: str) -> dict[str, Any]:
-        """Arrays an earlier stage of this view handed on."""
+    def load_scratch(self, stage: str) -> dict[str, Any]:
+        """Load the arrays that an earlier stage of this view saved."""
         path = self.scratch / f"{stage}.npz"
         if not path.is_file():
-            raise NotWritten(f"{path}: is not there: run the stage {stage} first")
+            raise NotWritten(f"{path}: file not found: run the stage {stage} first")
         with np.load(path) as file:
             return dict(file)
 
-    def left_out(self) -> str:
-        """Why this stage is not for this heart; empty where it is."""
+    def skip_reason(self) -> str:
+        """Reason not to run this stage for this heart; empty if it is to be run."""
         for gate in takewhile(lambda stage: stage != self.stage, GATES):
             path = record_path(self.folder, gate, self.case.id)
             record = ledger.read(path) if path.exists() else {"status": "complete"}
-            passes = ("complete",) if self.case.config.physiology.exclude else ("complete", "implausible")
-            if record["status"] not in passes:
+            accepted = ("complete",) if self.case.config.physiology.exclude else ("complete", "implausible")
+            if record["status"] not in accepted:
                 return record["reason"]
         return ""
 
-    def mark(self, status: str, reason: str) -> None:
-        """Let the record say, beside what is written, what is wrong with it."""
+    def set_verdict(self, status: str, reason: str) -> None:
+        """Set the status of the record of a job that has a result, and its reason."""
         self.verdict = {"status": status, "reason": reason}
 
     def commit(self, result: Result, cost: Cost) -> dict[str, float]:
-        """Write the results and then the record that says so; what it has cost."""
+        """Write the result, then the record; return the cost."""
         files: list[Path] = []
         for group, values in result.items():
-            self.store.write(group, values, *self.place)
-            files += self.store.files(group, *self.place)
+            self.store.write(group, values, *self.index)
+            files += self.store.files(group, *self.index)
         sha256 = ledger.checksums(files, self.store.path)
-        spent = cost.spent()
+        spent = cost.stop()
         self._record(**self.verdict, **spent, frames=self.case.config.loop.frames, sha256=sha256)
         return spent
 
-    def give_up(self, status: str, reason: str) -> None:
-        """Record that there is no result, and why; one of an earlier run goes."""
+    def record_without_result(self, status: str, reason: str) -> None:
+        """Record that there is no result, and why; delete the result of an earlier run."""
         for group in schema.written_by(self.stage, self.case.config):
-            for file in self.store.files(group, *self.place):
+            for file in self.store.files(group, *self.index):
                 file.unlink()
         self._record(status=status, reason=reason)
 
     def _record(self, **entries: Any) -> None:
-        named = {"stage": self.stage, "case": self.case.id, "view": self.view_name, "seed": self.case.config.seed}
-        ledger.commit(self.record, named | {"code": code_version(self._script)} | entries)
-        rmtree(self.unfinished, ignore_errors=True)
+        job = {"stage": self.stage, "case": self.case.id, "view": self.view_name, "seed": self.case.config.seed}
+        ledger.commit(self.record, job | {"code": code_version(self._script)} | entries)
+        rmtree(self.checkpoint_folder, ignore_errors=True)
 
 
 Work = Callable[[Job], Result]
 
 
 def main(stage: str, work: Work, description: str | None, per_view: bool = True) -> None:
-    """Run the work of a script from its command line."""
+    """Run a stage with the arguments of its command line."""
     run(stage, work, parser(stage, description, per_view).parse_args(), Cost())
 
 
 def run(stage: str, work: Work, arguments: argparse.Namespace, cost: Cost) -> None:
-    """Do the work of a stage and record what came of it.
+    """Run a stage and record its result.
 
     Parameters
     ----------
     stage : str
     work : callable
-        From the job to its arrays, by group.
+        Maps a job to its arrays by group.
     arguments : Namespace
-        As of :func:`parser`.
+        As parsed by :func:`parser`.
     cost : Cost
-        Of this process.
+        Cost counter of this process.
     """
     job = _open(stage, getfile(work), arguments)
     _prepare(job, arguments.threads)
-    if reason := job.left_out():
+    if reason := job.skip_reason():
         log.warning("skipped: %s", reason)
-        job.give_up("skipped", reason)
+        job.record_without_result("skipped", reason)
         return
-    cost.begin()
+    cost.start()
     try:
-        result = _single_blas(work, job)
+        # The rounding of BLAS sums depends on the number of threads, but results must not.
+        with threadpool_limits(1):
+            result = work(job)
     except NotWritten as error:
         sys.exit(f"{stage}: {error}")
-    except CannotBeMade as error:
-        log.warning("gives up: %s", error)
-        job.give_up("failed", str(error))
+    except CaseFailed as error:
+        log.warning("failed: %s", error)
+        job.record_without_result("failed", str(error))
         return
     log.info("done in %.1f s", job.commit(result, cost)["seconds"])
 
@@ -212,30 +204,22 @@ def _open(stage: str, script: str, arguments: argparse.Namespace) -> Job:
     return job
 
 
-def _single_blas(work: Work, job: Job) -> Result:
-    """BLAS on one thread: its sums depend on how many there are, and the bytes must not."""
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1):
-        return work(job)
-
-
 def _prepare(job: Job, threads: int) -> None:
     import numba
 
-    share()
-    numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))
-    place = " ".join(filter(None, [job.stage, job.case.id, job.view_name]))
-    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format=f"{place}: %(message)s", force=True)
+    lock_cache_writes()
+    numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))  # type: ignore[attr-defined]  # set at run time
+    label = " ".join(filter(None, [job.stage, job.case.id, job.view_name]))
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, format=f"{label}: %(message)s", force=True)
     logging.getLogger("numba").setLevel(logging.WARNING)
 
 
 def parser(stage: str, description: str | None, per_view: bool = True) -> argparse.ArgumentParser:
-    """Command line of a stage: repository, case, view where there is one, threads."""
+    """Command line of a stage: repository, case, view (for stages that are run per view) and threads."""
     parser = argparse.ArgumentParser(prog=stage, description=description)
-    parser.add_argument("repository", type=Path, help="folder of the repository, as out/demo")
-    parser.add_argument("case", help="case id, as in cases.csv")
+    parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
+    parser.add_argument("case", help="case id from cases.csv")
     if per_view:
         parser.add_argument("view", help="name of the view")
-    parser.add_argument("--threads", type=int, default=1, help="threads to use; the results do not depend on it")
+    parser.add_argument("--threads", type=int, default=1, help="number of threads; results do not depend on it")
     return parser

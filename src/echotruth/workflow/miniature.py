@@ -1,6 +1,6 @@
-"""A miniature of a configuration: hearts, images and trackers of the same kinds, and next to no size.
+"""Minimal version of a configuration, to compile its functions.
 
-Its jobs call the same functions on arrays of the same types as those of the configuration itself, in seconds.
+Its jobs call the same functions with the same types as those of the configuration itself, but take only seconds.
 """
 
 from __future__ import annotations
@@ -8,27 +8,28 @@ from __future__ import annotations
 from echotruth.config import Bmode, Config, Geometry, Motion, Pathology
 
 FRAMES = 3
-"""The fewest of which a cycle has a frame between two others."""
+"""Smallest number of frames for which a frame lies between two others."""
 LINES = 16
-THINNED = 100
-"""Scatterers of the configuration to one of the miniature."""
-SIDE = 128
-"""Most pixels along a side of the image, if the windows of all trackers fit into it."""
+DENSITY_DIVISOR = 100
+"""Density of scatterers in the configuration over that in the miniature."""
+MAX_SIZE_PX = 128
+"""Largest image size, unless the windows of the trackers need a larger one."""
 
 
 def miniature(config: Config) -> Config:
-    """A configuration of one small heart that moves by a formula.
+    """Configuration with one coarse heart, a prescribed motion, one view and one image size.
 
     Parameters
     ----------
     config : Config
-        Of one case.
+        Configuration of one case.
 
     Returns
     -------
     Config
-        One view and one image size; array, transmits, realism and trackers are as they were.
+        Array, transmits, realism and trackers are those of `config`.
     """
+    density = config.phantom.density_per_mm3 / DENSITY_DIVISOR
     return config.model_copy(
         update={
             "name": "miniature",
@@ -38,7 +39,7 @@ def miniature(config: Config) -> Config:
             "loop": config.loop.model_copy(update={"frames": FRAMES}),
             "motion": Motion(kind="rigid") if config.motion.kind == "beat" else config.motion,
             "views": dict(list(config.views.items())[:1]),
-            "phantom": config.phantom.model_copy(update={"density_per_mm3": config.phantom.density_per_mm3 / THINNED}),
+            "phantom": config.phantom.model_copy(update={"density_per_mm3": density}),
             "rf": config.rf.model_copy(update={"lines": LINES}),
             "bmode": _bmode(config),
         }
@@ -46,14 +47,14 @@ def miniature(config: Config) -> Config:
 
 
 def _geometry(config: Config) -> Geometry:
-    """The heart in the coarsest mesh; one of the size of the array where it was read from a file."""
+    """Heart in the coarsest mesh; instead of one from a file, the preset of the array's species."""
     species = config.probe.preset.partition("_")[0]
-    geometry = Geometry(preset=species) if config.geometry.file else config.geometry
+    geometry = Geometry.model_validate({"preset": species}) if config.geometry.file else config.geometry
     elements = ("circumferential_elements", "longitudinal_elements", "transmural_elements")
     return geometry.model_copy(update=dict(zip(elements, (12, 6, 1), strict=True)) | {"state": "unloaded"})
 
 
 def _bmode(config: Config) -> Bmode:
     windows = [getattr(tracker, "window_px", None) or 0 for tracker in config.tracking.trackers.values()]
-    side = max(min(SIDE, config.bmode.sizes[0]), 2 * max(windows))
-    return config.bmode.model_copy(update={"size_px": side, "downsampling": (1,)})
+    size = max(min(MAX_SIZE_PX, config.bmode.sizes[0]), 2 * max(windows))
+    return config.bmode.model_copy(update={"size_px": size, "downsampling": (1,)})

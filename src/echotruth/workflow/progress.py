@@ -1,4 +1,4 @@
-"""How far a run is, by what Snakemake says of its jobs and by what such jobs have taken before."""
+"""Progress of a run, from Snakemake's log and the durations of earlier jobs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import time
 from collections import Counter, defaultdict
 from pathlib import Path
 
-SECONDS = {
+DEFAULT_SECONDS = {
     "mechanics": 50.0,
     "physiology": 3.0,
     "imaging": 100.0,
@@ -19,11 +19,11 @@ SECONDS = {
     "report": 12.0,
     "report_images": 12.0,
 }
-"""Rule to the seconds that its job takes of a heart of 40 frames, until one has been timed."""
+"""Rule -> duration of its job for a heart of 40 frames, s; used until one has been measured."""
 STAGES = {"imaging": ("phantom", "truth", "rf", "bmode"), "tracking": ("tracking", "evaluation")}
-"""Rule to the stages that its job does, where these are several."""
-TIMED = 20
-"""Records that are read to know what the job of a stage takes."""
+"""Rule -> stages of its job, if there are several."""
+MAX_RECORDS = 20
+"""Largest number of records from which the mean duration of a stage is taken."""
 
 _COUNT = re.compile(r"^(\w+) +(\d+)$")
 _RULE = re.compile(r"^(?:local)?rule (\w+):$")
@@ -34,77 +34,77 @@ _FINISHED = re.compile(r"^Finished jobid: (\d+) \(Rule: (\w+)\)$")
 _CORES = re.compile(r"^Provided (?:cores|jobs): (\d+)")
 
 
-def measured(ledger: Path) -> dict[str, float]:
-    """Rule to the seconds that its jobs took, as the records of a repository tell.
+def measured_seconds(ledger: Path) -> dict[str, float]:
+    """Mean duration of the jobs of each rule, from the records of a repository.
 
     Parameters
     ----------
     ledger : Path
-        Folder of the records; it need not be there.
+        Folder of the records; it need not exist.
 
     Returns
     -------
     dict
-        Rules of which a stage has no record yet are left out.
+        Rule -> duration, s, for rules with records of all their stages.
     """
-    found = {}
-    for rule in SECONDS:
-        means = [_mean(ledger / stage) for stage in STAGES.get(rule, (rule,))]
+    durations = {}
+    for rule in DEFAULT_SECONDS:
+        means = [_mean_seconds(ledger / stage) for stage in STAGES.get(rule, (rule,))]
         if all(means):
-            found[rule] = sum(means)
-    return found
+            durations[rule] = sum(means)
+    return durations
 
 
-def _mean(stage: Path) -> float:
-    """Mean of the seconds of a stage, starting included; 0 where none was timed."""
-    paths = list(stage.glob("**/[!.]*.json"))[:TIMED]
+def _mean_seconds(stage: Path) -> float:
+    """Mean duration of a stage including its start, s; 0 without records."""
+    paths = list(stage.glob("**/[!.]*.json"))[:MAX_RECORDS]
     records = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
     times = [record["seconds"] + record["start_seconds"] for record in records if "start_seconds" in record]
     return sum(times) / len(times) if times else 0.0
 
 
 class Progress:
-    """State of a run.
+    """Progress of a run.
 
     Parameters
     ----------
-    weights : dict
-        Rule to the seconds that its job may take.
+    expected : dict
+        Rule -> expected duration of its job, s; replaces :data:`DEFAULT_SECONDS`.
     clock : callable
-        Seconds.
+        Returns the time, s.
 
     Attributes
     ----------
     logs : list of Path
-        Of the jobs that failed.
+        Logs of the jobs that failed.
     """
 
-    def __init__(self, weights: dict[str, float], clock=time.monotonic) -> None:
-        self._weights, self._clock = SECONDS | weights, clock
+    def __init__(self, expected: dict[str, float], clock=time.monotonic) -> None:
+        self._expected, self._clock = DEFAULT_SECONDS | expected, clock
         self._planned: Counter[str] = Counter()
-        self._running: dict[str, tuple[str, float]] = {}
-        self._took: dict[str, list[float]] = defaultdict(list)
-        self._cores, self._share = 1, 0.0
+        self._running: dict[str, tuple[str, float]] = {}  # job -> its rule and start time, s
+        self._durations: dict[str, list[float]] = defaultdict(list)
+        self._cores, self._fraction_done = 1, 0.0
         self._rule, self._failed = "", False
         self.logs: list[Path] = []
 
-    def hear(self, line: str) -> None:
-        """Take in a line of Snakemake's log."""
-        if (found := _COUNT.match(line)) and found[1] in self._weights:
-            self._planned[found[1]] = int(found[2])
-        elif found := _CORES.match(line):
-            self._cores = int(found[1])
-        elif found := _RULE.match(line) or _FAILED.match(line):
-            self._rule, self._failed = found[1], line.startswith("Error")
-        elif found := _JOB.match(line):
-            self._begin_or_fail(found[1])
-        elif (found := _LOG.match(line)) and self._failed:
-            self.logs.append(Path(found[1]))
-        elif found := _FINISHED.match(line):
-            rule, begun = self._running.pop(found[1], (found[2], self._clock()))
-            self._took[rule].append(self._clock() - begun)
+    def read_line(self, line: str) -> None:
+        """Update the progress from a line of Snakemake's log."""
+        if (match := _COUNT.match(line)) and match[1] in self._expected:
+            self._planned[match[1]] = int(match[2])
+        elif match := _CORES.match(line):
+            self._cores = int(match[1])
+        elif match := _RULE.match(line) or _FAILED.match(line):
+            self._rule, self._failed = match[1], line.startswith("Error")
+        elif match := _JOB.match(line):
+            self._start_or_fail(match[1])
+        elif (match := _LOG.match(line)) and self._failed:
+            self.logs.append(Path(match[1]))
+        elif match := _FINISHED.match(line):
+            rule, start = self._running.pop(match[1], (match[2], self._clock()))
+            self._durations[rule].append(self._clock() - start)
 
-    def _begin_or_fail(self, job: str) -> None:
+    def _start_or_fail(self, job: str) -> None:
         if self._failed:
             rule, _ = self._running.pop(job, (self._rule, 0.0))
             self._planned[rule] -= 1
@@ -112,56 +112,60 @@ class Progress:
             self._running[job] = (self._rule, self._clock())
 
     @property
-    def share(self) -> float:
-        """Share of the work that is done, from 0 to 1; it never falls."""
-        done = sum(map(sum, self._took.values())) + sum(self._elapsed(rule) for rule in self._planned)
-        left = sum(self._remaining(rule) for rule in self._planned)
-        self._share = max(self._share, done / (done + left) if left else 1.0 if self._planned else 0.0)
-        return self._share
+    def fraction_done(self) -> float:
+        """Fraction of the work that is done; it never decreases."""
+        done = sum(map(sum, self._durations.values())) + sum(self._elapsed(rule) for rule in self._planned)
+        left = sum(self._remaining_work(rule) for rule in self._planned)
+        fraction = done / (done + left) if left else 1.0 if self._planned else 0.0
+        self._fraction_done = max(self._fraction_done, fraction)
+        return self._fraction_done
 
     @property
-    def left(self) -> float:
-        """Seconds until the end: stage after stage, each on as many cores as it has jobs for."""
-        waits = (self._remaining(rule) / max(1, min(self._cores, self._open(rule))) for rule in self._planned)
-        return sum(waits)
+    def seconds_left(self) -> float:
+        """Time to the end, s, if the rules run one after the other, each on as many cores as it has jobs."""
+        return sum(
+            self._remaining_work(rule) / max(1, min(self._cores, self._unfinished(rule))) for rule in self._planned
+        )
 
     @property
-    def stage(self) -> str:
-        """What is being done, as `imaging (2 of 4)`."""
-        rules = [rule for rule in self._planned if rule in {name for name, _ in self._running.values()}]
-        named = [rule for rule in rules if not rule.startswith("compile")] or rules
-        told = (f"{rule} ({self._at(rule)} of {self._planned[rule]})" for rule in named)
-        return ", ".join(told).replace("_", " ") or "starting"
+    def running(self) -> str:
+        """Running rules, such as `imaging (2 of 4)`."""
+        running = {rule for rule, _ in self._running.values()}
+        rules = [rule for rule in self._planned if rule in running]
+        shown = [rule for rule in rules if not rule.startswith("compile")] or rules
+        texts = (f"{rule} ({self._job_number(rule)} of {self._planned[rule]})" for rule in shown)
+        return ", ".join(texts).replace("_", " ") or "starting"
 
-    def _at(self, rule: str) -> int:
-        return min(self._planned[rule], len(self._took[rule]) + 1)
+    def _job_number(self, rule: str) -> int:
+        return min(self._planned[rule], len(self._durations[rule]) + 1)
 
-    def _open(self, rule: str) -> int:
-        return self._planned[rule] - len(self._took[rule])
+    def _unfinished(self, rule: str) -> int:
+        return self._planned[rule] - len(self._durations[rule])
 
     def _elapsed(self, rule: str) -> float:
-        return sum(self._clock() - begun for name, begun in self._running.values() if name == rule)
+        return sum(self._clock() - start for name, start in self._running.values() if name == rule)
 
-    def _expected(self, rule: str) -> float:
-        """Seconds of a job: as timed in this run, or as weighed, at the pace of this run."""
-        took = self._took[rule]
-        return sum(took) / len(took) if took else self._weights[rule] * self._pace
+    def _expected_seconds(self, rule: str) -> float:
+        """Mean duration of a job in this run, s; without one, the expected one scaled to the speed of this run."""
+        durations = self._durations[rule]
+        return sum(durations) / len(durations) if durations else self._expected[rule] * self._slowdown
 
     @property
-    def _pace(self) -> float:
-        weighed = sum(self._weights[rule] * len(took) for rule, took in self._took.items())
-        return sum(map(sum, self._took.values())) / weighed if weighed else 1.0
+    def _slowdown(self) -> float:
+        """Measured over expected duration of the finished jobs."""
+        expected = sum(self._expected[rule] * len(durations) for rule, durations in self._durations.items())
+        return sum(map(sum, self._durations.values())) / expected if expected else 1.0
 
-    def _remaining(self, rule: str) -> float:
-        """Seconds of work of the jobs of a rule that have not ended; none has less than a twentieth of its own."""
-        expected = self._expected(rule)
-        begun = [begun for name, begun in self._running.values() if name == rule]
-        running = sum(max(expected - (self._clock() - each), expected / 20) for each in begun)
-        return running + max(0, self._open(rule) - len(begun)) * expected
+    def _remaining_work(self, rule: str) -> float:
+        """Remaining work of the unfinished jobs of a rule, s; each running job has at least 1/20 of its work left."""
+        expected = self._expected_seconds(rule)
+        starts = [start for name, start in self._running.values() if name == rule]
+        running = sum(max(expected - (self._clock() - start), expected / 20) for start in starts)
+        return running + max(0, self._unfinished(rule) - len(starts)) * expected
 
 
-def words(seconds: float) -> str:
-    """A time in words, as `2 min`."""
+def format_duration(seconds: float) -> str:
+    """Rounded duration, such as `2 min`."""
     if seconds < 50:
         return f"{max(10, 10 * round(seconds / 10))} s"
     return f"{round(seconds / 60)} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -1,4 +1,4 @@
-"""Files of hearts of which everything is known: an ellipsoid, turned and shifted, as others would write it."""
+"""Files of a known heart: an ellipsoid, rotated and shifted, as other programs would write it."""
 
 from types import SimpleNamespace
 
@@ -15,15 +15,15 @@ SHIFT = np.array([12.0, -7.0, 30.0])
 
 
 @pytest.fixture(scope="session")
-def lying():
-    """Mesh of the mouse's ellipsoid, and its nodes (n, 3) in mm where it lies in the files."""
+def file_heart():
+    """Mesh of the mouse's ellipsoid, and its nodes (n, 3) in the coordinates of the files, mm."""
     mesh = left_ventricle(Geometry(circumferential_elements=18, longitudinal_elements=8, transmural_elements=2))
     return SimpleNamespace(mesh=mesh, nodes=1e3 * mesh.nodes @ TURN + SHIFT, turn=TURN, shift=SHIFT)
 
 
 @pytest.fixture
-def written(tmp_path):
-    """Writes tetrahedra, with arrays over them, to a .vtu and gives its path."""
+def write_mesh(tmp_path):
+    """Write tetrahedra, with arrays over them, to a .vtu and return its path."""
     import pyvista
 
     def write(nodes, cells, name="heart.vtu", **arrays):
@@ -37,8 +37,8 @@ def written(tmp_path):
 
 
 @pytest.fixture
-def surface_written(tmp_path):
-    """Writes triangles to an .stl and gives its path."""
+def write_surface(tmp_path):
+    """Write triangles to an .stl and return its path."""
     import pyvista
 
     def write(nodes, triangles, name="wall.stl"):

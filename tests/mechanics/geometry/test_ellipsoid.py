@@ -6,7 +6,7 @@ import pytest
 from echotruth.config import Geometry
 from echotruth.fem.quadrature import triangle
 from echotruth.mechanics.geometry import cell_volumes
-from echotruth.mechanics.geometry.ellipsoid import ellipsoid, shells
+from echotruth.mechanics.geometry.ellipsoid import ellipsoid, semi_axes
 from echotruth.mechanics.geometry.mesh_quality import GeometryError
 from echotruth.mechanics.solver.cavity import cavity_volume, triangle_shape
 
@@ -40,7 +40,7 @@ def test_volumes_are_those_of_the_ellipsoids(elements, tolerance):
 @pytest.mark.parametrize("preset", ["rat", "human"])
 def test_other_species_are_meshed_as_well(preset):
     mesh = ellipsoid(Geometry(preset=preset))
-    (radius, length, base), outer = shells(Geometry(preset=preset))
+    (radius, length, base), outer = semi_axes(Geometry(preset=preset))
     assert cavity_volume(mesh.nodes, mesh.endo) == pytest.approx(cap(radius, length, base), rel=1e-4)
     assert cell_volumes(mesh).sum() == pytest.approx(cap(*outer) - cap(radius, length, base), rel=1e-4)
 
@@ -67,29 +67,29 @@ def test_every_node_of_the_sides_lies_on_its_ellipsoid():
 
 
 def test_hypertrophy_thickens_the_wall_outwards():
-    endo, epi = shells(Geometry(hypertrophy=1.5))
+    endo, epi = semi_axes(Geometry(hypertrophy=1.5))
     assert endo == pytest.approx((1.45e-3, 5.4e-3, 1.4e-3))
     assert epi == pytest.approx((2.95e-3, 6.6e-3, 1.4e-3))
 
 
 def test_dilation_widens_the_cavity_at_its_wall_thickness():
-    endo, epi = shells(Geometry(dilation=1.2))
+    endo, epi = semi_axes(Geometry(dilation=1.2))
     assert endo == pytest.approx((1.74e-3, 6.48e-3, 1.68e-3))
     assert epi == pytest.approx((2.74e-3, 7.28e-3, 1.68e-3))
 
 
 def test_elongation_lengthens_the_cavity_only():
-    endo, epi = shells(Geometry(elongation=0.9))
+    endo, epi = semi_axes(Geometry(elongation=0.9))
     assert endo == pytest.approx((1.45e-3, 4.86e-3, 1.26e-3))
     assert epi == pytest.approx((2.45e-3, 5.66e-3, 1.26e-3))
 
 
-def test_wall_that_turns_inside_out_is_refused_in_one_sentence():
+def test_wall_with_inverted_elements_is_refused_in_one_sentence():
     flat = Geometry(endo_radius_mm=0.05, wall_mm=29.95, endo_length_mm=5.4, apex_wall_mm=0.01, base_mm=5.3)
-    with pytest.raises(GeometryError, match="inside out: raise longitudinal_elements"):
+    with pytest.raises(GeometryError, match="inverted: raise longitudinal_elements"):
         ellipsoid(flat)
 
 
 def test_metres_written_as_millimetres_are_refused():
-    with pytest.raises(GeometryError, match=r"the cavity holds 3\.28e-\d+ uL, no heart has that: set geometry.scale"):
+    with pytest.raises(GeometryError, match=r"the cavity holds 3\.28e-\d+ uL, which no heart does: set geometry.scale"):
         ellipsoid(Geometry(endo_radius_mm=1.45e-3, endo_length_mm=5.4e-3, wall_mm=1e-3, base_mm=1.4e-3))

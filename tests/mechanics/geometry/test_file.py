@@ -8,13 +8,12 @@ import pytest
 import pyvista
 
 from echotruth.config import Geometry
-from echotruth.config.geometry import Labels
+from echotruth.config.geometry import CellLabels
 from echotruth.config.loading import load
-from echotruth.mechanics.geometry import GeometryError, cell_volumes, left_ventricle
-from echotruth.mechanics.geometry import mesh_quality as soundness
+from echotruth.mechanics.geometry import GeometryError, cell_volumes, left_ventricle, mesh_quality
 from echotruth.mechanics.geometry.boundary import boundary
-from echotruth.mechanics.geometry.boundary_labels import BASE, ENDO, EPI, with_sides
-from echotruth.mechanics.geometry.cut import wall_of
+from echotruth.mechanics.geometry.boundary_labels import BASE, ENDO, EPI, label_boundary
+from echotruth.mechanics.geometry.cut import extract_wall
 from echotruth.mechanics.geometry.file import quadratic
 from echotruth.mechanics.geometry.imported_mesh import read
 from echotruth.mechanics.geometry.mesh_quality import scaled_jacobian
@@ -24,41 +23,43 @@ EXAMPLE = Path(__file__).parents[3] / "config/rodero.yaml"
 
 
 @pytest.fixture
-def surface(lying):
-    return np.vstack([lying.mesh.endo, lying.mesh.epi, lying.mesh.base])
+def surface(file_heart):
+    return np.vstack([file_heart.mesh.endo, file_heart.mesh.epi, file_heart.mesh.base])
 
 
-def test_linear_tetrahedra_get_straight_middles(lying, written):
-    linear = lying.mesh.cells[:, :4]
-    mesh = left_ventricle(Geometry(file=written(lying.nodes, linear)))
-    assert mesh.cells.shape == lying.mesh.cells.shape and len(mesh.nodes) == len(lying.mesh.nodes)
-    nodes, cells = quadratic(lying.nodes, linear)
+def test_linear_tetrahedra_get_straight_middles(file_heart, write_mesh):
+    linear = file_heart.mesh.cells[:, :4]
+    mesh = left_ventricle(Geometry(file=write_mesh(file_heart.nodes, linear)))
+    assert mesh.cells.shape == file_heart.mesh.cells.shape and len(mesh.nodes) == len(file_heart.mesh.nodes)
+    nodes, cells = quadratic(file_heart.nodes, linear)
     np.testing.assert_allclose(nodes[cells[:, 4]], nodes[cells[:, :2]].mean(axis=1))
     assert [len(mesh.endo), len(mesh.epi), len(mesh.base)] == [
-        len(side) for side in (lying.mesh.endo, lying.mesh.epi, lying.mesh.base)
+        len(side) for side in (file_heart.mesh.endo, file_heart.mesh.epi, file_heart.mesh.base)
     ]
     assert np.all(mesh.nodes[mesh.base, 2] == 0) and mesh.nodes[:, 2].max() < 1e-9
 
 
-def test_septum_is_turned_to_x_by_its_cells(lying, written):
-    azimuth = lying.mesh.nodes[lying.mesh.cells[:, :4]].mean(axis=1)
+def test_septum_is_turned_to_x_by_its_cells(file_heart, write_mesh):
+    azimuth = file_heart.mesh.nodes[file_heart.mesh.cells[:, :4]].mean(axis=1)
     septal = np.abs(np.arctan2(azimuth[:, 1], azimuth[:, 0])) < 0.9
-    file = written(lying.nodes, lying.mesh.cells, part=np.where(septal, 7, 1))
-    mesh = left_ventricle(Geometry(file=file, septum=Labels(array="part", values=[7])))
+    file = write_mesh(file_heart.nodes, file_heart.mesh.cells, part=np.where(septal, 7, 1))
+    mesh = left_ventricle(Geometry(file=file, septum=CellLabels(array="part", values=[7])))
     middle = mesh.nodes[mesh.cells[septal, :4]].mean(axis=(0, 1))
     assert middle[0] > 0 and middle[1] == pytest.approx(0, abs=1e-6)
 
 
-def test_surface_that_does_not_close(lying, surface, surface_written):
-    with pytest.raises(GeometryError, match=r"does not close round the wall \(\d+ open and 0 crowded edges of \d+\)"):
-        left_ventricle(Geometry(file=surface_written(lying.nodes, surface[3:]), remesh=True))
+def test_surface_that_does_not_close(file_heart, surface, write_surface):
+    with pytest.raises(
+        GeometryError, match=r"does not close round the wall \(\d+ open and 0 non-manifold edges of \d+\)"
+    ):
+        left_ventricle(Geometry(file=write_surface(file_heart.nodes, surface[3:]), remesh=True))
 
 
-def test_surface_passed_round_in_any_direction(lying, surface, surface_written):
+def test_surface_of_triangles_in_any_orientation(file_heart, surface, write_surface):
     turned = surface[:, :3].copy()
     turned[::2] = turned[::2, ::-1]
-    one = left_ventricle(Geometry(file=surface_written(lying.nodes, surface), remesh=True))
-    other = left_ventricle(Geometry(file=surface_written(lying.nodes, turned, "turned.stl"), remesh=True))
+    one = left_ventricle(Geometry(file=write_surface(file_heart.nodes, surface), remesh=True))
+    other = left_ventricle(Geometry(file=write_surface(file_heart.nodes, turned, "turned.stl"), remesh=True))
     np.testing.assert_allclose(one.nodes, other.nodes, atol=1e-8)
 
 
@@ -74,27 +75,27 @@ def test_two_surfaces(tmp_path):
     ("keys", "reason"),
     [
         ({}, r"holds a surface, not tetrahedra: set geometry\.remesh: true"),
-        ({"remesh": True, "keep": Labels(array="part", values=[1])}, r"geometry\.keep chooses among tetrahedra"),
-        ({"remesh": True, "fibre": "f"}, r"geometry\.fibre chooses among tetrahedra, and a surface has none"),
+        ({"remesh": True, "keep": CellLabels(array="part", values=[1])}, r"geometry\.keep selects tetrahedra"),
+        ({"remesh": True, "fibre": "f"}, r"geometry\.fibre selects tetrahedra, and the file holds a surface"),
     ],
 )
-def test_keys_that_a_surface_cannot_have(lying, surface, surface_written, keys, reason):
+def test_keys_that_a_surface_cannot_have(file_heart, surface, write_surface, keys, reason):
     with pytest.raises(GeometryError, match=reason):
-        left_ventricle(Geometry(file=surface_written(lying.nodes, surface), **keys))
+        left_ventricle(Geometry(file=write_surface(file_heart.nodes, surface), **keys))
 
 
 @pytest.mark.parametrize("unit", ["m", "um"])
-def test_wrong_unit(lying, written, unit):
+def test_wrong_unit(file_heart, write_mesh, unit):
     with pytest.raises(
         GeometryError, match=rf"the cavity holds .*: set geometry\.unit, now {unit}, to one of m, cm, mm"
     ):
-        left_ventricle(Geometry(file=written(lying.nodes, lying.mesh.cells), unit=unit))
+        left_ventricle(Geometry(file=write_mesh(file_heart.nodes, file_heart.mesh.cells), unit=unit))
 
 
-def test_sliver_is_refused_with_the_remedy(lying, written, monkeypatch):
-    monkeypatch.setattr(soundness, "FLATTEST", 0.3)
-    with pytest.raises(GeometryError, match=r"are flat .*: mesh the wall anew with geometry\.remesh: true"):
-        left_ventricle(Geometry(file=written(lying.nodes, lying.mesh.cells)))
+def test_sliver_is_refused_with_the_remedy(file_heart, write_mesh, monkeypatch):
+    monkeypatch.setattr(mesh_quality, "MIN_SCALED_JACOBIAN", 0.3)
+    with pytest.raises(GeometryError, match=r"are flat .*: mesh the wall again with geometry\.remesh: true"):
+        left_ventricle(Geometry(file=write_mesh(file_heart.nodes, file_heart.mesh.cells)))
 
 
 @pytest.fixture(scope="module")
@@ -111,15 +112,15 @@ def example():
 
 
 def test_sides_of_a_human_heart_are_those_of_its_coordinates(example):
-    body = wall_of(read(example), example.keep)
-    skin = with_sides(body, boundary(body.cells)[0], None)
-    transmural = body.node_arrays["transmural"][skin.facets].mean(axis=1)
-    assert np.quantile(transmural[skin.side == ENDO], 0.98) < 0.1
-    assert np.median(transmural[skin.side == EPI]) == 1.0
-    assert 500 < np.sum(skin.side == BASE) < 3000
+    imported = extract_wall(read(example), example.keep)
+    surface = label_boundary(imported, boundary(imported.cells)[0], None)
+    transmural = imported.node_arrays["transmural"][surface.facets].mean(axis=1)
+    assert np.quantile(transmural[surface.labels == ENDO], 0.98) < 0.1
+    assert np.median(transmural[surface.labels == EPI]) == 1.0
+    assert 500 < np.sum(surface.labels == BASE) < 3000
 
 
-def test_human_heart_is_filled_anew(example):
+def test_human_heart_is_remeshed(example):
     mesh = left_ventricle(example)
     assert 85e-6 < cavity_volume(mesh.nodes, mesh.endo) < 130e-6
     assert 100e-6 < cell_volumes(mesh).sum() < 165e-6
@@ -134,5 +135,5 @@ def test_human_heart_as_it_is(example):
 
 
 def test_fibres_of_the_human_heart_are_a_placeholder(example):
-    with pytest.raises(GeometryError, match="'fiber' points one way in all of the wall, a placeholder"):
+    with pytest.raises(GeometryError, match="'fiber' has one direction in all of the wall, a placeholder"):
         left_ventricle(example.model_copy(update={"fibre": "fiber"}))

@@ -9,23 +9,23 @@ from echotruth.mechanics.geometry import GeometryError, left_ventricle
 
 
 @pytest.fixture(scope="module")
-def frames(lying):
+def frames(file_heart):
     """Fibre, sheet and normal of the rule, one a cell, in the heart frame."""
-    return fibre_frames(lying.mesh, wall_depth(lying.mesh), Fibres(), CENTROID)[:, 0]
+    return fibre_frames(file_heart.mesh, wall_depth(file_heart.mesh), Fibres(), CENTROID)[:, 0]
 
 
 @pytest.fixture
-def file(lying, frames, written):
-    fibre, sheet = (frames[:, k] @ lying.turn for k in (0, 1))
+def file(file_heart, frames, write_mesh):
+    fibre, sheet = (frames[:, k] @ file_heart.turn for k in (0, 1))
     arrays = {"f": 2 * fibre, "s": sheet + 0.3 * fibre, "one": np.tile([0, 0, 1.0], (len(fibre), 1))}
     zero = fibre.copy()
     zero[:4] = 0
-    return written(lying.nodes, lying.mesh.cells, **arrays, zero=zero, number=np.ones(len(fibre)))
+    return write_mesh(file_heart.nodes, file_heart.mesh.cells, **arrays, zero=zero, number=np.ones(len(fibre)))
 
 
 @pytest.fixture
-def septum(lying):
-    return (lying.shift + 9 * lying.turn[0]).tolist()
+def septum(file_heart):
+    return (file_heart.shift + 9 * file_heart.turn[0]).tolist()
 
 
 def test_directions_are_turned_with_the_heart(frames, file, septum):
@@ -34,7 +34,7 @@ def test_directions_are_turned_with_the_heart(frames, file, septum):
     np.testing.assert_allclose(mesh.sheet, frames[:, 1], atol=1e-6)
 
 
-def test_new_elements_take_those_of_the_nearest(frames, file, septum, lying):
+def test_new_elements_take_the_directions_of_the_nearest(frames, file, septum, file_heart):
     mesh = left_ventricle(Geometry(file=file, septum_point=septum, fibre="f", sheet="s", remesh=True))
     np.testing.assert_allclose(np.linalg.norm(mesh.fibre, axis=1), 1)
     np.testing.assert_allclose(np.einsum("ci,ci->c", mesh.fibre, mesh.sheet), 0, atol=1e-12)
@@ -42,15 +42,18 @@ def test_new_elements_take_those_of_the_nearest(frames, file, septum, lying):
     assert np.median(np.abs(np.einsum("ci,ci->c", mesh.fibre, rule))) > 0.9
 
 
-def test_none_are_carried_unasked(file):
+def test_no_directions_without_the_key(file):
     mesh = left_ventricle(Geometry(file=file))
     assert mesh.fibre is None and mesh.sheet is None
 
 
 REFUSED = {
-    ("g", None): r"geometry\.fibre = 'g' is not there: its arrays over cells are f, number, one, s, zero",
-    ("one", None): r"points one way in all of the wall, a placeholder: leave it out and the rule of the section fibres",
-    ("zero", None): r"geometry\.fibre = 'zero' is nought in 4 cells",
+    ("g", None): r"geometry\.fibre = 'g' is no array of the file: its arrays over cells are f, number, one, s, zero",
+    (
+        "one",
+        None,
+    ): r"has one direction in all of the wall, a placeholder: leave it out to use the rule of the section fibres",
+    ("zero", None): r"geometry\.fibre = 'zero' is zero in 4 cells",
     ("number", None): r"geometry\.fibre = 'number' is not an array of three components",
     ("f", "f"): r"geometry\.sheet = 'f' lies along the fibres in \d+ cells",
 }

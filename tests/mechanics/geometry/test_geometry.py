@@ -10,12 +10,14 @@ from echotruth.mechanics.solver.cavity import cavity_volume
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
 
 
-def test_ellipsoid_and_file_are_the_same_heart(lying, written):
-    file = written(lying.nodes, lying.mesh.cells)
-    septum = (lying.nodes[0] + lying.turn[0] * 5).tolist()
+def test_ellipsoid_and_file_are_the_same_heart(file_heart, write_mesh):
+    file = write_mesh(file_heart.nodes, file_heart.mesh.cells)
+    septum = (file_heart.nodes[0] + file_heart.turn[0] * 5).tolist()
     found = left_ventricle(Geometry(file=file, septum_point=septum))
-    np.testing.assert_allclose(np.sort(found.nodes, axis=0), np.sort(lying.mesh.nodes, axis=0), atol=1e-8)
-    assert cavity_volume(found.nodes, found.endo) == pytest.approx(cavity_volume(lying.mesh.nodes, lying.mesh.endo))
+    np.testing.assert_allclose(np.sort(found.nodes, axis=0), np.sort(file_heart.mesh.nodes, axis=0), atol=1e-8)
+    assert cavity_volume(found.nodes, found.endo) == pytest.approx(
+        cavity_volume(file_heart.mesh.nodes, file_heart.mesh.endo)
+    )
 
 
 def test_cells_add_up_to_the_wall(coarse_mesh):
@@ -24,5 +26,5 @@ def test_cells_add_up_to_the_wall(coarse_mesh):
 
 
 def test_missing_file_is_refused():
-    with pytest.raises(GeometryError, match=r"gone\.vtu: geometry\.file is not there: give its path"):
+    with pytest.raises(GeometryError, match=r"gone\.vtu: geometry\.file does not exist: give its path"):
         left_ventricle(Geometry(file="gone.vtu", **COARSE))

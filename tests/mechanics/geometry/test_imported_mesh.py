@@ -12,54 +12,58 @@ from echotruth.mechanics.geometry.imported_mesh import fingerprint, read
 from echotruth.mechanics.geometry.mesh_quality import GeometryError
 
 
-def test_linear_tetrahedra_and_their_arrays(lying, written):
-    cells = lying.mesh.cells[:, :4]
-    body = read(Geometry(file=written(lying.nodes, cells, part=np.arange(len(cells)))))
-    np.testing.assert_allclose(body.nodes[body.cells], 1e-3 * lying.nodes[cells], atol=1e-7)
-    np.testing.assert_array_equal(body.cell_arrays["part"], np.arange(len(cells)))
+def test_linear_tetrahedra_and_their_arrays(file_heart, write_mesh):
+    cells = file_heart.mesh.cells[:, :4]
+    imported = read(Geometry(file=write_mesh(file_heart.nodes, cells, part=np.arange(len(cells)))))
+    np.testing.assert_allclose(imported.nodes[imported.cells], 1e-3 * file_heart.nodes[cells], atol=1e-7)
+    np.testing.assert_array_equal(imported.cell_arrays["part"], np.arange(len(cells)))
 
 
-def test_quadratic_tetrahedra_come_in_the_order_of_vtk(lying, written):
-    body = read(Geometry(file=written(lying.nodes, lying.mesh.cells)))
-    np.testing.assert_allclose(body.nodes[body.cells], 1e-3 * lying.nodes[lying.mesh.cells], atol=1e-7)
+def test_quadratic_tetrahedra_come_in_the_order_of_vtk(file_heart, write_mesh):
+    imported = read(Geometry(file=write_mesh(file_heart.nodes, file_heart.mesh.cells)))
+    np.testing.assert_allclose(
+        imported.nodes[imported.cells], 1e-3 * file_heart.nodes[file_heart.mesh.cells], atol=1e-7
+    )
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6)])
-def test_unit_and_scale(lying, written, unit, factor):
-    file = written(lying.nodes, lying.mesh.cells)
-    body = read(Geometry(file=file, unit=unit, scale=2.0))
-    assert np.ptp(body.nodes, axis=0) == pytest.approx(2 * factor * np.ptp(lying.nodes, axis=0), rel=1e-6)
+def test_unit_and_scale(file_heart, write_mesh, unit, factor):
+    file = write_mesh(file_heart.nodes, file_heart.mesh.cells)
+    imported = read(Geometry(file=file, unit=unit, scale=2.0))
+    assert np.ptp(imported.nodes, axis=0) == pytest.approx(2 * factor * np.ptp(file_heart.nodes, axis=0), rel=1e-6)
 
 
-def test_groups_of_gmsh_have_names(lying, tmp_path):
-    mesh, facets = lying.mesh, lying.mesh.endo[:, [0, 1, 2, 3, 4, 5]]
+def test_groups_of_gmsh_have_names(file_heart, tmp_path):
+    mesh, facets = file_heart.mesh, file_heart.mesh.endo[:, [0, 1, 2, 3, 4, 5]]
     groups = [np.full(len(mesh.cells), 9), np.full(len(facets), 2)]
     meshio.Mesh(
-        lying.nodes,
+        file_heart.nodes,
         [("tetra10", mesh.cells), ("triangle6", facets)],
         cell_data={"gmsh:physical": groups, "gmsh:geometrical": groups},
         field_data={"muscle": np.array([9, 3]), "inner": np.array([2, 2])},
     ).write(tmp_path / "heart.msh", file_format="gmsh22", binary=False)
-    body = read(Geometry(file=str(tmp_path / "heart.msh")))
-    assert body.names == {"muscle": 9, "inner": 2}
-    assert body.cells.shape == mesh.cells.shape and body.triangles.shape == (len(facets), 3)
-    np.testing.assert_allclose(body.nodes[body.cells], 1e-3 * lying.nodes[mesh.cells], atol=1e-9)
-    assert set(body.cell_arrays["gmsh:physical"]) == {9} and set(body.triangle_arrays["gmsh:physical"]) == {2}
+    imported = read(Geometry(file=str(tmp_path / "heart.msh")))
+    assert imported.physical_groups == {"muscle": 9, "inner": 2}
+    assert imported.cells.shape == mesh.cells.shape and imported.triangles.shape == (len(facets), 3)
+    np.testing.assert_allclose(imported.nodes[imported.cells], 1e-3 * file_heart.nodes[mesh.cells], atol=1e-9)
+    assert set(imported.cell_arrays["gmsh:physical"]) == {9} and set(imported.triangle_arrays["gmsh:physical"]) == {2}
 
 
-def test_points_without_a_cell_and_points_there_twice_are_left_out(lying, written):
-    cells = lying.mesh.cells[:, :4]
+def test_unused_and_duplicate_points_are_left_out(file_heart, write_mesh):
+    cells = file_heart.mesh.cells[:, :4]
     apart = np.arange(cells.size).reshape(cells.shape)
-    nodes = np.vstack([lying.nodes[cells].reshape(-1, 3), [[900.0, 0, 0]]])
-    body = read(Geometry(file=written(nodes, apart)))
-    assert len(body.nodes) == len(np.unique(cells))
+    nodes = np.vstack([file_heart.nodes[cells].reshape(-1, 3), [[900.0, 0, 0]]])
+    imported = read(Geometry(file=write_mesh(nodes, apart)))
+    assert len(imported.nodes) == len(np.unique(cells))
 
 
-def test_surface_is_welded_together(lying, surface_written):
-    mesh = lying.mesh
-    body = read(Geometry(file=surface_written(lying.nodes, np.vstack([mesh.endo, mesh.epi, mesh.base])), remesh=True))
-    assert len(body.cells) == 0 and len(body.triangles) == len(mesh.endo) + len(mesh.epi) + len(mesh.base)
-    assert len(body.nodes) == 2 + len(body.triangles) // 2
+def test_surface_is_welded_together(file_heart, write_surface):
+    mesh = file_heart.mesh
+    imported = read(
+        Geometry(file=write_surface(file_heart.nodes, np.vstack([mesh.endo, mesh.epi, mesh.base])), remesh=True)
+    )
+    assert len(imported.cells) == 0 and len(imported.triangles) == len(mesh.endo) + len(mesh.epi) + len(mesh.base)
+    assert len(imported.nodes) == 2 + len(imported.triangles) // 2
 
 
 @pytest.mark.parametrize("suffix", ["vtu", "vtk", "msh", "stl", "ply", "vtp"])
@@ -68,25 +72,25 @@ def test_file_that_cannot_be_read(tmp_path, capfd, suffix, content):
     file = tmp_path / f"bad.{suffix}"
     file.write_text(content)
     with pytest.raises(
-        GeometryError, match=rf"bad\.{suffix}: .*(cannot be read as|is empty).*: write the file anew"
+        GeometryError, match=rf"bad\.{suffix}: .*(cannot be read as|is empty).*: write the file again"
     ) as caught:
         read(Geometry(file=str(file)))
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
 
 
-def test_file_cut_short(lying, written):
-    file = written(lying.nodes, lying.mesh.cells)
+def test_file_cut_short(file_heart, write_mesh):
+    file = write_mesh(file_heart.nodes, file_heart.mesh.cells)
     whole = Path(file).read_bytes()
     Path(file).write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(GeometryError, match=r"heart\.vtu: .*write the file anew"):
+    with pytest.raises(GeometryError, match=r"heart\.vtu: .*write the file again"):
         read(Geometry(file=file))
 
 
 REFUSED = {
     "heart.dat": r"ends in \.dat: give tetrahedra as \.vtu, \.vtk, \.msh, or a closed surface of the wall as \.stl",
     "heart": r"ends in no suffix: give tetrahedra",
-    "gone.vtu": r"geometry\.file is not there: give its path",
+    "gone.vtu": r"geometry\.file does not exist: give its path",
 }
 
 
@@ -115,16 +119,16 @@ def test_hexahedra_are_refused(tmp_path):
         read(Geometry(file=str(tmp_path / "bricks.vtu")))
 
 
-def test_points_that_are_no_numbers(lying, written):
-    nodes = lying.nodes.copy()
+def test_points_that_are_no_numbers(file_heart, write_mesh):
+    nodes = file_heart.nodes.copy()
     nodes[3] = np.nan
-    with pytest.raises(GeometryError, match="points that are not finite numbers: mend the file"):
-        read(Geometry(file=written(nodes, lying.mesh.cells)))
+    with pytest.raises(GeometryError, match="points that are not finite numbers: repair the file"):
+        read(Geometry(file=write_mesh(nodes, file_heart.mesh.cells)))
 
 
-def test_fingerprint_is_that_of_the_content(lying, written):
-    file = written(lying.nodes, lying.mesh.cells)
+def test_fingerprint_is_that_of_the_content(file_heart, write_mesh):
+    file = write_mesh(file_heart.nodes, file_heart.mesh.cells)
     before = fingerprint(Geometry(file=file))
-    written(lying.nodes + 1, lying.mesh.cells)
+    write_mesh(file_heart.nodes + 1, file_heart.mesh.cells)
     assert len(before) == 16 and fingerprint(Geometry(file=file)) != before
     assert fingerprint(Geometry()) == ""

@@ -9,7 +9,7 @@ from echotruth.mechanics.geometry.mesh_quality import (
     GeometryError,
     check_cavity,
     check_flat,
-    check_turned,
+    check_inverted,
     scaled_jacobian,
 )
 
@@ -24,7 +24,7 @@ def test_scaled_jacobian_is_one_for_the_regular_tetrahedron_and_nought_for_a_fla
 
 
 def test_sound_mesh_passes(coarse_mesh):
-    check_turned(coarse_mesh, "heart.vtu", "")
+    check_inverted(coarse_mesh, "heart.vtu", "")
     check_flat(coarse_mesh, "heart.vtu", "")
     check_cavity(coarse_mesh, "heart.vtu", "")
 
@@ -32,8 +32,8 @@ def test_sound_mesh_passes(coarse_mesh):
 def test_edge_bent_through_its_cell(coarse_mesh):
     nodes, cell = coarse_mesh.nodes.copy(), coarse_mesh.cells[7]
     nodes[cell[4]] += 2 * (nodes[cell[3]] - nodes[cell[4]])
-    with pytest.raises(GeometryError, match=r"heart\.vtu: \d+ of \d+ tetrahedra of the wall are inside out: remedy"):
-        check_turned(replace(coarse_mesh, nodes=nodes), "heart.vtu", "remedy")
+    with pytest.raises(GeometryError, match=r"heart\.vtu: \d+ of \d+ tetrahedra of the wall are inverted: remedy"):
+        check_inverted(replace(coarse_mesh, nodes=nodes), "heart.vtu", "remedy")
 
 
 def test_sliver(coarse_mesh):
@@ -45,5 +45,5 @@ def test_sliver(coarse_mesh):
 
 @pytest.mark.parametrize(("factor", "volume"), [(1e-3, "uL"), (1e3, "L")])
 def test_cavity_of_no_heart(coarse_mesh, factor, volume):
-    with pytest.raises(GeometryError, match=rf"the cavity holds \S+ {volume}, no heart has that: remedy"):
+    with pytest.raises(GeometryError, match=rf"the cavity holds \S+ {volume}, which no heart does: remedy"):
         check_cavity(replace(coarse_mesh, nodes=factor * coarse_mesh.nodes), "heart.vtu", "remedy")

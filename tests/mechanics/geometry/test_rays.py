@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.mechanics.geometry.rays import Rays, all_round
+from echotruth.mechanics.geometry.rays import Rays, sphere_directions
 
 
 @pytest.fixture(scope="module")
@@ -15,18 +15,18 @@ def ball():
 
 
 def test_lines_meet_a_sphere_where_they_should(ball):
-    directions = all_round(50)
-    for hits in ball.meetings(np.zeros_like(directions), directions):
+    directions = sphere_directions(50)
+    for hits in ball.intersections(np.zeros_like(directions), directions):
         assert hits[0] == pytest.approx(3e-3, rel=5e-3)
-    assert len(ball.meetings(np.array([[0.0, 0, -9e-3]]), np.array([[0.1, 0.2, 1.0]]) / np.sqrt(1.05))[0]) == 2
-    assert len(ball.meetings(np.array([[0.0, 0, -9e-3]]), np.array([[1.0, 0, 0]]))[0]) == 0
+    assert len(ball.intersections(np.array([[0.0, 0, -9e-3]]), np.array([[0.1, 0.2, 1.0]]) / np.sqrt(1.05))[0]) == 2
+    assert len(ball.intersections(np.array([[0.0, 0, -9e-3]]), np.array([[1.0, 0, 0]]))[0]) == 0
 
 
 def test_distance_from_the_surface(ball):
     assert ball.distances(np.array([[0, 0, 1e-3], [0, 5e-3, 0]])) == pytest.approx([2e-3, 2e-3], rel=0.01)
 
 
-def test_directions_go_all_round():
-    directions = all_round(500)
+def test_directions_are_even_over_the_sphere():
+    directions = sphere_directions(500)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1)
     np.testing.assert_allclose(directions.T @ directions / 500, np.eye(3) / 3, atol=2e-3)

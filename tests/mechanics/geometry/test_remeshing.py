@@ -22,9 +22,9 @@ def surface(mesh):
     return np.vstack([mesh.endo, mesh.epi, mesh.base])
 
 
-def test_refilled_ellipsoid_keeps_its_volumes(human, lying, surface_written, caplog):
+def test_remeshed_ellipsoid_keeps_its_volumes(human, file_heart, write_surface, caplog):
     caplog.set_level(logging.INFO, "echotruth.mechanics")
-    file = surface_written(1e3 * human.nodes @ lying.turn + lying.shift, surface(human))
+    file = write_surface(1e3 * human.nodes @ file_heart.turn + file_heart.shift, surface(human))
     mesh = left_ventricle(Geometry(file=file, remesh=True))
     # The file's triangles are flat, and the cut takes 0.2 % of the length.
     assert cavity_volume(mesh.nodes, mesh.endo) == pytest.approx(cavity_volume(human.nodes, human.endo), rel=0.015)
@@ -33,47 +33,47 @@ def test_refilled_ellipsoid_keeps_its_volumes(human, lying, surface_written, cap
     assert "the new wall lies 0." in caplog.text
 
 
-def test_tetrahedra_and_surface_give_the_same_wall(human, lying, written, surface_written):
-    nodes = 1e3 * human.nodes @ lying.turn + lying.shift
-    whole = left_ventricle(Geometry(file=written(nodes, human.cells[:, :4]), remesh=True))
-    shell = left_ventricle(Geometry(file=surface_written(nodes, surface(human)), remesh=True))
+def test_tetrahedra_and_surface_give_the_same_wall(human, file_heart, write_mesh, write_surface):
+    nodes = 1e3 * human.nodes @ file_heart.turn + file_heart.shift
+    whole = left_ventricle(Geometry(file=write_mesh(nodes, human.cells[:, :4]), remesh=True))
+    shell = left_ventricle(Geometry(file=write_surface(nodes, surface(human)), remesh=True))
     np.testing.assert_allclose(whole.nodes, shell.nodes, atol=2e-5)
     np.testing.assert_array_equal(whole.cells, shell.cells)
 
 
-def test_numbering_is_that_of_the_ellipsoid(human, surface_written):
-    file = surface_written(1e3 * human.nodes, surface(human))
+def test_numbering_is_that_of_the_ellipsoid(human, write_surface):
+    file = write_surface(1e3 * human.nodes, surface(human))
     mesh, other = left_ventricle(Geometry(file=file, remesh=True, **FEW)), left_ventricle(Geometry(**FEW))
     np.testing.assert_array_equal(np.sort(mesh.cells, axis=1), np.sort(other.cells, axis=1))
     assert [len(mesh.endo), len(mesh.base)] == [len(other.endo), len(other.base)]
 
 
-def test_bent_heart_is_followed(human, surface_written):
+def test_bent_heart_is_followed(human, write_surface):
     """A heart bent into a banana by 8 mm, with a bulge in the septum."""
     nodes = 1e3 * human.nodes
     nodes[:, 1] += 8 * (nodes[:, 2] / 80) ** 2
     nodes[:, 0] *= 1 - 0.1 * np.exp(-((nodes[:, 2] + 40) ** 2) / 400) * (nodes[:, 0] > 0)
     # The bulge bends the surface within an element; only its size is asked for.
-    mesh = left_ventricle(Geometry(file=surface_written(nodes, surface(human)), remesh=True))
+    mesh = left_ventricle(Geometry(file=write_surface(nodes, surface(human)), remesh=True))
     expected = cavity_volume(1e-3 * nodes, human.endo)
     assert cavity_volume(mesh.nodes, mesh.endo) == pytest.approx(expected, rel=0.02)
 
 
-def test_cut_is_as_deep_as_asked(human, surface_written):
-    file = surface_written(1e3 * human.nodes, surface(human))
+def test_cut_is_as_deep_as_asked(human, write_surface):
+    file = write_surface(1e3 * human.nodes, surface(human))
     depth = [-left_ventricle(Geometry(file=file, remesh=True, cut_mm=cut)).nodes[:, 2].min() for cut in (5.0, 15.0)]
     assert depth[0] - depth[1] == pytest.approx(10e-3, rel=0.02)
 
 
-def test_cut_that_leaves_nothing_is_refused(human, surface_written):
-    file = surface_written(1e3 * human.nodes, surface(human))
+def test_cut_that_leaves_nothing_is_refused(human, write_surface):
+    file = write_surface(1e3 * human.nodes, surface(human))
     with pytest.raises(GeometryError, match=r"the cut would leave .* mm of a cavity of .* mm: set geometry\.cut_mm"):
         left_ventricle(Geometry(file=file, remesh=True, cut_mm=70.0))
 
 
 @pytest.mark.slow
-def test_factors_shape_a_wall_from_a_file_too(human, surface_written):
-    file = surface_written(1e3 * human.nodes, surface(human))
+def test_factors_shape_a_wall_from_a_file_too(human, write_surface):
+    file = write_surface(1e3 * human.nodes, surface(human))
 
     def changed(**factors):
         mesh = left_ventricle(Geometry(file=file, remesh=True, **FEW, **factors))

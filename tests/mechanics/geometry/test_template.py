@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.mechanics.geometry.template import course, laid_through
+from echotruth.mechanics.geometry.template import ellipse_angle, mesh_wall
 
 
 def tube(depth, r, azimuth):
@@ -16,20 +16,20 @@ def tube(depth, r, azimuth):
 @pytest.mark.parametrize("around", [6, 12, 18, 36])
 def test_numbers_of_elements_are_as_asked(around):
     geometry = Geometry(circumferential_elements=around, longitudinal_elements=8, transmural_elements=2)
-    mesh = laid_through(tube, geometry)
+    mesh = mesh_wall(tube, geometry)
     assert len(mesh.base) == 2 * 2 * around
     assert np.unique(mesh.cells).size == len(mesh.nodes)
 
 
 def test_all_walls_share_one_numbering():
     geometry = Geometry(circumferential_elements=12, longitudinal_elements=4, transmural_elements=1)
-    first = laid_through(tube, geometry)
-    second = laid_through(lambda *at: 2 * tube(*at), geometry)
+    first = mesh_wall(tube, geometry)
+    second = mesh_wall(lambda *at: 2 * tube(*at), geometry)
     for name in ("cells", "endo", "epi", "base"):
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
-def test_course_runs_from_the_apex_to_the_base():
-    angle = course(np.linspace(0, 1, 50), 1.0, 3.0, 1.0)
+def test_ellipse_angle_runs_from_the_apex_to_the_base():
+    angle = ellipse_angle(np.linspace(0, 1, 50), 1.0, 3.0, 1.0)
     assert angle[0] == 0 and angle[-1] == pytest.approx(np.arccos(-1 / 3))
     assert np.all(np.diff(angle) > 0)

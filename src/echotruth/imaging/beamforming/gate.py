@@ -1,8 +1,8 @@
-"""Range gates: the part of the record in which the echoes of a focal zone stand.
+"""Range gates: the part of the record that contains the echoes of a focal zone.
 
-A zone needs a few of the record's samples, and its transmits cost as much as it has frequencies. The echoes of all
-pairs are taken to time once, sampled little more often than their band asks for; each zone cuts its gate out of them,
-and its edges, beyond what is needed, fall off smoothly, so that the spectrum of the gate hardly leaves the band.
+The cost of the transmits of a zone is proportional to the length of its record. The echoes of all pairs are transformed
+to time once, sampled little above the Nyquist rate; each zone cuts out its gate, whose edges, beyond what is needed,
+are tapered so smoothly that its spectrum hardly leaves the band.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from echotruth.imaging.beamforming.transmit import Zone
 from echotruth.imaging.rf.kernel import window
 from echotruth.imaging.rf.probe import element_centres
 
-EDGE = 36
+TAPER_SAMPLES = 36
 """Samples over which a gate falls off at either end."""
 SHARPNESS = 9.0
-"""Of the window whose integral that fall is (see :func:`~echotruth.imaging.rf.kernel.window`)."""
-MARGIN = 0.08
-"""How far the spectrum of a gate is kept beyond the band, over the sampling rate; so gates err by less than 1e-5, of
-echoes that fill their band, too."""
+"""Of the window whose integral is the taper (see :func:`~echotruth.imaging.rf.kernel.window`)."""
+BAND_MARGIN = 0.08
+"""Width of the spectrum of a gate that is kept beyond the band at either end, over the sampling rate; the error is then
+below 1e-5, for echoes that fill their band, too."""
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """Samples of the echoes of all pairs as analytic signals, below their carrier where the band allows it.
+    """Sampling of the echoes of all pairs as analytic signals, below their carrier where the band allows it.
 
     Attributes
     ----------
     bins : ndarray of shape (bins,)
-        Where the frequencies of the matrix go in a spectrum of the record.
+        Indices of the frequencies of the matrix in a spectrum of the record.
     samples : int
         Of the record.
     rate : float, Hz
     scale : float
-        Makes the matrix spectra of these samples.
+        Factor from the matrix to the spectra of these samples.
     """
 
     bins: np.ndarray
@@ -48,7 +48,7 @@ class Sampling:
     rate: float
     scale: float
 
-    def in_time(self, matrix: np.ndarray) -> np.ndarray:
+    def to_time(self, matrix: np.ndarray) -> np.ndarray:
         """Echoes of all pairs (samples, elements, elements), complex64, of a matrix (bins, elements, elements)."""
         spectra = np.zeros((self.samples, *matrix.shape[1:]), np.complex64)
         spectra[self.bins] = matrix * np.float32(self.scale)
@@ -61,9 +61,9 @@ class Gate:
     Parameters
     ----------
     sampling : Sampling
-    band : (float, float), Hz
+    band : ndarray of shape (2,), Hz
         Lowest and highest frequency of the echoes.
-    span : (float, float), s
+    time_range : (float, float), s
         Earliest and latest time that is needed.
 
     Attributes
@@ -72,37 +72,37 @@ class Gate:
         Sample of the record at which the gate begins.
     samples : int
     bins : ndarray of shape (bins,)
-        Where the frequencies are in a spectrum of the gate.
+        Indices of the frequencies in a spectrum of the gate.
     frequency : ndarray of shape (bins,), Hz
         Those within the band and its margin, evenly spaced, the lowest first.
     """
 
-    def __init__(self, sampling: Sampling, band: tuple[float, float], span: tuple[float, float]) -> None:
-        start, stop = (time * sampling.rate for time in span)
-        self.first = int(np.floor(start)) - EDGE
-        self.samples = fft.next_fast_len(int(np.ceil(stop)) + 1 + EDGE - self.first)
-        self._place = (self.first + np.arange(self.samples)) % sampling.samples
-        ramp = np.cumsum(window((np.arange(EDGE) + 0.5) / EDGE * TAPS - TAPS / 2, SHARPNESS))
+    def __init__(self, sampling: Sampling, band: np.ndarray, time_range: tuple[float, float]) -> None:
+        start, stop = (time * sampling.rate for time in time_range)
+        self.first = int(np.floor(start)) - TAPER_SAMPLES
+        self.samples = fft.next_fast_len(int(np.ceil(stop)) + 1 + TAPER_SAMPLES - self.first)
+        self._indices = (self.first + np.arange(self.samples)) % sampling.samples
+        ramp = np.cumsum(window((np.arange(TAPER_SAMPLES) + 0.5) / TAPER_SAMPLES * TAPS - TAPS / 2, SHARPNESS))
         self._taper = np.ones((self.samples, 1, 1), np.float32)
-        self._taper[:EDGE, 0, 0] = ramp / ramp[-1]
-        self._taper[-EDGE:, 0, 0] = ramp[::-1] / ramp[-1]
-        margin = min(MARGIN * sampling.rate, (sampling.rate - (band[1] - band[0])) / 2)
+        self._taper[:TAPER_SAMPLES, 0, 0] = ramp / ramp[-1]
+        self._taper[-TAPER_SAMPLES:, 0, 0] = ramp[::-1] / ramp[-1]
+        margin = min(BAND_MARGIN * sampling.rate, (sampling.rate - (band[1] - band[0])) / 2)
         alias = np.arange(self.samples) * sampling.rate / self.samples
-        # Of all the frequencies that look alike when sampled, the one in the band.
-        true = alias + np.ceil((band[0] - margin - alias) / sampling.rate) * sampling.rate
-        inside = np.flatnonzero(true <= band[1] + margin)
-        self.bins = inside[np.argsort(true[inside])]
-        self.frequency = true[self.bins]
+        # Of all the frequencies that share an alias, the one in the band.
+        frequency = alias + np.ceil((band[0] - margin - alias) / sampling.rate) * sampling.rate
+        inside = np.flatnonzero(frequency <= band[1] + margin)
+        self.bins = inside[np.argsort(frequency[inside])]
+        self.frequency = frequency[self.bins]
 
     def spectra(self, echoes: np.ndarray) -> np.ndarray:
         """Spectra (bins, elements, elements) of the gate, of the echoes in time (samples, elements, elements)."""
-        gated = echoes[self._place]
+        gated = echoes[self._indices]
         gated *= self._taper
         return fft.fft(gated, axis=0, overwrite_x=True, workers=numba.get_num_threads())[self.bins]
 
 
-def span(probe: Probe, zone: Zone, range_: np.ndarray, points: tuple[np.ndarray, np.ndarray]) -> tuple[float, float]:
-    """Earliest and latest echo between any two elements that the lines of a zone are made of, s.
+def echo_time_range(probe: Probe, zone: Zone, range_: np.ndarray, points: tuple) -> tuple[float, float]:
+    """Earliest and latest echo (r + |x - x_j|) / c - delay_i of any elements i, j, points x and ranges r of a zone, s.
 
     Parameters
     ----------
@@ -110,14 +110,13 @@ def span(probe: Probe, zone: Zone, range_: np.ndarray, points: tuple[np.ndarray,
     zone : Zone
         Of focused waves.
     range_ : ndarray of shape (ranges,), m
-        Of the zone.
     points : two ndarray of shape (lines, ranges), m
-        Their lateral and axial coordinates.
+        Lateral and axial coordinates of the samples.
     """
-    # On a line all paths grow with range, so that its ends tell.
-    lateral, axial = (each[:, [0, -1], None] for each in points)
+    # All paths grow with range, so that the ends of the lines suffice.
+    lateral, axial = (coordinate[:, [0, -1], None] for coordinate in points)
     path = range_[[0, -1], None] + np.hypot(lateral - element_centres(probe), axial)
-    received, delay = path / probe.si().sound_speed, zone.transmits.delay
-    earliest = received[:, 0].min(axis=1) - delay.max(axis=1)
-    latest = received[:, 1].max(axis=1) - delay.min(axis=1)
+    time, delay = path / probe.si().sound_speed, zone.transmits.delay
+    earliest = time[:, 0].min(axis=1) - delay.max(axis=1)
+    latest = time[:, 1].max(axis=1) - delay.min(axis=1)
     return float(earliest.min()), float(latest.max())

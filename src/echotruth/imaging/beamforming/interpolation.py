@@ -1,7 +1,7 @@
 """Interpolation of channel data at any time.
 
-The data are those below the carrier, interpolated by the exponential of a semicircle (Barnett, Magland, af Klinteberg
-2019, SIAM J Sci Comput 41:C479) and turned with the carrier. With the spectrum of the data divided by that of the
+The data, below their carrier, are interpolated by the exponential of a semicircle (Barnett, Magland, af Klinteberg
+2019, SIAM J Sci Comput 41:C479) and multiplied by the carrier. With the spectrum of the data divided by that of the
 interpolator, the error is 1e-5 or less of a strong echo.
 """
 
@@ -16,42 +16,41 @@ from numba.extending import intrinsic
 from echotruth.imaging.rf.kernel import TAPS, window, window_spectrum
 from echotruth.imaging.rf.vectors import LANES, Vectors
 
-LEAD = TAPS // 2 - 1
-"""Samples of them before its time; channels begin this much before time 0."""
+LEAD_TAPS = TAPS // 2 - 1
+"""Taps before the last at or before the time; channels begin as many samples before time 0."""
 OVERSAMPLING = 1.3
 """Least sampling frequency over the band of the data."""
 SHARPNESS = 14.0
-"""Of the window that interpolates."""
+"""Of the :func:`~echotruth.imaging.rf.kernel.window` that interpolates."""
 PHASE_BITS = 9
-"""Interpolators are tabulated for 2^9 fractions of a sample, with a slope between them."""
-NUMBERS = 2 * TAPS
-"""Of an interpolator: each value twice, for real and imaginary part."""
+"""Interpolators are tabulated at 2^9 fractions of a sample (phases), and linear in between."""
+TAP_FLOATS = 2 * TAPS
+"""Numbers of an interpolator: each tap twice, for real and imaginary part."""
 
 
-def spectrum(frequency: np.ndarray) -> np.ndarray:
+def interpolator_spectrum(frequency: np.ndarray) -> np.ndarray:
     """Fourier integral of the interpolator at frequencies (n,), cycles per sample; real, shape (n,)."""
     return window_spectrum(2j * np.pi * frequency, SHARPNESS).real
 
 
-def table() -> np.ndarray:
-    """Interpolators, and their slopes per phase.
+def interpolator_table() -> np.ndarray:
+    """Interpolators, and their differences to those of the next phase.
 
     Returns
     -------
-    Shape (2^PHASE_BITS * 2 * NUMBERS,), float32: for each fraction of a sample NUMBERS values and NUMBERS slopes.
+    Shape (2^PHASE_BITS * 2 * TAP_FLOATS,), float32: for each phase TAP_FLOATS values and TAP_FLOATS differences.
     """
     fraction = np.arange(2**PHASE_BITS + 1) / 2**PHASE_BITS
-    values = np.repeat(window(fraction[:, None] - (np.arange(TAPS) - LEAD), SHARPNESS), 2, axis=1)
+    values = np.repeat(window(fraction[:, None] - (np.arange(TAPS) - LEAD_TAPS), SHARPNESS), 2, axis=1)
     return np.concatenate([values[:-1], np.diff(values, axis=0)], axis=1).astype(np.float32).ravel()
 
 
 @intrinsic
-def add_taps(typing_context, sums, place, samples, start, table, row, scale):
-    """Add weight * samples * (values + step * slopes) to NUMBERS sums, tap by tap.
+def add_taps(typing_context, sums, first, samples, start, table, row, scale):
+    """Add weight * samples * (values + fraction * differences) to TAP_FLOATS sums, tap by tap.
 
-    The samples are the NUMBERS from samples[start] on, real and imaginary parts in turn, the values those at
-    table[row].
-    `scale` is (step, real and imaginary part of the weight).
+    The sums are those from sums[first] on, the samples those from samples[start] on, real and imaginary parts in turn,
+    and the values and differences those from table[row] on. `scale` is (fraction, real and imaginary part of weight).
     """
     single = types.Array(types.float32, 1, "C")
     if (sums, samples, table) != (single, single, single):
@@ -59,19 +58,19 @@ def add_taps(typing_context, sums, place, samples, start, table, row, scale):
     signature = types.void(*(single, types.intp) * 3, types.UniTuple(types.float32, 3))
 
     def generate(context, builder, signature, arguments):
-        sums, place, samples, start, table, row, scale = arguments
+        sums, first, samples, start, table, row, scale = arguments
         vectors = Vectors(context, builder)
-        step, real, imaginary = (vectors.filled(builder.extract_value(scale, k)) for k in range(3))
+        fraction, real, imaginary = (vectors.broadcast(builder.extract_value(scale, k)) for k in range(3))
         sign = ir.Constant(real.type, [-1.0, 1.0] * (LANES // 2))
         swapped = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [k ^ 1 for k in range(LANES)])
-        across = builder.fmul(imaginary, sign)
-        given, values = vectors.address(single, samples, start), vectors.address(single, table, row)
-        target, parts = vectors.address(single, sums, place), NUMBERS // LANES
+        signed_imaginary = builder.fmul(imaginary, sign)
+        source, values = vectors.address(single, samples, start), vectors.address(single, table, row)
+        target, parts = vectors.address(single, sums, first), TAP_FLOATS // LANES
         for part in range(parts):
-            value = vectors.fused(step, vectors.load(values, parts + part), vectors.load(values, part))
-            each = builder.fmul(value, vectors.load(given, part))
-            total = vectors.fused(each, real, vectors.load(target, part))
-            total = vectors.fused(builder.shuffle_vector(each, each, swapped), across, total)
+            value = vectors.fma(fraction, vectors.load(values, parts + part), vectors.load(values, part))
+            product = builder.fmul(value, vectors.load(source, part))
+            total = vectors.fma(product, real, vectors.load(target, part))
+            total = vectors.fma(builder.shuffle_vector(product, product, swapped), signed_imaginary, total)
             vectors.store(total, target, part)
         return context.get_dummy_value()
 

@@ -5,101 +5,101 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from echotruth.imaging.beamforming.aperture import Aperture, window
-from echotruth.imaging.beamforming.interpolation import LEAD, NUMBERS, PHASE_BITS, TAPS, add_taps, table
+from echotruth.imaging.beamforming.aperture import Aperture, apodization_weight
+from echotruth.imaging.beamforming.interpolation import LEAD_TAPS, PHASE_BITS, TAP_FLOATS, add_taps, interpolator_table
+from echotruth.imaging.rf.kernel import TAPS
 
-RANGES = 64
-"""Samples of a line that are summed over all elements at a time, to stay in the nearest memory."""
+BLOCK_RANGES = 64
+"""Samples of a line that are summed over all elements at a time, to stay in the first-level cache."""
 
 
 @numba.njit(cache=True)
-def turned(half, weight):
-    """Real and imaginary part of weight exp(2 i half), float32, for |half| <= pi / 2: polynomials right to 1e-6."""
-    s = half * half
-    sine = half * polynomial(s, (1 / 6, 1 / 120, 1 / 5040, 1 / 362880, 1 / 39916800))
+def phasor(half_angle, weight):
+    """Real and imaginary part of weight exp(2 i half_angle), float32, for |half_angle| <= pi / 2; accurate to 1e-6.
+
+    cos(2a) = 1 - 2 sin(a)^2, sin(2a) = 2 sin(a) cos(a), with Taylor polynomials of sin(a) and cos(a).
+    """
+    s = half_angle * half_angle
+    sine = half_angle * polynomial(s, (1 / 6, 1 / 120, 1 / 5040, 1 / 362880, 1 / 39916800))
     cosine = polynomial(s, (1 / 2, 1 / 24, 1 / 720, 1 / 40320, 1 / 3628800))
     twice = np.float32(2) * weight * sine
     return weight - twice * sine, twice * cosine
 
 
 @numba.njit(cache=True)
-def polynomial(s, terms):
-    """1 - s (a - s (b - s (c - ...)))."""
-    a, b, c, d, e = terms
+def polynomial(s, coefficients):
+    """1 - a s + b s^2 - c s^3 + d s^4 - e s^5."""
+    a, b, c, d, e = coefficients
     one = np.float32(1)
     inner = np.float32(c) - s * (np.float32(d) - s * np.float32(e))
     return one - s * (np.float32(a) - s * (np.float32(b) - s * inner))
 
 
 @numba.njit(cache=True)
-def echo_times(path, geometry, part, centre, channel, tapered, times):
-    """Where the echoes of points to an element stand in its channel, and their weights.
+def echo_times(path, geometry, block, centre, channel, tapered, times):
+    """Echo times (path + distance from point to element) / c, and weights apodization * exp(2 pi i carrier time).
 
     Parameters
     ----------
     path
-        Of the wave to the points of a line, shape (ranges,), m.
+        Transmit path to the points of a line, shape (ranges,), m.
     geometry
         Of the line, shape (4, ranges), see :func:`focus`.
-    part
+    block
         First of the points and the one after the last.
     centre
-        Of the element, m.
+        Lateral coordinate of the element, m.
     channel
-        Samples per metre of path, the number of samples at which an interpolator may begin (where it does not, the
-        weight is 0), and the carrier by which the weights turn, cycles per sample.
+        Samples per metre of path, samples at which an interpolator may begin (elsewhere the weight is 0), and carrier,
+        cycles per sample.
     tapered
-        Whether the aperture is.
+        Whether the apodization is.
     times
-        Written from 0 on: place in the channel, 0 out of it, its sample, phase of the table, rest of the phase, and
-        real and imaginary part of the weight, each of shape (RANGES,).
+        Written from 0 on: time in samples, 0 outside the channel; its sample, phase in the table, fraction of a phase,
+        and real and imaginary part of the weight, each of shape (BLOCK_RANGES,).
     """
-    at, sample, phase, rest, real, imaginary = times
+    time, sample, phase, fraction, real, imaginary = times
     rate, last, carrier = channel
-    first, stop = part
-    come, count = path[first:stop], stop - first
-    lateral, deep, middle, inverse = (
-        geometry[0][first:stop],
-        geometry[1][first:stop],
-        geometry[2][first:stop],
-        geometry[3][first:stop],
-    )
-    # Loops over few arrays each, which compilers make vectors of.
+    first, stop = block
+    transmit_path, count = path[first:stop], stop - first
+    lateral, axial = geometry[0][first:stop], geometry[1][first:stop]
+    middle, inverse_width = geometry[2][first:stop], geometry[3][first:stop]
+    # Loops over few arrays each, which compilers vectorise.
     for n in range(count):
-        across = lateral[n] - centre
-        at[n] = (come[n] + np.sqrt(across * across + deep[n] * deep[n])) * rate
+        offset = lateral[n] - centre
+        time[n] = (transmit_path[n] + np.sqrt(offset * offset + axial[n] * axial[n])) * rate
     for n in range(count):
-        inside = (at[n] >= 0) & (at[n] < last)
-        # Twice as far off as the aperture reaches, what is out of the record has no weight.
-        real[n] = np.float32((centre - middle[n]) * inverse[n]) if inside else np.float32(1)
-        at[n] = at[n] if inside else 0.0
+        inside = (time[n] >= 0) & (time[n] < last)
+        # An offset of one width is outside the aperture, so that echoes outside the record have no weight.
+        real[n] = np.float32((centre - middle[n]) * inverse_width[n]) if inside else np.float32(1)
+        time[n] = time[n] if inside else 0.0
     for n in range(count):
-        cycles = (at[n] + LEAD) * carrier
+        cycles = (time[n] + LEAD_TAPS) * carrier
         imaginary[n] = np.float32(np.pi * (cycles - np.int32(cycles + 0.5)))
     for n in range(count):
-        real[n], imaginary[n] = turned(imaginary[n], window(real[n], tapered))
+        real[n], imaginary[n] = phasor(imaginary[n], apodization_weight(real[n], tapered))
     for n in range(count):
         # In double precision, as a fraction of nearly 1 must not become the phase of the next sample.
-        sample[n] = np.int32(at[n])
-        fine = (at[n] - sample[n]) * (1 << PHASE_BITS)
-        phase[n] = np.int32(fine)
-        rest[n] = np.float32(fine - phase[n])
+        sample[n] = np.int32(time[n])
+        phases = (time[n] - sample[n]) * (1 << PHASE_BITS)
+        phase[n] = np.int32(phases)
+        fraction[n] = np.float32(phases - phase[n])
 
 
 @numba.njit(cache=True)
-def collect(sums, line):
-    """Add the sums over taps (ranges * NUMBERS,) to a line (ranges,), complex64."""
+def add_tap_sums(sums, line):
+    """Add the sums over the taps of each sample, (ranges * TAP_FLOATS,), to a line (ranges,), complex64."""
     for n in range(len(line)):
         real, imaginary = np.float32(0), np.float32(0)
-        for k in range(n * NUMBERS, (n + 1) * NUMBERS, 2):
+        for k in range(n * TAP_FLOATS, (n + 1) * TAP_FLOATS, 2):
             real += sums[k]
             imaginary += sums[k + 1]
         line[n] += np.complex64(complex(real, imaginary))
 
 
 @numba.njit(parallel=True, cache=True)
-def focus(lines, first, channels, which, path, geometry, array, table):
-    """Add the echoes of the points of some lines to them; one thread makes a line.
+def focus(lines, first, channels, transmit, path, geometry, array, table):
+    """Add the delayed, weighted echoes of all elements to some lines; one thread makes a line.
 
     Parameters
     ----------
@@ -109,51 +109,49 @@ def focus(lines, first, channels, which, path, geometry, array, table):
         The first of these lines.
     channels
         Shape (transmits, elements, 2 samples), float32: real and imaginary parts in turn.
-    which
-        Transmit taken for each of these lines, shape (n,).
+    transmit
+        Transmit of each of these lines, shape (n,).
     path
-        Of the wave to the points of these lines, shape (n, ranges), m.
+        Transmit path to the points of these lines, shape (n, ranges), m.
     geometry
-        Of all lines, shape (lines, 4, ranges), m: lateral and axial coordinates of the points, and middle (m)
-        and 1 / width (1/m) of their apertures.
+        Of all lines, shape (lines, 4, ranges): lateral and axial coordinates of the points (m), centre (m) and
+        1 / width (1/m) of their apertures.
     array
         Centres of the elements (elements,), m, samples per metre of path, whether apertures are tapered, and the
         carrier, cycles per sample.
     table
-        Of interpolators, as :func:`echotruth.imaging.beamforming.interpolation.table` makes it.
+        See :func:`echotruth.imaging.beamforming.interpolation.interpolator_table`.
     """
     centres, rate, tapered, carrier = array
-    elements, numbers = channels.shape[1:]
-    channel = rate, numbers // 2 - TAPS, carrier
-    for n in numba.prange(len(which)):
-        line, flat = first + n, channels[which[n]].reshape(elements * numbers)
-        sums = np.empty(RANGES * NUMBERS, np.float32)
-        sample, phase = np.empty(RANGES, np.int32), np.empty(RANGES, np.int32)
-        rest, real, imaginary = np.empty(RANGES, np.float32), np.empty(RANGES, np.float32), np.empty(RANGES, np.float32)
-        at = np.empty(RANGES)
-        for start in range(0, path.shape[1], RANGES):
-            part = start, min(start + RANGES, path.shape[1])
+    elements, floats = channels.shape[1:]
+    channel = rate, floats // 2 - TAPS, carrier
+    for n in numba.prange(len(transmit)):
+        line, flat = first + n, channels[transmit[n]].reshape(elements * floats)
+        sums = np.empty(BLOCK_RANGES * TAP_FLOATS, np.float32)
+        sample, phase = np.empty(BLOCK_RANGES, np.int32), np.empty(BLOCK_RANGES, np.int32)
+        fraction = np.empty(BLOCK_RANGES, np.float32)
+        real, imaginary = np.empty(BLOCK_RANGES, np.float32), np.empty(BLOCK_RANGES, np.float32)
+        time = np.empty(BLOCK_RANGES)
+        for start in range(0, path.shape[1], BLOCK_RANGES):
+            block = start, min(start + BLOCK_RANGES, path.shape[1])
             sums[:] = 0
             for element in range(elements):
-                times = at, sample, phase, rest, real, imaginary
-                echo_times(path[n], geometry[line], part, centres[element], channel, tapered, times)
-                for k in range(part[1] - start):
-                    place, row = element * numbers + 2 * sample[k], phase[k] * 2 * NUMBERS
-                    add_taps(sums, k * NUMBERS, flat, place, table, row, (rest[k], real[k], imaginary[k]))
-            collect(sums, lines[line, start : part[1]])
+                times = time, sample, phase, fraction, real, imaginary
+                echo_times(path[n], geometry[line], block, centres[element], channel, tapered, times)
+                for k in range(block[1] - start):
+                    source, row = element * floats + 2 * sample[k], phase[k] * 2 * TAP_FLOATS
+                    add_taps(sums, k * TAP_FLOATS, flat, source, table, row, (fraction[k], real[k], imaginary[k]))
+            add_tap_sums(sums, lines[line, start : block[1]])
 
 
 class ReceiveFocus:
-    """Dynamic focusing on receive at points along scan lines.
-
-    The transmitted wave reaches a point after its path, over c; the echo comes to an element after the distance
-    between them, over c. The element data are delayed by both and summed with the weights of the aperture.
+    """Dynamic receive focusing: the sum of the channels at the :func:`echo_times`, weighted by the aperture.
 
     Parameters
     ----------
     aperture
         Elements and their weights.
-    foot, range_
+    line_origin, range_
         Of the lines (lines,) and of their samples (ranges,), m.
     points
         Lateral and axial coordinates, each of shape (lines, ranges), m.
@@ -163,13 +161,13 @@ class ReceiveFocus:
         m/s.
     """
 
-    def __init__(self, aperture: Aperture, foot, range_, points, *, frequency, sampling, sound_speed):
-        middle, width = aperture.bounds(foot[:, None], range_)
-        self._geometry = np.stack([*points, middle, 1 / width], axis=1)
+    def __init__(self, aperture: Aperture, line_origin, range_, points, *, frequency, sampling, sound_speed):
+        centre, width = aperture.centre_and_width(line_origin[:, None], range_)
+        self._geometry = np.stack([*points, centre, 1 / width], axis=1)
         self._array = aperture.centres, sampling / sound_speed, aperture.tapered, frequency / sampling
-        self._table = table()
+        self._table = interpolator_table()
 
-    def __call__(self, lines: np.ndarray, first: int, channels: np.ndarray, which: np.ndarray, path: np.ndarray):
+    def __call__(self, lines: np.ndarray, first: int, channels: np.ndarray, transmit: np.ndarray, path: np.ndarray):
         """Add echoes to some lines.
 
         Parameters
@@ -180,10 +178,10 @@ class ReceiveFocus:
             The first of the lines that are added to.
         channels
             Shape (transmits, elements, samples), complex64, of
-            :class:`~echotruth.imaging.beamforming.synthesis.Synthesis`.
-        which
-            Transmit whose echoes each of these lines takes, shape (n,).
+            :class:`~echotruth.imaging.beamforming.synthesis.TransmitSynthesis`.
+        transmit
+            Transmit of each of these lines, shape (n,).
         path
-            From time 0 to the points of these lines, shape (n, ranges), m.
+            Transmit path to the points of these lines, shape (n, ranges), m.
         """
-        focus(lines, first, channels.view(np.float32), which, path, self._geometry, self._array, self._table)
+        focus(lines, first, channels.view(np.float32), transmit, path, self._geometry, self._array, self._table)

@@ -1,6 +1,6 @@
 """Scan lines: the straight lines along which a frame is focused.
 
-Frame of the probe: origin at the centre of the array, coordinates in the order lateral, axial.
+Coordinates are those of the probe: origin at the centre of the array, in the order lateral, axial.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ class Sector:
     angle: np.ndarray
 
     @property
-    def foot(self) -> np.ndarray:
+    def line_origin(self) -> np.ndarray:
         """Lateral coordinate at which each line leaves the array, shape (lines,), m."""
         return np.zeros(len(self.angle))
 
-    def place(self, lateral: np.ndarray, axial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Number of the line (a fraction between two) and range (m) of points, each as the coordinates (m)."""
+    def to_scan_coordinates(self, lateral: np.ndarray, axial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Line index (fractional) and range (m) of points of any shape, m."""
         line = (np.arctan2(lateral, axial) - self.angle[0]) / (self.angle[1] - self.angle[0])
         return line, np.hypot(lateral, axial)
 
@@ -42,35 +42,36 @@ class Linear:
 
     Attributes
     ----------
-    foot : ndarray (lines,)
+    line_origin : ndarray (lines,)
         Lateral coordinate at which each line leaves the array, m, evenly spaced; the smallest first.
     """
 
-    foot: np.ndarray
+    line_origin: np.ndarray
 
     @property
     def angle(self) -> np.ndarray:
-        """Of the lines from the axial axis, shape (lines,), rad: all 0."""
-        return np.zeros(len(self.foot))
+        """Angle of each line from the axial axis, shape (lines,), rad: all 0."""
+        return np.zeros(len(self.line_origin))
 
-    def place(self, lateral: np.ndarray, axial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Number of the line (a fraction between two) and range (m) of points, each as the coordinates (m)."""
-        line = (lateral - self.foot[0]) / (self.foot[1] - self.foot[0])
-        return np.broadcast_arrays(line, axial)
+    def to_scan_coordinates(self, lateral: np.ndarray, axial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Line index (fractional) and range (m) of points of any shape, m."""
+        line = (lateral - self.line_origin[0]) / (self.line_origin[1] - self.line_origin[0])
+        line, range_ = np.broadcast_arrays(line, axial)
+        return line, range_
 
 
 Scan = Sector | Linear
 
 
 def scan_lines(probe: Probe, rf: Rf) -> Scan:
-    """Lines of a frame; those of a linear scan reach over the whole array unless `rf.width_mm` says how far."""
+    """Lines of a frame; those of a linear scan span the array, or `rf.width_mm` if that is set."""
     half = (rf.si().sector if rf.scan == "sector" else scan_width(probe, rf)) / 2
-    place = np.linspace(-half, half, rf.lines)
-    return Sector(place) if rf.scan == "sector" else Linear(place)
+    values = np.linspace(-half, half, rf.lines)
+    return Sector(values) if rf.scan == "sector" else Linear(values)
 
 
 def scan_width(probe: Probe, rf: Rf) -> float:
-    """Distance of the outermost lines of a linear scan, m."""
+    """Distance between the outermost lines of a linear scan, m."""
     length = probe.elements * probe.si().pitch
     width = rf.si().width or length
     if width > length * (1 + 1e-9):
@@ -78,9 +79,9 @@ def scan_width(probe: Probe, rf: Rf) -> float:
     return width
 
 
-def points(scan: Scan, range_: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lateral and axial coordinates (lines, ranges) of the samples of all lines, m; range_ (ranges,) in m."""
-    lateral = scan.foot[:, None] + np.sin(scan.angle)[:, None] * range_
+def sample_positions(scan: Scan, range_: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lateral and axial coordinates (lines, ranges), m, of the samples of all lines at ranges (ranges,), m."""
+    lateral = scan.line_origin[:, None] + np.sin(scan.angle)[:, None] * range_
     return lateral, np.cos(scan.angle)[:, None] * range_
 
 

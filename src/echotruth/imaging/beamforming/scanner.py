@@ -6,22 +6,22 @@ import numpy as np
 
 from echotruth.config import Probe, Rf
 from echotruth.imaging.beamforming.aperture import Aperture
-from echotruth.imaging.beamforming.gate import span
+from echotruth.imaging.beamforming.gate import echo_time_range
 from echotruth.imaging.beamforming.receive import ReceiveFocus
-from echotruth.imaging.beamforming.scan import imaging_depth, points, scan_lines
-from echotruth.imaging.beamforming.synthesis import Synthesis, sampled
-from echotruth.imaging.beamforming.transmit import KINDS, Zone
+from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions, scan_lines
+from echotruth.imaging.beamforming.synthesis import TransmitSynthesis, channel_sampling
+from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES, Zone
 from echotruth.imaging.rf.full_matrix import FullMatrix
 
-__all__ = ["Scanner", "checked", "imaging_depth"]
+__all__ = ["Scanner", "imaging_depth", "validate_scatterers"]
 
 
 class Scanner:
-    """A probe that scans a frame; delays and phases are worked out once for all frames.
+    """A probe that scans a frame; delays and phases are computed once for all frames.
 
-    The whole frame is taken of scatterers at rest. There is no multiple scattering.
+    The scatterers are at rest during a frame. There is no multiple scattering.
 
-    What is kept for all frames are 48 bytes a sample of the lines, up to twice that with focal zones, and half a byte a
+    Memory for all frames: 48 bytes per sample of the lines, up to twice that with focal zones, and half a byte per
     frequency, element and transmit: 60 MB for the default array. A frame takes another 30 MB beside its matrix.
 
     Parameters
@@ -36,9 +36,9 @@ class Scanner:
     scan : Scan
         The lines.
     range : ndarray (ranges,)
-        Of the samples on a line from its foot, m; a step is half a wave path of one RF sample.
+        Distance of the samples from the origin of their line, m; the two-way path of a step takes one RF sample.
     frequency : float
-        Frequency to which the lines are demodulated, Hz.
+        Frequency at which the lines are demodulated, Hz.
     matrix : FullMatrix
         The echoes between all pairs.
     """
@@ -50,18 +50,18 @@ class Scanner:
         step = p.sound_speed / (2 * p.sampling)
         self.scan = scan_lines(probe, rf)
         self.range = step * np.arange(1, int(depth / step) + 2)
-        zones = KINDS[rf.transmit](probe, rf, self.scan).zones(self.range)
+        zones = TRANSMIT_SEQUENCES[rf.transmit](probe, rf, self.scan).zones(self.range)
         latest = max(np.abs(zone.transmits.delay).max() for zone in zones)
-        reach = np.hypot(*points(self.scan, self.range)).max()
-        self.matrix = FullMatrix(probe, reach, latest, rf.accuracy, rf.elevation)
-        self._sampling = sampled(self.matrix)
-        self._focus = [_ZoneFocus(probe, rf, self, zone) for zone in zones]
-        self.frequency = self._focus[0].channels.frequency
+        farthest = np.hypot(*sample_positions(self.scan, self.range)).max()
+        self.matrix = FullMatrix(probe, farthest, latest, rf.accuracy, rf.elevation)
+        self._sampling = channel_sampling(self.matrix)
+        self._zones = [_ZoneBeamformer(probe, rf, self, zone) for zone in zones]
+        self.frequency = self._zones[0].synthesis.frequency
         self._carrier = np.exp(-4j * np.pi * self.frequency / p.sound_speed * self.range).astype(np.complex64)
 
     @property
     def angle(self) -> np.ndarray:
-        """Of the lines from the axial axis, shape (lines,), rad; the smallest lateral coordinate first."""
+        """Angles of the lines from the axial axis, shape (lines,), rad; the smallest lateral coordinate first."""
         return self.scan.angle
 
     def lines(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
@@ -79,22 +79,22 @@ class Scanner:
         Shape (lines, ranges), complex64, demodulated by exp(-2 pi i frequency 2 range / c): a scatterer that moves
         away by d turns the phase by -4 pi frequency d / c.
         """
-        return self.beamform(self.matrix(*checked(position, amplitude)))
+        return self.beamform(self.matrix(*validate_scatterers(position, amplitude)))
 
     def beamform(self, matrix: np.ndarray) -> np.ndarray:
         """Lines (lines, ranges) of one frame, as :meth:`lines`, of its full matrix (bins, elements, elements)."""
         lines = np.zeros((len(self.scan.angle), len(self.range)), np.complex64)
-        gated = any(focus.channels.gate for focus in self._focus)
-        echoes = self._sampling.in_time(matrix) if gated else None
-        for focus in self._focus:
-            gate = focus.channels.gate
-            lines[:, focus.zone.part] += focus(gate.spectra(echoes) if gate else matrix)
+        gated = any(beamformer.synthesis.gate for beamformer in self._zones)
+        echoes = self._sampling.to_time(matrix) if gated else matrix
+        for beamformer in self._zones:
+            gate = beamformer.synthesis.gate
+            lines[:, beamformer.zone.samples] += beamformer(gate.spectra(echoes) if gate else matrix)
         lines *= self._carrier
         return lines
 
 
-class _ZoneFocus:
-    """The part of the lines in a zone.
+class _ZoneBeamformer:
+    """Beamforming of the samples of the lines in a focal zone.
 
     Parameters
     ----------
@@ -103,28 +103,28 @@ class _ZoneFocus:
     scanner
         Its scan, ranges and matrix.
     zone
-        The waves, the samples of a line that they serve, and their share there.
+        The waves, the samples of a line that they serve, and their weights there.
     """
 
     def __init__(self, probe: Probe, rf: Rf, scanner: Scanner, zone: Zone):
         p, scan = probe.si(), scanner.scan
-        self.zone, self._range = zone, scanner.range[zone.part]
-        self._points = points(scan, self._range)
-        needed = span(probe, zone, self._range, self._points) if len(zone.transmits.foci) else None
-        self.channels = Synthesis(scanner.matrix, p.frequency, zone.transmits, needed)
-        self._before = p.sound_speed * self.channels.start
+        self.zone, self._range = zone, scanner.range[zone.samples]
+        self._points = sample_positions(scan, self._range)
+        time_range = echo_time_range(probe, zone, self._range, self._points) if len(zone.transmits.foci) else None
+        self.synthesis = TransmitSynthesis(scanner.matrix, p.frequency, zone.transmits, time_range)
+        self._start_path = p.sound_speed * self.synthesis.start
         self._receive = ReceiveFocus(
             Aperture(probe, rf),
-            scan.foot,
+            scan.line_origin,
             self._range,
             self._points,
-            frequency=self.channels.carrier,
-            sampling=self.channels.sampling,
+            frequency=self.synthesis.carrier,
+            sampling=self.synthesis.sampling,
             sound_speed=p.sound_speed,
         )
 
     def __call__(self, matrix: np.ndarray) -> np.ndarray:
-        """Before demodulation, (lines, ranges of the zone), complex64.
+        """Lines before demodulation, (lines, ranges of the zone), complex64.
 
         Parameters
         ----------
@@ -133,21 +133,20 @@ class _ZoneFocus:
         """
         transmits = self.zone.transmits
         lines = np.zeros(self._points[0].shape, np.complex64)
-        for part, channels in self.channels(matrix):
+        for block, channels in self.synthesis(matrix):
             if len(transmits.foci):
-                path = np.tile(self._range - self._before, (len(channels), 1))
-                self._receive(lines, part.start, channels, np.arange(len(channels)), path)
+                path = np.tile(self._range - self._start_path, (len(channels), 1))
+                self._receive(lines, block.start, channels, np.arange(len(channels)), path)
                 continue
-            for number in range(part.start, part.stop):
-                path = transmits.path(number, *self._points)
-                which = np.full(len(lines), number - part.start)
-                self._receive(lines, 0, channels, which, path)
-        lines *= self.zone.share
+            for number in range(block.start, block.stop):
+                path = transmits.path_length(number, *self._points)
+                self._receive(lines, 0, channels, np.full(len(lines), number - block.start), path)
+        lines *= self.zone.blending
         return lines
 
 
-def checked(position: np.ndarray, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Scatterers as contiguous float64 arrays, or a ValueError that says what is wrong with them."""
+def validate_scatterers(position: np.ndarray, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Scatterers as contiguous float64 arrays; raises a ValueError if they are invalid."""
     position = np.ascontiguousarray(position, np.float64)
     amplitude = np.ascontiguousarray(amplitude, np.float64)
     if position.ndim != 2 or position.shape[1] != 3 or amplitude.shape != position.shape[:1]:

@@ -1,8 +1,8 @@
-"""Channel data of any transmits, made from the full matrix.
+"""Channel data of any transmits, synthesised from the full matrix.
 
-A transmit is the sum of the single ones, delayed and weighted; at each frequency that is a matrix product. The
-channels are made ready for interpolation: sampled little more often than the band asks for, and with what the
-interpolation will do to their spectrum divided out.
+A transmit is the delayed and weighted sum over single transmitters: S_i = sum_j M_ij w_j exp(-2 pi i f delay_j), at
+each frequency a matrix product. The channels are prepared for interpolation: sampled little above the Nyquist rate of
+their band, and with their spectrum divided by that of the interpolator.
 """
 
 from __future__ import annotations
@@ -19,21 +19,20 @@ from echotruth.imaging.beamforming.transmit import Transmits
 from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.imaging.rf.product import HEIGHT, padded, product
 
-BLOCK = 128
-"""Transmits synthesised at a time. Memory is BLOCK * elements * samples * 8 bytes, 31 MB for the default array."""
-APART = 16
-"""Numbers by which rows of matrices are longer than needed, or what is read together would share a few lines of the
-cache."""
-TILE = 16
-"""Frequencies that one thread takes at a time: two cache lines of a spectrum. Their phases follow one another by
-multiplication, so that those of the first alone are kept."""
+BLOCK_TRANSMITS = 128
+"""Transmits synthesised at a time. Memory is this * elements * samples * 8 bytes, 31 MB for the default array."""
+ROW_PADDING = 16
+"""Numbers added to the rows of matrices, so that neighbouring rows do not compete for the same lines of the cache."""
+TILE_BINS = 16
+"""Frequencies that one thread takes at a time: two cache lines of a spectrum. The phases of all but the first follow by
+multiplication and need not be kept."""
 
 
 @numba.njit(cache=True)
-def arrange(matrix, rows, left):
-    """Write a matrix (elements, elements), complex, as real ones: for :func:`product`, which sums over the first axis.
+def to_real_form(matrix, rows, left):
+    """Write a matrix M (elements, elements), complex, as the transpose of [[Re, -Im], [Im, Re]], for :func:`product`.
 
-    Its transpose and that times i, real parts before imaginary ones on both axes, (2 elements, 2 rows or more).
+    `left` has shape (2 elements, 2 rows or more); :func:`product` sums over its first axis.
     """
     elements = len(matrix)
     for j in range(elements):
@@ -44,64 +43,62 @@ def arrange(matrix, rows, left):
 
 
 @numba.njit(cache=True)
-def turn_on(weights, turn):
+def rotate(weights, rotation):
     """Multiply weights by phase factors, both (2, elements, transmits): real and imaginary part."""
     for j in range(weights.shape[1]):
         for k in range(weights.shape[2]):
             a, b = weights[0, j, k], weights[1, j, k]
-            weights[0, j, k] = a * turn[0, j, k] - b * turn[1, j, k]
-            weights[1, j, k] = a * turn[1, j, k] + b * turn[0, j, k]
+            weights[0, j, k] = a * rotation[0, j, k] - b * rotation[1, j, k]
+            weights[1, j, k] = a * rotation[1, j, k] + b * rotation[0, j, k]
 
 
 @numba.njit(parallel=True, cache=True)
-def synthesise(matrix, start, turn, factor, bins, spectra):
+def synthesise(matrix, start, rotation, factor, bins, spectra):
     """Channel spectra of transmits.
 
     Parameters
     ----------
     matrix
         Shape (bins, elements, elements), complex64.
-    start, turn
-        Weights at the first frequency of each tile and what turns them into those at the next frequency, shapes
-        (tiles, 2, elements, columns) and (2, elements, columns), float32: real and imaginary parts. The
-        columns are those of the transmits, filled up, and APART.
+    start, rotation
+        See :func:`transmit_weights`.
     factor
         Of the spectra, shape (bins,), float32.
     bins
-        Where the frequencies go in the spectra, shape (bins,).
+        Indices of the frequencies in the spectra, shape (bins,).
     spectra
         Written at `bins`: shape (transmits, elements, samples), complex64.
     """
     elements, transmits = matrix.shape[1], len(spectra)
-    rows, columns = -(-elements // HEIGHT) * HEIGHT, turn.shape[2]
+    rows, columns = -(-elements // HEIGHT) * HEIGHT, rotation.shape[2]
     for tile in numba.prange(len(start)):
-        first = tile * TILE
-        count = min(TILE, len(bins) - first)
-        found = np.empty((count, 2 * rows + 1, columns - APART), np.float32)
-        left = np.zeros((2 * elements, 2 * rows + APART), np.float32)
+        first = tile * TILE_BINS
+        count = min(TILE_BINS, len(bins) - first)
+        result = np.empty((count, 2 * rows + 1, columns - ROW_PADDING), np.float32)
+        left = np.zeros((2 * elements, 2 * rows + ROW_PADDING), np.float32)
         weights = start[tile].copy()
         for k in range(count):
-            arrange(matrix[first + k], rows, left)
-            product(left, weights.reshape(2 * elements, columns), found[k, : 2 * rows])
-            turn_on(weights, turn)
+            to_real_form(matrix[first + k], rows, left)
+            product(left, weights.reshape(2 * elements, columns), result[k, : 2 * rows])
+            rotate(weights, rotation)
         for element in range(elements):
             for transmit in range(transmits):
                 for k in range(count):
-                    value = complex(found[k, element, transmit], found[k, rows + element, transmit])
+                    value = complex(result[k, element, transmit], result[k, rows + element, transmit])
                     spectra[transmit, element, bins[first + k]] = np.complex64(value * factor[first + k])
 
 
-def sampled(matrix: FullMatrix) -> Sampling:
-    """Samples of the echoes of a matrix that can be interpolated."""
-    place = matrix.first + np.arange(len(matrix.frequency))
-    samples = fft.next_fast_len(int(interpolation.OVERSAMPLING * len(place)) + 1)
+def channel_sampling(matrix: FullMatrix) -> Sampling:
+    """Sampling at which the echoes of a matrix can be interpolated."""
+    band = matrix.first_bin + np.arange(len(matrix.frequency))
+    samples = fft.next_fast_len(int(interpolation.OVERSAMPLING * len(band)) + 1)
     # Twice for the analytic signal.
     scale = 2 * samples / matrix.samples
-    return Sampling(place % samples, samples, matrix.sampling * samples / matrix.samples, scale)
+    return Sampling(band % samples, samples, matrix.sampling * samples / matrix.samples, scale)
 
 
-class Synthesis:
-    """Channel data of transmits, phases worked out once for all frames.
+class TransmitSynthesis:
+    """Channel data of transmits; phases are computed once for all frames.
 
     Parameters
     ----------
@@ -111,7 +108,7 @@ class Synthesis:
         Centre frequency of the pulse, Hz.
     transmits
         Delays and weights.
-    span
+    time_range
         Earliest and latest echo that is needed, s; None for all of them.
 
     Attributes
@@ -119,7 +116,7 @@ class Synthesis:
     frequency : float
         The frequency of the record nearest the centre frequency, Hz.
     carrier : float
-        Frequency below which the channels are, Hz.
+        Carrier of the channels, Hz.
     gate : Gate or None
         The part of the record that is needed, where that is less than all.
     samples : int
@@ -131,27 +128,31 @@ class Synthesis:
     """
 
     def __init__(
-        self, matrix: FullMatrix, frequency: float, transmits: Transmits, span: tuple[float, float] | None = None
+        self, matrix: FullMatrix, frequency: float, transmits: Transmits, time_range: tuple[float, float] | None = None
     ):
-        record = sampled(matrix)
+        record = channel_sampling(matrix)
         self.frequency = _nearest(matrix.frequency, frequency)[1]
         self.sampling = record.rate
-        gate = span and Gate(record, matrix.frequency[[0, -1]], _interpolated(span, record.rate))
+        margin = interpolation.TAPS / record.rate
+        needed = time_range and (time_range[0] - margin, time_range[1] + margin)
+        gate = needed and Gate(record, matrix.frequency[[0, -1]], needed)
         self.gate = gate if gate and gate.samples < record.samples else None
         part, scale = (self.gate, 1.0) if self.gate else (record, record.scale)
         frequencies = self.gate.frequency if self.gate else matrix.frequency
         self.samples, self.start = part.samples, self.gate.first / record.rate if self.gate else 0.0
-        number, self.carrier = _nearest(frequencies, frequency)
-        # Channels are below their carrier, which need not be one of the record.
-        self._bins = (np.arange(len(frequencies)) - number) % self.samples
+        carrier_bin, self.carrier = _nearest(frequencies, frequency)
+        # Channels are below their carrier, which need not be a frequency of the record.
+        self._bins = (np.arange(len(frequencies)) - carrier_bin) % self.samples
         cycles = (frequencies - self.carrier) / self.sampling
-        self._factor = (scale / interpolation.spectrum(cycles)).astype(np.float32)
-        # Channels begin so much earlier that what the first echo is interpolated from is within them.
-        delay = transmits.delay + interpolation.LEAD / self.sampling
+        self._factor = (scale / interpolation.interpolator_spectrum(cycles)).astype(np.float32)
+        # Channels begin so much earlier that all taps of the first echo are within them.
+        delay = transmits.delay + interpolation.LEAD_TAPS / self.sampling
         step = frequencies[1] - frequencies[0]
-        self._blocks = [slice(at, min(at + BLOCK, len(delay))) for at in range(0, len(delay), BLOCK)]
-        self._phases = [
-            phases(delay[block].T, transmits.weight[block].T, frequencies[::TILE], step) for block in self._blocks
+        starts = range(0, len(delay), BLOCK_TRANSMITS)
+        self._blocks = [slice(start, min(start + BLOCK_TRANSMITS, len(delay))) for start in starts]
+        self._weights = [
+            transmit_weights(delay[block].T, transmits.weight[block].T, frequencies[::TILE_BINS], step)
+            for block in self._blocks
         ]
 
     def __call__(self, matrix: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
@@ -166,48 +167,45 @@ class Synthesis:
         Yields
         ------
         The transmits as a slice, and their data, shape (transmits, elements, samples), complex64: what
-        :class:`~echotruth.imaging.beamforming.receive.ReceiveFocus` takes. The data hold until the next are asked for.
+        :class:`~echotruth.imaging.beamforming.receive.ReceiveFocus` takes. The next data overwrite them.
         """
         # Fresh memory for every block would cost more than the transform.
         memory = np.empty((self._blocks[0].stop, matrix.shape[1], self.samples), np.complex64)
-        for block, (start, turn) in zip(self._blocks, self._phases, strict=True):
+        for block, (start, rotation) in zip(self._blocks, self._weights, strict=True):
             spectra = memory[: block.stop - block.start]
             spectra[:] = 0
-            synthesise(matrix, start, turn, self._factor, self._bins, spectra)
+            synthesise(matrix, start, rotation, self._factor, self._bins, spectra)
             yield block, fft.ifft(spectra, axis=2, overwrite_x=True, workers=numba.get_num_threads())
 
 
 def _nearest(frequencies: np.ndarray, frequency: float) -> tuple[int, float]:
-    """Number of the nearest of some frequencies, and that frequency."""
-    number = int(np.abs(frequencies - frequency).argmin())
-    return number, float(frequencies[number])
+    """Index of the nearest of some frequencies, and that frequency."""
+    index = int(np.abs(frequencies - frequency).argmin())
+    return index, float(frequencies[index])
 
 
-def _interpolated(span: tuple[float, float], rate: float) -> tuple[float, float]:
-    """A span of time and what the samples in it are interpolated from, s."""
-    return span[0] - interpolation.TAPS / rate, span[1] + interpolation.TAPS / rate
-
-
-def phases(delay: np.ndarray, weight: np.ndarray, frequency: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """Weights of the elements in each transmit, weight exp(-2 pi i frequency delay), and their turn over `step`.
+def transmit_weights(
+    delay: np.ndarray, weight: np.ndarray, frequency: np.ndarray, step: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Complex weights of the elements, weight exp(-2 pi i frequency delay), and their rotation exp(-2 pi i step delay).
 
     Parameters
     ----------
     delay, weight
         Shape (elements, transmits), s and 1.
     frequency
-        Shape (tiles,), Hz.
+        First frequency of each tile, shape (tiles,), Hz.
     step
-        Hz.
+        From one frequency to the next, Hz.
 
     Returns
     -------
-    Shapes (tiles, 2, elements, columns) and (2, elements, columns), float32: real and imaginary parts, filled up with
-    columns of weight 0.
+    Shapes (tiles, 2, elements, columns) and (2, elements, columns), float32: real and imaginary parts. The columns are
+    the transmits, filled up with columns of weight 0, and ROW_PADDING.
     """
-    more = padded(delay.shape[1]) + APART - delay.shape[1]
-    delay, weight = (np.pad(each, ((0, 0), (0, more))) for each in (delay, weight))
-    start = -2 * np.pi * np.multiply.outer(frequency, delay)
-    turn = -2 * np.pi * step * delay
-    weights = weight * np.stack([np.cos(start), np.sin(start)], axis=1)
-    return weights.astype(np.float32), np.stack([np.cos(turn), np.sin(turn)]).astype(np.float32)
+    more = padded(delay.shape[1]) + ROW_PADDING - delay.shape[1]
+    delay, weight = (np.pad(values, ((0, 0), (0, more))) for values in (delay, weight))
+    phase = -2 * np.pi * np.multiply.outer(frequency, delay)
+    phase_step = -2 * np.pi * step * delay
+    weights = weight * np.stack([np.cos(phase), np.sin(phase)], axis=1)
+    return weights.astype(np.float32), np.stack([np.cos(phase_step), np.sin(phase_step)]).astype(np.float32)

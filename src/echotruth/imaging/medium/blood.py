@@ -1,7 +1,7 @@
-"""Blood: scatterers that fill the cavity, are carried by the wall and flow at random.
+"""Blood: scatterers that fill the cavity, are carried by the wall and diffuse.
 
-The cavity is a mesh of its own: every triangle of the endocardium is the outer face of a quadratic tetrahedron with its
-fourth vertex in the middle of the base. Its motion is that of the wall on the wall and fades towards that middle.
+The cavity is a mesh of its own: every triangle of the endocardium is a face of a quadratic tetrahedron whose fourth
+vertex is the centre of the base. Its motion is that of the wall at the wall, and falls off towards that centre.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from echotruth.config import Config
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, Integers, MaterialPoints, interpolate, jacobian
 from echotruth.heart import Heart
-from echotruth.imaging.medium.phantom import in_tetrahedron, largest_ratio
-from echotruth.imaging.medium.random_process import Course
+from echotruth.imaging.medium.phantom import cube_to_tetrahedron, max_jacobian
+from echotruth.imaging.medium.random_process import RandomProcess
 
-_SIDES = np.array([(0, 1), (1, 2), (2, 0)])
+_EDGES = np.array([(0, 1), (1, 2), (2, 0)])
 
 
 class Cavity:
-    """The cavity as quadratic tetrahedra between the endocardium and the middle of its rim.
+    """The cavity as quadratic tetrahedra between the endocardium and the centre of its rim.
 
     Parameters
     ----------
@@ -32,34 +32,34 @@ class Cavity:
     Attributes
     ----------
     cells : ndarray of shape (n_facets, 10)
-        Nodes of the tetrahedra: the middle of the base, nodes of the endocardium, middles between both.
+        Nodes of the tetrahedra: the centre of the base, the endocardial nodes, the middles of the edges between them.
     rim : ndarray of shape (n,)
-        Vertices of the wall round the lid of the cavity.
+        Vertices of the wall around the lid of the cavity.
     """
 
     def __init__(self, endo: Integers) -> None:
         self._wall, facets = np.unique(endo, return_inverse=True)
         facets = facets.reshape(endo.shape)
-        self._corners, spokes = np.unique(facets[:, :3], return_inverse=True)
+        self._vertices, spokes = np.unique(facets[:, :3], return_inverse=True)
         self.rim = self._wall[_rim(facets)]
         facets, spokes = 1 + facets, 1 + len(self._wall) + spokes.reshape(-1, 3)
-        # The normal points to the middle, so the triangle is run through backwards.
+        # The normals point to the centre, so that the order of the vertices is reversed.
         a, b, c, ab, bc, ca = facets.T
-        of_a, of_b, of_c = spokes.T
-        middle = np.zeros(len(endo), int)
-        self.cells = np.column_stack([middle, a, c, b, of_a, ca, of_c, of_b, ab, bc]).astype(np.int32)
+        spoke_a, spoke_b, spoke_c = spokes.T
+        centre = np.zeros(len(endo), int)
+        self.cells = np.column_stack([centre, a, c, b, spoke_a, ca, spoke_c, spoke_b, ab, bc]).astype(np.int32)
 
     def positions(self, nodes: Floats) -> Floats:
-        """Nodes of the cavity (n, 3), m, by those of the wall (n_nodes, 3), m."""
-        middle, wall = nodes[self.rim].mean(axis=0), nodes[self._wall]
-        return np.vstack([middle, wall, (wall[self._corners] + middle) / 2])
+        """Nodes of the cavity (n, 3), m, from the nodes of the wall (n_nodes, 3), m."""
+        centre, wall = nodes[self.rim].mean(axis=0), nodes[self._wall]
+        return np.vstack([centre, wall, (wall[self._vertices] + centre) / 2])
 
 
 def _rim(facets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Vertices on the sides that belong to one triangle alone."""
-    sides = np.sort(facets[:, _SIDES].reshape(-1, 2), axis=1)
-    each, count = np.unique(sides, axis=0, return_counts=True)
-    return np.unique(each[count == 1])
+    """Vertices of the edges that belong to one triangle only."""
+    edges = np.sort(facets[:, _EDGES].reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return np.unique(unique[count == 1])
 
 
 @dataclass(frozen=True)
@@ -70,26 +70,26 @@ class Blood:
     ----------
     points : MaterialPoints of length n
         In the cells of the cavity.
-    room : ndarray of shape (n,), m^3
-        A scatterer is there while the volume of the cavity about it, over that of the local coordinates, is larger
-        than this: so blood is equally dense in every frame, however much of it is left.
+    jacobian_threshold : ndarray of shape (n,), m^3
+        A scatterer is present in a frame while det(dx / dxi) at its point exceeds this, so that blood is equally dense
+        in every frame, whatever the volume of the cavity.
     amplitude : ndarray of shape (n,)
     """
 
     points: MaterialPoints
-    room: Floats
+    jacobian_threshold: Floats
     amplitude: Floats
 
-    def at(self, frame: int, heart: Heart, flow: Course) -> tuple[Floats, Floats]:
+    def at(self, frame: int, heart: Heart, diffusion: RandomProcess) -> tuple[Floats, Floats]:
         """Blood in a frame.
 
         Parameters
         ----------
         frame : int
         heart : Heart
-        flow : Course of ndarray of shape (n, 3), m
-            Random offsets. Who would come to lie in the wall or beyond the middle of the base goes the other way; if
-            that is no better, none.
+        diffusion : RandomProcess of ndarray of shape (n, 3), m
+            Random offsets. One that leads into the wall or beyond the centre of the base is reversed; if the reversed
+            one does so too, it is set to zero.
 
         Returns
         -------
@@ -99,20 +99,20 @@ class Blood:
         """
         cavity = Cavity(heart.endo)
         nodes = cavity.positions(heart.positions(frame))
-        there = self.room < np.linalg.det(jacobian(nodes, cavity.cells, self.points))
-        points = MaterialPoints(self.points.cell[there], self.points.xi[there])
-        carried, offset = interpolate(nodes, cavity.cells, points), flow(frame)[there]
-        left = np.arange(len(points))
-        for other_way in (-1, 0):
-            place = carried[left] + offset[left]
-            out = (locate(heart.positions(frame), heart.cells, place).cell >= 0) | (place[:, 2] > nodes[0, 2])
-            left = left[out]
-            offset[left] *= other_way
-        return carried + offset, self.amplitude[there]
+        present = self.jacobian_threshold < np.linalg.det(jacobian(nodes, cavity.cells, self.points))
+        points = MaterialPoints(self.points.cell[present], self.points.xi[present])
+        carried, offset = interpolate(nodes, cavity.cells, points), diffusion(frame)[present]
+        pending = np.arange(len(points))
+        for factor in (-1, 0):
+            position = carried[pending] + offset[pending]
+            in_wall = locate(heart.positions(frame), heart.cells, position).cell >= 0
+            pending = pending[in_wall | (position[:, 2] > nodes[0, 2])]
+            offset[pending] *= factor
+        return carried + offset, self.amplitude[present]
 
 
-def fill(config: Config, heart: Heart, random: np.random.Generator) -> Blood:
-    """Fill the cavity with blood.
+def seed_blood(config: Config, heart: Heart, random: np.random.Generator) -> Blood:
+    """Draw scatterers uniformly over the cavity.
 
     Parameters
     ----------
@@ -123,14 +123,14 @@ def fill(config: Config, heart: Heart, random: np.random.Generator) -> Blood:
     Returns
     -------
     Blood
-        As many scatterers as the fullest cavity holds, and a few more. Their amplitudes are normally distributed;
-        the variance in a volume is that of muscle times the level.
+        Enough scatterers for the fullest cavity. Their amplitudes are normally distributed; the variance in a volume is
+        that of muscle times the level.
     """
     blood, cavity = config.realism.blood, Cavity(heart.endo)
     frames = range(len(heart.displacement))
-    bound = np.max([largest_ratio(cavity.positions(heart.positions(k)), cavity.cells) for k in frames], axis=0)
+    bound = np.max([max_jacobian(cavity.positions(heart.positions(k)), cavity.cells) for k in frames], axis=0)
     number = random.poisson(blood.density * config.phantom.si().density * bound.sum() / 6)
     cell = random.choice(len(bound), size=number, p=bound / bound.sum()).astype(np.int32)
-    points = MaterialPoints(cell, in_tetrahedron(random.random((number, 3))))
-    room = random.random(number) * bound[cell]
-    return Blood(points, room, blood.strength * random.standard_normal(number))
+    points = MaterialPoints(cell, cube_to_tetrahedron(random.random((number, 3))))
+    jacobian_threshold = random.random(number) * bound[cell]
+    return Blood(points, jacobian_threshold, blood.amplitude_std * random.standard_normal(number))

@@ -1,4 +1,4 @@
-"""The medium: all that echoes in the frames of one view."""
+"""The medium: all scatterers in the frames of one view."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from echotruth.config import Config
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, MaterialPoints, interpolate
 from echotruth.heart import Heart
-from echotruth.imaging.medium.blood import Blood, Cavity, fill
-from echotruth.imaging.medium.phantom import Scatterers, scatter
-from echotruth.imaging.medium.random_process import Random, fading, wandering
-from echotruth.imaging.medium.surroundings import Following, outside, surround
+from echotruth.imaging.medium.blood import Blood, Cavity, seed_blood
+from echotruth.imaging.medium.phantom import Scatterers, seed_wall
+from echotruth.imaging.medium.random_process import Random, ar1, brownian, diffusion_std
+from echotruth.imaging.medium.surroundings import SurroundingsMotion, outside_heart, seed_surroundings
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
 
@@ -23,9 +23,12 @@ Arrays = dict[str, NDArray[Any]]
 InBeam = Callable[[Floats], NDArray[np.bool_]]
 """Positions in the image (n, 3), m, to whether they are within the beam, (n,)."""
 
+MAX_DIFFUSION = 5
+"""Offset that blood is assumed not to exceed over a cycle, in standard deviations."""
 
-def seed(config: Config, heart: Heart, plane: Plane, random: Random, in_beam: InBeam) -> Arrays:
-    """Everything that echoes in a view, as arrays that can be handed on; what no frame's beam reaches is left out.
+
+def seed_medium(config: Config, heart: Heart, plane: Plane, random: Random, in_beam: InBeam) -> Arrays:
+    """Seed all scatterers of a view, as arrays that can be stored, without those that are in the beam in no frame.
 
     Parameters
     ----------
@@ -33,64 +36,55 @@ def seed(config: Config, heart: Heart, plane: Plane, random: Random, in_beam: In
     heart : Heart
     plane : Plane
     random : Random
-        Of each kind of scatterer.
+        For each kind of scatterer.
     in_beam : callable
         As :meth:`echotruth.imaging.rf.full_matrix.FullMatrix.in_beam`.
 
     Returns
     -------
     dict of ndarray
-        cell, xi and amplitude of the scatterers in the wall; blood_* and around_* where there are such.
+        cell, xi and amplitude of the scatterers in the wall; blood_* and surroundings_* where there are such.
     """
     frames = [heart.positions(frame) for frame in range(len(heart.displacement))]
-    wall = scatter(config, heart, plane, random("phantom"))
+    wall = seed_wall(config, heart, plane, random("phantom"))
     arrays: Arrays = {"cell": wall.points.cell, "xi": wall.points.xi, "amplitude": wall.amplitude}
-    arrays = _ever(arrays, (wall.image(nodes, heart.cells, plane) for nodes in frames), in_beam)
+    arrays = _ever_in_beam(arrays, (wall.image_positions(nodes, heart.cells, plane) for nodes in frames), in_beam)
     if config.realism.blood.level_dB is not None:
-        blood, cavity = fill(config, heart, random("blood")), Cavity(heart.endo)
-        found = {"blood_cell": blood.points.cell, "blood_xi": blood.points.xi}
-        found |= {"blood_room": blood.room, "blood_amplitude": blood.amplitude}
+        blood, cavity = seed_blood(config, heart, random("blood")), Cavity(heart.endo)
+        candidates: Arrays = {"blood_cell": blood.points.cell, "blood_xi": blood.points.xi}
+        candidates |= {"blood_jacobian_threshold": blood.jacobian_threshold, "blood_amplitude": blood.amplitude}
         carried = (interpolate(cavity.positions(nodes), cavity.cells, blood.points) for nodes in frames)
-        reach = FARTHEST * diffusion(config, read_loop(config.loop).period)
-        arrays |= _ever(found, (_nearer(plane.image(place), reach) for place in carried), in_beam)
+        offset = MAX_DIFFUSION * diffusion_std(read_loop(config.loop).period, *_blood_decorrelation(config))
+        nearest = (_moved_towards_plane(plane.to_image(position), offset) for position in carried)
+        arrays |= _ever_in_beam(candidates, nearest, in_beam)
     if config.realism.surroundings.level_dB is not None:
-        around = surround(config, heart, plane, random("surroundings"))
-        moves = Following(heart, around.position, config.realism.surroundings.si().follow)
-        found = {"around_position": around.position, "around_amplitude": around.amplitude}
-        arrays |= _ever(found, (plane.image(moves(frame)) for frame in range(len(frames))), in_beam)
+        tissue = seed_surroundings(config, heart, plane, random("surroundings"))
+        motion = SurroundingsMotion(heart, tissue.position, config.realism.surroundings.si().follow)
+        candidates = {"surroundings_position": tissue.position, "surroundings_amplitude": tissue.amplitude}
+        arrays |= _ever_in_beam(candidates, (plane.to_image(motion(k)) for k in range(len(frames))), in_beam)
     return arrays
 
 
-def _ever(arrays: Arrays, places: Iterable[Floats], in_beam: InBeam) -> Arrays:
-    """Of arrays over scatterers, those that are in the beam in any frame; places (n, 3), m, are those of each."""
-    inside = np.logical_or.reduce([in_beam(place) for place in places])
-    return {name: values[inside] for name, values in arrays.items()}
+def _ever_in_beam(arrays: Arrays, positions: Iterable[Floats], in_beam: InBeam) -> Arrays:
+    """Entries of the scatterers that are in the beam in any frame; positions in the image of each frame (n, 3), m."""
+    kept = np.logical_or.reduce([in_beam(position) for position in positions])
+    return {name: values[kept] for name, values in arrays.items()}
 
 
-def _nearer(place: Floats, distance: float) -> Floats:
-    """Places (n, 3), m, moved to the plane by a distance, m, or into it."""
-    beside = np.maximum(np.abs(place[:, 2]) - distance, 0)
-    return np.column_stack([place[:, :2], beside])
+def _moved_towards_plane(position: Floats, distance: float) -> Floats:
+    """Positions (n, 3), m, moved towards the plane by a distance, m, at most onto it."""
+    elevation = np.maximum(np.abs(position[:, 2]) - distance, 0)
+    return np.column_stack([position[:, :2], elevation])
 
 
-FARTHEST = 5
-"""How far blood is taken to diffuse over a cycle, over the standard deviation of its offset."""
-
-
-def diffusion(config: Config, period: float) -> float:
-    """Standard deviation of the offset of blood after a time, s, along an axis, m; see :func:`wandering`."""
-    constant, wavelength = _flow(config)
-    return float(np.sqrt(2 * period / constant) * wavelength / (4 * np.pi))
-
-
-def _flow(config: Config) -> tuple[float, float]:
-    """Time in which the echo of blood is another, s, and the wavelength, m."""
+def _blood_decorrelation(config: Config) -> tuple[float, float]:
+    """Time constant of the echo of blood, s, and wavelength, m."""
     probe = config.probe.si()
     return config.realism.blood.si().time, probe.sound_speed / probe.frequency
 
 
 class Medium:
-    """All that echoes, frame by frame.
+    """All scatterers, frame by frame.
 
     Parameters
     ----------
@@ -99,9 +93,9 @@ class Medium:
     plane : Plane
     time : ndarray of shape (frame,), s
     seeded : dict of ndarray
-        As :func:`seed` leaves it.
+        As :func:`seed_medium` returns it.
     random : Random
-        Of what changes from frame to frame.
+        For what changes from frame to frame.
     """
 
     def __init__(
@@ -110,40 +104,44 @@ class Medium:
         self._config, self._heart, self._plane = config, heart, plane
         points = MaterialPoints(seeded["cell"], seeded["xi"])
         self._wall = Scatterers(points, seeded["amplitude"], config.phantom.in_plane_only)
-        self._strength = self._speckle(seeded["amplitude"], time, "wall", random)
-        self._blood = self._around = None
+        self._wall_amplitude = self._amplitudes(seeded["amplitude"], time, "wall", random)
+        self._blood = self._surroundings = None
         if "blood_cell" in seeded:
             points = MaterialPoints(seeded["blood_cell"], seeded["blood_xi"])
-            self._blood = Blood(points, seeded["blood_room"], seeded["blood_amplitude"])
-            self._flow = wandering(len(points), time, *_flow(config), random)
-        if "around_position" in seeded:
-            self._around = Following(heart, seeded["around_position"], config.realism.surroundings.si().follow)
-            self._around_strength = self._speckle(seeded["around_amplitude"], time, "surroundings", random)
+            self._blood = Blood(points, seeded["blood_jacobian_threshold"], seeded["blood_amplitude"])
+            self._diffusion = brownian(len(points), time, *_blood_decorrelation(config), random)
+        if "surroundings_position" in seeded:
+            decay_length = config.realism.surroundings.si().follow
+            self._surroundings = SurroundingsMotion(heart, seeded["surroundings_position"], decay_length)
+            amplitude = seeded["surroundings_amplitude"]
+            self._surroundings_amplitude = self._amplitudes(amplitude, time, "surroundings", random)
 
-    def _speckle(self, amplitude: Floats, time: Floats, name: str, random: Random) -> Callable[[int], Floats]:
+    def _amplitudes(self, amplitude: Floats, time: Floats, name: str, random: Random) -> Callable[[int], Floats]:
+        """Amplitudes by frame: constant, or decorrelating."""
         constant = self._config.realism.decorrelation.si().time
-        return (lambda frame: amplitude) if constant is None else fading(amplitude, time, constant, name, random)
+        return (lambda frame: amplitude) if constant is None else ar1(amplitude, time, constant, name, random)
 
     def wall(self, frame: int) -> tuple[Floats, Floats]:
-        """The scatterers of the wall alone: positions in the image (n, 3), m, and amplitudes (n,)."""
-        return self._wall.image(self._heart.positions(frame), self._heart.cells, self._plane), self._strength(frame)
+        """Positions in the image (n, 3), m, and amplitudes (n,) of the scatterers in the wall."""
+        position = self._wall.image_positions(self._heart.positions(frame), self._heart.cells, self._plane)
+        return position, self._wall_amplitude(frame)
 
     def in_wall(self, frame: int, lateral: Floats, axial: Floats) -> NDArray[np.bool_]:
-        """Whether places in the image, each as the coordinates (any shape), m, lie in the wall in a frame."""
-        places = np.stack([lateral, axial, np.zeros_like(lateral)], axis=-1).reshape(-1, 3)
-        found = locate(self._heart.positions(frame), self._heart.cells, self._plane.heart(places))
-        return (found.cell >= 0).reshape(lateral.shape)
+        """Whether points of the image lie in the wall in a frame; all arrays of one shape, coordinates in m."""
+        position = np.stack([lateral, axial, np.zeros_like(lateral)], axis=-1).reshape(-1, 3)
+        points = locate(self._heart.positions(frame), self._heart.cells, self._plane.to_heart(position))
+        return (points.cell >= 0).reshape(lateral.shape)
 
     def __call__(self, frame: int) -> tuple[Floats, Floats]:
         """Positions in the image (n, 3), m, and amplitudes (n,) of all scatterers in a frame."""
         parts = [self.wall(frame)]
         if self._blood is not None:
-            position, amplitude = self._blood.at(frame, self._heart, self._flow)
-            parts.append((self._plane.image(position), amplitude))
-        if self._around is not None:
-            position, amplitude = self._around(frame), self._around_strength(frame)
-            there = outside(self._heart, frame, position)
-            there &= self._plane.image(position)[:, 1] > 0
-            parts.append((self._plane.image(position[there]), amplitude[there]))
+            position, amplitude = self._blood.at(frame, self._heart, self._diffusion)
+            parts.append((self._plane.to_image(position), amplitude))
+        if self._surroundings is not None:
+            position, amplitude = self._surroundings(frame), self._surroundings_amplitude(frame)
+            present = outside_heart(self._heart, frame, position)
+            present &= self._plane.to_image(position)[:, 1] > 0
+            parts.append((self._plane.to_image(position[present]), amplitude[present]))
         positions, amplitudes = zip(*parts, strict=True)
         return np.concatenate(positions), np.concatenate(amplitudes)

@@ -1,4 +1,4 @@
-"""Scatterers in the wall, carried by the shape functions of the elements they sit in."""
+"""Scatterers in the wall, carried by the shape functions of their elements."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class Scatterers:
     amplitude: Floats
     in_plane_only: bool
 
-    def image(self, positions: Floats, cells: NDArray[np.int32], plane: Plane) -> Floats:
-        """Where they are in the image.
+    def image_positions(self, nodes: Floats, cells: NDArray[np.int32], plane: Plane) -> Floats:
+        """Positions of the scatterers in the image.
 
         Parameters
         ----------
-        positions : ndarray of shape (n_nodes, 3), m
-            Of the nodes in a frame.
+        nodes : ndarray of shape (n_nodes, 3), m
+            In the frame.
         cells : ndarray of shape (n_cells, 10)
         plane : Plane
 
@@ -47,21 +47,21 @@ class Scatterers:
         ndarray of shape (n, 3), m
             Lateral, axial, elevation.
         """
-        places = plane.image(interpolate(positions, cells, self.points))
+        position = plane.to_image(interpolate(nodes, cells, self.points))
         if self.in_plane_only:
-            places[:, 2] = 0
-        return places
+            position[:, 2] = 0
+        return position
 
 
-def scatter(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> Scatterers:
-    """The scatterers of one view: in the wall, or in its cut with the plane when `in_plane_only`."""
+def seed_wall(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> Scatterers:
+    """Seed the wall, or its section by the imaging plane if `phantom.in_plane_only`."""
     if config.phantom.in_plane_only:
-        return seed_plane(config, heart, plane, random)
-    return seed(config.phantom, heart.nodes, heart.cells, random)
+        return seed_section(config, heart, plane, random)
+    return seed_volume(config.phantom, heart.nodes, heart.cells, random)
 
 
-def seed(phantom: Phantom, nodes: Floats, cells: NDArray[np.int32], random: np.random.Generator) -> Scatterers:
-    """Scatter points evenly over the volume of the unloaded wall.
+def seed_volume(phantom: Phantom, nodes: Floats, cells: NDArray[np.int32], random: np.random.Generator) -> Scatterers:
+    """Draw scatterers uniformly over the volume of the unloaded wall.
 
     Parameters
     ----------
@@ -76,18 +76,18 @@ def seed(phantom: Phantom, nodes: Floats, cells: NDArray[np.int32], random: np.r
     Scatterers
         Their number is Poisson distributed about density times volume, as in a uniform random medium.
     """
-    bound = largest_ratio(nodes, cells)
-    tried = random.poisson(phantom.si().density * bound.sum() / 6)
-    cell = random.choice(len(cells), size=tried, p=bound / bound.sum()).astype(np.int32)
-    points = MaterialPoints(cell, in_tetrahedron(random.random((tried, 3))))
-    # Elements are curved: thinning by the local volume leaves the density even within each.
-    kept = random.random(tried) * bound[cell] < np.linalg.det(jacobian(nodes, cells, points))
-    points = MaterialPoints(points.cell[kept], points.xi[kept])
+    bound = max_jacobian(nodes, cells)
+    candidates = random.poisson(phantom.si().density * bound.sum() / 6)
+    cell = random.choice(len(cells), size=candidates, p=bound / bound.sum()).astype(np.int32)
+    points = MaterialPoints(cell, cube_to_tetrahedron(random.random((candidates, 3))))
+    # Elements are curved: rejection by the local Jacobian makes the density uniform within each.
+    accepted = random.random(candidates) * bound[cell] < np.linalg.det(jacobian(nodes, cells, points))
+    points = MaterialPoints(points.cell[accepted], points.xi[accepted])
     return Scatterers(points, random.standard_normal(len(points)), in_plane_only=False)
 
 
-def seed_plane(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> Scatterers:
-    """Scatter points evenly over the wall in the imaging plane at end-diastole, as the paper's phantom is printed.
+def seed_section(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> Scatterers:
+    """Draw scatterers uniformly over the wall in the imaging plane at end-diastole, as the paper's phantom is printed.
 
     Their areal density is the volumetric one times the thickness of the beam at its elevation focus,
     wavelength x focus / height.
@@ -105,26 +105,26 @@ def seed_plane(config: Config, heart: Heart, plane: Plane, random: np.random.Gen
     """
     array = config.probe.si()
     thickness = array.sound_speed / array.frequency * array.elevation_focus / array.height
-    corners = plane.image(heart.positions(0))[:, :2]
-    low, size = corners.min(axis=0), np.ptp(corners, axis=0)
-    tried = random.poisson(config.phantom.si().density * thickness * size.prod())
-    places = np.column_stack([low + size * random.random((tried, 2)), np.zeros(tried)])
-    points = locate(heart.positions(0), heart.cells, plane.heart(places))
-    kept = points.cell >= 0
-    points = MaterialPoints(points.cell[kept], points.xi[kept])
+    nodes = plane.to_image(heart.positions(0))[:, :2]
+    low, size = nodes.min(axis=0), np.ptp(nodes, axis=0)
+    candidates = random.poisson(config.phantom.si().density * thickness * size.prod())
+    position = np.column_stack([low + size * random.random((candidates, 2)), np.zeros(candidates)])
+    points = locate(heart.positions(0), heart.cells, plane.to_heart(position))
+    inside = points.cell >= 0
+    points = MaterialPoints(points.cell[inside], points.xi[inside])
     return Scatterers(points, random.standard_normal(len(points)), in_plane_only=True)
 
 
-def in_tetrahedron(cube: Floats) -> Floats:
-    """Fold the unit cube onto the unit tetrahedron, evenly: sorted coordinates have even gaps."""
+def cube_to_tetrahedron(cube: Floats) -> Floats:
+    """Map uniform points of the unit cube to uniform points of the unit tetrahedron: the gaps of sorted coordinates."""
     return np.diff(np.sort(cube, axis=1), prepend=0.0, axis=1)
 
 
-def largest_ratio(nodes: Floats, cells: NDArray[np.int32]) -> Floats:
-    """A bound on the volume of tissue per volume of local coordinates in each cell, m^3."""
+def max_jacobian(nodes: Floats, cells: NDArray[np.int32]) -> Floats:
+    """Upper bound of det(dx / dxi), volume per volume of local coordinates, in each cell, (n_cells,), m^3."""
     corners = np.vstack([np.zeros(3), np.eye(3)])
-    places = np.vstack([corners, corners[EDGES].mean(axis=1)])
-    cell = np.repeat(np.arange(len(cells), dtype=np.int32), len(places))
-    ratios = np.linalg.det(jacobian(nodes, cells, MaterialPoints(cell, np.tile(places, (len(cells), 1)))))
-    # Between the nodes the cubic can rise a little above its values at them.
-    return 1.1 * ratios.reshape(len(cells), -1).max(axis=1)
+    xi = np.vstack([corners, corners[EDGES].mean(axis=1)])
+    cell = np.repeat(np.arange(len(cells), dtype=np.int32), len(xi))
+    determinants = np.linalg.det(jacobian(nodes, cells, MaterialPoints(cell, np.tile(xi, (len(cells), 1)))))
+    # Between the nodes the cubic can rise a little above its nodal values.
+    return 1.1 * determinants.reshape(len(cells), -1).max(axis=1)

@@ -1,4 +1,4 @@
-"""Random courses over the frames of a clip, each frame drawn from the one before."""
+"""Random processes over the frames of a clip, each frame drawn from the one before."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ Random = Callable[[str], np.random.Generator]
 """Name of what is drawn to the generator that draws it, always the same and in the same state."""
 
 
-class Course:
-    """A random course that may be asked for at any frame, in any order.
+class RandomProcess:
+    """A Markov process over frames that can be evaluated at any frame, in any order.
 
     Parameters
     ----------
     start : ndarray
         Value at frame 0.
     step : callable
-        Value at a frame - 1 and that frame to the value there; what it draws must depend on the frame alone.
+        Maps the value at the previous frame and the frame number to the value at that frame; its random numbers must
+        depend on the frame number alone.
     """
 
     def __init__(self, start: Floats, step: Callable[[Floats, int], Floats]) -> None:
@@ -38,61 +39,65 @@ class Course:
         return self._value
 
 
-def fading(amplitude: Floats, time: Floats, constant: float, name: str, random: Random) -> Course:
-    """Amplitudes that are replaced bit by bit, an autoregressive process of order one.
+def ar1(amplitude: Floats, time: Floats, time_constant: float, name: str, random: Random) -> RandomProcess:
+    """Amplitudes that decorrelate as an autoregressive process of order one.
 
-    a(t) = rho a(t - dt) + sqrt(1 - rho^2) e, rho = exp(-dt / constant), e normally distributed with the variance of
-    the amplitudes: their variance stays and their correlation, and with it that of the RF, is exp(-dt / constant).
+    a(t) = rho a(t - dt) + sqrt(1 - rho^2) e, rho = exp(-dt / time_constant), with e normally distributed with the
+    variance of the amplitudes. Their variance is constant; their correlation, and that of the RF, is rho.
 
     Parameters
     ----------
     amplitude : ndarray of shape (n,)
         At frame 0.
     time : ndarray of shape (frame,), s
-    constant : float, s
+    time_constant : float, s
     name : str
-        Of what fades: the key of its random numbers.
+        Kind of scatterer: the key of its random numbers.
     random : Random
 
     Returns
     -------
-    Course of ndarray of shape (n,)
+    RandomProcess of ndarray of shape (n,)
     """
-    spread = sqrt((amplitude**2).mean()) if len(amplitude) else 0.0
+    std = sqrt((amplitude**2).mean()) if len(amplitude) else 0.0
 
-    def step(last: Floats, frame: int) -> Floats:
-        rho = exp(-(time[frame] - time[frame - 1]) / constant)
-        fresh = random(f"{name} fades {frame}").standard_normal(len(last))
-        return rho * last + sqrt(1 - rho**2) * spread * fresh
+    def step(previous: Floats, frame: int) -> Floats:
+        rho = exp(-(time[frame] - time[frame - 1]) / time_constant)
+        innovation = random(f"{name} fades {frame}").standard_normal(len(previous))
+        return rho * previous + sqrt(1 - rho**2) * std * innovation
 
-    return Course(amplitude, step)
+    return RandomProcess(amplitude, step)
 
 
-def wandering(number: int, time: Floats, constant: float, wavelength: float, random: Random) -> Course:
-    """Offsets of particles that diffuse.
-
-    The echo of one that moves by d along the beam turns by q d, q = 4 pi / wavelength. Diffusion with D lets the
-    correlation of the echo of many fall as exp(-q^2 D t) (Berne & Pecora, Dynamic Light Scattering, section 5.4);
-    D = 1 / (q^2 constant) makes that exp(-t / constant).
+def brownian(number: int, time: Floats, time_constant: float, wavelength: float, random: Random) -> RandomProcess:
+    """Offsets of particles that diffuse; see :func:`diffusion_std`.
 
     Parameters
     ----------
     number : int
-        Particles.
     time : ndarray of shape (frame,), s
-    constant : float, s
+    time_constant : float, s
     wavelength : float, m
-        Of the centre frequency.
+        At the centre frequency.
     random : Random
 
     Returns
     -------
-    Course of ndarray of shape (n, 3), m
+    RandomProcess of ndarray of shape (number, 3), m
     """
-    wavenumber = 4 * pi / wavelength
 
-    def step(last: Floats, frame: int) -> Floats:
-        spread = sqrt(2 * (time[frame] - time[frame - 1]) / constant) / wavenumber
-        return last + spread * random(f"blood wanders {frame}").standard_normal(last.shape)
+    def step(previous: Floats, frame: int) -> Floats:
+        std = diffusion_std(time[frame] - time[frame - 1], time_constant, wavelength)
+        return previous + std * random(f"blood wanders {frame}").standard_normal(previous.shape)
 
-    return Course(np.zeros((number, 3)), step)
+    return RandomProcess(np.zeros((number, 3)), step)
+
+
+def diffusion_std(duration: float, time_constant: float, wavelength: float) -> float:
+    """Standard deviation along an axis, m, of particles that diffuse for a duration, s.
+
+    A displacement d along the beam turns the phase of the echo by q d, q = 4 pi / wavelength. The echo of many
+    decorrelates as exp(-q^2 D t) (Berne & Pecora, Dynamic Light Scattering, section 5.4). D = 1 / (q^2 time_constant)
+    makes that exp(-t / time_constant); the standard deviation is sqrt(2 D t).
+    """
+    return sqrt(2 * duration / time_constant) / (4 * pi / wavelength)

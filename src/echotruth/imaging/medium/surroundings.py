@@ -12,12 +12,12 @@ from echotruth.config import Config
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats
 from echotruth.heart import Heart
-from echotruth.imaging.beamforming.scan import imaging_depth, points, scan_lines
+from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions, scan_lines
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.view import Plane
 
 NEIGHBOURS = 8
-"""Nodes of the epicardium whose motion a scatterer outside of it takes on."""
+"""Epicardial nodes from which the motion of a scatterer is interpolated."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Surroundings:
     Attributes
     ----------
     position : ndarray of shape (n, 3), m
-        At end-diastole, in the heart frame. Some lie in the heart: they come out where it draws back.
+        At end-diastole, in the heart frame. Some lie in the heart and appear where it withdraws.
     amplitude : ndarray of shape (n,)
     """
 
@@ -35,57 +35,59 @@ class Surroundings:
     amplitude: Floats
 
 
-class Following:
-    """Motion of the surroundings: that of the epicardium near by, fading with the distance from it.
+class SurroundingsMotion:
+    """Motion of the surroundings: that of the nearest epicardium times exp(-distance / decay length).
+
+    Nodes are weighted by the inverse square of their distance.
 
     Parameters
     ----------
     heart : Heart
     position : ndarray of shape (n, 3), m
-        Of scatterers at end-diastole, in the heart frame.
-    length : float, m
-        Distance over which the motion falls to 1/e; 0 if nothing follows.
+        Of the scatterers at end-diastole, in the heart frame.
+    decay_length : float, m
+        0 for surroundings at rest.
     """
 
-    def __init__(self, heart: Heart, position: Floats, length: float) -> None:
-        self._heart, self._position, self._moves = heart, position, length > 0
-        if not self._moves:
+    def __init__(self, heart: Heart, position: Floats, decay_length: float) -> None:
+        self._heart, self._position, self._at_rest = heart, position, decay_length == 0
+        if self._at_rest:
             return
-        self._epi = epicardium(heart)
-        distance, self._near = cKDTree(heart.positions(0)[self._epi]).query(position, NEIGHBOURS)
-        share = 1 / np.maximum(distance, 1e-9) ** 2
-        self._share = share / share.sum(axis=1, keepdims=True) * np.exp(-distance[:, :1] / length)
+        self._epi = epicardial_nodes(heart)
+        distance, self._nearest = cKDTree(heart.positions(0)[self._epi]).query(position, NEIGHBOURS)
+        weight = 1 / np.maximum(distance, 1e-9) ** 2
+        self._weight = weight / weight.sum(axis=1, keepdims=True) * np.exp(-distance[:, :1] / decay_length)
 
     def __call__(self, frame: int) -> Floats:
         """Positions in a frame, (n, 3), m."""
-        if not self._moves:
+        if self._at_rest:
             return self._position
-        moved = (self._heart.displacement[frame] - self._heart.displacement[0])[self._epi]
-        return self._position + np.einsum("pk,pki->pi", self._share, moved[self._near])
+        displacement = (self._heart.displacement[frame] - self._heart.displacement[0])[self._epi]
+        return self._position + np.einsum("pk,pki->pi", self._weight, displacement[self._nearest])
 
 
-def epicardium(heart: Heart) -> NDArray[np.int64]:
-    """Nodes of the epicardium, where the wall depth is 1."""
+def epicardial_nodes(heart: Heart) -> NDArray[np.int64]:
+    """Nodes at which the wall depth is 1."""
     return np.flatnonzero(heart.wall_depth > 1 - 1e-9)
 
 
-def outside(heart: Heart, frame: int, position: Floats) -> NDArray[np.bool_]:
-    """Which places (n, 3), m, are neither in the wall nor in the cavity nor in the column above its lid, (n,).
+def outside_heart(heart: Heart, frame: int, position: Floats) -> NDArray[np.bool_]:
+    """Whether positions (n, 3), m, are neither in the wall, nor in the cavity, nor in the column above its lid; (n,).
 
-    That column is where the atrium is, and full of blood too faint to matter.
+    In that column is the atrium, full of blood too faint to matter.
     """
     nodes, cavity = heart.positions(frame), Cavity(heart.endo)
     rim = nodes[cavity.rim]
-    middle = rim.mean(axis=0)
-    radius = np.hypot(*(rim - middle)[:, :2].T).mean()
-    found = (position[:, 2] < middle[2]) | (np.hypot(*(position - middle)[:, :2].T) > radius)
-    found[found] = locate(nodes, heart.cells, position[found]).cell < 0
-    found[found] = locate(cavity.positions(nodes), cavity.cells, position[found]).cell < 0
-    return found
+    centre = rim.mean(axis=0)
+    radius = np.hypot(*(rim - centre)[:, :2].T).mean()
+    outside = (position[:, 2] < centre[2]) | (np.hypot(*(position - centre)[:, :2].T) > radius)
+    outside[outside] = locate(nodes, heart.cells, position[outside]).cell < 0
+    outside[outside] = locate(cavity.positions(nodes), cavity.cells, position[outside]).cell < 0
+    return outside
 
 
-def surround(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> Surroundings:
-    """Scatter points evenly over what the probe images.
+def seed_surroundings(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> Surroundings:
+    """Draw scatterers uniformly over what the probe images.
 
     Parameters
     ----------
@@ -97,30 +99,30 @@ def surround(config: Config, heart: Heart, plane: Plane, random: np.random.Gener
     Returns
     -------
     Surroundings
-        Within the sector, from `start_mm` to the greatest depth, within the beam in elevation. Their amplitudes are
-        normally distributed; the variance in a volume is that of muscle times the level.
+        In the scan from `start_mm` to the imaging depth, and in the beam in elevation. Their amplitudes are normally
+        distributed; the variance in a volume is that of muscle times the level.
     """
-    around, depth = config.realism.surroundings, imaging_depth(config.rf, config.bmode)
-    scan, start = scan_lines(config.probe, config.rf), around.si().start
-    leeway = np.abs((heart.displacement - heart.displacement[0])[:, epicardium(heart)] @ plane.axes[2]).max()
-    side, _ = points(scan, np.array([depth]))
-    half = np.array([1.1 * np.abs(side).max(), beam_thickness(config, np.array([start, depth])).max() + leeway])
+    settings, depth = config.realism.surroundings, imaging_depth(config.rf, config.bmode)
+    scan, start = scan_lines(config.probe, config.rf), settings.si().start
+    margin = np.abs((heart.displacement - heart.displacement[0])[:, epicardial_nodes(heart)] @ plane.axes[2]).max()
+    lateral, _ = sample_positions(scan, np.array([depth]))
+    half = np.array([1.1 * np.abs(lateral).max(), beam_half_thickness(config, np.array([start, depth])).max() + margin])
     low = np.array([-half[0], 0, -half[1]])
     size = np.array([2 * half[0], depth, 2 * half[1]])
-    number = random.poisson(around.density * config.phantom.si().density * size.prod())
-    place = low + size * random.random((number, 3))
-    line, reach = scan.place(place[:, 0], place[:, 1])
-    seen = (np.abs(2 * line / (len(scan.angle) - 1) - 1) < 1.1) & (reach > start) & (reach < depth)
-    seen &= np.abs(place[:, 2]) < beam_thickness(config, reach) + leeway
-    place = place[seen]
-    return Surroundings(plane.heart(place), around.strength * random.standard_normal(len(place)))
+    number = random.poisson(settings.density * config.phantom.si().density * size.prod())
+    position = low + size * random.random((number, 3))
+    line, range_ = scan.to_scan_coordinates(position[:, 0], position[:, 1])
+    imaged = (np.abs(2 * line / (len(scan.angle) - 1) - 1) < 1.1) & (range_ > start) & (range_ < depth)
+    imaged &= np.abs(position[:, 2]) < beam_half_thickness(config, range_) + margin
+    position = position[imaged]
+    return Surroundings(plane.to_heart(position), settings.amplitude_std * random.standard_normal(len(position)))
 
 
-def beam_thickness(config: Config, reach: Floats) -> Floats:
-    """Half the thickness of the beam at a range (n,), m: by rays, and up to the first zero of its diffraction.
+def beam_half_thickness(config: Config, range_: Floats) -> Floats:
+    """Half the thickness of the beam at ranges (n,), m: H / 2 |1 - r / F| (rays) + wavelength r / H (first zero).
 
     Beyond, the two-way beam is 26 dB and more below its maximum.
     """
     p = config.probe.si()
-    rays = p.height / 2 * np.abs(1 - reach / p.elevation_focus)
-    return rays + p.sound_speed / p.frequency * reach / p.height
+    rays = p.height / 2 * np.abs(1 - range_ / p.elevation_focus)
+    return rays + p.sound_speed / p.frequency * range_ / p.height

@@ -1,7 +1,7 @@
 """Attenuation proportional to frequency, applied to the traces of all echoes at once.
 
 In a full matrix the time of arrival tells the path, so that exp(-alpha (f - f0) c t) may be applied after the echoes
-have been summed. As a function of time and frequency it is of low rank: a few courses in time, each with a filter.
+have been summed. As a function of time and frequency it is of low rank: the sum of a few products of the two.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ import numpy as np
 
 from echotruth.arrays import Floats
 
-ERROR = 1e-6
+TOLERANCE = 1e-6
 """Relative error of the sum of products."""
 
 
-def separated(rate: Floats, time: Floats) -> tuple[Floats, Floats]:
-    """Courses in time and filters whose products sum to exp(-rate time).
+def separable_damping(rate: Floats, time: Floats) -> tuple[Floats, Floats]:
+    """Functions of time and of frequency whose products sum to exp(-rate time).
 
     Parameters
     ----------
@@ -25,12 +25,11 @@ def separated(rate: Floats, time: Floats) -> tuple[Floats, Floats]:
 
     Returns
     -------
-    courses : ndarray of shape (rank, samples)
+    damping : ndarray of shape (rank, samples)
     filters : ndarray of shape (rank, bins)
     """
     if not rate.any():
         return np.ones((1, len(time))), np.ones((1, len(rate)))
-    damping = np.exp(-np.multiply.outer(rate, time))
-    left, size, right = np.linalg.svd(damping, full_matrices=False)
-    rank = int((size > ERROR * size[0]).sum())
+    left, size, right = np.linalg.svd(np.exp(-np.multiply.outer(rate, time)), full_matrices=False)
+    rank = int((size > TOLERANCE * size[0]).sum())
     return right[:rank], (left[:, :rank] * size[:rank]).T

@@ -1,58 +1,61 @@
-"""Directivity of an element: how loud and of what colour it is at an angle.
+"""Directivity of an element, and how the spectra of pairs of elements follow from it.
 
 A strip of width w in a soft baffle sends D(f) = sinc(pi w f sin(theta) / c) cos(theta) (Selfridge, Kino, Khuri-Yakub
-1980, Appl Phys Lett 37:35). A pair of elements hears a pulse through D_i(f) D_j(f). Near the centre frequency f0, D
-changes with frequency as (f / f0)^b, b = x cot(x) - 1 with x its argument at f0, so that the product depends on
-b_i + b_j, the colour of the pair, above all, and a little on (b_i - b_j)^2. For every angle from the centre of the
-array that is fitted by polynomials.
+1980, Appl Phys Lett 37:35). The pulse of a pair of elements is multiplied by D_i(f) D_j(f). Near the centre frequency
+f0, D changes with frequency as (f / f0)^b, with the spectral exponent b = d ln D / d ln f = x cot(x) - 1, x being the
+argument of the sinc at f0. So the product depends on b_i + b_j above all, and a little on (b_i - b_j)^2. For every
+angle from the centre of the array that is fitted by polynomials.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 
-KINDS = 48
-"""Angles for which the pulses of all pairs are worked out, evenly spaced in their sine."""
-WIDEST = 2.8**2
+ANGLES = 48
+"""Angles for which the spectra of all pairs are fitted, evenly spaced in their sine."""
+MAX_ARGUMENT_SQUARED = 2.8**2
 """Greatest x^2 for which they are; beyond it (elements wider than 0.9 wavelengths seen steeply from the side) the
-colour is that of this one."""
-APERTURE = 0.25
+spectral exponent is that of this one."""
+HALF_APERTURE = 0.25
 """Sine of the angle, to either side, of the elements for which they are fitted: an array half as wide as it is far."""
-SPREAD = 9
+SAMPLED_ELEMENTS = 9
 """Elements among them that are tried."""
-TERMS = 15
+SERIES_TERMS = 15
 STEPS = 2048
-"""Of the table of :func:`tabulated`; interpolated linearly it errs by 1e-7."""
+"""Of :func:`directivity_table`; interpolated linearly it errs by 1e-7."""
 
 
 def sinc_series() -> tuple[Floats, Floats]:
-    """Coefficients of sin(x) / x and of its derivative in y = x^2, highest power first, each of shape (TERMS,)."""
-    factorial = np.cumprod(np.concatenate([[1.0], np.arange(1, 2 * TERMS)]))
-    value = (-1.0) ** np.arange(TERMS) / factorial[1::2]
-    return value[::-1].copy(), np.append(value[1:] * np.arange(1, TERMS), 0.0)[::-1].copy()
+    """Coefficients of sin(x) / x and of its derivative in y = x^2, highest power first, each of (SERIES_TERMS,)."""
+    factorial = np.cumprod(np.concatenate([[1.0], np.arange(1, 2 * SERIES_TERMS)]))
+    value = (-1.0) ** np.arange(SERIES_TERMS) / factorial[1::2]
+    return value[::-1].copy(), np.append(value[1:] * np.arange(1, SERIES_TERMS), 0.0)[::-1].copy()
 
 
-VALUE, SLOPE = sinc_series()
+SINC, SINC_DERIVATIVE = sinc_series()
 
 
-def sinc(square: Floats) -> Floats:
+def sinc(square: Floats) -> NDArray[Any]:
     """sin(x) / x of y = x^2 (any shape), for y up to 40; negative y gives sinh."""
-    return np.polyval(VALUE, square)
+    return np.polyval(SINC, square)
 
 
-def tilt(square: Floats) -> Floats:
-    """b = x cot(x) - 1 of y = x^2 (any shape), up to `WIDEST`: power of the frequency that D follows near f0."""
-    square = np.minimum(square, WIDEST)
-    return 2 * square * np.polyval(SLOPE, square) / sinc(square)
+def spectral_exponent(square: Floats) -> Floats:
+    """b = x cot(x) - 1 of y = x^2 (any shape), up to `MAX_ARGUMENT_SQUARED`: D follows f^b near f0."""
+    square = np.minimum(square, MAX_ARGUMENT_SQUARED)
+    return 2 * square * np.polyval(SINC_DERIVATIVE, square) / sinc(square)
 
 
-def shapes(width: float, ratio: Floats, count: int) -> tuple[Floats, Floats]:
-    """What the pulses of pairs are multiplied by, for every angle from the centre of the array.
+def pair_spectra(width: float, ratio: Floats, count: int) -> tuple[Floats, Floats]:
+    """Fit D_i(f) D_j(f) / (D_i(f0) D_j(f0)) of all pairs, for every angle from the centre of the array.
 
-    With b_i and b_j less a mean, e = b_i + b_j and g = (b_i - b_j)^2, that is a sum over the shapes times 1, e, e^2,
-    e^3, g and g e, or the first of these; it is 1 at the centre frequency.
+    With b_i and b_j less a mean, e = b_i + b_j and g = (b_i - b_j)^2, the fit is S_0 + S_1 e + S_2 e^2 + S_3 e^3 +
+    S_4 g + S_5 g e, or the first terms of it.
 
     Parameters
     ----------
@@ -61,31 +64,32 @@ def shapes(width: float, ratio: Floats, count: int) -> tuple[Floats, Floats]:
     ratio : ndarray of shape (n,)
         Frequencies over the centre frequency.
     count : int
-        Of shapes, up to 6.
+        Terms, up to 6.
 
     Returns
     -------
-    means : ndarray of shape (KINDS,)
-        Of b.
-    shapes : ndarray of shape (KINDS, count, n)
+    mean_exponent : ndarray of shape (ANGLES,)
+        Mean of b.
+    spectra : ndarray of shape (ANGLES, count, n)
+        S_0, S_1 and so on.
     """
     scale = (np.pi * width) ** 2
-    means, found = np.empty(KINDS), np.empty((KINDS, count, len(ratio)))
-    one, other = np.triu_indices(SPREAD)
-    for kind, sine in enumerate(np.linspace(0, 1, KINDS)):
-        sines = sine + APERTURE * np.cos(np.pi * (np.arange(SPREAD) + 0.5) / SPREAD)
-        squares = np.minimum(scale * np.minimum(sines**2, 1), WIDEST)
-        b = tilt(squares)
-        means[kind] = (b.min() + b.max()) / 2
-        pulses = sinc(np.outer(squares, ratio**2)) / sinc(squares)[:, None]
-        b -= means[kind]
-        e, g = b[one] + b[other], (b[one] - b[other]) ** 2
+    mean_exponent, spectra = np.empty(ANGLES), np.empty((ANGLES, count, len(ratio)))
+    i, j = np.triu_indices(SAMPLED_ELEMENTS)
+    for angle, sine in enumerate(np.linspace(0, 1, ANGLES)):
+        sines = sine + HALF_APERTURE * np.cos(np.pi * (np.arange(SAMPLED_ELEMENTS) + 0.5) / SAMPLED_ELEMENTS)
+        squares = np.minimum(scale * np.minimum(sines**2, 1), MAX_ARGUMENT_SQUARED)
+        b = spectral_exponent(squares)
+        mean_exponent[angle] = (b.min() + b.max()) / 2
+        directivity = sinc(np.outer(squares, ratio**2)) / sinc(squares)[:, None]
+        b -= mean_exponent[angle]
+        e, g = b[i] + b[j], (b[i] - b[j]) ** 2
         terms = np.column_stack([e**0, e, e**2, e**3, g, g * e])[:, :count]
-        found[kind] = np.linalg.lstsq(terms, pulses[one] * pulses[other], rcond=None)[0]
-    return means, found
+        spectra[angle] = np.linalg.lstsq(terms, directivity[i] * directivity[j], rcond=None)[0]
+    return mean_exponent, spectra
 
 
-def tabulated(width: float) -> Floats:
+def directivity_table(width: float) -> Floats:
     """Directivity without its cosine, and b, at the centre frequency over the square of the sine of the angle.
 
     Parameters
@@ -99,4 +103,4 @@ def tabulated(width: float) -> Floats:
         At squares of the sine from 0 to 1 in STEPS equal steps; the last row stands twice, for interpolation at 1.
     """
     squares = (np.pi * width) ** 2 * np.minimum(np.arange(STEPS + 2) / STEPS, 1)
-    return np.stack([sinc(squares), tilt(squares)], axis=1)
+    return np.stack([sinc(squares), spectral_exponent(squares)], axis=1)

@@ -1,8 +1,8 @@
 """Haze: reverberation of what lies near the array.
 
-Sound that went to and fro between array, skin and ribs arrives later than the straight echo, so it is drawn deeper;
-but its wavefront is still that of the near place, so it is out of focus there and smeared over the lines. Byram & Shu
-(2016, J Med Imaging 3:046005) simulate it so: linear echoes of the near places, shifted later by random times. With
+Sound that went to and fro between array, skin and ribs arrives later than the direct echo, so it is drawn deeper; but
+its wavefront is still that of the near position, so it is out of focus there and smeared over the lines. Byram & Shu
+(2016, J Med Imaging 3:046005) simulate it so: linear echoes of near scatterers, shifted later by random times. With
 times from an exponential distribution and some in every resolution cell they met the statistics of clutter in tissue.
 """
 
@@ -16,14 +16,14 @@ from echotruth.config import Probe
 from echotruth.config.realism import Haze
 from echotruth.imaging.rf.probe import spectral_width
 
-A_CELL = 2
+ECHOES_PER_CELL = 2
 """Later echoes in an axial resolution cell: with two, Byram & Shu met the speckle of clutter in tissue."""
-FARTHEST = 4
+MAX_LENGTHS = 4
 """Later echoes are drawn up to this many means of their distance."""
 
 
 def reverberation(haze: Haze, probe: Probe, depth: float, random: np.random.Generator) -> np.ndarray:
-    """Later echoes of an echo from the near places.
+    """Draw the later echoes of an echo from near the array.
 
     Parameters
     ----------
@@ -38,15 +38,19 @@ def reverberation(haze: Haze, probe: Probe, depth: float, random: np.random.Gene
     -------
     Shape (echoes, 2): range by which they seem to lie deeper, m, and amplitude over that of the first.
     """
+    assert haze.level_dB is not None
     h, speed = haze.si(), probe.si().sound_speed
     resolution = speed / 2 * sqrt(2) * log(2) / pi / spectral_width(probe)
-    number = ceil(A_CELL * FARTHEST * h.length / resolution)
+    number = ceil(ECHOES_PER_CELL * MAX_LENGTHS * h.length / resolution)
     deeper = random.exponential(h.length, number)
     amplitude = random.standard_normal(number) * 10 ** (haze.level_dB / 20) / sqrt(number)
     return np.column_stack([deeper, amplitude])[deeper < depth - h.near]
 
 
-def response(echoes: np.ndarray, frequency: np.ndarray, sound_speed: float) -> np.ndarray:
-    """Spectrum of later echoes (echoes, 2), without the first, at frequencies (bins,), Hz: shape (bins,), complex."""
-    turns = np.multiply.outer(frequency, 2 * echoes[:, 0] / sound_speed)
-    return (np.exp(-2j * pi * turns) * echoes[:, 1]).sum(axis=1)
+def reverberation_filter(echoes: np.ndarray, frequency: np.ndarray, sound_speed: float) -> np.ndarray:
+    """Transfer function sum_n A_n exp(-2 pi i f 2 d_n / c) of later echoes (echoes, 2) of depth d and amplitude A.
+
+    The first echo is not in it. At frequencies (bins,), Hz: shape (bins,), complex.
+    """
+    cycles = np.multiply.outer(frequency, 2 * echoes[:, 0] / sound_speed)
+    return (np.exp(-2j * pi * cycles) * echoes[:, 1]).sum(axis=1)

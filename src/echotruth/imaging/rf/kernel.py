@@ -1,14 +1,15 @@
-"""Kernels that put an echo of any shape on the fast-time grid.
+"""Least-squares kernels that put an echo of any shape on the fast-time grid.
 
-An echo of spectrum exp(-2 pi i f t) S(f), S smooth, is written as a few samples around t: those that come nearest to
-it in the band of the pulse by least squares, with the spectrum of a fixed window in the place of the pulse. Outside of
-the band they may do what they like, which is why so few suffice. Divided by the spectrum of the window and multiplied
-by that of the pulse, they are the echo.
+An echo of spectrum exp(-2 pi i f t) S(f), S smooth, is written as a few samples h_n around t: those of which the
+spectrum, sum_n h_n exp(-2 pi i f t_n), comes nearest to exp(-2 pi i f t) S(f) W(f) over the band of the pulse in the
+least-squares sense, with W the spectrum of a fixed window. Outside of the band it is free, which is why so few samples
+suffice. Divided by W and multiplied by the spectrum of the pulse, they are the echo.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ NODES = 24
 """Frequencies at which spectra are sampled."""
 
 
-_NODE, _SHARE = np.polynomial.legendre.leggauss(128)
+_NODE, _WEIGHT = np.polynomial.legendre.leggauss(128)
 
 
 def window(offset: Floats, sharpness: float) -> Floats:
@@ -30,10 +31,11 @@ def window(offset: Floats, sharpness: float) -> Floats:
     return np.exp(sharpness * (np.sqrt(inside) - 1))
 
 
-def window_spectrum(cycles: NDArray[np.complex128], sharpness: float) -> NDArray[np.complex128]:
-    """Integral of window(u) exp(-cycles u) over u in samples, for `cycles` (n,), radians a sample: shape (n,)."""
+def window_spectrum(frequency: NDArray[np.complex128], sharpness: float) -> NDArray[np.complex128]:
+    """Integral of window(u) exp(-s u) over u in samples, at complex frequencies s (n,), rad per sample: shape (n,)."""
     offset = _NODE * TAPS / 2
-    return np.exp(-np.multiply.outer(cycles, offset)) @ (_SHARE * TAPS / 2 * window(offset, sharpness))
+    decay: NDArray[np.complex128] = np.exp(-np.multiply.outer(frequency, offset))
+    return decay @ (_WEIGHT * TAPS / 2 * window(offset, sharpness))
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,10 @@ class Grid:
     sampling: float
     sharpness: float
 
-    def cycles(self, frequency: Floats, loss: Floats) -> NDArray[np.complex128]:
-        """Radians per sample (n,) at frequencies (n,), Hz, of a grid whose samples are damped at rates (n,), 1/s."""
-        return (loss + 2j * np.pi * frequency) / self.sampling
+    def complex_frequency(self, frequency: Floats, loss: Floats) -> NDArray[np.complex128]:
+        """s = (loss + 2 pi i f) / sampling, rad per sample, of frequencies f (n,), Hz, damped at rates (n,), 1/s."""
+        rate: NDArray[np.complex128] = loss + 2j * np.pi * frequency
+        return rate / self.sampling
 
 
 @dataclass(frozen=True)
@@ -77,13 +80,13 @@ class Band:
     loss: Floats
 
 
-def offsets(blocks: int) -> NDArray[np.int64]:
-    """Places of the samples of a kernel of so many blocks, from the sample at or before the echo: (blocks TAPS,)."""
+def sample_offsets(blocks: int) -> NDArray[np.int64]:
+    """Samples of a kernel of so many blocks, counted from the sample at or before the echo: (blocks TAPS,)."""
     count = blocks * TAPS
     return np.arange(count) - (count // 2 - 1)
 
 
-def fit(band: Band, blocks: int, fraction: float) -> tuple[Floats, Floats]:
+def fit_kernel(band: Band, blocks: int, fraction: float) -> tuple[NDArray[Any], NDArray[Any]]:
     """Least-squares map from a spectrum to the samples of an echo that is late by a fraction of a sample.
 
     Parameters
@@ -98,21 +101,21 @@ def fit(band: Band, blocks: int, fraction: float) -> tuple[Floats, Floats]:
     -------
     taps : ndarray of shape (blocks TAPS, 2 NODES)
         Times a spectrum S at the nodes, its real parts before the imaginary ones, gives the samples.
-    left : ndarray of shape (2 NODES, 2 NODES)
-        Times the same gives what the samples miss, weighted so that the sum of its squares is the energy lost.
+    residual : ndarray of shape (2 NODES, 2 NODES)
+        Times the same gives the error, weighted so that the sum of its squares is the energy lost.
     """
-    cycles = band.grid.cycles(band.frequency, band.loss)
-    late = np.exp(-np.multiply.outer(cycles, offsets(blocks) - fraction))
-    late /= window_spectrum(cycles, band.grid.sharpness)[:, None]
+    frequency = band.grid.complex_frequency(band.frequency, band.loss)
+    shifted = np.exp(-np.multiply.outer(frequency, sample_offsets(blocks) - fraction))
+    shifted /= window_spectrum(frequency, band.grid.sharpness)[:, None]
     root = np.sqrt(band.weight)
-    # What is reached, and what is asked for, as real numbers.
-    reached = stacked((root[:, None] * late).T).T
-    asked = np.diag(np.concatenate([root, root]))
-    taps = np.linalg.lstsq(reached, asked, rcond=1e-9)[0]
-    return taps, asked - reached @ taps
+    # Spectra of single samples, and the spectrum that is sought, as real numbers.
+    basis = stack_real_imaginary((root[:, None] * shifted).T).T
+    target = np.diag(np.concatenate([root, root]))
+    taps = np.linalg.lstsq(basis, target, rcond=1e-9)[0]
+    return taps, target - basis @ taps
 
 
-def fits(band: Band, blocks: int, degree: int, phases: int) -> Floats:
+def fit_polynomials(band: Band, blocks: int, degree: int, phases: int) -> Floats:
     """Maps from a spectrum to the polynomials in the fraction of a sample, for every phase.
 
     Parameters
@@ -129,14 +132,14 @@ def fits(band: Band, blocks: int, degree: int, phases: int) -> Floats:
     ndarray of shape (blocks, phases, degree + 1, TAPS, 2 NODES)
         The coefficient of the highest power first; the variable is the fraction of a sample beyond the phase.
     """
-    cell = 1 / phases
-    nodes = cell * (0.5 - 0.5 * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1)))
+    step = 1 / phases
+    nodes = step * (0.5 - 0.5 * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1)))
     powers = np.linalg.inv(np.vander(nodes, degree + 1))
-    found = np.stack([[fit(band, blocks, phase * cell + node)[0] for node in nodes] for phase in range(phases)])
-    coefficients = np.einsum("dn,pntf->pdtf", powers, found)
+    taps = np.stack([[fit_kernel(band, blocks, phase * step + node)[0] for node in nodes] for phase in range(phases)])
+    coefficients = np.einsum("dn,pntf->pdtf", powers, taps)
     return coefficients.reshape(phases, degree + 1, blocks, TAPS, -1).transpose(2, 0, 1, 3, 4)
 
 
-def stacked(spectra: NDArray[np.complex128]) -> Floats:
+def stack_real_imaginary(spectra: NDArray[np.complexfloating]) -> Floats:
     """Real parts before imaginary ones, along the last axis."""
     return np.concatenate([spectra.real, spectra.imag], axis=-1)

@@ -1,4 +1,4 @@
-"""The phased array: elements, weights and pulse.
+"""The phased array: elements and pulse.
 
 Frame of the probe: origin at the centre of the array, coordinates in the order lateral, axial, elevation.
 """
@@ -11,10 +11,10 @@ import numpy as np
 
 from echotruth.config import Probe
 
-FAINTEST = 0.01
+SPECTRUM_CUTOFF = 0.01
 """Spectrum of the pulse, relative to its maximum, below which it is cut (-40 dB)."""
-HIGHEST = 0.46
-"""Highest frequency of the pulse over the sampling frequency; above it echoes cannot be deposited accurately."""
+MAX_FREQUENCY = 0.46
+"""Highest frequency of the pulse over the sampling frequency; above it echoes cannot be spread accurately."""
 
 
 def element_centres(probe: Probe) -> np.ndarray:
@@ -23,22 +23,8 @@ def element_centres(probe: Probe) -> np.ndarray:
     return (np.arange(p.elements) - (p.elements - 1) / 2) * p.pitch
 
 
-def apodization(probe: Probe, kind: str) -> np.ndarray:
-    """Weights of the elements over the aperture, shape (elements,), 1.
-
-    `hann` is cos^2(pi x / L) at the element centres x, with L = elements * pitch, so the outermost elements still
-    count; `none` is all ones.
-    """
-    if kind == "none":
-        return np.ones(probe.elements)
-    if kind == "hann":
-        aperture = probe.elements * probe.si().pitch
-        return np.cos(pi * element_centres(probe) / aperture) ** 2
-    raise ValueError(f"Apodization {kind!r} is not known: use 'hann' or 'none'.")
-
-
 def spectral_width(probe: Probe) -> float:
-    """Standard deviation of the Gaussian two-way spectrum (amplitude), Hz.
+    """Standard deviation of the Gaussian two-way spectrum (amplitude), B f0 / (2 sqrt(2 ln 2)), Hz.
 
     The amplitude falls to one half (-6 dB) at half the bandwidth from the centre frequency.
     """
@@ -48,14 +34,15 @@ def spectral_width(probe: Probe) -> float:
 def pulse_band(probe: Probe) -> tuple[float, float]:
     """Lowest and highest frequency of the pulse, Hz: where its spectrum is cut off."""
     p = probe.si()
-    half = spectral_width(probe) * sqrt(-2 * log(FAINTEST))
-    return max(p.frequency - half, 0.0), min(p.frequency + half, HIGHEST * p.sampling)
+    half = spectral_width(probe) * sqrt(-2 * log(SPECTRUM_CUTOFF))
+    return max(p.frequency - half, 0.0), min(p.frequency + half, MAX_FREQUENCY * p.sampling)
 
 
 def pulse_spectrum(probe: Probe, frequency: np.ndarray) -> np.ndarray:
-    """Spectrum of the two-way pulse, real and without delay.
+    """Spectrum exp(-(f - f0)^2 / (2 sigma^2)) of the two-way pulse, real and without delay.
 
-    A sinusoid at the centre frequency in a Gaussian window, cut to :func:`pulse_band`.
+    A sinusoid at the centre frequency f0 in a Gaussian window, sigma being :func:`spectral_width`, cut to
+    :func:`pulse_band`.
 
     Parameters
     ----------
@@ -73,7 +60,7 @@ def pulse_spectrum(probe: Probe, frequency: np.ndarray) -> np.ndarray:
 
 
 def pulse(probe: Probe, time: np.ndarray) -> np.ndarray:
-    """The two-way pulse as it is seen, its peak at time 0.
+    """The two-way pulse in time, its peak at time 0.
 
     Parameters
     ----------

@@ -19,36 +19,36 @@ HEIGHT, WIDTH = 4, 16
 
 
 def padded(count, multiple=WIDTH):
-    """The least multiple that is no less than a count, or than each of an array."""
+    """A count, or each of an array, rounded up to the next multiple."""
     return -(-count // multiple) * multiple
 
 
 @intrinsic
-def tile(typing_context, weights, rows, i, n, out, more):
-    """out[i : i + HEIGHT, n : n + WIDTH] = weights[:, i : i + HEIGHT].T @ rows[:, n : n + WIDTH], or `more` by that."""
+def multiply_tile(typing_context, weights, rows, i, n, out, accumulate):
+    """out[i : i + HEIGHT, n : n + WIDTH] = weights[:, i : i + HEIGHT].T @ rows[:, n : n + WIDTH], or += it."""
     matrix = types.Array(types.float32, 2, "C")
     if (weights, rows, out) != (matrix, matrix, matrix):
-        raise TypingError("tile takes contiguous matrices of float32")
+        raise TypingError("multiply_tile takes contiguous matrices of float32")
 
     def generate(context, builder, signature, arguments):
-        weights, rows, i, n, out, more = arguments
+        weights, rows, i, n, out, accumulate = arguments
         vectors = Vectors(context, builder)
-        parts, nothing = range(WIDTH // LANES), ir.Constant(VECTOR, [0.0] * LANES)
+        parts, zero = range(WIDTH // LANES), ir.Constant(VECTOR, [0.0] * LANES)
         targets, sums = [], []
         for height in range(HEIGHT):
-            target = vectors.place(matrix, out, builder.add(i, ir.Constant(i.type, height)), n)
-            targets.append(builder.bitcast(target, VECTOR.as_pointer()))
-            found = [builder.select(more, vectors.load(targets[-1], part), nothing) for part in parts]
-            sums.append([cgutils.alloca_once_value(builder, value) for value in found])
+            target = vectors.row_address(matrix, out, builder.add(i, ir.Constant(i.type, height)), n)
+            targets.append(target)
+            values = [builder.select(accumulate, vectors.load(target, part), zero) for part in parts]
+            sums.append([cgutils.alloca_once_value(builder, value) for value in values])
         count = builder.extract_value(context.make_array(matrix)(context, builder, rows).shape, 0)
         with cgutils.for_range(builder, count) as loop:
-            row, weight = vectors.place(matrix, rows, loop.index, n), vectors.place(matrix, weights, loop.index, i)
-            row = builder.bitcast(row, VECTOR.as_pointer())
+            row = vectors.row_address(matrix, rows, loop.index, n)
+            weight = vectors.element_address(matrix, weights, loop.index, i)
             right = [vectors.load(row, part) for part in parts]
             for height in range(HEIGHT):
-                left = vectors.filled(builder.load(builder.gep(weight, [ir.Constant(ir.IntType(64), height)])))
+                left = vectors.broadcast(builder.load(builder.gep(weight, [ir.Constant(ir.IntType(64), height)])))
                 for part, total in enumerate(sums[height]):
-                    builder.store(vectors.fused(left, right[part], builder.load(total)), total)
+                    builder.store(vectors.fma(left, right[part], builder.load(total)), total)
         for target, totals in zip(targets, sums, strict=True):
             for part, total in enumerate(totals):
                 vectors.store(builder.load(total), target, part)
@@ -58,8 +58,8 @@ def tile(typing_context, weights, rows, i, n, out, more):
 
 
 @numba.njit(cache=True)
-def product(weights, rows, out, half=False, more=False):
-    """Write weights.T @ rows to a matrix, as much of it as is asked for.
+def product(weights, rows, out, upper=False, accumulate=False):
+    """Write weights.T @ rows.
 
     Parameters
     ----------
@@ -69,11 +69,11 @@ def product(weights, rows, out, half=False, more=False):
         Shape (m, n or more), float32.
     out
         Written: shape (i, n), float32; i is a multiple of HEIGHT, n of WIDTH.
-    half
-        Whether only the columns from the row on are needed; those before may be left as they are.
-    more
+    upper
+        Whether only the upper triangle is needed; what is below it may be left as it is.
+    accumulate
         Whether the product is added to what is in the matrix.
     """
     for n in range(0, out.shape[1], WIDTH):
-        for i in range(0, min(n + WIDTH, len(out)) if half else len(out), HEIGHT):
-            tile(weights, rows, i, n, out, more)
+        for i in range(0, min(n + WIDTH, len(out)) if upper else len(out), HEIGHT):
+            multiply_tile(weights, rows, i, n, out, accumulate)

@@ -1,9 +1,9 @@
-"""Shadow: a rib that blocks the way between some elements and some scatterers.
+"""Acoustic shadow: a rib that blocks the way between some elements and some scatterers.
 
 The rib lies across the plane of the image at one depth, from its edge outwards. The straight ray from an element to a
-scatterer passes or is blocked, there and back; sound is not bent round the edge. From every scatterer behind the rib
-its edge is seen at one place of the array, its horizon, and the elements beyond are blocked. So scatterers are taken
-in strips of nearly the same horizon, and in the full matrix of a strip rows and columns of blocked elements are faint.
+scatterer passes or is blocked, there and back; sound is not bent round the edge. Seen from a scatterer behind the rib,
+the edge projects to one position on the array, and the elements beyond are blocked. So scatterers are taken in strips
+of nearly the same projection, and in the full matrix of a strip the rows and columns of blocked elements are faint.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ class Rib:
         self._edge = s.depth * tan(s.edge)
         self._centres = self._side * centres
         last = (np.ptp(centres) + self._softness) / 2
-        self.horizons = np.linspace(-last, last, STRIPS + 1)
+        self._projections = np.linspace(-last, last, STRIPS + 1)
 
-    def horizon(self, position: np.ndarray) -> np.ndarray:
-        """Place on the array where the rib's edge is before a scatterer.
+    def projected_edge(self, position: np.ndarray) -> np.ndarray:
+        """Project the edge of the rib from scatterers on the array.
 
         Parameters
         ----------
@@ -52,22 +52,23 @@ class Rib:
         Shape (scatterers,), m, towards the side of the rib; elements farther to that side are blocked. Infinite for
         scatterers before the rib.
         """
-        lateral, share = self._side * position[:, 0], self._depth / position[:, 1]
-        behind = share < 1
-        share = np.where(behind, share, 0)
-        return np.where(behind, (self._edge - lateral * share) / (1 - share), np.inf)
+        lateral, ratio = self._side * position[:, 0], self._depth / position[:, 1]
+        behind = ratio < 1
+        ratio = np.where(behind, ratio, 0)
+        return np.where(behind, (self._edge - lateral * ratio) / (1 - ratio), np.inf)
 
-    def aperture(self, horizon: float) -> np.ndarray:
-        """Amplitude that passes to or from the elements for one horizon (m): shape (elements,), float32."""
-        free = np.clip((horizon - self._centres) / self._softness + 0.5, 0, 1)
+    def transmission(self, projection: float) -> np.ndarray:
+        """Amplitude that passes to or from the elements for one projected edge (m): shape (elements,), float32."""
+        free = np.clip((projection - self._centres) / self._softness + 0.5, 0, 1)
         # A quarter of a sine, squared, is a ramp with round ends.
         return (self._floor + (1 - self._floor) * np.sin(pi / 2 * free) ** 2).astype(np.float32)
 
     def strips(self, position: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Scatterers (n, 3), m, strip by strip: their indices, and the aperture (elements,) that they see."""
-        nearest = np.searchsorted((self.horizons[1:] + self.horizons[:-1]) / 2, self.horizon(position))
+        """Scatterers (n, 3), m, strip by strip: their indices, and what passes to the elements, (elements,)."""
+        middles = (self._projections[1:] + self._projections[:-1]) / 2
+        nearest = np.searchsorted(middles, self.projected_edge(position))
         order = np.argsort(nearest, kind="stable")
-        ends = np.searchsorted(nearest[order], np.arange(len(self.horizons) + 1))
-        for strip, horizon in enumerate(self.horizons):
+        ends = np.searchsorted(nearest[order], np.arange(len(self._projections) + 1))
+        for strip, projection in enumerate(self._projections):
             if ends[strip] < ends[strip + 1]:
-                yield order[ends[strip] : ends[strip + 1]], self.aperture(horizon)
+                yield order[ends[strip] : ends[strip + 1]], self.transmission(projection)

@@ -1,4 +1,4 @@
-"""Vectors of single-precision numbers in LLVM's language, for what no compiler would make of a loop."""
+"""LLVM code for vectors of single-precision numbers, where a compiler would not vectorise the loop by itself."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ VECTOR = ir.VectorType(ir.FloatType(), LANES)
 
 
 class Vectors:
-    """What a builder is told, in terms of vectors and of numba's arrays."""
+    """Instructions of a builder on vectors and on numba's arrays."""
 
     def __init__(self, context, builder):
         self._context, self._builder = context, builder
@@ -23,52 +23,54 @@ class Vectors:
         data = self._context.make_array(kind)(self._context, self._builder, array).data
         return self._builder.bitcast(self._builder.gep(data, [index]), VECTOR.as_pointer())
 
-    def load(self, address, place=0):
-        return self._builder.load(self._builder.gep(address, [_number(64, place)]), align=4)
+    def load(self, address, offset=0):
+        """The vector that lies so many vectors after an address."""
+        return self._builder.load(self._builder.gep(address, [_integer(64, offset)]), align=4)
 
-    def store(self, value, address, place=0):
-        self._builder.store(value, self._builder.gep(address, [_number(64, place)]), align=4)
+    def store(self, value, address, offset=0):
+        """Store a vector so many vectors after an address."""
+        self._builder.store(value, self._builder.gep(address, [_integer(64, offset)]), align=4)
 
-    def place(self, kind, array, row, column):
+    def element_address(self, kind, array, row, column):
         """Address of an element of a matrix."""
-        found = self._context.make_array(kind)(self._context, self._builder, array)
-        width = self._builder.extract_value(found.shape, 1)
+        matrix = self._context.make_array(kind)(self._context, self._builder, array)
+        width = self._builder.extract_value(matrix.shape, 1)
         row = ir.Constant(width.type, row) if isinstance(row, int) else row
-        return self._builder.gep(found.data, [self._builder.add(self._builder.mul(width, row), column)])
+        return self._builder.gep(matrix.data, [self._builder.add(self._builder.mul(width, row), column)])
 
-    def lanes(self, kind, array, row, column):
+    def row_address(self, kind, array, row, column):
         """Address of LANES neighbours in a row of a matrix, as a vector."""
-        place = self.place(kind, array, row, column)
-        return self._builder.bitcast(place, ir.VectorType(place.type.pointee, LANES).as_pointer())
+        address = self.element_address(kind, array, row, column)
+        return self._builder.bitcast(address, ir.VectorType(address.type.pointee, LANES).as_pointer())
 
-    def filled(self, scalar):
+    def broadcast(self, scalar):
         """A vector of LANES times a scalar of any type."""
-        nothing = ir.Constant(ir.VectorType(scalar.type, LANES), ir.Undefined)
-        one = self._builder.insert_element(nothing, scalar, _number(32, 0))
+        undefined = ir.Constant(ir.VectorType(scalar.type, LANES), ir.Undefined)
+        one = self._builder.insert_element(undefined, scalar, _integer(32, 0))
         return self._builder.shuffle_vector(
-            one, nothing, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+            one, undefined, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
         )
 
-    def fused(self, a, b, c):
-        """a b + c, rounded once: what comes out must not hang on how a compiler joins sums and products."""
+    def fma(self, a, b, c):
+        """a b + c, rounded once: the result must not depend on how a compiler joins sums and products."""
         function = ir.FunctionType(VECTOR, [VECTOR] * 3)
-        fused = get_or_insert_function(self._builder.module, function, f"llvm.fma.v{LANES}f32")
-        return self._builder.call(fused, [a, b, c])
+        fma = get_or_insert_function(self._builder.module, function, f"llvm.fma.v{LANES}f32")
+        return self._builder.call(fma, [a, b, c])
 
     def polynomial(self, address, first, count, variable):
         """Value of a polynomial whose coefficients, the highest power first, are vectors from the `first`-th on."""
         value = self.load(address, first)
         for power in range(1, count):
-            value = self.fused(value, variable, self.load(address, first + power))
+            value = self.fma(value, variable, self.load(address, first + power))
         return value
 
 
-def _number(bits, value):
+def _integer(bits, value):
     return ir.Constant(ir.IntType(bits), value)
 
 
 @intrinsic
-def fused(typing_context, a, b, c):
+def fma(typing_context, a, b, c):
     """a b + c of float32, rounded once."""
 
     def generate(context, builder, signature, arguments):

@@ -1,4 +1,4 @@
-"""The left ventricle: an ellipsoid, the wall in a file, or a tube in its place."""
+"""Meshes of the left ventricle: an ellipsoid, the wall in a file, or a tube in its place."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def left_ventricle(geometry: Geometry) -> Mesh:
     Raises
     ------
     GeometryError
-        If there is no such ventricle, in one sentence with the remedy.
+        If the ventricle cannot be meshed, in one sentence with the remedy.
     """
     if geometry.file is None:
         return tube(geometry) if geometry.shape == "tube" else ellipsoid(geometry)
-    from echotruth.mechanics.geometry.file import heart_of
+    from echotruth.mechanics.geometry.file import ventricle_from_file
 
-    return heart_of(geometry)
+    return ventricle_from_file(geometry)
 
 
 def cell_volumes(mesh: Mesh) -> Floats:

@@ -1,18 +1,23 @@
-"""The boundary of a mesh of tetrahedra: its triangles, and which of them are neighbours."""
+"""Boundary triangles of a tetrahedral mesh, and the adjacency of its cells and triangles."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from echotruth.fem.tetrahedra import EDGES, Floats, Integers
 
+Indices = NDArray[np.intp]
+
 FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
 """Vertices of the faces of a tetrahedron; the normals point out."""
 
-_EDGE_OF = {frozenset(edge.tolist()): 4 + i for i, edge in enumerate(EDGES)}
-_QUADRATIC = np.array([[*f, *(_EDGE_OF[frozenset((f[i], f[(i + 1) % 3]))] for i in range(3))] for f in FACES.tolist()])
+_EDGE_NODE = {frozenset(edge.tolist()): 4 + i for i, edge in enumerate(EDGES)}
+_QUADRATIC_FACES = np.array(
+    [[*f, *(_EDGE_NODE[frozenset((f[i], f[(i + 1) % 3]))] for i in range(3))] for f in FACES.tolist()]
+)
 """The same with the middles of edges 01, 12, 20."""
 
 
@@ -30,13 +35,13 @@ def boundary(cells: Integers) -> tuple[Integers, Integers]:
     owner : ndarray of shape (n_facets,)
         Tetrahedron of each.
     """
-    faces, number, count = _numbered(cells)
+    faces, number, count = _numbered_faces(cells)
     outside = count[number] == 1
     return faces[outside], np.repeat(np.arange(len(cells)), 4)[outside].astype(np.int32)
 
 
-def neighbours(cells: Integers) -> tuple[Integers, Integers]:
-    """Tetrahedra that share a face, and the two faces as each of them sees it.
+def adjacent_cells(cells: Integers) -> tuple[Integers, Integers]:
+    """Pairs of tetrahedra that share a face.
 
     Parameters
     ----------
@@ -46,27 +51,27 @@ def neighbours(cells: Integers) -> tuple[Integers, Integers]:
     -------
     pairs : ndarray of shape (n_pairs, 2)
     faces : ndarray of shape (n_pairs, 2, 3)
-        Vertices, in the order in which the normal points out of the first and of the second.
+        Vertices of the shared face, in the order in which its normal points out of the first and of the second.
     """
-    faces, number, count = _numbered(cells)
-    order = np.argsort(number, kind="stable")
-    shared = order[count[number[order]] == 2].reshape(-1, 2)
+    faces, number, count = _numbered_faces(cells)
+    shared = _pairs(number, count)
     return (shared // 4).astype(np.int32), faces[shared, :3]
 
 
-def crowded_faces(cells: Integers) -> int:
+def count_nonmanifold_faces(cells: Integers) -> int:
     """Number of faces that belong to more than two tetrahedra."""
-    return int(np.count_nonzero(_numbered(cells)[2] > 2))
+    return int(np.count_nonzero(_numbered_faces(cells)[2] > 2))
 
 
-def _numbered(cells: Integers) -> tuple[Integers, Integers, Integers]:
+def _numbered_faces(cells: Integers) -> tuple[Integers, Indices, Indices]:
     """All faces cell by cell, the number of each as a set of vertices, and how often each number occurs."""
-    faces = cells[:, FACES if cells.shape[1] == 4 else _QUADRATIC].reshape(4 * len(cells), -1)
-    number, count = _unique(np.sort(faces[:, :3], axis=1))
+    faces = cells[:, FACES if cells.shape[1] == 4 else _QUADRATIC_FACES].reshape(4 * len(cells), -1)
+    number, count = _unique_rows(np.sort(faces[:, :3], axis=1))
     return faces, number, count
 
 
-def _unique(rows: Integers) -> tuple[Integers, Integers]:
+def _unique_rows(rows: Integers) -> tuple[Indices, Indices]:
+    """Number of each row, the same for equal rows, and how often each number occurs."""
     # One integer a row sorts ten times faster than rows do.
     base = rows.max(initial=0) + np.int64(1)
     code = rows[:, 0].astype(np.int64)
@@ -76,7 +81,13 @@ def _unique(rows: Integers) -> tuple[Integers, Integers]:
     return number, count
 
 
-def edges_of(triangles: Integers) -> tuple[Integers, Integers, Integers]:
+def _pairs(number: Indices, count: Indices) -> Indices:
+    """Indices (n_pairs, 2) at which each number that occurs twice stands."""
+    order = np.argsort(number, kind="stable")
+    return order[count[number[order]] == 2].reshape(-1, 2)
+
+
+def triangle_edges(triangles: Integers) -> tuple[Integers, Indices, Indices]:
     """Edges of triangles.
 
     Parameters
@@ -86,32 +97,30 @@ def edges_of(triangles: Integers) -> tuple[Integers, Integers, Integers]:
     Returns
     -------
     edges : ndarray of shape (3 n, 2)
-        Vertices in rising order: edge k is one of triangle k // 3.
+        Vertices in rising order; edge k belongs to triangle k // 3.
     number : ndarray of shape (3 n,)
         The same for the same edge.
     count : ndarray of shape (n_edges,)
-        How many triangles share it, by number.
+        Number of triangles that share it, by number.
     """
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    return edges, *_unique(edges)
+    return edges, *_unique_rows(edges)
 
 
-def beside(triangles: Integers) -> Integers:
+def adjacent_triangles(triangles: Integers) -> Integers:
     """Pairs of triangles that share an edge, of a surface whose edges have two triangles each: (n_pairs, 2)."""
-    _, number, count = edges_of(triangles)
-    order = np.argsort(number, kind="stable")
-    shared = order[count[number[order]] == 2].reshape(-1, 2)
-    return (shared // 3).astype(np.int32)
+    _, number, count = triangle_edges(triangles)
+    return (_pairs(number, count) // 3).astype(np.int32)
 
 
-def pieces(n: int, pairs: Integers) -> Integers:
-    """Number of the connected piece that each of n things belongs to; piece 0 has the most.
+def component_labels(n: int, pairs: Integers) -> Integers:
+    """Number of the connected component of each of n items; component 0 has the most.
 
     Parameters
     ----------
     n : int
     pairs : ndarray of shape (n_pairs, 2)
-        Things that hang together.
+        Items that are connected.
     """
     graph = csr_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     _, label = connected_components(graph, directed=False)
@@ -120,16 +129,30 @@ def pieces(n: int, pairs: Integers) -> Integers:
     return rank[label]
 
 
-def largest(chosen: np.ndarray, pairs: Integers) -> np.ndarray:
-    """The largest connected piece of the things chosen (bool, shape (n,)), as bool of that shape."""
-    if not chosen.any():
-        return chosen
-    inside = pairs[chosen[pairs].all(axis=1)]
-    label = pieces(len(chosen), inside)
-    return chosen & (label == np.argmax(np.bincount(label[chosen])))
+def largest_component(selected: np.ndarray, pairs: Integers) -> np.ndarray:
+    """Largest connected component of the selected items (bool, shape (n,)), as bool of that shape."""
+    if not selected.any():
+        return selected
+    label = component_labels(len(selected), pairs[selected[pairs].all(axis=1)])
+    return selected & (label == np.argmax(np.bincount(label[selected])))
+
+
+def add_edge_nodes(vertices: Integers, n_nodes: int) -> tuple[Integers, Integers]:
+    """Add a node, from number `n_nodes` on, to every edge of linear tetrahedra (n_cells, 4): edges and quadratic cells.
+
+    The edges, shape (n_edges, 2), are the vertices beside each new node; the cells have the shape (n_cells, 10).
+    """
+    ends = np.sort(vertices[:, EDGES].reshape(-1, 2), axis=1)
+    edges, number = np.unique(ends, axis=0, return_inverse=True)
+    return edges, np.hstack([vertices, n_nodes + number.reshape(-1, 6)]).astype(np.int32)
 
 
 def area_vectors(nodes: Floats, triangles: Integers) -> Floats:
-    """Normals as long as the area of straight triangles, shape (n, 3), m^2."""
+    """Area vectors (b - a) x (c - a) / 2 of straight triangles, shape (n, 3), m^2."""
     a, b, c = (nodes[triangles[:, i]] for i in range(3))
     return np.cross(b - a, c - a) / 2
+
+
+def unit_vector(vector: Floats) -> Floats:
+    """Vector (n,) divided by its length."""
+    return vector / np.linalg.norm(vector)

@@ -1,4 +1,4 @@
-"""The left ventricle in a file, brought into the heart frame."""
+"""The left ventricle from a file, as a mesh in the heart frame."""
 
 from __future__ import annotations
 
@@ -7,21 +7,27 @@ import logging
 import numpy as np
 
 from echotruth.config import Geometry
-from echotruth.fem.tetrahedra import EDGES, Floats, Integers, Mesh
-from echotruth.mechanics.geometry import imported_mesh as reading
-from echotruth.mechanics.geometry.boundary import beside, boundary, edges_of, pieces
-from echotruth.mechanics.geometry.boundary_labels import NAMES, Skin, with_sides
-from echotruth.mechanics.geometry.cut import marked, wall_of
-from echotruth.mechanics.geometry.file_fibres import carried
-from echotruth.mechanics.geometry.frame import Frame, frame_of
-from echotruth.mechanics.geometry.imported_mesh import METRES, Body
-from echotruth.mechanics.geometry.mesh_quality import GeometryError, check_cavity, check_flat, check_turned
-from echotruth.mechanics.geometry.remeshing import refilled
+from echotruth.fem.tetrahedra import Floats, Integers, Mesh
+from echotruth.mechanics.geometry import imported_mesh
+from echotruth.mechanics.geometry.boundary import (
+    add_edge_nodes,
+    adjacent_triangles,
+    boundary,
+    component_labels,
+    triangle_edges,
+)
+from echotruth.mechanics.geometry.boundary_labels import NAMES, BoundarySurface, label_boundary
+from echotruth.mechanics.geometry.cut import extract_wall, select_cells
+from echotruth.mechanics.geometry.file_fibres import map_fibres
+from echotruth.mechanics.geometry.frame import HeartFrame, heart_frame
+from echotruth.mechanics.geometry.imported_mesh import METRES, ImportedMesh
+from echotruth.mechanics.geometry.mesh_quality import GeometryError, check_cavity, check_flat, check_inverted
+from echotruth.mechanics.geometry.remeshing import remesh
 
 logger = logging.getLogger("echotruth.mechanics")
 
 
-def heart_of(geometry: Geometry) -> Mesh:
+def ventricle_from_file(geometry: Geometry) -> Mesh:
     """Mesh of the wall in a file.
 
     Parameters
@@ -36,44 +42,44 @@ def heart_of(geometry: Geometry) -> Mesh:
     Raises
     ------
     GeometryError
-        Where the file holds no sound left ventricle.
+        Where the file holds no valid left ventricle.
     """
     source = str(geometry.file)
-    body = reading.read(geometry)
-    if len(body.cells):
-        body = wall_of(body, geometry.keep)
-        facets, _ = boundary(body.cells)
+    imported = imported_mesh.read(geometry)
+    if len(imported.cells):
+        imported = extract_wall(imported, geometry.keep)
+        facets, _ = boundary(imported.cells)
     else:
-        _refuse_surface(geometry)
-        facets = _closed(body)
-    skin = with_sides(body, facets, geometry.sides)
-    septum = _septum(body, geometry)
+        _check_surface_keys(geometry)
+        facets = _closed_surface(imported)
+    surface = label_boundary(imported, facets, geometry.sides)
+    septum = _septum_point(imported, geometry)
     if geometry.remesh:
-        mesh, frame = refilled(skin, septum, geometry, source)
-        check_turned(mesh, source, "change the numbers of elements, or cut deeper with geometry.cut_mm")
+        mesh, frame = remesh(surface, septum, geometry, source)
+        check_inverted(mesh, source, "change the numbers of elements, or cut deeper with geometry.cut_mm")
     else:
-        mesh, frame = _as_it_is(body, skin, septum)
-        check_flat(mesh, source, "mesh the wall anew with geometry.remesh: true")
-        check_turned(mesh, source, "mesh the wall anew with geometry.remesh: true")
+        mesh, frame = _keep_cells(imported, surface, septum)
+        check_flat(mesh, source, "mesh the wall again with geometry.remesh: true")
+        check_inverted(mesh, source, "mesh the wall again with geometry.remesh: true")
     check_cavity(mesh, source, f"set geometry.unit, now {geometry.unit}, to one of {', '.join(METRES)}")
-    return carried(mesh, body, frame, geometry)
+    return map_fibres(mesh, imported, frame, geometry)
 
 
-def _as_it_is(body: Body, skin: Skin, septum: Floats | None) -> tuple[Mesh, Frame]:
+def _keep_cells(imported: ImportedMesh, surface: BoundarySurface, septum: Floats | None) -> tuple[Mesh, HeartFrame]:
     """The tetrahedra of the file, made quadratic."""
-    frame = frame_of(skin, septum)
-    nodes, cells = quadratic(frame.points(body.nodes), body.cells)
+    frame = heart_frame(surface, septum)
+    nodes, cells = quadratic(frame.transform_points(imported.nodes), imported.cells)
     # The boundary comes in the same order from quadratic tetrahedra as from linear ones.
     facets, _ = boundary(cells)
-    sides = {name: facets[skin.side == number] for number, name in enumerate(NAMES)}
-    rim = np.unique(sides["base"])
-    if np.ptp(nodes[rim, 2]) < 1e-4 * np.ptp(nodes[:, 2]):
-        nodes[rim, 2] = 0.0
+    sides = {name: facets[surface.labels == number] for number, name in enumerate(NAMES)}
+    base = np.unique(sides["base"])
+    if np.ptp(nodes[base, 2]) < 1e-4 * np.ptp(nodes[:, 2]):
+        nodes[base, 2] = 0.0
     return Mesh(nodes, cells, **sides), frame
 
 
 def quadratic(nodes: Floats, cells: Integers) -> tuple[Floats, Integers]:
-    """Straight middles added to the edges of linear tetrahedra; quadratic ones stay.
+    """Add nodes in the middle of the edges of linear tetrahedra; quadratic ones stay.
 
     Parameters
     ----------
@@ -87,17 +93,16 @@ def quadratic(nodes: Floats, cells: Integers) -> tuple[Floats, Integers]:
     """
     if cells.shape[1] == 10:
         return nodes, cells
-    ends = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
-    edges, number = np.unique(ends, axis=0, return_inverse=True)
-    middle = nodes[edges].mean(axis=1)
-    return np.vstack([nodes, middle]), np.hstack([cells, len(nodes) + number.reshape(-1, 6)]).astype(np.int32)
+    edges, cells = add_edge_nodes(cells, len(nodes))
+    return np.vstack([nodes, nodes[edges].mean(axis=1)]), cells
 
 
-def _refuse_surface(geometry: Geometry) -> None:
+def _check_surface_keys(geometry: Geometry) -> None:
+    """Refuse keys that a file without tetrahedra cannot have."""
     for key in ("keep", "septum", "fibre"):
         if getattr(geometry, key) is not None:
             raise GeometryError(
-                f"{geometry.file}: geometry.{key} chooses among tetrahedra, and a surface has none: leave it out"
+                f"{geometry.file}: geometry.{key} selects tetrahedra, and the file holds a surface: leave it out"
             )
     if not geometry.remesh:
         raise GeometryError(
@@ -105,50 +110,50 @@ def _refuse_surface(geometry: Geometry) -> None:
         )
 
 
-def _closed(body: Body) -> Integers:
+def _closed_surface(imported: ImportedMesh) -> Integers:
     """The triangles of a closed surface, their normals out of the wall."""
-    corners = np.sort(body.triangles, axis=1)
+    corners = np.sort(imported.triangles, axis=1)
     # Triangles whose corners were merged have shrunk to a line.
-    facets = body.triangles[(corners[:, 1:] != corners[:, :-1]).all(axis=1)]
-    _, _, count = edges_of(facets)
+    facets = imported.triangles[(corners[:, 1:] != corners[:, :-1]).all(axis=1)]
+    _, _, count = triangle_edges(facets)
     if (count != 2).any():
-        kinds = f"{np.sum(count == 1)} open and {np.sum(count > 2)} crowded edges"
+        faults = f"{np.sum(count == 1)} open and {np.sum(count > 2)} non-manifold edges"
         raise GeometryError(
-            f"{body.source}: the surface does not close round the wall ({kinds} of {len(count)}): close its "
+            f"{imported.source}: the surface does not close round the wall ({faults} of {len(count)}): close its "
             "holes, the base included"
         )
-    parts = pieces(len(facets), beside(facets)).max() + 1
+    parts = component_labels(len(facets), adjacent_triangles(facets)).max() + 1
     if parts > 1:
         raise GeometryError(
-            f"{body.source}: holds {parts} surfaces that do not touch: join endocardium and epicardium by a base"
+            f"{imported.source}: holds {parts} surfaces that do not touch: join endocardium and epicardium by a base"
         )
-    return _outward(body, facets)
+    return _outward(imported, facets)
 
 
-def _outward(body: Body, facets: Integers) -> Integers:
-    """Triangles turned so that neighbours agree and the volume inside is positive."""
+def _outward(imported: ImportedMesh, facets: Integers) -> Integers:
+    """Triangles in an order of vertices in which neighbours agree and the volume inside is positive."""
     import pyvista
 
-    surface = pyvista.PolyData.from_regular_faces(body.nodes, facets)
-    turned = surface.compute_normals(
+    surface = pyvista.PolyData.from_regular_faces(imported.nodes, facets)  # type: ignore[arg-type]  # any integers do
+    oriented = surface.compute_normals(
         cell_normals=True, point_normals=False, consistent_normals=True, split_vertices=False, auto_orient_normals=False
     )
-    facets = turned.regular_faces.astype(np.int32)
-    corner = body.nodes[facets]
-    inside = np.einsum("fi,fi->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2]))
-    return facets if inside > 0 else facets[:, ::-1].copy()
+    facets = oriented.regular_faces.astype(np.int32)
+    corner = imported.nodes[facets]
+    volume = np.einsum("fi,fi->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2]))
+    return facets if volume > 0 else facets[:, ::-1].copy()
 
 
-def _septum(body: Body, geometry: Geometry) -> Floats | None:
-    """A place in the septum, shape (3,), m."""
+def _septum_point(imported: ImportedMesh, geometry: Geometry) -> Floats | None:
+    """A point in the septum, shape (3,), m."""
     if geometry.septum_point is not None:
         return np.array(geometry.septum_point) * METRES[geometry.unit] * geometry.scale
     if geometry.septum is None:
-        logger.info("%s: septum not named, x is the file's own x axis", body.source)
+        logger.info("%s: septum not named, x is the file's own x axis", imported.source)
         return None
-    cells = body.cells[marked(body, geometry.septum, "geometry.septum")]
+    cells = imported.cells[select_cells(imported, geometry.septum, "geometry.septum")]
     if not len(cells):
         raise GeometryError(
-            f"{body.source}: geometry.septum.values names no cell of the wall: choose others of its values"
+            f"{imported.source}: geometry.septum.values names no cell of the wall: choose others of its values"
         )
-    return body.nodes[cells[:, :4]].mean(axis=(0, 1))
+    return imported.nodes[cells[:, :4]].mean(axis=(0, 1))

@@ -1,4 +1,4 @@
-"""What a ventricle must be to be solved; anything else is refused in one sentence."""
+"""Shape and orientation of tetrahedra, and the checks that a ventricle must pass to be solved."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape_gradient
 from echotruth.mechanics.solver.cavity import cavity_volume
 
-CAVITIES = (0.1e-9, 5e-3)
-"""Volumes (m^3) that a cavity may have: 0.1 uL, an embryo's, to 5 L, an elephant's."""
+CAVITY_VOLUMES = (0.1e-9, 5e-3)
+"""Smallest and largest volume of a cavity, m^3: from 0.1 uL, an embryo's, to 5 L, an elephant's."""
 
-FLATTEST = 0.02
+MIN_SCALED_JACOBIAN = 0.02
 """Smallest scaled Jacobian of a tetrahedron, 1 for the regular one; 0.1 is poor, 0 is flat
 (Knupp, Finite Elem Anal Des 39 (2003) 217)."""
+
+_MIRRORED = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]
+"""Order of the nodes of a tetrahedron with its vertices 1 and 2 swapped."""
 
 
 class GeometryError(ValueError):
@@ -22,7 +25,7 @@ class GeometryError(ValueError):
 
 
 def jacobians(nodes: Floats, cells: Integers) -> NDArray[np.float64]:
-    """Volume of tissue per volume of local coordinates, at the quadrature points.
+    """Determinant of dX/dxi, the volume of tissue per volume of local coordinates, at the quadrature points.
 
     Parameters
     ----------
@@ -34,6 +37,20 @@ def jacobians(nodes: Floats, cells: Integers) -> NDArray[np.float64]:
     ndarray of shape (n_cells, 14), m^3
     """
     return np.linalg.det(np.einsum("cai,qaj->cqij", nodes[cells], shape_gradient(tetrahedron()[0])))
+
+
+def straight_volumes(nodes: Floats, cells: Integers) -> Floats:
+    """Signed volumes (b - a) x (c - a) . (d - a) / 6 of the straight tetrahedra abcd, shape (n_cells,), m^3."""
+    a, b, c, d = (nodes[cells[:, i]] for i in range(4))
+    return np.einsum("ci,ci->c", np.cross(b - a, c - a), d - a) / 6
+
+
+def right_handed(nodes: Floats, cells: Integers) -> Integers:
+    """Cells (n_cells, 4 or 10) with two vertices swapped where they are left-handed."""
+    cells = cells.copy()
+    left = straight_volumes(nodes, cells) < 0
+    cells[left] = cells[left][:, _MIRRORED[: cells.shape[1]]]
+    return cells
 
 
 def scaled_jacobian(nodes: Floats, cells: Integers) -> Floats:
@@ -59,33 +76,31 @@ def scaled_jacobian(nodes: Floats, cells: Integers) -> Floats:
     return np.sqrt(2) * volume / np.maximum(product, np.finfo(float).tiny)
 
 
-def check_turned(mesh: Mesh, source: str, remedy: str) -> None:
-    """Refuse tetrahedra that are inside out; `source` and `remedy` begin and end the sentence."""
-    inside_out = np.count_nonzero(jacobians(mesh.nodes, mesh.cells).min(axis=1) <= 0)
-    if inside_out:
-        raise GeometryError(
-            f"{source}: {inside_out} of {len(mesh.cells)} tetrahedra of the wall are inside out: {remedy}"
-        )
+def check_inverted(mesh: Mesh, source: str, remedy: str) -> None:
+    """Refuse inverted tetrahedra; `source` and `remedy` begin and end the sentence."""
+    inverted = np.count_nonzero(jacobians(mesh.nodes, mesh.cells).min(axis=1) <= 0)
+    if inverted:
+        raise GeometryError(f"{source}: {inverted} of {len(mesh.cells)} tetrahedra of the wall are inverted: {remedy}")
 
 
 def check_flat(mesh: Mesh, source: str, remedy: str) -> None:
-    """Refuse tetrahedra without a volume to speak of."""
-    flat = np.count_nonzero(scaled_jacobian(mesh.nodes, mesh.cells) < FLATTEST)
+    """Refuse tetrahedra that are nearly flat."""
+    flat = np.count_nonzero(scaled_jacobian(mesh.nodes, mesh.cells) < MIN_SCALED_JACOBIAN)
     if flat:
         raise GeometryError(
             f"{source}: {flat} of {len(mesh.cells)} tetrahedra of the wall are flat (scaled Jacobian below "
-            f"{FLATTEST:g}): {remedy}"
+            f"{MIN_SCALED_JACOBIAN:g}): {remedy}"
         )
 
 
 def check_cavity(mesh: Mesh, source: str, remedy: str) -> None:
-    """Refuse a cavity that no heart has."""
+    """Refuse a cavity of a volume that no heart has."""
     volume = cavity_volume(mesh.nodes, mesh.endo)
-    if not CAVITIES[0] <= volume <= CAVITIES[1]:
-        raise GeometryError(f"{source}: the cavity holds {_readable(volume)}, no heart has that: {remedy}")
+    if not CAVITY_VOLUMES[0] <= volume <= CAVITY_VOLUMES[1]:
+        raise GeometryError(f"{source}: the cavity holds {_with_unit(volume)}, which no heart does: {remedy}")
 
 
-def _readable(volume: float) -> str:
+def _with_unit(volume: float) -> str:
     for size, name in ((1e-3, "L"), (1e-6, "mL")):
         if abs(volume) >= size:
             return f"{volume / size:.3g} {name}"

@@ -1,10 +1,8 @@
-"""A wall in its own coordinates: quadratic tetrahedra over wall depth, distance from the apex and azimuth.
+"""The template of quadratic tetrahedra that is mapped to every ventricle.
 
-Points of the wall have three parameters: wall depth w (0 endocardium, 1
-epicardium), distance r from the apex to the base along the shell (0 to 1) and
-azimuth. The mesh is made in these parameters and mapped to a wall, so that the
-middles of edges lie on the curved shells, and all walls of one template share
-their numbering.
+Points of the wall have three parameters: wall depth w (0 endocardium, 1 epicardium), distance r from the apex to the
+base along the wall (0 to 1) and azimuth. The mesh is made in these parameters and mapped to a wall, so that the middles
+of edges lie on its curved surfaces, and all walls of one template share their numbering.
 """
 
 from __future__ import annotations
@@ -14,20 +12,21 @@ from collections.abc import Callable
 import numpy as np
 
 from echotruth.config import Geometry
-from echotruth.fem.tetrahedra import EDGES, Floats, Integers, Mesh
-from echotruth.mechanics.geometry.boundary import boundary
+from echotruth.fem.tetrahedra import Floats, Integers, Mesh
+from echotruth.mechanics.geometry.boundary import add_edge_nodes, boundary
+from echotruth.mechanics.geometry.mesh_quality import right_handed
 
-Wall = Callable[[Floats, Floats, Floats], Floats]
-"""Depth, distance from the apex and azimuth, each of shape (n_nodes,), to positions (n_nodes, 3), m."""
+WallMap = Callable[[Floats, Floats, Floats], Floats]
+"""Map of wall depth, distance from the apex and azimuth, each of shape (n_nodes,), to positions (n_nodes, 3), m."""
 
 
-def laid_through(wall: Wall, geometry: Geometry) -> Mesh:
-    """The template mapped to a wall.
+def mesh_wall(position: WallMap, geometry: Geometry) -> Mesh:
+    """Map the template to a wall.
 
     Parameters
     ----------
-    wall : callable
-        See `Wall`.
+    position : callable
+        See `WallMap`.
     geometry : Geometry
         Of which the numbers of elements are used.
 
@@ -35,23 +34,23 @@ def laid_through(wall: Wall, geometry: Geometry) -> Mesh:
     -------
     Mesh
     """
-    triangles, disc = _disc(geometry.circumferential_elements, geometry.longitudinal_elements)
+    triangles, disc = _disc_mesh(geometry.circumferential_elements, geometry.longitudinal_elements)
     layers = geometry.transmural_elements
     vertices = np.vstack([np.column_stack([np.full(len(disc), k / layers), disc]) for k in range(layers + 1)])
     cells, parameters = _quadratic(_extrude(triangles, len(disc), layers), vertices)
-    nodes = wall(*parameters.T)
-    _orient(nodes, cells)
+    nodes = position(*parameters.T)
+    cells = right_handed(nodes, cells)
     facets, _ = boundary(cells)
     depth, r, _ = parameters[facets].transpose(2, 0, 1)
     sides = [np.all(side, axis=1) for side in (depth == 0, depth == 1, r == 1)]
     return Mesh(nodes, cells, *(facets[side] for side in sides))
 
 
-def course(r: Floats, radius: float, length: float, base: float) -> Floats:
+def ellipse_angle(r: Floats, radius: float, length: float, base: float) -> Floats:
     """Angle of an ellipse at a distance from its apex.
 
-    Half of the spacing is even in arc length, half in the angle of the ellipse:
-    small elements where the apex is most curved.
+    The distance is the mean of the relative arc length and the relative angle, which makes elements small where the
+    apex is most curved.
 
     Parameters
     ----------
@@ -67,17 +66,17 @@ def course(r: Floats, radius: float, length: float, base: float) -> Floats:
     ndarray of shape (n,), rad
         0 at the apex, pi/2 at the equator.
     """
-    angle = np.linspace(0, np.arccos(-base / length), _SAMPLES)
+    angle = np.linspace(0, np.arccos(-base / length), _TABLE_SIZE)
     speed = np.hypot(radius * np.cos(angle), length * np.sin(angle))
     arc = np.concatenate([[0], np.cumsum((speed[1:] + speed[:-1]) / 2)])
     return np.interp(r, (arc / arc[-1] + angle / angle[-1]) / 2, angle)
 
 
-_SAMPLES = 2001
+_TABLE_SIZE = 2001
 """Points of the table that turns arc length into angle."""
 
 
-def _disc(around: int, rings: int) -> tuple[Integers, Floats]:
+def _disc_mesh(around: int, rings: int) -> tuple[Integers, Floats]:
     """Triangles of a disc: the apex, then rings of 6, 12, ... up to `around` points."""
     sizes = [1] + [min(6 * k, around) for k in range(1, rings + 1)]
     start = np.cumsum([0, *sizes])
@@ -86,13 +85,13 @@ def _disc(around: int, rings: int) -> tuple[Integers, Floats]:
         # Rings of equal size are turned by half a step, for triangles with nearly equal sides.
         angle += np.pi / around if sizes[k] == sizes[k - 1] else 0.0
         points += [(k / rings, angle + 2 * np.pi * i / sizes[k]) for i in range(sizes[k])]
-        band = _turned(sizes[k]) if sizes[k] == sizes[k - 1] else _growing(k)
+        band = _equal_rings(sizes[k]) if sizes[k] == sizes[k - 1] else _growing_rings(k)
         triangles += [[start[k - 1 + ring] + i for ring, i in corners] for corners in band]
     return np.array(triangles, dtype=np.int32), np.array(points)
 
 
-def _turned(n: int) -> list[list[tuple[int, int]]]:
-    """Triangles between two rings of n points, the outer (ring 1) half a step ahead."""
+def _equal_rings(n: int) -> list[list[tuple[int, int]]]:
+    """Triangles between two rings of n points, the outer (ring 1) turned by half a step."""
     band = []
     for i in range(n):
         j = (i + 1) % n
@@ -100,8 +99,8 @@ def _turned(n: int) -> list[list[tuple[int, int]]]:
     return band
 
 
-def _growing(k: int) -> list[list[tuple[int, int]]]:
-    """Triangles between rings of 6 (k - 1) and 6 k points: six sectors, each of k upright and k - 1 turned."""
+def _growing_rings(k: int) -> list[list[tuple[int, int]]]:
+    """Triangles between rings of 6 (k - 1) and 6 k points: in each of six sectors k point inwards, k - 1 outwards."""
     inner, outer = max(6 * (k - 1), 1), 6 * k
     band = []
     for sector in range(6):
@@ -128,10 +127,8 @@ def _extrude(triangles: Integers, n_points: int, layers: int) -> Integers:
 
 
 def _quadratic(tetrahedra: Integers, vertices: Floats) -> tuple[Integers, Floats]:
-    """Add the middles of the edges, in parameters."""
-    ends = np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1)
-    edges, number = np.unique(ends, axis=0, return_inverse=True)
-    cells = np.hstack([tetrahedra, len(vertices) + number.reshape(-1, 6)]).astype(np.int32)
+    """Cells (n_cells, 10) and parameters (n_nodes, 3) with a node in the middle of every edge, in parameters."""
+    edges, cells = add_edge_nodes(tetrahedra, len(vertices))
     a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]
     turn = (b[:, 2] - a[:, 2] + np.pi) % (2 * np.pi) - np.pi
     azimuth = a[:, 2] + turn / 2
@@ -139,10 +136,3 @@ def _quadratic(tetrahedra: Integers, vertices: Floats) -> tuple[Integers, Floats
     azimuth = np.where(a[:, 1] == 0, b[:, 2], np.where(b[:, 1] == 0, a[:, 2], azimuth))
     middle = np.column_stack([(a[:, 0] + b[:, 0]) / 2, (a[:, 1] + b[:, 1]) / 2, azimuth])
     return cells, np.vstack([vertices, middle])
-
-
-def _orient(nodes: Floats, cells: Integers) -> None:
-    """Swap two vertices of the tetrahedra that are left-handed."""
-    a, b, c, d = nodes[cells[:, :4]].transpose(1, 0, 2)
-    left = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0
-    cells[left] = cells[left][:, [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]]

@@ -1,4 +1,4 @@
-"""The tube: a wall of one thickness about the long axis, open at both ends."""
+"""The tube: a wall of uniform thickness about the long axis, open at both ends."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Mesh
-from echotruth.mechanics.geometry.ellipsoid import shells
-from echotruth.mechanics.geometry.lattice import lattice, tubular
+from echotruth.mechanics.geometry.ellipsoid import semi_axes
+from echotruth.mechanics.geometry.lattice import lattice, tube_map
 
 
 class Tube(NamedTuple):
-    """Lengths of a tube from the base at z = 0 downwards.
+    """Dimensions of a tube below its base at z = 0.
 
     Attributes
     ----------
@@ -25,18 +25,13 @@ class Tube(NamedTuple):
     length: float
 
 
-def lengths(geometry: Geometry) -> Tube:
+def tube_dimensions(geometry: Geometry) -> Tube:
     """The tube as wide as the ellipsoids are at the equator and as long as the inner one is below the base."""
-    (inner, length, base), (outer, _, _) = shells(geometry)
+    (inner, length, base), (outer, _, _) = semi_axes(geometry)
     return Tube(inner, outer, length + base)
 
 
 def tube(geometry: Geometry) -> Mesh:
-    """Mesh of the tube, in boxes of six tetrahedra each; the lower end is none of its named sides.
-
-    Parameters
-    ----------
-    geometry : Geometry
-    """
+    """Mesh of the tube, in boxes of six tetrahedra each; its lower end is neither endocardium, epicardium nor base."""
     counts = geometry.transmural_elements, geometry.circumferential_elements, geometry.longitudinal_elements
-    return lattice(counts, tubular(*lengths(geometry)), around=True)[0]
+    return lattice(counts, tube_map(*tube_dimensions(geometry)), periodic=True)[0]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echotruth.fem.tetrahedra import Floats
+from echotruth.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -28,18 +28,15 @@ class Activation:
     delay: Floats
     step: float
 
-    def share(self) -> Floats:
-        """Part of T_Ca at a frame that each cell bears in that frame, shape (n_cells,)."""
+    def tension_fraction(self) -> Floats:
+        """dT/dT_Ca of each cell within one frame, shape (n_cells,)."""
         return self.scale * np.clip(1 - self.delay / self.step, 0, 1)
 
-    def before(self, past: Sequence[float]) -> Floats:
-        """What each cell bears, shape (n_cells,), Pa, of the T_Ca (Pa) of the frames before this one."""
-        return self.scale * self._course([*past, 0.0])
+    def delayed_tension(self, earlier: Sequence[float]) -> Floats:
+        """Tension of each cell, shape (n_cells,), Pa, from T_Ca (Pa) of the frames before this one."""
+        return self.tension([*earlier, 0.0])
 
-    def tension(self, course: Sequence[float]) -> Floats:
+    def tension(self, t_ca: Sequence[float] | Floats) -> Floats:
         """Tension of each cell, shape (n_cells,), Pa, in the last of the frames whose T_Ca (Pa) is given."""
-        return self.scale * self._course(course)
-
-    def _course(self, course: Sequence[float]) -> Floats:
-        frame = np.arange(-1, len(course))
-        return np.interp(len(course) - 1 - self.delay / self.step, frame, [0.0, *course], left=0.0)
+        frame = np.arange(-1, len(t_ca))
+        return self.scale * np.interp(len(t_ca) - 1 - self.delay / self.step, frame, [0.0, *t_ca], left=0.0)

@@ -1,4 +1,4 @@
-"""From cells and facets to one system of equations.
+"""Assembly of cells and facets into one system of equations.
 
 Every sum runs in a fixed order, so that the result is the same to the last byte
 whatever the number of threads.
@@ -10,42 +10,43 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from echotruth.fem.tetrahedra import Floats, Integers, Mesh
+from echotruth.arrays import Floats
+from echotruth.fem.tetrahedra import Integers, Mesh
 from echotruth.mechanics.solver.support import Support
 
 CELLS, ENDO, EPI = 0, 1, 2
-"""Groups of nodes that share an equation."""
+"""Groups of elements: cells, facets of the endocardium and of the epicardium."""
 
 
 class Assembly:
-    """Numbers of the equations and the sums over the cells that share them.
+    """Numbers of the equations, and the sums over the elements that share them.
 
     Attributes
     ----------
     n_equations : int
     equation : ndarray of shape (n_nodes, 3)
-        Number of the equation of each displacement, -1 where it is held.
+        Number of the equation of each displacement, -1 where it is fixed.
     """
 
     def __init__(self, mesh: Mesh, support: Support) -> None:
-        self.frames = support.frames
+        self.directions = support.directions
         self.n_equations = int(support.free.sum())
         self.equation = np.full(support.free.shape, -1, dtype=np.int64)
         self.equation[support.free] = np.arange(self.n_equations)
         groups = (mesh.cells, mesh.endo, mesh.epi) if support.spring else (mesh.cells, mesh.endo)
         self._groups = [self.equation[group].reshape(len(group), -1) for group in groups]
-        self._pattern(self._groups)
+        self._find_pattern(self._groups)
 
-    def _pattern(self, groups: list[NDArray[np.int64]]) -> None:
-        """Find where each entry of the packed blocks goes; what is held goes to an entry past the end."""
+    def _find_pattern(self, groups: list[NDArray[np.int64]]) -> None:
+        """Find the matrix entry of each entry of the packed blocks; an extra one takes those of fixed displacements."""
         n, keys = self.n_equations, []
         for equations in groups:
             first, second = (equations[:, k] for k in np.triu_indices(equations.shape[1]))
             row, column = np.minimum(first, second), np.maximum(first, second)
             keys.append(np.where(row < 0, n * n, row * n + column).ravel())
-        found, place = np.unique(np.concatenate([*keys, [n * n]]), return_inverse=True)
-        self._place, self._nnz = place.ravel()[:-1], len(found) - 1
-        row, column = np.divmod(found[:-1], n)
+        entries, entry_of_block = np.unique(np.concatenate([*keys, [n * n]]), return_inverse=True)
+        self._entry_of_block, self._nnz = entry_of_block.ravel()[:-1], len(entries) - 1
+        row, column = np.divmod(entries[:-1], n)
         self._indices = column.astype(np.int32)
         self._indptr = np.searchsorted(row, np.arange(n + 1)).astype(np.int32)
 
@@ -55,7 +56,7 @@ class Assembly:
         Parameters
         ----------
         blocks : ndarray of shape (n_cells, 30), or (n_facets, 18) for a group of facets
-            In the directions of `frames`.
+            Along `directions`.
         group : CELLS, ENDO or EPI
 
         Returns
@@ -63,7 +64,8 @@ class Assembly:
         ndarray of shape (n_equations,)
         """
         equations = self._groups[group].ravel() + 1
-        return np.bincount(equations, blocks.ravel(), self.n_equations + 1)[1:]
+        weights = blocks.ravel()
+        return np.bincount(equations, weights, self.n_equations + 1)[1:]  # type: ignore[return-value]  # floats if weighted
 
     def matrix(self, *blocks: Floats) -> csr_matrix:
         """Sum of packed block matrices.
@@ -71,7 +73,7 @@ class Assembly:
         Parameters
         ----------
         *blocks : ndarray of shape (n_cells, 465) or (n_facets, 171)
-            Upper triangles, row by row, in the directions of `frames`: cells, endocardium and,
+            Upper triangles, row by row, along `directions`: cells, endocardium and,
             where there are springs, epicardium.
 
         Returns
@@ -79,27 +81,27 @@ class Assembly:
         csr_matrix of shape (n_equations, n_equations)
             Its upper triangle.
         """
-        entries = np.concatenate([block.ravel() for block in blocks])
-        data = np.bincount(self._place, entries, self._nnz + 1)[:-1]
+        values = np.concatenate([block.ravel() for block in blocks])
+        data = np.bincount(self._entry_of_block, values, self._nnz + 1)[:-1]
         return csr_matrix((data, self._indices, self._indptr), (self.n_equations, self.n_equations))
 
-    def spread(self, solution: Floats) -> Floats:
+    def displacement(self, solution: Floats) -> Floats:
         """Cartesian displacement (n_nodes, 3) of a solution (n_equations,)."""
-        held = np.append(solution, 0.0)[self.equation]
-        return np.einsum("nk,nki->ni", held, self.frames)
+        with_fixed = np.append(solution, 0.0)[self.equation]
+        return np.einsum("nk,nki->ni", with_fixed, self.directions)
 
     def of_cells(self, solution: Floats) -> Floats:
-        """Displacements (n_cells, 30) of the cells, in the directions of `frames`."""
-        return np.append(solution, 0.0)[self._groups[0]]
+        """Displacements (n_cells, 30) of the nodes of the cells, along `directions`."""
+        return np.append(solution, 0.0)[self._groups[CELLS]]
 
-    def turn(self, facets: Integers, gradient: Floats) -> Floats:
-        """Vectors (facet, 6, 3) in the directions of `frames`."""
-        return np.einsum("faik,fak->fai", self.frames[facets], gradient)
+    def rotate(self, facets: Integers, vectors: Floats) -> Floats:
+        """Vectors (n_facets, 6, 3) at the nodes of facets, rotated to `directions`."""
+        return np.einsum("faik,fak->fai", self.directions[facets], vectors)
 
-    def pack(self, facets: Integers, hessian: Floats) -> Floats:
-        """Matrices (facet, 18, 18) in the directions of `frames`, packed to (facet, 171)."""
-        frame = self.frames[facets]
-        turned = hessian.reshape(len(facets), 6, 3, 6, 3)
-        turned = np.einsum("faik,fakbl->faibl", frame, turned)
-        turned = np.einsum("fbjl,faibl->faibj", frame, turned).reshape(hessian.shape)
-        return turned[:, *np.triu_indices(18)]
+    def pack(self, facets: Integers, matrices: Floats) -> Floats:
+        """Matrices (n_facets, 18, 18) of facets, rotated to `directions` and packed to (n_facets, 171)."""
+        directions = self.directions[facets]
+        rotated = matrices.reshape(len(facets), 6, 3, 6, 3)
+        rotated = np.einsum("faik,fakbl->faibl", directions, rotated)
+        rotated = np.einsum("fbjl,faibl->faibj", directions, rotated).reshape(matrices.shape)
+        return rotated[:, *np.triu_indices(18)]

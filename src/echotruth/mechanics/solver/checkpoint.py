@@ -1,4 +1,4 @@
-"""Frames of an unfinished beat, kept so that a stopped run goes on where it was."""
+"""Solved frames of an unfinished beat, stored so that a stopped run can resume."""
 
 from __future__ import annotations
 
@@ -7,60 +7,60 @@ import pickle
 from dataclasses import dataclass
 from pathlib import Path
 
-from echotruth.mechanics.solver.equilibrium import Load, Past, State, Unknown
+from echotruth.mechanics.solver.equilibrium import Load, PreviousState, State, Unknown
 
 
 @dataclass(frozen=True)
-class Factored:
-    """Where the factors in use were made: with these the next frame takes the same steps as if nothing had stopped."""
+class Linearization:
+    """Where the factors in use were made: with the same factors a resumed run takes the same steps."""
 
     state: State
     load: Load
     unknown: Unknown
-    past: Past
+    previous: PreviousState
 
 
 @dataclass(frozen=True)
-class Frame:
+class SolvedFrame:
     """A solved frame.
 
     Attributes
     ----------
     state : State
     load : Load
-        Met by it.
-    steps : int
-        Factorizations up to it.
-    residual : float
-        Relative imbalance of force, volume and growth that is left.
-    factored : Factored, optional
+        Balanced by the state.
+    factorizations : int
+        Number up to this frame.
+    max_error : float
+        Largest relative residual of force, cavity volume and cell volumes.
+    linearization : Linearization, optional
     """
 
     state: State
     load: Load
-    steps: int
-    residual: float
-    factored: Factored | None
+    factorizations: int
+    max_error: float
+    linearization: Linearization | None
 
 
-class Progress:
-    """A folder with one file a frame.
+class Checkpoints:
+    """A folder with one file for each solved frame.
 
     Parameters
     ----------
     folder : Path
-        Of one heart, one configuration and one version of the code: whoever names it sees to that.
+        Of one heart, one configuration and one version of the code; the caller must see to that.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def frames(self) -> list[Frame]:
+    def load(self) -> list[SolvedFrame]:
         """Frames solved so far, in order."""
         return [pickle.loads(path.read_bytes()) for path in sorted(self.folder.glob("*.frame"))]
 
-    def add(self, frame: Frame) -> None:
-        """Keep one frame more."""
+    def add(self, frame: SolvedFrame) -> None:
+        """Store the next frame."""
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"{len(list(self.folder.glob('*.frame'))):05d}.frame"
         part = path.with_suffix(".part")

@@ -1,6 +1,6 @@
 """The heart driven through a cycle, frame by frame.
 
-Of pressure, volume and tension two are given and the third is solved: the tension from a
+Two of pressure, volume and tension are prescribed and the third is solved: the tension from a
 pressure-volume loop, the volume from pressure and tension, the pressure from volume and tension.
 """
 
@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.loop.cycle import Cycle
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.checkpoint import Frame, Progress
+from echotruth.mechanics.solver.checkpoint import Checkpoints, SolvedFrame
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load, State, Unknown
-from echotruth.mechanics.solver.newton import Diverged, Walk, combined
+from echotruth.mechanics.solver.newton import Diverged, LoadStepper, linear_combination
 
 logger = logging.getLogger("echotruth.mechanics")
 
-FIRST_STIFFNESS = 1100.0
-"""Start (Pa) of the search for the stiffness."""
+INITIAL_STIFFNESS = 1100.0
+"""Stiffness (Pa) from which the search for it starts."""
 
 UNKNOWN: dict[str, Unknown] = {"pressure_volume": "tension", "pressure": None, "volume": "cavity_pressure"}
-"""What each drive solves for beside the displacements."""
+"""Scalar unknown of each drive."""
 
 
 @dataclass(frozen=True)
@@ -37,23 +37,23 @@ class Beat:
     displacement : ndarray of shape (n_frames, n_nodes, 3), m
         From the unloaded state.
     pressure, volume : ndarray of shape (n_frames,), Pa and m^3
-        In the solved cavity.
-    pressure_asked, volume_asked : ndarray of shape (n_frames,), Pa and m^3
-        What the cycle asks for; not a number where it leaves it open.
+        Of the solved cavity.
+    pressure_target, volume_target : ndarray of shape (n_frames,), Pa and m^3
+        Prescribed by the cycle; not a number where it prescribes none.
     tension : ndarray of shape (n_frames,), Pa
         T_Ca of the healthy, undelayed wall.
     newton_steps : ndarray of shape (n_frames,)
         Factorizations.
     residual : ndarray of shape (n_frames,)
-        Relative imbalance of force, volume and growth that is left.
+        Largest relative residual of force, cavity volume and cell volumes.
     stiffness : float, Pa
     """
 
     displacement: Floats
     pressure: Floats
     volume: Floats
-    pressure_asked: Floats
-    volume_asked: Floats
+    pressure_target: Floats
+    volume_target: Floats
     tension: Floats
     newton_steps: NDArray[np.int64]
     residual: Floats
@@ -61,25 +61,25 @@ class Beat:
 
 
 def solve(
-    heart: Equilibrium,
+    equations: Equilibrium,
     cycle: Cycle,
     activation: Activation,
     stiffness: float | None = None,
-    progress: Progress | None = None,
+    checkpoints: Checkpoints | None = None,
 ) -> Beat:
     """Drive a heart through a cycle.
 
     Parameters
     ----------
-    heart : Equilibrium
+    equations : Equilibrium
     cycle : Cycle
     activation : Activation
         Of its cells.
     stiffness : float, optional, Pa
         C of the passive law. If not given, it is solved from end-diastole; if given, the
-        volumes of a pressure-volume loop are scaled to what the heart then holds at end-diastole.
-    progress : Progress, optional
-        Frames solved before, which are taken up, and those solved now.
+        volumes of a pressure-volume loop are scaled to the volume at end-diastolic pressure.
+    checkpoints : Checkpoints, optional
+        Frames solved before, from which the solution resumes, and those solved now.
 
     Returns
     -------
@@ -90,30 +90,30 @@ def solve(
     Diverged
         If a frame cannot be solved.
     """
-    walk = Walk(heart, FIRST_STIFFNESS if stiffness is None else stiffness)
-    frames = progress.frames() if progress else []
+    stepper = LoadStepper(equations, INITIAL_STIFFNESS if stiffness is None else stiffness)
+    frames = checkpoints.load() if checkpoints else []
     if frames:
-        logger.info("goes on after %d of %d frames", len(frames), len(cycle.time))
-        walk.resume(frames[-1])
+        logger.info("resuming after %d of %d frames", len(frames), len(cycle.time))
+        stepper.resume(frames[-1])
     else:
-        end_diastole(walk, cycle, stiffness)
-        frames = [_kept(walk, progress)]
+        fill_to_end_diastole(stepper, cycle, stiffness)
+        frames = [_checkpoint(stepper, checkpoints)]
     if stiffness is not None and cycle.drive == "pressure_volume":
-        cycle = cycle.scaled(frames[0].load.volume / float(cycle.volume[0]))
+        cycle = cycle.scaled(frames[0].load.volume / cycle.edv)
     while len(frames) < len(cycle.time):
-        _next(walk, cycle, activation, [frame.state for frame in frames])
-        frames.append(_kept(walk, progress))
-        _report(cycle, frames)
-    return _beat(heart, cycle, frames)
+        _solve_next(stepper, cycle, activation, [frame.state for frame in frames])
+        frames.append(_checkpoint(stepper, checkpoints))
+        _log(cycle, frames)
+    return _beat(equations, cycle, frames)
 
 
-def end_diastole(walk: Walk, cycle: Cycle, stiffness: float | None) -> None:
+def fill_to_end_diastole(stepper: LoadStepper, cycle: Cycle, stiffness: float | None) -> None:
     """Fill the passive heart to end-diastole.
 
     Parameters
     ----------
-    walk : Walk
-        At rest.
+    stepper : LoadStepper
+        In the unloaded state.
     cycle : Cycle
     stiffness : float, optional, Pa
         C. If not given, it is solved from the end-diastolic pressure and volume.
@@ -124,69 +124,69 @@ def end_diastole(walk: Walk, cycle: Cycle, stiffness: float | None) -> None:
         If the heart cannot be filled.
     """
     if cycle.pressure is None:
-        walk.to(Load(0.0, float(cycle.volume[0]), 0.0), "cavity_pressure")
+        stepper.advance(Load(0.0, cycle.edv, 0.0), "cavity_pressure")
         return
-    pressure = float(cycle.pressure[0])
-    if stiffness is None:
-        _fits(cycle, walk.load.volume)
-    walk.to(Load(pressure, 1.0, 0.0), None)
-    logger.info("filled to %.4g uL with C = %.4g kPa", walk.load.volume * 1e9, walk.state.stiffness / 1e3)
-    if stiffness is None:
-        state = walk.to(Load(pressure, float(cycle.volume[0]), 0.0), "stiffness")
-        logger.info("C = %.4g kPa for an end-diastolic volume of %.4g uL", state.stiffness / 1e3, cycle.volume[0] * 1e9)
-
-
-def _fits(cycle: Cycle, empty: float) -> None:
-    if cycle.volume[0] <= empty:
-        volumes = f"{cycle.volume[0] * 1e9:.3g} uL at end-diastole, and the unloaded cavity {empty * 1e9:.3g} uL"
+    pressure, unloaded_volume = float(cycle.pressure[0]), stepper.load.volume
+    if stiffness is None and cycle.edv <= unloaded_volume:
+        edv, unloaded = cycle.edv * 1e9, unloaded_volume * 1e9
+        volumes = f"{edv:.3g} uL at end-diastole, and the unloaded cavity {unloaded:.3g} uL"
         raise Diverged(f"the loop has {volumes}: raise edv_uL, or make the heart smaller (scale).")
+    stepper.advance(Load(pressure, 1.0, 0.0), None)
+    logger.info("filled to %.4g uL with C = %.4g kPa", stepper.load.volume * 1e9, stepper.state.stiffness / 1e3)
+    if stiffness is None:
+        state = stepper.advance(Load(pressure, cycle.edv, 0.0), "stiffness")
+        logger.info("C = %.4g kPa for an end-diastolic volume of %.4g uL", state.stiffness / 1e3, cycle.edv * 1e9)
 
 
-def _next(walk: Walk, cycle: Cycle, activation: Activation, states: list[State]) -> None:
-    """Solve the frame after those given."""
+def _solve_next(stepper: LoadStepper, cycle: Cycle, activation: Activation, states: list[State]) -> None:
+    """Solve the frame after the given states."""
     frame, unknown = len(states), UNKNOWN[cycle.drive]
     pressure = 0.0 if cycle.pressure is None else float(cycle.pressure[frame])
     volume = 1.0 if cycle.volume is None else float(cycle.volume[frame])
+    fraction: Floats | float
     if unknown == "tension":
-        share, tension = activation.share(), activation.before([state.tension for state in states])
+        fraction = activation.tension_fraction()
+        tension = activation.delayed_tension([state.tension for state in states])
     else:
-        share, tension = 0.0, activation.tension(cycle.tension[: frame + 1])
-    load = Load(pressure, volume, share, tension, time=float(cycle.time[frame]))
-    walk.to(load, unknown, _extrapolated(states))
+        assert cycle.tension is not None
+        fraction, tension = 0.0, activation.tension(cycle.tension[: frame + 1])
+    load = Load(pressure, volume, fraction, tension, time=float(cycle.time[frame]))
+    stepper.advance(load, unknown, _extrapolated(states))
     if cycle.tension is not None:
-        walk.state = replace(walk.state, tension=float(cycle.tension[frame]))
+        stepper.state = replace(stepper.state, tension=float(cycle.tension[frame]))
 
 
-def _kept(walk: Walk, progress: Progress | None) -> Frame:
-    frame = walk.frame()
-    if progress:
-        progress.add(frame)
+def _checkpoint(stepper: LoadStepper, checkpoints: Checkpoints | None) -> SolvedFrame:
+    frame = stepper.solved_frame()
+    if checkpoints:
+        checkpoints.add(frame)
     return frame
 
 
-def _report(cycle: Cycle, frames: list[Frame]) -> None:
+def _log(cycle: Cycle, frames: list[SolvedFrame]) -> None:
     number, (before, now) = len(frames) - 1, frames[-2:]
-    place = (number, len(cycle.time), cycle.time[number] * 1e3, now.load.pressure / 1e3, now.load.volume * 1e9)
-    row = (*place, now.state.tension / 1e3, now.steps - before.steps)
-    logger.info("frame %d of %d, %.4g ms: %.2f kPa, %.4g uL, T_Ca %.2f kPa, %d steps", *row)
+    pressure, volume, tension = now.load.pressure / 1e3, now.load.volume * 1e9, now.state.tension / 1e3
+    row = (number, len(cycle.time), cycle.time[number] * 1e3, pressure, volume, tension)
+    text = "frame %d of %d, %.4g ms: %.2f kPa, %.4g uL, T_Ca %.2f kPa, %d factorizations"
+    logger.info(text, *row, now.factorizations - before.factorizations)
 
 
 def _extrapolated(states: list[State]) -> tuple[State, ...]:
-    """On from the last states by polynomials of degrees 3 to 1."""
+    """Next state by polynomials of degrees 3 to 1 through the last ones."""
     weights = ((-1, 4, -6, 4), (1, -3, 3), (-1, 2))
-    return tuple(combined(states[-len(row) :], row) for row in weights if len(states) >= len(row))
+    return tuple(linear_combination(states[-len(row) :], row) for row in weights if len(states) >= len(row))
 
 
-def _beat(heart: Equilibrium, cycle: Cycle, frames: list[Frame]) -> Beat:
-    nothing = np.full(len(frames), np.nan)
+def _beat(equations: Equilibrium, cycle: Cycle, frames: list[SolvedFrame]) -> Beat:
+    none = np.full(len(frames), np.nan)
     return Beat(
-        displacement=np.array([heart.assembly.spread(frame.state.solution) for frame in frames]),
+        displacement=np.array([equations.assembly.displacement(frame.state.solution) for frame in frames]),
         pressure=np.array([frame.load.pressure for frame in frames]),
         volume=np.array([frame.load.volume for frame in frames]),
-        pressure_asked=nothing if UNKNOWN[cycle.drive] == "cavity_pressure" else cycle.pressure,
-        volume_asked=nothing if cycle.volume is None else cycle.volume,
+        pressure_target=none if cycle.pressure is None else cycle.pressure,
+        volume_target=none if cycle.volume is None else cycle.volume,
         tension=np.array([frame.state.tension for frame in frames]),
-        newton_steps=np.diff([frame.steps for frame in frames], prepend=0),
-        residual=np.array([frame.residual for frame in frames]),
+        newton_steps=np.diff([frame.factorizations for frame in frames], prepend=0),
+        residual=np.array([frame.max_error for frame in frames]),
         stiffness=frames[0].state.stiffness,
     )

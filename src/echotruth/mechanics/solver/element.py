@@ -1,13 +1,12 @@
 """Quadratic tetrahedron with one pressure, condensed.
 
-Perturbed Lagrangian: the pressure p of a cell multiplies the growth of its volume,
-int (J - 1) p - p^2 / (2 kappa), and is an unknown of its own; each Newton step
-eliminates it within the cell (Simo & Hughes, Computational Inelasticity, section 7.3;
-Bonet & Wood, Nonlinear Continuum Mechanics, section 8.6). One pressure keeps the mean
-volume of a cell, not that of its points; a weak energy C local_bulk (J - 1)^2 / 2 beside it
-keeps these near one, and vanishes as the mesh is refined.
-Strains are taken in the fibre axes: the gradients of the shape functions are turned
-into them once.
+Perturbed Lagrangian: with W the energy of the wall and p the pressure of a cell, an unknown of its own, a cell has the
+energy int W + (J - 1) p - p^2 / (2 kappa). Each Newton step eliminates p within the cell, which adds kappa / V G G^T to
+the tangent, with G = dv/du the gradient of the deformed volume and V the unloaded volume (Simo & Hughes, Computational
+Inelasticity, section 7.3; Bonet & Wood, Nonlinear Continuum Mechanics, section 8.6). One pressure keeps the mean
+volume of a cell, not that of its points; a weak energy C local_bulk (J - 1)^2 / 2 keeps these near one, and
+vanishes as the mesh is refined. Strains are taken in the fibre axes, into which dN/dX, the gradients of the shape
+functions, are turned once.
 """
 
 from __future__ import annotations
@@ -21,56 +20,56 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Mesh
-from echotruth.mechanics.fibres import gradients
+from echotruth.mechanics.fibres import material_gradients
 from echotruth.mechanics.solver import stress_point as point
-from echotruth.mechanics.solver.stress_point import COMPILED, PASSIVE, VOLUMETRIC, WHOLE
+from echotruth.mechanics.solver.stress_point import COMPILED, PASSIVE, TOTAL, VOLUMETRIC
 
 DOFS = 30
 """Displacements of a cell, node by node."""
 
 WIDTH = 32
-"""Length of a row of its tangent, filled up for vector units."""
+"""Length of a row of its tangent, padded for vector units."""
 
 PACKED = DOFS * (DOFS + 1) // 2
 """Entries of the upper triangle of its tangent, row by row."""
 
 
 class Elements(NamedTuple):
-    """Cells with all that does not change.
+    """Cells and their constants.
 
     Attributes
     ----------
     cells : ndarray of shape (n_cells, 10)
-    slope : ndarray of shape (n_cells, n_points, 10, 3), 1/m
+    dN_dX : ndarray of shape (n_cells, n_points, 10, 3), 1/m
         Gradients of the shape functions along the fibre axes.
     weight : ndarray of shape (n_cells, n_points), m^3
-        Unloaded volume that each quadrature point stands for.
-    frame : ndarray of shape (n_nodes, 3, 3)
-        Rows: the directions of the displacements of a node.
-    turned : ndarray of shape (n_nodes,), bool
+        Unloaded volume of each quadrature point.
+    directions : ndarray of shape (n_nodes, 3, 3)
+        Rows: directions of the displacements of a node.
+    rotated : ndarray of shape (n_nodes,), bool
         Whether these are not x, y, z.
     """
 
     cells: NDArray[np.int32]
-    slope: Floats
+    dN_dX: Floats
     weight: Floats
-    frame: Floats
-    turned: NDArray[np.bool_]
+    directions: Floats
+    rotated: NDArray[np.bool_]
 
 
-class Law(NamedTuple):
-    """Constants of the wall.
+class WallLaw(NamedTuple):
+    """Laws of the wall with their constants.
 
     Attributes
     ----------
     energy : numba CFunc
-        Of the passive law, as given by `materials.compiled`.
+        Of the passive law, from `materials.compiled`.
     constants : ndarray
-        Its numbers.
+        Of the passive law.
     active : ndarray of shape (2,)
         beta of the active law, and the power of the stretch by which the tension is divided.
     bulk_modulus : float, Pa
-        Of the mean volume of each cell.
+        kappa, of the mean volume of each cell.
     local_bulk : float
         The same of the volume at each point, over C.
     viscosity : float, Pa s
@@ -84,38 +83,38 @@ class Law(NamedTuple):
     viscosity: float = 0.0
 
 
-class Load(NamedTuple):
-    """What scales the stresses of each cell.
+class CellState(NamedTuple):
+    """Factors of the stresses of each cell.
 
     Attributes
     ----------
     stiffness, tension, pressure : ndarray of shape (n_cells,), Pa
         C, T_Ca and the pressure, positive in tension.
-    viscosity : ndarray of shape (n_cells,), Pa
-        Viscosity over the time since the state before.
-    before : ndarray of shape (n_cells, n_points, 6)
+    viscous_modulus : ndarray of shape (n_cells,), Pa
+        Viscosity over the time since the previous state.
+    previous_c : ndarray of shape (n_cells, n_points, 6)
         Right Cauchy-Green tensor of that state, in the fibre axes.
     """
 
     stiffness: Floats
     tension: Floats
     pressure: Floats
-    viscosity: Floats
-    before: Floats
+    viscous_modulus: Floats
+    previous_c: Floats
 
 
-class Blocks(NamedTuple):
-    """Response of each cell.
+class Response(NamedTuple):
+    """Forces, volume and tangent of each cell.
 
     Attributes
     ----------
     force : ndarray of shape (n_cells, 4, 30), m^2
-        Passive, active and volumetric force for a stiffness, tension and pressure of one, which are left out
-        without a tangent, and the whole (N).
+        `PASSIVE`, `ACTIVE` and `VOLUMETRIC` force for a stiffness, tension and pressure of one, computed only
+        with a tangent, and the `TOTAL` (N).
     volume : ndarray of shape (n_cells,), m^3
         Deformed volume; not a number where the cell is inside out.
     tangent : ndarray of shape (n_cells, 465) or (0, 465), N/m
-        Upper triangle of the condensed tangent; left out if there is no room for it.
+        Upper triangle of the condensed tangent; (0, 465) if it is not wanted.
     """
 
     force: Floats
@@ -123,7 +122,7 @@ class Blocks(NamedTuple):
     tangent: Floats
 
 
-def elements(mesh: Mesh, axes: Floats | None = None, frame: Floats | None = None) -> Elements:
+def build_elements(mesh: Mesh, axes: Floats | None = None, directions: Floats | None = None) -> Elements:
     """Cells of a wall with fibres.
 
     Parameters
@@ -131,149 +130,146 @@ def elements(mesh: Mesh, axes: Floats | None = None, frame: Floats | None = None
     mesh : Mesh
     axes : ndarray of shape (n_cells, n_points, 3, 3), optional
         Rows f, s, n, or other axes of the material, at the points of `quadrature.tetrahedron`; x, y, z if not given.
-    frame : ndarray of shape (n_nodes, 3, 3), optional
-        Rows: the directions of the displacements of each node; x, y, z if not given.
+    directions : ndarray of shape (n_nodes, 3, 3), optional
+        Rows: directions of the displacements of each node; x, y, z if not given.
     """
     xi, weight = tetrahedron()
-    slope, volume = gradients(mesh, xi)
+    dN_dX, volume = material_gradients(mesh, xi)
     if axes is not None:
-        slope = np.einsum("cqai,cqji->cqaj", slope, axes)
-    frame = np.tile(np.eye(3), (len(mesh.nodes), 1, 1)) if frame is None else frame
-    turned = np.any(frame != np.eye(3), axis=(1, 2))
-    return Elements(mesh.cells, np.ascontiguousarray(slope), volume * weight, frame, turned)
+        dN_dX = np.einsum("cqai,cqji->cqaj", dN_dX, axes)
+    directions = np.tile(np.eye(3), (len(mesh.nodes), 1, 1)) if directions is None else directions
+    rotated = np.any(directions != np.eye(3), axis=(1, 2))
+    return Elements(mesh.cells, np.ascontiguousarray(dN_dX), volume * weight, directions, rotated)
 
 
-def blocks(n_cells: int, with_tangent: bool) -> Blocks:
-    """Room for the response of cells."""
+def allocate_response(n_cells: int, with_tangent: bool) -> Response:
+    """Uninitialized response."""
     tangent = np.empty((n_cells if with_tangent else 0, PACKED))
-    return Blocks(np.empty((n_cells, 4, DOFS)), np.empty(n_cells), tangent)
+    return Response(np.empty((n_cells, 4, DOFS)), np.empty(n_cells), tangent)
 
 
 @njit(**COMPILED)
-def respond(nodes: Floats, body: Elements, law: Law, load: Load, out: Blocks) -> None:
-    """Forces and tangents of all cells.
+def evaluate(nodes: Floats, elements: Elements, law: WallLaw, state: CellState, out: Response) -> None:
+    """Evaluate forces, volumes and tangents of all cells.
 
     Parameters
     ----------
     nodes : ndarray of shape (n_nodes, 3), m
         Deformed positions.
-    body : Elements
-    law : Law
-    load : Load
-    out : Blocks
+    elements : Elements
+    law : WallLaw
+    state : CellState
+    out : Response
         Filled.
     """
     with_tangent = out.tangent.shape[0] > 0
-    x, ke, along, at = np.empty((10, 3)), np.empty((DOFS, WIDTH)), np.zeros((9, WIDTH)), point.room()
-    for cell in range(body.cells.shape[0]):
+    x, ke, dP_du, work = np.empty((10, 3)), np.empty((DOFS, WIDTH)), np.zeros((9, WIDTH)), point.allocate()
+    for cell in range(elements.cells.shape[0]):
         force = out.force[cell]
         force[:], out.volume[cell] = 0.0, 0.0
         if with_tangent:
             ke[:] = 0.0
-        scale = load.stiffness[cell], load.tension[cell], load.pressure[cell], load.viscosity[cell]
-        _gather(nodes, body.cells, cell, x)
-        for q in range(body.weight.shape[1]):
-            slope, weight = body.slope[cell, q], body.weight[cell, q]
-            j = point.deform(x, slope, at.f, at.c)
-            point.respond(j, law, scale, load.before[cell, q], at, with_tangent)
-            point.add_force(at, slope, weight, force, PASSIVE if with_tangent else WHOLE)
+        scale = state.stiffness[cell], state.tension[cell], state.pressure[cell], state.viscous_modulus[cell]
+        _gather(nodes, elements.cells, cell, x)
+        for q in range(elements.weight.shape[1]):
+            dN_dX, weight = elements.dN_dX[cell, q], elements.weight[cell, q]
+            j = point.deform(x, dN_dX, work.f, work.c)
+            point.evaluate(j, law, scale, state.previous_c[cell, q], work, with_tangent)
+            point.add_force(work, dN_dX, weight, force, PASSIVE if with_tangent else TOTAL)
             if with_tangent:
-                point.moduli(at, weight)
-                _add_tangent(at.modulus, slope, along, ke)
+                point.linearize(work, weight)
+                _add_tangent(work.dP_dF, dN_dX, dP_du, ke)
             out.volume[cell] += weight * j if j > 0 else np.nan
         if with_tangent:
-            _add_condensed(force[VOLUMETRIC], law.bulk_modulus / np.sum(body.weight[cell]), ke)
-        _turn_nodes(body, cell, force, ke, with_tangent)
+            _add_condensed(force[VOLUMETRIC], law.bulk_modulus / np.sum(elements.weight[cell]), ke)
+        _rotate_nodes(elements, cell, force, ke, with_tangent)
         if with_tangent:
             _pack(ke, out.tangent[cell])
 
 
 @njit(**COMPILED)
-def stretch(nodes: Floats, body: Elements, c: Floats) -> Floats:
-    """Fill C, (n_cells, n_points, 6), along the fibre axes, for nodes at (n_nodes, 3), m.
+def right_cauchy_green(nodes: Floats, elements: Elements, c: Floats) -> Floats:
+    """Fill C = F^T F, (n_cells, n_points, 6), along the fibre axes, for nodes at (n_nodes, 3), m.
 
     Returns
     -------
     ndarray of shape (n_cells, n_points)
         J.
     """
-    j, f, x = np.empty(body.weight.shape), np.empty((3, 3)), np.empty((10, 3))
-    for cell in range(body.cells.shape[0]):
-        _gather(nodes, body.cells, cell, x)
-        for q in range(body.weight.shape[1]):
-            j[cell, q] = point.deform(x, body.slope[cell, q], f, c[cell, q])
+    j, f, x = np.empty(elements.weight.shape), np.empty((3, 3)), np.empty((10, 3))
+    for cell in range(elements.cells.shape[0]):
+        _gather(nodes, elements.cells, cell, x)
+        for q in range(elements.weight.shape[1]):
+            j[cell, q] = point.deform(x, elements.dN_dX[cell, q], f, c[cell, q])
     return j
 
 
 @njit(**COMPILED)
-def _add_condensed(growth, factor, ke):
-    """Add what the eliminated pressure leaves: the growth of the volume, squared."""
+def _add_condensed(gradient, factor, ke):
+    """Add `factor` G G^T of the eliminated pressure."""
     for r in range(DOFS):
         for s in range(r, DOFS):
-            ke[r, s] += factor * growth[r] * growth[s]
+            ke[r, s] += factor * gradient[r] * gradient[s]
 
 
 @njit(**COMPILED)
-def _add_tangent(modulus, slope, along, ke):
-    """Add the second derivatives of the energy by the displacements to all entries.
-
-    dP/dF, a matrix over pairs (axis, material axis), stands between the gradients of the shape functions.
-    """
+def _add_tangent(dP_dF, dN_dX, dP_du, ke):
+    """Add dN_a/dX_J dP_iJ/dF_kL dN_b/dX_L to all entries ke[3 a + i, 3 b + k]; `dP_du` is a work array."""
     for r in range(9):
         for i in range(3):
-            first, second, third = modulus[r, 3 * i], modulus[r, 3 * i + 1], modulus[r, 3 * i + 2]
+            first, second, third = dP_dF[r, 3 * i], dP_dF[r, 3 * i + 1], dP_dF[r, 3 * i + 2]
             for a in range(10):
-                along[r, 3 * a + i] = first * slope[a, 0] + second * slope[a, 1] + third * slope[a, 2]
+                dP_du[r, 3 * a + i] = first * dN_dX[a, 0] + second * dN_dX[a, 1] + third * dN_dX[a, 2]
     for a in range(10):
-        x, y, z = slope[a, 0], slope[a, 1], slope[a, 2]
+        x, y, z = dN_dX[a, 0], dN_dX[a, 1], dN_dX[a, 2]
         for i in range(3):
-            row, first, second, third = ke[3 * a + i], along[3 * i], along[3 * i + 1], along[3 * i + 2]
-            for s in range(WIDTH):  # all of the row, of a length known beforehand: that is what vector units like
+            row, first, second, third = ke[3 * a + i], dP_du[3 * i], dP_du[3 * i + 1], dP_du[3 * i + 2]
+            for s in range(WIDTH):  # the whole row, of a length known to the compiler, so that it is vectorized
                 row[s] += x * first[s] + y * second[s] + z * third[s]
 
 
 @njit(**COMPILED)
 def _gather(nodes, cells, cell, x):
-    """Fill the positions (10, 3) of the nodes of a cell."""
+    """Fill the positions x (10, 3) of the nodes of a cell."""
     for a in range(10):
         for i in range(3):
             x[a, i] = nodes[cells[cell, a], i]
 
 
 @njit(**COMPILED)
-def _turn_nodes(body, cell, force, ke, with_tangent):
-    """Turn the forces and the tangent of a cell to the directions of its nodes."""
+def _rotate_nodes(elements, cell, force, ke, with_tangent):
+    """Rotate the forces and the tangent of a cell to the directions of its nodes."""
     for a in range(10):
-        if body.turned[body.cells[cell, a]]:
-            frame = body.frame[body.cells[cell, a]]
+        if elements.rotated[elements.cells[cell, a]]:
+            directions = elements.directions[elements.cells[cell, a]]
             for part in range(4):
-                _turn_force(a, frame, force[part])
+                _rotate_force(a, directions, force[part])
             if with_tangent:
-                _turn_tangent(a, frame, ke)
+                _rotate_tangent(a, directions, ke)
 
 
 @njit(**COMPILED)
-def _turn_force(a, frame, force):
-    """Turn the force of node a to its own directions."""
+def _rotate_force(a, directions, force):
+    """Rotate the force of node a to its directions."""
     x, y, z = force[3 * a], force[3 * a + 1], force[3 * a + 2]
     for i in range(3):
-        force[3 * a + i] = frame[i, 0] * x + frame[i, 1] * y + frame[i, 2] * z
+        force[3 * a + i] = directions[i, 0] * x + directions[i, 1] * y + directions[i, 2] * z
 
 
 @njit(**COMPILED)
-def _turn_tangent(a, frame, ke):
-    """Turn the tangent of node a to its own directions."""
+def _rotate_tangent(a, directions, ke):
+    """Rotate the tangent of node a to its directions."""
     for r in range(DOFS):
         for s in range(r):
             ke[r, s] = ke[s, r]
     for s in range(DOFS):
         x, y, z = ke[3 * a, s], ke[3 * a + 1, s], ke[3 * a + 2, s]
         for i in range(3):
-            ke[3 * a + i, s] = frame[i, 0] * x + frame[i, 1] * y + frame[i, 2] * z
+            ke[3 * a + i, s] = directions[i, 0] * x + directions[i, 1] * y + directions[i, 2] * z
     for r in range(DOFS):
         x, y, z = ke[r, 3 * a], ke[r, 3 * a + 1], ke[r, 3 * a + 2]
         for i in range(3):
-            ke[r, 3 * a + i] = x * frame[i, 0] + y * frame[i, 1] + z * frame[i, 2]
+            ke[r, 3 * a + i] = x * directions[i, 0] + y * directions[i, 1] + z * directions[i, 2]
 
 
 @njit(**COMPILED)

@@ -1,14 +1,22 @@
 """Equilibrium of the heart under a cavity pressure, and its Newton corrections.
 
-The unknowns are the displacements, the pressure of each cell and, if asked for, one
-number more - the active tension, the stiffness or the cavity pressure - with the cavity
-volume as its equation. That last pair borders the tangent: one factorization serves both
-right-hand sides.
+Unknowns are the free displacements u, the pressure p_c of each cell (positive in tension) and, if asked for, one scalar
+s: the active tension, the stiffness or the cavity pressure P. With v_c and V_c the deformed and unloaded volume of a
+cell and V(u) that of the cavity, the residuals are
+
+    r = f(u, p, s) - P dV/du,    r_c = v_c(u) / V_c - 1 - p_c / kappa,    r_V = V(u) - V_target.
+
+P is work-conjugate to V: its load P dV/du does the work P dV. Newton's method eliminates p_c in its cell and borders
+the tangent with s, so that one factorization of K serves both right-hand sides. With G_c = dv_c/du and g = dV/du:
+
+    K = d(f - P g)/du + sum_c kappa / V_c G_c G_c^T,
+    K du_0 = -r - sum_c kappa r_c G_c,    K du_s = -dr/ds,
+    ds = -(r_V + g . du_0) / (g . du_s),    du = du_0 + ds du_s,    dp_c = kappa (r_c + G_c . du / V_c).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 import numpy as np
@@ -17,136 +25,136 @@ from echotruth.arrays import Floats
 from echotruth.fem.sparse import factorization
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.mechanics.solver import cavity, element
-from echotruth.mechanics.solver import stress_point as point
 from echotruth.mechanics.solver.assembly import CELLS, ENDO, EPI, Assembly
-from echotruth.mechanics.solver.support import Support, springs
+from echotruth.mechanics.solver.stress_point import ACTIVE, PASSIVE, TOTAL, VOLUMETRIC
+from echotruth.mechanics.solver.support import Support, spring_stiffness
 
 Unknown = Literal["stiffness", "tension", "cavity_pressure"] | None
+"""The scalar unknown."""
 
 
 @dataclass(frozen=True)
 class State:
-    """What is solved for.
+    """The unknowns.
 
     Attributes
     ----------
     solution : ndarray of shape (n_equations,), m
-    pressure : ndarray of shape (n_cells,), Pa
-        Of the cells, positive in tension.
+        Free displacements.
+    cell_pressure : ndarray of shape (n_cells,), Pa
+        Positive in tension.
     stiffness, tension, cavity_pressure : float, Pa
         C, T_Ca and the pressure of the blood.
     """
 
     solution: Floats
-    pressure: Floats
+    cell_pressure: Floats
     stiffness: float
     tension: float = 0.0
     cavity_pressure: float = 0.0
 
-    def moved(self, step: Correction, share: float, unknown: Unknown) -> State:
-        """The state with a share of a correction added."""
-        solution, pressure = self.solution + share * step.solution, self.pressure + share * step.pressure
-        state = replace(self, solution=solution, pressure=pressure)
-        return replace(state, **{unknown: getattr(self, unknown) + share * step.scalar}) if unknown else state
+    def corrected(self, correction: Correction, damping: float, unknown: Unknown) -> State:
+        """The state plus `damping` times a correction."""
+        solution = self.solution + damping * correction.solution
+        state = replace(self, solution=solution, cell_pressure=self.cell_pressure + damping * correction.cell_pressure)
+        return replace(state, **{unknown: getattr(self, unknown) + damping * correction.scalar}) if unknown else state
 
 
 @dataclass(frozen=True)
 class Correction:
-    """Changes of the unknowns, in the units of `State`; the scalar is that of the one number more."""
+    """Changes of the unknowns, in the units of `State`; `scalar` is that of the scalar unknown."""
 
     solution: Floats
-    pressure: Floats
+    cell_pressure: Floats
     scalar: float
 
     @property
-    def size(self) -> float:
+    def norm(self) -> float:
         """Norm of the change of the displacements, m."""
         return norm(self.solution)
 
-    def along(self, other: Correction) -> float:
-        """Part of another that lies in this one, by the displacements."""
+    def projection(self, other: Correction) -> float:
+        """<self, other> / <other, other>, of the displacements."""
         return float(np.sum(self.solution * other.solution) / np.sum(other.solution**2))
 
     def plus(self, factor: float, other: Correction) -> Correction:
-        """This and a multiple of another."""
-        changes = (getattr(self, name) + factor * getattr(other, name) for name in ("solution", "pressure", "scalar"))
-        return Correction(*changes)
+        """This correction plus `factor` times another."""
+        return Correction(*(getattr(self, k.name) + factor * getattr(other, k.name) for k in fields(self)))
 
 
 @dataclass(frozen=True)
 class Load:
-    """What the heart must meet.
+    """The load that a state balances.
 
     Attributes
     ----------
     pressure : float, Pa
-        In the cavity; of no account where it is solved.
+        Of the cavity; ignored where it is solved.
     volume : float, m^3
-        Of the cavity; of no account where no number more is solved.
-    share : ndarray of shape (n_cells,), or 1
-        Part of the state's tension that each cell bears.
+        Of the cavity; ignored where there is no scalar unknown.
+    tension_fraction : ndarray of shape (n_cells,), or 1
+        Fraction of the state's tension that each cell bears.
     tension : ndarray of shape (n_cells,), or float, Pa
-        Tension of each cell beside that.
-    moved : float
-        Part of the displacement that the support imposes.
+        Tension of each cell in addition.
+    prescribed_fraction : float
+        Fraction of the displacement that the support prescribes.
     time : float, s
-        When: the wall is viscous between two times.
     """
 
     pressure: float
     volume: float
-    share: Floats | float = 1.0
+    tension_fraction: Floats | float = 1.0
     tension: Floats | float = 0.0
-    moved: float = 0.0
+    prescribed_fraction: float = 0.0
     time: float = 0.0
 
-    def toward(self, other: Load, share: float) -> Load:
-        """The load at a share of the way to another."""
-        names = ("pressure", "volume", "share", "tension", "moved", "time")
-        pairs = ((getattr(self, name), getattr(other, name)) for name in names)
-        return Load(*(first + share * (last - first) for first, last in pairs))
+    def toward(self, other: Load, fraction: float) -> Load:
+        """The load at a fraction of the way to another."""
+        pairs = ((getattr(self, k.name), getattr(other, k.name)) for k in fields(self))
+        return Load(*(first + fraction * (last - first) for first, last in pairs))
 
 
 @dataclass(frozen=True)
-class Past:
-    """The state before, against which the wall is viscous, and the time since, s."""
+class PreviousState:
+    """The state from which the viscous strain rate is taken, and the time since, s."""
 
     state: State
     time: float
-    moved: float = 0.0
+    prescribed_fraction: float = 0.0
 
 
 @dataclass(frozen=True)
-class Imbalance:
-    """How far a state is from equilibrium.
+class Residual:
+    """Residuals of the equations.
 
     Attributes
     ----------
     force : ndarray of shape (n_equations,), N
-    growth : ndarray of shape (n_cells,)
-        J - 1 - p / kappa, the mean over each cell.
+        r, of the nodes.
+    volumetric : ndarray of shape (n_cells,)
+        r_c, the mean of J - 1 - p / kappa over each cell.
     volume : float, m^3
-        Cavity volume less the one asked for.
-    force_error, volume_error, growth_error : float
-        Relative norms of the three: to the forces on the nodes, to the volume asked for and to one.
+        r_V, cavity volume less its target.
+    force_error, volume_error, volumetric_error : float
+        Relative norms of the three: to the forces on the nodes, to the target and to one.
     """
 
     force: Floats
-    growth: Floats
+    volumetric: Floats
     volume: float
     force_error: float
     volume_error: float
-    growth_error: float
+    volumetric_error: float
 
     @property
-    def error(self) -> float:
+    def total_error(self) -> float:
         """Sum of the relative norms."""
-        return self.force_error + self.volume_error + self.growth_error
+        return self.force_error + self.volume_error + self.volumetric_error
 
     @property
-    def worst(self) -> float:
+    def max_error(self) -> float:
         """Largest of the relative norms."""
-        return max(self.force_error, self.volume_error, self.growth_error)
+        return max(self.force_error, self.volume_error, self.volumetric_error)
 
 
 class Equilibrium:
@@ -158,7 +166,7 @@ class Equilibrium:
         Unloaded.
     fibre_frames : ndarray of shape (n_cells, n_points, 3, 3)
         Rows f, s, n at the points of `quadrature.tetrahedron`.
-    law : element.Law
+    law : element.WallLaw
     support : Support
     stiffness_scale : ndarray of shape (n_cells,), optional
         Factor of the stiffness of each cell.
@@ -168,130 +176,130 @@ class Equilibrium:
         self,
         mesh: Mesh,
         fibre_frames: Floats,
-        law: element.Law,
+        law: element.WallLaw,
         support: Support,
         stiffness_scale: Floats | None = None,
     ):
         self.mesh, self.law, self.support = mesh, law, support
         self.assembly = Assembly(mesh, support)
-        self.body = element.elements(mesh, fibre_frames, support.frames)
-        self.unloaded = np.sum(self.body.weight, axis=1)
+        self.elements = element.build_elements(mesh, fibre_frames, support.directions)
+        self.unloaded_volume = np.sum(self.elements.weight, axis=1)
         self.stiffness_scale = np.ones(len(mesh.cells)) if stiffness_scale is None else stiffness_scale
-        self._cells = element.blocks(len(mesh.cells), with_tangent=True)
+        self._response = element.allocate_response(len(mesh.cells), with_tangent=True)
         self._facets = np.empty((len(mesh.endo), 18, 18))
-        self._springs = springs(mesh, support.spring) if support.spring else None
+        self._springs = spring_stiffness(mesh, support.spring) if support.spring else None
         self._solver = factorization(single=True)
-        self.past: Past | None = None
-        self._rate, self._before = np.zeros(len(mesh.cells)), np.zeros((*self.body.weight.shape, 6))
+        self.previous: PreviousState | None = None
+        self._viscous_modulus = np.zeros(len(mesh.cells))
+        self._previous_c = np.zeros((*self.elements.weight.shape, 6))
 
-    def remember(self, past: Past) -> None:
-        """Be viscous against a past state; without time since, the wall is elastic."""
-        self.past = past
-        elastic = past.time <= 0 or self.law.viscosity == 0
-        self._rate[:] = 0.0 if elastic else self.law.viscosity / past.time
+    def set_previous(self, previous: PreviousState) -> None:
+        """Set the previous state; without time since, the wall is elastic."""
+        self.previous = previous
+        elastic = previous.time <= 0 or self.law.viscosity == 0
+        self._viscous_modulus[:] = 0.0 if elastic else self.law.viscosity / previous.time
         if not elastic:
-            element.stretch(self.positions(past.state, past.moved), self.body, self._before)
+            nodes = self.positions(previous.state, previous.prescribed_fraction)
+            element.right_cauchy_green(nodes, self.elements, self._previous_c)
 
     def close(self) -> None:
-        """Give the memory of the factors back."""
+        """Free the memory of the factors."""
         self._solver.close()
 
-    def rest(self, stiffness: float) -> State:
-        """The unloaded state."""
+    def unloaded_state(self, stiffness: float) -> State:
+        """State without displacement and stress."""
         return State(np.zeros(self.assembly.n_equations), np.zeros(len(self.mesh.cells)), stiffness)
 
-    def positions(self, state: State, moved: float = 0.0) -> Floats:
-        """Deformed nodes, shape (n_nodes, 3), m, with a part of the displacement that the support imposes."""
-        nodes = self.mesh.nodes + self.assembly.spread(state.solution)
-        return nodes if self.support.moved is None else nodes + moved * self.support.moved
+    def positions(self, state: State, prescribed_fraction: float = 0.0) -> Floats:
+        """Deformed nodes, shape (n_nodes, 3), m."""
+        nodes, prescribed = self.mesh.nodes + self.assembly.displacement(state.solution), self.support.prescribed
+        return nodes if prescribed is None else nodes + prescribed_fraction * prescribed
 
     def volume(self, state: State) -> float:
         """Volume of the cavity, m^3."""
         return cavity.cavity_volume(self.positions(state), self.mesh.endo)
 
-    def tension(self, state: State, load: Load) -> Floats:
+    def cell_tension(self, state: State, load: Load) -> Floats:
         """T_Ca of each cell, shape (n_cells,), Pa."""
-        return np.zeros(len(self.mesh.cells)) + state.tension * load.share + load.tension
+        return np.zeros(len(self.mesh.cells)) + state.tension * load.tension_fraction + load.tension
 
-    def imbalance(self, state: State, load: Load, unknown: Unknown) -> Imbalance:
+    def residual(self, state: State, load: Load, unknown: Unknown) -> Residual:
         """Residuals of a state under a load."""
-        return self._imbalance(state, load, unknown, self._cells._replace(tangent=np.empty((0, element.PACKED))))
+        return self._residual(state, load, unknown, self._response._replace(tangent=np.empty((0, element.PACKED))))
 
     # Far from a solution the exponential may overflow; the line search then goes back.
     @np.errstate(over="ignore", invalid="ignore")
-    def _imbalance(self, state: State, load: Load, unknown: Unknown, out: element.Blocks) -> Imbalance:
-        nodes = self.positions(state, load.moved)
-        stiffness, tension = state.stiffness * self.stiffness_scale, self.tension(state, load)
-        scale = element.Load(stiffness, tension, state.pressure, self._rate, self._before)
-        element.respond(nodes, self.body, self.law, scale, out)
-        slope = cavity.load(nodes, self.mesh.endo)
-        self._gradient = self.assembly.vector(self.assembly.turn(self.mesh.endo, slope), ENDO)
-        inside = self.assembly.vector(out.force[:, point.WHOLE]) + self._spring_force(nodes)
-        blood = (state.cavity_pressure if unknown == "cavity_pressure" else load.pressure) * self._gradient
-        growth = out.volume / self.unloaded - 1 - state.pressure / self.law.bulk_modulus
-        # The volume is of third degree in the positions (Euler's theorem).
-        volume = float(np.sum(slope * nodes[self.mesh.endo])) / 3 - load.volume if unknown else 0.0
-        errors = norm(inside - blood) / self._size(blood, out), abs(volume) / load.volume if unknown else 0.0
-        return Imbalance(inside - blood, growth, volume, *errors, norm(growth) / np.sqrt(len(growth)))
-
-    def _size(self, blood: Floats, out: element.Blocks) -> float:
-        """Norm of the forces that balance at the nodes: of the blood, and of the cells where there is none."""
-        return norm(blood) or norm(out.force[:, point.WHOLE]) or 1.0
+    def _residual(self, state: State, load: Load, unknown: Unknown, response: element.Response) -> Residual:
+        nodes = self.positions(state, load.prescribed_fraction)
+        stiffness, tension = state.stiffness * self.stiffness_scale, self.cell_tension(state, load)
+        cell_state = element.CellState(stiffness, tension, state.cell_pressure, self._viscous_modulus, self._previous_c)
+        element.evaluate(nodes, self.elements, self.law, cell_state, response)
+        gradient = cavity.volume_gradient(nodes, self.mesh.endo)
+        self._volume_gradient = self.assembly.vector(self.assembly.rotate(self.mesh.endo, gradient), ENDO)
+        internal = self.assembly.vector(response.force[:, TOTAL]) + self._spring_force(nodes)
+        external = (state.cavity_pressure if unknown == "cavity_pressure" else load.pressure) * self._volume_gradient
+        volumetric = response.volume / self.unloaded_volume - 1 - state.cell_pressure / self.law.bulk_modulus
+        # V is of third degree in the positions x: V = x . dV/dx / 3 (Euler's theorem).
+        volume = float(np.sum(gradient * nodes[self.mesh.endo])) / 3 - load.volume if unknown else 0.0
+        force_scale = norm(external) or norm(response.force[:, TOTAL]) or 1.0
+        errors = norm(internal - external) / force_scale, abs(volume) / load.volume if unknown else 0.0
+        return Residual(internal - external, volumetric, volume, *errors, norm(volumetric) / np.sqrt(len(volumetric)))
 
     def _spring_force(self, nodes: Floats) -> Floats | float:
         if self._springs is None:
             return 0.0
-        moved = (nodes - self.mesh.nodes)[self.mesh.epi].reshape(-1, 18)
-        force = np.einsum("frs,fs->fr", self._springs, moved).reshape(-1, 6, 3)
-        return self.assembly.vector(self.assembly.turn(self.mesh.epi, force), EPI)
+        displacement = (nodes - self.mesh.nodes)[self.mesh.epi].reshape(-1, 18)
+        force = np.einsum("frs,fs->fr", self._springs, displacement).reshape(-1, 6, 3)
+        return self.assembly.vector(self.assembly.rotate(self.mesh.epi, force), EPI)
 
     def linearize(self, state: State, load: Load, unknown: Unknown) -> Tangent:
         """Factor the tangent at a state."""
-        self._imbalance(state, load, unknown, self._cells)
+        self._residual(state, load, unknown, self._response)
         pressure = state.cavity_pressure if unknown == "cavity_pressure" else load.pressure
-        cavity.stiffness(self.positions(state, load.moved), self.mesh.endo, self._facets)
-        facets = self.assembly.pack(self.mesh.endo, -pressure * self._facets)
-        around = [] if self._springs is None else [self.assembly.pack(self.mesh.epi, self._springs)]
-        self._solver.factor(self.assembly.matrix(self._cells.tangent, facets, *around))
+        cavity.volume_hessian(self.positions(state, load.prescribed_fraction), self.mesh.endo, self._facets)
+        blocks = [self.assembly.pack(self.mesh.endo, -pressure * self._facets)]
+        if self._springs is not None:
+            blocks.append(self.assembly.pack(self.mesh.epi, self._springs))
+        self._solver.factor(self.assembly.matrix(self._response.tangent, *blocks))
         return Tangent(self, unknown, load, state)
 
     def solve(self, right: Floats) -> Floats:
         """Solution for a right-hand side (n_equations,) with the factors of the last tangent."""
         return self._solver.solve(right[:, None])[:, 0]
 
-    def response(self, unknown: Unknown, load: Load) -> Floats:
-        """Force (n_equations,) on the nodes for a change of the one number more, at the state evaluated last."""
+    def scalar_force(self, unknown: Unknown, load: Load) -> Floats:
+        """-dr/ds, shape (n_equations,), at the state evaluated last."""
         if unknown == "cavity_pressure":
-            return self._gradient
-        part, scale = point.PASSIVE, -self.stiffness_scale
+            return self._volume_gradient
+        part, scale = PASSIVE, -self.stiffness_scale
         if unknown == "tension":
-            part, scale = point.ACTIVE, -load.share * np.ones(len(self.mesh.cells))
-        return self.assembly.vector(scale[:, None] * self._cells.force[:, part], CELLS)
+            part, scale = ACTIVE, -load.tension_fraction * np.ones(len(self.mesh.cells))
+        return self.assembly.vector(scale[:, None] * self._response.force[:, part], CELLS)
 
 
 class Tangent:
-    """The factored tangent at one state, from which corrections of this and later states are had."""
+    """The factored tangent at one state, which gives corrections of this and later states."""
 
     def __init__(self, equations: Equilibrium, unknown: Unknown, load: Load, state: State) -> None:
         self._equations, self.unknown, self.load, self.state = equations, unknown, load, state
-        self.past = equations.past
-        self._growth = equations._cells.force[:, point.VOLUMETRIC].copy()
+        self.previous = equations.previous
+        self._cell_gradient = equations._response.force[:, VOLUMETRIC].copy()  # G_c
         if unknown:
-            self._gradient = equations._gradient
-            self._response = equations.solve(equations.response(unknown, load))
-            self._compliance = float(np.sum(self._gradient * self._response))
+            self._volume_gradient = equations._volume_gradient  # g
+            self._scalar_solution = equations.solve(equations.scalar_force(unknown, load))  # du_s
+            self._compliance = float(np.sum(self._volume_gradient * self._scalar_solution))  # g . du_s
 
-    def correction(self, imbalance: Imbalance) -> Correction:
-        """Newton correction of an imbalance."""
-        heart = self._equations
-        bulk = heart.law.bulk_modulus
-        condensed = heart.assembly.vector(bulk * imbalance.growth[:, None] * self._growth)
-        solution, scalar = heart.solve(-imbalance.force - condensed), 0.0
+    def correction(self, residual: Residual) -> Correction:
+        """Newton correction of a residual."""
+        equations = self._equations
+        kappa = equations.law.bulk_modulus
+        condensed = equations.assembly.vector(kappa * residual.volumetric[:, None] * self._cell_gradient)
+        solution, scalar = equations.solve(-residual.force - condensed), 0.0
         if self.unknown:
-            scalar = -(imbalance.volume + float(np.sum(self._gradient * solution))) / self._compliance
-            solution += scalar * self._response
-        growth = np.sum(self._growth * heart.assembly.of_cells(solution), axis=1) / heart.unloaded
-        return Correction(solution, bulk * (imbalance.growth + growth), scalar)
+            scalar = -(residual.volume + float(np.sum(self._volume_gradient * solution))) / self._compliance
+            solution += scalar * self._scalar_solution
+        cell_change = np.sum(self._cell_gradient * equations.assembly.of_cells(solution), axis=1)
+        return Correction(solution, kappa * (residual.volumetric + cell_change / equations.unloaded_volume), scalar)
 
 
 def norm(vector: Floats) -> float:

@@ -1,28 +1,28 @@
 """Stress at one point of the wall, and its derivative by the deformation.
 
 Parts of the stress stand in the order `PASSIVE`, `ACTIVE`, `VOLUMETRIC`, each for a factor of one, and
-after them `WHOLE`, with the viscous stress; `scale` holds the factors.
+after them `TOTAL`, with the viscous stress; `scale` holds the factors C, T_Ca, p and viscous modulus.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from echotruth.arrays import Floats
-from echotruth.mechanics.solver import stress as material
+from echotruth.mechanics.solver import stress as laws
 
-PASSIVE, ACTIVE, VOLUMETRIC, WHOLE = range(4)
-"""Parts: for a stiffness, an active tension and a pressure of one, and the whole."""
+PASSIVE, ACTIVE, VOLUMETRIC, TOTAL = range(4)
+"""Parts: for a stiffness, an active tension and a pressure of one, and the total."""
 
-COMPILED = {"cache": True, "error_model": "numpy"}
-"""How the functions of an element are compiled. Nothing is contracted: code from the cache would be so otherwise."""
+COMPILED: dict[str, Any] = {"cache": True, "error_model": "numpy"}
+"""Options of the compiled functions. No contraction to FMA: code from the cache would be contracted differently."""
 
 
 class Point(NamedTuple):
-    """Room for one point.
+    """Work arrays of one point.
 
     Attributes
     ----------
@@ -33,11 +33,12 @@ class Point(NamedTuple):
     passive : ndarray of shape (6,)
         Passive stress for a stiffness of one.
     stress : ndarray of shape (4, 6)
-        Parts of the stress.
-    tangent : ndarray of shape (6, 6), Pa
-        Derivative of the whole stress by the strain.
-    modulus : ndarray of shape (9, 9)
-        dP/dF times a weight.
+        Parts of the second Piola-Kirchhoff stress S.
+    dS_dE : ndarray of shape (6, 6), Pa
+        Derivative of the total S by the strain.
+    dP_dF : ndarray of shape (9, 9)
+        Derivative of the first Piola-Kirchhoff stress P = F S, times a weight; rows and columns are pairs (axis,
+        material axis).
     """
 
     f: Floats
@@ -46,13 +47,13 @@ class Point(NamedTuple):
     strain: Floats
     passive: Floats
     stress: Floats
-    tangent: Floats
-    modulus: Floats
+    dS_dE: Floats
+    dP_dF: Floats
 
 
 @njit(**COMPILED)
-def room():
-    """Room for one point."""
+def allocate():
+    """Uninitialized work arrays."""
     return Point(
         np.empty((3, 3)),
         np.empty(6),
@@ -66,17 +67,17 @@ def room():
 
 
 @njit(**COMPILED)
-def deform(x, slope, f, c):
-    """Fill the deformation gradient (3, 3) and C (6,); returns det F, which is negative inside out."""
+def deform(x, dN_dX, f, c):
+    """Fill F_iJ = sum_a x_ai dN_a/dX_J and C = F^T F, (6,); returns J = det F, which is negative inside out."""
     for i in range(3):
         first, second, third = 0.0, 0.0, 0.0
         for a in range(10):
-            first += x[a, i] * slope[a, 0]
-            second += x[a, i] * slope[a, 1]
-            third += x[a, i] * slope[a, 2]
+            first += x[a, i] * dN_dX[a, 0]
+            second += x[a, i] * dN_dX[a, 1]
+            third += x[a, i] * dN_dX[a, 2]
         f[i, 0], f[i, 1], f[i, 2] = first, second, third
     for k in range(6):
-        p, q = material.PAIRS[k, 0], material.PAIRS[k, 1]
+        p, q = laws.PAIRS[k, 0], laws.PAIRS[k, 1]
         c[k] = f[0, p] * f[0, q] + f[1, p] * f[1, q] + f[2, p] * f[2, q]
     return (
         f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
@@ -86,31 +87,32 @@ def deform(x, slope, f, c):
 
 
 @njit(**COMPILED)
-def respond(j, law, scale, before, at, with_tangent):
+def evaluate(j, law, scale, previous_c, work, with_tangent):
     """Fill the parts of the stress and its tangent of a point whose C and J are known.
 
-    Elastic parts, each for a factor of one, and what resists the growth of strain since `before`, a C (6,) too
-    (Kelvin-Voigt).
+    S = C S_passive + T_Ca S_active + (p + C local_bulk (J - 1)) J C^-1 + viscous modulus (C - C_previous) / 2; the last
+    term is viscous (Kelvin-Voigt), with the growth of C since the previous state.
     """
-    stiffness, tension, pressure, viscosity = scale
-    c, inverse, passive, stress, tangent = at.c, at.inverse, at.passive, at.stress, at.tangent
-    material.invert(c, inverse)
-    shrink = material.isochoric_strain(c, abs(j), at.strain)
-    law.energy(at.strain, law.constants, passive, tangent)
-    trace = material.isochoric_stress(c, inverse, shrink, passive)
-    active, slope = material.active(c[0], law.active[0], law.active[1])
+    stiffness, tension, pressure, viscous_modulus = scale
+    c, inverse, passive, stress, tangent = work.c, work.inverse, work.passive, work.stress, work.dS_dE
+    laws.invert(c, inverse)
+    factor = laws.isochoric_strain(c, abs(j), work.strain)
+    law.energy(work.strain, law.constants, passive, tangent)
+    trace = laws.isochoric_stress(c, inverse, factor, passive)
+    active, active_tangent = laws.active(c[0], law.active[0], law.active[1])
     bulk = stiffness * law.local_bulk
-    swelling = bulk * (j - 1) + pressure
+    hydrostatic = bulk * (j - 1) + pressure
     for k in range(6):
-        stress[WHOLE, k] = stiffness * passive[k] + swelling * j * inverse[k] + viscosity * (c[k] - before[k]) / 2
-    stress[WHOLE, 0] += tension * active
+        viscous = viscous_modulus * (c[k] - previous_c[k]) / 2
+        stress[TOTAL, k] = stiffness * passive[k] + hydrostatic * j * inverse[k] + viscous
+    stress[TOTAL, 0] += tension * active
     if with_tangent:
-        material.isochoric_tangent(c, inverse, shrink, trace, passive, tangent)
+        laws.isochoric_tangent(c, inverse, factor, trace, passive, tangent)
         tangent *= stiffness
-        material.add_volumetric(inverse, j, swelling, bulk, tangent)
-        tangent[0, 0] += tension * slope
+        laws.add_volumetric(inverse, j, hydrostatic, bulk, tangent)
+        tangent[0, 0] += tension * active_tangent
         for k in range(6):
-            tangent[k, k] += viscosity / material.SHEAR[k]
+            tangent[k, k] += viscous_modulus / laws.MULTIPLICITY[k]
             for m in range(k):
                 tangent[k, m] = tangent[m, k]
             stress[PASSIVE, k] = passive[k] + law.local_bulk * (j - 1) * j * inverse[k]
@@ -119,9 +121,9 @@ def respond(j, law, scale, before, at, with_tangent):
 
 
 @njit(**COMPILED)
-def add_force(at, slope, weight, force, start):
-    """Add the parts of the force (4, 30) from `start` on: the first Piola-Kirchhoff stress along the slopes (10, 3)."""
-    f, stress = at.f, at.stress
+def add_force(work, dN_dX, weight, force, start):
+    """Add weight P_iJ dN_a/dX_J, P = F S, to the parts of the nodal force (4, 30) from `start` on."""
+    f, stress = work.f, work.stress
     for part in range(start, 4):
         ff, ss, nn = stress[part, 0], stress[part, 1], stress[part, 2]
         fs, fn, sn = stress[part, 3], stress[part, 4], stress[part, 5]
@@ -130,31 +132,31 @@ def add_force(at, slope, weight, force, start):
             second = weight * (f[i, 0] * fs + f[i, 1] * ss + f[i, 2] * sn)
             third = weight * (f[i, 0] * fn + f[i, 1] * sn + f[i, 2] * nn)
             for a in range(10):
-                force[part, 3 * a + i] += first * slope[a, 0] + second * slope[a, 1] + third * slope[a, 2]
+                force[part, 3 * a + i] += first * dN_dX[a, 0] + second * dN_dX[a, 1] + third * dN_dX[a, 2]
 
 
 @njit(**COMPILED)
-def moduli(at, weight):
-    """Fill dP/dF, times a weight: F D F and the whole stress itself (Holzapfel, section 6.6)."""
-    f, tangent, modulus = at.f, at.tangent, at.modulus
-    half = np.empty((9, 6))
+def linearize(work, weight):
+    """Fill weight dP_iJ/dF_kL, with dP_iJ/dF_kL = F_iM dS_MJ/dE_NL F_kN + delta_ik S_JL (Holzapfel, section 6.6)."""
+    f, tangent, dP_dF = work.f, work.dS_dE, work.dP_dF
+    dP_dE = np.empty((9, 6))
     for r in range(9):
         i, k = r // 3, r % 3
-        first, second, third = material.COMPONENT[0, k], material.COMPONENT[1, k], material.COMPONENT[2, k]
+        first, second, third = laws.COMPONENT[0, k], laws.COMPONENT[1, k], laws.COMPONENT[2, k]
         for n in range(6):
-            half[r, n] = weight * (
+            dP_dE[r, n] = weight * (
                 f[i, 0] * tangent[first, n] + f[i, 1] * tangent[second, n] + f[i, 2] * tangent[third, n]
             )
     for r in range(9):
         for s in range(9):
             i, k = s // 3, s % 3
-            modulus[r, s] = (
-                f[i, 0] * half[r, material.COMPONENT[0, k]]
-                + f[i, 1] * half[r, material.COMPONENT[1, k]]
-                + f[i, 2] * half[r, material.COMPONENT[2, k]]
+            dP_dF[r, s] = (
+                f[i, 0] * dP_dE[r, laws.COMPONENT[0, k]]
+                + f[i, 1] * dP_dE[r, laws.COMPONENT[1, k]]
+                + f[i, 2] * dP_dE[r, laws.COMPONENT[2, k]]
             )
     for k in range(3):
         for m in range(3):
-            whole = weight * at.stress[WHOLE, material.COMPONENT[k, m]]
+            total = weight * work.stress[TOTAL, laws.COMPONENT[k, m]]
             for i in range(3):
-                modulus[3 * i + k, 3 * i + m] += whole
+                dP_dF[3 * i + k, 3 * i + m] += total

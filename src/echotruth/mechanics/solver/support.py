@@ -1,4 +1,4 @@
-"""What holds the heart: its base, and the springs of its surroundings."""
+"""Support of the heart: its base, and the springs of its surroundings."""
 
 from __future__ import annotations
 
@@ -8,59 +8,61 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from echotruth.arrays import Floats
 from echotruth.fem.quadrature import triangle
-from echotruth.fem.tetrahedra import Floats, Mesh
+from echotruth.fem.tetrahedra import Mesh
 from echotruth.mechanics.solver.cavity import triangle_shape
 
 
 @dataclass(frozen=True)
 class Support:
-    """Which displacements are free, and in which directions they are counted.
+    """Which displacements are free, and along which directions.
 
     Attributes
     ----------
-    frames : ndarray of shape (n_nodes, 3, 3)
-        Rows: the directions of the displacements of each node.
+    directions : ndarray of shape (n_nodes, 3, 3)
+        Rows: directions of the three displacements of each node.
     free : ndarray of shape (n_nodes, 3), bool
     spring : float, Pa/m
         Stiffness per area against motion of the epicardium along its unloaded normal.
-    moved : ndarray of shape (n_nodes, 3), m, or None
-        Displacement imposed on every node, of which the solution is the rest.
+    prescribed : ndarray of shape (n_nodes, 3), m, or None
+        Displacement of every node to which that of the solution is added.
     """
 
-    frames: Floats
+    directions: Floats
     free: NDArray[np.bool_]
     spring: float = 0.0
-    moved: Floats | None = None
+    prescribed: Floats | None = None
 
 
-def of_base(mesh: Mesh, base: Literal["radial_free", "fixed"], spring: float = 0.0) -> Support:
+def base_support(mesh: Mesh, base: Literal["radial_free", "fixed"], spring: float = 0.0) -> Support:
     """Support of a heart at its base.
 
     Parameters
     ----------
     mesh : Mesh
     base : "radial_free" or "fixed"
-        Nodes of the base move along the radius from the long axis alone, or not at all.
+        Nodes of the base move only along the radius from the long axis, or not at all.
     spring : float, Pa/m
     """
-    frames = np.tile(np.eye(3), (len(mesh.nodes), 1, 1))
+    directions = np.tile(np.eye(3), (len(mesh.nodes), 1, 1))
     nodes = np.unique(mesh.base)
     x, y, _ = (mesh.nodes[nodes] / np.linalg.norm(mesh.nodes[nodes, :2], axis=1, keepdims=True)).T
-    frames[nodes, 0, :2] = np.column_stack([x, y])
-    frames[nodes, 1, :2] = np.column_stack([-y, x])
+    directions[nodes, 0, :2] = np.column_stack([x, y])
+    directions[nodes, 1, :2] = np.column_stack([-y, x])
     free = np.ones((len(mesh.nodes), 3), dtype=bool)
     free[nodes] = [base == "radial_free", False, False]
-    return Support(frames, free, spring)
+    return Support(directions, free, spring)
 
 
-def springs(mesh: Mesh, stiffness: float) -> Floats:
-    """Stiffness of springs along the unloaded normals of the epicardium.
+def spring_stiffness(mesh: Mesh, stiffness: float) -> Floats:
+    """Stiffness matrices of springs along the unloaded normals of the epicardium: int k (N_a n) (N_b n)^T dA.
 
     Parameters
     ----------
     mesh : Mesh
     stiffness : float, Pa/m
+        k.
 
     Returns
     -------
@@ -68,10 +70,10 @@ def springs(mesh: Mesh, stiffness: float) -> Floats:
         Rows and columns run over node and axis.
     """
     xi, weight = triangle()
-    value, slope = triangle_shape(xi)
-    first, second = (np.einsum("qa,fai->fqi", slope[..., k], mesh.nodes[mesh.epi]) for k in (0, 1))
+    value, dN_dxi = triangle_shape(xi)
+    first, second = (np.einsum("qa,fai->fqi", dN_dxi[..., k], mesh.nodes[mesh.epi]) for k in (0, 1))
     area = np.cross(first, second)
     normal = area / np.linalg.norm(area, axis=-1, keepdims=True)
-    push = np.einsum("qa,fqi->fqai", value, normal).reshape(*normal.shape[:2], 18)
+    normal_shape = np.einsum("qa,fqi->fqai", value, normal).reshape(*normal.shape[:2], 18)
     measure = stiffness * weight * np.linalg.norm(area, axis=-1)
-    return np.einsum("fqr,fqs,fq->frs", push, push, measure)
+    return np.einsum("fqr,fqs,fq->frs", normal_shape, normal_shape, measure)

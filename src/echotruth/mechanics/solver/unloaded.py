@@ -1,8 +1,7 @@
 """The unloaded state of a heart that was imaged at end-diastole.
 
-The state is sought whose inflation gives back the imaged one: the displacement that a
-guess takes on under end-diastolic pressure is subtracted from the image (inverse
-displacement method; Bols et al., J Comput Appl Math 246 (2013) 10).
+X_(k+1) = X_k + (x_image - x(X_k)): the misfit of the inflated guess is added to the guess until end-diastolic pressure
+inflates it to the image (inverse displacement method; Bols et al., J Comput Appl Math 246 (2013) 10).
 """
 
 from __future__ import annotations
@@ -13,29 +12,30 @@ from dataclasses import replace
 
 import numpy as np
 
-from echotruth.fem.tetrahedra import Floats, Mesh
+from echotruth.arrays import Floats
+from echotruth.fem.tetrahedra import Mesh
 from echotruth.mechanics.geometry.mesh_quality import jacobians
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load, State
-from echotruth.mechanics.solver.newton import Diverged, Walk
+from echotruth.mechanics.solver.newton import Diverged, LoadStepper
 
 logger = logging.getLogger("echotruth.mechanics")
 
-CLOSE = 1e-6
+MAX_MISFIT = 1e-6
 """Largest distance between the inflated and the imaged nodes, over the size of the heart."""
 
-_MOST_ROUNDS = 60
-_LEAST_SHARE = 1 / 64
+_MAX_ITERATIONS = 60
+_MIN_STEP = 1 / 64
 
 
-def unloaded(image: Mesh, equations: Callable[[Mesh], Equilibrium], pressure: float, stiffness: float) -> Mesh:
+def unload(image: Mesh, equations_of: Callable[[Mesh], Equilibrium], pressure: float, stiffness: float) -> Mesh:
     """Unload an imaged heart.
 
     Parameters
     ----------
     image : Mesh
         At end-diastole.
-    equations : callable
-        Gives the equations of an unloaded mesh; fibres and tissue follow it.
+    equations_of : callable
+        Unloaded mesh to its equations; fibres and tissue follow the mesh.
     pressure : float, Pa
         At end-diastole.
     stiffness : float, Pa
@@ -44,7 +44,7 @@ def unloaded(image: Mesh, equations: Callable[[Mesh], Equilibrium], pressure: fl
     Returns
     -------
     Mesh
-        Inflated to that pressure, its nodes are those of the image to `CLOSE`.
+        Inflated to that pressure, its nodes are those of the image to `MAX_MISFIT`.
 
     Raises
     ------
@@ -52,42 +52,42 @@ def unloaded(image: Mesh, equations: Callable[[Mesh], Equilibrium], pressure: fl
         If no such state is found.
     """
     size = float(np.ptp(image.nodes, axis=0).max())
-    guess, state, far = image, None, np.inf
-    for number in range(_MOST_ROUNDS):
-        reached, state = _inflated(guess, equations, pressure, stiffness, state)
-        rest = image.nodes - reached
-        before, far = far, float(np.abs(rest).max()) / size
-        logger.info("unloading, round %d: %.2g of the heart's size from the image", number + 1, far)
-        if far < CLOSE:
+    guess, state, error = image, None, np.inf
+    for number in range(_MAX_ITERATIONS):
+        inflated, state = _inflate(guess, equations_of, pressure, stiffness, state)
+        misfit = image.nodes - inflated
+        previous_error, error = error, float(np.abs(misfit).max()) / size
+        logger.info("unloading, iteration %d: misfit of %.2g of the heart's size", number + 1, error)
+        if error < MAX_MISFIT:
             return guess
-        if far > 10 * before:
+        if error > 10 * previous_error:
             break
-        guess = _moved(guess, rest)
+        guess = _displaced(guess, misfit)
     raise Diverged(
         f"no unloaded state was found that fills to the image at {pressure / 1e3:.3g} kPa: raise stiffness_kPa, or "
         "lower the end-diastolic pressure of the loop."
     )
 
 
-def _inflated(
-    mesh: Mesh, equations: Callable[[Mesh], Equilibrium], pressure: float, stiffness: float, near: State | None
+def _inflate(
+    mesh: Mesh, equations_of: Callable[[Mesh], Equilibrium], pressure: float, stiffness: float, predictor: State | None
 ) -> tuple[Floats, State]:
     """Nodes (n_nodes, 3), m, and state of a mesh under a pressure."""
-    heart = equations(mesh)
+    equations = equations_of(mesh)
     try:
-        walk = Walk(heart, stiffness)
-        state = walk.to(Load(pressure, 1.0, 0.0), None, () if near is None else (near,))
-        return heart.positions(state), state
+        stepper = LoadStepper(equations, stiffness)
+        state = stepper.advance(Load(pressure, 1.0, 0.0), None, () if predictor is None else (predictor,))
+        return equations.positions(state), state
     finally:
-        heart.close()
+        equations.close()
 
 
-def _moved(mesh: Mesh, rest: Floats) -> Mesh:
-    """The mesh with as much of a displacement added as leaves no tetrahedron inside out."""
-    share = 1.0
-    while share >= _LEAST_SHARE:
-        nodes = mesh.nodes + share * rest
+def _displaced(mesh: Mesh, displacement: Floats) -> Mesh:
+    """The mesh displaced as far as leaves no tetrahedron inside out."""
+    step = 1.0
+    while step >= _MIN_STEP:
+        nodes = mesh.nodes + step * displacement
         if jacobians(nodes, mesh.cells).min() > 0:
             return replace(mesh, nodes=nodes)
-        share /= 2
+        step /= 2
     raise Diverged("unloading turns the wall inside out: raise stiffness_kPa, or mend the mesh where it is thin.")

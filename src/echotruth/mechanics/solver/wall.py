@@ -1,4 +1,4 @@
-"""The wall of a heart: mesh, depth, fibres and tissue, and the equations they make."""
+"""The wall of a heart - mesh, depth and tissue - and its equations."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echotruth.arrays import Floats
 from echotruth.config import Config, Mechanics
 from echotruth.fem.quadrature import tetrahedron
-from echotruth.fem.tetrahedra import Floats, Mesh
+from echotruth.fem.tetrahedra import Mesh
 from echotruth.materials import compiled
 from echotruth.mechanics import fibres
 from echotruth.mechanics.pathology import Tissue, tissue
 from echotruth.mechanics.solver import element
 from echotruth.mechanics.solver.equilibrium import Equilibrium
-from echotruth.mechanics.solver.support import of_base
+from echotruth.mechanics.solver.support import base_support
 
 
 @dataclass(frozen=True)
@@ -35,18 +36,18 @@ class Wall:
 
 
 def wall(config: Config, mesh: Mesh) -> Wall:
-    """The wall that a configuration makes of a mesh.
+    """Wall of a mesh with the pathology of a configuration.
 
     Raises
     ------
     PathologyError
-        If its disease is nowhere in the mesh.
+        If no cell of the mesh has the pathology.
     """
     depth = fibres.wall_depth(mesh)
     return Wall(mesh, depth, tissue(mesh, depth, config.pathology))
 
 
-def equilibrium(config: Config, heart: Wall) -> Equilibrium:
+def equilibrium(config: Config, wall: Wall) -> Equilibrium:
     """Equations of a wall, with the fibres, laws and support of a configuration.
 
     Raises
@@ -55,15 +56,15 @@ def equilibrium(config: Config, heart: Wall) -> Equilibrium:
         If the fibres are to come with the mesh and do not.
     """
     section = config.mechanics
-    frames = fibres.fibre_frames(heart.mesh, heart.depth, config.fibres, tetrahedron()[0], config.seed)
-    support = of_base(heart.mesh, section.base, section.si().epicardial_spring)
-    return Equilibrium(heart.mesh, frames, law(section), support, heart.tissue.stiffness_scale)
+    frames = fibres.fibre_frames(wall.mesh, wall.depth, config.fibres, tetrahedron()[0], config.seed)
+    support = base_support(wall.mesh, section.base, section.si().epicardial_spring)
+    return Equilibrium(wall.mesh, frames, wall_law(section), support, wall.tissue.stiffness_scale)
 
 
-def law(section: Mechanics) -> element.Law:
+def wall_law(section: Mechanics) -> element.WallLaw:
     """Laws of the wall, SI, from their section of the configuration."""
     power = 2.0 if section.active.stress == "cauchy" else 0.0
     active = np.array([section.active.length_dependence, power])
-    material, values = section.material, section.si()
-    bulk = values.bulk_modulus, values.local_bulk
-    return element.Law(compiled(material.law), material.constants(), active, *bulk, values.viscosity)
+    material, si = section.material, section.si()
+    bulk = si.bulk_modulus, si.local_bulk
+    return element.WallLaw(compiled(material.law), material.constants(), active, *bulk, si.viscosity)

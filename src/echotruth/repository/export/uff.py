@@ -1,7 +1,7 @@
-"""The ultrasound file format of the UltraSound ToolBox (USTB), as its classes `uff.*` are laid out in HDF5.
+"""The ultrasound file format (UFF) of the UltraSound ToolBox (USTB): HDF5 with its classes `uff.*`.
 
-An object is a group that names its class, a list of objects a group of numbered ones, and an array a dataset with its
-dimensions in the order of Fortran, the last one of the toolbox first. A complex array is a group of two.
+An object is a group with the name of its class, a list of objects a group of numbered ones, and an array a dataset with
+its dimensions in Fortran order, the last one of the toolbox first. A complex array is a group of two.
 
 Rodriguez-Molares et al., The UltraSound ToolBox, IEEE Int Ultrason Symp 2017.
 """
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from echotruth.repository.export.values import echoes, places
+from echotruth.repository.export.values import sample_positions, scaled_channels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,7 +24,7 @@ SPHERICAL = 1
 
 
 def write(file: Any, rf: xr.Dataset) -> None:
-    """Write `channel_data` and `beamformed_data`, whichever is kept.
+    """Write `channel_data` and `beamformed_data`, whichever is stored.
 
     Parameters
     ----------
@@ -45,14 +45,14 @@ def _channel_data(group: Any, rf: xr.Dataset) -> None:
     for number, lateral in enumerate(rf.transmitter.values, start=1):
         _wave(_object(sequence, f"sequence_{number:04d}", "uff.wave"), float(lateral), rf)
     shape = tuple(rf.sizes[dim] for dim in ("frame", "transmitter", "receiver", "sample"))
-    _frames(group, "data", shape, echoes(rf))
+    _frames(group, "data", shape, scaled_channels(rf))
 
 
 def _wave(group: Any, lateral: float, rf: xr.Dataset) -> None:
-    """One element that sends alone.
+    """Wave transmitted by one element alone.
 
-    The toolbox counts time from when the wave passes the origin. From a source that is not behind the array it takes
-    the wave to have come a path from the origin to the source first, so the delay of the record is that path.
+    In the toolbox time starts when the wave passes the origin. If the source is not behind the array, the wave is
+    taken to travel from the origin to the source first, so that the delay of the record is |x| / c.
     """
     _array(group, "wavefront", [[SPHERICAL]], "uff.wavefront")
     for name in ("source", "origin"):
@@ -66,18 +66,18 @@ def _beamformed_data(group: Any, rf: xr.Dataset) -> None:
     _settings(group, rf, modulation_frequency=rf.attrs["demodulation_frequency"])
     sector = rf.attrs["scan"] == "sector"
     scan = _object(group, "scan", "uff.sector_scan" if sector else "uff.linear_scan")
-    _array(scan, "azimuth_axis" if sector else "x_axis", rf.line_angle if sector else rf.line_foot)
+    _array(scan, "azimuth_axis" if sector else "x_axis", rf.line_angle if sector else rf.line_origin)
     _array(scan, "depth_axis" if sector else "z_axis", rf.range)
     if sector:
         _point(scan, "origin", 0.0)
-    for name, place in zip("xz", places(rf), strict=True):
-        _array(scan, name, place.ravel())
+    for name, coordinate in zip("xz", sample_positions(rf), strict=True):
+        _array(scan, name, coordinate.ravel())
     _array(scan, "y", np.zeros(rf.sizes["line"] * rf.sizes["range"]))
     shape = (rf.sizes["frame"], 1, 1, rf.sizes["line"] * rf.sizes["range"])
     data = group.create_group("data")
     data.attrs.update({"class": "single", "name": "data", "complex": [1], "imaginary": [0]})
     for name, part in (("real", np.real), ("imag", np.imag)):
-        _frames(data, name, shape, (part(each.values).reshape(1, 1, -1) for each in rf.lines))
+        _frames(data, name, shape, (part(lines.values).reshape(1, 1, -1) for lines in rf.lines))
         data[name].attrs["imaginary"] = [int(name == "imag")]
 
 
@@ -105,7 +105,7 @@ def _probe(group: Any, rf: xr.Dataset) -> None:
 
 
 def _point(group: Any, name: str, lateral: float) -> None:
-    """A point on the array, in the spherical coordinates of the format."""
+    """A point of the array in the spherical coordinates of the format."""
     point = _object(group, name, "uff.point")
     _array(point, "distance", abs(lateral))
     _array(point, "azimuth", np.arctan2(lateral, 0.0))
@@ -124,7 +124,7 @@ def _array(group: Any, name: str, values: ArrayLike, kind: str = "single") -> No
 
 
 def _frames(group: Any, name: str, shape: tuple[int, ...], frames: Iterator[NDArray[Any]]) -> None:
-    """An array whose first dimension is the frame, written one by one."""
+    """An array whose first dimension is the frame, written frame by frame."""
     dataset = group.create_dataset(name, shape, np.float32)
     dataset.attrs.update({"class": "single", "name": name, "complex": [0], "imaginary": [0]})
     for frame, values in enumerate(frames):

@@ -1,6 +1,6 @@
 """The HDF5 layout of zea, a toolbox for cognitive ultrasound imaging (https://zea.readthedocs.io, data format 0.1).
 
-A track holds the data (frames first) and the scan, that is the transmits, all in 32 bits; the array stands beside it.
+A track holds the data (frames first) and the scan (the transmits), all in 32 bits; the probe stands beside it.
 """
 
 from __future__ import annotations
@@ -10,19 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from echotruth.repository.export.values import echoes, places
+from echotruth.repository.export.values import sample_positions, scaled_channels
 
 if TYPE_CHECKING:
     import xarray as xr
 
 VERSION = "0.1.8"
-"""Of zea, whose layout is written."""
-BEHIND = 1e-6
-"""Distance of the source of a wave behind its element, m: 0 would stand for a plane wave."""
+"""Version of zea whose layout is written."""
+
+SOURCE_DISTANCE = 1e-6
+"""Distance of the virtual source of a wave behind its element, m: 0 would mean a plane wave."""
 
 
 def write(file: Any, rf: xr.Dataset) -> None:
-    """Write channels as `raw_data` and lines as `beamformed_data`, whichever is kept.
+    """Write channels as `raw_data` and lines as `beamformed_data`, whichever is stored.
 
     Parameters
     ----------
@@ -58,32 +59,32 @@ def _raw(group: Any, rf: xr.Dataset) -> None:
     frames, *_, samples = (rf.sizes[dim] for dim in ("frame", "transmitter", "receiver", "sample"))
     elements = rf.sizes["element"]
     raw = group.create_dataset("raw_data", (frames, elements, samples, elements, 1), np.float32)
-    for frame, channels in enumerate(echoes(rf)):
+    for frame, channels in enumerate(scaled_channels(rf)):
         raw[frame] = channels.transpose(0, 2, 1)[..., None]
 
 
 def _scan(group: Any, rf: xr.Dataset) -> None:
-    """Every element in its turn."""
+    """Transmits: every element alone, one after the other."""
     element = rf.element.values
-    one_each = np.ones(len(element))
+    ones = np.ones(len(element))
     values = {
         "sampling_frequency": rf.attrs["sampling_frequency"],
         "center_frequency": rf.attrs["centre_frequency"],
         "demodulation_frequency": rf.attrs["centre_frequency"],
         "sound_speed": rf.attrs["sound_speed"],
-        "initial_times": float(rf["sample"][0]) * one_each,
+        "initial_times": float(rf["sample"][0]) * ones,
         "t0_delays": np.zeros((len(element), len(element))),
         "tx_apodizations": np.eye(len(element)),
-        "focus_distances": -BEHIND * one_each,
+        "focus_distances": -SOURCE_DISTANCE * ones,
         "transmit_origins": np.column_stack([element, np.zeros((len(element), 2))]),
-        "polar_angles": 0 * one_each,
-        "azimuth_angles": 0 * one_each,
+        "polar_angles": 0 * ones,
+        "azimuth_angles": 0 * ones,
     }
     _put(group, values)
 
 
 def _beamformed(group: Any, rf: xr.Dataset) -> None:
-    lateral, axial = (place.T for place in places(rf))
+    lateral, axial = (coordinate.T for coordinate in sample_positions(rf))
     values = group.create_dataset("values", (rf.sizes["frame"], *axial.shape, 2), np.float32)
     for frame, lines in enumerate(rf.lines):
         values[frame] = np.stack([lines.values.real.T, lines.values.imag.T], axis=-1)

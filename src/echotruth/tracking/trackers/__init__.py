@@ -1,1 +1,1 @@
-"""The trackers, one module a method; each has a function `track`."""
+"""The trackers: one module per method, each with a function `track`."""

@@ -1,4 +1,4 @@
-"""Dense inverse search of OpenCV as it is (Kroeger et al. 2016, ECCV, LNCS 9908:471)."""
+"""Dense inverse search of OpenCV, unmodified (Kroeger et al. 2016, ECCV, LNCS 9908:471)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 
 from echotruth.config.tracking import Dis
-from echotruth.tracking.flow import follow
+from echotruth.tracking.flow import track_by_flow
 
-SMALLEST = 32
-"""Least side of an image, px; on flat ones of 24 px OpenCV 5.0 reads beyond its memory."""
+MIN_IMAGE_SIDE = 32
+"""Smallest side of an image, px; for flat ones of 24 px OpenCV 5.0 reads beyond its memory."""
 PRESETS = {
     "ultrafast": cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST,
     "fast": cv2.DISOPTICAL_FLOW_PRESET_FAST,
@@ -30,12 +30,12 @@ def track(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
 
-    The library says nothing of quality; :mod:`echotruth.tracking.flow` does.
+    The quality is that of :mod:`echotruth.tracking.flow`; the library has none.
     """
-    return follow(partial(flow, preset=settings.preset), frames, points, spacing, settings.reference)
+    return track_by_flow(partial(optical_flow, preset=settings.preset), frames, points, spacing, settings.reference)
 
 
-def flow(first: np.ndarray, second: np.ndarray, preset: str = "medium") -> np.ndarray:
+def optical_flow(first: np.ndarray, second: np.ndarray, preset: str = "medium") -> np.ndarray:
     """Motion of every pixel from one image to another.
 
     Parameters
@@ -43,7 +43,7 @@ def flow(first: np.ndarray, second: np.ndarray, preset: str = "medium") -> np.nd
     first, second : ndarray of shape (axial, lateral)
         Grey values from 0 to 1, all finite.
     preset : {"ultrafast", "fast", "medium"}
-        Of OpenCV.
+        Preset of OpenCV.
 
     Returns
     -------
@@ -53,11 +53,12 @@ def flow(first: np.ndarray, second: np.ndarray, preset: str = "medium") -> np.nd
     Raises
     ------
     ValueError
-        If the image is smaller than OpenCV can do with.
+        If the image is smaller than OpenCV can process.
     """
-    if min(first.shape) < SMALLEST:
-        raise ValueError(f"Dense inverse search needs images of {SMALLEST} px or more, not {first.shape}.")
+    if min(first.shape) < MIN_IMAGE_SIDE:
+        raise ValueError(f"Dense inverse search needs images of {MIN_IMAGE_SIDE} px or more, not {first.shape}.")
     # The library cuts the image into as many stripes as there are threads, and their seams show in the motion.
     cv2.setNumThreads(1)
-    images = ((255 * image).round().astype(np.uint8) for image in (first, second))
-    return cv2.DISOpticalFlow_create(PRESETS[preset]).calc(*images, None)
+    before, after = ((255 * image).round().astype(np.uint8) for image in (first, second))
+    # OpenCV takes None for a flow that it is to allocate.
+    return cv2.DISOpticalFlow.create(PRESETS[preset]).calc(before, after, None)  # type: ignore[call-overload]

@@ -1,6 +1,6 @@
-"""A tracker from elsewhere: called as it is, and its answer looked at before it is believed.
+"""Trackers from outside the package: a callable or a program is run, and its result checked.
 
-It is given copies of the clip, the points and the mask, and nothing of the truth. What it prints goes to stderr.
+It receives copies of the clip, the points and the mask, and nothing of the truth. What it prints goes to stderr.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from echotruth.config.tracking import GIVEN, Guest
+from echotruth.config.tracking import TRACKER_ARGUMENTS, External
 from echotruth.tracking import external_program
 from echotruth.tracking.external_program import in_one_line
 from echotruth.tracking.failure import TrackerFailed
 
-GROUP = "echotruth.trackers"
+ENTRY_POINT_GROUP = "echotruth.trackers"
 """Group of entry points under which a package names its trackers."""
 
-ROUNDING = 1e-6
-"""By how much a quality may lie outside of 0 to 1 and be taken for single precision's 0 or 1."""
+QUALITY_TOLERANCE = 1e-6
+"""Distance of a quality outside 0 to 1 that is accepted as rounding in single precision."""
 
-MOVED_PX = 1.0
-"""Median displacement in frame 0, where it is 0 by definition, from which an answer is taken for something else."""
+MAX_INITIAL_DISPLACEMENT_PX = 1.0
+"""Median displacement in frame 0, where it is 0 by definition, above which the result is not a displacement."""
 
 
 def track(
@@ -37,101 +37,95 @@ def track(
     spacing: float,
     frame_time: np.ndarray,
     seed: int,
-    settings: Guest,
+    settings: External,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Ask a guest; arrays, shapes and units are those of :func:`echotruth.tracking.tracker.track`.
+    """Run an external tracker; arrays, shapes and units are those of :func:`echotruth.tracking.tracker.track`.
 
     Raises
     ------
     TrackerFailed
-        If the guest cannot be found, raises, ends the interpreter, takes too long or does not answer as asked.
+        If the tracker cannot be found, raises, exits, takes too long or returns an invalid result.
     """
-    given = (frames.copy(), points.copy(), mask.copy(), float(spacing), frame_time.copy(), int(seed))
-    name = settings.track or " ".join(settings.command or ())
+    arguments = (frames.copy(), points.copy(), mask.copy(), float(spacing), frame_time.copy(), int(seed))
+    command = settings.command or []
     try:
         if settings.track is not None:
-            answer = _called(settings.track, given, settings.options)
+            result = _call(settings.track, arguments, settings.options)
         else:
-            entries = dict(zip(GIVEN, given, strict=True)) | settings.options
-            answer = external_program.run(list(settings.command or ()), entries, settings.timeout_s)
-        return _checked(answer, (len(frames), len(points)))
+            entries = dict(zip(TRACKER_ARGUMENTS, arguments, strict=True)) | settings.options
+            result = external_program.run(command, entries, settings.timeout_s)
+        return _checked(result, (len(frames), len(points)))
     except TrackerFailed as error:
+        name = getattr(settings.track, "__name__", settings.track) or " ".join(command)
         raise TrackerFailed(f"{name} {error}") from error.__cause__
 
 
-def _called(track: str, given: tuple[Any, ...], options: dict[str, Any]) -> Any:
-    """What a callable returns."""
+def _call(name: str | Callable[..., Any], arguments: tuple[Any, ...], options: dict[str, Any]) -> Any:
     try:
         with redirect_stdout(sys.stderr):
-            return _found(track)(*given, **options)
+            return (name if callable(name) else _load(name))(*arguments, **options)
     except TrackerFailed:
         raise
     except (Exception, SystemExit) as error:
-        # The first place is the call above: where there is no other, the call itself was refused.
-        places = [f" ({Path(place.filename).name}, line {place.lineno})" for place in extract_tb(error.__traceback__)]
-        raise TrackerFailed(f"raised {_named(error)}{places[-1] if len(places) > 1 else ''}") from error
+        # The first entry is the call above; if it is the only one, the arguments were refused.
+        lines = [f" ({Path(entry.filename).name}, line {entry.lineno})" for entry in extract_tb(error.__traceback__)]
+        raise TrackerFailed(f"raised {_describe(error)}{lines[-1] if len(lines) > 1 else ''}") from error
 
 
-def _named(error: BaseException) -> str:
+def _describe(error: BaseException) -> str:
     return in_one_line(f"{type(error).__name__}: {error}")
 
 
-def _found(track: str) -> Callable[..., Any]:
-    """The callable of a name; what lies in the current directory can be imported as a package can."""
+def _load(name: str) -> Callable[..., Any]:
+    """Import the callable `package.module:function` or the entry point; the current directory is searched too."""
     if not {"", str(Path.cwd())} & set(sys.path):
         sys.path.insert(0, str(Path.cwd()))
-    known = entry_points(group=GROUP)
-    if ":" not in track and track not in known.names:
-        there = ", ".join(sorted(known.names)) or "none"
+    installed = entry_points(group=ENTRY_POINT_GROUP)
+    if ":" not in name and name not in installed.names:
         raise TrackerFailed(
-            f"is not an entry point of the group {GROUP} (there is {there}): install the package that has it, or "
-            "write package.module:function"
+            f"is not an entry point of the group {ENTRY_POINT_GROUP} (installed: "
+            f"{', '.join(sorted(installed.names)) or 'none'}): install its package, or write package.module:function"
         )
-    entry = EntryPoint("guest", track, GROUP) if ":" in track else known[track]
+    entry = EntryPoint("external", name, ENTRY_POINT_GROUP) if ":" in name else installed[name]
     try:
-        found = entry.load()
+        return entry.load()
     except (Exception, SystemExit) as error:
-        raise TrackerFailed(f"cannot be imported: {_named(error)}") from error
-    if not callable(found):
-        raise TrackerFailed(f"is a {type(found).__name__}, where a function is needed")
-    return found
+        raise TrackerFailed(f"cannot be imported: {_describe(error)}") from error
 
 
-def _checked(answer: Any, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement and quality of an answer, as arrays of our own."""
-    if isinstance(answer, tuple) and len(answer) != 2:
-        raise TrackerFailed(
-            f"returned a tuple of {len(answer)}, where displacement, or displacement and quality is due"
-        )
-    displacement, quality = answer if isinstance(answer, tuple) else (answer, None)
-    displacement = _reals("displacement", displacement, (*shape, 2))
-    found = np.isfinite(displacement).all(-1)
-    if not found[1:].any():
+def _checked(result: Any, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and quality as new arrays, from what the tracker returned."""
+    if isinstance(result, tuple) and len(result) != 2:
+        raise TrackerFailed(f"returned a tuple of {len(result)}, not displacement, or displacement and quality")
+    displacement, quality = result if isinstance(result, tuple) else (result, None)
+    displacement = _real_array("displacement", displacement, (*shape, 2))
+    known = np.isfinite(displacement).all(-1)
+    if not known[1:].any():
         raise TrackerFailed("returned no finite displacement after frame 0")
-    moved = np.median(np.hypot(*displacement[0][found[0]].T)) if found[0].any() else 0.0
-    if moved > MOVED_PX:
+    initial = np.median(np.hypot(*displacement[0][known[0]].T)) if known[0].any() else 0.0
+    if initial > MAX_INITIAL_DISPLACEMENT_PX:
         raise TrackerFailed(
-            f"returned a displacement of {moved:.1f} px in frame 0, where it is 0: return displacements since frame 0, "
-            "not positions"
+            f"returned a displacement of {initial:.1f} px in frame 0, where it is 0: return displacements since frame "
+            "0, not positions"
         )
     if quality is None:
-        return displacement, np.where(found, 1.0, np.nan)
-    quality = _reals("quality", quality, shape)
-    if (np.abs(quality - 0.5) > 0.5 + ROUNDING).any():
+        return displacement, np.where(known, 1.0, np.nan)
+    quality = _real_array("quality", quality, shape)
+    if (np.abs(quality - 0.5) > 0.5 + QUALITY_TOLERANCE).any():
         low, high = np.nanmin(quality), np.nanmax(quality)
-        raise TrackerFailed(f"returned a quality from {low:.3g} to {high:.3g}, where it goes from 0 to 1")
+        raise TrackerFailed(f"returned a quality from {low:.3g} to {high:.3g}, not from 0 to 1")
     return displacement, np.clip(quality, 0, 1)
 
 
-def _reals(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """An array of real numbers of that shape, NaN where masked, or a word about what it is instead."""
+def _real_array(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Array of real numbers of a shape, NaN where masked; TrackerFailed if the values are something else."""
     try:
         array = np.ma.asarray(values)
     except Exception as error:
-        raise TrackerFailed(f"returned a {name} that is no array ({_named(error)}): {shape} is due") from error
+        raise TrackerFailed(f"returned a {name} that is not an array of shape {shape} ({_describe(error)})") from error
     if array.dtype.kind not in "fiub":
-        what = type(values).__name__ if array.dtype.kind == "O" else array.dtype
-        raise TrackerFailed(f"returned a {name} of {what}, where real numbers of shape {shape} are due")
+        kind = type(values).__name__ if array.dtype.kind == "O" else array.dtype
+        raise TrackerFailed(f"returned a {name} of {kind}, not of real numbers of shape {shape}")
     if array.shape != shape:
-        raise TrackerFailed(f"returned a {name} of shape {array.shape}, where {shape} is due")
-    return array.astype(float).filled(np.nan)
+        raise TrackerFailed(f"returned a {name} of shape {array.shape}, not {shape}")
+    return np.ma.filled(array.astype(float), np.nan)

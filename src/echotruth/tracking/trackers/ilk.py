@@ -1,4 +1,4 @@
-"""Iterative Lucas-Kanade of scikit-image as it is (Le Besnerais and Champagnat 2005, ICIP, 1:137)."""
+"""Iterative Lucas-Kanade of scikit-image, unmodified (Le Besnerais and Champagnat 2005, ICIP, 1:137)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from skimage.registration import optical_flow_ilk
 
 from echotruth.config.tracking import Ilk
-from echotruth.tracking.flow import follow
+from echotruth.tracking.flow import track_by_flow
 
 
 def track(
@@ -22,12 +22,12 @@ def track(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
 
-    The library says nothing of quality; :mod:`echotruth.tracking.flow` does.
+    The quality is that of :mod:`echotruth.tracking.flow`; the library has none.
     """
-    return follow(partial(flow, radius=settings.radius_px), frames, points, spacing, settings.reference)
+    return track_by_flow(partial(optical_flow, radius=settings.radius_px), frames, points, spacing, settings.reference)
 
 
-def flow(first: np.ndarray, second: np.ndarray, radius: int = 7) -> np.ndarray:
+def optical_flow(first: np.ndarray, second: np.ndarray, radius: int = 7) -> np.ndarray:
     """Motion of every pixel from one image to another.
 
     Parameters
@@ -35,7 +35,7 @@ def flow(first: np.ndarray, second: np.ndarray, radius: int = 7) -> np.ndarray:
     first, second : ndarray of shape (axial, lateral)
         Grey values from 0 to 1, all finite.
     radius : int
-        Of the window about a pixel, px.
+        Radius of the window around a pixel, px.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Cross-correlation of windows that shrink from pass to pass, the second image deformed by the motion found so far.
+"""Cross-correlation of windows that shrink from pass to pass, with the second image deformed by the current estimate.
 
-After Scarano 2002 (Meas Sci Technol 13:R1): each pass carries the second image back by the field of the one before and
-adds what its windows still find. A field is smoothed over the width of a window, without which motion finer than
-the windows would grow from pass to pass (Astarita 2006, Exp Fluids 40:977).
+After Scarano 2002 (Meas Sci Technol 13:R1): each pass warps the second image back by the field of the previous pass and
+adds the shifts of its windows. The field is smoothed over the width of a window; otherwise motion finer than the
+windows would grow from pass to pass (Astarita 2006, Exp Fluids 40:977).
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import numpy as np
 from echotruth.config.tracking import WindowDeformation
 from echotruth.imaging import spline
 from echotruth.tracking.accumulation import accumulate
-from echotruth.tracking.correlation import match, textured
-from echotruth.tracking.field import Motion, motion, smooth, validated
-from echotruth.tracking.grey import levels
-from echotruth.tracking.windows import SMALLEST, Windows, arrange
+from echotruth.tracking.correlation import has_texture, match_windows
+from echotruth.tracking.field import DisplacementField, displacement_field, replace_outliers, smooth
+from echotruth.tracking.grey import grey_levels
+from echotruth.tracking.windows import MIN_WINDOW_SIDE, Windows, arrange
 
 STRIDE = 0.5
 """Step between windows over their side."""
-REACH = 0.25
+MAX_SHIFT = 0.25
 """Largest shift over the side of a window (Keane and Adrian 1990, Meas Sci Technol 1:1202)."""
 
 
@@ -37,18 +37,18 @@ def track(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
 
-    The quality is the correlation of the last windows, none below 0. Windows cover the image whatever the mask.
+    The quality is the correlation of the last windows, at least 0. Windows cover the whole image; the mask is not used.
 
     Raises
     ------
     ValueError
-        As :func:`arranged`.
+        See :func:`window_passes`.
     """
-    passes = arranged(settings, frames.shape[1:], spacing)
-    return accumulate(WindowPairs(passes), levels(frames), points, settings.reference)
+    passes = window_passes(settings, frames.shape[1:], spacing)
+    return accumulate(WindowDeformationTracker(passes), grey_levels(frames), points, settings.reference)
 
 
-def arranged(settings: WindowDeformation, shape: tuple[int, int], spacing: float) -> list[Windows]:
+def window_passes(settings: WindowDeformation, shape: tuple[int, int], spacing: float) -> list[Windows]:
     """Windows of all passes.
 
     Parameters
@@ -66,17 +66,19 @@ def arranged(settings: WindowDeformation, shape: tuple[int, int], spacing: float
     Raises
     ------
     ValueError
-        If the image does not hold two windows side by side.
+        If two windows do not fit side by side into the image.
     """
-    passes = [arrange(shape, side, STRIDE) for side in sides(settings, spacing)]
+    passes = [arrange(shape, side, STRIDE) for side in window_sides(settings, spacing)]
     for windows in passes:
         if min(len(windows.top), len(windows.left)) < 2:
-            raise ValueError(f"An image of {shape[0]} x {shape[1]} px holds no two windows of {windows.side} px.")
+            raise ValueError(
+                f"An image of {shape[0]} x {shape[1]} px has no room for two windows of {windows.side} px."
+            )
     return passes
 
 
-def sides(settings: WindowDeformation, spacing: float) -> list[int]:
-    """Sides of the windows of all passes at one image size.
+def window_sides(settings: WindowDeformation, spacing: float) -> list[int]:
+    """Side of the windows in each pass.
 
     Parameters
     ----------
@@ -89,13 +91,13 @@ def sides(settings: WindowDeformation, spacing: float) -> list[int]:
     list of int
         px, even, 8 at least.
     """
-    every = [max(SMALLEST, 2 * round(side / spacing / 2)) for side in settings.si().windows]
-    return every + every[-1:] * (settings.sweeps - 1)
+    sides = [max(MIN_WINDOW_SIDE, 2 * round(side / spacing / 2)) for side in settings.si().windows]
+    return sides + sides[-1:] * (settings.sweeps - 1)
 
 
 @dataclass(frozen=True)
-class WindowPairs:
-    """Window deformation of two images, as :class:`echotruth.tracking.accumulation.Pairs`.
+class WindowDeformationTracker:
+    """Window deformation of two images, as :class:`echotruth.tracking.accumulation.PairTracker`.
 
     Attributes
     ----------
@@ -105,117 +107,118 @@ class WindowPairs:
 
     passes: list[Windows]
 
-    def prepare(self, image: np.ndarray) -> Prepared:
-        """An image (axial, lateral), float32, with grey values from 0 to 1 or NaN, and what is worth knowing of it."""
+    def prepare(self, image: np.ndarray) -> PreparedImage:
+        """Spline and texture of an image (axial, lateral), float32, with grey values from 0 to 1 or NaN."""
         unknown = np.isnan(image)
-        seen = {windows.side: textured(image, windows) for windows in self.passes}
-        near = {windows.side: covered(windows, seen[windows.side], image.shape) for windows in self.passes[1:]}
-        return Prepared(image, spline.coefficients(np.where(unknown, np.float32(0), image)), unknown, seen, near)
+        textured = {windows.side: has_texture(image, windows) for windows in self.passes}
+        search = {w.side: search_pixels(w, textured[w.side], image.shape) for w in self.passes[1:]}
+        coefficients = spline.coefficients(np.where(unknown, np.float32(0), image))
+        return PreparedImage(image, coefficients, unknown, textured, search)
 
-    def match(self, first: Prepared, second: Prepared, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def match(self, first: PreparedImage, second: PreparedImage, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step (n, 2) in px and quality (n,) of points."""
-        moved, peak = self.field(first, second)
-        step, alike = moved.at(points), self.passes[-1].interpolate(peak[..., None], points)
-        return np.where(np.isnan(alike), np.nan, step), np.maximum(alike[:, 0], 0)
+        field, peak = self.field(first, second)
+        step, ncc = field.at(points), self.passes[-1].interpolate(peak[..., None], points)
+        return np.where(np.isnan(ncc), np.nan, step), np.maximum(ncc[:, 0], 0)
 
-    def field(self, first: Prepared, second: Prepared) -> tuple[Motion, np.ndarray]:
-        """Motion everywhere.
+    def field(self, first: PreparedImage, second: PreparedImage) -> tuple[DisplacementField, np.ndarray]:
+        """Displacement of the whole image.
 
         Returns
         -------
-        moved : Motion
-            That of the windows near by where there is no texture.
+        field : DisplacementField
+            Where there is no texture, that of the windows near by.
         peak : ndarray of shape (rows, columns)
             Correlation of the last windows; NaN where they have no texture.
         """
-        moved = None
+        field = None
         for windows in self.passes:
             side = windows.side
-            back = carry(second, moved, first.near[side]) if moved else second.image
-            shift, peak = match(first.image, back, windows, first.seen[side], round(REACH * side))
-            shift += moved.mean(windows) if moved else 0.0
-            moved = motion(smooth(validated(shift)), windows, first.image.shape)
-        return moved, peak
+            warped = warp(second, field, first.search[side]) if field else second.image
+            shift, peak = match_windows(first.image, warped, windows, first.textured[side], round(MAX_SHIFT * side))
+            shift += field.mean(windows) if field else 0.0
+            field = displacement_field(smooth(replace_outliers(shift)), windows, first.image.shape)
+        assert field is not None
+        return field, peak
 
 
 @dataclass(frozen=True)
-class Prepared:
-    """An image and what is worth working out once.
+class PreparedImage:
+    """An image and what every comparison needs of it.
 
     Attributes
     ----------
     image : ndarray of shape (axial, lateral), float32
-        Grey values from 0 to 1; NaN where there are none.
+        Grey values from 0 to 1; NaN where unknown.
     coefficients : ndarray
         Of its spline, see :func:`echotruth.imaging.spline.coefficients`.
     unknown : ndarray of shape (axial, lateral), bool
         Pixels without a value.
-    seen : dict of ndarray of shape (rows, columns), bool
-        By the side of windows, which of them have texture.
-    near : dict of ndarray of shape (axial, lateral), bool
-        By the side of windows, the pixels with which those are compared.
+    textured : dict of ndarray of shape (rows, columns), bool
+        Side of the windows -> windows that have texture.
+    search : dict of ndarray of shape (axial, lateral), bool
+        Side of the windows -> pixels within the largest shift of these.
     """
 
     image: np.ndarray
     coefficients: np.ndarray
     unknown: np.ndarray
-    seen: dict[int, np.ndarray]
-    near: dict[int, np.ndarray]
+    textured: dict[int, np.ndarray]
+    search: dict[int, np.ndarray]
 
 
-def covered(windows: Windows, seen: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Pixels (axial, lateral), bool, under the windows that are seen (rows, columns) at any lag."""
-    result, reach = np.zeros(shape, bool), round(REACH * windows.side)
-    for row, column in np.argwhere(seen):
-        top, left = windows.top[row] - reach, windows.left[column] - reach
-        result[max(0, top) : top + windows.side + 2 * reach, max(0, left) : left + windows.side + 2 * reach] = True
-    return result
+def search_pixels(windows: Windows, textured: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Pixels (axial, lateral), bool, that the textured windows (rows, columns) cover at any lag."""
+    pixels, lag = np.zeros(shape, bool), round(MAX_SHIFT * windows.side)
+    for row, column in np.argwhere(textured):
+        top, left = windows.top[row] - lag, windows.left[column] - lag
+        pixels[max(0, top) : top + windows.side + 2 * lag, max(0, left) : left + windows.side + 2 * lag] = True
+    return pixels
 
 
-def carry(image: Prepared, moved: Motion, near: np.ndarray) -> np.ndarray:
-    """An image carried back by the motion to it.
+def warp(image: PreparedImage, field: DisplacementField, pixels: np.ndarray) -> np.ndarray:
+    """Warp an image back by the displacement to it, I(x + u(x)).
 
     Parameters
     ----------
-    image : Prepared
-    moved : Motion
-    near : ndarray of shape (axial, lateral), bool
-        Pixels that are wanted.
+    image : PreparedImage
+    field : DisplacementField
+    pixels : ndarray of shape (axial, lateral), bool
+        Pixels at which the result is wanted.
 
     Returns
     -------
     ndarray of shape (axial, lateral), float32
-        At every pixel what is at the end of its motion, or at the border nearest to it; NaN where there is nothing, or
-        it is not wanted.
+        Outside the image its border is taken; NaN where unknown or not wanted.
     """
-    columns, rows = moved.pixels
-    result = np.full(near.shape, np.nan, np.float32)
-    _carry(image.coefficients, image.unknown, moved.coefficients, columns, rows, near, result)
+    columns, rows = field.pixel_weights
+    result = np.full(pixels.shape, np.nan, np.float32)
+    _warp(image.coefficients, image.unknown, field.coefficients, columns, rows, pixels, result)
     return result
 
 
 @numba.njit(cache=True, nogil=True)
-def _carry(image, unknown, moved, columns, rows, near, result):
-    height, width = near.shape
-    (column, across), line = columns, np.empty(moved.shape[1:])
+def _warp(image, unknown, field, columns, rows, pixels, result):
+    height, width = pixels.shape
+    (column, weight_x), line = columns, np.empty(field.shape[1:])
     for y in range(height):
-        _along(moved, rows[0][y], rows[1][y], line)
+        _interpolate_row(field, rows[0][y], rows[1][y], line)
         for x in range(width):
-            if near[y, x]:
+            if pixels[y, x]:
                 lateral, axial = np.float64(x), np.float64(y)
                 for b in range(4):
-                    lateral += across[x, b] * line[column[x] + b, 0]
-                    axial += across[x, b] * line[column[x] + b, 1]
+                    lateral += weight_x[x, b] * line[column[x] + b, 0]
+                    axial += weight_x[x, b] * line[column[x] + b, 1]
                 lateral, axial = min(max(lateral, 0.0), width - 1.0), min(max(axial, 0.0), height - 1.0)
                 if not unknown[int(axial + 0.5), int(lateral + 0.5)]:
                     result[y, x] = spline.value(image, np.float32(axial), np.float32(lateral))
 
 
 @numba.njit(cache=True, nogil=True)
-def _along(moved, first, shares, line):
-    """Write the coefficients (columns, 2) of the motion along a row of pixels, by the shares of four rows of them."""
+def _interpolate_row(field, first, weights, line):
+    """Write the coefficients (columns, 2) of a field along a row of pixels, from four rows of its coefficients."""
     for j in range(len(line)):
         for k in range(2):
             line[j, k] = 0.0
             for a in range(4):
-                line[j, k] += shares[a] * moved[first + a, j, k]
+                line[j, k] += weights[a] * field[first + a, j, k]

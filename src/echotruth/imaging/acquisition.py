@@ -1,6 +1,6 @@
-"""Acquisition: the full matrix of every frame, with what comes between the medium and the record.
+"""Acquisition: the full matrix of every frame, with acoustic shadow, reverberation haze and noise.
 
-Shadow, haze and noise act on the echoes between all pairs of elements, so that whatever is made of them has them.
+They act on the echoes between all pairs of elements, so that any transmit made of these has them.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from math import sqrt
 import numpy as np
 
 from echotruth.config import Config
-from echotruth.imaging.beamforming.scan import imaging_depth, points
-from echotruth.imaging.beamforming.scanner import Scanner, checked
+from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions
+from echotruth.imaging.beamforming.scanner import Scanner, validate_scatterers
 from echotruth.imaging.medium.medium import Medium
 from echotruth.imaging.medium.random_process import Random
-from echotruth.imaging.rf.haze import response, reverberation
+from echotruth.imaging.rf.haze import reverberation, reverberation_filter
 from echotruth.imaging.rf.shadow import Rib
 
 
@@ -38,29 +38,30 @@ class Acquisition:
     def __init__(self, config: Config, scanner: Scanner, medium: Medium, random: Random):
         realism = config.realism
         self._scanner, self._medium, self._random = scanner, medium, random
-        self._near, self._again, self._rib = 0.0, None, None
+        self._haze_range, self._filter, self._rib = 0.0, None, None
         if realism.haze.level_dB is not None:
             echoes = reverberation(realism.haze, config.probe, imaging_depth(config.rf, config.bmode), random("haze"))
-            self._near = realism.haze.si().near
-            self._again = 1 + response(echoes, scanner.matrix.frequency, config.probe.si().sound_speed)
+            self._haze_range = realism.haze.si().near
+            self._filter = 1 + reverberation_filter(echoes, scanner.matrix.frequency, config.probe.si().sound_speed)
         if realism.shadow.side != "none":
             self._rib = Rib(realism.shadow, scanner.matrix.centres)
-        self.noise = 0.0 if realism.noise.snr_dB is None else self._loudness() * 10 ** (-realism.noise.snr_dB / 20)
+        snr = realism.noise.snr_dB
+        self.noise = 0.0 if snr is None else self._signal_to_unit_noise() * 10 ** (-snr / 20)
 
     def __call__(self, frame: int) -> np.ndarray:
         """Spectra of the record of all pairs in a frame, (bins, elements, elements), as of :class:`FullMatrix`."""
-        record = self.echoes(*checked(*self._medium(frame)))
+        record = self.echoes(*validate_scatterers(*self._medium(frame)))
         if self.noise:
             record += np.float32(self.noise) * self.unit_noise(frame)
         return record
 
     def echoes(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
         """Record of scatterers, their positions (n, 3), m, and amplitudes (n,), without noise."""
-        if self._again is None:
+        if self._filter is None:
             return self.direct(position, amplitude)
-        near = np.linalg.norm(position, axis=1) < self._near
+        near = np.linalg.norm(position, axis=1) < self._haze_range
         record = self.direct(position[near], amplitude[near])
-        record *= self._again.astype(np.complex64)[:, None, None]
+        record *= self._filter.astype(np.complex64)[:, None, None]
         record += self.direct(position[~near], amplitude[~near])
         return record
 
@@ -70,25 +71,25 @@ class Acquisition:
         if self._rib is None:
             return matrix(position, amplitude)
         record = np.zeros((len(matrix.frequency), len(matrix.centres), len(matrix.centres)), np.complex64)
-        for strip, aperture in self._rib.strips(position):
-            record += np.multiply.outer(aperture, aperture) * matrix(position[strip], amplitude[strip])
+        for strip, transmission in self._rib.strips(position):
+            record += np.multiply.outer(transmission, transmission) * matrix(position[strip], amplitude[strip])
         return record
 
     def unit_noise(self, frame: int) -> np.ndarray:
         """Noise of variance 1 in the records of all pairs in a frame, at the frequencies of the matrix.
 
-        White over the pairs and over the band of the pulse, to which a receiver is tuned; none beside the band.
+        White over the pairs and over the band of the pulse, to which a receiver is tuned; none outside the band.
         """
         matrix = self._scanner.matrix
         shape = (len(matrix.frequency), len(matrix.centres), len(matrix.centres), 2)
         parts = self._random(f"noise {frame}").standard_normal(shape, dtype=np.float32)
         return parts.view(np.complex64)[..., 0] / np.float32(sqrt(2))
 
-    def _loudness(self) -> float:
-        """Root mean square of the echo of muscle over that of unit noise, where muscle is at end-diastole."""
+    def _signal_to_unit_noise(self) -> float:
+        """RMS of the echo of muscle over that of unit noise, in the lines where muscle is at end-diastole."""
         scanner = self._scanner
-        muscle = self._medium.in_wall(0, *points(scanner.scan, scanner.range))
+        muscle = self._medium.in_wall(0, *sample_positions(scanner.scan, scanner.range))
         if not muscle.any():
-            raise ValueError("There is no muscle in the image at end-diastole, so its noise cannot be set.")
+            raise ValueError("There is no muscle in the image at end-diastole, so realism.noise.snr_dB has no meaning.")
         echo, noise = scanner.lines(*self._medium.wall(0)), scanner.beamform(self.unit_noise(0))
         return float(np.linalg.norm(echo[muscle]) / np.linalg.norm(noise[muscle]))

@@ -1,0 +1,12 @@
+"""Read a repository: global longitudinal strain and ejection fraction of every heart in it.
+
+python examples/global_strain.py out/demo
+"""
+
+import sys
+
+import echotruth as et
+
+tree = et.open(sys.argv[1] if len(sys.argv) > 1 else "out/demo")
+table = tree["physiology"].to_dataset()[["longitudinal_strain", "ejection_fraction"]].to_dataframe()
+print((100 * table).round(1).to_string())

@@ -1,0 +1,73 @@
+"""The exact sum: every term of every pair of elements and frequency in float64, written from the formulas alone.
+
+It is what :class:`~echotruth.imaging.rf.full_matrix.FullMatrix` approximates, and serves to measure its error:
+
+    S_ij(f) = P(f) sum_k a_k u_ki(f) u_kj(f)
+    u(f)    = D(f) E(f) exp(-alpha f r) exp(-2 pi i f r / c) / r
+    D(f)    = sinc(pi w f sin(theta) / c) cos(theta)
+    E(f)    = 1/H int exp(-i k [h^2/2 (1/r' - 1/F) - h y/r']) dh,  k = 2 pi f / c,
+
+with the pulse P, the amplitude a, and for each element its distance r and angle theta to a scatterer at elevation y,
+its range r' in the plane of the image, width w, height H and elevation focus F, and the attenuation alpha.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.arrays import Floats
+from echotruth.config import Probe
+from echotruth.imaging.rf.probe import element_centres, pulse_spectrum
+
+Spectra = NDArray[np.complex128]
+
+
+def exact_matrix(
+    probe: Probe, position: Floats, amplitude: Floats, frequency: Floats, *, elevation: bool = True
+) -> Spectra:
+    """Echoes S between all pairs.
+
+    Parameters
+    ----------
+    probe : Probe
+    position : ndarray of shape (scatterers, 3), m
+        Lateral, axial, elevation.
+    amplitude : ndarray of shape (scatterers,)
+    frequency : ndarray of shape (bins,), Hz
+    elevation : bool
+        Whether the lens is there; without it E = 1.
+
+    Returns
+    -------
+    ndarray of shape (bins, elements, elements), 1/m^2
+    """
+    waves = (one_way(probe, position, f, elevation=elevation) for f in frequency)
+    pulse = pulse_spectrum(probe, frequency)
+    return np.array([p * (wave * amplitude) @ wave.T for p, wave in zip(pulse, waves, strict=True)])
+
+
+def one_way(probe: Probe, position: Floats, frequency: float, *, elevation: bool = True) -> Spectra:
+    """Wave u of every element at every scatterer (n, 3), m, at a frequency, Hz: (elements, scatterers), 1/m."""
+    p = probe.si()
+    lateral = position[:, 0] - element_centres(probe)[:, None]
+    distance = np.sqrt(lateral**2 + position[:, 1] ** 2 + position[:, 2] ** 2)
+    # NumPy's sinc(x) is sin(pi x) / (pi x).
+    directivity = np.sinc(p.width * frequency / p.sound_speed * lateral / distance) * position[:, 1] / distance
+    attenuation = probe.attenuation_dB_per_cm_MHz * 100 / 1e6 * np.log(10) / 20  # nepers per metre and hertz
+    wave = directivity * np.exp(-(attenuation + 2j * np.pi / p.sound_speed) * frequency * distance) / distance
+    return wave * fresnel(probe, position, frequency) if elevation else wave
+
+
+def fresnel(probe: Probe, position: Floats, frequency: float) -> Spectra:
+    """Response E of the lens of every element to every scatterer: (elements, scatterers); as :func:`one_way`."""
+    p = probe.si()
+    range_ = np.hypot(position[:, 0] - element_centres(probe)[:, None], position[:, 1])
+    defocus, slope = 1 / range_ - 1 / p.elevation_focus, position[:, 2] / range_
+    wavenumber = 2 * np.pi * frequency / p.sound_speed
+    phase = wavenumber * p.height / 2 * (np.abs(slope).max() + np.abs(defocus).max() * p.height / 4)
+    node, weight = np.polynomial.legendre.leggauss(32 + int(phase))
+    response = np.zeros(range_.shape, complex)
+    for h, part in zip(node * p.height / 2, weight / 2, strict=True):
+        response += part * np.exp(-1j * wavenumber * (h**2 / 2 * defocus - h * slope))
+    return response

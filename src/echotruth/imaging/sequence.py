@@ -1,0 +1,77 @@
+"""A sequence: all frames of one view, from the scatterers to the lines."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.config import Config
+from echotruth.heart import Heart
+from echotruth.imaging.acquisition import Acquisition
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.medium.medium import Arrays, Medium, seed_medium
+from echotruth.imaging.medium.random_process import Random
+from echotruth.imaging.recorder import RfRecorder
+from echotruth.imaging.view import Plane
+from echotruth.loop.cycle import read_loop
+
+logger = logging.getLogger("echotruth")
+
+
+class Sequence:
+    """A heart before a probe, imaged frame by frame.
+
+    Parameters
+    ----------
+    config : Config
+        The sections phantom, probe, rf, realism and bmode are used, and the times of the loop.
+    heart : Heart
+    plane : Plane
+        Where the probe stands, as :func:`echotruth.imaging.view.imaging_plane` places it.
+    random : Random
+        Makes a generator of random numbers for each purpose.
+
+    Attributes
+    ----------
+    scanner : Scanner
+    """
+
+    def __init__(self, config: Config, heart: Heart, plane: Plane, random: Random) -> None:
+        self._config, self._heart, self._plane, self._random = config, heart, plane, random
+        self.scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+
+    def scatterers(self) -> Arrays:
+        """Draw the scatterers of the view; see :func:`echotruth.imaging.medium.medium.seed_medium`."""
+        return seed_medium(self._config, self._heart, self._plane, self._random, self.scanner.matrix.in_beam)
+
+    def acquisition(self, scatterers: Arrays) -> Acquisition:
+        """Return what makes the full matrix of any frame."""
+        time = read_loop(self._config.loop).time
+        medium = Medium(self._config, self._heart, self._plane, time=time, seeded=scatterers, random=self._random)
+        return Acquisition(self._config, self.scanner, medium, self._random)
+
+    def lines(self, scatterers: Arrays, recorder: RfRecorder | None = None) -> NDArray[np.complex64]:
+        """Image all frames.
+
+        Parameters
+        ----------
+        scatterers : dict of ndarray
+            As :meth:`scatterers` returns them.
+        recorder : RfRecorder, optional
+            It is given the full matrix of every frame.
+
+        Returns
+        -------
+        ndarray of shape (frame, lines, ranges), complex64
+            Demodulated lines, as of :meth:`echotruth.imaging.beamforming.scanner.Scanner.lines`.
+        """
+        acquire, frames, lines = self.acquisition(scatterers), len(self._heart.displacement), []
+        for frame in range(frames):
+            matrix = acquire(frame)
+            if recorder:
+                recorder.add(frame, matrix)
+            lines.append(self.scanner.beamform(matrix))
+            logger.info("frame %d of %d", frame + 1, frames)
+        return np.stack(lines)

@@ -1,0 +1,55 @@
+"""Every example runs, and comes to its physical number."""
+
+import runpy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from echotruth.config import Config
+from echotruth.loop.cycle import read_loop
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def run(name):
+    return runpy.run_path(str(EXAMPLES / f"{name}.py"))
+
+
+def test_heart_ejects_what_its_loop_prescribes():
+    volume = read_loop(Config(loop={"frames": 10}).loop).volume
+    found = run("ejection_fraction")["ejection_fraction"]
+    assert found == pytest.approx(1 - volume.min() / volume[0], abs=2e-3)
+    assert 0.5 < found < 0.7  # mice: 0.55 to 0.70 (Vinhas 2013)
+
+
+def test_infarct_is_stretched_while_the_rest_shortens():
+    found = run("infarct")
+    assert found["infarct"] > 0.02
+    assert found["remote"] < -0.05
+
+
+def test_cross_section_of_a_tube_that_keeps_its_volume_grows_as_it_shortens():
+    assert run("incompressible_tube")["area_ratio"] == pytest.approx(1 / 0.85, rel=0.01)
+
+
+def test_echo_of_a_point_is_as_long_as_the_pulse():
+    found = run("point_spread")
+    assert found["length"] == pytest.approx(found["due"], rel=0.03)
+
+
+def test_speckle_is_rayleigh_distributed():
+    assert run("speckle")["snr"] == pytest.approx(np.sqrt(np.pi / (4 - np.pi)), rel=0.05)
+
+
+def test_tracker_finds_the_motion_that_one_at_rest_misses():
+    rest, dis = sorted(run("own_tracker")["errors"].values(), reverse=True)
+    assert rest == pytest.approx(100, abs=0.1)
+    assert dis < 25
+
+
+def test_example_of_a_repository_says_how_to_get_one(monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["global_strain.py", "out/none"])
+    with pytest.raises(FileNotFoundError, match="give the folder that a run made"):
+        run("global_strain")
