@@ -26,7 +26,6 @@ MOUSE, HUMAN = "mouse, 25 MHz", "human, 2.72 MHz"
 
 SPEED = {
     "ours": 20000,
-    "ours, 1e-3": 20000,
     "ours, elevation": 20000,
     "PyMUST": 1000,
     "PyMUST, elevation": 200,
@@ -40,7 +39,7 @@ SPEED = {
 THICK = ("ours, elevation", "PyMUST, elevation", "PyMUST as it comes, elevation", "eSDIva, elevation")
 """Those whose scatterers fill a slab; those of the others lie in the plane of the image."""
 
-IN_PLANE = ("ours", "ours, 1e-3")
+IN_PLANE = ("ours",)
 
 TRANSMITS = (1, 8, 128)
 FRAME = 10000
@@ -48,7 +47,6 @@ FRAME = 10000
 
 GROWTH = {
     "ours": (1000, 10000, 100000, 1000000),
-    "ours, 1e-3": (1000, 10000, 100000, 1000000),
     "ours, elevation": (1000, 10000, 100000, 1000000),
     "PyMUST": (100, 1000, 10000),
     "PyMUST as it comes": (100, 1000, 10000),

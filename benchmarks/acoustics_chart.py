@@ -9,7 +9,6 @@ Result = dict[str, Any]
 
 STYLES = {
     "ours": ("o-", "tab:blue", "ours, 64 transmits"),
-    "ours, 1e-3": ("o--", "tab:blue", "ours, 64 transmits, accuracy 1e-3"),
     "ours, elevation": ("o:", "tab:blue", "ours with elevation, 64 transmits"),
     "PyMUST": ("s-", "tab:orange", "PyMUST, 1 transmit"),
     "PyMUST, elevation": ("s--", "tab:orange", "PyMUST with elevation, 1 transmit"),

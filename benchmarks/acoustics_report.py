@@ -11,7 +11,7 @@ from report import page, table
 Result = dict[str, Any]
 Lines = list[str]
 
-MATRIX = ("ours", "ours, 1e-3", "ours, elevation", "eSDIva, matrix")
+MATRIX = ("ours", "ours, elevation", "eSDIva, matrix")
 """Parties that give all elements to all elements; the others give one transmit."""
 
 

@@ -21,10 +21,9 @@ from echotruth.cases import generator
 from echotruth.config import Probe, Rf
 from echotruth.evaluation.clip import Clip, grid_points
 from echotruth.evaluation.scoring import ground_truth, score
-from echotruth.imaging.acquisition import Acquisition
-from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import bmode_clip
-from echotruth.imaging.medium.medium import Medium, seed_medium
+from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
 from echotruth.tracking.tracker import track
@@ -57,12 +56,9 @@ def clips(job: Job, density: float) -> dict[int, np.ndarray]:
     config = config.model_copy(update={"phantom": phantom})
     plane = Plane(**job.read("phantom", "origin", "axes"))
     random = partial(generator, job.case, job.view_name)
-    scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
-    seeded = seed_medium(config, heart, plane, random, scanner.matrix.in_beam)
-    medium = Medium(config, heart, plane, time=read_loop(config.loop).time, seeded=seeded, random=random)
-    acquire = Acquisition(config, scanner, medium, random)
-    lines = np.stack([scanner.beamform(acquire(frame)) for frame in range(len(heart.displacement))])
-    return bmode_clip(lines, scanner.scan, scanner.range, config.bmode)
+    sequence = Sequence(config, heart, plane, random)
+    lines = sequence.lines(sequence.scatterers())
+    return bmode_clip(lines, sequence.scanner.scan, sequence.scanner.range, config.bmode)
 
 
 def errors(job: Job, images: dict[int, np.ndarray], tracker: str) -> list[float]:

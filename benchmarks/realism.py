@@ -24,11 +24,8 @@ from echotruth.config import Config, Rf
 from echotruth.config.loading import load
 from echotruth.fem.location import locate
 from echotruth.heart import Heart
-from echotruth.imaging.acquisition import Acquisition
-from echotruth.imaging.beamforming.scan import imaging_depth
-from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import bmode_clip, pixel_centres
-from echotruth.imaging.medium.medium import Medium, seed_medium
+from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.view import Plane, imaging_plane
 
 HERE = Path(__file__).parent
@@ -125,10 +122,8 @@ def random(name: str) -> np.random.Generator:
 
 def pictures(config: Config, beating: Heart, time: np.ndarray, where: Plane) -> Iterator[np.ndarray]:
     """Lines of two frames in a row, and so on through the cycle: (2, lines, ranges)."""
-    scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
-    seeded = seed_medium(config, beating, where, random, scanner.matrix.in_beam)
-    medium = Medium(config, beating, where, time=time, seeded=seeded, random=random)
-    acquire = Acquisition(config, scanner, medium, random)
+    sequence = Sequence(config, beating, where, random, time)
+    scanner, acquire = sequence.scanner, sequence.acquisition(sequence.scatterers())
     show = partial(bmode_clip, scan=scanner.scan, range_=scanner.range, bmode=config.bmode)
     lines = [scanner.beamform(acquire(k + more)) for k in range(0, FRAMES - 1, EVERY) for more in (0, 1)]
     yield from show(np.stack(lines))[SIZE]

@@ -14,7 +14,7 @@ class ExactRecord:
     As `FullMatrix`; the record is so long that it does for all transmits.
     """
 
-    def __init__(self, probe, depth, latest, accuracy=0.0, elevation=True):
+    def __init__(self, probe, depth, latest, elevation=True):
         p = probe.si()
         self.samples, self.sampling = 2160, p.sampling
         self.centres = (np.arange(p.elements) - (p.elements - 1) / 2) * p.pitch

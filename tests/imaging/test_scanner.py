@@ -191,7 +191,7 @@ def correlation(still, moved, lag):
 
 def recovered_shift(depth, pivot, shift, **keys):
     """Lateral motion of speckle over that of its scatterers, by the correlation of the images of 24 blocks."""
-    rf = Rf(lines=TURN_LINES, sector_deg=18, elevation=False, accuracy=1e-3, **keys)
+    rf = Rf(lines=TURN_LINES, sector_deg=18, elevation=False, **keys)
     scanner = Scanner(Probe(elements=32, pitch_um=92.0), rf, depth + 1e-3)
     near = np.abs(scanner.range - depth) < 0.3e-3
     match = np.zeros(len(TURN_LAGS))

@@ -3,8 +3,7 @@
 from functools import partial
 
 from echotruth.cases import generator
-from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
-from echotruth.imaging.medium.medium import seed_medium
+from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import cavity_centroid
 from echotruth.imaging.view import imaging_plane
 from echotruth.workflow.job import Job, Result, main
@@ -13,8 +12,7 @@ from echotruth.workflow.job import Job, Result, main
 def work(job: Job) -> Result:
     heart, config = job.heart, job.case.config
     plane = imaging_plane(job.view, config.rf, heart.positions(0)[heart.endo.ravel()])
-    scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
-    scatterers = seed_medium(config, heart, plane, partial(generator, job.case, job.view_name), scanner.matrix.in_beam)
+    scatterers = Sequence(config, heart, plane, partial(generator, job.case, job.view_name)).scatterers()
     job.save_scratch(**scatterers)
     centre, number = cavity_centroid(heart, plane), len(scatterers["amplitude"])
     return {"phantom": {"scatterers": number, "origin": plane.origin, "axes": plane.axes, "centre": centre}}

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
 from echotruth.section import Fraction, Positive, Section, invalid
-
-
-def _number(value: Any) -> Any:
-    """Convert text such as 2e-5 to a number: YAML reads it as a number only with a decimal point."""
-    try:
-        return float(value) if isinstance(value, str) else value
-    except ValueError:
-        return value
 
 
 class View(Section):
@@ -79,13 +71,11 @@ class Rf(Section):
     """Apodization on receive and, if focused or synthetic aperture, on transmit."""
     f_number: Annotated[FiniteFloat, Field(ge=0, le=20)] = 0.0
     """Smallest F-number, on receive and focused transmit; 0 uses the whole array at every range."""
-    accuracy: Annotated[FiniteFloat, BeforeValidator(_number), Field(ge=2e-5, le=1e-3)] = 2e-5
-    """Largest relative error (L2) of the RF against the exact sum; 1e-3 is faster. Applies only without `elevation`,
-    whose own error is greater: 1.5 % beyond one aperture, or beyond two with the tall lens of a human's array, and
-    some per cent nearer or, with attenuation, far from the plane."""
     elevation: bool = True
     """Include scatterers off the imaging plane, with the lens's elevation beam; `false` makes the elements infinitely
-    tall."""
+    tall. The error of the RF against the exact sum (relative, L2) is 1.5 % beyond one aperture, or beyond two with the
+    tall lens of a human's array, and some per cent nearer or, with attenuation, far from the plane; without the lens it
+    is 2e-5."""
     keep: list[Literal["lines", "channels"]] = Field(default=[])
     """RF to keep in the repository: `lines`, demodulated, and `channels`, the echoes in every element of each element
     transmitting alone (full matrix), from which any transmit can be synthesised."""

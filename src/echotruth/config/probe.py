@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     Filled = Annotated[T, "never None once validated"]
 else:
     Filled = Optional[T]  # noqa: UP045
+"""Type of a key that may be null in a file; the section then has the value of the preset."""
 
 FROM_PRESET: Any = None
 

@@ -16,7 +16,7 @@ from scipy import fft
 from echotruth.config import Config
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES
-from echotruth.imaging.rf.full_matrix import FullMatrix
+from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
 
 LENS_ACCURACY = 0.015
 """Relative error (L2) of the RF under a lens, from `FullMatrix.accurate_from` on; see docs/conventions.md."""
@@ -143,5 +143,5 @@ def _settings(config: Config) -> dict[str, Any]:
         "scan": rf.scan,
         "apodization": rf.apodization,
         "f_number": rf.f_number,
-        "accuracy": LENS_ACCURACY if rf.elevation else rf.accuracy,
+        "accuracy": LENS_ACCURACY if rf.elevation else PLANE_ACCURACY,
     }

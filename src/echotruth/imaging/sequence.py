@@ -7,6 +7,7 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
+from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.acquisition import Acquisition
@@ -26,20 +27,23 @@ class Sequence:
     Parameters
     ----------
     config : Config
-        The sections phantom, probe, rf, realism and bmode are used, and the times of the loop.
+        The sections phantom, probe, rf, realism, bmode and loop are used.
     heart : Heart
     plane : Plane
         Where the probe stands, as :func:`echotruth.imaging.view.imaging_plane` places it.
     random : Random
         Makes a generator of random numbers for each purpose.
+    time : ndarray of shape (frame,), s, optional
+        Of the frames. Default: those of the loop.
 
     Attributes
     ----------
     scanner : Scanner
     """
 
-    def __init__(self, config: Config, heart: Heart, plane: Plane, random: Random) -> None:
+    def __init__(self, config: Config, heart: Heart, plane: Plane, random: Random, time: Floats | None = None) -> None:
         self._config, self._heart, self._plane, self._random = config, heart, plane, random
+        self._time = read_loop(config.loop).time if time is None else time
         self.scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
 
     def scatterers(self) -> Arrays:
@@ -48,8 +52,7 @@ class Sequence:
 
     def acquisition(self, scatterers: Arrays) -> Acquisition:
         """Return what makes the full matrix of any frame."""
-        time = read_loop(self._config.loop).time
-        medium = Medium(self._config, self._heart, self._plane, time=time, seeded=scatterers, random=self._random)
+        medium = Medium(self._config, self._heart, self._plane, time=self._time, seeded=scatterers, random=self._random)
         return Acquisition(self._config, self.scanner, medium, self._random)
 
     def lines(self, scatterers: Arrays, recorder: RfRecorder | None = None) -> NDArray[np.complex64]:

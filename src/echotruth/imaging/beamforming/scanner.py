@@ -53,7 +53,7 @@ class Scanner:
         zones = TRANSMIT_SEQUENCES[rf.transmit](probe, rf, self.scan).zones(self.range)
         latest = max(np.abs(zone.transmits.delay).max() for zone in zones)
         farthest = np.hypot(*sample_positions(self.scan, self.range)).max()
-        self.matrix = FullMatrix(probe, farthest, latest, rf.accuracy, rf.elevation)
+        self.matrix = FullMatrix(probe, farthest, latest, rf.elevation)
         self._sampling = channel_sampling(self.matrix)
         self._zones = [_ZoneBeamformer(probe, rf, self, zone) for zone in zones]
         self.frequency = self._zones[0].synthesis.frequency

@@ -32,21 +32,21 @@ from echotruth.imaging.rf.product import padded
 
 BLOCK = 256
 """Scatterers spread at a time."""
-FINE, FAST, LENS, WIDE, NEAR = 3, 2, 1, 4, spreading.SUBAPERTURES
-"""Schemes of the kernels' tables (see :data:`.spreading.COEFFICIENTS`) for an error of 2e-5 and of 1e-3 in the plane,
-and under a lens, there also for elements wider than `MAX_NARROW_WIDTH` and for scatterers that each subaperture looks
-up for itself."""
+PLANE, LENS, WIDE, NEAR = 2, 1, 3, spreading.SUBAPERTURES
+"""Schemes of the kernels' tables (see :data:`.spreading.COEFFICIENTS`): in the plane, and under a lens, there also for
+elements wider than `MAX_NARROW_WIDTH` and for scatterers that each subaperture looks up for itself."""
+PLANE_ACCURACY = 2e-5
+"""Relative error (L2) against the exact sum without the lens, within 32 degrees."""
 LENS_SPECTRA, PAIR_SPECTRA = (0, 0, 0, 0, 1, 1, 2), (0, 1, 2, 2, 0, 1, 0)
 """By the number of a term: the spectrum of :func:`.lens_spectra` and that of :func:`.directivity.pair_spectra` whose
 product it is."""
 MAX_NARROW_WIDTH = 0.75
 """Width of an element, in wavelengths, up to which its directivity hardly changes with frequency."""
-MAX_BAND, SHARPNESS = {FINE: 0.32, FAST: 0.41}, {FINE: 20.0, FAST: 15.0}
-"""Greatest frequency of the pulse over the sampling frequency of the grid, and sharpness of the window."""
-FINE_ACCURACY = 1e-4
-"""Accuracy below which the tables are `FINE`."""
-CLUSTER_TOLERANCE = {FINE: 1e-6, FAST: 2e-4, LENS: 1e-3, WIDE: 1e-3}
-"""By the scheme: too little to be seen in the error."""
+MAX_BAND, SHARPNESS = (0.32, 0.41), (20.0, 15.0)
+"""Greatest frequency of the pulse over the sampling frequency of the grid, and sharpness of the window: without and
+with the lens."""
+CLUSTER_TOLERANCE = (1e-6, 1e-3)
+"""Likewise: too little to be seen in the error."""
 
 
 class FullMatrix:
@@ -60,12 +60,11 @@ class FullMatrix:
         Greatest range of interest, m. Scatterers farther than this and half a pulse are left out.
     max_delay : float
         Greatest delay, early or late, that will be added to the echoes, s.
-    accuracy : float
-        Relative error (L2) that is allowed against the exact sum without the lens: 2e-5 or 1e-3.
     elevation : bool
-        Whether the lens is there; without it, echoes are those of strips without end, and positions still in space.
-        Under the lens the error is 1.5 % beyond one aperture, most of it in what is far beside the plane; before an
-        array as tall as a human's, where echoes are longer than a kernel, some per cent up to two apertures.
+        Whether the lens is there; without it, echoes are those of strips without end, and positions still in space; the
+        error against the exact sum is then :data:`PLANE_ACCURACY`. Under the lens it is 1.5 % beyond one aperture, most
+        of it in what is far beside the plane; before an array as tall as a human's, where echoes are longer than a
+        kernel, some per cent up to two apertures.
 
     Attributes
     ----------
@@ -84,15 +83,12 @@ class FullMatrix:
         Greatest range of a scatterer.
     """
 
-    def __init__(
-        self, probe: Probe, depth: float, max_delay: float = 0.0, accuracy: float = 2e-5, elevation: bool = True
-    ) -> None:
+    def __init__(self, probe: Probe, depth: float, max_delay: float = 0.0, elevation: bool = True) -> None:
         p = probe.si()
         low, high = pulse_band(probe)
         self._width = p.width * p.frequency / p.sound_speed
-        in_plane = FINE if accuracy < FINE_ACCURACY and not elevation else FAST
-        self._scheme = (LENS if self._width <= MAX_NARROW_WIDTH else WIDE) if elevation else in_plane
-        grid = Grid(max(p.sampling, high / MAX_BAND[in_plane]), SHARPNESS[in_plane])
+        self._scheme = (LENS if self._width <= MAX_NARROW_WIDTH else WIDE) if elevation else PLANE
+        grid = Grid(max(p.sampling, high / MAX_BAND[elevation]), SHARPNESS[elevation])
         self.sampling = grid.sampling
         half_pulse = 4.5 / (2 * np.pi * spectral_width(probe))
         self.max_range = depth + p.sound_speed * half_pulse / 2
@@ -110,8 +106,7 @@ class FullMatrix:
         self._set_filters(probe, grid, low, high)
         band = _band(probe, grid, low, high)
         self._lens = Lens(probe, self.max_range, band) if elevation else None
-        tolerance = CLUSTER_TOLERANCE[self._scheme]
-        self._clusters = Clusters(self.centres, p.sound_speed, band, self.max_range, tolerance)
+        self._clusters = Clusters(self.centres, p.sound_speed, band, self.max_range, CLUSTER_TOLERANCE[elevation])
         self._tabulate(band, band.frequency / p.frequency)
 
     def _set_filters(self, probe: Probe, grid: Grid, low: float, high: float) -> None:

@@ -26,18 +26,17 @@ LEAD = 32
 
 COEFFICIENTS = {
     1: (3, 2, 0, 0, 2, 0, 0),
-    2: (2, 2, 1, 1, 0, 0, 0),
-    3: (3, 3, 2, 2, 1, 1, 0),
-    4: (3, 2, 2, 0, 2, 2, 0),
-    5: (3, 2, 2, 0, 2, 2, 2),
+    2: (3, 3, 2, 2, 1, 1, 0),
+    3: (3, 2, 2, 0, 2, 2, 0),
+    4: (3, 2, 2, 0, 2, 2, 2),
 }
 """Coefficients of the polynomial of each term, by the number of a scheme; each is a row of the table of a phase, the
 highest power first. The terms are multiplied by 1, e, e^2, e^3, g, g e and d: e is the sum of the spectral exponents b
 of the two elements, g the sum of their inverse-range offsets under a lens and (b_i - b_j)^2 in the plane, d the
 difference of these offsets."""
-PHASE_BITS = (0, 2, 4, 4, 2, 2)
+PHASE_BITS = (0, 2, 4, 2, 2)
 """By the number of a scheme: its polynomials are in the fraction of a sample within each of 2^bits phases."""
-SUBAPERTURES = 5
+SUBAPERTURES = 4
 """Scheme for echoes that each subaperture looks up for itself in the tables of the lens."""
 MAX_CORRECTION = 0.3
 """Greatest correction that an element makes to the response of its lens: logarithm of the amplitude, or radians."""
