@@ -36,7 +36,6 @@ import numpy as np
 import report
 from threadpoolctl import threadpool_limits
 
-from echotruth.cases import generator
 from echotruth.config.loading import load
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.scoring import ground_truth, score
@@ -50,6 +49,7 @@ from echotruth.loop.cycle import read_loop
 from echotruth.repository import ledger
 from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.section import Section
+from echotruth.seeds import generator
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job

@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 import speckle
 
-from echotruth.cases import generator
 from echotruth.config import Probe, Rf
 from echotruth.evaluation.clip import Clip, grid_points
 from echotruth.evaluation.scoring import ground_truth, score
@@ -26,6 +25,7 @@ from echotruth.imaging.bmode import bmode_clip
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
+from echotruth.seeds import generator
 from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job
 

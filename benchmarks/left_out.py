@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from echotruth.cases import generator
 from echotruth.fem.tetrahedra import MaterialPoints
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.medium.medium import seed_medium
@@ -22,6 +21,7 @@ from echotruth.imaging.medium.phantom import Scatterers
 from echotruth.imaging.rf import elevation
 from echotruth.imaging.view import Plane
 from echotruth.repository.ledger import record_path
+from echotruth.seeds import generator
 from echotruth.workflow.job import Job
 
 

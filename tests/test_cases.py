@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from echotruth.cases import case_id, expand, find_case, generator, table
+from echotruth.cases import case_id, expand, find_case, table
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError
+from echotruth.seeds import generator
 
 SWEEP = {"fibres.endo_deg": [60.0, 84.0], "seed": [1, 2]}
 

@@ -10,8 +10,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from echotruth.config import Config, Loop, Section
 from echotruth.config.loading import ConfigError, override
 from echotruth.section import unit_of
@@ -96,12 +94,6 @@ def table(cases: list[Case]) -> pd.DataFrame:
 
     rows = [{"case": case.id, "seed": case.config.seed, **_sweepable(case.config)} for case in cases]
     return pd.DataFrame(rows)
-
-
-def generator(case: Case, view: str, stage: str) -> np.random.Generator:
-    """Random generator of one stage, seeded by case, view and stage alone."""
-    key = json.dumps([case.config.seed, case.id, view, stage]).encode()
-    return np.random.default_rng(np.frombuffer(sha256(key).digest(), np.uint32))
 
 
 def _combinations(config: Config) -> Iterator[dict[str, Any]]:

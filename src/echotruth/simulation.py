@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from echotruth.cases import Case, generator
+from echotruth.cases import Case
 from echotruth.config import Config, Probe, View
 from echotruth.config.loading import read_yaml, validate
 from echotruth.config.tracking import External
@@ -27,6 +27,7 @@ from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import simulate
 from echotruth.repository import schema
+from echotruth.seeds import generator
 from echotruth.tracking.tracker import track as track_points
 from echotruth.tracking.windows import grid
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import pearsonr
 
 from echotruth.evaluation.agreement import compare, limits_of_agreement
-from echotruth.evaluation.displacement import WallPoints
+from echotruth.evaluation.displacement_error import WallPoints
 
 COUNT = 60
 LAYER, SEGMENT = np.tile(np.arange(1, 7), 10), np.repeat(np.arange(7, 12), 12)

@@ -25,6 +25,7 @@ from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
+from echotruth.repository.checksums import checksums
 from echotruth.repository.ledger import record_path
 from echotruth.repository.store import Store
 from echotruth.tracking import grid
@@ -107,7 +108,7 @@ def write_clip(folder, store, case, index, beating, view):
         store.write(f"bmode/{size}", {"image": random.integers(0, 256, (len(COURSE), size, size))}, *index)
     for stage in ("truth", "bmode"):
         files = [file for size in CONFIG.bmode.sizes for file in store.files(f"{stage}/{size}", *index)]
-        record = {"status": "complete", "sha256": ledger.checksums(files, store.path)}
+        record = {"status": "complete", "sha256": checksums(files, store.path)}
         ledger.commit(record_path(folder, stage, case, view), record)
 
 

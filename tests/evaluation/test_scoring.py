@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from echotruth.evaluation.displacement import WallPoints
+from echotruth.evaluation.displacement_error import WallPoints
 from echotruth.evaluation.polar import directions
 from echotruth.evaluation.scoring import Truth, metrics, score
 from echotruth.evaluation.strain import StrainOperator

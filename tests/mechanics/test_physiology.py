@@ -5,15 +5,8 @@ import pytest
 
 from echotruth.config import Config, Fibres, Geometry, Loop, Physiology
 from echotruth.mechanics.beat import beat
-from echotruth.mechanics.physiology import (
-    APICAL_SLICE,
-    BASAL_SLICE,
-    BOUNDS,
-    measures,
-    slice_rotation,
-    twist,
-    violated_bound,
-)
+from echotruth.mechanics.physiology import BOUNDS, measures, violated_bound
+from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, slice_rotation, twist
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
 WELL = {

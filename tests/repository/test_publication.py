@@ -16,8 +16,9 @@ from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Ph
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
+from echotruth.repository.checksums import ChecksumError
 from echotruth.repository.ledger import GATES, VIEW_STAGES
-from echotruth.repository.publication import ChecksumError, publish
+from echotruth.repository.publication import publish
 from echotruth.repository.store import Store, schema_of
 from echotruth.tracking import grid
 from echotruth.workflow.cost import Cost

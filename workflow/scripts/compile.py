@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 from cases import lay_out
 
-from echotruth.cases import expand, generator
+from echotruth.cases import expand
 from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.mechanics.prescribed import prescribed_motion
+from echotruth.seeds import generator
 from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job, Result, parser, run
 from echotruth.workflow.miniature import miniature

@@ -7,7 +7,8 @@ from echotruth.mechanics.geometry import GeometryError
 from echotruth.mechanics.pathology import PathologyError
 from echotruth.mechanics.prescribed import MotionError
 from echotruth.mechanics.solver.newton import Diverged
-from echotruth.workflow.job import CaseFailed, Job, Result, main
+from echotruth.workflow.failure import CaseFailed
+from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:

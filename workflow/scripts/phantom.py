@@ -2,10 +2,10 @@
 
 from functools import partial
 
-from echotruth.cases import generator
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import cavity_centroid
 from echotruth.imaging.view import imaging_plane
+from echotruth.seeds import generator
 from echotruth.workflow.job import Job, Result, main
 
 

@@ -5,7 +5,8 @@ import sys
 from pathlib import Path
 
 from echotruth.repository import ledger
-from echotruth.repository.publication import ChecksumError, publish
+from echotruth.repository.checksums import ChecksumError
+from echotruth.repository.publication import publish
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")

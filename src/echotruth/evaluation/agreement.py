@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from echotruth.evaluation import statistics
-from echotruth.evaluation.displacement import WallPoints
+from echotruth.evaluation.displacement_error import WallPoints
 
 REFERENCES = ("heart", "plane", "operator")
 """Reference strains, all at the same material points: E = (F^T F - I) / 2 in space along the wall's axes; E of the part

@@ -1,4 +1,7 @@
-"""Score of a tracker on one clip, and the metrics of the leaderboard made from it."""
+"""Score of a tracker on one clip, and the metrics of the leaderboard made from it.
+
+The formulas stand in :mod:`.displacement_error` (NRMSE and others), :mod:`.agreement` (strain) and :mod:`.statistics`.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ import numpy as np
 from echotruth.evaluation import statistics
 from echotruth.evaluation.agreement import REFERENCES, compare
 from echotruth.evaluation.clip import grid_points
-from echotruth.evaluation.displacement import WallPoints, evaluate
+from echotruth.evaluation.displacement_error import WallPoints, evaluate
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
@@ -139,9 +142,9 @@ def score(tracked: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
     Returns
     -------
     dict of ndarray
-        The results of :func:`.displacement.evaluate` and :func:`.agreement.compare`, and tracked_strain (frame, grid
-        rows, grid columns, 3: radial, tangential, shear) and through_plane_correlation (): of the length of the error
-        with the displacement out of the plane, at ES; NaN where either is the same at all points.
+        The results of :func:`.displacement_error.evaluate` and :func:`.agreement.compare`, and tracked_strain (frame,
+        grid rows, grid columns, 3: radial, tangential, shear) and through_plane_correlation (): of the length of the
+        error with the displacement out of the plane, at ES; NaN where either is the same at all points.
     """
     displacement = np.asarray(tracked, float)[:, truth.inside]
     strain, es = truth.operator.strain(displacement), truth.es

@@ -8,14 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from echotruth.arrays import Floats
 from echotruth.config.physiology import Physiology
+from echotruth.mechanics.twist import twist
 
 Arrays = dict[str, NDArray]
-
-BASAL_SLICE, APICAL_SLICE = 0.2, 0.8
-"""Slices whose rotation makes the twist: distance from the base plane, over that of the endocardial apex."""
-_HALF_SLICE = 0.1
 
 CC, LL = 1, 2
 """Index of the circumferential and the longitudinal component of strain."""
@@ -83,47 +79,6 @@ def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays) -> Arrays:
         "tension_min": tension.min(),
         "tension_es": tension[es],
     }
-
-
-def twist(unloaded: Floats, endo: NDArray[np.integer], positions: Floats) -> Floats:
-    """Rotation of the apex less that of the base since end-diastole.
-
-    Parameters
-    ----------
-    unloaded : ndarray of shape (n_nodes, 3), m
-    endo : ndarray of shape (n_facets, 6)
-        Nodes of the endocardial triangles.
-    positions : ndarray of shape (n_frames, n_nodes, 3), m
-
-    Returns
-    -------
-    ndarray of shape (n_frames,), rad
-        Positive where the apex turns counter-clockwise seen from the apex, as it does in health
-        (Young & Cowan 2012); between frames it may turn by less than half a turn.
-    """
-    height = unloaded[:, 2] / unloaded[endo, 2].min()
-    slices = (np.abs(height - centre) <= _HALF_SLICE for centre in (APICAL_SLICE, BASAL_SLICE))
-    apex, base = (slice_rotation(positions[:, nodes, :2]) for nodes in slices)
-    return base - apex  # the long axis points to the base: seen from the apex, rotation about it is clockwise
-
-
-def slice_rotation(points: Floats) -> Floats:
-    """Least-squares rotation of a slice about its centroid since the first frame.
-
-    Parameters
-    ----------
-    points : ndarray of shape (n_frames, n_points, 2), m
-
-    Returns
-    -------
-    ndarray of shape (n_frames,), rad
-        Counter-clockwise, and continuous beyond half a turn.
-    """
-    arms = points - points.mean(axis=1, keepdims=True)
-    first = arms[0]
-    dot = np.sum(first * arms, axis=(1, 2))
-    cross = np.sum(first[:, 0] * arms[..., 1] - first[:, 1] * arms[..., 0], axis=1)
-    return np.unwrap(np.arctan2(cross, dot))
 
 
 def violated_bound(measured: dict[str, ArrayLike], bounds: Physiology) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -36,11 +35,6 @@ def commit(path: Path, record: dict[str, Any]) -> None:
 def read(path: Path) -> dict[str, Any]:
     """Read a record."""
     return json.loads(path.read_text(encoding="utf-8"))
-
-
-def checksums(files: list[Path], root: Path) -> dict[str, str]:
-    """SHA-256 of each file by its path below `root`."""
-    return {file.relative_to(root).as_posix(): sha256(file.read_bytes()).hexdigest() for file in files}
 
 
 def rows(registry: Path) -> dict[str, int]:

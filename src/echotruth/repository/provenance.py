@@ -17,7 +17,7 @@ import echotruth
 PACKAGES = ("numpy", "scipy", "numba", "scikit-image", "pypardiso", "mkl", "meshio", "vtk", "xarray", "zarr")
 """Packages whose version may affect the numbers, besides OpenCV, which is installed under several names."""
 
-_EXCLUDED = ("echotruth.config", "echotruth.cases", "echotruth.repository.provenance", "echotruth.repository")
+_EXCLUDED = ("echotruth.config", "echotruth.cases", "echotruth.repository", "echotruth.workflow")
 """Modules that pass on settings and results without affecting them: a change of these reruns nothing."""
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +9,10 @@ from echotruth.cases import expand
 from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.repository import ledger
+from echotruth.repository.checksums import verify
 from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
 from echotruth.repository.provenance import packages
 from echotruth.repository.store import Store
-
-
-class ChecksumError(ValueError):
-    """A file that is missing or differs from what its job wrote."""
 
 
 def publish(folder: Path) -> dict[str, Any]:
@@ -41,7 +37,7 @@ def publish(folder: Path) -> dict[str, Any]:
     store = Store(folder / f"{config.name}.zarr")
     rows = ledger.rows(folder / "registry.txt")
     records = {case.id: _records(folder, config, case.id) for case in expand(config)}
-    files = sum(_verify(store.path, path, ledger.read(path)) for paths in records.values() for path in paths)
+    files = sum(verify(store.path, path, ledger.read(path)) for paths in records.values() for path in paths)
     verdicts = {case: _verdict(paths) for case, paths in records.items()}
     retired = {"status": "retired", "reason": "not a case of this configuration"}
     for column in ("status", "reason"):
@@ -61,15 +57,6 @@ def _records(folder: Path, config: Config, case: str) -> list[Path]:
     """Paths of the records of a case: those of the gates, then those of the views."""
     gates = [record_path(folder, stage, case) for stage in GATES]
     return gates + [record_path(folder, stage, case, view) for stage in VIEW_STAGES for view in config.views]
-
-
-def _verify(root: Path, path: Path, record: dict[str, Any]) -> int:
-    """Compare the files of a record with their checksums; returns their number."""
-    for name, expected in record.get("sha256", {}).items():
-        file = root / name
-        if not file.is_file() or sha256(file.read_bytes()).hexdigest() != expected:
-            raise ChecksumError(f"{file}: is missing or differs from what its job wrote: delete {path} and run again")
-    return len(record.get("sha256", {}))
 
 
 def _attributes(config: Config, records: dict[str, list[Path]]) -> dict[str, Any]:

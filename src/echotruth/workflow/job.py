@@ -15,23 +15,22 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from echotruth.cases import Case, find_case, generator
+from echotruth.cases import Case, find_case
 from echotruth.config import View
 from echotruth.config.loading import load
 from echotruth.heart import Heart
 from echotruth.repository import ledger, schema
+from echotruth.repository.checksums import checksums
 from echotruth.repository.ledger import GATES, record_path
 from echotruth.repository.provenance import code_version
 from echotruth.repository.store import NotWritten, Store, Values
+from echotruth.seeds import generator
 from echotruth.workflow.compiled import lock_cache_writes
 from echotruth.workflow.cost import Cost
+from echotruth.workflow.failure import CaseFailed
 
 Result = dict[str, Values]
 log = logging.getLogger("echotruth")
-
-
-class CaseFailed(ValueError):
-    """A case has no solution; the failure is recorded and the other cases continue."""
 
 
 class Job:
@@ -134,7 +133,7 @@ class Job:
         for group, values in result.items():
             self.store.write(group, values, *self.index)
             files += self.store.files(group, *self.index)
-        sha256 = ledger.checksums(files, self.store.path)
+        sha256 = checksums(files, self.store.path)
         spent = cost.stop()
         self._record(**self.verdict, **spent, frames=self.case.config.loop.frames, sha256=sha256)
         return spent

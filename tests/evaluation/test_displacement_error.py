@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from echotruth.evaluation.displacement import WallPoints, evaluate, transmural_gradient
+from echotruth.evaluation.displacement_error import WallPoints, evaluate, transmural_gradient
 from echotruth.evaluation.polar import directions, resolve
 
 ORIGIN = np.array([1e-3, 6e-3])
