@@ -23,7 +23,7 @@ Seconds = dict[str, dict[str, float]]
 
 def scan(array: Array, **changes: Any) -> tuple[Rf, Bmode]:
     """Lines of one focus and an image that suit an array."""
-    rf = Rf(focus_mm=1e3 * array.focus, zones=1, sector_deg=np.rad2deg(SECTOR), **changes)
+    rf = Rf(focus_mm=1e3 * array.focus, focal_zones=1, sector_deg=np.rad2deg(SECTOR), **changes)
     return rf, Bmode(field_of_view_mm=1e3 * array.far)
 
 

@@ -15,8 +15,8 @@ from echotruth.fem.tetrahedra import Floats, Mesh, shape
 from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.mechanics import fibres
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver import drive
 from echotruth.mechanics.solver.activation import Activation
+from echotruth.mechanics.solver.cycle import fill_to_end_diastole, solve
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
 from echotruth.mechanics.solver.newton import LoadStepper
 from echotruth.mechanics.solver.support import base_support
@@ -84,7 +84,7 @@ class Ours:
         n, clock, whole = len(self._wall.mesh.cells), Clock(), read_loop(Loop())
         everywhere = Activation(np.ones(n), np.zeros(n), whole.period / len(whole.time))
         with clock("cycle"):
-            self._beat = drive.solve(self._heart, _first(whole, frames), everywhere, stiffness)
+            self._beat = solve(self._heart, _first(whole, frames), everywhere, stiffness)
         course = {name: getattr(self._beat, name).tolist() for name in ("tension", "pressure", "volume")}
         course |= {"stiffness": float(self._beat.stiffness), "newton_steps": int(self._beat.newton_steps.sum())}
         return course | {"steps_of_frame": self._beat.newton_steps.tolist()} | clock.seconds["cycle"]
@@ -96,7 +96,7 @@ class Ours:
     def fill(self, stiffness: float) -> None:
         """Go to end-diastole."""
         stepper, whole = LoadStepper(self._heart, stiffness), read_loop(Loop())
-        drive.fill_to_end_diastole(stepper, _first(whole, 1), stiffness)
+        fill_to_end_diastole(stepper, _first(whole, 1), stiffness)
         load = stepper.load
         self._state, self._load = stepper.state, replace(load, volume=OFF * load.volume, tension_fraction=1.0)
 

@@ -185,7 +185,7 @@ def main() -> None:
     if given.clip:
         results["real, apical view"] = measure_real(given.clip)
     beating, time = heart(beat_of_default(given.beat))
-    configs = {"realistic": load(HERE.parent / "config/realistic.yaml"), "as printed": Config(rf=Rf(zones=1))}
+    configs = {"realistic": load(HERE.parent / "config/realistic.yaml"), "as printed": Config(rf=Rf(focal_zones=1))}
     for name, config in configs.items():
         keep = partial(np.save, given.pictures / f"{name}.npy") if given.pictures else lambda frames: None
         results[name] = measure_ours(config, beating, time, keep)

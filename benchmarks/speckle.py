@@ -29,8 +29,8 @@ DEPTHS = (4e-3, 6.5e-3, 8.5e-3)
 """Ranges of the points, m."""
 TRANSMITS = {
     "focused, five zones": {},
-    "focused, one zone": {"zones": 1},
-    "focused, one zone, f-number 3": {"zones": 1, "f_number": 3.0},
+    "focused, one zone": {"focal_zones": 1},
+    "focused, one zone, f-number 3": {"focal_zones": 1, "f_number": 3.0},
     "11 plane waves": {"transmit": "plane"},
     "11 diverging waves": {"transmit": "diverging"},
     "synthetic aperture": {"transmit": "synthetic_aperture"},

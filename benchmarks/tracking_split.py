@@ -140,8 +140,8 @@ def rows(job: Job, view: str) -> list[list[str]]:
         for frames in (downsample(free, free.shape[-1] // size), clip.frames):
             answer = clip.on_grid(*track(frames, *clip.tracker_arguments[1:], TRACKER))[0]
             figures = metrics(score(answer, truth), truth.wall.plane)
-            tangential = "ecc" if truth.wall.plane == "short_axis" else "ell"
-            shown = "nrmse_percent", f"tracker_{tangential}_rms_points", "tracker_err_bias_points"
+            tangential = "e_cc" if truth.wall.plane == "short_axis" else "e_ll"
+            shown = "nrmse_percent", f"tracker_{tangential}_rms_pp", "tracker_e_rr_bias_pp"
             cells += [f"{figures[name]:.1f}" for name in shown]
         cells.append(f"{halved(clip, truth):.1f}")
         likeness = alike(clip, truth)
@@ -161,7 +161,8 @@ def main() -> None:
     head += [f"{images}: {figure}" for images in ("blobs", "images") for figure in strains]
     head += ["images, every other frame: NRMSE", "likeness of the first four steps", "of all, median"]
     table = report.table(head, [line for view, job in jobs.items() for line in rows(job, view)])
-    text = ["# What of the error is whose", "", "`bspline_dic` at end-systole: % and points of strain.", "", *table, ""]
+    units = "`bspline_dic` at end-systole: % and percentage points of strain."
+    text = ["# What of the error is whose", "", units, "", *table, ""]
     (RESULTS / "tracking_split.md").write_text("\n".join(text))
 
 

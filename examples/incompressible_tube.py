@@ -7,7 +7,7 @@ heart = et.beat(
     {
         "geometry": {"shape": "tube", "endo_length_mm": 3, "base_mm": 1, "circumferential_elements": 24,
                      "longitudinal_elements": 4, "transmural_elements": 2},
-        "motion": {"kind": "cylinder", "cylinder": {"shortening": shortening}},
+        "motion": {"kind": "tube", "tube": {"shortening": shortening}},
         "loop": {"frames": 4},
         "bmode": {"size_px": 256, "downsampling": (1,)},
         "rf": {"lines": 64},

@@ -5,7 +5,7 @@ import numpy as np
 import echotruth as et
 
 probe, depth = et.Probe(), 8e-3  # m
-scanner = et.Scanner(probe, et.Rf(lines=33, zones=1), depth)
+scanner = et.Scanner(probe, et.Rf(lines=33, focal_zones=1), depth)
 lines = scanner.lines(position=np.array([[0.0, 6.5e-3, 0.0]]), amplitude=np.ones(1))
 
 line = np.abs(lines[np.abs(lines).max(axis=1).argmax()])

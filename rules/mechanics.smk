@@ -36,4 +36,5 @@ def mechanics_settings(config):
     if config.motion.kind == "beat":
         return settings_version(*anatomy, config.loop, loop_curves(config.loop), config.mechanics)
     formula = getattr(config.motion, config.motion.kind)
-    return settings_version(*anatomy, loop_curves(config.loop)[0], config.motion.course, formula, config.rf.focus_mm)
+    amplitude = (loop_curves(config.loop)[0], config.motion.time_course)
+    return settings_version(*anatomy, *amplitude, formula, config.rf.focus_mm)

@@ -17,6 +17,8 @@ import pandas as pd
 import pytest
 import xarray as xr
 
+import echotruth as et
+
 ROOT = Path(__file__).parents[1]
 CONFIG = """\
 name: tiny
@@ -102,6 +104,17 @@ def made(tmp_path_factory):
 def tree(made):
     with xr.open_datatree(made.out / "tiny.zarr") as opened:
         yield opened
+
+
+def test_clip_read_at_a_notebook_is_tracked_and_scored_as_the_workflow_does(made, tree):
+    """Up to the numbers of the store, which are of single precision."""
+    folder, case = made.out, str(tree["bmode/128"]["case"].values[0])
+    heart, clip = et.load_heart(folder, case), et.load_clip(folder, case, "long_axis", 64)
+    tracked = et.track(clip, "corrected")
+    stored = tree["tracking/64"].sel(case=case, view="long_axis", tracker="corrected")
+    np.testing.assert_array_equal(tracked["displacement"], stored["displacement"])
+    scores = tree["evaluation/64"].sel(case=case, view="long_axis", tracker="corrected")
+    assert et.evaluate(tracked, heart)["nrmse_all_percent"] == pytest.approx(100 * float(scores["nrmse_all"]), rel=1e-6)
 
 
 def documented():

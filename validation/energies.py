@@ -65,7 +65,7 @@ class ConstitutiveModel:
         Of the active law.
     bulk : float, Pa
         Of the volume: at a point here, of the mean over a cell in the solver.
-    local_bulk : float
+    pointwise_bulk_ratio : float
         Of the volume at a point, over C.
     """
 
@@ -75,17 +75,19 @@ class ConstitutiveModel:
     beta: float = 1.4
     power: float = 2.0
     bulk: float = 2e6
-    local_bulk: float = 20.0
+    pointwise_bulk_ratio: float = 20.0
 
     def law(self) -> element.WallLaw:
         """The same model for the solver."""
         active = np.array([self.beta, self.power])
         energy = compiled(name(self.material))
-        return element.WallLaw(energy, self.material.constants(), active, self.bulk, local_bulk=self.local_bulk)
+        return element.WallLaw(
+            energy, self.material.constants(), active, self.bulk, pointwise_bulk_ratio=self.pointwise_bulk_ratio
+        )
 
     def density(self, f: NDArray) -> NDArray:
         """Energy per unloaded volume, shape (...), Pa, of F (..., 3, 3) whose columns belong to the fibre axes."""
-        volume = (self.bulk + self.stiffness * self.local_bulk) / 2 * (determinant(f) - 1) ** 2
+        volume = (self.bulk + self.stiffness * self.pointwise_bulk_ratio) / 2 * (determinant(f) - 1) ** 2
         return self.stiffness * passive(f, self.material) + self.tension * active(f, self.beta, self.power) + volume
 
 

@@ -15,9 +15,9 @@ from echotruth.loop.cycle import read_loop
 from echotruth.mechanics import fibres, kinematics
 from echotruth.mechanics.fibres import material_gradients
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver import drive
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.checkpoint import SolvedFrame
+from echotruth.mechanics.solver.cycle import SolvedCycle, solve
 from echotruth.mechanics.solver.equilibrium import Equilibrium, PreviousState
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
@@ -33,7 +33,7 @@ class SolvedBeat:
     ----------
     config : Config
     wall : Wall
-    beat : drive.Beat
+    beat : SolvedCycle
     previous_states : tuple of PreviousState
         The state relative to which each frame was viscous: that of the frame before, or of a substep from it.
     es : int
@@ -45,7 +45,7 @@ class SolvedBeat:
 
     config: Config
     wall: Wall
-    beat: drive.Beat
+    beat: SolvedCycle
     previous_states: tuple[PreviousState, ...]
     es: int
     period: float
@@ -89,7 +89,7 @@ def solved(around: int, along: int, through: int) -> SolvedBeat:
     record = _PreviousStates(equations)
     tissue = unloaded.tissue
     activation = Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
-    beat = drive.solve(equations, cycle, activation, checkpoints=record)
+    beat = solve(equations, cycle, activation, checkpoints=record)
     equations.close()
     es, previous = int(np.argmax(cycle.pressure / cycle.volume)), tuple(record.previous_states)
     return SolvedBeat(config, unloaded, beat, previous, es, cycle.period, equations.assembly.displacement)

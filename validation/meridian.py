@@ -70,7 +70,7 @@ class AxisymmetricBody:
         offsets = np.stack(np.meshgrid(range(3), range(3), indexing="ij"), axis=-1).reshape(1, 9, 2)
         self.cells = np.ravel_multi_index(tuple(np.moveaxis(first + offsets, -1, 0)), (across, along))
         self.inner = np.arange(along)[np.arange(3) + 2 * np.arange(counts[1])[:, None]]
-        self.model = replace(model, bulk=0.0, local_bulk=0.0)
+        self.model = replace(model, bulk=0.0, pointwise_bulk_ratio=0.0)
         self._set_shape_functions(axes)
         axis, base = self.parameters[:, 1] == 0, self.parameters[:, 1] == 1
         free = np.ones((len(self.nodes), 3), dtype=bool)

@@ -97,7 +97,7 @@ class _VirtualWork:
         return pressure * (8 * difference(1.0) - difference(2.0)) / 12
 
     def _passive(self, f: Floats) -> complex:
-        local = self.section.local_bulk / 2 * (energies.determinant(f) - 1) ** 2
+        local = self.section.pointwise_bulk_ratio / 2 * (energies.determinant(f) - 1) ** 2
         return np.sum((energies.passive(f, self.section.material) + local) * self.volume)
 
     def _active(self, f: Floats) -> complex:

@@ -8,35 +8,67 @@
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from echotruth.cases import expand
+    from echotruth.config import Config, Probe, Rf, View
+    from echotruth.config.building import configure
+    from echotruth.config.loading import ConfigError
+    from echotruth.heart import Heart
+    from echotruth.imaging.beamforming.scanner import Scanner
+    from echotruth.imaging.rf.full_matrix import FullMatrix
+    from echotruth.notebook.datasets import heart_dataset
+    from echotruth.notebook.repositories import load_clip, load_heart, open
+    from echotruth.notebook.simulation import beat, evaluate, image, track
+    from echotruth.tracking.failure import TrackerFailed
 
 __version__ = "0.1.0"
 
+__all__ = [
+    "Config",
+    "ConfigError",
+    "FullMatrix",
+    "Heart",
+    "Probe",
+    "Rf",
+    "Scanner",
+    "TrackerFailed",
+    "View",
+    "beat",
+    "configure",
+    "evaluate",
+    "expand",
+    "heart_dataset",
+    "image",
+    "load_clip",
+    "load_heart",
+    "open",
+    "track",
+]
+
 _ORIGIN = {
-    "Bmode": "config",
-    "Config": "config",
-    "ConfigError": "config.loading",
-    "FullMatrix": "imaging.rf.full_matrix",
-    "Heart": "heart",
-    "Probe": "config",
-    "Rf": "config",
-    "Scanner": "imaging.beamforming.scanner",
-    "View": "config",
-    "beat": "simulation",
-    "configure": "simulation",
-    "evaluate": "simulation",
-    "image": "simulation",
-    "open": "simulation",
-    "track": "simulation",
+    "cases": ("expand",),
+    "config": ("Config", "Probe", "Rf", "View"),
+    "config.building": ("configure",),
+    "config.loading": ("ConfigError",),
+    "heart": ("Heart",),
+    "imaging.beamforming.scanner": ("Scanner",),
+    "imaging.rf.full_matrix": ("FullMatrix",),
+    "notebook.datasets": ("heart_dataset",),
+    "notebook.repositories": ("load_clip", "load_heart", "open"),
+    "notebook.simulation": ("beat", "evaluate", "image", "track"),
+    "tracking.failure": ("TrackerFailed",),
 }
-"""Public name to the module it comes from; that is imported when the name is first used."""
+"""Module to the public names that come from it; it is imported when one of them is first used."""
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _ORIGIN:
-        raise AttributeError(f"module 'echotruth' has no attribute {name!r}")
-    return getattr(import_module(f"echotruth.{_ORIGIN[name]}"), name)
+    for module, names in _ORIGIN.items():
+        if name in names:
+            return getattr(import_module(f"echotruth.{module}"), name)
+    raise AttributeError(f"module 'echotruth' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return [*_ORIGIN, "__version__"]
+    return [*__all__, "__version__"]

@@ -73,6 +73,11 @@ class Heart:
         """z of the unloaded endocardial apex, m."""
         return float(self.nodes[self.endo.ravel(), 2].min())
 
+    @property
+    def endo_at_ed(self) -> Floats:
+        """Endocardial nodes at end-diastole, (n, 3), m; those of several triangles several times."""
+        return self.positions(0)[self.endo.ravel()]
+
     def positions(self, frame: int) -> Floats:
         """Nodes in a frame, (n_nodes, 3), m."""
         return self.nodes + self.displacement[frame]

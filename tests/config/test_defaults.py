@@ -44,7 +44,7 @@ def test_focal_zones_of_a_preset_lie_within_each_others_depth_of_field(name):
     config = configured(probe={"preset": name})
     probe, rf = config.probe.si(), config.rf.si()
     depth = 7 * probe.sound_speed / probe.frequency * (rf.focus / (probe.elements * probe.pitch)) ** 2
-    assert depth / 3 < rf.zone < depth
+    assert depth / 3 < rf.focal_spacing < depth
 
 
 def test_default_is_the_mouse():

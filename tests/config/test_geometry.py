@@ -35,12 +35,12 @@ def test_length_or_factor_is_swept(key):
 def test_keys_of_a_file_are_read_from_yaml_as_they_stand():
     geometry = {
         "file": "heart.vtu",
-        "keep": {"array": "_volume-id", "values": [1, 7]},
-        "sides": {"array": "side", "endo": [1], "base": ["lid"]},
+        "wall_cells": {"array": "_volume-id", "values": [1, 7]},
+        "surface_labels": {"array": "side", "endo": [1], "base": ["lid"]},
         "septum_point": [1.0, 2, 3.5],
     }
     found = validate({"geometry": geometry}, "a.yaml").geometry
-    assert found.keep.values == [1, 7] and found.sides.epi == [] and found.septum_point == [1, 2, 3.5]
+    assert found.wall_cells.values == [1, 7] and found.surface_labels.epi == [] and found.septum_point == [1, 2, 3.5]
 
 
 def test_combination_that_makes_no_ellipsoid_is_refused():

@@ -16,7 +16,7 @@ BAD = {
     "geometry: {file: a.vtu, wall_mm: 1}": "geometry.wall_mm = 1.0: applies to the ellipsoid: leave it out",
     "geometry: {file: a.vtu, dilation: 2}": "geometry.dilation = 2.0: needs remesh: true",
     "geometry: {file: a.vtu, sheet: s}": "geometry.sheet = 's': needs the fibre directions too",
-    "geometry: {file: a.vtu, keep: {values: [1]}}": "geometry.keep.array = ",
+    "geometry: {file: a.vtu, wall_cells: {values: [1]}}": "geometry.wall_cells.array = ",
     "geometry: {file: a.vtu, unit: inch}": "geometry.unit = 'inch': should be 'm', 'cm', 'mm' or 'um'",
     "loop: {esv_uL: 60, edv_uL: 50}": "loop.esv_uL = 60.0: must be smaller than edv_uL = 50.0",
     "fibres: {endo_deg: 95}": "fibres.endo_deg = 95: should be less than or equal to 90",
@@ -38,8 +38,10 @@ BAD = {
     "tracking: {trackers: {one: {method: external}}}": "trackers.one.track = null: give either track or command",
     "tracking: {grid_px: 100, }\nbmode: {size_px: 64, downsampling: [1]}": "grid_px = 100: must not exceed the largest",
     "rf: {focus_mm: 12}": "rf.focus_mm = 12.0: must be smaller than bmode.field_of_view_mm = 12",
-    "rf: {focus_mm: 10}": "rf.focus_mm = 10.0: must be smaller than 10, so that its zones = 5 foci, zone_mm = 1 apart",
-    "rf: {zone_mm: 4}": "rf.focus_mm = 6.5: must exceed 8, so that its zones = 5 foci, zone_mm = 4 apart, lie in front",
+    "rf: {focus_mm: 10}": "rf.focus_mm = 10.0: must be smaller than 10, so that its focal_zones = 5 foci, "
+    "focal_spacing_mm = 1 apart",
+    "rf: {focal_spacing_mm: 4}": "rf.focus_mm = 6.5: must exceed 8, so that its focal_zones = 5 foci, "
+    "focal_spacing_mm = 4 apart, lie in front",
     "rf: {scan: linear, width_mm: 3.0}": "rf.width_mm = 3.0: must not exceed 2.944, the length of the array",
     "rf: {f_number: -1}": "rf.f_number = -1",
     "rf: {lines: 4}": "rf.lines = 4",

@@ -32,6 +32,6 @@ def test_the_realistic_preset_is_the_demo_with_all_of_it_on():
     demo = load("config/demo.yaml")
     off = Config().realism
     assert all(getattr(preset.realism, name) != getattr(off, name) for name in type(off).model_fields)
-    assert preset.rf == demo.rf.model_copy(update={"zones": 1})
+    assert preset.rf == demo.rf.model_copy(update={"focal_zones": 1})
     same = {"realism": off, "name": demo.name, "rf": demo.rf, "tracking": demo.tracking}
     assert preset.model_copy(update=same) == demo

@@ -77,11 +77,11 @@ def test_spread_of_a_layer_and_its_transmural_gradient():
     size = np.array([8, 7, 6, 5, 4.5, 4])[wall.layer - 1] * 1e-5 * np.where(arm[:, 1] < 0, 1, -1)
     tangential = directions(wall.position, ORIGIN, "short_axis")[:, 1]
     found = evaluate(clip(0 * arm), clip(size[:, None] * tangential), wall, 1)
-    np.testing.assert_allclose(found["true_spread"][[1, 6], 1], [8e-5, 4e-5])
+    np.testing.assert_allclose(found["true_displacement_sd"][[1, 6], 1], [8e-5, 4e-5])
     assert found["true_transmural_gradient"] == pytest.approx(50)
     assert np.isnan(found["tracked_transmural_gradient"]).all()
-    np.testing.assert_allclose(found["true_segment"][[0, 3], 1], np.array([1, -1]) * 5.75e-5)
-    assert np.isnan(found["true_segment"][1]).all()
+    np.testing.assert_allclose(found["true_segment_displacement"][[0, 3], 1], np.array([1, -1]) * 5.75e-5)
+    assert np.isnan(found["true_segment_displacement"][1]).all()
 
 
 def test_transmural_gradient_is_negative_where_the_spread_grows_outwards():
@@ -95,7 +95,7 @@ def test_points_without_estimate_count_only_in_the_coverage():
     tracked[1, np.flatnonzero(wall.layer == 3)[:12]] = np.nan
     found = evaluate(tracked, clip(arm), wall, 1)
     np.testing.assert_allclose(found["nrmse"][[0, 1, 3], 0], 0.1)
-    assert np.isnan(found["nrmse"][2]).all() and np.isnan(found["tracked_spread"][2]).all()
+    assert np.isnan(found["nrmse"][2]).all() and np.isnan(found["tracked_displacement_sd"][2]).all()
     assert found["coverage"] == pytest.approx(0.75)
 
 
@@ -111,11 +111,15 @@ def test_points_outside_the_wall_do_not_count():
 def test_no_wall_is_all_nan():
     wall, arm = ring()
     found = evaluate(clip(arm), clip(arm + np.nan), wall, 1)
-    assert np.isnan(found["coverage"]) and np.isnan(found["nrmse"]).all() and np.isnan(found["true_segment"]).all()
+    assert (
+        np.isnan(found["coverage"])
+        and np.isnan(found["nrmse"]).all()
+        and np.isnan(found["true_segment_displacement"]).all()
+    )
 
 
 def test_one_point_has_no_spread():
     wall, arm = ring(points=1)
     found = evaluate(clip(arm), clip(arm), wall, 1)
     assert np.isfinite(found["nrmse"]).all()
-    assert np.isnan(found["tracked_spread"][1:]).all() and np.isnan(found["tracked_transmural_gradient"]).all()
+    assert np.isnan(found["tracked_displacement_sd"][1:]).all() and np.isnan(found["tracked_transmural_gradient"]).all()

@@ -20,7 +20,7 @@ def scores(values, views=("mid",), failure=""):
         for k, value in enumerate(each)
         for view in views
     ]
-    strains = {f"{name}_rms_points": 1.0 for name in ("ecc", "ell", "err")}
+    strains = {f"{name}_rms_pp": 1.0 for name in ("e_cc", "e_ll", "e_rr")}
     return pd.DataFrame(lines).assign(**strains, failure=failure)
 
 
@@ -78,7 +78,7 @@ def test_losing_the_hard_clip_does_not_pay(failure):
     hard = (whole["case"] == "heart1") & (whole["view"] == "apex")
     whole = whole.assign(epe_um=np.where(hard, 40.0, 10.0), coverage_percent=100.0)
     lost = hard & (whole["tracker"] == "b")
-    figures = ["epe_um", "ecc_rms_points", "ell_rms_points", "err_rms_points"]
+    figures = ["epe_um", "e_cc_rms_pp", "e_ll_rms_pp", "e_rr_rms_pp"]
     whole.loc[lost, figures] = np.nan
     whole.loc[lost, ["nrmse_all_percent", "coverage_percent", "failure"]] = 100.0, 0.0, failure
     table = standings(whole, 1)
@@ -94,10 +94,10 @@ def test_losing_the_hard_clip_does_not_pay(failure):
 
 def test_views_that_show_a_strain_to_no_tracker_do_not_count_in_its_mean():
     whole = scores({"a": [5, 6], "b": [7, 8]}, views=("mid", "long_axis"))
-    whole.loc[whole["view"] == "mid", "ell_rms_points"] = np.nan
+    whole.loc[whole["view"] == "mid", "e_ll_rms_pp"] = np.nan
     table = standings(whole, 1)
-    assert (overall(table)[["ell_rms_points", "ell_rms_points_low", "ell_rms_points_high"]] == 1).all(axis=None)
-    assert table[table["view"] == "mid"]["ell_rms_points"].isna().all()
+    assert (overall(table)[["e_ll_rms_pp", "e_ll_rms_pp_low", "e_ll_rms_pp_high"]] == 1).all(axis=None)
+    assert table[table["view"] == "mid"]["e_ll_rms_pp"].isna().all()
 
 
 def test_a_mean_over_views_is_one_of_hearts():
@@ -139,7 +139,7 @@ def test_rows_are_of_the_hearts_that_count(tree, tmp_path):
     table = rows(tree, CONFIG, np.array([0, 2]), tmp_path)
     assert list(table["case"]) == ["a"] * 4 + ["c"] * 4 and list(table["tracker"]) == ["one", "two"] * 4
     assert list(table["nrmse_percent"][:2]) == [10, 20] and (table["failure"] == "").all()
-    assert table["ecc_rms_points"].isna().tolist() == [False, False, True, True] * 2
+    assert table["e_cc_rms_pp"].isna().tolist() == [False, False, True, True] * 2
 
 
 def test_a_failure_is_read_from_the_ledger(tree, tmp_path):

@@ -46,7 +46,7 @@ def test_the_truth_itself_has_no_error(truth):
     for name, value in found.items():
         # What is the same at every point correlates with nothing: the error, and the strain of this slice.
         perfect = np.nan if name.endswith("correlation") else {"coverage_percent": 100}.get(name, 0)
-        if "ell_" in name or "transmural_gradient" in name:
+        if "e_ll_" in name or "transmural_gradient" in name:
             continue
         assert value == pytest.approx(perfect, abs=1e-6, nan_ok=True), name
 
@@ -78,20 +78,20 @@ def test_a_tracker_that_sees_nine_tenths_is_off_by_a_tenth(truth):
     assert found["drift_um"] == 0
     # Stretches of 0.91 instead of 0.90, in every direction.
     bias = 100 * (0.91**2 - 0.9**2) / 2
-    for name in ("global_ecc_bias_points", "ecc_rms_points", "segment_err_error_points", "tracker_err_rms_points"):
+    for name in ("global_e_cc_bias_pp", "e_cc_rms_pp", "segment_e_rr_error_pp", "tracker_e_rr_rms_pp"):
         assert found[name] == pytest.approx(bias), name
-    assert found["segment_ecc_limits_points"] == pytest.approx(0, abs=1e-9)
+    assert found["segment_e_cc_limits_pp"] == pytest.approx(0, abs=1e-9)
 
 
 def test_long_axis_tells_the_longitudinal_strain_alone(truth):
     found = metrics(score(tracked(truth, 0.9 * truth.displacement), ventricle("long_axis")), "long_axis")
-    assert np.isnan(found["ecc_rms_points"]) and found["ell_rms_points"] == pytest.approx(100 * (0.91**2 - 0.9**2) / 2)
+    assert np.isnan(found["e_cc_rms_pp"]) and found["e_ll_rms_pp"] == pytest.approx(100 * (0.91**2 - 0.9**2) / 2)
 
 
 def test_no_answer_is_an_error_of_all_there_is(truth):
     found = metrics(score(tracked(truth, np.nan * truth.displacement), truth), "short_axis")
     assert found["coverage_percent"] == 0 and found["nrmse_all_percent"] == pytest.approx(100)
-    assert np.isnan(found["nrmse_percent"]) and np.isnan(found["ecc_rms_points"]) and np.isnan(found["epe_um"])
+    assert np.isnan(found["nrmse_percent"]) and np.isnan(found["e_cc_rms_pp"]) and np.isnan(found["epe_um"])
 
 
 def test_leaving_points_out_does_not_pay(truth):
@@ -143,5 +143,5 @@ def test_a_grid_too_coarse_for_strain_still_has_an_error_of_displacement(truth, 
     )
     found = metrics(score(tracked(few, 0.9 * few.displacement), few), "short_axis")
     np.testing.assert_allclose(found["nrmse_percent"], 10 if count else np.nan)
-    assert np.isnan(found["ecc_rms_points"]) and np.isnan(found["global_err_bias_points"])
+    assert np.isnan(found["e_cc_rms_pp"]) and np.isnan(found["global_e_rr_bias_pp"])
     assert np.isnan(few.arrays["true_strain"]).sum() >= few.arrays["true_strain"].size - 3 * 5 * 3 * count

@@ -118,7 +118,7 @@ def test_a_later_echo_is_the_first_one_shifted(scanner):
 
 
 def test_only_near_echoes_are_repeated(acquire):
-    hazy, clear = (acquire(**what)[0] for what in ({"haze": {"level_dB": -10.0, "near_mm": 3.0}}, {}))
+    hazy, clear = (acquire(**what)[0] for what in ({"haze": {"level_dB": -10.0, "max_source_range_mm": 3.0}}, {}))
     near, far = np.array([[0.2e-3, 2.5e-3, 0.0]]), np.array([[0.2e-3, 3.5e-3, 0.0]])
     one = np.ones(1)
     assert np.array_equal(hazy.echoes(far, one), clear.echoes(far, one))
@@ -128,7 +128,7 @@ def test_only_near_echoes_are_repeated(acquire):
 
 
 def test_later_echoes_have_the_level_asked_for():
-    config = Config.model_validate({"realism": {"haze": {"level_dB": -15.0, "length_mm": 1.0}}})
+    config = Config.model_validate({"realism": {"haze": {"level_dB": -15.0, "mean_extra_range_mm": 1.0}}})
     draws = [reverberation(config.realism.haze, config.probe, 1.0, np.random.default_rng(k)) for k in range(300)]
     power = np.mean([(draw[:, 1] ** 2).sum() for draw in draws])
     assert 10 * np.log10(power) == pytest.approx(-15, abs=0.1)
@@ -136,7 +136,9 @@ def test_later_echoes_have_the_level_asked_for():
 
 
 def test_no_later_echo_seems_to_lie_beyond_the_image():
-    config = Config.model_validate({"realism": {"haze": {"level_dB": -15.0, "length_mm": 5.0, "near_mm": 4.0}}})
+    config = Config.model_validate(
+        {"realism": {"haze": {"level_dB": -15.0, "mean_extra_range_mm": 5.0, "max_source_range_mm": 4.0}}}
+    )
     echoes = reverberation(config.realism.haze, config.probe, 12e-3, np.random.default_rng(0))
     assert echoes[:, 0].max() < 8e-3
     assert len(echoes) > 100
@@ -144,7 +146,7 @@ def test_no_later_echo_seems_to_lie_beyond_the_image():
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_an_echo_is_faint_where_its_ray_crosses_the_rib(acquire, scanner, side):
-    config = {"side": side, "edge_deg": 8.0, "depth_mm": 1.5, "softness_mm": 0.4, "level_dB": -30.0}
+    config = {"side": side, "edge_deg": 8.0, "depth_mm": 1.5, "edge_width_mm": 0.4, "level_dB": -30.0}
     acquisition, _ = acquire(shadow=config)
     draw = np.random.default_rng(7)
     place, amplitude = draw.uniform([-3e-3, 3e-3, 0], [3e-3, 9e-3, 0], (60, 3)), draw.standard_normal(60)

@@ -40,7 +40,7 @@ def receive_weights(rf, origin, ranges):
 def waves(scanner, rf, line, points):
     """Delays (s) and weights (transmits, elements) of the waves that serve a line; their paths to points (n, 2), m, and
     their shares there, each (transmits, n)."""
-    direction = np.radians(rf.tilt_deg / 2) * np.linspace(-1, 1, rf.transmits)[:, None]
+    direction = np.radians(rf.angle_span_deg / 2) * np.linspace(-1, 1, rf.transmits)[:, None]
     direction = np.concatenate([np.sin(direction), np.cos(direction)], axis=1)
     if rf.transmit == "plane":
         return direction[:, :1] * X / SPEED, np.ones((len(direction), 64)), direction @ points.T, 1.0
@@ -53,11 +53,11 @@ def waves(scanner, rf, line, points):
         path = np.hypot(points[:, 0] - X[:, None], points[:, 1])
         return np.zeros((64, 64)), np.diag(np.cos(np.pi * X / LENGTH) ** 2), path, 1.0
     origin, angle = scanner.scan.line_origin[line], scanner.scan.angle[line]
-    step = 1e-3 * rf.zone_mm
-    foci = 6.5e-3 + step * (np.arange(rf.zones)[:, None] - (rf.zones - 1) / 2)
+    step = 1e-3 * rf.focal_spacing_mm
+    foci = 6.5e-3 + step * (np.arange(rf.focal_zones)[:, None] - (rf.focal_zones - 1) / 2)
     distance = np.hypot(origin + foci * np.sin(angle) - X, foci * np.cos(angle))
     weight = receive_weights(rf, origin, foci[:, 0])
-    path = np.tile(np.hypot(points[:, 0] - origin, points[:, 1]), (rf.zones, 1))
+    path = np.tile(np.hypot(points[:, 0] - origin, points[:, 1]), (rf.focal_zones, 1))
     blending = np.maximum(0, 1 - np.abs(np.clip(path, foci[0], foci[-1]) - foci) / step)
     return (foci - distance) / SPEED, weight, path, blending
 
@@ -84,8 +84,8 @@ def exact_line(scanner, matrix, rf, line, ranges):
     "keys",
     [
         {},
-        {"zones": 1},
-        {"zones": 2, "zone_mm": 3.0, "f_number": 2.5},
+        {"focal_zones": 1},
+        {"focal_zones": 2, "focal_spacing_mm": 3.0, "f_number": 2.5},
         {"apodization": "none"},
         {"f_number": 2.5},
         {"scan": "linear"},
@@ -111,7 +111,7 @@ def test_it_holds_for_other_arrays(preset):
     """The interpolation is as good at any band, also a narrow one that is sampled below its carrier."""
     probe = Probe(preset=preset, bandwidth=0.2)
     wavelength = SPEED / probe.si().frequency
-    rf = Rf(lines=16, focus_mm=6.5, zones=1)
+    rf = Rf(lines=16, focus_mm=6.5, focal_zones=1)
     scanner = Scanner(probe, rf, 160 * wavelength)
     random = np.random.default_rng(3)
     shape = (len(scanner.matrix.frequency), 64, 64)
@@ -142,8 +142,10 @@ def test_line_bytes_do_not_depend_on_threads(matrix, keys):
 
 
 def test_a_line_of_two_zones_is_that_of_two_foci_faded_over(matrix):
-    blended = Scanner(Probe(), Rf(lines=16, zones=2, zone_mm=2.0), 10e-3)
-    near, far = (Scanner(Probe(), Rf(lines=16, zones=1, focus_mm=mm), 10e-3).beamform(matrix) for mm in (5.5, 7.5))
+    blended = Scanner(Probe(), Rf(lines=16, focal_zones=2, focal_spacing_mm=2.0), 10e-3)
+    near, far = (
+        Scanner(Probe(), Rf(lines=16, focal_zones=1, focus_mm=mm), 10e-3).beamform(matrix) for mm in (5.5, 7.5)
+    )
     weight = np.clip((blended.range - 5.5e-3) / 2e-3, 0, 1)
     found = blended.beamform(matrix)
     assert np.abs(found - (near + weight * (far - near))).max() < 2e-6 * np.abs(found).max()

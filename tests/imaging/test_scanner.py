@@ -21,7 +21,7 @@ FLAT = Probe(height_mm=0.05)
 
 @pytest.fixture(scope="module")
 def narrow():
-    return Scanner(FLAT, Rf(lines=61, sector_deg=24, zones=1), 9e-3)
+    return Scanner(FLAT, Rf(lines=61, sector_deg=24, focal_zones=1), 9e-3)
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +124,7 @@ def test_every_transmit_puts_a_point_where_it_is(keys):
 @pytest.mark.usefixtures("exact_record")
 def test_a_linear_scan_puts_a_point_where_it_is(transmit):
     probe = Probe(elements=128)
-    rf = Rf(lines=25, width_mm=1.0, scan="linear", f_number=2.0, transmit=transmit, focus_mm=4.0, tilt_deg=16.0)
+    rf = Rf(lines=25, width_mm=1.0, scan="linear", f_number=2.0, transmit=transmit, focus_mm=4.0, angle_span_deg=16.0)
     scanner = Scanner(probe, rf, 4.3e-3)
     lateral = scanner.scan.line_origin[15] + 5e-6
     image = np.abs(scanner.lines(np.array([[lateral, 4e-3, 0]]), np.ones(1)))
@@ -191,7 +191,7 @@ def correlation(still, moved, lag):
 
 def recovered_shift(depth, pivot, shift, **keys):
     """Lateral motion of speckle over that of its scatterers, by the correlation of the images of 24 blocks."""
-    rf = Rf(lines=TURN_LINES, sector_deg=18, elevation=False, **keys)
+    rf = Rf(lines=TURN_LINES, sector_deg=18, elevation_beam=False, **keys)
     scanner = Scanner(Probe(elements=32, pitch_um=92.0), rf, depth + 1e-3)
     near = np.abs(scanner.range - depth) < 0.3e-3
     match = np.zeros(len(TURN_LAGS))
@@ -206,7 +206,7 @@ def recovered_shift(depth, pivot, shift, **keys):
 def test_speckle_that_turns_off_the_middle_focus_moves_as_its_tissue_with_zones_and_slips_with_one(depth, pivot):
     """Blocks turned by 70 um about a point 2 mm away (Kallel, Bertrand & Meunier 1994, IEEE Trans UFFC 41:105)."""
     assert recovered_shift(depth, pivot, 70e-6) == pytest.approx(1, abs=0.05)
-    assert recovered_shift(depth, pivot, 70e-6, zones=1) < 0.85
+    assert recovered_shift(depth, pivot, 70e-6, focal_zones=1) < 0.85
 
 
 def test_a_shift_of_the_phantom_shifts_the_speckle(narrow):

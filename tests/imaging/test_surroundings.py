@@ -7,7 +7,9 @@ from echotruth.config import Config
 from echotruth.imaging.medium.surroundings import SurroundingsMotion, epicardial_nodes, outside_heart, seed_surroundings
 from echotruth.imaging.view import imaging_plane
 
-CONFIG = Config.model_validate({"realism": {"surroundings": {"level_dB": -12.0, "density": 0.02, "follow_mm": 0.5}}})
+CONFIG = Config.model_validate(
+    {"realism": {"surroundings": {"level_dB": -12.0, "density": 0.02, "motion_decay_mm": 0.5}}}
+)
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ def sent(**keys):
 
 @pytest.mark.parametrize("scan", ["sector", "linear"])
 def test_focused_delays_bring_all_elements_to_the_focus_at_once(scan):
-    rf = Rf(lines=17, scan=scan, zones=1)
+    rf = Rf(lines=17, scan=scan, focal_zones=1)
     lines = scan_lines(Probe(), rf)
     lateral, axial = lines.line_origin + 6.5e-3 * np.sin(lines.angle), 6.5e-3 * np.cos(lines.angle)
     flight = np.hypot(lateral[:, None] - X, axial[:, None]) / SPEED
@@ -29,22 +29,22 @@ def test_focused_delays_bring_all_elements_to_the_focus_at_once(scan):
 
 
 def test_foci_are_evenly_spaced_about_the_middle_one():
-    assert np.allclose(sent(zones=5, zone_mm=1.0).foci, [4.5e-3, 5.5e-3, 6.5e-3, 7.5e-3, 8.5e-3])
-    assert np.allclose(sent(zones=2, zone_mm=3.0).foci, [5e-3, 8e-3])
-    assert np.allclose(sent(zones=1).foci, [6.5e-3])
+    assert np.allclose(sent(focal_zones=5, focal_spacing_mm=1.0).foci, [4.5e-3, 5.5e-3, 6.5e-3, 7.5e-3, 8.5e-3])
+    assert np.allclose(sent(focal_zones=2, focal_spacing_mm=3.0).foci, [5e-3, 8e-3])
+    assert np.allclose(sent(focal_zones=1).foci, [6.5e-3])
     assert sent(transmit="plane").foci.size == 0
 
 
 def test_a_zone_has_the_waves_of_its_own_focus():
-    transmits = sent(zones=3, zone_mm=1.5, f_number=2.0)
+    transmits = sent(focal_zones=3, focal_spacing_mm=1.5, f_number=2.0)
     for zone, focus in zip(transmits.zones(RANGE), (5.0, 6.5, 8.0), strict=True):
-        alone = sent(zones=1, focus_mm=focus, f_number=2.0)
+        alone = sent(focal_zones=1, focus_mm=focus, f_number=2.0)
         assert np.allclose(zone.transmits.delay, alone.delay, atol=1e-18, rtol=0)
         assert np.allclose(zone.transmits.weight, alone.weight, atol=1e-12)
 
 
 def test_zones_fade_into_one_another_between_their_foci_and_end_with_the_line():
-    zones, weights = sent(zones=3, zone_mm=1.0).zones(RANGE), np.zeros((3, len(RANGE)))
+    zones, weights = sent(focal_zones=3, focal_spacing_mm=1.0).zones(RANGE), np.zeros((3, len(RANGE)))
     for zone, weight in zip(zones, weights, strict=True):
         weight[zone.samples] = zone.blending
     assert np.allclose(weights.sum(axis=0), 1)
@@ -56,9 +56,9 @@ def test_zones_fade_into_one_another_between_their_foci_and_end_with_the_line():
 
 def test_zones_beyond_the_lines_are_left_out():
     """Half of the lines end before the second focus, none reaches the third."""
-    zones = sent(zones=3, zone_mm=1.0).zones(RANGE[RANGE < 6e-3])
+    zones = sent(focal_zones=3, focal_spacing_mm=1.0).zones(RANGE[RANGE < 6e-3])
     assert np.allclose([zone.transmits.foci for zone in zones], [[5.5e-3], [6.5e-3]])
-    assert sum(len(zone.blending) for zone in sent(zones=5).zones(RANGE)) < 2 * len(RANGE)
+    assert sum(len(zone.blending) for zone in sent(focal_zones=5).zones(RANGE)) < 2 * len(RANGE)
 
 
 @pytest.mark.parametrize("keys", [{"transmit": "plane"}, {"transmit": "diverging"}])
@@ -72,7 +72,7 @@ def test_a_wave_is_at_each_element_when_that_sends(keys):
 
 
 def test_plane_waves_are_tilted_evenly_about_straight_ahead():
-    transmits = sent(transmit="plane", transmits=5, tilt_deg=40.0)
+    transmits = sent(transmit="plane", transmits=5, angle_span_deg=40.0)
     slope = SPEED * (transmits.delay[:, -1] - transmits.delay[:, 0]) / (X[-1] - X[0])
     assert np.allclose(np.degrees(np.arcsin(slope)), [-20, -10, 0, 10, 20])
 
@@ -82,7 +82,7 @@ def test_a_single_wave_goes_straight_ahead():
 
 
 def test_a_diverging_wave_is_on_a_circle_about_its_source():
-    transmits = sent(transmit="diverging", transmits=3, tilt_deg=60.0, source_mm=3.0)
+    transmits = sent(transmit="diverging", transmits=3, angle_span_deg=60.0, virtual_source_mm=3.0)
     source = -3e-3 * np.array([np.sin(np.radians(30)), np.cos(np.radians(30))])
     around = np.linspace(-0.5, 0.5, 7)
     circle = source[:, None] + 8e-3 * np.stack([np.sin(around), np.cos(around)])
@@ -103,7 +103,7 @@ def test_in_a_synthetic_aperture_each_element_sends_alone():
 
 
 def test_a_least_f_number_narrows_the_aperture_that_focuses():
-    transmits = sent(f_number=4.0, apodization="none", zones=1)
+    transmits = sent(f_number=4.0, apodization="none", focal_zones=1)
     assert (transmits.weight == (np.abs(X) <= 6.5e-3 / 4 / 2)).all()
 
 
@@ -114,10 +114,10 @@ def test_a_least_f_number_narrows_the_aperture_that_focuses():
         {"f_number": -1.0},
         {"lines": 4},
         {"transmits": 0},
-        {"source_mm": 0.0},
+        {"virtual_source_mm": 0.0},
         {"width_mm": -1.0},
-        {"zones": 0},
-        {"zone_mm": 0.0},
+        {"focal_zones": 0},
+        {"focal_spacing_mm": 0.0},
     ],
 )
 def test_impossible_transmits_are_refused(keys):
@@ -126,6 +126,6 @@ def test_impossible_transmits_are_refused(keys):
 
 
 def test_zones_that_reach_behind_the_array_are_refused_where_they_are_used():
-    with pytest.raises(ValueError, match="must exceed 2, so that its zones = 5 foci, zone_mm = 1 apart"):
+    with pytest.raises(ValueError, match="must exceed 2, so that its focal_zones = 5 foci, focal_spacing_mm = 1 apart"):
         Rf(focus_mm=2.0)
-    assert Rf(focus_mm=2.0, transmit="plane").focus_mm == Rf(focus_mm=2.0, zones=1).focus_mm == 2
+    assert Rf(focus_mm=2.0, transmit="plane").focus_mm == Rf(focus_mm=2.0, focal_zones=1).focus_mm == 2

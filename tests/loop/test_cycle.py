@@ -1,4 +1,4 @@
-"""The shipped cycles, the columns of each drive, the sampling, and the errors about invalid files."""
+"""The shipped cycles, the columns of the prescribed quantities, the sampling, and the errors about invalid files."""
 
 import numpy as np
 import pytest
@@ -61,10 +61,10 @@ def test_pressure_relaxes_with_its_time_constant(name, start, end, constant):
 
 
 def test_twitch_has_the_volume_of_the_mouse_and_the_tension_solved_for_it():
-    twitch, mouse = read_loop(Loop(file="twitch", drive="volume")), read_loop(Loop())
+    twitch, mouse = read_loop(Loop(file="twitch", prescribed="volume")), read_loop(Loop())
     assert twitch.pressure is None
     np.testing.assert_allclose(twitch.volume, mouse.volume, rtol=1e-4)
-    pressed = read_loop(Loop(file="twitch", drive="pressure"))
+    pressed = read_loop(Loop(file="twitch", prescribed="pressure"))
     np.testing.assert_allclose(pressed.pressure, mouse.pressure, rtol=1e-3)
     assert twitch.tension[0] == 0
     assert twitch.tension[es_frame(mouse.pressure, mouse.volume)] == pytest.approx(43e3, rel=0.03)
@@ -138,24 +138,24 @@ ALL = "time_ms,pressure_mmHg,tension_kPa,volume_uL\n"
 
 
 @pytest.mark.parametrize(
-    ("drive", "expected"),
+    ("prescribed", "expected"),
     [
         ("pressure_volume", {"pressure", "volume"}),
         ("pressure", {"pressure", "tension"}),
         ("volume", {"volume", "tension"}),
     ],
 )
-def test_a_drive_takes_its_own_columns_and_leaves_the_rest_open(tmp_path, drive, expected):
-    loop = written(tmp_path, TWITCH, head=ALL).model_copy(update={"drive": drive})
+def test_prescribed_quantities_take_their_own_columns_and_leave_the_rest_open(tmp_path, prescribed, expected):
+    loop = written(tmp_path, TWITCH, head=ALL).model_copy(update={"prescribed": prescribed})
     cycle = read_loop(loop)
-    assert cycle.drive == drive
+    assert cycle.prescribed == prescribed
     assert {name for name in ("pressure", "volume", "tension") if getattr(cycle, name) is not None} == expected
-    if drive != "pressure_volume":
+    if prescribed != "pressure_volume":
         np.testing.assert_allclose(cycle.tension[::2], [0, 40e3, 45e3, 1e3])
 
 
 def test_without_a_tension_the_volume_drives_a_passive_heart(tmp_path):
-    cycle = read_loop(written(tmp_path, GOOD).model_copy(update={"drive": "volume"}))
+    cycle = read_loop(written(tmp_path, GOOD).model_copy(update={"prescribed": "volume"}))
     assert cycle.pressure is None
     np.testing.assert_array_equal(cycle.tension, np.zeros(8))
 
@@ -165,31 +165,31 @@ def test_scaling_keeps_the_ejection_fraction_and_all_else():
     twice = mouse.scaled(2.0)
     np.testing.assert_allclose(twice.volume, 2 * mouse.volume)
     assert twice.pressure is mouse.pressure and twice.time is mouse.time
-    assert read_loop(Loop(file="twitch", drive="pressure")).scaled(2.0).volume is None
+    assert read_loop(Loop(file="twitch", prescribed="pressure")).scaled(2.0).volume is None
 
 
 @pytest.mark.parametrize(
-    ("drive", "head", "row", "message"),
+    ("prescribed", "head", "row", "message"),
     [
         (
             "pressure_volume",
             "time_ms,pressure_mmHg,volume_ml",
             "0,4,50",
-            "no column of the volume, which the drive press",
+            "no column of the volume, which loop.prescribed = press",
         ),
         (
             "pressure",
             "time_ms,pressure_mmHg,volume_uL",
             "0,4,50",
-            "the drive pressure needs; add one and name it tension_",
+            "loop.prescribed = pressure needs; add one and name it tension_",
         ),
         ("volume", "time_ms,pressure_mmHg", "0,4", "name it volume_uL or volume_mL or volume_m3"),
         ("volume", "time_ms,time_s,volume_uL", "0,0,50", "time_ms and time_s both give the time; keep one of them"),
     ],
 )
-def test_missing_column_and_one_given_twice_are_named(tmp_path, drive, head, row, message):
+def test_missing_column_and_one_given_twice_are_named(tmp_path, prescribed, head, row, message):
     with pytest.raises(LoopError) as caught:
-        read_loop(written(tmp_path, [row] * 5, head=head + "\n").model_copy(update={"drive": drive}))
+        read_loop(written(tmp_path, [row] * 5, head=head + "\n").model_copy(update={"prescribed": prescribed}))
     assert message in str(caught.value)
     assert str(caught.value).endswith(".") and "loop.csv" in str(caught.value)
 
@@ -204,7 +204,7 @@ def test_missing_column_and_one_given_twice_are_named(tmp_path, drive, head, row
 )
 def test_tension_that_no_beat_has_is_refused(tmp_path, rows, message):
     with pytest.raises(LoopError) as caught:
-        read_loop(written(tmp_path, rows, head=ALL).model_copy(update={"drive": "pressure"}))
+        read_loop(written(tmp_path, rows, head=ALL).model_copy(update={"prescribed": "pressure"}))
     assert message in str(caught.value)
 
 

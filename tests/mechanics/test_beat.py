@@ -60,7 +60,7 @@ def energies(unloaded, displacement):
     cells = volume.sum(axis=1)
     growth = np.sum(j * volume, axis=1) / cells - 1
     bulk = mechanics.si().bulk_modulus / 2 * np.sum(cells * growth**2)
-    passive = (np.exp(q) - 1) / 2 + mechanics.local_bulk * (j - 1) ** 2 / 2
+    passive = (np.exp(q) - 1) / 2 + mechanics.pointwise_bulk_ratio * (j - 1) ** 2 / 2
     return np.sum(passive * volume), np.sum(active * volume), bulk
 
 

@@ -18,7 +18,9 @@ def mesh() -> Mesh:
 
 
 def law(name="fung", power=2.0):
-    return element.WallLaw(compiled(name), LAWS[name].Law().constants(), np.array([1.4, power]), 2e6, local_bulk=20.0)
+    return element.WallLaw(
+        compiled(name), LAWS[name].Law().constants(), np.array([1.4, power]), 2e6, pointwise_bulk_ratio=20.0
+    )
 
 
 def cell_state(mesh, pressure=0.0, stiffness=1.1e3, tension=4e4, viscosity=0.0):

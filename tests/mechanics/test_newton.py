@@ -83,4 +83,4 @@ def test_load_without_equilibrium_ends_in_one_sentence(hemisphere, caplog):
         pytest.raises(Diverged, match=r"kPa and a volume of .* uL"),
     ):
         stepper.advance(Load(1e3, 1e-12), "tension")
-    assert any("step of the load halved" in message for message in caplog.messages)
+    assert any("load step halved" in message for message in caplog.messages)

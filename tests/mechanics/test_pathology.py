@@ -127,7 +127,10 @@ def test_an_infarct_goes_before_its_border_and_that_before_lateness(hemisphere):
 @pytest.mark.parametrize(
     ("infarct", "sentence"),
     [
-        ({"radius_mm": 0.001}, r"radius_mm = 0.001 at position 0.5 and azimuth_deg 90.0: no cell .*: raise it"),
+        (
+            {"radius_mm": 0.001},
+            r"radius_mm = 0.001 at position 0.5 and azimuth_deg 90.0: no cell .*: increase radius_mm",
+        ),
         ({"segments": [17], "transmurality": 0.01}, r"segments = \[17\]: no cell .*: name segments that the mesh has"),
     ],
 )

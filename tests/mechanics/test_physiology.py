@@ -122,7 +122,7 @@ def test_a_bound_that_is_null_is_not_used():
 
 
 def test_every_bound_of_the_section_is_checked():
-    assert {bound.key for bound in BOUNDS} == set(Physiology.model_fields) - {"exclude"}
+    assert {bound.key for bound in BOUNDS} == set(Physiology.model_fields) - {"exclude_implausible"}
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ PHANTOMS = Path(__file__).parents[2] / "config/phantoms.yaml"
 def config(kind, elements=(12, 4, 1), frames=2, **section):
     around, along, through = elements
     counts = {"circumferential_elements": around, "longitudinal_elements": along, "transmural_elements": through}
-    motion = {"kind": kind, "course": "ramp", kind: section}
+    motion = {"kind": kind, "time_course": "ramp", kind: section}
     return Config(geometry={"shape": "tube", **counts}, loop={"file": "mouse", "frames": frames}, motion=motion)
 
 
@@ -53,12 +53,12 @@ def in_elements(mesh, displacement, random):
     return (np.einsum("qa,cai->cqi", values, each[mesh.cells]) for each in (mesh.nodes, displacement))
 
 
-def cylinder_strain(section, radius):
+def tube_strain(section, radius):
     """RR, CC, LL, RC, RL, CL of the default tube by hand, from C = F^T F in polar coordinates; radius at ED, m."""
     stretch, inner = 1 - section.shortening, INNER * (1 - section.contraction)
     r = np.sqrt(inner**2 + (radius**2 - INNER**2) / stretch)
     growth, torsion = radius / (stretch * r), np.radians(section.torsion_deg) / LENGTH
-    shear = r * np.radians(section.endo_turn_deg) / (OUTER - INNER)
+    shear = r * np.radians(section.endo_rotation_deg) / (OUTER - INNER)
     hoop, along = r / radius, r * torsion
     c = [growth**2 + shear**2, hoop**2, stretch**2 + along**2, shear * hoop, shear * along, hoop * along]
     return (np.stack(c, axis=-1) - [1, 1, 1, 0, 0, 0]) / 2
@@ -85,7 +85,7 @@ def test_triangle_and_ramp_go_in_equal_steps_and_the_cosine_is_smooth():
     )
 
 
-@pytest.mark.parametrize("kind", ["rigid", "affine", "cylinder"])
+@pytest.mark.parametrize("kind", ["rigid", "affine", "tube"])
 def test_nothing_has_moved_at_end_diastole_and_most_at_end_systole(kind):
     mechanics = prescribed_motion(config(kind, frames=3))["mechanics"]
     assert not mechanics["displacement"][0].any()
@@ -93,7 +93,7 @@ def test_nothing_has_moved_at_end_diastole_and_most_at_end_systole(kind):
 
 
 def test_tube_has_the_volume_of_a_tube_and_keeps_it():
-    setting = config("cylinder", (24, 4, 2))
+    setting = config("tube", (24, 4, 2))
     mesh, after = left_ventricle(setting.geometry), heart(setting).positions(1)
     volume = np.pi * (OUTER**2 - INNER**2) * LENGTH
     assert cell_volumes(mesh).sum() == pytest.approx(volume, rel=1e-4)
@@ -105,7 +105,7 @@ def test_tube_has_the_volume_of_a_tube_and_keeps_it():
 
 
 def test_the_ventricle_of_a_file_or_preset_can_be_shifted_as_well():
-    section = {"kind": "rigid", "course": "ramp", "rigid": {"lateral_um": 50.0, "axial_um": 0.0}}
+    section = {"kind": "rigid", "time_course": "ramp", "rigid": {"lateral_um": 50.0, "axial_um": 0.0}}
     setting = Config(
         geometry=Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1),
         loop={"file": "mouse", "frames": 2},
@@ -127,7 +127,7 @@ def test_a_shift_has_its_components_in_the_short_axis_image_and_no_strain():
 
 
 def test_a_turn_is_counter_clockwise_in_the_image_and_no_strain():
-    setting = config("rigid", lateral_um=0.0, axial_um=0.0, turn_deg=30.0)
+    setting = config("rigid", lateral_um=0.0, axial_um=0.0, rotation_deg=30.0)
     arrays = prescribed_motion(setting)
     moving = heart(setting, arrays)
     view = imaging_plane(setting.views["mid"], setting.rf, moving.positions(0)[moving.endo.ravel()])
@@ -153,7 +153,7 @@ def test_an_affine_motion_has_its_gradient_in_the_image_in_every_frame_and_eleme
 
 def test_the_cylinder_has_the_gradient_of_its_formula():
     """Central differences of the formula give the strains in closed form, and no change of volume."""
-    setting, step = config("cylinder", torsion_deg=40.0, endo_turn_deg=20.0), 1e-7
+    setting, step = config("tube", torsion_deg=40.0, endo_rotation_deg=20.0), 1e-7
     mesh, random = left_ventricle(setting.geometry), np.random.default_rng(1)
     radius, turn = random.uniform(INNER, OUTER, 50), random.uniform(0, 2 * np.pi, 50)
     place = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), random.uniform(-LENGTH, 0, 50)])
@@ -166,23 +166,23 @@ def test_the_cylinder_has_the_gradient_of_its_formula():
     along = np.einsum("pij,kjp->pik", gradient, axes)
     whole = (np.einsum("pki,pkj->pij", along, along) - np.eye(3)) / 2
     found = np.stack([whole[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], axis=-1)
-    np.testing.assert_allclose(found, cylinder_strain(setting.motion.cylinder, radius), atol=1e-7)
+    np.testing.assert_allclose(found, tube_strain(setting.motion.tube, radius), atol=1e-7)
 
 
 def test_strain_of_the_cylinder_converges_to_its_closed_form():
     errors = []
     for elements in ((12, 4, 2), (24, 8, 4)):
-        setting = config("cylinder", elements)
+        setting = config("tube", elements)
         mesh = left_ventricle(setting.geometry)
         radius = np.hypot(*(shape(CENTROID) @ mesh.nodes[mesh.cells])[:, 0, :2].T)
-        exact = cylinder_strain(setting.motion.cylinder, radius)
+        exact = tube_strain(setting.motion.tube, radius)
         found = prescribed_motion(setting)["kinematics"]["strain"][1]
         errors.append(np.sqrt(np.mean((found - exact) ** 2, axis=0)))
     assert errors[1].max() < 0.005
     assert (errors[1] < errors[0] / 2.5).all(), "of second order, 4, where the mesh is fine"
 
 
-@pytest.mark.parametrize("setting, off", [(config("cylinder", (24, 12, 3)), 8e-4), (load(PHANTOMS), 4.5e-4)])
+@pytest.mark.parametrize("setting, off", [(config("tube", (24, 12, 3)), 8e-4), (load(PHANTOMS), 4.5e-4)])
 def test_elements_carry_the_tissue_of_the_cylinder_as_the_formula_says(setting, off):
     """Elements of the default mesh, and of config/phantoms.yaml: what carries the scatterers is the truth."""
     mesh = left_ventricle(setting.geometry)
@@ -202,7 +202,7 @@ def test_elements_carry_rigid_and_affine_motion_to_the_last_bits(kind):
 
 def test_torsion_twists_as_a_healthy_heart_does_and_there_is_no_loop():
     """The nodes of the slices at 0.2 and 0.8 lie about 5/24 and 19/24; there is nothing else to measure."""
-    arrays = prescribed_motion(config("cylinder", (24, 12, 1), torsion_deg=20.0, endo_turn_deg=0.0))
+    arrays = prescribed_motion(config("tube", (24, 12, 1), torsion_deg=20.0, endo_rotation_deg=0.0))
     found = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"])
     assert np.degrees(found["twist"][1]) == pytest.approx(20 * 14 / 24)
     assert np.isnan([found["ejection_fraction"], found["tension_min"], found["tension_es"]]).all()

@@ -10,7 +10,9 @@ from echotruth.mechanics.solver import unloaded
 from echotruth.mechanics.solver.cavity import cavity_volume
 from echotruth.mechanics.solver.newton import Diverged
 
-IMAGE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1, state="end_diastole")
+IMAGE = Geometry(
+    circumferential_elements=12, longitudinal_elements=6, transmural_elements=1, given_state="end_diastole"
+)
 
 
 def config(**loop):
@@ -29,7 +31,9 @@ def test_heart_imaged_at_end_diastole_is_met_there():
 
 def test_loop_is_scaled_to_the_image_and_keeps_its_ejection_fraction():
     volume = beat(config())["mechanics"]["volume_target"]
-    unscaled = beat(Config(geometry=IMAGE.model_copy(update={"state": "unloaded"}), loop=Loop(frames=2)))["mechanics"]
+    unscaled = beat(Config(geometry=IMAGE.model_copy(update={"given_state": "unloaded"}), loop=Loop(frames=2)))[
+        "mechanics"
+    ]
     assert volume[1] / volume[0] == pytest.approx(unscaled["volume_target"][1] / unscaled["volume_target"][0])
 
 

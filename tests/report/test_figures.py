@@ -13,7 +13,7 @@ pytestmark = pytest.mark.filterwarnings("ignore")  # of the little store that st
 def figures(tmp_path, statuses, exclude):
     """Figures of a repository of which nothing but the verdicts is there."""
     xr.DataTree.from_dict({"/cases": xr.Dataset({"status": ("case", np.array(statuses))})}).to_zarr(tmp_path / "a.zarr")
-    return Figures(tmp_path / "a.zarr", Config(physiology=Physiology(exclude=exclude)), tmp_path)
+    return Figures(tmp_path / "a.zarr", Config(physiology=Physiology(exclude_implausible=exclude)), tmp_path)
 
 
 @pytest.mark.parametrize("exclude", [True, False])

@@ -63,15 +63,15 @@ def test_leaderboard(tmp_path, hearts):
     keys = [(f"h{k}", view, size, name) for k in range(hearts) for view in ("mid", "apex") for size in (64, 32)
               for name in ("one", "two", "failing")]  # fmt: skip
     table = pd.DataFrame(keys, columns=["case", "view", "size_px", "tracker"])
-    for figure in ("nrmse_all_percent", "ecc_rms_points", "ell_rms_points", "err_rms_points"):
+    for figure in ("nrmse_all_percent", "e_cc_rms_pp", "e_ll_rms_pp", "e_rr_rms_pp"):
         table[figure] = random.uniform(1, 30, len(table))
     failing = table["tracker"] == "failing"
     table.loc[failing, "nrmse_all_percent"] = 100.0
-    table.loc[failing, ["ecc_rms_points", "err_rms_points"]] = np.nan
+    table.loc[failing, ["e_cc_rms_pp", "e_rr_rms_pp"]] = np.nan
     ranked = standings(table.assign(failure=np.where(failing, "no motion", "")), 1)
     assert best(ranked)[-1] == "failing"
     whole = seen(leaderboard.draw(tmp_path / "leaderboard.png", ranked, best(ranked)))
-    without_radial = ranked.assign(err_rms_points=np.nan)
+    without_radial = ranked.assign(e_rr_rms_pp=np.nan)
     assert seen(leaderboard.draw(tmp_path / "two.png", without_radial, best(ranked))).shape[1] < whole.shape[1]
 
 

@@ -158,7 +158,7 @@ def test_heart_out_of_bounds_is_imaged_only_where_the_configuration_says_so(fold
     assert Job(folder, stage, CASES[0].id, view).skip_reason() == ""
     assert Job(folder, stage, CASES[1].id, view).skip_reason() == LENGTHENS
     assert Job(folder, "physiology", CASES[1].id).skip_reason() == ""
-    kept = CONFIG.model_copy(update={"physiology": Physiology(exclude=False)})
+    kept = CONFIG.model_copy(update={"physiology": Physiology(exclude_implausible=False)})
     (folder / "config.yaml").write_text(yaml.safe_dump(kept.model_dump(mode="json")))
     assert Job(folder, stage, CASES[1].id, view).skip_reason() == ""
     assert publish(folder)["implausible"] == 1
@@ -166,7 +166,7 @@ def test_heart_out_of_bounds_is_imaged_only_where_the_configuration_says_so(fold
 
 @pytest.mark.parametrize("exclude", [True, False])
 def test_heart_without_a_solution_is_never_measured_nor_imaged(folder, exclude):
-    kept = CONFIG.model_copy(update={"physiology": Physiology(exclude=exclude)})
+    kept = CONFIG.model_copy(update={"physiology": Physiology(exclude_implausible=exclude)})
     (folder / "config.yaml").write_text(yaml.safe_dump(kept.model_dump(mode="json")))
     Job(folder, "mechanics", CASES[1].id).record_without_result("failed", "no equilibrium")
     for stage, view in JOBS[1:]:

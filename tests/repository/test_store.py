@@ -109,7 +109,9 @@ def test_flipped_bit_is_an_error_and_not_a_wrong_number(store, group, name, plac
         store.read(group, *job(group, 0))
 
 
-@pytest.mark.parametrize("group, name", [("bmode/64", "image"), ("mechanics", "pressure"), ("phantom", "scatterers")])
+@pytest.mark.parametrize(
+    "group, name", [("bmode/64", "image"), ("mechanics", "pressure"), ("phantom", "scatterer_count")]
+)
 def test_truncated_shard_is_an_error(store, group, name):
     fill(store, group, *job(group, 0))
     (file,) = [path for path in store.files(group, *job(group, 0)) if f"/{name}/" in path.as_posix()]

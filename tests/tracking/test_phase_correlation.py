@@ -46,14 +46,14 @@ def test_subpixel_offset_is_exact_for_the_peak_of_a_shifted_texture():
     )
 
 
-@pytest.mark.parametrize("floor, found", [(0.0, False), (0.05, True)])
-def test_shift_of_noisy_coarse_speckle_is_found_by_the_frequencies_above_a_floor(floor, found):
+@pytest.mark.parametrize("spectral_threshold, found", [(0.0, False), (0.05, True)])
+def test_shift_of_noisy_coarse_speckle_is_found_by_the_frequencies_above_a_threshold(spectral_threshold, found):
     """Phase-only correlation gives frequencies that contain only noise the same weight as those of the speckle."""
     rng = np.random.default_rng(3)
     speckle = gaussian_filter(rng.standard_normal((160, 160)), 3, mode="wrap")
     speckle *= 60 / speckle.std()
     frames = [128 + np.roll(speckle, (-3 * t, 2 * t), (0, 1)) + rng.normal(0, 4, speckle.shape) for t in range(2)]
-    tracker = PhaseCorrelation(taper="hann", floor=floor, reference="previous")
+    tracker = PhaseCorrelation(taper="hann", spectral_threshold=spectral_threshold, reference="previous")
     points = grid(speckle.shape, 20).reshape(-1, 2)
     moved, _ = track(np.stack(frames), points, speckle < np.inf, 25e-6, np.arange(2.0), 0, tracker)
     assert (np.median(np.hypot(*(moved[1] - [2, -3]).T)) < 0.3) == found
@@ -75,7 +75,11 @@ def test_window_in_tissue_keeps_its_size():
 
 @pytest.mark.parametrize(
     "options",
-    [{}, {"taper": "hann", "reference": "previous"}, {"taper": "hann", "reference": "bidirectional", "floor": 0.01}],
+    [
+        {},
+        {"taper": "hann", "reference": "previous"},
+        {"taper": "hann", "reference": "bidirectional", "spectral_threshold": 0.01},
+    ],
 )
 def test_rigid_shift_is_followed_to_half_a_pixel(clip, options):
     frames = clip(lambda place, t: place + np.array([2 * t, -3 * t]), 5)

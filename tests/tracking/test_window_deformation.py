@@ -40,7 +40,7 @@ def test_deformed_windows_find_a_turn_that_rigid_ones_blur(speckle, inner):
 
     images = speckle(192, lambda place: place), speckle(192, turned)
     truth = turned(inner) - inner
-    error = [np.sqrt(((step(*images, inner, sweeps=n) - truth) ** 2).mean()) for n in (1, 4)]
+    error = [np.sqrt(((step(*images, inner, final_passes=n) - truth) ** 2).mean()) for n in (1, 4)]
     assert error[1] < 0.1 and error[1] < 0.6 * error[0]
 
 
@@ -130,7 +130,7 @@ def test_image_warped_back_by_its_displacement_is_the_first(shifted):
 
 
 def test_windows_are_the_same_tissue_at_every_size_but_eight_pixels_at_least():
-    settings = WindowDeformation(windows_mm=[1.5, 0.75, 0.375], sweeps=2)
+    settings = WindowDeformation(windows_mm=[1.5, 0.75, 0.375], final_passes=2)
     found = [window_deformation.window_sides(settings, 12e-3 / n) for n in (512, 256, 128)]
     assert found == [[64, 32, 16, 16], [32, 16, 8, 8], [16, 8, 8, 8]]
 

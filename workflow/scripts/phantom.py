@@ -11,11 +11,11 @@ from echotruth.workflow.job import Job, Result, main
 
 def work(job: Job) -> Result:
     heart, config = job.heart, job.case.config
-    plane = imaging_plane(job.view, config.rf, heart.positions(0)[heart.endo.ravel()])
+    plane = imaging_plane(job.view, config.rf, heart.endo_at_ed)
     scatterers = Sequence(config, heart, plane, partial(generator, job.case, job.view_name)).scatterers()
     job.save_scratch(**scatterers)
     centre, number = cavity_centroid(heart, plane), len(scatterers["amplitude"])
-    return {"phantom": {"scatterers": number, "origin": plane.origin, "axes": plane.axes, "centre": centre}}
+    return {"phantom": {"scatterer_count": number, "origin": plane.origin, "axes": plane.axes, "centre": centre}}
 
 
 if __name__ == "__main__":

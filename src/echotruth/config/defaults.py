@@ -21,7 +21,14 @@ HEART_DEFAULTS = {
 }
 """`geometry.preset` -> default of dotted keys."""
 
-_KEYS = ("phantom.density_per_mm3", "rf.focus_mm", "rf.zones", "rf.zone_mm", "rf.sector_deg", "bmode.field_of_view_mm")
+_KEYS = (
+    "phantom.density_per_mm3",
+    "rf.focus_mm",
+    "rf.focal_zones",
+    "rf.focal_spacing_mm",
+    "rf.sector_deg",
+    "bmode.field_of_view_mm",
+)
 _SCANS = {
     "mouse_25MHz": (2800.0, 6.5, 5, 1.0, 64.0, 12.0),
     "mouse_30MHz": (5300.0, 6.5, 5, 1.0, 64.0, 12.0),
@@ -34,7 +41,7 @@ ARRAY_DEFAULTS: dict[str, dict[str, float]] = {n: dict(zip(_KEYS, row, strict=Tr
 
 REFERENCE_FIELD_OF_VIEW_MM = 12.0
 """Field of view for which the sections of the trackers give their default lengths."""
-TRACKER_LENGTHS = ("windows_mm", "subset_mm", "knots_mm", "margin_um", "resolved_um")
+TRACKER_LENGTHS = ("windows_mm", "subset_mm", "knots_mm", "margin_um", "speckle_pixel_um")
 """Keys of trackers that scale with `bmode.field_of_view_mm`, because larger hearts have thicker walls."""
 
 

@@ -66,16 +66,16 @@ class Geometry(Section):
     """Elements from apex to base."""
     transmural_elements: Annotated[int, Field(ge=1, le=20)] = 3
     """Quadratic elements through the wall."""
-    state: Literal["unloaded", "end_diastole"] = "unloaded"
+    given_state: Literal["unloaded", "end_diastole"] = "unloaded"
     """State of the given shape: unloaded, or at end-diastolic pressure, from which the unloaded shape is solved."""
     file: str | None = None
     """Mesh file with the wall, instead of the ellipsoid: tetrahedra (.vtu, .vtk, .msh) or a closed surface (.stl, .ply,
     .vtp)."""
     unit: Literal["m", "cm", "mm", "um"] = "mm"
     """Unit of the coordinates in the file."""
-    keep: CellLabels | None = None
+    wall_cells: CellLabels | None = None
     """Cells of the file that belong to the wall. Default: all."""
-    sides: BoundaryLabels | None = None
+    surface_labels: BoundaryLabels | None = None
     """Labels of endocardium, epicardium and base in the file. Default: they are detected."""
     septum: CellLabels | None = None
     """Cells of the file that belong to the septum, which is rotated to +x. Default: `septum_point`, or the file's own x
@@ -151,4 +151,4 @@ class Geometry(Section):
 
 _ELLIPSOID_KEYS = ("shape", "preset", "endo_radius_mm", "endo_length_mm", "wall_mm", "apex_wall_mm", "base_mm")
 _REMESH_KEYS = ("elongation", "dilation", "hypertrophy", "cut_mm")
-_FILE_KEYS = ("unit", "keep", "sides", "septum", "septum_point", "remesh", "cut_mm", "fibre", "sheet")
+_FILE_KEYS = ("unit", "wall_cells", "surface_labels", "septum", "septum_point", "remesh", "cut_mm", "fibre", "sheet")

@@ -17,7 +17,7 @@ from echotruth.section import Section, discriminator, variants
 
 
 class ConfigError(ValueError):
-    """A configuration that cannot be run; the message names file, key, value and remedy."""
+    """Raised if a configuration cannot be run; the message names file, key, value and remedy."""
 
 
 class _StrictLoader(yaml.SafeLoader):

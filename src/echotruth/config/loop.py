@@ -8,20 +8,20 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from echotruth.section import Positive, Section, invalid
 
-Drive = Literal["pressure_volume", "pressure", "volume"]
+Prescribed = Literal["pressure_volume", "pressure", "volume"]
 
 
 class Loop(Section):
     """The cycle that drives the heart: what is prescribed over time."""
 
-    drive: Drive = "pressure_volume"
+    prescribed: Prescribed = "pressure_volume"
     """What is prescribed: `pressure_volume` (the active tension is solved); `volume` with active tension, zero if
     the file has none (the pressure is solved); or `pressure` with active tension (the volume is solved, and is not
     unique during ejection)."""
     file: str = "mouse"
-    """A shipped cycle (`mouse`, `rat`, `human`; `twitch` for the drive `volume`) or a CSV file with columns of time and
-    of the prescribed quantities, each named with its unit: time_ms or _s; pressure_mmHg, _kPa or _Pa; volume_uL, _mL
-    or _m3; tension_kPa or _Pa."""
+    """A shipped cycle (`mouse`, `rat`, `human`; `twitch` for `prescribed: volume`) or a CSV file with columns of time
+    and of the prescribed quantities, each named with its unit: time_ms or _s; pressure_mmHg, _kPa or _Pa; volume_uL,
+    _mL or _m3; tension_kPa or _Pa."""
     heart_rate_per_min: Annotated[FiniteFloat, Field(gt=0)] | None = None
     """Heart rate; the cycle's time is scaled to it. Default: that of the file."""
     edv_uL: Positive | None = None
@@ -47,7 +47,7 @@ class Loop(Section):
     def _maps_what_it_prescribes(self) -> Loop:
         for key in ("edv_uL", "esv_uL", "edp_mmHg", "esp_mmHg"):
             missing = "volume" if key.endswith("uL") else "pressure"
-            value, drive = getattr(self, key), {"volume": "pressure", "pressure": "volume"}[missing]
-            if self.drive == drive and value is not None:
-                raise invalid(key, value, f"the drive {drive} prescribes no {missing}: leave it out")
+            value, given = getattr(self, key), {"volume": "pressure", "pressure": "volume"}[missing]
+            if self.prescribed == given and value is not None:
+                raise invalid(key, value, f"must be left out, because loop.prescribed = {given} gives no {missing}")
         return self

@@ -28,7 +28,7 @@ class Mechanics(Section):
     """Active stress of the wall."""
     bulk_modulus_kPa: Annotated[FiniteFloat, Field(ge=100)] = 2000.0
     """Penalty on volume change; below 2000 kPa it shifts pressures by per cents."""
-    local_bulk: Annotated[FiniteFloat, Field(ge=0, le=1000)] = 20.0
+    pointwise_bulk_ratio: Annotated[FiniteFloat, Field(ge=0, le=1000)] = 20.0
     """Penalty on volume change at each point of an element, over C: keeps det F near 1 where elements are large."""
     viscosity_Pa_s: Annotated[FiniteFloat, Field(ge=0)] = 1.0
     """Viscous stress over the rate of Green-Lagrange strain. It lets a wall whose fibres weaken as they shorten pass to

@@ -9,7 +9,7 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from echotruth.section import Fraction, Section, invalid
 
-Kind = Literal["beat", "rigid", "affine", "cylinder"]
+Kind = Literal["beat", "rigid", "affine", "tube"]
 TimeCourse = Literal["cosine", "triangle", "ramp"]
 Translation = Annotated[FiniteFloat, Field(ge=-1e5, le=1e5)]
 Rotation = Annotated[FiniteFloat, Field(ge=-180, le=180)]
@@ -28,7 +28,7 @@ class Rigid(Section):
     """Translation along the axial axis of short-axis images, away from the probe."""
     elevation_um: Translation = 0.0
     """Translation perpendicular to short-axis images, towards the base."""
-    turn_deg: Rotation = 0.0
+    rotation_deg: Rotation = 0.0
     """Rotation about the long axis, counter-clockwise in short-axis images."""
 
 
@@ -56,7 +56,7 @@ class Affine(Section):
         return self
 
 
-class Cylinder(Section):
+class TubeMotion(Section):
     """Contraction, shortening and torsion of a tube at constant wall volume."""
 
     contraction: Annotated[FiniteFloat, Field(ge=-1, lt=1)] = 0.35
@@ -65,7 +65,7 @@ class Cylinder(Section):
     """Relative decrease of the length; negative values stretch the tube."""
     torsion_deg: Rotation = 15.0
     """Rotation of the lower (apical) end relative to the base, counter-clockwise seen from the apex."""
-    endo_turn_deg: Rotation = 6.0
+    endo_rotation_deg: Rotation = 6.0
     """Rotation of the inner surface relative to the outer one, counter-clockwise seen from the apex; linear in the
     radius."""
 
@@ -74,9 +74,9 @@ class Motion(Section):
     """Motion of the heart: the beat of the finite-element heart, or an exact formula."""
 
     kind: Kind = "beat"
-    """`beat`: solved from loop, fibres and mechanics. `rigid`, `affine`, `cylinder`: prescribed by the section of that
+    """`beat`: solved from loop, fibres and mechanics. `rigid`, `affine`, `tube`: prescribed by the section of that
     name, without pressures; only the period and the frames of `loop` apply, and the bounds of `physiology` do not."""
-    course: TimeCourse = "cosine"
+    time_course: TimeCourse = "cosine"
     """Time course of a prescribed motion, from 0 at end-diastole to the full motion at end-systole: `cosine`, to
     mid-cycle and back; `triangle`, the same in equal steps; `ramp`, in equal steps to the last frame."""
     rigid: Rigid = Rigid()
@@ -84,6 +84,6 @@ class Motion(Section):
     axes."""
     affine: Affine = Affine()
     """`affine`: uniform deformation gradient in the whole heart."""
-    cylinder: Cylinder = Cylinder()
-    """`cylinder`: contraction, shortening and torsion of a tube (`geometry.shape`) at constant wall volume; by default
+    tube: TubeMotion = TubeMotion()
+    """`tube`: contraction, shortening and torsion of a tube (`geometry.shape`) at constant wall volume; by default
     the ejection fraction is 0.62."""

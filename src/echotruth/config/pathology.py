@@ -19,12 +19,12 @@ Delay = Annotated[FiniteFloat, Field(ge=0, le=1000)]
 
 
 class Infarct(Section):
-    """Stiff tissue that does not contract: whole AHA segments, or a ball. There is none if neither is given."""
+    """Stiff tissue that does not contract: whole AHA segments, or a sphere. There is none if neither is given."""
 
     segments: Annotated[list[Segment], Field(min_length=1)] | None = None
     """AHA segments."""
     radius_mm: Positive | None = None
-    """Radius of a ball centred in the middle of the wall at `position` and `azimuth_deg`."""
+    """Radius of a sphere centred in the middle of the wall at `position` and `azimuth_deg`."""
     position: Fraction = 0.5
     """Ball only: position of its centre along the long axis, 0 at the base, 1 at the endocardial apex."""
     azimuth_deg: Annotated[FiniteFloat, Field(ge=-180, le=180)] = 90.0
@@ -68,6 +68,6 @@ class Pathology(Section):
     """Regional disease; hypertrophy and dilation are keys of `geometry`, disarray of `fibres`."""
 
     infarct: Infarct = Infarct()
-    """Stiff tissue that does not contract: whole AHA segments, or a ball. There is none if neither is given."""
+    """Stiff tissue that does not contract: whole AHA segments, or a sphere. There is none if neither is given."""
     late_activation: LateActivation = LateActivation()
     """Delay of the active tension by AHA segment."""

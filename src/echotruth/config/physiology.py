@@ -12,7 +12,7 @@ from echotruth.section import Fraction, Section, invalid
 class Physiology(Section):
     """Bounds on a solved heart; a heart outside is kept and marked with the reason. `null` switches a bound off."""
 
-    exclude: bool = True
+    exclude_implausible: bool = True
     """Do not image and track a heart outside the bounds; `false` images and tracks it. In both cases it is marked
     `implausible`, and figures and scores include it only if no heart is within the bounds."""
     longitudinal_strain_max: FiniteFloat | None = 0.0

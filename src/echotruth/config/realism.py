@@ -39,7 +39,7 @@ class Decorrelation(Section):
 class Blood(Tissue):
     """Scatterers in the cavity, up to the plane of the base."""
 
-    time_ms: Time = 10.0
+    decorrelation_time_ms: Time = 10.0
     """Time in which the correlation of the RF falls to 1/e because of random flow, which adds to the motion of the
     wall."""
 
@@ -49,7 +49,7 @@ class Surroundings(Tissue):
 
     start_mm: Positive = 2.0
     """Range from the array at which the tissue begins."""
-    follow_mm: Length = 1.0
+    motion_decay_mm: Length = 1.0
     """Distance from the epicardium over which its motion falls to 1/e of that of the epicardium; 0 for no motion."""
 
 
@@ -66,9 +66,9 @@ class Haze(Section):
 
     level_dB: Level | None = None
     """Total power of the repeated echoes relative to the first; null for no reverberation."""
-    near_mm: Positive = 4.0
+    max_source_range_mm: Positive = 4.0
     """Largest range of echoes that are repeated."""
-    length_mm: Positive = 2.0
+    mean_extra_range_mm: Positive = 2.0
     """Mean additional range of the repeated echoes, which is exponentially distributed."""
 
 
@@ -81,7 +81,7 @@ class Shadow(Section):
     """Depth of the rib."""
     edge_deg: Annotated[FiniteFloat, Field(gt=-60, lt=60)] = 10.0
     """Direction of the rib's edge seen from the middle of the array: angle from the axial axis towards `side`."""
-    softness_mm: Length = 0.5
+    edge_width_mm: Length = 0.5
     """Length of the array over which elements change from open to blocked; 0 for a sharp edge."""
     level_dB: Annotated[FiniteFloat, Field(ge=-120, le=0)] = -40.0
     """One-way transmission of the rib."""

@@ -62,7 +62,7 @@ class Config(Section):
         if rf.focus_mm >= side:
             raise invalid("rf.focus_mm", rf.focus_mm, f"must be smaller than bmode.field_of_view_mm = {side:g}")
         if rf.focus_mm + rf.focal_half_span_mm >= side:
-            foci = f"its zones = {rf.zones} foci, zone_mm = {rf.zone_mm:g} apart"
+            foci = f"its focal_zones = {rf.focal_zones} foci, focal_spacing_mm = {rf.focal_spacing_mm:g} apart"
             remedy = f"must be smaller than {side - rf.focal_half_span_mm:g}, so that {foci}, lie in the field of view"
             raise invalid("rf.focus_mm", rf.focus_mm, remedy)
         return self
@@ -95,10 +95,10 @@ class Config(Section):
     @model_validator(mode="after")
     def _check_shape(self) -> Config:
         kind, shape = self.motion.kind, self.geometry.shape
-        if kind == "cylinder" and shape != "tube":
+        if kind == "tube" and shape != "tube":
             raise invalid("motion.kind", kind, "needs geometry.shape = tube")
         if shape == "tube" and kind == "beat":
-            remedy = "has no closed cavity and cannot beat: set motion.kind to rigid, affine or cylinder"
+            remedy = "has no closed cavity and cannot beat: set motion.kind to rigid, affine or tube"
             raise invalid("geometry.shape", shape, remedy)
         return self
 
@@ -131,15 +131,17 @@ class Config(Section):
     @model_validator(mode="after")
     def _check_stiffness(self) -> Config:
         key, stiffness = "mechanics.material.stiffness_kPa", self.mechanics.material.stiffness_kPa
-        drive, end_diastolic = self.loop.drive, self.geometry.state == "end_diastole"
+        prescribed, end_diastolic = self.loop.prescribed, self.geometry.given_state == "end_diastole"
         if self.motion.kind != "beat":
             return self
-        if drive != "pressure_volume" and stiffness is None:
-            raise invalid(key, None, f"must be given, because it cannot be solved for with loop.drive = {drive}")
+        if prescribed != "pressure_volume" and stiffness is None:
+            raise invalid(
+                key, None, f"must be given, because it cannot be solved for with loop.prescribed = {prescribed}"
+            )
         if end_diastolic and stiffness is None:
-            remedy = "must be given if geometry.state is end_diastole, because the unloaded volume is not known"
+            remedy = "must be given if geometry.given_state is end_diastole, because the unloaded volume is not known"
             raise invalid(key, None, remedy)
-        if end_diastolic and drive == "volume":
-            remedy = "needs geometry.state = unloaded, because there is no pressure to unload from"
-            raise invalid("loop.drive", drive, remedy)
+        if end_diastolic and prescribed == "volume":
+            remedy = "needs geometry.given_state = unloaded, because there is no pressure to unload from"
+            raise invalid("loop.prescribed", prescribed, remedy)
         return self

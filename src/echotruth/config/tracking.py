@@ -33,7 +33,7 @@ class PhaseCorrelation(Section):
     """Step between windows, as a fraction of the side of a window."""
     taper: Literal["none", "hann"] = "none"
     """Weights of the pixels of a window before the Fourier transform."""
-    floor: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.0
+    spectral_threshold: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.0
     """Magnitude, relative to the largest, below which a frequency is left out: it holds only noise, to which
     phase-only correlation would give the same weight as to speckle."""
     reference: Reference = "ED"
@@ -52,7 +52,7 @@ class WindowDeformation(Section):
     """Name of the method."""
     windows_mm: Annotated[list[Positive], Field(min_length=1, max_length=6)] = Field(default=[1.5, 0.75])
     """Side of the windows in each pass; 8 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
-    sweeps: Annotated[int, Field(ge=1, le=20)] = 3
+    final_passes: Annotated[int, Field(ge=1, le=20)] = 3
     """Number of passes with the last size."""
     reference: Reference = "bidirectional"
 
@@ -77,13 +77,13 @@ class BsplineDic(Section):
     margin_um: Annotated[FiniteFloat, Field(ge=0)] = 180.0
     """Pixels up to this distance from the wall are used too; the edge of the wall shows how it thickens. Default: as
     suits `bmode.field_of_view_mm`."""
-    range_dB: Annotated[FiniteFloat, Field(ge=0, le=120)] = 45.0
+    dynamic_range_dB: Annotated[FiniteFloat, Field(ge=0, le=120)] = 45.0
     """Dynamic range of the images, by which log compression is undone: dark gaps between speckles change more than the
     bright speckles do. 0 uses the grey values."""
     blur_px: Annotated[FiniteFloat, Field(ge=0, le=5)] = 0.6
-    """Standard deviation of the Gaussian blur of images with pixels much larger than `resolved_um`, against aliasing;
-    images with pixels of that size are not blurred."""
-    resolved_um: Annotated[FiniteFloat, Field(ge=0)] = 16.0
+    """Standard deviation of the Gaussian blur of images with pixels much larger than `speckle_pixel_um`, against
+    aliasing; images with pixels of that size are not blurred."""
+    speckle_pixel_um: Annotated[FiniteFloat, Field(ge=0)] = 16.0
     """Size of pixels that resolve the speckle fully: speed of sound / (6 bandwidth). Default: as suits
     `bmode.field_of_view_mm`."""
     smoothness: Positive = 3000.0
@@ -238,7 +238,7 @@ def default_trackers(scale: float = 1.0) -> dict[str, Any]:
     window: dict[str, Any] = {"window_px": None, "window_mm": 1.5 * scale}
     return {
         "as_published": PhaseCorrelation(),
-        "corrected": PhaseCorrelation(**window, taper="hann", floor=0.01, reference="bidirectional"),
+        "corrected": PhaseCorrelation(**window, taper="hann", spectral_threshold=0.01, reference="bidirectional"),
         "window_deformation": WindowDeformation(),
         "affine_dic": AffineDic(),
         "dis": Dis(),

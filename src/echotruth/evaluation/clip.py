@@ -34,7 +34,7 @@ class Clip:
     frame_time : ndarray of shape (frame,)
         Time since end-diastole, s.
     seed : int
-        Of the tracker's random numbers.
+        Seed of the tracker's random numbers.
     """
 
     frames: np.ndarray

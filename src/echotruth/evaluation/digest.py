@@ -16,7 +16,7 @@ def digest(folder: Path, case: str, view: str) -> str:
     Parameters
     ----------
     folder : Path
-        Of the repository.
+        Folder of the repository.
     case, view : str
 
     Returns

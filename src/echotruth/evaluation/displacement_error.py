@@ -85,11 +85,11 @@ def evaluate(tracked: np.ndarray, true: np.ndarray, wall: WallPoints, es: int) -
             Mean, median and 95th percentile of the length of the error at ES, m.
         drift ()
             RMS error in the last frame, when the tissue is almost back at its ED position, m.
-        tracked_spread, true_spread (region, 2)
+        tracked_displacement_sd, true_displacement_sd (region, 2)
             Standard deviation of radial and tangential displacement over a region at ES, m.
         tracked_transmural_gradient, true_transmural_gradient ()
             :func:`transmural_gradient` of the tangential spread, %.
-        tracked_segment, true_segment (17, 2)
+        tracked_segment_displacement, true_segment_displacement (17, 2)
             Mean radial, tangential displacement of the AHA segments at ES, m.
         coverage ()
             Fraction of the wall's points at ES that have an estimate.
@@ -150,9 +150,9 @@ def _spreads(polar: dict[str, np.ndarray], wall: WallPoints, es: int) -> dict[st
     result = {}
     for name, value in polar.items():
         spread = statistics.standard_deviation(value[es], wall.regions)
-        result[f"{name}_spread"] = spread
+        result[f"{name}_displacement_sd"] = spread
         result[f"{name}_transmural_gradient"] = transmural_gradient(spread[1, 1], spread[-1, 1])
-        result[f"{name}_segment"] = statistics.mean(value[es], wall.segments)
+        result[f"{name}_segment_displacement"] = statistics.mean(value[es], wall.segments)
     return result
 
 

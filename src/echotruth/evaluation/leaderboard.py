@@ -45,11 +45,11 @@ def rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path) 
     tree : DataTree
         The repository.
     config : Config
-        Of the repository.
+        Configuration of the repository.
     complete : ndarray of int
         Rows of the hearts to include.
     folder : Path
-        Of the repository; its ledger says which tracker failed, `external` holds the scores of external trackers.
+        Folder of the repository; its ledger says which tracker failed, `external` holds scores of external trackers.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def standings(rows: pd.DataFrame, seed: int) -> pd.DataFrame:
     rows : DataFrame
         As :func:`rows` returns them.
     seed : int
-        Of the bootstrap.
+        Seed of the bootstrap.
 
     Returns
     -------
@@ -158,7 +158,7 @@ def _table(clips: pd.DataFrame, cases: list[str], clips_per_heart: int, resample
     table = pd.DataFrame({"tracker": trackers}).set_index("tracker")
     table["hearts"] = every_view.groupby("tracker").sum()
     table["failures"] = (clips["failure"] != "").groupby(clips["tracker"]).sum()
-    for name in (RANKED_BY, "ecc_rms_points", "ell_rms_points", "err_rms_points"):
+    for name in (RANKED_BY, "e_cc_rms_pp", "e_ll_rms_pp", "e_rr_rms_pp"):
         values = means[name].unstack("case").reindex(index=trackers, columns=cases).to_numpy().T
         if name == RANKED_BY:
             table["rank"] = ranks(values.mean(0))

@@ -48,13 +48,13 @@ class EvaluationRun:
     Attributes
     ----------
     folder : Path
-        Of the repository, `out/NAME`.
+        Folder of the repository, `out/NAME`.
     config : Config
-        Of the repository.
+        Configuration of the repository.
     name : str
-        Of the tracker.
+        Name of the tracker.
     settings : Section
-        Of the tracker, as one of `tracking.trackers`.
+        Settings of the tracker, as one of `tracking.trackers`.
     """
 
     folder: Path
@@ -170,7 +170,7 @@ def prepare(repository: Path, name: str, values: dict[str, Any]) -> EvaluationRu
     repository : Path
         `out/NAME` or `out/NAME/NAME.zarr`.
     name : str
-        Of the tracker; letters, digits and underscores.
+        Name of the tracker; letters, digits and underscores.
     values : dict
         Its settings, as in a configuration.
 

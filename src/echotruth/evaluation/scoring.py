@@ -89,7 +89,7 @@ def ground_truth(job: Job) -> Truth:
     Parameters
     ----------
     job : Job
-        Of any stage of one view; geometry, mechanics and phantom are read.
+        Job of any stage of the view; geometry, mechanics and phantom are read.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, field_
     heart : Heart
     plane : Plane
     kind : {"short_axis", "long_axis"}
-        Of the plane.
+        Orientation of the plane.
     position : ndarray of shape (grid rows, grid columns, 2), m
         Lateral, axial, at end-diastole.
     field_of_view : float
@@ -137,7 +137,7 @@ def score(tracked: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
     tracked : ndarray of shape (frame, grid rows, grid columns, 2)
         Displacement since end-diastole: lateral, axial, m; NaN where unknown.
     truth : Truth
-        Of the view.
+        True motion in the same view.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def metrics(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
     score : dict of ndarray
         As :func:`score` returns it.
     plane : {"short_axis", "long_axis"}
-        Of the view: its tangential strain is circumferential (`ecc`) or longitudinal (`ell`).
+        Orientation of the view: its tangential strain is circumferential (`e_cc`) or longitudinal (`e_ll`).
 
     Returns
     -------
@@ -175,9 +175,9 @@ def metrics(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
         Name of a metric, which ends in its unit, to its value; NaN for the strain that the plane does not show. All at
         ES except `nrmse_cycle_percent` and `drift_um`.
     """
-    tangential = {"short_axis": "ecc", "long_axis": "ell"}[plane]
+    tangential = {"short_axis": "e_cc", "long_axis": "e_ll"}[plane]
     tracked_gradient, true_gradient = (score[f"{name}_transmural_gradient"] for name in ("tracked", "true"))
-    components = {"err": 0, "ecc": None, "ell": None, tangential: 1}
+    components = {"e_rr": 0, "e_cc": None, "e_ll": None, tangential: 1}
     values = {
         "nrmse_percent": 100 * score["nrmse"][0, 2],
         "nrmse_all_percent": 100 * score["nrmse_all"],
@@ -202,15 +202,15 @@ def metrics(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
 
 
 def _strain_metrics(score: dict[str, np.ndarray], name: str, component: int) -> dict[str, float]:
-    """Metrics of one strain component, in points (hundredths of strain)."""
+    """Metrics of one strain component, in percentage points."""
     heart, operator = REFERENCES.index("heart"), REFERENCES.index("operator")
     _, lower, upper, _ = score["segment_agreement"][heart, :, component]
     return {
-        f"global_{name}_bias_points": 100 * score["strain_bias"][heart, 0, component],
-        f"{name}_rms_points": 100 * score["strain_rms"][heart, 0, component],
+        f"global_{name}_bias_pp": 100 * score["strain_bias"][heart, 0, component],
+        f"{name}_rms_pp": 100 * score["strain_rms"][heart, 0, component],
         f"{name}_correlation": score["strain_correlation"][heart, 0, component],
-        f"segment_{name}_error_points": 100 * score["segment_strain_error"][heart, component],
-        f"segment_{name}_limits_points": 100 * (upper - lower) / 2,
-        f"tracker_{name}_bias_points": 100 * score["strain_bias"][operator, 0, component],
-        f"tracker_{name}_rms_points": 100 * score["strain_rms"][operator, 0, component],
+        f"segment_{name}_error_pp": 100 * score["segment_strain_error"][heart, component],
+        f"segment_{name}_limits_pp": 100 * (upper - lower) / 2,
+        f"tracker_{name}_bias_pp": 100 * score["strain_bias"][operator, 0, component],
+        f"tracker_{name}_rms_pp": 100 * score["strain_rms"][operator, 0, component],
     }

@@ -8,10 +8,10 @@ E = (F^T F - I) / 2 along the wall's axes at end-diastole.
 
 The quadratic terms matter at the borders of the wall, where all points lie to one side: a linear fit takes the gradient
 of the interior there, and radial strain varies steeply. On the true motion of the default heart at ES
-(basal slice, radius 0.45 mm, 35 points) they halve the error of the operator's radial strain, 11.1 to 5.6 points RMS
-(bias -3.5 to -1.5), and lower that of the circumferential from 1.6 to 1.0; white noise of 5 um then makes 2.2 and 0.5
-points instead of 0.9 and 0.4, which is below that error. A radius of 0.40 mm gives 5.2 and 0.9 with noise of 2.3 and
-0.6; one of 0.60 mm 7.1 and 1.2 with 1.2 and 0.3.
+(basal slice, radius 0.45 mm, 35 points) they halve the error of the operator's radial strain, 11.1 to 5.6 percentage
+points RMS (bias -3.5 to -1.5), and lower that of the circumferential from 1.6 to 1.0; white noise of 5 um then makes
+2.2 and 0.5 instead of 0.9 and 0.4, which is below that error. A radius of 0.40 mm gives 5.2 and 0.9 with noise of 2.3
+and 0.6; one of 0.60 mm 7.1 and 1.2 with 1.2 and 0.3.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class StrainOperator:
     axes : ndarray of shape (point, 2, 2)
         Unit vectors of the wall at end-diastole: (radial, tangential) by (lateral, axial).
     radius : float
-        Of the neighbourhood of a point, m.
+        Radius of the neighbourhood of a point, m.
     """
 
     position: np.ndarray

@@ -19,7 +19,7 @@ SCRIPTS = (".py", ".jl", ".m", ".r", ".sh", ".pl", ".js", ".lua")
 
 
 class EvaluationError(ValueError):
-    """A tracker that cannot be evaluated; the message says why, and what to do."""
+    """Raised if a tracker cannot be evaluated; the message says why, and what to do."""
 
 
 def parse_tracker(

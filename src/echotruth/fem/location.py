@@ -2,8 +2,8 @@
 
 A quadratic tetrahedron lies in the convex hull of its Bezier points: its corners, and for each edge twice its mid-edge
 node less the mean of its ends (Farin, Curves and Surfaces for Computer Aided Geometric Design). They bound how far it
-reaches beyond each face of the straight tetrahedron with the same corners. That leaves few cells for a point, and
-Newton's method on x(xi) = x decides.
+reaches beyond each face of the straight tetrahedron with the same corners. That leaves few cells for a point, which
+Newton's method on x(xi) = x tests.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _MAX_BOXES = 64
 """Boxes along an axis at most."""
 
 _TOLERANCE = 1e-10
-"""By how much local coordinates may leave the tetrahedron: round-off at a face must lose no point."""
+"""Distance by which local coordinates may leave the tetrahedron, so that round-off at a face loses no point."""
 
 _MARGIN = 1e-9
 """Margin of a hull, over its size, which holds the tolerance."""
@@ -173,7 +173,7 @@ def _near(straight, least, point, local):  # pragma: no cover - compiled
 
 @numba.njit(cache=True, error_model="numpy")
 def _invert(corner, derivatives, point, xi, work):  # pragma: no cover - compiled
-    """Newton's method for x(xi) = point, in place: dx/dxi delta = point - x(xi); whether xi is in the cell.
+    """Newton's method for x(xi) = point, in place: dx/dxi delta = point - x(xi); returns if xi is in the cell.
 
     x(xi) is the corner plus sum_k xi_k (dx/dxi_k at the corner + dx/dxi_k at xi) / 2, exactly.
     """

@@ -40,7 +40,7 @@ _ALIGNMENT = 64
 
 
 class SingularMatrix(ArithmeticError):
-    """A matrix that could not be factored."""
+    """Raised if a matrix cannot be factored."""
 
 
 class Factorization(Protocol):

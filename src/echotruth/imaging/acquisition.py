@@ -1,6 +1,6 @@
 """Acquisition: the full matrix of every frame, with acoustic shadow, reverberation haze and noise.
 
-They act on the echoes between all pairs of elements, so that any transmit made of these has them.
+Applied to the full matrix, so that every synthesised transmit contains them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Acquisition:
     scanner : Scanner
     medium : Medium
     random : Random
-        Of the reverberation, and of the noise in each frame.
+        Makes the generators of the reverberation and of the noise in each frame.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Acquisition:
         self._haze_range, self._filter, self._rib = 0.0, None, None
         if realism.haze.level_dB is not None:
             echoes = reverberation(realism.haze, config.probe, imaging_depth(config.rf, config.bmode), random("haze"))
-            self._haze_range = realism.haze.si().near
+            self._haze_range = realism.haze.si().max_source_range
             self._filter = 1 + reverberation_filter(echoes, scanner.matrix.frequency, config.probe.si().sound_speed)
         if realism.shadow.side != "none":
             self._rib = Rib(realism.shadow, scanner.matrix.centres)
@@ -49,7 +49,7 @@ class Acquisition:
         self.noise = 0.0 if snr is None else self._signal_to_unit_noise() * 10 ** (-snr / 20)
 
     def __call__(self, frame: int) -> np.ndarray:
-        """Spectra of the record of all pairs in a frame, (bins, elements, elements), as of :class:`FullMatrix`."""
+        """Spectra of the record of all pairs in a frame, (bins, elements, elements), as from :class:`FullMatrix`."""
         record = self.echoes(*validate_scatterers(*self._medium(frame)))
         if self.noise:
             record += np.float32(self.noise) * self.unit_noise(frame)
@@ -66,7 +66,7 @@ class Acquisition:
         return record
 
     def direct(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
-        """The same without haze."""
+        """Echoes without reverberation."""
         matrix = self._scanner.matrix
         if self._rib is None:
             return matrix(position, amplitude)

@@ -22,7 +22,7 @@ LENS_ACCURACY = 0.015
 """Relative error (L2) of the RF under a lens, from `FullMatrix.accurate_from` on; see docs/conventions.md."""
 
 MIN_SAMPLES_PER_PERIOD = 2.1
-"""Of the highest frequency; a record that is finer is decimated."""
+"""Minimum samples per period of the highest frequency; finer records are decimated."""
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -33,7 +33,7 @@ class RfRecorder:
     Parameters
     ----------
     keep : list of str
-        As `rf.keep`.
+        Value of `rf.keep`.
     matrix : FullMatrix
     frames : int
     """
@@ -42,7 +42,7 @@ class RfRecorder:
         elements = len(matrix.centres)
         self._matrix, self._keep_lines, self._arrays = matrix, "lines" in keep, Arrays()
         if "channels" in keep:
-            # Whole numbers, for all frames lie in memory until the job writes them at once.
+            # Integers, because all frames stay in memory until the job writes them together.
             self._arrays["channels"] = np.zeros((frames, elements, elements, decimated_samples(matrix)), np.int16)
             self._arrays["channels_step"] = np.zeros(frames)
 
@@ -58,7 +58,7 @@ class RfRecorder:
 
 
 def decimated_samples(full: FullMatrix) -> int:
-    """Samples of a channel: all of the record, or every second or third ... one where they hold its band."""
+    """Samples of a channel: those of the record, decimated by the largest integer factor that keeps its band."""
     coarsest = max(1, int(full.samples / MIN_SAMPLES_PER_PERIOD / (full.first_bin + len(full.frequency))))
     return full.samples // max(step for step in range(1, coarsest + 1) if full.samples % step == 0)
 
@@ -100,14 +100,14 @@ def metadata(config: Config, scanner: Scanner) -> tuple[Arrays, dict[str, int], 
     Parameters
     ----------
     config : Config
-        Of any case.
+        Configuration of any case.
     scanner : Scanner
-        Of that.
+        Scanner of that configuration.
 
     Returns
     -------
     arrays, sizes, attributes : dict
-        Of the group `rf` in the repository: coordinates and transmits, lengths of dimensions, settings in SI units.
+        The group `rf` of the repository: coordinates and transmits, lengths of dimensions, settings in SI units.
     """
     waves, scan, matrix = (
         TRANSMIT_SEQUENCES[config.rf.transmit](config.probe, config.rf, scanner.scan),
@@ -143,5 +143,5 @@ def _settings(config: Config) -> dict[str, Any]:
         "scan": rf.scan,
         "apodization": rf.apodization,
         "f_number": rf.f_number,
-        "accuracy": LENS_ACCURACY if rf.elevation else PLANE_ACCURACY,
+        "accuracy": LENS_ACCURACY if rf.elevation_beam else PLANE_ACCURACY,
     }

@@ -34,7 +34,7 @@ class Sequence:
     random : Random
         Makes a generator of random numbers for each purpose.
     time : ndarray of shape (frame,), s, optional
-        Of the frames. Default: those of the loop.
+        Times of the frames. Default: those of the loop.
 
     Attributes
     ----------

@@ -9,18 +9,18 @@ from types import SimpleNamespace
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.config.loop import Drive, Loop
+from echotruth.config.loop import Loop, Prescribed
 from echotruth.loop.phases import es_frame
 from echotruth.loop.recording import LoopError, Recording, read
 
 SHIPPED = Path(__file__).parent / "recordings"
 
-PRESCRIBED: dict[Drive, tuple[str, ...]] = {
+PRESCRIBED: dict[Prescribed, tuple[str, ...]] = {
     "pressure_volume": ("pressure", "volume"),
     "pressure": ("pressure", "tension"),
     "volume": ("volume",),
 }
-"""Quantities that each drive needs in its file; `volume` takes a tension too where there is one."""
+"""Value of `loop.prescribed` -> quantities that the file must have; `volume` takes a tension too where there is one."""
 
 _CURVES = ("pressure", "volume", "tension")
 
@@ -40,7 +40,7 @@ class Cycle:
     ----------
     source : str
         File it came from.
-    drive : "pressure_volume", "pressure" or "volume"
+    prescribed : "pressure_volume", "pressure" or "volume"
         What is prescribed.
     period : float, s
     time : ndarray of shape (n_frames,), s
@@ -51,7 +51,7 @@ class Cycle:
     """
 
     source: str
-    drive: Drive
+    prescribed: Prescribed
     period: float
     time: Floats
     pressure: Floats | None
@@ -104,21 +104,23 @@ def read_loop(loop: Loop) -> Cycle:
     sampled = {
         name: None if values is None else _resample(time / time[-1], values, phase) for name, values in curves.items()
     }
-    if loop.drive == "volume" and sampled["tension"] is None:
+    if loop.prescribed == "volume" and sampled["tension"] is None:
         sampled["tension"] = np.zeros(loop.frames)
-    return Cycle(str(recording.path), loop.drive, period, phase * period, **sampled)
+    return Cycle(str(recording.path), loop.prescribed, period, phase * period, **sampled)
 
 
 def _read_recording(loop: Loop) -> Recording:
-    """Columns of the file that the drive needs, and no others."""
+    """Columns of the file that `loop.prescribed` needs, and no others."""
     path = SHIPPED / f"{loop.file}.csv"
     path = path if path.is_file() else Path(loop.file)
     if not path.is_file():
         shipped = ", ".join(sorted(file.stem for file in SHIPPED.glob("*.csv")))
         remedy = f"give the path of a CSV file or the name of a shipped loop ({shipped})"
         raise LoopError(f"{path}: there is no readable loop of this name; {remedy}.")
-    needed = ("time", *PRESCRIBED[loop.drive])
-    return read(path, f"the drive {loop.drive}", needed, ("tension",) if loop.drive == "volume" else ())
+    needed = ("time", *PRESCRIBED[loop.prescribed])
+    return read(
+        path, f"loop.prescribed = {loop.prescribed}", needed, ("tension",) if loop.prescribed == "volume" else ()
+    )
 
 
 def _check_time(recording: Recording) -> None:

@@ -23,7 +23,7 @@ _MIN_ROWS = 4
 
 
 class LoopError(ValueError):
-    """A cycle that cannot drive a heart; the message names file, row, value and remedy."""
+    """Raised if a cycle cannot drive a heart; the message names file, row, value and remedy."""
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ def compiled(name: str) -> Callable:
     Returns
     -------
     numba CFunc
-        Of one type for all laws, so that the element is compiled once.
+        Its type is the same for all laws, so that the element is compiled once.
     """
     from numba import cfunc, float64
 

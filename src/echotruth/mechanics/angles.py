@@ -45,11 +45,11 @@ def angles_from_frames(frames: Floats, axes: Floats) -> tuple[Floats, Floats, Fl
     Returns
     -------
     helix, transverse, sheet : ndarray of shape (...), rad
-        Between -pi/2 and pi/2: neither fibre nor sheet has a head. A fibre along L has no transverse angle.
+        Between -pi/2 and pi/2: fibres and sheets have no sign. A fibre along L has no transverse angle.
     """
     fibre, sheet, _ = np.moveaxis(frames, -2, 0)
     f_r, f_c, f_l = np.moveaxis(np.einsum("...j,...ij->...i", fibre, axes), -1, 0)
-    # The sheet angle is that about the fibre that points along C, wherever the head of this one is.
+    # The sheet angle is about the fibre direction that points along C, whatever the sign of this one.
     fibre = fibre * np.where(f_c < 0, -1.0, 1.0)[..., None]
     in_wall = np.cross(axes[..., 0, :], fibre)
     sheet_angle = _line_angle(np.sum(sheet * in_wall, axis=-1), np.sum(sheet * np.cross(in_wall, fibre), axis=-1))
@@ -57,7 +57,7 @@ def angles_from_frames(frames: Floats, axes: Floats) -> tuple[Floats, Floats, Fl
 
 
 def _line_angle(x: Floats, y: Floats) -> Floats:
-    """Angle of a line without a head, between -pi/2 and pi/2, rad, by its components."""
+    """Angle of a line without a sign, between -pi/2 and pi/2, rad, from its components."""
     return np.arctan2(y * np.where(x < 0, -1.0, 1.0), np.abs(x))
 
 

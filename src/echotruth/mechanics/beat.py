@@ -15,9 +15,9 @@ from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.history import Arrays, collect_outputs
 from echotruth.mechanics.prescribed import prescribed_motion
-from echotruth.mechanics.solver import drive
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.checkpoint import Checkpoints
+from echotruth.mechanics.solver.cycle import SolvedCycle, solve
 from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
@@ -30,7 +30,7 @@ def beat(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
     Parameters
     ----------
     config : Config
-        Of which the seed and the sections geometry, fibres, pathology, loop and mechanics are used.
+        Only the seed and the sections geometry, fibres, pathology, loop and mechanics are used.
     scratch : Path, optional
         Folder in which solved frames are kept until the beat is complete, so that a stopped run continues there.
 
@@ -38,8 +38,8 @@ def beat(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
     -------
     dict of dict of ndarray
         Groups `geometry`, `fibres`, `pathology`, `mechanics` and `kinematics`; the arrays, their
-        shapes and units are those of docs/schema.md. Numba's number of threads is the caller's
-        to set; the arrays do not depend on it.
+        shapes and units are those of docs/schema.md. The caller sets Numba's number of
+        threads; the arrays do not depend on it.
 
     Raises
     ------
@@ -61,20 +61,20 @@ def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
     """The unloaded wall of a configuration, solved for where its geometry is that of end-diastole."""
     mesh = left_ventricle(config.geometry)
     logger.info("%d tetrahedra, %d nodes", len(mesh.cells), len(mesh.nodes))
-    if config.geometry.state == "end_diastole":
+    if config.geometry.given_state == "end_diastole":
         assert cycle.pressure is not None
         stiffness = config.mechanics.material.si().stiffness
         mesh = unload(mesh, lambda guess: equilibrium(config, wall(config, guess)), cycle.pressure[0], stiffness)
     return wall(config, mesh)
 
 
-def _solve(config: Config, unloaded: Wall, cycle: Cycle, scratch: Path | None) -> drive.Beat:
+def _solve(config: Config, unloaded: Wall, cycle: Cycle, scratch: Path | None) -> SolvedCycle:
     tissue = unloaded.tissue
     activation = Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
     equations = equilibrium(config, unloaded)
     checkpoints = Checkpoints(scratch / _fingerprint(config, unloaded, cycle)) if scratch else None
     try:
-        return drive.solve(equations, cycle, activation, config.mechanics.material.si().stiffness, checkpoints)
+        return solve(equations, cycle, activation, config.mechanics.material.si().stiffness, checkpoints)
     finally:
         equations.close()
 
@@ -85,7 +85,7 @@ def _fingerprint(config: Config, unloaded: Wall, cycle: Cycle) -> str:
     return sha256(pickle.dumps((settings, unloaded, cycle))).hexdigest()[:16]
 
 
-def _mechanics_arrays(solved: drive.Beat, cycle: Cycle) -> Arrays:
+def _mechanics_arrays(solved: SolvedCycle, cycle: Cycle) -> Arrays:
     return {
         "time": cycle.time,
         "pressure": solved.pressure,

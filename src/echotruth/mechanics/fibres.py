@@ -22,7 +22,7 @@ CENTROID = np.full((1, 3), 0.25)
 
 
 class FibreError(ValueError):
-    """Fibre directions that the mesh lacks."""
+    """Raised if the mesh lacks the fibre directions that the configuration asks for."""
 
 
 def wall_depth(mesh: Mesh) -> Floats:
@@ -116,7 +116,7 @@ def _gradient(mesh: Mesh, values: Floats, dN_dX: Floats) -> Floats:
     norm = np.linalg.norm(gradient, axis=-1)
     flat = norm < 1e-6 * np.median(norm)
     if flat.any():
-        # A cell with all its nodes on one side of the wall has no gradient: that of its neighbours stands in.
+        # A cell with all its nodes on one side of the wall has no gradient: it takes that of its neighbours.
         of_cell = np.repeat(gradient.mean(axis=1), 10, axis=0)
         nodes = mesh.cells.ravel()
         of_node = np.stack([np.bincount(nodes, part, len(mesh.nodes)) for part in of_cell.T], axis=-1)
@@ -191,7 +191,7 @@ def fibre_frames(mesh: Mesh, depth: Floats, fibres: Fibres, xi: Floats, seed: in
     xi : ndarray of shape (n_points, 3)
         Local coordinates, the same in every tetrahedron.
     seed : int, optional
-        Of the random angles of the disarray.
+        Seed of the random angles of the disarray.
 
     Returns
     -------

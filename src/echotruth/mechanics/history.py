@@ -21,7 +21,7 @@ def collect_outputs(config: Config, wall: Wall, mechanics: Arrays) -> dict[str, 
     Parameters
     ----------
     config : Config
-        Of which the seed and the section fibres are used.
+        Only the seed and the section fibres are used.
     wall : Wall
         Unloaded.
     mechanics : dict of ndarray

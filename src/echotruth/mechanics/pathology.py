@@ -15,7 +15,7 @@ from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, MaterialPoints, Mesh, interpolate, shape
 
 HEALTHY, INFARCT, BORDER, LATE = range(4)
-"""Regions; where two overlap, an infarct goes before its border zone and that before late activation."""
+"""Regions; where they overlap, infarct takes precedence over border zone, and border zone over late activation."""
 
 ACTIVATION_DELAY = {
     "lbbb": dict.fromkeys((1, 4, 7, 10, 13, 15, 17), 4e-3) | dict.fromkeys((5, 6, 11, 12, 16), 8e-3),
@@ -35,7 +35,7 @@ _CENTROID = int(np.flatnonzero((_SAMPLES == 0.25).all(axis=1))[0])
 
 
 class PathologyError(ValueError):
-    """A pathology that no cell of the heart has."""
+    """Raised if no cell of the heart has the pathology of the configuration."""
 
 
 @dataclass(frozen=True)
@@ -106,20 +106,20 @@ def _infarct_weight(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
         raise PathologyError(_no_cell(infarct))
     if border == 0:
         return core.astype(float)
-    # The nearest of samples a quarter of an edge apart: the distance in a straight line, be it through the cavity.
+    # Straight-line distance, even through the cavity, to the nearest of samples a quarter of an edge apart.
     distance, _ = KDTree(positions[infarcted]).query(positions[:, _CENTROID], distance_upper_bound=border)
     return np.where(core, 1.0, np.clip(1 - distance / border, 0, 1))
 
 
 def _in_region(mesh: Mesh, depth: Floats, infarct: Infarct, positions: Floats) -> NDArray[np.bool_]:
-    """Whether positions (..., 3), m, are in the segments or the ball of the infarct, at any depth."""
+    """Whether positions (..., 3), m, are in the segments or the sphere of the infarct, at any depth."""
     if infarct.segments is not None:
         return np.isin(segment(positions, _apex(mesh)), infarct.segments)
     return np.linalg.norm(positions - infarct_centre(mesh, depth, infarct), axis=-1) <= infarct.si().radius
 
 
 def infarct_centre(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
-    """Centre of the ball of an infarct: the middle of the wall in a direction from the long axis.
+    """Centre of the sphere of an infarct: the middle of the wall in a direction from the long axis.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def infarct_centre(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
     depth : ndarray of shape (n_nodes,)
         Wall depth.
     infarct : Infarct
-        Of which position and azimuth are used.
+        Only position and azimuth are used.
 
     Returns
     -------
@@ -158,9 +158,9 @@ def _apex(mesh: Mesh) -> float:
 def _no_cell(infarct: Infarct) -> str:
     """Why the infarct is refused, and the remedy."""
     if infarct.segments is not None:
-        region, remedy = f"segments = {infarct.segments}", "name segments that the mesh has, or raise transmurality"
+        region, remedy = f"segments = {infarct.segments}", "name segments that the mesh has, or increase transmurality"
     else:
         where = f"at position {infarct.position} and azimuth_deg {infarct.azimuth_deg}"
         region = f"radius_mm = {infarct.radius_mm} {where}"
-        remedy = "raise it, refine the mesh, or move the ball to where there is wall"
+        remedy = "increase radius_mm, refine the mesh, or move the sphere into the wall"
     return f"pathology.infarct.{region}: no cell has its centroid in it: {remedy}."

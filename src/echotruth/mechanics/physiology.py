@@ -48,7 +48,7 @@ BOUNDS = (
     Bound("tension_es_min_kPa", "tension_es", "the active tension at end-systole (kPa)", 1e-3),
     Bound("tension_es_max_kPa", "tension_es", "the active tension at end-systole (kPa)", 1e-3),
 )
-"""In the order in which they are checked: first whether there is a solution, then whether it is a heart."""
+"""Order of checks: accuracy of the solution, then plausibility."""
 
 
 def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays) -> Arrays:
@@ -87,7 +87,7 @@ def violated_bound(measured: dict[str, ArrayLike], bounds: Physiology) -> str:
     Parameters
     ----------
     measured : dict of ndarray
-        As from `measures`.
+        As :func:`measures` returns it.
     bounds : Physiology
     """
     for bound in BOUNDS:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from echotruth.config import Config
-from echotruth.config.motion import Affine, Cylinder, Rigid, TimeCourse
+from echotruth.config.motion import Affine, Rigid, TimeCourse, TubeMotion
 from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.heart import SHORT_AXIS
 from echotruth.loop.cycle import read_loop
@@ -17,7 +17,7 @@ from echotruth.mechanics.solver.wall import wall
 
 
 class MotionError(ValueError):
-    """A motion that cannot be imaged."""
+    """Raised if a motion cannot be imaged."""
 
 
 def prescribed_motion(config: Config) -> dict[str, Arrays]:
@@ -26,7 +26,7 @@ def prescribed_motion(config: Config) -> dict[str, Arrays]:
     Parameters
     ----------
     config : Config
-        Of which the seed, the sections geometry, fibres, pathology, loop and motion, and the transmit focus are used.
+        Only the seed, the sections geometry, fibres, pathology, loop and motion, and the transmit focus are used.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def prescribed_motion(config: Config) -> dict[str, Arrays]:
         With one sentence, if the heart or the period is invalid, or the heart would move into the array.
     """
     mesh = left_ventricle(config.geometry)
-    amplitude = motion_amplitude(config.motion.course, config.loop.frames)
+    amplitude = motion_amplitude(config.motion.time_course, config.loop.frames)
     displacement = np.stack([displacement_at(config, mesh, mesh.nodes, a) for a in amplitude])
     _check_clearance(config, mesh, displacement)
     undefined = ("pressure", "volume", "pressure_target", "volume_target", "active_tension", "residual")
@@ -89,7 +89,7 @@ def displacement_at(config: Config, mesh: Mesh, positions: Floats, amplitude: fl
     positions : ndarray of shape (..., 3), m
         At end-diastole, in the heart frame.
     amplitude : float
-        Of the motion, a.
+        Amplitude a of the motion.
 
     Returns
     -------
@@ -101,15 +101,15 @@ def displacement_at(config: Config, mesh: Mesh, positions: Floats, amplitude: fl
     if motion.kind == "affine":
         fixed_point = np.array([0, 0, motion.affine.position * mesh.nodes[mesh.endo, 2].min()])
         return affine(motion.affine, positions - fixed_point, amplitude)
-    return cylinder(motion.cylinder, tube_dimensions(config.geometry), positions, amplitude)
+    return tube_motion(motion.tube, tube_dimensions(config.geometry), positions, amplitude)
 
 
 def rigid(section: Rigid, positions: Floats, amplitude: float) -> Floats:
-    """Displacement (Q(a turn) - I) x + a shift of positions x (..., 3), m, with a rotation Q about the long axis."""
+    """Displacement (Q(a angle) - I) x + a shift of positions x (..., 3), m, with a rotation Q about the long axis."""
     si = section.si()
     shift = np.array([si.lateral, si.axial, si.elevation]) @ SHORT_AXIS
     # The long axis points to the base: seen from the apex, rotation about it is clockwise.
-    return positions @ (_rotation_about_z(-amplitude * si.turn) - np.eye(3)).T + amplitude * shift
+    return positions @ (_rotation_about_z(-amplitude * si.rotation) - np.eye(3)).T + amplitude * shift
 
 
 def affine(section: Affine, offsets: Floats, amplitude: float) -> Floats:
@@ -118,7 +118,7 @@ def affine(section: Affine, offsets: Floats, amplitude: float) -> Floats:
     return amplitude * offsets @ (gradient - np.eye(3)).T
 
 
-def cylinder(section: Cylinder, tube: Tube, positions: Floats, amplitude: float) -> Floats:
+def tube_motion(section: TubeMotion, tube: Tube, positions: Floats, amplitude: float) -> Floats:
     """Displacement in a tube that contracts, shortens and twists.
 
     With capitals at end-diastole, r^2 = r_i^2 + (R^2 - R_i^2) / lambda, theta = Theta + gamma Z + omega(R) and
@@ -129,7 +129,7 @@ def cylinder(section: Cylinder, tube: Tube, positions: Floats, amplitude: float)
 
     Parameters
     ----------
-    section : Cylinder
+    section : TubeMotion
     tube : Tube
         At end-diastole, its base in z = 0.
     positions : ndarray of shape (..., 3), m
@@ -148,7 +148,7 @@ def cylinder(section: Cylinder, tube: Tube, positions: Floats, amplitude: float)
     difference = inner**2 - tube.inner**2 + (square - tube.inner**2) * (1 / stretch - 1)
     r_over_R = np.sqrt(1 + difference / square)
     from_outside = (tube.outer - np.sqrt(square)) / (tube.outer - tube.inner)
-    angle = amplitude * (si.torsion * z / tube.length - si.endo_turn * from_outside)
+    angle = amplitude * (si.torsion * z / tube.length - si.endo_rotation * from_outside)
     cos, sin = r_over_R * np.cos(angle), r_over_R * np.sin(angle)
     return np.stack([(cos - 1) * x - sin * y, sin * x + (cos - 1) * y, (stretch - 1) * z], axis=-1)
 

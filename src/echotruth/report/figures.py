@@ -44,7 +44,7 @@ class Figures:
         self.config, self.folder = config, folder
         status = self.tree["cases/status"].values
         self.complete = np.flatnonzero(status == "complete")
-        if not len(self.complete) and not config.physiology.exclude:
+        if not len(self.complete) and not config.physiology.exclude_implausible:
             self.complete = np.flatnonzero(status == "implausible")
         if not len(self.complete):
             raise ValueError(f"{store}: no case is complete: see the reasons in cases/reason")
@@ -146,7 +146,9 @@ class Figures:
         short = [name for name, view in self.config.views.items() if view.plane == "short_axis"]
         data = self.group(f"evaluation/{self.sizes[0]}").sel(tracker=self.order[0], polar="tangential", view=short)
         # A segment at a boundary may be visible in two planes; their mean is shown.
-        true, tracked = (data[name].mean("view").values for name in ("true_segment", "tracked_segment"))
+        true, tracked = (
+            data[name].mean("view").values for name in ("true_segment_displacement", "tracked_segment_displacement")
+        )
         bullseye.draw(self.folder / "bullseye.png", true, tracked, self.order[0])
 
     def error(self) -> None:
@@ -159,7 +161,7 @@ class Figures:
         layers = {}
         for size in self.sizes:
             data = self.tree[f"evaluation/{size}"].to_dataset().isel(case=self.complete)
-            layers[size] = data.rms_error.sel(measure="tangential").isel(region=slice(1, None))
+            layers[size] = data.rms_error.sel(component="tangential").isel(region=slice(1, None))
         errors = {
             view: {
                 tracker: {size: rms.sel(view=view, tracker=tracker).mean("case").values for size, rms in layers.items()}

@@ -16,8 +16,8 @@ from echotruth.report.error import SIZES
 
 PANELS = (
     ("nrmse_all_percent", "NRMSE of displacement at ES (%)"),
-    ("ecc_rms_points", "RMS error of $E_{CC}$ at ES (points)"),
-    ("err_rms_points", "RMS error of $E_{RR}$ at ES (points)"),
+    ("e_cc_rms_pp", "RMS error of $E_{CC}$ at ES (pp)"),
+    ("e_rr_rms_pp", "RMS error of $E_{RR}$ at ES (pp)"),
 )
 """Metrics that are drawn, and their labels."""
 

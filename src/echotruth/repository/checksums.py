@@ -11,7 +11,7 @@ from typing import Any
 
 
 class ChecksumError(ValueError):
-    """A file that is missing or differs from what its job wrote."""
+    """Raised if a file is missing or differs from what its job wrote."""
 
 
 def checksums(files: list[Path], root: Path) -> dict[str, str]:
@@ -27,7 +27,7 @@ def verify(root: Path, path: Path, record: dict[str, Any]) -> int:
     root : Path
         Folder of the store.
     path : Path
-        Of the record.
+        Path of the record.
     record : dict
         As :func:`echotruth.repository.ledger.read` returns it.
 

@@ -22,7 +22,7 @@ def sizes(mesh: Mesh) -> dict[str, int]:
     Parameters
     ----------
     mesh : Mesh
-        Of any case: all meshes have the same topology.
+        Mesh of any case: all meshes have the same topology.
     """
     return {
         "node": len(mesh.nodes),

@@ -12,9 +12,22 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-import echotruth
+PACKAGE = Path(__file__).parents[1]
+"""Folder of echotruth."""
 
-PACKAGES = ("numpy", "scipy", "numba", "scikit-image", "pypardiso", "mkl", "meshio", "vtk", "xarray", "zarr")
+PACKAGES = (
+    "echotruth",
+    "numpy",
+    "scipy",
+    "numba",
+    "scikit-image",
+    "pypardiso",
+    "mkl",
+    "meshio",
+    "vtk",
+    "xarray",
+    "zarr",
+)
 """Packages whose version may affect the numbers, besides OpenCV, which is installed under several names."""
 
 _EXCLUDED = ("echotruth.config", "echotruth.cases", "echotruth.repository", "echotruth.workflow")
@@ -46,7 +59,7 @@ def settings_version(*settings: Any) -> str:
 
 def packages() -> dict[str, str]:
     """Versions of echotruth and of the packages that may affect the numbers, by name."""
-    versions = {"echotruth": echotruth.__version__}
+    versions: dict[str, str] = {}
     for name in PACKAGES:
         with suppress(PackageNotFoundError):
             versions[name] = version(name)
@@ -93,7 +106,7 @@ def _path(name: str) -> Path | None:
     """File of a script or of a module of echotruth, without importing it."""
     if name.endswith(".py"):
         return Path(name)
-    path = Path(echotruth.__file__).parent.joinpath(*name.split(".")[1:])
+    path = PACKAGE.joinpath(*name.split(".")[1:])
     files = (path.with_suffix(".py"), path / "__init__.py")
     return next((file for file in files if file.is_file()), None)
 

@@ -21,7 +21,7 @@ def publish(folder: Path) -> dict[str, Any]:
     Parameters
     ----------
     folder : Path
-        Of the repository, `out/NAME`.
+        Folder of the repository, `out/NAME`.
 
     Returns
     -------

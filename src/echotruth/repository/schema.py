@@ -82,7 +82,7 @@ PHYSIOLOGY = (
 )
 
 PHANTOM = (
-    _array("scatterers", "case view", "int32", "1", "number of scatterers in the wall that enter the beam"),
+    _array("scatterer_count", "case view", "int32", "1", "number of scatterers in the wall that enter the beam"),
     _array("origin", "case view xyz", "float64", "m", "centre of the array in the heart frame"),
     _array("axes", "case view vector xyz", "float64", "1", "lateral, axial and elevation axes in the heart frame"),
     _array("centre", "case view plane", "float64", "m", "origin of polar components in the image"),
@@ -147,7 +147,7 @@ COORDINATES = (
     _array("transmitter", "transmitter", "float64", "m", "lateral position of the transmitting element"),
     _array("receiver", "receiver", "float64", "m", "lateral position of the receiving element"),
     _array("polar", "polar", "string", "1", "radial, tangential (long axis: transverse, longitudinal)"),
-    _array("measure", "measure", "string", "1", "polar component, or the whole vector"),
+    _array("component", "component", "string", "1", "polar component, or the whole vector"),
 )
 
 LABELS: dict[str, tuple[str, ...]] = {
@@ -161,7 +161,7 @@ LABELS: dict[str, tuple[str, ...]] = {
     "statistic": ("mean", "median", "p95"),
     "agreement": ("bias", "lower", "upper", "correlation"),
     "polar": ("radial", "tangential"),
-    "measure": ("radial", "tangential", "total"),
+    "component": ("radial", "tangential", "total"),
 }
 """Labels of the dimensions that are the same in every repository."""
 

@@ -28,7 +28,7 @@ zarr.config.set({"array.write_empty_chunks": True})
 
 
 class NotWritten(ValueError):
-    """A part of an array that its job has not written."""
+    """Raised if a part of an array was not written by its job."""
 
 
 class Store:
@@ -102,7 +102,7 @@ class Store:
         """Arrays of a group for one case (and view); a missing or damaged shard is an error."""
         opened = self._open(group, "r")
         by_name = {array.name: array for array in schema_of(group)}
-        # Of the RF only a part may be stored.
+        # Only a part of the RF may be stored.
         arrays = [by_name[name] for name in names or by_name if names or name in opened]
         for array in arrays:
             self._require_written(group, array, row[: array.leading])

@@ -80,7 +80,7 @@ def _exit_status(command: list[str], stderr: Path, timeout: float) -> int:
 
 
 def _write(path: Path, entries: dict[str, Any]) -> None:
-    """As `numpy.savez`, but for any names of the entries (as `file`), and without Python objects."""
+    """Like `numpy.savez`, but entries may have any name (such as `file`), and Python objects are refused."""
     with ZipFile(path, "w") as archive:
         for name, value in entries.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as file:

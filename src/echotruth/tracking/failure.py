@@ -2,4 +2,4 @@
 
 
 class TrackerFailed(ValueError):
-    """A tracker gave no result, or an invalid one; the message says why in one sentence."""
+    """Raised if a tracker gives no result, or an invalid one; the message says why in one sentence."""

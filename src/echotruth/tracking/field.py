@@ -14,7 +14,7 @@ from echotruth.tracking.windows import Windows
 MAX_RESIDUAL = 2.0
 """Normalised residual above which a vector is an outlier (Westerweel and Scarano 2005)."""
 NOISE_LEVEL = 0.1
-"""Scatter of vectors from measurement noise alone, px (the same)."""
+"""Scatter of vectors from measurement noise alone, px (Westerweel and Scarano 2005)."""
 
 
 def replace_outliers(field: np.ndarray) -> np.ndarray:

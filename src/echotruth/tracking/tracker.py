@@ -26,7 +26,7 @@ def track(
     Parameters
     ----------
     frames : ndarray of shape (frame, axial, lateral)
-        B-mode clip of one cycle, any real type; frame 0 is end-diastole and would follow the last frame.
+        B-mode clip of one cycle, any real type; frame 0 is end-diastole, and the clip is periodic.
     points : ndarray of shape (n, 2)
         Positions at end-diastole: lateral, axial, px (0 is the centre of the first pixel).
     mask : ndarray of shape (axial, lateral), bool

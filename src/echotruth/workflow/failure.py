@@ -1,5 +1,5 @@
-"""Failure of a case: its job records the reason in the ledger, from where it comes to `cases/reason`."""
+"""Failure of a case: its job records the reason in the ledger, and publication copies it to `cases/reason`."""
 
 
 class CaseFailed(ValueError):
-    """A case has no solution; the failure is recorded and the other cases continue."""
+    """Raised if a case has no solution; the failure is recorded and the other cases continue."""

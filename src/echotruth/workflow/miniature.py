@@ -51,7 +51,7 @@ def _geometry(config: Config) -> Geometry:
     species = config.probe.preset.partition("_")[0]
     geometry = Geometry.model_validate({"preset": species}) if config.geometry.file else config.geometry
     elements = ("circumferential_elements", "longitudinal_elements", "transmural_elements")
-    return geometry.model_copy(update=dict(zip(elements, (12, 6, 1), strict=True)) | {"state": "unloaded"})
+    return geometry.model_copy(update=dict(zip(elements, (12, 6, 1), strict=True)) | {"given_state": "unloaded"})
 
 
 def _bmode(config: Config) -> Bmode:

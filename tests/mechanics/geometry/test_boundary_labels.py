@@ -106,9 +106,13 @@ def test_sides_named_over_points(file_heart):
 
 def test_wrong_array_or_value(file_heart):
     imported, facets = as_imported(file_heart.nodes, file_heart.mesh), boundary(file_heart.mesh.cells)[0]
-    with pytest.raises(GeometryError, match=r"geometry\.sides\.array = 'sid' is no array of the file: .* are side"):
+    with pytest.raises(
+        GeometryError, match=r"geometry\.surface_labels\.array = 'sid' is no array of the file: .* are side"
+    ):
         label_boundary(imported, facets, BoundaryLabels(array="sid", endo=[11]))
-    with pytest.raises(GeometryError, match=r"geometry\.sides\.base = \[99\]: no facet of the wall has these values"):
+    with pytest.raises(
+        GeometryError, match=r"geometry\.surface_labels\.base = \[99\]: no facet of the wall has these values"
+    ):
         label_boundary(imported, facets, BoundaryLabels(array="side", base=[99]))
 
 

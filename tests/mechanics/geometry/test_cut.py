@@ -59,19 +59,21 @@ def test_ragged_cut_is_trimmed(linear):
 def test_wrong_array_is_answered_with_those_there(linear):
     imported = as_imported(*linear, part=np.ones(len(linear[1])), region=np.ones(len(linear[1])))
     with pytest.raises(
-        GeometryError, match=r"geometry\.keep\.array = 'prt' is no array of the file: its arrays .* part, region"
+        GeometryError, match=r"geometry\.wall_cells\.array = 'prt' is no array of the file: its arrays .* part, region"
     ):
         extract_wall(imported, CellLabels(array="prt", values=[1]))
     with pytest.raises(GeometryError, match="it has none over cells"):
         extract_wall(as_imported(*linear), CellLabels(array="part", values=[1]))
-    with pytest.raises(GeometryError, match=r"geometry\.keep leaves no cell: choose others of its values"):
+    with pytest.raises(GeometryError, match=r"geometry\.wall_cells leaves no cell: choose others of its values"):
         extract_wall(imported, CellLabels(array="part", values=[2]))
 
 
 def test_group_without_a_name(linear):
     imported = as_imported(*linear, part=np.ones(len(linear[1])))
-    with pytest.raises(GeometryError, match=r"geometry\.keep\.values = 'wall' is no physical group .* give numbers"):
-        select_cells(imported, CellLabels(array="part", values=["wall"]), "geometry.keep")
+    with pytest.raises(
+        GeometryError, match=r"geometry\.wall_cells\.values = 'wall' is no physical group .* give numbers"
+    ):
+        select_cells(imported, CellLabels(array="part", values=["wall"]), "geometry.wall_cells")
 
 
 def test_parts_that_do_not_touch(linear):

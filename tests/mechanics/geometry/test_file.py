@@ -75,7 +75,10 @@ def test_two_surfaces(tmp_path):
     ("keys", "reason"),
     [
         ({}, r"holds a surface, not tetrahedra: set geometry\.remesh: true"),
-        ({"remesh": True, "keep": CellLabels(array="part", values=[1])}, r"geometry\.keep selects tetrahedra"),
+        (
+            {"remesh": True, "wall_cells": CellLabels(array="part", values=[1])},
+            r"geometry\.wall_cells selects tetrahedra",
+        ),
         ({"remesh": True, "fibre": "f"}, r"geometry\.fibre selects tetrahedra, and the file holds a surface"),
     ],
 )
@@ -112,7 +115,7 @@ def example():
 
 
 def test_sides_of_a_human_heart_are_those_of_its_coordinates(example):
-    imported = extract_wall(read(example), example.keep)
+    imported = extract_wall(read(example), example.wall_cells)
     surface = label_boundary(imported, boundary(imported.cells)[0], None)
     transmural = imported.node_arrays["transmural"][surface.facets].mean(axis=1)
     assert np.quantile(transmural[surface.labels == ENDO], 0.98) < 0.1

@@ -22,7 +22,7 @@ from echotruth.imaging.rf.probe import element_centres
 TAPER_SAMPLES = 36
 """Samples over which a gate falls off at either end."""
 SHARPNESS = 9.0
-"""Of the window whose integral is the taper (see :func:`~echotruth.imaging.rf.kernel.window`)."""
+"""Sharpness of the window whose integral is the taper (see :func:`~echotruth.imaging.rf.kernel.window`)."""
 BAND_MARGIN = 0.08
 """Width of the spectrum of a gate that is kept beyond the band at either end, over the sampling rate; the error is then
 below 1e-5, for echoes that fill their band, too."""
@@ -74,7 +74,7 @@ class Gate:
     bins : ndarray of shape (bins,)
         Indices of the frequencies in a spectrum of the gate.
     frequency : ndarray of shape (bins,), Hz
-        Those within the band and its margin, evenly spaced, the lowest first.
+        Frequencies within the band and its margin, evenly spaced, the lowest first.
     """
 
     def __init__(self, sampling: Sampling, band: np.ndarray, time_range: tuple[float, float]) -> None:
@@ -88,7 +88,7 @@ class Gate:
         self._taper[-TAPER_SAMPLES:, 0, 0] = ramp[::-1] / ramp[-1]
         margin = min(BAND_MARGIN * sampling.rate, (sampling.rate - (band[1] - band[0])) / 2)
         alias = np.arange(self.samples) * sampling.rate / self.samples
-        # Of all the frequencies that share an alias, the one in the band.
+        # The frequency in the band, of those that share an alias.
         frequency = alias + np.ceil((band[0] - margin - alias) / sampling.rate) * sampling.rate
         inside = np.flatnonzero(frequency <= band[1] + margin)
         self.bins = inside[np.argsort(frequency[inside])]
@@ -108,7 +108,7 @@ def echo_time_range(probe: Probe, zone: Zone, range_: np.ndarray, points: tuple)
     ----------
     probe : Probe
     zone : Zone
-        Of focused waves.
+        Zone of focused waves.
     range_ : ndarray of shape (ranges,), m
     points : two ndarray of shape (lines, ranges), m
         Lateral and axial coordinates of the samples.

@@ -21,7 +21,7 @@ LEAD_TAPS = TAPS // 2 - 1
 OVERSAMPLING = 1.3
 """Least sampling frequency over the band of the data."""
 SHARPNESS = 14.0
-"""Of the :func:`~echotruth.imaging.rf.kernel.window` that interpolates."""
+"""Sharpness of the interpolating :func:`~echotruth.imaging.rf.kernel.window`."""
 PHASE_BITS = 9
 """Interpolators are tabulated at 2^9 fractions of a sample (phases), and linear in between."""
 TAP_FLOATS = 2 * TAPS

@@ -53,7 +53,7 @@ def echo_times(path, geometry, block, centre, channel, tapered, times):
         Samples per metre of path, samples at which an interpolator may begin (elsewhere the weight is 0), and carrier,
         cycles per sample.
     tapered
-        Whether the apodization is.
+        Whether the apodization is tapered.
     times
         Written from 0 on: time in samples, 0 outside the channel; its sample, phase in the table, fraction of a phase,
         and real and imaginary part of the weight, each of shape (BLOCK_RANGES,).
@@ -152,7 +152,7 @@ class ReceiveFocus:
     aperture
         Elements and their weights.
     line_origin, range_
-        Of the lines (lines,) and of their samples (ranges,), m.
+        Origins of the lines (lines,) and ranges of their samples (ranges,), m.
     points
         Lateral and axial coordinates, each of shape (lines, ranges), m.
     frequency, sampling

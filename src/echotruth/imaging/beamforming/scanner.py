@@ -53,7 +53,7 @@ class Scanner:
         zones = TRANSMIT_SEQUENCES[rf.transmit](probe, rf, self.scan).zones(self.range)
         latest = max(np.abs(zone.transmits.delay).max() for zone in zones)
         farthest = np.hypot(*sample_positions(self.scan, self.range)).max()
-        self.matrix = FullMatrix(probe, farthest, latest, rf.elevation)
+        self.matrix = FullMatrix(probe, farthest, latest, rf.elevation_beam)
         self._sampling = channel_sampling(self.matrix)
         self._zones = [_ZoneBeamformer(probe, rf, self, zone) for zone in zones]
         self.frequency = self._zones[0].synthesis.frequency
@@ -99,7 +99,7 @@ class _ZoneBeamformer:
     Parameters
     ----------
     probe, rf
-        As of the scanner.
+        Array, lines and transmits of the scanner.
     scanner
         Its scan, ranges and matrix.
     zone
@@ -129,7 +129,7 @@ class _ZoneBeamformer:
         Parameters
         ----------
         matrix
-            Of the whole record, or of the gate of the zone: shape (bins, elements, elements).
+            Full matrix of the whole record, or of the gate of the zone: shape (bins, elements, elements).
         """
         transmits = self.zone.transmits
         lines = np.zeros(self._points[0].shape, np.complex64)

@@ -63,7 +63,7 @@ def synthesise(matrix, start, rotation, factor, bins, spectra):
     start, rotation
         See :func:`transmit_weights`.
     factor
-        Of the spectra, shape (bins,), float32.
+        Factor of the spectra, shape (bins,), float32.
     bins
         Indices of the frequencies in the spectra, shape (bins,).
     spectra
@@ -92,7 +92,7 @@ def channel_sampling(matrix: FullMatrix) -> Sampling:
     """Sampling at which the echoes of a matrix can be interpolated."""
     band = matrix.first_bin + np.arange(len(matrix.frequency))
     samples = fft.next_fast_len(int(interpolation.OVERSAMPLING * len(band)) + 1)
-    # Twice for the analytic signal.
+    # The factor 2 makes the signal analytic.
     scale = 2 * samples / matrix.samples
     return Sampling(band % samples, samples, matrix.sampling * samples / matrix.samples, scale)
 
@@ -120,9 +120,9 @@ class TransmitSynthesis:
     gate : Gate or None
         The part of the record that is needed, where that is less than all.
     samples : int
-        Of a channel.
+        Number of samples of a channel.
     sampling : float
-        Of a channel, Hz.
+        Sampling frequency of a channel, Hz.
     start : float
         Time of the echoes at the beginning of a channel, s.
     """

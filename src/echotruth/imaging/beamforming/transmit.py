@@ -88,11 +88,11 @@ class Zone:
 def focused_waves(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
     """One transmit per line and zone, focused on the line, with the aperture of the focus.
 
-    The foci are `rf.zones`, `rf.zone_mm` apart, with `rf.focus_mm` in their middle. A wave reaches its focus at
-    (focal range) / (speed of sound), as if it came from the origin of the line.
+    The foci are `rf.focal_zones`, `rf.focal_spacing_mm` apart, with `rf.focus_mm` in their middle. A wave reaches its
+    focus at (focal range) / (speed of sound), as if it came from the origin of the line.
     """
     aperture, values = Aperture(probe, rf), rf.si()
-    foci = values.focus + (np.arange(rf.zones) - (rf.zones - 1) / 2) * values.zone
+    foci = values.focus + (np.arange(rf.focal_zones) - (rf.focal_zones - 1) / 2) * values.focal_spacing
     delay = np.concatenate([_advance(aperture.centres, scan, focus) for focus in foci]) / probe.si().sound_speed
     weight = np.concatenate([aperture.weights(scan.line_origin, focus) for focus in foci])
     origin = np.tile(np.stack([scan.line_origin, np.zeros(len(scan.line_origin))], axis=1), (len(foci), 1))
@@ -115,8 +115,8 @@ def plane_waves(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
 def diverging_waves(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
     """Circular waves of evenly spaced angles from virtual sources behind the array, all elements alike.
 
-    A source is `rf.source_mm` from the centre of the array (Papadacci 2014, IEEE Trans UFFC 61:288), or where the
-    array subtends the angle of the sector.
+    A source is `rf.virtual_source_mm` from the centre of the array (Papadacci 2014, IEEE Trans UFFC 61:288), or where
+    the array subtends the angle of the sector.
     """
     distance = virtual_source_distance(probe, rf)
     origin = -distance * _directions(rf)
@@ -144,11 +144,11 @@ TRANSMIT_SEQUENCES = {
 def virtual_source_distance(probe: Probe, rf: Rf) -> float:
     """Distance of the virtual sources of diverging waves from the centre of the array, m."""
     length = probe.elements * probe.si().pitch
-    return rf.si().source or length / 2 / np.tan(rf.si().sector / 2)
+    return rf.si().virtual_source or length / 2 / np.tan(rf.si().sector / 2)
 
 
 def _directions(rf: Rf) -> np.ndarray:
     """Lateral and axial components of the directions of the waves, shape (transmits, 2), 1."""
-    half = rf.si().tilt / 2
+    half = rf.si().angle_span / 2
     angle = np.linspace(-half, half, rf.transmits) if rf.transmits > 1 else np.zeros(1)
     return np.stack([np.sin(angle), np.cos(angle)], axis=1)

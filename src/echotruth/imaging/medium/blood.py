@@ -1,7 +1,8 @@
 """Blood: scatterers that fill the cavity, are carried by the wall and diffuse.
 
 The cavity is a mesh of its own: every triangle of the endocardium is a face of a quadratic tetrahedron whose fourth
-vertex is the centre of the base. Its motion is that of the wall at the wall, and falls off towards that centre.
+vertex is the centre of the base. It moves with the wall at the endocardium and less towards the
+centre of the base.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ MAX_DIFFUSION = 5
 
 
 def seed_medium(config: Config, heart: Heart, plane: Plane, random: Random, in_beam: InBeam) -> Arrays:
-    """Seed all scatterers of a view, as arrays that can be stored, without those that are in the beam in no frame.
+    """Seed all scatterers of a view, as arrays that can be stored, omitting scatterers that never enter the beam.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def seed_medium(config: Config, heart: Heart, plane: Plane, random: Random, in_b
         arrays |= _ever_in_beam(candidates, nearest, in_beam)
     if config.realism.surroundings.level_dB is not None:
         tissue = seed_surroundings(config, heart, plane, random("surroundings"))
-        motion = SurroundingsMotion(heart, tissue.position, config.realism.surroundings.si().follow)
+        motion = SurroundingsMotion(heart, tissue.position, config.realism.surroundings.si().motion_decay)
         candidates = {"surroundings_position": tissue.position, "surroundings_amplitude": tissue.amplitude}
         arrays |= _ever_in_beam(candidates, (plane.to_image(motion(k)) for k in range(len(frames))), in_beam)
     return arrays
@@ -80,7 +80,7 @@ def _moved_towards_plane(position: Floats, distance: float) -> Floats:
 def _blood_decorrelation(config: Config) -> tuple[float, float]:
     """Time constant of the echo of blood, s, and wavelength, m."""
     probe = config.probe.si()
-    return config.realism.blood.si().time, probe.sound_speed / probe.frequency
+    return config.realism.blood.si().decorrelation_time, probe.sound_speed / probe.frequency
 
 
 class Medium:
@@ -111,7 +111,7 @@ class Medium:
             self._blood = Blood(points, seeded["blood_jacobian_threshold"], seeded["blood_amplitude"])
             self._diffusion = brownian(len(points), time, *_blood_decorrelation(config), random)
         if "surroundings_position" in seeded:
-            decay_length = config.realism.surroundings.si().follow
+            decay_length = config.realism.surroundings.si().motion_decay
             self._surroundings = SurroundingsMotion(heart, seeded["surroundings_position"], decay_length)
             amplitude = seeded["surroundings_amplitude"]
             self._surroundings_amplitude = self._amplitudes(amplitude, time, "surroundings", random)

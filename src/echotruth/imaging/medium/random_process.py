@@ -10,7 +10,7 @@ import numpy as np
 from echotruth.arrays import Floats
 
 Random = Callable[[str], np.random.Generator]
-"""Name of what is drawn to the generator that draws it, always the same and in the same state."""
+"""Function that returns a freshly seeded generator for a named quantity."""
 
 
 class RandomProcess:

@@ -27,7 +27,7 @@ class Surroundings:
     Attributes
     ----------
     position : ndarray of shape (n, 3), m
-        At end-diastole, in the heart frame. Some lie in the heart and appear where it withdraws.
+        At end-diastole, in the heart frame. Scatterers inside the heart are hidden until the heart moves away.
     amplitude : ndarray of shape (n,)
     """
 
@@ -44,7 +44,7 @@ class SurroundingsMotion:
     ----------
     heart : Heart
     position : ndarray of shape (n, 3), m
-        Of the scatterers at end-diastole, in the heart frame.
+        Scatterers at end-diastole, in the heart frame.
     decay_length : float, m
         0 for surroundings at rest.
     """
@@ -74,7 +74,7 @@ def epicardial_nodes(heart: Heart) -> NDArray[np.int64]:
 def outside_heart(heart: Heart, frame: int, position: Floats) -> NDArray[np.bool_]:
     """Whether positions (n, 3), m, are neither in the wall, nor in the cavity, nor in the column above its lid; (n,).
 
-    In that column is the atrium, full of blood too faint to matter.
+    That column is the atrium, whose blood is too faint to matter.
     """
     nodes, cavity = heart.positions(frame), Cavity(heart.endo)
     rim = nodes[cavity.rim]

@@ -24,9 +24,9 @@ SIZE = 3.0
 """Width of a cluster in the sine of the angle, in wavelengths over half the array; and its depth in 1/range, in
 wavelengths over the square of that."""
 EXTRA_ELEMENTS = 4
-"""Skeleton elements beyond those that are needed, so that their errors level out."""
+"""Skeleton elements in addition to those that the tolerance requires; their errors average out."""
 RIDGE = 4.0
-"""Error of an element that the interpolation weights are to expect, over the tolerance."""
+"""Assumed error of an element, over the tolerance; it regularises the interpolation weights."""
 SAMPLES = 6
 """Angles, and ranges, at which the echoes of a cluster are sampled."""
 
@@ -42,7 +42,7 @@ class Cluster:
     weights : ndarray of shape (few, elements)
         Interpolation weights of each of them in every element.
     delay : ndarray of shape (elements,), s
-        Of the centre of the cluster; taken out of the echoes before they are interpolated.
+        Delay of the centre of the cluster; removed from the echoes before they are interpolated.
     """
 
     skeleton: NDArray[np.int64]
@@ -56,11 +56,11 @@ class Clusters:
     Parameters
     ----------
     centres : ndarray of shape (elements,), m
-        Of the elements.
+        Lateral coordinates of the elements.
     sound_speed : float
         m/s.
     band : Band
-        Of the pulse.
+        Band of the pulse.
     max_range : float
         Greatest range, m.
     tolerance : float
@@ -110,9 +110,9 @@ class Clusters:
         return Cluster(skeleton, weights, delay[:, 0])
 
     def _delays(self, curvature: Floats, sine: Floats) -> Floats:
-        """Of echoes on one way, less that to the centre of the array, (elements, n), s; of 1/range (n,) and sine (n,).
+        """One-way delays relative to the array centre, (elements, n), s, for 1/range (n,) and sine of the angle (n,).
 
-        Worked out so that no difference of like numbers is taken far away.
+        Written to avoid cancellation at large range.
         """
         range_ = 1 / curvature
         longer = self._centres[:, None] ** 2 - 2 * np.multiply.outer(self._centres, range_ * sine)
@@ -161,7 +161,7 @@ class Expansion:
         Parameters
         ----------
         spectra : ndarray of shape (bins, pairs), complex64
-            Of the pairs of skeleton elements of every cluster, one after the other.
+            Spectra of the pairs of skeleton elements, cluster by cluster.
         """
         matrix = np.empty((len(spectra), self._elements, self._elements), np.complex64)
         expand(spectra, self._first, self._skeleton, self._weights, self._phasor, matrix)

@@ -19,15 +19,15 @@ from echotruth.arrays import Floats
 ANGLES = 48
 """Angles for which the spectra of all pairs are fitted, evenly spaced in their sine."""
 MAX_ARGUMENT_SQUARED = 2.8**2
-"""Greatest x^2 for which they are; beyond it (elements wider than 0.9 wavelengths seen steeply from the side) the
+"""Largest x^2 that is fitted; beyond it (elements wider than 0.9 wavelengths seen steeply from the side) the
 spectral exponent is that of this one."""
 HALF_APERTURE = 0.25
 """Sine of the angle, to either side, of the elements for which they are fitted: an array half as wide as it is far."""
 SAMPLED_ELEMENTS = 9
-"""Elements among them that are tried."""
+"""Number of element positions used in the fit."""
 SERIES_TERMS = 15
 STEPS = 2048
-"""Of :func:`directivity_table`; interpolated linearly it errs by 1e-7."""
+"""Steps of :func:`directivity_table`; the error of linear interpolation is 1e-7."""
 
 
 def sinc_series() -> tuple[Floats, Floats]:

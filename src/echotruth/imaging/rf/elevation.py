@@ -21,9 +21,9 @@ from echotruth.imaging.rf.kernel import Band, fit_kernel, stack_real_imaginary
 BEAM_TAIL_ENERGY = 1.3e-4
 """Energy of the echoes that are left out beside the beam, over that of all echoes from scatterers at the same range."""
 MAX_BLOCKS = 4
-"""Blocks of samples that the longest echoes get; what is longer is cut."""
+"""Largest number of blocks of samples of an echo; longer echoes are truncated."""
 MAX_ERROR_ENERGY = 3e-5
-"""Energy that a kernel may miss, over that of an echo from the plane at the same range."""
+"""Energy of the error of a kernel, relative to that of an echo from the plane at the same range."""
 CURVATURES = 192
 MAX_SLOPE = 1.0
 """Greatest elevation over range."""
@@ -31,10 +31,10 @@ SLOPES_PER_BEAMWIDTH = 24
 """Slopes tabulated per wavelength over height."""
 MAX_SUBAPERTURE = 0.17
 """Greatest product of the Fresnel number H^2 / (4 lambda r) of an element and the square of half the width of a
-subaperture over the range r: what is left of E beyond the first order is then about 1 %."""
+subaperture over the range r: the terms of E beyond the first order are then about 1 %."""
 MAX_SUBAPERTURES = 2
 ACCURATE_ERROR = 1e-2
-"""What a kernel may miss, over the echo from the plane at the same range, where echoes count as accurate."""
+"""Largest error of an accurate kernel (amplitude), relative to the echo from the plane at the same range."""
 
 
 class Lens:
@@ -56,7 +56,7 @@ class Lens:
     beam : ndarray of shape (CURVATURES, slopes, NODES), complex64
         E at the frequencies of the band, without its delay.
     delay : ndarray of shape (CURVATURES, slopes), s
-        Taken out of it.
+        Delay removed from `beam`.
     log_derivative : ndarray of shape (CURVATURES, slopes), m
         g = (dE / d(1/r)) / E over the band: real part that of the amplitude, imaginary part that of the phase.
     derivative_residual : ndarray of shape (CURVATURES, slopes, NODES), complex64, m
@@ -79,7 +79,7 @@ class Lens:
         angular_frequency = 2 * np.pi * p.frequency
         self.log_derivative = _log_derivative(beam, derivative, band, p.frequency)
         self.delay = _delays(beam**2, band) / 2
-        # Traces will be damped by their time, and the loss goes by the way: so much the lens must not be damped.
+        # Traces are damped by arrival time, but attenuation depends on path length: compensate for the lens delay.
         undamped = band.loss + 2j * np.pi * band.frequency
         advance = np.exp(np.multiply.outer(self.delay, undamped))
         phase_slope = np.multiply.outer(self.log_derivative.imag, undamped / angular_frequency)
@@ -104,7 +104,7 @@ class Lens:
         return self.blocks[nearest[..., 0], nearest[..., 1]].astype(np.int64)
 
     def subapertures(self, range_: Floats) -> NDArray[np.int64]:
-        """Number of subapertures that look up scatterers at ranges (n,), m, for themselves: (n,)."""
+        """Number of subapertures with a separate table lookup per scatterer, at ranges (n,), m: (n,)."""
         needed = np.sqrt(self._fresnel * self._half_aperture**2 / (MAX_SUBAPERTURE * range_**3))
         return np.clip(np.ceil(needed), 1, min(MAX_SUBAPERTURES, self._elements)).astype(np.int64)
 
@@ -218,7 +218,7 @@ def _blocks(spectrum: NDArray, band: Band) -> tuple[NDArray[np.uint8], Floats]:
 def _edge_slope(spectrum: NDArray, band: Band, slope: Floats) -> Floats:
     """Slope beyond which scatterers evenly spread over elevation have `BEAM_TAIL_ENERGY` of the energy of all.
 
-    Of pulses (curvatures, slopes, NODES): (curvatures,).
+    Takes pulses (curvatures, slopes, NODES); returns (curvatures,).
     """
     energy = (np.abs(spectrum) ** 2 * band.weight).sum(axis=-1)
     outside = energy[:, ::-1].cumsum(axis=1)[:, ::-1] / energy.sum(axis=1, keepdims=True)

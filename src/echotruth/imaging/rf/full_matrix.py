@@ -33,20 +33,21 @@ from echotruth.imaging.rf.product import padded
 BLOCK = 256
 """Scatterers spread at a time."""
 PLANE, LENS, WIDE, NEAR = 2, 1, 3, spreading.SUBAPERTURES
-"""Schemes of the kernels' tables (see :data:`.spreading.COEFFICIENTS`): in the plane, and under a lens, there also for
-elements wider than `MAX_NARROW_WIDTH` and for scatterers that each subaperture looks up for itself."""
+"""Schemes of the kernels' tables (see :data:`.spreading.COEFFICIENTS`): without a lens; with it; with it for elements
+wider than `MAX_NARROW_WIDTH`; with it for scatterers that have a separate table lookup for each subaperture."""
 PLANE_ACCURACY = 2e-5
-"""Relative error (L2) against the exact sum without the lens, within 32 degrees."""
+"""Relative error (L2) against the exact sum without the lens, within 32 degrees, or within 24 degrees if elements are
+0.88 wavelengths wide (`mouse_30MHz`, `mouse_40MHz`)."""
 LENS_SPECTRA, PAIR_SPECTRA = (0, 0, 0, 0, 1, 1, 2), (0, 1, 2, 2, 0, 1, 0)
-"""By the number of a term: the spectrum of :func:`.lens_spectra` and that of :func:`.directivity.pair_spectra` whose
-product it is."""
+"""Each term is the product of a spectrum of :func:`.lens_spectra` and one of :func:`.directivity.pair_spectra`: their
+indices, by the number of the term."""
 MAX_NARROW_WIDTH = 0.75
 """Width of an element, in wavelengths, up to which its directivity hardly changes with frequency."""
 MAX_BAND, SHARPNESS = (0.32, 0.41), (20.0, 15.0)
 """Greatest frequency of the pulse over the sampling frequency of the grid, and sharpness of the window: without and
 with the lens."""
 CLUSTER_TOLERANCE = (1e-6, 1e-3)
-"""Likewise: too little to be seen in the error."""
+"""Relative error of the cluster interpolation, without and with the lens; negligible beside the other errors."""
 
 
 class FullMatrix:
@@ -61,10 +62,10 @@ class FullMatrix:
     max_delay : float
         Greatest delay, early or late, that will be added to the echoes, s.
     elevation : bool
-        Whether the lens is there; without it, echoes are those of strips without end, and positions still in space; the
-        error against the exact sum is then :data:`PLANE_ACCURACY`. Under the lens it is 1.5 % beyond one aperture, most
-        of it in what is far beside the plane; before an array as tall as a human's, where echoes are longer than a
-        kernel, some per cent up to two apertures.
+        Whether the lens is there; without it, elements are infinitely tall; positions remain three-dimensional. The
+        error against the exact sum is :data:`PLANE_ACCURACY` without the lens. With it, the error is 1.5 % beyond one
+        aperture, mostly from scatterers far from the plane; for an array as tall as a human's it is some per cent up
+        to two apertures, where echoes are longer than a kernel.
 
     Attributes
     ----------
@@ -77,7 +78,7 @@ class FullMatrix:
     samples : int
         Length of the record; it starts at time 0 and ends with the latest echo plus room for delays and pulse.
     centres : ndarray of shape (elements,), m
-        Of the elements.
+        Lateral coordinates of the elements.
     sound_speed : float, m/s
     max_range : float, m
         Greatest range of a scatterer.
@@ -110,7 +111,7 @@ class FullMatrix:
         self._tabulate(band, band.frequency / p.frequency)
 
     def _set_filters(self, probe: Probe, grid: Grid, low: float, high: float) -> None:
-        """What turns spread traces into echoes: functions of time and responses in the band, in pairs."""
+        """Set the filters that convert gridded traces to echoes: pairs of a function of time and a response."""
         p = probe.si()
         cycles = np.arange(self.samples // 2 + 1) / self.samples
         inside = np.flatnonzero((cycles * self.sampling >= low) & (cycles * self.sampling <= high))
@@ -126,7 +127,7 @@ class FullMatrix:
         self._responses = (filters * response * advance).astype(np.complex64)
 
     def _tabulate(self, band: Band, ratio: np.ndarray) -> None:
-        """Tables of kernels in the plane, or what makes those under the lens."""
+        """Set the tables of kernels without the lens, or the lookup tables from which those with the lens are made."""
         coefficients, phases = spreading.COEFFICIENTS[self._scheme], _phases(self._scheme)
         count = 6 if self._lens else 1 + max(term for term, number in enumerate(coefficients) if number)
         self._mean_exponent, pair_spectra = directivity.pair_spectra(self._width, ratio, count)
@@ -146,9 +147,9 @@ class FullMatrix:
         self._tables[:] = tables
 
     def in_beam(self, position: np.ndarray) -> np.ndarray:
-        """Which of the scatterers at `position` (n, 3), m, are within the record and the beam: (n,), bool.
+        """Whether each scatterer at `position` (n, 3), m, is within the record and the beam: (n,), bool.
 
-        All others together add no more than :data:`~echotruth.imaging.rf.elevation.BEAM_TAIL_ENERGY` says.
+        The energy of all others together is at most :data:`~echotruth.imaging.rf.elevation.BEAM_TAIL_ENERGY`.
         """
         inside = np.linalg.norm(position, axis=1) <= self.max_range
         if self._lens:
@@ -170,7 +171,7 @@ class FullMatrix:
     def _spread(
         self, traces: np.ndarray, elements: np.ndarray, position: np.ndarray, amplitude: np.ndarray, subapertures: int
     ) -> None:
-        """Add the echoes of scatterers that so many subapertures look up for themselves, a block at a time."""
+        """Add the echoes of scatterers, a block at a time, with a separate table lookup for each subaperture."""
         scheme = NEAR if subapertures > 1 else self._scheme
         size, lens = sum(spreading.COEFFICIENTS[scheme]) * TAPS, self._lens is not None
         first, angle = subaperture_bounds(len(self.centres), subapertures), self._angle_index(position)
@@ -187,11 +188,11 @@ class FullMatrix:
 
     @property
     def accurate_from(self) -> float:
-        """Range from which on the error is that of the lens, m; 0 without one."""
+        """Smallest range with the full accuracy of the lens, m; 0 without a lens."""
         return self._lens.accurate_from if self._lens else 0.0
 
     def _angle_index(self, position: np.ndarray) -> np.ndarray:
-        """Which of the angles from the centre of the array is nearest, shape (n,)."""
+        """Index of the nearest tabulated angle from the centre of the array, shape (n,)."""
         sine = np.abs(position[:, 0]) / np.linalg.norm(position, axis=1)
         return np.rint(sine * (directivity.ANGLES - 1)).astype(np.int64)
 
@@ -257,7 +258,7 @@ class _LensKernels:
     angle : ndarray of shape (n,)
         Index of the angle from the centre of the array of each.
     subapertures : int
-        Those that look them up for themselves.
+        Number of subapertures with a separate table lookup per scatterer.
     """
 
     def __init__(self, full: FullMatrix, position: np.ndarray, angle: np.ndarray, subapertures: int) -> None:
@@ -289,9 +290,9 @@ class _LensKernels:
 
 
 def _record_length(least: int) -> int:
-    """Samples of a record of at least so many, quickly transformed.
+    """Smallest fast transform length of at least `least` samples that is not a multiple of 256.
 
-    No multiple of 256: echoes stand at like places of all traces, and those of such a length share a few cache lines.
+    Echoes are at similar samples of all traces; with a multiple of 256 these would compete for the same cache lines.
     """
     samples = fft.next_fast_len(least, real=True)
     return samples if samples % 256 else _record_length(samples + 1)

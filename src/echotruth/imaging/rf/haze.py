@@ -3,7 +3,7 @@
 Sound that went to and fro between array, skin and ribs arrives later than the direct echo, so it is drawn deeper; but
 its wavefront is still that of the near position, so it is out of focus there and smeared over the lines. Byram & Shu
 (2016, J Med Imaging 3:046005) simulate it so: linear echoes of near scatterers, shifted later by random times. With
-times from an exponential distribution and some in every resolution cell they met the statistics of clutter in tissue.
+times from an exponential distribution, some in every resolution cell, they reproduce the statistics of clutter.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from echotruth.config.realism import Haze
 from echotruth.imaging.rf.probe import spectral_width
 
 ECHOES_PER_CELL = 2
-"""Later echoes in an axial resolution cell: with two, Byram & Shu met the speckle of clutter in tissue."""
+"""Later echoes per axial resolution cell: two reproduce the measured speckle statistics of clutter (Byram & Shu)."""
 MAX_LENGTHS = 4
 """Later echoes are drawn up to this many means of their distance."""
 
@@ -30,21 +30,21 @@ def reverberation(haze: Haze, probe: Probe, depth: float, random: np.random.Gene
     haze, probe
         Their settings.
     depth
-        Greatest range of interest, m; what would seem to lie deeper is left out.
+        Greatest range of interest, m; echoes that would appear deeper are left out.
     random
-        The same for all frames, for array, skin and ribs stay where they are.
+        Generator; the echoes are the same in all frames, because array, skin and ribs do not move.
 
     Returns
     -------
-    Shape (echoes, 2): range by which they seem to lie deeper, m, and amplitude over that of the first.
+    Shape (echoes, 2): apparent additional depth, m, and amplitude relative to the first echo.
     """
     assert haze.level_dB is not None
     h, speed = haze.si(), probe.si().sound_speed
     resolution = speed / 2 * sqrt(2) * log(2) / pi / spectral_width(probe)
-    number = ceil(ECHOES_PER_CELL * MAX_LENGTHS * h.length / resolution)
-    deeper = random.exponential(h.length, number)
+    number = ceil(ECHOES_PER_CELL * MAX_LENGTHS * h.mean_extra_range / resolution)
+    deeper = random.exponential(h.mean_extra_range, number)
     amplitude = random.standard_normal(number) * 10 ** (haze.level_dB / 20) / sqrt(number)
-    return np.column_stack([deeper, amplitude])[deeper < depth - h.near]
+    return np.column_stack([deeper, amplitude])[deeper < depth - h.max_source_range]
 
 
 def reverberation_filter(echoes: np.ndarray, frequency: np.ndarray, sound_speed: float) -> np.ndarray:

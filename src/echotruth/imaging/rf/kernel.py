@@ -46,7 +46,7 @@ class Grid:
     ----------
     sampling : float, Hz
     sharpness : float
-        Of the :func:`window`, that of Barnett, Magland, af Klinteberg 2019, SIAM J Sci Comput 41:C479. A sharp one
+        Sharpness of the :func:`window` of Barnett, Magland, af Klinteberg 2019, SIAM J Sci Comput 41:C479. A sharp one
         leaves room for long echoes, but needs a fine grid.
     """
 
@@ -95,14 +95,14 @@ def fit_kernel(band: Band, blocks: int, fraction: float) -> tuple[NDArray[Any], 
     blocks : int
         Blocks of TAPS samples.
     fraction : float
-        Of a sample.
+        Fraction of a sample by which the echo is late.
 
     Returns
     -------
     taps : ndarray of shape (blocks TAPS, 2 NODES)
-        Times a spectrum S at the nodes, its real parts before the imaginary ones, gives the samples.
+        Maps a spectrum S at the nodes, its real parts before the imaginary ones, to the samples.
     residual : ndarray of shape (2 NODES, 2 NODES)
-        Times the same gives the error, weighted so that the sum of its squares is the energy lost.
+        Maps the same spectrum to the error, weighted so that the sum of its squares is the energy lost.
     """
     frequency = band.grid.complex_frequency(band.frequency, band.loss)
     shifted = np.exp(-np.multiply.outer(frequency, sample_offsets(blocks) - fraction))
@@ -123,7 +123,7 @@ def fit_polynomials(band: Band, blocks: int, degree: int, phases: int) -> Floats
     band : Band
     blocks : int
     degree : int
-        Of the polynomials.
+        Degree of the polynomials.
     phases : int
         Equal parts of a sample, each with a polynomial of its own.
 

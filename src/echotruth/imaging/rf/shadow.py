@@ -33,10 +33,10 @@ class Rib:
     def __init__(self, shadow: Shadow, centres: np.ndarray):
         s = shadow.si()
         self._side = 1 if shadow.side == "right" else -1
-        self._depth, self._softness, self._floor = s.depth, max(s.softness, 1e-9), 10 ** (shadow.level_dB / 20)
+        self._depth, self._edge_width, self._floor = s.depth, max(s.edge_width, 1e-9), 10 ** (shadow.level_dB / 20)
         self._edge = s.depth * tan(s.edge)
         self._centres = self._side * centres
-        last = (np.ptp(centres) + self._softness) / 2
+        last = (np.ptp(centres) + self._edge_width) / 2
         self._projections = np.linspace(-last, last, STRIPS + 1)
 
     def projected_edge(self, position: np.ndarray) -> np.ndarray:
@@ -59,7 +59,7 @@ class Rib:
 
     def transmission(self, projection: float) -> np.ndarray:
         """Amplitude that passes to or from the elements for one projected edge (m): shape (elements,), float32."""
-        free = np.clip((projection - self._centres) / self._softness + 0.5, 0, 1)
+        free = np.clip((projection - self._centres) / self._edge_width + 0.5, 0, 1)
         # A quarter of a sine, squared, is a ramp with round ends.
         return (self._floor + (1 - self._floor) * np.sin(pi / 2 * free) ** 2).astype(np.float32)
 

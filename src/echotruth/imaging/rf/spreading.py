@@ -22,7 +22,7 @@ from echotruth.imaging.rf.vectors import LANES, Vectors
 FRACTION_BITS = 18
 """Times are integers in units of 2^-18 samples, so that the sum over both ways is exact."""
 LEAD = 32
-"""Samples of a row before time 0: room for what of a kernel comes before its echo."""
+"""Samples of a row before time 0: padding before time 0 for the leading part of a kernel."""
 
 COEFFICIENTS = {
     1: (3, 2, 0, 0, 2, 0, 0),
@@ -35,11 +35,11 @@ highest power first. The terms are multiplied by 1, e, e^2, e^3, g, g e and d: e
 of the two elements, g the sum of their inverse-range offsets under a lens and (b_i - b_j)^2 in the plane, d the
 difference of these offsets."""
 PHASE_BITS = (0, 2, 4, 2, 2)
-"""By the number of a scheme: its polynomials are in the fraction of a sample within each of 2^bits phases."""
+"""Phase bits of each scheme: a sample is divided into 2^bits phases, with one polynomial for each."""
 SUBAPERTURES = 4
-"""Scheme for echoes that each subaperture looks up for itself in the tables of the lens."""
+"""Scheme for echoes with a separate lookup in the tables of the lens for each subaperture."""
 MAX_CORRECTION = 0.3
-"""Greatest correction that an element makes to the response of its lens: logarithm of the amplitude, or radians."""
+"""Largest correction of the lens response for an element: logarithm of the amplitude, or phase in radians."""
 TRANSMIT_GROUPS = 32
 """Groups of transmitters among which threads choose; few, since each reads all tables."""
 

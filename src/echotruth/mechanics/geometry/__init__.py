@@ -25,7 +25,7 @@ def left_ventricle(geometry: Geometry) -> Mesh:
     -------
     Mesh
         Wall in the heart frame, in metres: long axis z from apex to base, the base in or about the plane z = 0,
-        in the state that `geometry.state` names.
+        in the state that `geometry.given_state` names.
 
     Raises
     ------

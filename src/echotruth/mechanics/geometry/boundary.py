@@ -18,7 +18,7 @@ _EDGE_NODE = {frozenset(edge.tolist()): 4 + i for i, edge in enumerate(EDGES)}
 _QUADRATIC_FACES = np.array(
     [[*f, *(_EDGE_NODE[frozenset((f[i], f[(i + 1) % 3]))] for i in range(3))] for f in FACES.tolist()]
 )
-"""The same with the middles of edges 01, 12, 20."""
+"""Nodes of the faces of a quadratic tetrahedron: vertices, then the middles of edges 01, 12, 20."""
 
 
 def boundary(cells: Integers) -> tuple[Integers, Integers]:
@@ -99,7 +99,7 @@ def triangle_edges(triangles: Integers) -> tuple[Integers, Indices, Indices]:
     edges : ndarray of shape (3 n, 2)
         Vertices in rising order; edge k belongs to triangle k // 3.
     number : ndarray of shape (3 n,)
-        The same for the same edge.
+        Number of the edge of each row; rows of one edge share it.
     count : ndarray of shape (n_edges,)
         Number of triangles that share it, by number.
     """

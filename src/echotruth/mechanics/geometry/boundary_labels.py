@@ -41,7 +41,7 @@ MIN_ENCLOSURE = 0.55
 SMOOTHING_LENGTH = 0.03
 """Distance over which normals are averaged, over the size of the wall: a wall cut along cells is rough."""
 
-_REMEDY = "give a wall around a cavity that is open at the base, or name its sides with geometry.sides"
+_REMEDY = "give a wall around a cavity that is open at the base, or name its sides with geometry.surface_labels"
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class BoundarySurface:
         return self.nodes[np.unique(self.facets[self.labels == label][:, :3])]
 
 
-def label_boundary(mesh: ImportedMesh, facets: Integers, sides: BoundaryLabels | None) -> BoundarySurface:
+def label_boundary(mesh: ImportedMesh, facets: Integers, given: BoundaryLabels | None) -> BoundarySurface:
     """Label the boundary of a wall.
 
     Parameters
@@ -82,7 +82,7 @@ def label_boundary(mesh: ImportedMesh, facets: Integers, sides: BoundaryLabels |
     mesh : ImportedMesh
     facets : ndarray of shape (n_facets, 3 or 6)
         Closed: every edge has two of them.
-    sides : BoundaryLabels or None
+    given : BoundaryLabels or None
         Values of the labels in the file.
 
     Raises
@@ -90,11 +90,11 @@ def label_boundary(mesh: ImportedMesh, facets: Integers, sides: BoundaryLabels |
     GeometryError
         Where there is no cavity, or no base round its opening.
     """
-    labels = _labels_of_file(mesh, facets, sides) if sides else np.full(len(facets), -1, dtype=np.int8)
+    labels = _labels_of_file(mesh, facets, given) if given else np.full(len(facets), -1, dtype=np.int8)
     if (labels < 0).any():
         all_named = all((labels == number).any() for number in range(len(NAMES)))
         # An array over points leaves the facets at the rims open.
-        if all_named and sides is not None and sides.array in mesh.triangle_arrays:
+        if all_named and given is not None and given.array in mesh.triangle_arrays:
             completed = _fill_from_neighbours(labels, adjacent_triangles(facets))
         else:
             completed = _detect_labels(mesh, facets)
@@ -109,24 +109,25 @@ def label_boundary(mesh: ImportedMesh, facets: Integers, sides: BoundaryLabels |
     return surface
 
 
-def _labels_of_file(mesh: ImportedMesh, facets: Integers, sides: BoundaryLabels) -> NDArray[np.int8]:
-    """CellLabels of the facets that the file names, -1 elsewhere."""
+def _labels_of_file(mesh: ImportedMesh, facets: Integers, given: BoundaryLabels) -> NDArray[np.int8]:
+    """Labels of the facets that the file names, -1 elsewhere."""
     labels = np.full(len(facets), -1, dtype=np.int8)
-    over_nodes = sides.array in mesh.node_arrays and sides.array not in mesh.triangle_arrays
+    over_nodes = given.array in mesh.node_arrays and given.array not in mesh.triangle_arrays
     if not over_nodes:
-        named_array(mesh.triangle_arrays, sides.array, mesh.source, "geometry.sides.array", "triangles or points")
+        key = "geometry.surface_labels.array"
+        named_array(mesh.triangle_arrays, given.array, mesh.source, key, "triangles or points")
     for number, name in enumerate(NAMES):
-        configured: list[int | str] = getattr(sides, name)
-        values = group_numbers(configured, mesh, f"geometry.sides.{name}")
+        configured: list[int | str] = getattr(given, name)
+        values = group_numbers(configured, mesh, f"geometry.surface_labels.{name}")
         if over_nodes:
-            matching = np.isin(mesh.node_arrays[sides.array], values)[facets[:, :3]].all(axis=1)
+            matching = np.isin(mesh.node_arrays[given.array], values)[facets[:, :3]].all(axis=1)
         else:
-            triangles = mesh.triangles[np.isin(mesh.triangle_arrays[sides.array], values)]
+            triangles = mesh.triangles[np.isin(mesh.triangle_arrays[given.array], values)]
             matching = _is_among(facets, triangles, len(mesh.nodes))
         if configured and not matching.any():
             raise GeometryError(
-                f"{mesh.source}: geometry.sides.{name} = {configured}: no facet of the wall has these values in "
-                f"{sides.array}: choose others of its values"
+                f"{mesh.source}: geometry.surface_labels.{name} = {configured}: no facet of the wall has these values "
+                f"in {given.array}: choose others of its values"
             )
         labels[matching] = number
     return labels
@@ -151,7 +152,7 @@ def _fill_from_neighbours(labels: NDArray[np.int8], pairs: Integers) -> NDArray[
 
 
 def _detect_labels(mesh: ImportedMesh, facets: Integers) -> NDArray[np.int8]:
-    """CellLabels of a wall from its shape alone."""
+    """Labels of all facets, detected from the shape of the wall."""
     cavity_point, opening = _find_cavity(mesh, facets)
     pairs = adjacent_triangles(facets)
     area, centre = area_vectors(mesh.nodes, facets), mesh.nodes[facets[:, :3]].mean(axis=1)

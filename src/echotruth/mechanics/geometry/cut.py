@@ -26,7 +26,7 @@ MAX_SPLINTERS = 0.01
 """Largest fraction of the cells that is left out where a cut disconnects it from the rest."""
 
 
-def extract_wall(mesh: ImportedMesh, keep: CellLabels | None) -> ImportedMesh:
+def extract_wall(mesh: ImportedMesh, wall_cells: CellLabels | None) -> ImportedMesh:
     """The tetrahedra of the wall, as one manifold mesh.
 
     Parameters
@@ -41,9 +41,11 @@ def extract_wall(mesh: ImportedMesh, keep: CellLabels | None) -> ImportedMesh:
     GeometryError
         If they are folded, in several parts, or hang together by less than a face.
     """
-    selected = select_cells(mesh, keep, "geometry.keep") if keep else np.ones(len(mesh.cells), dtype=bool)
+    selected = (
+        select_cells(mesh, wall_cells, "geometry.wall_cells") if wall_cells else np.ones(len(mesh.cells), dtype=bool)
+    )
     if not selected.any():
-        raise GeometryError(f"{mesh.source}: geometry.keep leaves no cell: choose others of its values")
+        raise GeometryError(f"{mesh.source}: geometry.wall_cells leaves no cell: choose others of its values")
     # Files use either order of vertices, which says nothing about the shape.
     mesh = replace(mesh, cells=right_handed(mesh.nodes, mesh.cells))
     _check_folds(mesh)
@@ -168,7 +170,7 @@ def _check_manifold(mesh: ImportedMesh) -> None:
         sizes = ", ".join(map(str, np.bincount(component)[:5]))
         raise GeometryError(
             f"{mesh.source}: the wall is in {component.max() + 1} parts (of {sizes} tetrahedra): choose one with "
-            "geometry.keep, or join them in the file"
+            "geometry.wall_cells, or join them in the file"
         )
     _, _, count = triangle_edges(boundary(mesh.cells)[0])
     if (count > 2).any():

@@ -47,7 +47,7 @@ def semi_axes(geometry: Geometry) -> tuple[tuple[float, float, float], tuple[flo
     Returns
     -------
     endo, epi : tuple of float, m
-        The cavity is dilated and elongated, then the wall put around it, then all scaled.
+        The cavity is dilated and elongated, the wall is added, and the result is scaled.
     """
     size = {key: value * UNITS["mm"] * geometry.scale for key, value in geometry.lengths().items()}
     elongation = geometry.dilation * geometry.elongation

@@ -47,12 +47,12 @@ def ventricle_from_file(geometry: Geometry) -> Mesh:
     source = str(geometry.file)
     imported = imported_mesh.read(geometry)
     if len(imported.cells):
-        imported = extract_wall(imported, geometry.keep)
+        imported = extract_wall(imported, geometry.wall_cells)
         facets, _ = boundary(imported.cells)
     else:
         _check_surface_keys(geometry)
         facets = _closed_surface(imported)
-    surface = label_boundary(imported, facets, geometry.sides)
+    surface = label_boundary(imported, facets, geometry.surface_labels)
     septum = _septum_point(imported, geometry)
     if geometry.remesh:
         mesh, frame = remesh(surface, septum, geometry, source)
@@ -99,7 +99,7 @@ def quadratic(nodes: Floats, cells: Integers) -> tuple[Floats, Integers]:
 
 def _check_surface_keys(geometry: Geometry) -> None:
     """Refuse keys that a file without tetrahedra cannot have."""
-    for key in ("keep", "septum", "fibre"):
+    for key in ("wall_cells", "septum", "fibre"):
         if getattr(geometry, key) is not None:
             raise GeometryError(
                 f"{geometry.file}: geometry.{key} selects tetrahedra, and the file holds a surface: leave it out"

@@ -101,7 +101,7 @@ def _read_file(source: str, suffix: str) -> ImportedMesh:
         mesh = _read_gmsh(source) if suffix == ".msh" else _read_vtk(source)
     except GeometryError:
         raise
-    except Exception as error:  # the libraries that read do not say what they raise
+    except Exception as error:  # the libraries do not document what they raise
         reason = (str(error).splitlines() or ["it does not begin as one"])[0].rstrip(".")
         raise GeometryError(f"{source}: cannot be read as {suffix} ({reason}): write the file again") from None
     if mesh is None:
@@ -132,7 +132,7 @@ def _read_vtk(source: str) -> ImportedMesh | None:
 
 
 def _read_quietly(source: str) -> Any:
-    """What VTK reads, with its messages raised in place of printed."""
+    """Read with VTK; its messages are raised instead of printed."""
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 

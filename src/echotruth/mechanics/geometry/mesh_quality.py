@@ -21,7 +21,7 @@ _MIRRORED = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]
 
 
 class GeometryError(ValueError):
-    """A ventricle that cannot be meshed."""
+    """Raised if a ventricle cannot be meshed."""
 
 
 def jacobians(nodes: Floats, cells: Integers) -> NDArray[np.float64]:
@@ -60,7 +60,7 @@ def scaled_jacobian(nodes: Floats, cells: Integers) -> Floats:
     ----------
     nodes : ndarray of shape (n_nodes, 3), m
     cells : ndarray of shape (n_cells, 4 or more)
-        Of which the first four nodes are the vertices.
+        The first four nodes of a cell are its vertices.
 
     Returns
     -------

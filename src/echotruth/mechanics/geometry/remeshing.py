@@ -97,7 +97,7 @@ def remesh(surface: BoundarySurface, septum: Floats | None, geometry: Geometry, 
     if np.mean(~through) > MAX_MISSES:
         raise GeometryError(
             f"{source}: {np.sum(~through)} of {len(r)} lines from the long axis meet no wall: raise geometry.cut_mm to "
-            "cut deeper below the base, or name the sides with geometry.sides"
+            "cut deeper below the base, or name the sides with geometry.surface_labels"
         )
     endo_epi = np.array([[distances[0], distances[-1]] for distances in hits if len(distances) > 1])
     degree = min(geometry.longitudinal_elements, geometry.circumferential_elements // 2)
@@ -143,7 +143,7 @@ def _frame_at_cut(surface: BoundarySurface, septum: Floats | None, geometry: Geo
         if not 0.3 * length < height < length:
             raise GeometryError(
                 f"{source}: the cut would leave {1e3 * height:.3g} mm of a cavity of {1e3 * length:.3g} mm: set "
-                "geometry.cut_mm, its depth below the centre of the base, or name the base with geometry.sides"
+                "geometry.cut_mm, its depth below the centre of the base, or name the base with geometry.surface_labels"
             )
         along = origin - apex
         origin = _cavity_centroid(caster, apex + along * height / (along @ z), axes, source)

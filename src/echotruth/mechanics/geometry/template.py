@@ -28,7 +28,7 @@ def mesh_wall(position: WallMap, geometry: Geometry) -> Mesh:
     position : callable
         See `WallMap`.
     geometry : Geometry
-        Of which the numbers of elements are used.
+        Only its numbers of elements are used.
 
     Returns
     -------

@@ -12,7 +12,7 @@ from echotruth.mechanics.solver.equilibrium import Load, PreviousState, State, U
 
 @dataclass(frozen=True)
 class Linearization:
-    """Where the factors in use were made: with the same factors a resumed run takes the same steps."""
+    """State at which the current factorization was computed; restored so that a resumed run is identical."""
 
     state: State
     load: Load
@@ -49,7 +49,7 @@ class Checkpoints:
     Parameters
     ----------
     folder : Path
-        Of one heart, one configuration and one version of the code; the caller must see to that.
+        It must belong to one heart, one configuration and one version of the code; the caller ensures this.
     """
 
     def __init__(self, folder: Path) -> None:

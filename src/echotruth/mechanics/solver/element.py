@@ -4,7 +4,7 @@ Perturbed Lagrangian: with W the energy of the wall and p the pressure of a cell
 energy int W + (J - 1) p - p^2 / (2 kappa). Each Newton step eliminates p within the cell, which adds kappa / V G G^T to
 the tangent, with G = dv/du the gradient of the deformed volume and V the unloaded volume (Simo & Hughes, Computational
 Inelasticity, section 7.3; Bonet & Wood, Nonlinear Continuum Mechanics, section 8.6). One pressure keeps the mean
-volume of a cell, not that of its points; a weak energy C local_bulk (J - 1)^2 / 2 keeps these near one, and
+volume of a cell, not that of its points; a weak energy C pointwise_bulk_ratio (J - 1)^2 / 2 keeps these near one, and
 vanishes as the mesh is refined. Strains are taken in the fibre axes, into which dN/dX, the gradients of the shape
 functions, are turned once.
 """
@@ -63,15 +63,15 @@ class WallLaw(NamedTuple):
     Attributes
     ----------
     energy : numba CFunc
-        Of the passive law, from `materials.compiled`.
+        Energy of the passive law, from `materials.compiled`.
     constants : ndarray
-        Of the passive law.
+        Constants of the passive law.
     active : ndarray of shape (2,)
         beta of the active law, and the power of the stretch by which the tension is divided.
     bulk_modulus : float, Pa
         kappa, of the mean volume of each cell.
-    local_bulk : float
-        The same of the volume at each point, over C.
+    pointwise_bulk_ratio : float
+        Pointwise bulk modulus divided by C.
     viscosity : float, Pa s
     """
 
@@ -79,7 +79,7 @@ class WallLaw(NamedTuple):
     constants: Floats
     active: Floats
     bulk_modulus: float
-    local_bulk: float = 0.0
+    pointwise_bulk_ratio: float = 0.0
     viscosity: float = 0.0
 
 

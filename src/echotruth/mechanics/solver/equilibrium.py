@@ -89,9 +89,9 @@ class Load:
     Attributes
     ----------
     pressure : float, Pa
-        Of the cavity; ignored where it is solved.
+        Cavity pressure; ignored where it is solved.
     volume : float, m^3
-        Of the cavity; ignored where there is no scalar unknown.
+        Cavity volume; ignored where there is no scalar unknown.
     tension_fraction : ndarray of shape (n_cells,), or 1
         Fraction of the state's tension that each cell bears.
     tension : ndarray of shape (n_cells,), or float, Pa

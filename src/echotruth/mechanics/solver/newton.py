@@ -2,9 +2,9 @@
 
 With F the residual of a state x and J the factored tangent, a correction solves J dx = -F(x). The step x + d dx, with
 damping d, is taken if the correction after it, J dx' = -F(x + d dx), has |dx'| < (1 - d / 4) |dx| (natural monotonicity
-test; Deuflhard, Newton Methods for Nonlinear Problems, section 3.3); if not, d is halved. Factors serve, from frame to
-frame too, with Broyden's updates, as long as the corrections still needed cost less than new factors. Steps of the load
-are halved where Newton's method fails.
+test; Deuflhard, Newton Methods for Nonlinear Problems, section 3.3); if not, d is halved. Factors are
+reused, also from frame to frame, with Broyden's updates, as long as the remaining corrections cost less than new
+factors. Load steps are halved where Newton's method fails.
 """
 
 from __future__ import annotations
@@ -36,21 +36,22 @@ TOLERANCE = 1e-8
 """Relative residual of force, cavity volume and cell volumes at which a state counts as solved."""
 
 MAX_PREDICTOR_RESIDUAL = 0.3
-"""Residual of a predictor above which a load step is halved untried; not at rest, where every load exceeds it."""
+"""Residual of a predictor above which the load step is halved without an attempt, except from the unloaded state."""
 
 GOOD_PREDICTOR_RESIDUAL = 0.05
-"""Residual of a predictor below which no other is tried."""
+"""Residual of a predictor below which it is used without trying the others."""
 
 REFACTOR_COST = 15
-"""Corrections with old factors that cost as much as a tangent, its factors and one correction."""
+"""Number of corrections with old factors that cost as much as a new tangent, its factors and one correction."""
 
 _MAX_NEWTON_STEPS = 25
 _MIN_DAMPING = 1 / 16
 _MIN_LOAD_STEP = 1 / 128
+_REMEDY = "use a finer mesh or more frames"
 
 
 class Diverged(ValueError):
-    """A heart for which no equilibrium was found."""
+    """Raised if no equilibrium of the heart is found."""
 
 
 class LoadStepper:
@@ -59,11 +60,11 @@ class LoadStepper:
     Attributes
     ----------
     state, load
-        The last solved ones.
+        Last solved state, and the load that it balances.
     max_error : float
         Largest relative residual of the state.
     factorizations : int
-        Done so far.
+        Number of factorizations so far.
     """
 
     def __init__(self, equations: Equilibrium, stiffness: float) -> None:
@@ -97,7 +98,7 @@ class LoadStepper:
                 self.state = self._solve(target, unknown, (*predictors, *_extrapolated(path, fraction + step)), step)
             except Diverged as failure:
                 step, predictors = step / 2, ()
-                logger.debug("step of the load halved to %g: %s", step, failure)
+                logger.debug("load step halved to %g: %s", step, failure)
                 if step < _MIN_LOAD_STEP:
                     raise
                 continue
@@ -125,7 +126,7 @@ class LoadStepper:
     def _solve(self, load: Load, unknown: Unknown, predictors: tuple[State, ...], step: float) -> State:
         state, residual = self._best_predictor(load, unknown, predictors)
         if residual.total_error > MAX_PREDICTOR_RESIDUAL and self.load.pressure and step > _MIN_LOAD_STEP:
-            raise Diverged(f"too long a step {_at(load, unknown)}.")
+            raise Diverged(f"The load step is too large {_at(load, unknown)}.")
         if self._tangent is not None and self._tangent.unknown != unknown:
             self._tangent = None
         for _ in range(_MAX_NEWTON_STEPS):
@@ -134,10 +135,10 @@ class LoadStepper:
                 return state
             state, residual = self._newton(state, residual, load, unknown)
         self._tangent = None
-        raise Diverged(f"no equilibrium within {_MAX_NEWTON_STEPS} Newton steps {_at(load, unknown)}.")
+        raise Diverged(f"No equilibrium within {_MAX_NEWTON_STEPS} Newton steps {_at(load, unknown)}: {_REMEDY}.")
 
     def _best_predictor(self, load: Load, unknown: Unknown, predictors: tuple[State, ...]) -> tuple[State, Residual]:
-        """The first good one of the predictors and the last state, or else the best of them."""
+        """The first predictor (or the last state) with a small residual, or the one with the smallest."""
         best, least = self.state, None
         for state in (*predictors, self.state):
             residual = self.equations.residual(state, load, unknown)
@@ -178,7 +179,7 @@ class LoadStepper:
                 damping /= 2
                 if damping < _MIN_DAMPING:
                     self._tangent = None
-                    raise Diverged(f"Newton's method stalls {_at(load, unknown)}.")
+                    raise Diverged(f"The load step did not converge {_at(load, unknown)}: {_REMEDY}.")
 
     def _factor(self, state: State, load: Load, unknown: Unknown) -> Tangent:
         self.factorizations += 1

@@ -90,8 +90,9 @@ def deform(x, dN_dX, f, c):
 def evaluate(j, law, scale, previous_c, work, with_tangent):
     """Fill the parts of the stress and its tangent of a point whose C and J are known.
 
-    S = C S_passive + T_Ca S_active + (p + C local_bulk (J - 1)) J C^-1 + viscous modulus (C - C_previous) / 2; the last
-    term is viscous (Kelvin-Voigt), with the growth of C since the previous state.
+    S = C S_passive + T_Ca S_active + (p + C pointwise_bulk_ratio (J - 1)) J C^-1
+    + viscous modulus (C - C_previous) / 2; the last term is viscous (Kelvin-Voigt), with the growth of C since the
+    previous state.
     """
     stiffness, tension, pressure, viscous_modulus = scale
     c, inverse, passive, stress, tangent = work.c, work.inverse, work.passive, work.stress, work.dS_dE
@@ -100,7 +101,7 @@ def evaluate(j, law, scale, previous_c, work, with_tangent):
     law.energy(work.strain, law.constants, passive, tangent)
     trace = laws.isochoric_stress(c, inverse, factor, passive)
     active, active_tangent = laws.active(c[0], law.active[0], law.active[1])
-    bulk = stiffness * law.local_bulk
+    bulk = stiffness * law.pointwise_bulk_ratio
     hydrostatic = bulk * (j - 1) + pressure
     for k in range(6):
         viscous = viscous_modulus * (c[k] - previous_c[k]) / 2
@@ -115,7 +116,7 @@ def evaluate(j, law, scale, previous_c, work, with_tangent):
             tangent[k, k] += viscous_modulus / laws.MULTIPLICITY[k]
             for m in range(k):
                 tangent[k, m] = tangent[m, k]
-            stress[PASSIVE, k] = passive[k] + law.local_bulk * (j - 1) * j * inverse[k]
+            stress[PASSIVE, k] = passive[k] + law.pointwise_bulk_ratio * (j - 1) * j * inverse[k]
             stress[ACTIVE, k] = active if k == 0 else 0.0
             stress[VOLUMETRIC, k] = j * inverse[k]
 

@@ -83,7 +83,7 @@ def _inflate(
 
 
 def _displaced(mesh: Mesh, displacement: Floats) -> Mesh:
-    """The mesh displaced as far as leaves no tetrahedron inside out."""
+    """The mesh displaced by the largest tried fraction that inverts no tetrahedron."""
     step = 1.0
     while step >= _MIN_STEP:
         nodes = mesh.nodes + step * displacement

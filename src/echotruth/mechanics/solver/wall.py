@@ -66,5 +66,5 @@ def wall_law(section: Mechanics) -> element.WallLaw:
     power = 2.0 if section.active.stress == "cauchy" else 0.0
     active = np.array([section.active.length_dependence, power])
     material, si = section.material, section.si()
-    bulk = si.bulk_modulus, si.local_bulk
+    bulk = si.bulk_modulus, si.pointwise_bulk_ratio
     return element.WallLaw(compiled(material.law), material.constants(), active, *bulk, si.viscosity)

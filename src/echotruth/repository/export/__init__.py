@@ -26,7 +26,7 @@ FORMATS: dict[str, tuple[Callable[[Any, xr.Dataset], None], str]] = {
 
 
 class ExportError(ValueError):
-    """RF that cannot be exported; the message says why, and what to do."""
+    """Raised if RF cannot be exported; the message says why, and what to do."""
 
 
 def export(repository: Path, name: str, case: str, view: str, file: Path | None = None) -> Path:
@@ -37,7 +37,7 @@ def export(repository: Path, name: str, case: str, view: str, file: Path | None 
     repository : Path
         `out/NAME` or `out/NAME/NAME.zarr`.
     name : str
-        Of the format: `uff` or `zea`.
+        Name of the format: `uff` or `zea`.
     case, view : str
     file : Path, optional
         File to write (default: CASE_VIEW in the folder `export` beside the Zarr hierarchy).
@@ -94,5 +94,5 @@ def _open_rf(store: Path, case: str, view: str) -> xr.Dataset:
             raise ExportError(f"{value} is not a {key} of {store}: use {', '.join(known[:20])}")
         row.append(known.index(value))
     if not Store(store).files("rf", *row):
-        raise ExportError(f"{case} has no RF of {view} in {store}: see cases/status for why, or run it to its end")
+        raise ExportError(f"{case} has no RF of {view} in {store}: see cases/reason for why, or run it to its end")
     return rf.sel(case=case, view=view)

@@ -49,7 +49,7 @@ def track(
         See :func:`echotruth.tracking.trackers.window_deformation.window_passes`.
     """
     half = max(MIN_HALF, round(settings.si().subset / spacing / 2))
-    windows = WindowDeformation(windows_mm=[ratio * 2e3 * half * spacing for ratio in INITIAL_WINDOWS], sweeps=1)
+    windows = WindowDeformation(windows_mm=[ratio * 2e3 * half * spacing for ratio in INITIAL_WINDOWS], final_passes=1)
     initial = WindowDeformationTracker(window_passes(windows, frames.shape[1:], spacing))
     return accumulate(AffineTracker(half, initial), grey_levels(frames), points, settings.reference)
 

@@ -44,7 +44,7 @@ class WallTrajectory:
     Attributes
     ----------
     coefficients : ndarray of shape (frame, knot, 2)
-        Of the displacement, px.
+        Coefficients of the displacement, px.
     variance : ndarray of shape (frame,)
         Variance of the displacement, px^2 up to a factor; infinite in frames without texture.
     ncc : ndarray of shape (frame, n)
@@ -72,14 +72,14 @@ def track(
     if not mask.any():
         return np.full((len(frames), len(points), 2), np.nan), np.full((len(frames), len(points)), np.nan)
     values = settings.si()
-    blur = values.blur_px * np.sqrt(max(0.0, 1 - (values.resolved / spacing) ** 2))
+    blur = values.blur_px * np.sqrt(max(0.0, 1 - (values.speckle_pixel / spacing) ** 2))
     knot_spacing = max(values.knots / spacing, MIN_KNOT_SPACING)
     region = wall_region(mask, knot_spacing, values.margin / spacing, values.transmural_scale)
-    ncc = NormalizedCrossCorrelation(region.positions, region.inside, points, 2 * knot_spacing, values.range)
+    ncc = NormalizedCrossCorrelation(region.positions, region.inside, points, 2 * knot_spacing, values.dynamic_range)
     block = max(1, min(int(knot_spacing / FLOW_PIXELS_PER_KNOT), min(mask.shape) // MIN_IMAGE_SIDE))
 
     def prepare(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        amplitude = decompress(np.nan_to_num(frame), values.range)
+        amplitude = decompress(np.nan_to_num(frame), values.dynamic_range)
         blurred = cv2.GaussianBlur(amplitude, (0, 0), blur, borderType=cv2.BORDER_REFLECT) if blur else amplitude
         return block_mean(amplitude, block), blurred
 

@@ -37,7 +37,7 @@ def track(
     windows = arrange(frames.shape[1:], window_side(settings, spacing), settings.stride)
     finite = frames[np.isfinite(frames)] if frames.dtype.kind == "f" else frames
     contrast = float(finite.max()) - float(finite.min()) if finite.size else 0.0
-    tracker = PhaseCorrelationTracker(windows, settings.taper, contrast, max(settings.floor, ROUNDING))
+    tracker = PhaseCorrelationTracker(windows, settings.taper, contrast, max(settings.spectral_threshold, ROUNDING))
     return accumulate(tracker, frames, points, settings.reference)
 
 
@@ -72,18 +72,18 @@ class PhaseCorrelationTracker:
         Weights of the pixels of a window.
     contrast : float
         Range of grey values in the clip.
-    floor : float
+    spectral_threshold : float
         Magnitude, relative to the largest, below which a frequency is left out.
     """
 
     windows: Windows
     taper: str
     contrast: float
-    floor: float
+    spectral_threshold: float
 
     def prepare(self, image: np.ndarray) -> PhaseSpectra:
         """:func:`phase_spectra` of an image."""
-        return phase_spectra(image, self.windows, self.taper, self.contrast, self.floor)
+        return phase_spectra(image, self.windows, self.taper, self.contrast, self.spectral_threshold)
 
     def match(self, first: PhaseSpectra, second: PhaseSpectra, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step (n, 2) in px and quality (n,) of points, linear between the windows."""
@@ -109,7 +109,7 @@ class PhaseSpectra:
 
 
 def phase_spectra(
-    image: np.ndarray, windows: Windows, taper: str, contrast: float, floor: float = ROUNDING
+    image: np.ndarray, windows: Windows, taper: str, contrast: float, spectral_threshold: float = ROUNDING
 ) -> PhaseSpectra:
     """Fourier transforms of the windows of an image, normalised to unit magnitude.
 
@@ -122,7 +122,7 @@ def phase_spectra(
         Weights of the pixels of a window, applied after subtraction of its mean.
     contrast : float
         Range of grey values in the clip; a window with less than 1/255 of it as standard deviation has no texture.
-    floor : float
+    spectral_threshold : float
         Magnitude, relative to the largest, below which a frequency is left out.
 
     Returns
@@ -140,7 +140,7 @@ def phase_spectra(
         values *= hann[:, None] * hann
     spectrum = fft.rfft2(values)
     magnitude = np.abs(spectrum)
-    used = magnitude > floor * magnitude.max((-2, -1), keepdims=True)
+    used = magnitude > spectral_threshold * magnitude.max((-2, -1), keepdims=True)
     return PhaseSpectra(textured, np.divide(spectrum, magnitude, out=np.zeros_like(spectrum), where=used))
 
 

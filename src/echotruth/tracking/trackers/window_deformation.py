@@ -92,7 +92,7 @@ def window_sides(settings: WindowDeformation, spacing: float) -> list[int]:
         px, even, 8 at least.
     """
     sides = [max(MIN_WINDOW_SIDE, 2 * round(side / spacing / 2)) for side in settings.si().windows]
-    return sides + sides[-1:] * (settings.sweeps - 1)
+    return sides + sides[-1:] * (settings.final_passes - 1)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a notebook calls does in memory what the workflow does in a repository."""
+"""What a notebook calls: configurations, hearts, clips, tracked motion and scores, without a repository."""
 
 import subprocess
 import sys
@@ -26,6 +26,7 @@ TUBE = {
     "phantom": {"density_per_mm3": 300.0},
     "rf": {"lines": 48},
     "bmode": {"size_px": 128, "downsampling": (1, 2)},
+    "tracking": {"grid_px": 2},
 }
 
 
@@ -39,7 +40,7 @@ def clip(heart):
     return et.image(heart)
 
 
-def test_import_takes_less_than_three_tenths_of_a_second_and_loads_no_numba():
+def test_import_takes_less_than_three_tenths_of_a_second():
     code = (
         "import sys, time; start = time.process_time(); import echotruth; "
         "assert time.process_time() - start < 0.3; assert 'numba' not in sys.modules"
@@ -100,7 +101,12 @@ def test_function_that_raises_is_named(clip):
         (lambda heart, clip: et.track(clip, "dic"), ConfigError, "method = 'dic': should be"),
         (lambda heart, clip: et.track(clip, "dis", window=3), ConfigError, "window is not a key"),
         (lambda heart, clip: et.configure(geometry={"preset": "cat"}), ConfigError, "geometry.preset = 'cat'"),
+        (lambda heart, clip: et.track(clip.isel(frame=slice(1, None)), "dis"), ValueError, "has 2 of 3 frames"),
+        (lambda heart, clip: et.track(clip.drop_attrs(), "dis"), ValueError, "lost its attribute case"),
+        (lambda heart, clip: et.beat({"cases": {"seed": [1, 2]}}), ValueError, "cases sweeps seed"),
+        (lambda heart, clip: et.heart_dataset(heart, "rf"), ValueError, "group = 'rf': the heart has geometry"),
         (lambda heart, clip: et.open("out/nowhere"), FileNotFoundError, "out/nowhere.*is not a repository"),
+        (lambda heart, clip: et.load_heart("out/nowhere"), FileNotFoundError, "out/nowhere.*is not a repository"),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_sentence(heart, clip, call, error, words):
@@ -109,8 +115,65 @@ def test_what_cannot_be_done_is_refused_in_one_sentence(heart, clip, call, error
     assert "\n" not in str(caught.value)
 
 
+def test_another_heart_than_the_one_imaged_is_refused(clip):
+    other = et.beat(TUBE | {"motion": {"kind": "rigid", "rigid": {"lateral_um": 30.0}}})
+    with pytest.raises(ValueError, match="made of another heart"):
+        et.evaluate(et.track(clip, "dis"), other)
+
+
+def test_scores_of_smaller_images_are_at_the_same_points_of_the_tissue(clip, heart):
+    small = et.image(heart, size=64)
+    at_all, at_half = (et.evaluate(et.track(each, "dis"), heart) for each in (clip, small))
+    np.testing.assert_array_equal(clip["grid_mask"], small["grid_mask"])
+    assert np.isfinite(at_all["e_rr_rms_pp"]) and np.isfinite(at_half["e_rr_rms_pp"])
+
+
+def test_lines_are_kept_where_asked(heart, clip):
+    lines = et.image(heart, size=64, keep_lines=True)["lines"]
+    assert lines.dims == ("frame", "line", "range") and lines.shape[:2] == (3, 48) and lines.dtype == np.complex64
+
+
+def test_tracker_of_the_configuration_goes_by_its_name(clip):
+    named, method = et.track(clip, "as_published", window_px=16), et.track(clip, "phase_correlation", window_px=16)
+    np.testing.assert_array_equal(named["displacement"], method["displacement"])
+
+
+def test_groups_of_a_heart_have_dimensions_and_units(heart):
+    data = et.heart_dataset(heart, "kinematics")
+    assert data["strain_mean"].dims == ("frame", "strain_component")
+    assert list(data["strain_component"].values[:3]) == ["RR", "CC", "LL"]
+    assert et.heart_dataset(heart, "mechanics")["displacement"].attrs["units"] == "m"
+
+
 def test_given_keys_are_merged_into_a_file(tmp_path):
     (tmp_path / "mine.yaml").write_text("geometry: {preset: rat, wall_mm: 2.2}\n")
     config = et.configure(tmp_path / "mine.yaml", geometry={"hypertrophy": 1.1})
     assert (config.geometry.preset, config.geometry.wall_mm, config.geometry.hypertrophy) == ("rat", 2.2, 1.1)
     assert config.probe.preset == "rat_15MHz"
+
+
+def test_given_keys_are_merged_however_deep():
+    config = et.configure({"mechanics": {"active": {"stress": "second_piola_kirchhoff"}}}, **{"loop.frames": 20})
+    config = et.configure(config, mechanics={"active": {"length_dependence": 0.5}})
+    assert (config.mechanics.active.stress, config.mechanics.active.length_dependence) == (
+        "second_piola_kirchhoff",
+        0.5,
+    )
+    assert config.loop.frames == 20
+
+
+def test_what_follows_a_preset_follows_a_new_one_and_what_was_given_stays():
+    mouse = et.configure(**{"rf.lines": 100, "bmode.dynamic_range_dB": 60.0})
+    human = et.configure(mouse, geometry={"preset": "human"})
+    assert (
+        human.model_dump()
+        == et.configure(**{"geometry.preset": "human", "rf.lines": 100, "bmode.dynamic_range_dB": 60.0}).model_dump()
+    )
+    other = et.configure(mouse, probe={"preset": "mouse_40MHz"})
+    assert other.phantom.density_per_mm3 == et.configure(probe={"preset": "mouse_40MHz"}).phantom.density_per_mm3
+
+
+@pytest.mark.parametrize("name", ["demo", "paper", "human", "realistic", "phantoms"])
+def test_a_configuration_that_nothing_is_changed_in_stays_as_it_is(name):
+    config = et.configure(f"config/{name}.yaml")
+    assert et.configure(config).model_dump() == config.model_dump()

@@ -25,11 +25,11 @@ INITIAL_STIFFNESS = 1100.0
 """Stiffness (Pa) from which the search for it starts."""
 
 UNKNOWN: dict[str, Unknown] = {"pressure_volume": "tension", "pressure": None, "volume": "cavity_pressure"}
-"""Scalar unknown of each drive."""
+"""Scalar unknown of each value of `loop.prescribed`."""
 
 
 @dataclass(frozen=True)
-class Beat:
+class SolvedCycle:
     """A solved cycle.
 
     Attributes
@@ -37,7 +37,7 @@ class Beat:
     displacement : ndarray of shape (n_frames, n_nodes, 3), m
         From the unloaded state.
     pressure, volume : ndarray of shape (n_frames,), Pa and m^3
-        Of the solved cavity.
+        Solved pressure and volume of the cavity.
     pressure_target, volume_target : ndarray of shape (n_frames,), Pa and m^3
         Prescribed by the cycle; not a number where it prescribes none.
     tension : ndarray of shape (n_frames,), Pa
@@ -66,7 +66,7 @@ def solve(
     activation: Activation,
     stiffness: float | None = None,
     checkpoints: Checkpoints | None = None,
-) -> Beat:
+) -> SolvedCycle:
     """Drive a heart through a cycle.
 
     Parameters
@@ -74,7 +74,7 @@ def solve(
     equations : Equilibrium
     cycle : Cycle
     activation : Activation
-        Of its cells.
+        Active tension of the cells of the heart.
     stiffness : float, optional, Pa
         C of the passive law. If not given, it is solved from end-diastole; if given, the
         volumes of a pressure-volume loop are scaled to the volume at end-diastolic pressure.
@@ -83,7 +83,7 @@ def solve(
 
     Returns
     -------
-    Beat
+    SolvedCycle
 
     Raises
     ------
@@ -98,13 +98,13 @@ def solve(
     else:
         fill_to_end_diastole(stepper, cycle, stiffness)
         frames = [_checkpoint(stepper, checkpoints)]
-    if stiffness is not None and cycle.drive == "pressure_volume":
+    if stiffness is not None and cycle.prescribed == "pressure_volume":
         cycle = cycle.scaled(frames[0].load.volume / cycle.edv)
     while len(frames) < len(cycle.time):
         _solve_next(stepper, cycle, activation, [frame.state for frame in frames])
         frames.append(_checkpoint(stepper, checkpoints))
         _log(cycle, frames)
-    return _beat(equations, cycle, frames)
+    return _solved_cycle(equations, cycle, frames)
 
 
 def fill_to_end_diastole(stepper: LoadStepper, cycle: Cycle, stiffness: float | None) -> None:
@@ -140,7 +140,7 @@ def fill_to_end_diastole(stepper: LoadStepper, cycle: Cycle, stiffness: float | 
 
 def _solve_next(stepper: LoadStepper, cycle: Cycle, activation: Activation, states: list[State]) -> None:
     """Solve the frame after the given states."""
-    frame, unknown = len(states), UNKNOWN[cycle.drive]
+    frame, unknown = len(states), UNKNOWN[cycle.prescribed]
     pressure = 0.0 if cycle.pressure is None else float(cycle.pressure[frame])
     volume = 1.0 if cycle.volume is None else float(cycle.volume[frame])
     fraction: Floats | float
@@ -177,9 +177,9 @@ def _extrapolated(states: list[State]) -> tuple[State, ...]:
     return tuple(linear_combination(states[-len(row) :], row) for row in weights if len(states) >= len(row))
 
 
-def _beat(equations: Equilibrium, cycle: Cycle, frames: list[SolvedFrame]) -> Beat:
+def _solved_cycle(equations: Equilibrium, cycle: Cycle, frames: list[SolvedFrame]) -> SolvedCycle:
     none = np.full(len(frames), np.nan)
-    return Beat(
+    return SolvedCycle(
         displacement=np.array([equations.assembly.displacement(frame.state.solution) for frame in frames]),
         pressure=np.array([frame.load.pressure for frame in frames]),
         volume=np.array([frame.load.volume for frame in frames]),

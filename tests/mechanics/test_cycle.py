@@ -1,4 +1,4 @@
-"""Hearts with each drive, interrupted and resumed, diseased and healthy."""
+"""Hearts driven by each of the prescribed quantities, interrupted and resumed, diseased and healthy."""
 
 import logging
 from dataclasses import replace
@@ -10,9 +10,9 @@ from echotruth.config import Config, Geometry, Loop, Mechanics, Pathology
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver import drive
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.checkpoint import Checkpoints
+from echotruth.mechanics.solver.cycle import solve
 from echotruth.mechanics.solver.wall import equilibrium, wall
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
@@ -24,7 +24,7 @@ def solved(cycle, config=CONFIG, stiffness=None, checkpoints=None):
     activation = Activation(body.tissue.tension_scale, body.tissue.activation_delay, cycle.period / len(cycle.time))
     equations = equilibrium(config, body)
     try:
-        return drive.solve(equations, cycle, activation, stiffness, checkpoints)
+        return solve(equations, cycle, activation, stiffness, checkpoints)
     finally:
         equations.close()
 
@@ -40,7 +40,7 @@ def driven(cycle):
 
 
 def test_volume_and_tension_give_back_the_pressure(cycle, driven):
-    other = replace(cycle, drive="volume", pressure=None, tension=driven.tension)
+    other = replace(cycle, prescribed="volume", pressure=None, tension=driven.tension)
     back = solved(other, stiffness=driven.stiffness)
     np.testing.assert_allclose(back.pressure, cycle.pressure, rtol=1e-4)
     assert np.all(np.isnan(back.pressure_target))
@@ -52,9 +52,9 @@ def test_pressure_alone_fills_the_passive_heart_as_its_volume_does(cycle, driven
     """Without tension the volume that bears a pressure is the only one."""
     none, pressure = np.zeros(4), cycle.pressure[0] * np.array([1.0, 1.5, 1.2, 0.5])
     slack = replace(cycle, time=cycle.time[:4], tension=none)
-    filled = solved(replace(slack, drive="pressure", pressure=pressure, volume=None), stiffness=driven.stiffness)
+    filled = solved(replace(slack, prescribed="pressure", pressure=pressure, volume=None), stiffness=driven.stiffness)
     assert filled.volume[0] == pytest.approx(driven.volume[0], rel=1e-7)
-    back = solved(replace(slack, drive="volume", pressure=None, volume=filled.volume), stiffness=driven.stiffness)
+    back = solved(replace(slack, prescribed="volume", pressure=None, volume=filled.volume), stiffness=driven.stiffness)
     np.testing.assert_allclose(back.pressure, pressure, rtol=1e-6)
 
 

@@ -1,0 +1,94 @@
+"""Building a configuration in Python: from a file, another configuration or nothing, and some keys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from echotruth.config.loading import read_yaml, validate
+from echotruth.config.sections import Config
+
+Source = Config | dict[str, Any] | str | Path | None
+
+_NAMED = ("views", "trackers", "cases")
+"""Mappings of names that the user gives: one that is given replaces the other."""
+_KINDS = ("law", "method")
+"""Keys that decide which other keys a section has."""
+
+
+def configure(source: Source = None, **keys: Any) -> Config:
+    """Make a configuration.
+
+    Parameters
+    ----------
+    source : Config, dict, str or Path, optional
+        A configuration, its keys and values, or a YAML file. Default: the default heart.
+    **keys
+        Sections, as `geometry={"preset": "human"}`, or single keys, as `**{"loop.frames": 20}`; they are merged into
+        the source (config/README.md lists them). What follows a preset follows the new one.
+
+    Returns
+    -------
+    Config
+
+    Raises
+    ------
+    ConfigError
+        With one sentence that names key, value and remedy.
+
+    Examples
+    --------
+    >>> configure(geometry={"preset": "rat"}).probe.preset
+    'rat_15MHz'
+    """
+    if isinstance(source, Config):
+        values, name = _given(source), source.name
+    elif isinstance(source, str | Path):
+        values, name = read_yaml(Path(source)), str(source)
+    else:
+        values, name = source or {}, "configuration"
+    for key, value in keys.items():
+        *parents, leaf = key.split(".")
+        nested = {leaf: value}
+        for parent in reversed(parents):
+            nested = {parent: nested}
+        values = _merged(values, nested)
+    return validate(values, name)
+
+
+def _given(config: Config) -> dict[str, Any]:
+    """Keys in which a configuration differs from the default one of its presets."""
+    presets = {"geometry": {"preset": config.geometry.preset}, "probe": {"preset": config.probe.preset}}
+    # What a preset is by default follows another preset.
+    follows = validate({"geometry": presets["geometry"]}, "presets").probe.preset == config.probe.preset
+    default = validate(presets, "presets").model_dump()
+    found = _difference(config.model_dump(), default)
+    found["geometry"] = presets["geometry"] | found.get("geometry", {})
+    return found if follows else found | {"probe": presets["probe"] | found.get("probe", {})}
+
+
+def _difference(values: dict[str, Any], default: dict[str, Any]) -> dict[str, Any]:
+    found = {}
+    for key, value in values.items():
+        other = default.get(key)
+        if isinstance(value, dict) and isinstance(other, dict) and key not in _NAMED:
+            if any(value.get(kind) != other.get(kind) for kind in _KINDS):
+                found[key] = value
+            elif inner := _difference(value, other):
+                found[key] = inner
+        elif value != other:
+            found[key] = value
+    return found
+
+
+def _merged(values: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    """Values with those given in place of theirs, section by section."""
+    found = dict(values)
+    for key, value in given.items():
+        old: Any = values.get(key)
+        merges = isinstance(value, dict) and isinstance(old, dict) and key not in _NAMED
+        if merges and all(old.get(kind) == value.get(kind, old.get(kind)) for kind in _KINDS):
+            found[key] = _merged(old, value)
+        else:
+            found[key] = value
+    return found

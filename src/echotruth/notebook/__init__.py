@@ -1,0 +1,1 @@
+"""Functions for notebooks: they do in memory what the workflow does in a repository."""

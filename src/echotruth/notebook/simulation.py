@@ -1,0 +1,274 @@
+"""From a configuration to a heart, from a heart to a clip, and from a clip to a score."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from echotruth.cases import Case
+from echotruth.config import Config, Probe, View
+from echotruth.config.building import Source, configure
+from echotruth.config.tracking import External
+from echotruth.evaluation.clip import Clip, grid_points
+from echotruth.evaluation.scoring import metrics, score, truth_at
+from echotruth.heart import Heart
+from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
+from echotruth.imaging.sequence import Sequence
+from echotruth.imaging.truth import pixel_truth
+from echotruth.imaging.view import Plane, imaging_plane
+from echotruth.mechanics.beat import simulate
+from echotruth.mechanics.physiology import measures, violated_bound
+from echotruth.notebook.datasets import case_of, clip_dataset, dataset, fingerprint
+from echotruth.seeds import generator
+from echotruth.tracking.tracker import track as track_points
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+
+def beat(config: Source = None, progress: bool = True) -> Heart:
+    """Move a heart through one cycle: its beat, or a prescribed motion.
+
+    Parameters
+    ----------
+    config : Config, dict, str or Path, optional
+        Anything that :func:`echotruth.configure` accepts.
+    progress : bool
+        Whether a line on stderr says how far it is, where a person watches.
+
+    Returns
+    -------
+    Heart
+        Its `arrays` hold the groups geometry, fibres, pathology, mechanics, kinematics and physiology (docs/schema.md);
+        `echotruth.heart_dataset` gives them dimensions and units. A heart that violates a bound of the section
+        physiology is returned with a warning.
+
+    Raises
+    ------
+    ConfigError
+        If the configuration is invalid.
+    GeometryError, FibreError, PathologyError, LoopError, MotionError, Diverged
+        If geometry, fibres, pathology, loop or motion are invalid, or the solver does not converge.
+    """
+    settings = config if isinstance(config, Config) else configure(config)
+    if settings.cases:
+        raise ValueError(f"cases sweeps {', '.join(settings.cases)}: beat one, as echotruth.expand(config)[0].config")
+    with _told("beat", progress):
+        arrays = simulate(settings)
+    arrays["physiology"] = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"])
+    reason = violated_bound(dict(arrays["physiology"]), settings.physiology)
+    if reason and settings.motion.kind == "beat":
+        warnings.warn(f"implausible heart: {reason}", stacklevel=2)
+    return Heart.of(arrays, settings)
+
+
+def image(
+    heart: Heart,
+    view: str | View = "mid",
+    probe: str | Probe | None = None,
+    size: int | None = None,
+    *,
+    keep_lines: bool = False,
+    progress: bool = True,
+) -> xr.Dataset:
+    """Image a heart, frame by frame.
+
+    Parameters
+    ----------
+    heart : Heart
+        Its configuration says how it is imaged.
+    view : str or View
+        Name of a view of the configuration, or an imaging plane.
+    probe : str or Probe, optional
+        Another array, or its name; what follows the array by default (scan, density of scatterers) follows it.
+    size : int, optional
+        Pixels along a side: `bmode.size_px` over one of `bmode.downsampling`. Default: the largest.
+    keep_lines : bool
+        Whether the demodulated lines are returned as well.
+    progress : bool
+        Whether a line on stderr says how far it is, where a person watches.
+
+    Returns
+    -------
+    Dataset
+        The clip `image` (frame, axial, lateral), uint8, and the truth at every pixel: displacement since end-diastole
+        (m), strain, mask, layer, segment, region and wall_depth; units are attributes of each array. `grid_mask` says
+        which points of the trackers' grid are in the wall.
+
+    Raises
+    ------
+    ConfigError
+        If the probe does not suit the configuration.
+    ValueError
+        If there is no such view or size.
+    """
+    if heart.config is None:
+        raise ValueError("The heart has no configuration: make it by echotruth.beat or echotruth.load_heart.")
+    config, name = _imaged_by(heart.config, view, probe)
+    size = config.bmode.sizes[0] if size is None else size
+    if size not in config.bmode.sizes:
+        raise ValueError(f"size = {size}: use one of {', '.join(map(str, config.bmode.sizes))}, or change bmode.")
+    case, plane = Case("heart", {}, config), imaging_plane(config.views[name], config.rf, heart.endo_at_ed)
+    sequence = Sequence(config, heart, plane, partial(generator, case, name))
+    with _told("image", progress):
+        lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range
+    gain = time_gain_compensation(config.probe, config.bmode, range_)
+    values = {
+        f"bmode/{size}": {"image": bmode_clip(lines, sequence.scanner.scan, range_, config.bmode, gain)[size]},
+        f"truth/{size}": pixel_truth(heart, plane, *pixel_centres(config.bmode, size)),
+    }
+    clip = clip_dataset(heart, case, name, plane, values)
+    if keep_lines:
+        about = {"long_name": "lines, demodulated by exp(-4 pi i f range / c)", "frequency": sequence.scanner.frequency}
+        clip["lines"] = (("frame", "line", "range"), lines, about)
+        clip = clip.assign_coords(range=range_, line_angle=("line", sequence.scanner.angle))
+    return clip
+
+
+def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", **options: Any) -> xr.Dataset:
+    """Track the wall in a clip.
+
+    Parameters
+    ----------
+    clip : Dataset
+        A whole cycle, as :func:`image` or :func:`echotruth.load_clip` returns it. The tracker sees `image`, and the
+        wall at end-diastole.
+    tracker : str or callable
+        Name of a tracker of the configuration, of a method (config/README.md, `tracking.trackers`), or
+        `package.module:function`; or a function `track(frames, points, mask, spacing, frame_time, seed, **options)`
+        as docs/trackers.md describes it.
+    **options
+        Settings of the method, or keyword arguments of the function.
+
+    Returns
+    -------
+    Dataset
+        displacement (frame, axial, lateral, plane), m, since end-diastole, and quality (frame, axial, lateral) at the
+        points of the trackers' grid; NaN outside the wall.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such method or setting.
+    TrackerFailed
+        If the tracker finds no motion.
+    ValueError
+        If the clip is not a whole cycle, or has lost its attributes.
+    """
+    case = case_of(clip)
+    if clip.sizes["frame"] != case.config.loop.frames:
+        number = f"{clip.sizes['frame']} of {case.config.loop.frames} frames"
+        raise ValueError(f"The clip has {number}: track a whole cycle.")
+    inside, size = clip["grid_mask"].values, clip.sizes["axial"]
+    points = grid_points(case.config, size)[inside]
+    spacing = case.config.bmode.si().field_of_view / size
+    seed = int(generator(case, clip.attrs["view"], "tracking").integers(2**31))
+    frames, mask, times = clip["image"].values, clip["mask"].values[0], clip["time"].values
+    arguments = Clip(frames, mask, inside, points, spacing, times, seed)
+    found = track_points(*arguments.tracker_arguments, _settings(case.config, tracker, options))
+    displacement, quality = arguments.on_grid(*found)
+    coordinates = {"axial": clip["grid_axial"].values, "lateral": clip["grid_lateral"].values}
+    values = {f"tracking/{size}": {"displacement": displacement, "quality": quality}}
+    return dataset(case, values, coordinates).assign_attrs(clip.attrs, tracker=_name(tracker))
+
+
+def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
+    """Compare a tracked motion with that of the heart.
+
+    Parameters
+    ----------
+    tracked : Dataset
+        As :func:`track` returns it. One from elsewhere needs `displacement` (frame, axial, lateral, plane), m, since
+        end-diastole, the coordinates axial and lateral, m, and the attributes of the clip.
+    heart : Heart
+        The heart that was imaged.
+
+    Returns
+    -------
+    Series
+        The metrics of the leaderboard, each with its unit in its name, as `nrmse_percent` (docs/tracking.md).
+
+    Raises
+    ------
+    ValueError
+        If it is another heart, frames are missing, or the data set has lost its attributes.
+    """
+    import pandas as pd
+
+    case, attributes = case_of(tracked), tracked.attrs
+    if attributes.get("heart", fingerprint(heart)) != fingerprint(heart):
+        raise ValueError("The clip was made of another heart: give the one that was imaged.")
+    frames = len(heart.displacement)
+    if tracked.sizes["frame"] != frames:
+        raise ValueError(f"The displacement has {tracked.sizes['frame']} frames, and the heart has {frames}.")
+    kind = case.config.views[attributes["view"]].plane
+    plane = Plane(np.array(attributes["plane_origin"]), np.reshape(attributes["plane_axes"], (3, 3)))
+    lateral, axial = np.meshgrid(tracked["lateral"].values, tracked["axial"].values)
+    position = np.stack([lateral, axial], axis=-1)
+    truth = truth_at(heart, plane, kind, position, case.config.bmode.si().field_of_view)
+    displacement = tracked["displacement"].transpose("frame", "axial", "lateral", "plane").values
+    return pd.Series(metrics(score(displacement, truth), kind), name=attributes.get("tracker"))
+
+
+def _imaged_by(config: Config, view: str | View, probe: str | Probe | None) -> tuple[Config, str]:
+    """Configuration with the view and the probe asked for, and the name of the view."""
+    if isinstance(probe, str):
+        config = configure(config, probe={"preset": probe})
+    elif probe is not None:
+        config = configure(config, probe=probe.model_dump())
+    if isinstance(view, View):
+        return config.model_copy(update={"views": {"view": view}}), "view"
+    if view not in config.views:
+        raise ValueError(f"view = {view!r}: use one of {', '.join(config.views)}, or give a View.")
+    return config, view
+
+
+def _settings(config: Config, tracker: str | Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Section of a tracker, as :func:`echotruth.tracking.tracker.track` takes it."""
+    if callable(tracker):
+        return External.model_construct(track=tracker, options=options)
+    known = config.tracking.trackers
+    if tracker in known:
+        given = known[tracker].model_dump() | options
+    else:
+        given = {"method": "external", "track": tracker, "options": options} if ":" in tracker else {}
+        given = given or {"method": tracker, **options}
+    return configure(config, tracking={"trackers": {"tracker": given}}).tracking.trackers["tracker"]
+
+
+def _name(tracker: str | Callable[..., Any]) -> str:
+    return tracker if isinstance(tracker, str) else getattr(tracker, "__name__", type(tracker).__name__)
+
+
+@contextmanager
+def _told(what: str, progress: bool) -> Iterator[None]:
+    """Show what the package logs on one line of stderr, where a person watches; BLAS runs on one thread.
+
+    Its sums depend on the number of threads, and the bytes must not.
+    """
+    from threadpoolctl import threadpool_limits
+
+    logger, handler = logging.getLogger("echotruth"), logging.StreamHandler(sys.stderr)
+    watched = progress and (sys.stderr.isatty() or "ipykernel" in sys.modules)
+    handler.terminator = ""
+    handler.setFormatter(logging.Formatter(f"\r\033[K{what}: %(message)s"))
+    level = logger.level
+    if watched:
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO)
+    try:
+        with threadpool_limits(1):
+            yield
+    finally:
+        if watched:
+            logger.removeHandler(handler)
+            logger.setLevel(level)
+            sys.stderr.write("\r\033[K")
