@@ -1,4 +1,4 @@
-"""Presets of phased arrays.
+"""Presets of phased arrays; a new one also needs its name in :mod:`.probe` and its scan in :mod:`.defaults`.
 
 mouse_25MHz
     Pitch 0.75 wavelengths: steered by 20 degrees, the highest lobe is 36 dB below the main one. Beam and pulse (-6 dB,

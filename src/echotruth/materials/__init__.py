@@ -5,7 +5,8 @@ with a key `law` that is the name of the module. `energy(e, constants, stress, t
 function that Numba can compile: given the isochoric Green-Lagrange strain e, shape (6,), in the
 order ff, ss, nn, fs, fn, sn (tensor components), and the numbers of `Law.constants`, it returns
 W / C, and fills `stress`, dW/dE / C of shape (6,), and `tangent`, d2W/dE2 / C of shape (6, 6), which turns a
-strain with doubled shear into a stress. To add a law, add such a file and nothing else.
+strain with doubled shear into a stress. To add a law, add such a file and nothing else
+(and for the tests its energy in validation/energies.py).
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Failure of a case: its job records the reason in the ledger, and publication copies it to `cases/reason`."""
+"""Failure of a case: its job records the reason in the ledger, and publication copies it to `cases/reason`.
+
+Errors of the mechanics become failures in workflow/scripts/mechanics.py.
+"""
 
 
 class CaseFailed(ValueError):

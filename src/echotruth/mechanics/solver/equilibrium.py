@@ -4,12 +4,13 @@ Unknowns are the free displacements u, the pressure p_c of each cell (positive i
 s: the active tension, the stiffness or the cavity pressure P. With v_c and V_c the deformed and unloaded volume of a
 cell and V(u) that of the cavity, the residuals are
 
-    r = f(u, p, s) - P dV/du,    r_c = v_c(u) / V_c - 1 - p_c / kappa,    r_V = V(u) - V_target.
+    r = f(u, p, s) + K_e u - P dV/du,    r_c = v_c(u) / V_c - 1 - p_c / kappa,    r_V = V(u) - V_target.
 
-P is work-conjugate to V: its load P dV/du does the work P dV. Newton's method eliminates p_c in its cell and borders
+K_e are the springs of the epicardium (:func:`.support.spring_stiffness`). P is work-conjugate to V: its load P dV/du
+does the work P dV. Newton's method eliminates p_c in its cell and borders
 the tangent with s, so that one factorization of K serves both right-hand sides. With G_c = dv_c/du and g = dV/du:
 
-    K = d(f - P g)/du + sum_c kappa / V_c G_c G_c^T,
+    K = d(f + K_e u - P g)/du + sum_c kappa / V_c G_c G_c^T,
     K du_0 = -r - sum_c kappa r_c G_c,    K du_s = -dr/ds,
     ds = -(r_V + g . du_0) / (g . du_s),    du = du_0 + ds du_s,    dp_c = kappa (r_c + G_c . du / V_c).
 """
@@ -246,6 +247,7 @@ class Equilibrium:
         return Residual(internal - external, volumetric, volume, *errors, norm(volumetric) / np.sqrt(len(volumetric)))
 
     def _spring_force(self, nodes: Floats) -> Floats | float:
+        """K_e u: force of the springs of the epicardium on the free displacements."""
         if self._springs is None:
             return 0.0
         displacement = (nodes - self.mesh.nodes)[self.mesh.epi].reshape(-1, 18)

@@ -1,4 +1,7 @@
-"""Support of the heart: its base, and the springs of its surroundings."""
+"""Support of the heart: its base, and the springs of its surroundings.
+
+The stiffness of the springs enters residual and tangent in :mod:`.equilibrium`.
+"""
 
 from __future__ import annotations
 
