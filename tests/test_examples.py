@@ -1,5 +1,6 @@
 """Every example runs, and comes to its physical number."""
 
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import echotruth as et
 from echotruth.config import Config
 from echotruth.loop.cycle import read_loop
 
@@ -53,3 +55,18 @@ def test_example_of_a_repository_says_how_to_get_one(monkeypatch):
     monkeypatch.setattr(sys, "argv", ["global_strain.py", "out/none"])
     with pytest.raises(FileNotFoundError, match="give the folder that a run made"):
         run("global_strain")
+
+
+def test_blocks_of_the_page_about_python_run_one_after_the_other():
+    page, names = (EXAMPLES.parent / "docs/python.md").read_text(), {}
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    for block in blocks:
+        exec(block, names)
+    assert len(blocks) == 4
+    assert names["clip"]["image"].shape == (5, 128, 128)
+    assert float(names["mechanics"]["volume"][0]) == pytest.approx(50e-9, rel=1e-3)
+
+
+def test_page_about_python_names_all_that_is_public():
+    page = (EXAMPLES.parent / "docs/python.md").read_text()
+    assert {name for name in et.__all__ if f"et.{name}" not in page} <= {"Config", "ConfigError", "TrackerFailed"}
