@@ -23,6 +23,8 @@ PIXELS = (490, 760)
 WALL_OPACITY = 0.16
 """Opacity of the wall in front of its fibres."""
 
+MARGIN = 1.03
+"""Half the width of a picture over that of the heart, at least."""
 ROD_LENGTH = 0.075
 """Length of the rods that show fibres, over that of the heart."""
 
@@ -146,7 +148,10 @@ def _camera(states: Sequence[State]) -> Camera:
     nodes = np.concatenate([state.nodes for state in states])
     low, high = nodes.min(0), nodes.max(0)
     half_height = 0.5 * float(high[2] - low[2]) + 0.17 * float(high[0] - low[0])
-    return Camera(np.array(VIEWPOINT), (low + high) / 2, half_height, PIXELS)
+    camera = Camera(np.array(VIEWPOINT), (low + high) / 2, half_height, PIXELS)
+    # A wide heart would be cut off at the sides.
+    half_width = MARGIN * float(np.abs((nodes - camera.centre) @ camera.axes[0]).max())
+    return replace(camera, half_height=max(half_height, half_width * PIXELS[1] / PIXELS[0]))
 
 
 def _opaque(surface: Surface, camera: Camera) -> np.ndarray:
