@@ -40,12 +40,11 @@ from echotruth.config.loading import load
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.scoring import ground_truth, score
 from echotruth.imaging.beamforming.scan import scan_lines
-from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth, validate_scatterers
+from echotruth.imaging.beamforming.scanner import validate_scatterers
 from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
-from echotruth.imaging.medium.medium import Medium, seed_medium
+from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import Plane
-from echotruth.loop.cycle import read_loop
 from echotruth.repository import ledger
 from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.section import Section
@@ -141,13 +140,11 @@ class Parts:
         self._heart, self._config = self._job(stage="truth").heart, self._job(stage="truth").case.config
         self._frames = len(self._heart.displacement)
         place = self._job(stage="truth").read("phantom", "origin", "axes")
-        self._plane, self._random = Plane(**place), partial(generator, self._job(stage="rf").case, view)
-        given = self._config.probe, self._config.rf, imaging_depth(self._config.rf, self._config.bmode)
-        self._scanner = Scanner(*given)
+        self._plane, random = Plane(**place), partial(generator, self._job(stage="rf").case, view)
+        self._sequence = Sequence(self._config, self._heart, self._plane, random)
 
     def phantom(self) -> float:
-        in_beam = self._scanner.matrix.in_beam
-        return timed(lambda: seed_medium(self._config, self._heart, self._plane, self._random, in_beam))
+        return timed(self._sequence.scatterers)
 
     def truth(self) -> float:
         some = replace(self._heart, displacement=self._heart.displacement[:SOME])
@@ -156,18 +153,15 @@ class Parts:
         return self._frames / len(some.displacement) * spent
 
     def rf(self) -> float:
-        config, heart, scanner = self._config, self._heart, self._scanner
-        seeded = seed_medium(config, heart, self._plane, self._random, scanner.matrix.in_beam)
-        times = read_loop(config.loop).time
-        medium = Medium(config, heart, self._plane, time=times, seeded=seeded, random=self._random)
-        position, amplitude = medium(0)
+        scanner = self._sequence.scanner
+        position, amplitude = self._sequence.medium(self._sequence.scatterers())(0)
         even = np.random.default_rng(0).uniform(position.min(0), position.max(0), position.shape)
         scatterers = validate_scatterers(even, amplitude)
         matrix = scanner.matrix(*scatterers)
         return self._frames * (timed(lambda: scanner.matrix(*scatterers)) + timed(lambda: scanner.beamform(matrix)))
 
     def bmode(self) -> float:
-        config, scanner = self._config, self._scanner
+        config, scanner = self._config, self._sequence.scanner
         shape = (SOME, len(scanner.angle), len(scanner.range))
         lines = np.random.default_rng(0).standard_normal((*shape, 2), np.float32).view(np.complex64)[..., 0]
         scan = scan_lines(config.probe, config.rf)

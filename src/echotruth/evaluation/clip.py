@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echotruth.config import Config
+from echotruth.imaging.bmode import pixel_centres
 from echotruth.loop.cycle import read_loop
 from echotruth.tracking.windows import grid
 
@@ -99,6 +100,14 @@ def grid_points(config: Config, size: int) -> np.ndarray:
     largest = config.bmode.sizes[0]
     # A pixel of a smaller image is the mean of a block of pixels: x_small + 1/2 = (x_largest + 1/2) size / largest.
     return (grid((largest, largest), config.tracking.grid_px) + 0.5) * (size / largest) - 0.5
+
+
+def grid_positions(config: Config) -> np.ndarray:
+    """Positions of the grid, (grid rows, grid columns, 2): lateral, axial, m."""
+    largest = config.bmode.sizes[0]
+    axial, lateral = pixel_centres(config.bmode, largest)
+    points = grid_points(config, largest).round().astype(int)
+    return np.stack([lateral[points[..., 0]], axial[points[..., 1]]], axis=-1)
 
 
 def clips(job: Job) -> dict[int, Clip]:

@@ -12,11 +12,10 @@ import numpy as np
 
 from echotruth.evaluation import statistics
 from echotruth.evaluation.agreement import REFERENCES, compare
-from echotruth.evaluation.clip import grid_points
+from echotruth.evaluation.clip import grid_positions
 from echotruth.evaluation.displacement_error import WallPoints, evaluate
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.heart import Heart
-from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import cavity_centroid, material_truth
 from echotruth.imaging.view import Plane
 
@@ -96,12 +95,8 @@ def ground_truth(job: Job) -> Truth:
     Truth
     """
     heart, config = job.heart, job.case.config
-    phantom, largest = job.read("phantom", "origin", "axes"), config.bmode.sizes[0]
-    axial, lateral = pixel_centres(config.bmode, largest)
-    points = grid_points(config, largest).round().astype(int)
-    position = np.stack([lateral[points[..., 0]], axial[points[..., 1]]], axis=-1)
-    plane = Plane(phantom["origin"], phantom["axes"])
-    return truth_at(heart, plane, job.view.plane, position, config.bmode.si().field_of_view)
+    plane = Plane(**job.read("phantom", "origin", "axes"))
+    return truth_at(heart, plane, job.view.plane, grid_positions(config), config.bmode.si().field_of_view)
 
 
 def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, field_of_view: float) -> Truth:

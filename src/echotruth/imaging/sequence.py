@@ -52,8 +52,11 @@ class Sequence:
 
     def acquisition(self, scatterers: Arrays) -> Acquisition:
         """Return what makes the full matrix of any frame."""
-        medium = Medium(self._config, self._heart, self._plane, time=self._time, seeded=scatterers, random=self._random)
-        return Acquisition(self._config, self.scanner, medium, self._random)
+        return Acquisition(self._config, self.scanner, self.medium(scatterers), self._random)
+
+    def medium(self, scatterers: Arrays) -> Medium:
+        """Return the scatterers of any frame."""
+        return Medium(self._config, self._heart, self._plane, time=self._time, seeded=scatterers, random=self._random)
 
     def lines(self, scatterers: Arrays, recorder: RfRecorder | None = None) -> NDArray[np.complex64]:
         """Image all frames.

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from echotruth.cases import Case
+from echotruth.config import Config
 from echotruth.config.building import configure
-from echotruth.evaluation.clip import grid_points
+from echotruth.evaluation.clip import grid_positions
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import pixel_truth
@@ -52,18 +55,17 @@ def clip_dataset(heart: Heart, case: Case, view: str, plane: Plane, values: dict
         Name of the view.
     plane : Plane
     values : dict of dict of ndarray
-        Groups `bmode/SIZE` and `truth/SIZE`, and `rf` where lines are kept.
+        Groups `bmode/SIZE` and `truth/SIZE`.
     """
-    bmode = case.config.bmode
-    size, largest = int(next(iter(values)).rpartition("/")[2]), bmode.sizes[0]
-    axial, lateral = pixel_centres(bmode, size)
+    axial, lateral = pixel_centres(case.config.bmode, int(next(iter(values)).rpartition("/")[2]))
     found = dataset(case, values, {"axial": axial, "lateral": lateral})
-    index = grid_points(case.config, largest).round().astype(int)
-    axial, lateral = (axis[index[..., k]] for axis, k in zip(pixel_centres(bmode, largest), (1, 0), strict=True))
-    at_ed = pixel_truth(_at_ed(heart), plane, axial[:, 0], lateral[0])["mask"][0]
+    grid = grid_positions(case.config)
+    lateral, axial = grid[0, :, 0], grid[:, 0, 1]
+    first = replace(heart, displacement=heart.displacement[:1])
+    at_ed = pixel_truth(first, plane, axial, lateral)["mask"][0]
     about = {"long_name": "whether a point that trackers follow is in the wall at ED", "units": "1"}
     points = {"grid_mask": (("grid_axial", "grid_lateral"), at_ed, about)}
-    found = found.assign(points).assign_coords(grid_axial=axial[:, 0], grid_lateral=lateral[0])
+    found = found.assign(points).assign_coords(grid_axial=axial, grid_lateral=lateral)
     return found.assign_attrs(
         case=case.id,
         view=view,
@@ -103,8 +105,6 @@ def case_of(clip: xr.Dataset) -> Case:
     missing = [name for name in ("case", "config", "view", "plane_origin", "plane_axes") if name not in clip.attrs]
     if missing:
         raise ValueError(f"The data set has lost its attribute {missing[0]}: keep those that echotruth.image gave it.")
-    import json
-
     return Case(clip.attrs["case"], {}, configure(json.loads(clip.attrs["config"])))
 
 
@@ -113,8 +113,15 @@ def fingerprint(heart: Heart) -> str:
     return sha256(np.ascontiguousarray(heart.displacement).tobytes()).hexdigest()[:12]
 
 
-def _at_ed(heart: Heart) -> Heart:
-    """The heart in its first frame alone."""
-    from dataclasses import replace
+def image_size(config: Config, size: int | None) -> int:
+    """Pixels along a side of a clip: the size asked for, or the largest.
 
-    return replace(heart, displacement=heart.displacement[:1])
+    Raises
+    ------
+    ValueError
+        If the configuration has no clips of that size.
+    """
+    sizes = config.bmode.sizes
+    if size is not None and size not in sizes:
+        raise ValueError(f"size = {size}: use one of {', '.join(map(str, sizes))}, or change bmode.")
+    return sizes[0] if size is None else size

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
-from echotruth.notebook.datasets import clip_dataset
+from echotruth.notebook.datasets import clip_dataset, image_size
 from echotruth.repository.ledger import rows
 from echotruth.workflow.job import Job
 
@@ -78,9 +78,7 @@ def load_clip(repository: str | Path, case: str = "heart", view: str = "mid", si
     config = job.case.config
     if view not in config.views:
         raise ValueError(f"view = {view!r}: use one of {', '.join(config.views)}.")
-    size = config.bmode.sizes[0] if size is None else size
-    if size not in config.bmode.sizes:
-        raise ValueError(f"size = {size}: use one of {', '.join(map(str, config.bmode.sizes))}.")
+    size = image_size(config, size)
     values = {group: job.read(group) for group in (f"bmode/{size}", f"truth/{size}")}
     return clip_dataset(job.heart, job.case, view, Plane(**job.read("phantom", "origin", "axes")), values)
 

@@ -25,7 +25,7 @@ from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.physiology import measures, violated_bound
-from echotruth.notebook.datasets import case_of, clip_dataset, dataset, fingerprint
+from echotruth.notebook.datasets import case_of, clip_dataset, dataset, fingerprint, image_size
 from echotruth.seeds import generator
 from echotruth.tracking.tracker import track as track_points
 
@@ -61,7 +61,7 @@ def beat(config: Source = None, progress: bool = True) -> Heart:
     settings = config if isinstance(config, Config) else configure(config)
     if settings.cases:
         raise ValueError(f"cases sweeps {', '.join(settings.cases)}: beat one, as echotruth.expand(config)[0].config")
-    with _told("beat", progress):
+    with _progress_line("beat", progress):
         arrays = simulate(settings)
     arrays["physiology"] = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"])
     reason = violated_bound(dict(arrays["physiology"]), settings.physiology)
@@ -113,12 +113,10 @@ def image(
     if heart.config is None:
         raise ValueError("The heart has no configuration: make it by echotruth.beat or echotruth.load_heart.")
     config, name = _imaged_by(heart.config, view, probe)
-    size = config.bmode.sizes[0] if size is None else size
-    if size not in config.bmode.sizes:
-        raise ValueError(f"size = {size}: use one of {', '.join(map(str, config.bmode.sizes))}, or change bmode.")
+    size = image_size(config, size)
     case, plane = Case("heart", {}, config), imaging_plane(config.views[name], config.rf, heart.endo_at_ed)
     sequence = Sequence(config, heart, plane, partial(generator, case, name))
-    with _told("image", progress):
+    with _progress_line("image", progress):
         lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range
     gain = time_gain_compensation(config.probe, config.bmode, range_)
     values = {
@@ -249,7 +247,7 @@ def _name(tracker: str | Callable[..., Any]) -> str:
 
 
 @contextmanager
-def _told(what: str, progress: bool) -> Iterator[None]:
+def _progress_line(what: str, progress: bool) -> Iterator[None]:
     """Show what the package logs on one line of stderr, where a person watches; BLAS runs on one thread.
 
     Its sums depend on the number of threads, and the bytes must not.

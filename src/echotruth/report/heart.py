@@ -25,6 +25,7 @@ WALL_OPACITY = 0.16
 
 MARGIN = 1.03
 """Half the width of a picture over that of the heart, at least."""
+
 ROD_LENGTH = 0.075
 """Length of the rods that show fibres, over that of the heart."""
 
