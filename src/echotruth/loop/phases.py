@@ -47,13 +47,25 @@ def phases(pressure: Floats, volume: Floats) -> NDArray[np.uint8]:
     """
     es = es_frame(pressure, volume)
     edv, esv = volume[0], np.quantile(volume, 0.05)
-    margin = np.clip(_NOISE_SDS * noise(volume), *(leak * abs(edv - esv) for leak in _MAX_LEAK))
+    margin = leak(volume, edv - esv)
     half_empty = volume < (edv + esv) / 2
     aortic = _last(volume >= edv - margin, 0, _first(half_empty, 0, es))
     mitral = _last(volume <= esv + margin, es, _first(~half_empty, es, len(volume)))
     frame = np.arange(len(volume))
     systole = np.where(frame <= aortic, CONTRACTION, np.where(frame <= es, EJECTION, RELAXATION))
     return np.where(frame <= max(mitral, es), systole, FILLING).astype(np.uint8)
+
+
+def leak(volume: Floats, stroke_volume: float) -> float:
+    """Change of volume, m^3, that may pass a closed valve: noise, and 1 to 10 % of the stroke volume.
+
+    Parameters
+    ----------
+    volume : ndarray of shape (n_frames,), m^3
+    stroke_volume : float, m^3
+    """
+    smallest, largest = (share * abs(stroke_volume) for share in _MAX_LEAK)
+    return float(np.clip(_NOISE_SDS * noise(volume), smallest, largest))
 
 
 def noise(volume: Floats) -> float:
