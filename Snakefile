@@ -16,6 +16,7 @@ from echotruth.cases import expand as expand_cases
 from echotruth.workflow.compiled import CACHE_GROUPS, cache_folder
 from echotruth.config.loading import ConfigError, validate
 from echotruth.mechanics.geometry.imported_mesh import fingerprint
+from echotruth.mechanics.motion_file.files import content_hash
 from echotruth.loop.cycle import read_loop
 from echotruth.workflow.miniature import miniature
 from echotruth.repository.provenance import code_version, settings_version

@@ -36,5 +36,7 @@ def mechanics_settings(config):
     if config.motion.kind == "beat":
         return settings_version(*anatomy, config.loop, loop_curves(config.loop), config.mechanics)
     formula = getattr(config.motion, config.motion.kind)
+    if config.motion.kind == "file":
+        formula = settings_version(formula, content_hash(config.motion.file.path))
     amplitude = (loop_curves(config.loop)[0], config.motion.time_course)
     return settings_version(*anatomy, *amplitude, formula, config.rf.focus_mm)

@@ -67,6 +67,21 @@ def test_blocks_of_the_page_about_python_run_one_after_the_other():
     assert float(names["mechanics"]["volume"][0]) == pytest.approx(50e-9, rel=1e-3)
 
 
+def test_block_of_the_page_about_motion_from_files_runs_on_a_series(tmp_path, monkeypatch, coarse_mesh):
+    import pyvista
+
+    monkeypatch.chdir(tmp_path)
+    for frame, a in enumerate(np.sin(np.pi * np.arange(8) / 8) ** 2):
+        nodes = 1e3 * coarse_mesh.nodes * (1 - a * np.array([0.2, 0.2, 0.1]))
+        pyvista.UnstructuredGrid({24: coarse_mesh.cells.astype(np.int64)}, nodes).save(f"heart_{frame}.vtu")
+    page, names = (EXAMPLES.parent / "docs/motion.md").read_text(), {}
+    (block,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(block, names)
+    volume = names["heart"].arrays["mechanics"]["volume"]
+    assert volume[4] / volume[0] == pytest.approx(0.8 * 0.8 * 0.9, rel=1e-6)
+    assert 0 < names["et"].evaluate(names["tracked"], names["heart"])["nrmse_percent"] < 40
+
+
 def test_page_about_python_names_all_that_is_public():
     page = (EXAMPLES.parent / "docs/python.md").read_text()
     assert {name for name in et.__all__ if f"et.{name}" not in page} <= {"Config", "ConfigError", "TrackerFailed"}

@@ -61,7 +61,10 @@ def expand(config: Config, source: str = "configuration") -> list[Case]:
         raise ConfigError(f"{source}: cases gives a value twice for one key: list each value once")
     for loop in {case.config.loop for case in cases}:
         _check_loop(loop, source)
-    for file in {case.config.geometry.file for case in cases}:
+    series = {case.config.motion.file.path for case in cases if case.config.motion.kind == "file"}
+    for path in series:
+        _check_series(path, source)
+    for file in {case.config.geometry.file for case in cases} - series:
         if file is not None and not Path(file).is_file():
             raise ConfigError(f"{source}: geometry.file = {file!r}: file not found: give its path from this folder")
     return cases
@@ -129,6 +132,16 @@ def _check_loop(loop: Loop, source: str) -> None:
         read_loop(loop)
     except LoopError as error:
         raise ConfigError(f"{source}: loop: {error}") from None
+
+
+def _check_series(path: str | None, source: str) -> None:
+    from echotruth.mechanics.motion_file.files import series_files
+    from echotruth.mechanics.prescribed import MotionError
+
+    try:
+        series_files(str(path))
+    except MotionError as error:
+        raise ConfigError(f"{source}: {error}") from None
 
 
 def _sweepable(section: Section, prefix: str = "") -> dict[str, Any]:

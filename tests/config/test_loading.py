@@ -76,7 +76,7 @@ def test_missing_file_is_named(tmp_path):
         load(tmp_path / "nowhere.yaml")
 
 
-@pytest.mark.parametrize("name", ["demo", "paper", "realistic", "rodero", "sweep"])
+@pytest.mark.parametrize("name", ["demo", "fimh25", "paper", "realistic", "rodero", "sweep"])
 def test_shipped_configurations_are_accepted(name):
     assert load(ROOT / f"config/{name}.yaml").name == name
 

@@ -7,10 +7,11 @@ from echotruth.config import Config
 from echotruth.config.loading import ConfigError, validate
 
 TUBE = "geometry: {shape: tube}\n"
+FILE = "motion: {{kind: file, file: {{path: {}}}}}\n"
 
 BAD = {
     "motion: {kind: tube}": "motion.kind = 'tube': needs geometry.shape = tube",
-    "motion: {kind: still}": "motion.kind = 'still': should be 'beat', 'rigid', 'affine' or 'tube'",
+    "motion: {kind: still}": "motion.kind = 'still': should be 'beat', 'rigid', 'affine', 'tube' or 'file'",
     "motion: {kind: rigid, rigid: {lateral_mm: 1}}": "motion.rigid.lateral_mm is not a key: did you mean "
     "motion.rigid.lateral_um?",
     TUBE: "geometry.shape = 'tube': has no closed cavity and cannot beat: set motion.kind to rigid, affine or tube",
@@ -28,6 +29,12 @@ BAD = {
     "motion: {affine: {gradient: [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]}}": "has the eigenvalue -1 and would flatten",
     "motion: {affine: {gradient: [[1, 1, 0], [1, 1, 0], [0, 0, 1]]}}": "has the eigenvalue 0 and would flatten",
     "motion: {affine: {gradient: [[-1, 0, 0], [0, -1, 0], [0, 0, 1]]}}": "has the eigenvalue -1 and would flatten",
+    "motion: {kind: file}": "motion.file.path = null: must be given with motion.kind = file",
+    FILE.format("a.npy"): "geometry.file = null: must be given, because a.npy holds positions and no tetrahedra",
+    FILE.format("a.pvd"): "loop.heart_rate_per_min = null: must be given with motion.kind = file",
+    FILE.format("a.pvd") + "geometry: {remesh: true}": "geometry.remesh = True: must be false with motion.kind = file",
+    FILE.format("a.pvd, frames: [5, 5]"): "motion.file.frames = [5, 5]: must be the first and, after it, the last",
+    FILE.format("a.pvd, frames: [5, 9], ed_frame: 4"): "motion.file.ed_frame = 4: must be one of the frames 5 to 9",
 }
 
 
@@ -49,3 +56,16 @@ def test_kinds_can_be_swept_and_shapes_cannot():
     shapes = Config(motion={"kind": "rigid"}, cases={"geometry.shape": ["ellipsoid", "tube"]})
     with pytest.raises(ConfigError, match=r"geometry.shape cannot be swept"):
         expand(shapes)
+
+
+def test_mesh_of_a_series_is_its_own_unless_another_is_given():
+    motion, loop = {"kind": "file", "file": {"path": "heart.pvd"}}, {"heart_rate_per_min": 500.0}
+    assert Config(motion=motion, loop=loop).geometry.file == "heart.pvd"
+    assert Config(motion=motion, loop=loop, geometry={"file": "mesh.msh"}).geometry.file == "mesh.msh"
+    assert Config(motion=motion | {"kind": "beat"}).geometry.file is None
+
+
+def test_series_that_is_not_there_is_refused_before_the_run():
+    config = Config(motion={"kind": "file", "file": {"path": "no_*.vtu"}}, loop={"heart_rate_per_min": 500.0})
+    with pytest.raises(ConfigError, match=r"motion.file.path = 'no_\*.vtu': there is no such file"):
+        expand(config)

@@ -15,6 +15,8 @@ from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.recorder import metadata
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.geometry import GeometryError, left_ventricle
+from echotruth.mechanics.motion_file.wall import moving_wall
+from echotruth.mechanics.prescribed import MotionError
 from echotruth.repository import layout, ledger, schema
 from echotruth.repository.store import Store
 from echotruth.tracking import grid
@@ -31,7 +33,7 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     cases : list of Case
         Cases of the configuration.
     """
-    mesh = left_ventricle(config.geometry)
+    mesh = moving_wall(config).mesh if config.motion.kind == "file" else left_ventricle(config.geometry)
     folder.mkdir(parents=True, exist_ok=True)
     rows = ledger.register(folder / "registry.txt", [case.id for case in cases])
     times = np.full((len(rows), config.loop.frames), np.nan)
@@ -59,7 +61,7 @@ def main() -> None:
     try:
         config = validate(yaml.safe_load(arguments.config) or {}, arguments.config.name)
         lay_out(arguments.repository, config, expand(config, arguments.config.name))
-    except (ConfigError, GeometryError) as error:
+    except (ConfigError, GeometryError, MotionError) as error:
         sys.exit(str(error))
 
 

@@ -1,4 +1,4 @@
-"""Geometry, fibres, mechanics and kinematics of one heart, solved through its loop or prescribed by a formula."""
+"""Geometry, fibres, mechanics and kinematics of one heart: solved through its loop, by a formula, or from files."""
 
 from echotruth.loop.recording import LoopError
 from echotruth.mechanics.beat import simulate

@@ -58,7 +58,7 @@ class Geometry(Section):
     """Factor on the size of the cavity; the wall thickness does not change."""
     hypertrophy: Factor = 1.0
     """Factor on the wall thickness; the wall grows outwards and the cavity does not change."""
-    scale: Annotated[FiniteFloat, Field(gt=0.1, lt=100)] = 1.0
+    scale: Annotated[FiniteFloat, Field(ge=0.1, le=100)] = 1.0
     """Factor on all lengths."""
     circumferential_elements: Annotated[int, Field(ge=6, le=120, multiple_of=6)] = 24
     """Elements around the wall."""
@@ -70,7 +70,7 @@ class Geometry(Section):
     """State of the given shape: unloaded, or at end-diastolic pressure, from which the unloaded shape is solved."""
     file: str | None = None
     """Mesh file with the wall, instead of the ellipsoid: tetrahedra (.vtu, .vtk, .msh) or a closed surface (.stl, .ply,
-    .vtp)."""
+    .vtp). Default with `motion.kind: file`: the first mesh of `motion.file.path`."""
     unit: Literal["m", "cm", "mm", "um"] = "mm"
     """Unit of the coordinates in the file."""
     wall_cells: CellLabels | None = None

@@ -1,4 +1,4 @@
-"""Section `motion`: the beat of the heart, or a motion prescribed by a formula."""
+"""Section `motion`: the beat of the heart, or a motion prescribed by a formula or read from a file."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from echotruth.section import Fraction, Section, invalid
 
-Kind = Literal["beat", "rigid", "affine", "tube"]
+Kind = Literal["beat", "rigid", "affine", "tube", "file"]
 TimeCourse = Literal["cosine", "triangle", "ramp"]
 Translation = Annotated[FiniteFloat, Field(ge=-1e5, le=1e5)]
 Rotation = Annotated[FiniteFloat, Field(ge=-180, le=180)]
+FrameNumber = Annotated[int, Field(ge=0)]
 Row = Annotated[list[Annotated[FiniteFloat, Field(ge=-5, le=5)]], Field(min_length=3, max_length=3)]
 
 _IMAGINARY_TOLERANCE = 1e-6
@@ -70,12 +71,48 @@ class TubeMotion(Section):
     radius."""
 
 
+class FileMotion(Section):
+    """A series of tetrahedral meshes, or of positions of the nodes of one mesh, over one cycle."""
+
+    path: str | None = None
+    """The series: files in one pattern (`heart_*.vtk`, also .vtu, .pvtu, .msh), in the order of the numbers in their
+    names; a .pvd or .xdmf file; or positions of the points of `geometry.file`, of shape (frame, point, 3), as .npy, or
+    as .npz with the array `positions` and, optionally, `times`. The unit of all lengths is `geometry.unit` times
+    `geometry.scale`."""
+    displacement: str | None = None
+    """Array over the points that is added to their positions (in .npz: to those of `geometry.file`). Default: the
+    points themselves move."""
+    times: Annotated[list[FiniteFloat], Field(min_length=2)] | None = None
+    """Time of each frame of the series, in any unit, because one cycle takes 60 s / `loop.heart_rate_per_min`.
+    Default: the times in the .pvd, .xdmf or .npz file, or equal steps."""
+    frames: Annotated[list[FrameNumber], Field(min_length=2, max_length=2)] | None = None
+    """First and last frame of the cycle, counted from 0 in the series. Default: all."""
+    repeats_first: bool | None = None
+    """Whether the last frame of the cycle is the first one again, one period later. Default: if it is as near to it as
+    1 % of the motion."""
+    ed_frame: FrameNumber | None = None
+    """Frame of end-diastole, counted from 0 in the series. Default: that with the largest cavity, the first
+    of them while the valves are closed."""
+
+    @model_validator(mode="after")
+    def _check_frames(self) -> FileMotion:
+        if self.frames is None:
+            return self
+        first, last = self.frames
+        if last <= first:
+            raise invalid("frames", self.frames, "must be the first and, after it, the last frame of the cycle")
+        if self.ed_frame is not None and not first <= self.ed_frame <= last:
+            raise invalid("ed_frame", self.ed_frame, f"must be one of the frames {first} to {last}")
+        return self
+
+
 class Motion(Section):
-    """Motion of the heart: the beat of the finite-element heart, or an exact formula."""
+    """Motion of the heart: the beat of the finite-element heart, an exact formula, or meshes in files."""
 
     kind: Kind = "beat"
     """`beat`: solved from loop, fibres and mechanics. `rigid`, `affine`, `tube`: prescribed by the section of that
-    name, without pressures; only the period and the frames of `loop` apply, and the bounds of `physiology` do not."""
+    name, without pressures; only the period and the frames of `loop` apply, and the bounds of `physiology` do not.
+    `file`: the same, read from the files of the section of that name (docs/motion.md)."""
     time_course: TimeCourse = "cosine"
     """Time course of a prescribed motion, from 0 at end-diastole to the full motion at end-systole: `cosine`, to
     mid-cycle and back; `triangle`, the same in equal steps; `ramp`, in equal steps to the last frame."""
@@ -87,3 +124,5 @@ class Motion(Section):
     tube: TubeMotion = TubeMotion()
     """`tube`: contraction, shortening and torsion of a tube (`geometry.shape`) at constant wall volume; by default
     the ejection fraction is 0.62."""
+    file: FileMotion = FileMotion()
+    """`file`: meshes of one cycle in files."""

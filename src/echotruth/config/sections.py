@@ -103,6 +103,24 @@ class Config(Section):
         return self
 
     @model_validator(mode="after")
+    def _check_motion_file(self) -> Config:
+        if self.motion.kind != "file":
+            return self
+        path, rate = self.motion.file.path, self.loop.heart_rate_per_min
+        if path is None:
+            remedy = "must be given with motion.kind = file: the files of the series, such as heart_*.vtu or heart.pvd"
+            raise invalid("motion.file.path", None, remedy)
+        if self.geometry.file is None:
+            raise invalid("geometry.file", None, f"must be given, because {path} holds positions and no tetrahedra")
+        if self.geometry.remesh:
+            remedy = "must be false with motion.kind = file, because the elements that move are those of the file"
+            raise invalid("geometry.remesh", True, remedy)
+        if rate is None:
+            remedy = "must be given with motion.kind = file: 60000 over the period in ms, which the series is scaled to"
+            raise invalid("loop.heart_rate_per_min", None, remedy)
+        return self
+
+    @model_validator(mode="after")
     def _check_tissues(self) -> Config:
         for name, tissue in {"blood": self.realism.blood, "surroundings": self.realism.surroundings}.items():
             key, level = f"realism.{name}.level_dB", tissue.level_dB

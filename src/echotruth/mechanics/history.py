@@ -14,6 +14,9 @@ from echotruth.mechanics.solver.wall import Wall
 
 Arrays = dict[str, NDArray]
 
+MAX_VALUES = 50_000_000
+"""Number of strains that are held at a time."""
+
 
 def collect_outputs(config: Config, wall: Wall, mechanics: Arrays) -> dict[str, Arrays]:
     """Collect the output arrays of a heart from its wall and its motion.
@@ -81,9 +84,16 @@ def _wall_strain_statistics(mesh: Mesh, displacement: Floats, depth: Floats, lay
     """Statistics over the quadrature points, for a layer may be thinner than a cell and hold no centroid."""
     xi, weight = tetrahedron()
     volume = (fibres.material_gradients(mesh, xi)[1] * weight).ravel()
-    strains = kinematics.wall_strain(mesh, displacement, fibres.wall_axes(mesh, depth, xi))
-    strains = strains.reshape(len(displacement), -1, len(kinematics.RCL_COMPONENTS))
-    mean, sd = kinematics.weighted_mean_sd(strains, volume)
+    axes = fibres.wall_axes(mesh, depth, xi)
     layer = fibres.layer(fibres.interpolate_in_cells(mesh, depth, xi), layers).ravel()
-    by_layer = kinematics.layer_strain(strains, volume, layer, layers)
-    return {"strain_mean": mean, "strain_sd": sd, "layer_strain": by_layer}
+    parts: dict[str, list[Floats]] = {"strain_mean": [], "strain_sd": [], "layer_strain": []}
+    # A fine mesh has gigabytes of strain.
+    frames = max(1, MAX_VALUES // (volume.size * len(kinematics.RCL_COMPONENTS)))
+    for start in range(0, len(displacement), frames):
+        part = displacement[start : start + frames]
+        strains = kinematics.wall_strain(mesh, part, axes, displacement[0]).reshape(len(part), volume.size, -1)
+        mean, sd = kinematics.weighted_mean_sd(strains, volume)
+        by_layer = kinematics.layer_strain(strains, volume, layer, layers)
+        for name, values in zip(parts, (mean, sd, by_layer), strict=True):
+            parts[name].append(values)
+    return {name: np.concatenate(values) for name, values in parts.items()}

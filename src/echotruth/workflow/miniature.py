@@ -37,7 +37,7 @@ def miniature(config: Config) -> Config:
             "fibres": config.fibres.model_copy(update={"source": "rule", "disarray_deg": 0.0}),
             "pathology": Pathology(),
             "loop": config.loop.model_copy(update={"frames": FRAMES}),
-            "motion": Motion(kind="rigid") if config.motion.kind == "beat" else config.motion,
+            "motion": Motion(kind="rigid") if config.motion.kind in ("beat", "file") else config.motion,
             "views": dict(list(config.views.items())[:1]),
             "phantom": config.phantom.model_copy(update={"density_per_mm3": density}),
             "rf": config.rf.model_copy(update={"lines": LINES}),

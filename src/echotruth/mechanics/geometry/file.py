@@ -53,7 +53,7 @@ def ventricle_from_file(geometry: Geometry) -> Mesh:
         _check_surface_keys(geometry)
         facets = _closed_surface(imported)
     surface = label_boundary(imported, facets, geometry.surface_labels)
-    septum = _septum_point(imported, geometry)
+    septum = septum_point(imported, geometry)
     if geometry.remesh:
         mesh, frame = remesh(surface, septum, geometry, source)
         check_inverted(mesh, source, "change the numbers of elements, or cut deeper with geometry.cut_mm")
@@ -68,14 +68,26 @@ def ventricle_from_file(geometry: Geometry) -> Mesh:
 def _keep_cells(imported: ImportedMesh, surface: BoundarySurface, septum: Floats | None) -> tuple[Mesh, HeartFrame]:
     """The tetrahedra of the file, made quadratic."""
     frame = heart_frame(surface, septum)
-    nodes, cells = quadratic(frame.transform_points(imported.nodes), imported.cells)
+    mesh = labelled_mesh(*quadratic(frame.transform_points(imported.nodes), imported.cells), surface)
+    base = np.unique(mesh.base)
+    if np.ptp(mesh.nodes[base, 2]) < 1e-4 * np.ptp(mesh.nodes[:, 2]):
+        mesh.nodes[base, 2] = 0.0
+    return mesh, frame
+
+
+def labelled_mesh(nodes: Floats, cells: Integers, surface: BoundarySurface) -> Mesh:
+    """Mesh of quadratic tetrahedra, with the sides that were found on those of the file.
+
+    Parameters
+    ----------
+    nodes : ndarray of shape (n_nodes, 3), m
+    cells : ndarray of shape (n_cells, 10)
+    surface : BoundarySurface
+        Of the same cells, linear or quadratic.
+    """
     # The boundary comes in the same order from quadratic tetrahedra as from linear ones.
     facets, _ = boundary(cells)
-    sides = {name: facets[surface.labels == number] for number, name in enumerate(NAMES)}
-    base = np.unique(sides["base"])
-    if np.ptp(nodes[base, 2]) < 1e-4 * np.ptp(nodes[:, 2]):
-        nodes[base, 2] = 0.0
-    return Mesh(nodes, cells, **sides), frame
+    return Mesh(nodes, cells, **{name: facets[surface.labels == number] for number, name in enumerate(NAMES)})
 
 
 def quadratic(nodes: Floats, cells: Integers) -> tuple[Floats, Integers]:
@@ -144,7 +156,7 @@ def _outward(imported: ImportedMesh, facets: Integers) -> Integers:
     return facets if volume > 0 else facets[:, ::-1].copy()
 
 
-def _septum_point(imported: ImportedMesh, geometry: Geometry) -> Floats | None:
+def septum_point(imported: ImportedMesh, geometry: Geometry) -> Floats | None:
     """A point in the septum, shape (3,), m."""
     if geometry.septum_point is not None:
         return np.array(geometry.septum_point) * METRES[geometry.unit] * geometry.scale

@@ -31,6 +31,9 @@ _VTK_TYPES = {1: "vertex", 2: "vertex", 3: "line", 4: "line", 5: "triangle", 7: 
 _VTK_TYPES |= {11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8"}
 _VTK_TYPES[24] = "tetra10"
 
+_LAGRANGE = {(69, 3): 5, (69, 6): 22, (71, 4): 10, (71, 10): 24}
+"""VTK's Lagrange cells of any order, as DOLFINx writes them, with their number of nodes: the same of fixed order."""
+
 
 @dataclass(frozen=True)
 class ImportedMesh:
@@ -81,13 +84,13 @@ def read(geometry: Geometry) -> ImportedMesh:
         raise GeometryError(f"{source}: geometry.file ends in {suffix or 'no suffix'}: give {formats}")
     if not Path(source).is_file():
         raise GeometryError(f"{source}: geometry.file does not exist: give its path relative to the working directory")
-    mesh = _read_file(source, suffix)
+    mesh = read_file(source)
     if not len(mesh.cells) and (suffix in VOLUME_SUFFIXES or not len(mesh.triangles)):
         missing = "tetrahedra" if suffix in VOLUME_SUFFIXES else "triangles"
         raise GeometryError(f"{source}: holds no {missing}: give {formats}")
     if not np.isfinite(mesh.nodes).all():
         raise GeometryError(f"{source}: holds points that are not finite numbers: repair the file")
-    return _merge_points(replace(mesh, nodes=mesh.nodes * METRES[geometry.unit] * geometry.scale))
+    return merge_points(replace(mesh, nodes=mesh.nodes * METRES[geometry.unit] * geometry.scale))
 
 
 def fingerprint(geometry: Geometry) -> str:
@@ -96,7 +99,15 @@ def fingerprint(geometry: Geometry) -> str:
     return sha256(path.read_bytes()).hexdigest()[:16] if path and path.is_file() else ""
 
 
-def _read_file(source: str, suffix: str) -> ImportedMesh:
+def read_file(source: str) -> ImportedMesh:
+    """All points and cells of a file, in its own unit.
+
+    Raises
+    ------
+    GeometryError
+        If the file cannot be read.
+    """
+    suffix = Path(source).suffix.lower()
     try:
         mesh = _read_gmsh(source) if suffix == ".msh" else _read_vtk(source)
     except GeometryError:
@@ -117,7 +128,7 @@ def _read_vtk(source: str) -> ImportedMesh | None:
         return None
     if isinstance(grid, pyvista.PolyData):
         grid = grid.triangulate()
-    grid = grid.cast_to_unstructured_grid()
+    grid = _of_fixed_order(grid.cast_to_unstructured_grid())
     types = {int(number): _VTK_TYPES.get(int(number), f"VTK cell {number}") for number in np.unique(grid.celltypes)}
     used = {number: name for number, name in types.items() if name in _USED_TYPES}
     blocks = [(name, grid.cells_dict[number], grid.celltypes == number) for number, name in used.items()]
@@ -129,6 +140,20 @@ def _read_vtk(source: str) -> ImportedMesh | None:
         *_split_arrays({name: np.asarray(grid.cell_data[name]) for name in grid.cell_data}, blocks),
         {name: np.asarray(grid.point_data[name]) for name in grid.point_data},
     )
+
+
+def _of_fixed_order(grid: Any) -> Any:
+    """The grid with linear and quadratic Lagrange triangles and tetrahedra as such; their nodes are in one order."""
+    import pyvista
+
+    if not np.isin(grid.celltypes, [kind for kind, _ in _LAGRANGE]).any():
+        return grid
+    sizes = np.diff(pyvista.convert_array(grid.GetCells().GetOffsetsArray()))
+    types = [_LAGRANGE.get((int(t), int(n)), int(t)) for t, n in zip(grid.celltypes, sizes, strict=True)]
+    found = pyvista.UnstructuredGrid(grid.cells, np.array(types, np.uint8), grid.points)
+    found.cell_data.update(dict(grid.cell_data))
+    found.point_data.update(dict(grid.point_data))
+    return found
 
 
 def _read_quietly(source: str) -> Any:
@@ -193,7 +218,7 @@ def _split_arrays(arrays: Arrays, blocks: list[tuple[str, NDArray, NDArray]]) ->
     return split[0], split[1]
 
 
-def _merge_points(mesh: ImportedMesh) -> ImportedMesh:
+def merge_points(mesh: ImportedMesh) -> ImportedMesh:
     """The mesh with coincident points merged and points without a cell left out."""
     size = np.ptp(mesh.nodes, axis=0).max()
     if not size > 0:

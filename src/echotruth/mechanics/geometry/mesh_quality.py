@@ -97,10 +97,11 @@ def check_cavity(mesh: Mesh, source: str, remedy: str) -> None:
     """Refuse a cavity of a volume that no heart has."""
     volume = cavity_volume(mesh.nodes, mesh.endo)
     if not CAVITY_VOLUMES[0] <= volume <= CAVITY_VOLUMES[1]:
-        raise GeometryError(f"{source}: the cavity holds {_with_unit(volume)}, which no heart does: {remedy}")
+        raise GeometryError(f"{source}: the cavity holds {format_volume(volume)}, which no heart does: {remedy}")
 
 
-def _with_unit(volume: float) -> str:
+def format_volume(volume: float) -> str:
+    """Volume, m^3, in L, mL or uL."""
     for size, name in ((1e-3, "L"), (1e-6, "mL")):
         if abs(volume) >= size:
             return f"{volume / size:.3g} {name}"

@@ -1,0 +1,84 @@
+"""Files of a series: those that a pattern matches, those that a .pvd or .xdmf file names, and the hash of all."""
+
+from __future__ import annotations
+
+import glob
+import re
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+from echotruth.mechanics.prescribed import MotionError
+
+_NAMED = {
+    ".pvd": re.compile(r'file\s*=\s*["\']([^"\']+)["\']'),
+    ".pvtu": re.compile(r'Source\s*=\s*["\']([^"\']+)["\']'),
+    ".xdmf": re.compile(r">\s*([^<>\n]+?\.(?:h5|hdf5|hdf|bin))\b", re.IGNORECASE),
+}
+_NAMED[".xmf"] = _NAMED[".xdmf"]
+"""Suffix of a file -> other files that it names."""
+
+
+def series_files(path: str) -> list[Path]:
+    """Files that a path names: itself, or those that match its pattern.
+
+    Parameters
+    ----------
+    path : str
+        Path of a file, or a pattern with *, ? or [].
+
+    Returns
+    -------
+    list of Path
+        In the order of the numbers in their names.
+
+    Raises
+    ------
+    MotionError
+        If there is none.
+    """
+    if Path(path).is_file():
+        return [Path(path)]
+    files = sorted((Path(file) for file in glob.glob(path) if Path(file).is_file()), key=_natural_order)
+    if not files:
+        remedy = "give its path, or a pattern such as heart_*.vtu, relative to the working directory"
+        raise MotionError(f"motion.file.path = {path!r}: there is no such file: {remedy}.")
+    return files
+
+
+def content_hash(path: str) -> str:
+    """Hash of the content of all files of a series: a changed file is a changed motion; empty where there is none."""
+    try:
+        files = series_files(path)
+    except MotionError:
+        return ""
+    digest = sha256()
+    for file in _with_named(files):
+        status = file.stat()
+        digest.update(_file_hash(file, status.st_mtime_ns, status.st_size))
+    return digest.hexdigest()[:16]
+
+
+def _with_named(files: list[Path]) -> list[Path]:
+    """The files, and those that they name and that exist."""
+    found: list[Path] = []
+    pending = list(files)
+    while pending:
+        file = pending.pop(0)
+        if file in found or not file.is_file():
+            continue
+        found.append(file)
+        if named := _NAMED.get(file.suffix.lower()):
+            names = named.findall(file.read_text(errors="replace"))
+            pending += [file.parent / name.split(":")[0] for name in names]
+    return found
+
+
+@cache
+def _file_hash(file: Path, _modified_ns: int, _size: int) -> bytes:
+    return sha256(file.read_bytes()).digest()
+
+
+def _natural_order(file: Path) -> list[tuple[int, str]]:
+    """Key by which frame_9 comes before frame_10."""
+    return [(int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", str(file))]
