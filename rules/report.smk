@@ -18,6 +18,7 @@ rule report:
         heart=figure("heart.png", "1 Heart", "Heart at ED and ES"),
         loop=figure("loop.png", "1 Heart", "Pressure-volume loop and active tension"),
         strain=figure("strain.png", "1 Heart", "Strain over the cycle"),
+        physiology=figure("physiology.png", "1 Heart", "Motion over the cycle beside measured hearts"),
         bullseye=figure("bullseye.png", "3 Tracking", "Bullseye, FE and tracked"),
         error=figure("error.png", "3 Tracking", "Error by layer and resolution"),
         leaderboard=figure("leaderboard.png", "3 Tracking", "Leaderboard"),

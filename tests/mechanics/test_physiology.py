@@ -3,21 +3,37 @@
 import numpy as np
 import pytest
 
-from echotruth.config import Config, Fibres, Geometry, Loop, Physiology
+from echotruth.config import Config, Geometry, Physiology
+from echotruth.config.loading import override
+from echotruth.loop.phases import CONTRACTION, EJECTION, FILLING, RELAXATION
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.physiology import BOUNDS, measures, violated_bound
-from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, slice_rotation, twist
+from echotruth.mechanics.prescribed import prescribed_motion
+from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation, slice_rotation, twist
+from echotruth.repository.schema import PHYSIOLOGY
 
-COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
+COARSE = Geometry(circumferential_elements=6, longitudinal_elements=8, transmural_elements=2)
 WELL = {
     "twist": np.radians([0.0, 10.0, -15.0]),
+    "twist_ivc": np.radians(1.0),
+    "twist_es": np.radians(6.0),
+    "strain_ivc": np.array([0.05, -0.01, 0.0, -0.02, 0.01, 0.0]),
+    "strain_es": np.array([0.4, -0.15, -0.14, 0.0, 0.02, 0.03]),
+    "layer_strain_ivc": np.zeros((6, 6)),
     "longitudinal_strain": np.array(-0.1),
+    "gls": np.array(-0.17),
+    "tei_index": np.array(0.42),
     "ejection_fraction": np.array(0.64),
     "volume_ratio_min": np.array(0.32),
     "loop_error": np.array(1e-8),
     "tension_min": np.array(0.0),
     "tension_es": np.array(43e3),
 }
+
+
+def strain(**components):
+    """Six components of strain, zero but for those given."""
+    return np.array([components.get(name, 0.0) for name in ("RR", "CC", "LL", "RC", "RL", "CL")])
 
 
 def turned(mesh, degrees):
@@ -32,11 +48,36 @@ def relative_height(mesh):
     return mesh.nodes[:, 2] / mesh.nodes[mesh.endo, 2].min()
 
 
+def measured(mesh, frames, **mechanics):
+    """Measures of a mesh with its nodes in given places in every frame."""
+    count = len(frames)
+    given = {
+        "time": 3e-3 * np.arange(count),
+        "displacement": frames - mesh.nodes,
+        **{name: np.full(count, np.nan) for name in ("pressure", "volume", "active_tension")},
+        **{name: np.full(count, np.nan) for name in ("pressure_target", "volume_target")},
+        "es_frame": np.array(count - 1),
+        "phase": np.zeros(count, np.uint8),
+    }
+    kinematics = {
+        "strain_mean": np.zeros((count, 6)),
+        "layer_strain": np.zeros((count, 3, 6)),
+        "volume_ratio_min": np.ones(count),
+    }
+    given |= {name: mechanics.pop(name) for name in list(mechanics) if name in given}
+    sides = {side: getattr(mesh, side) for side in ("endo", "epi", "base")}
+    geometry = {"node_position": mesh.nodes, "cell_node": mesh.cells, **sides}
+    return measures(geometry, given, kinematics | mechanics)
+
+
 def test_twist_is_what_was_imposed_and_positive_as_in_health(coarse_mesh):
     steps = [(0, 0), (-10, 3), (-25, 5), (4, -6)]
     frames = np.stack([turned(coarse_mesh, np.where(relative_height(coarse_mesh) > 0.5, *step)) for step in steps])
     found = twist(coarse_mesh.nodes, coarse_mesh.endo, frames)
     np.testing.assert_allclose(np.degrees(found), [base - apex for apex, base in steps], atol=1e-9)
+    for centre, of_step in ((APICAL_SLICE, 0), (BASAL_SLICE, 1)):
+        slices = rotation(coarse_mesh.nodes, coarse_mesh.endo, frames, centre)
+        np.testing.assert_allclose(np.degrees(slices), [-step[of_step] for step in steps], atol=1e-9)
 
 
 def test_even_twist_counts_between_the_slices(coarse_mesh):
@@ -57,35 +98,86 @@ def test_shift_and_squeeze_are_no_rotation():
     np.testing.assert_allclose(slice_rotation(np.stack([points, squeezed])), 0, atol=1e-12)
 
 
-def test_measures_are_those_of_the_arrays(coarse_mesh):
-    still = np.zeros((4, *coarse_mesh.nodes.shape))
-    strain = np.zeros((4, 6))
-    strain[2, 1:3] = -0.17, -0.09
+def test_numbers_are_those_of_the_arrays(coarse_mesh):
+    mean = np.zeros((4, 6))
+    mean[2, 1:3] = -0.17, -0.09
+    volume = np.array([50e-9, 45e-9, 20e-9, 30e-9])
     mechanics = {
-        "displacement": still,
-        "pressure": np.array([500.0, 9e3, 13e3, 600.0]),
-        "volume": np.array([50e-9, 45e-9, 20e-9, 30e-9]),
-        "pressure_target": np.full(4, np.nan),
+        "volume": volume,
         "volume_target": np.array([50e-9, 45e-9, 20e-9, 30.3e-9]),
         "active_tension": np.array([0.0, 30e3, 40e3, -200.0]),
         "es_frame": np.array(2),
     }
-    kinematics = {"strain_mean": strain, "volume_ratio_min": np.array([1, 0.9, 0.4, 0.8])}
-    geometry = {"node_position": coarse_mesh.nodes, "endo": coarse_mesh.endo}
-    found = measures(geometry, mechanics, kinematics)
-    numbers = {name: float(value) for name, value in found.items() if np.ndim(value) == 0}
-    assert numbers == pytest.approx(
-        {
-            "longitudinal_strain": -0.09,
-            "circumferential_strain": -0.17,
-            "ejection_fraction": 0.6,
-            "volume_ratio_min": 0.4,
-            "loop_error": 0.3 / 30.3,
-            "tension_min": -200,
-            "tension_es": 40e3,
-        }
+    still = np.tile(coarse_mesh.nodes, (4, 1, 1))
+    kinematics = {"strain_mean": mean, "volume_ratio_min": np.array([1, 0.9, 0.4, 0.8])}
+    found = measured(coarse_mesh, still, **mechanics, **kinematics)
+    expected = {
+        "longitudinal_strain": -0.09,
+        "circumferential_strain": -0.17,
+        "ejection_fraction": 0.6,
+        "volume_ratio_min": 0.4,
+        "loop_error": 0.3 / 30.3,
+        "tension_min": -200,
+        "tension_es": 40e3,
+        "gls": 0,
+        "wall_thickening": 0,
+        "twist_es": 0,
+    }
+    assert {name: float(found[name]) for name in expected} == pytest.approx(expected, abs=1e-15)
+
+
+def test_values_at_the_end_of_isovolumic_contraction_and_at_end_systole_are_of_those_frames(coarse_mesh):
+    phase = np.array([CONTRACTION, CONTRACTION, EJECTION, EJECTION, RELAXATION, FILLING], np.uint8)
+    twists = np.array([0, -2, 3, 5, 8, -20.0])
+    frames = np.stack([turned(coarse_mesh, np.where(relative_height(coarse_mesh) > 0.5, -t, 0)) for t in twists])
+    mean, layers = np.random.default_rng(0).normal(size=(6, 6)), np.random.default_rng(1).normal(size=(6, 3, 6))
+    found = measured(coarse_mesh, frames, phase=phase, es_frame=np.array(3), strain_mean=mean, layer_strain=layers)
+    for end, frame in (("ivc", 1), ("es", 3)):
+        assert np.degrees(found[f"twist_{end}"]) == pytest.approx(twists[frame])
+        np.testing.assert_array_equal(found[f"strain_{end}"], mean[frame])
+        np.testing.assert_array_equal(found[f"layer_strain_{end}"], layers[frame])
+    assert np.degrees(found["twist_peak"]) == pytest.approx(8)  # the larger one falls in filling
+    assert found["twist_peak_delay"] == pytest.approx(3e-3)
+
+
+def test_axial_motion_is_that_of_the_apex_and_the_mean_over_the_area_of_the_base(coarse_mesh):
+    """A lift by a + b r^2 lifts the ring of radii r1 and r2 by a + b (r1^2 + r2^2) / 2 in the mean."""
+    radius = np.hypot(*coarse_mesh.nodes[:, :2].T)
+    inner, outer = (
+        radius[np.intersect1d(coarse_mesh.base, side)].max() for side in (coarse_mesh.endo, coarse_mesh.epi)
     )
-    np.testing.assert_array_equal(found["twist"], np.zeros(4))
+    frames = np.stack([coarse_mesh.nodes] * 2)
+    frames[0, :, 2] += 0.7e-3  # at end-diastole already away from the unloaded place
+    frames[1, :, 2] += 0.5e-3 + 100.0 * radius**2
+    found = measured(coarse_mesh, frames)
+    np.testing.assert_allclose(found["apex_motion"], [0, -0.2e-3], atol=1e-12)
+    lift = -0.2e-3 + 50.0 * (inner**2 + outer**2)
+    np.testing.assert_allclose(found["base_motion"], [0, lift], rtol=0.01, atol=1e-12)
+
+
+def test_gls_and_thickening_are_relative_to_end_diastole(coarse_mesh):
+    """From end-diastole, itself a third larger than unloaded, to end-systole the wall shortens and widens."""
+    end_diastole = 4 / 3 * coarse_mesh.nodes
+    shortened, widened = 0.9 * end_diastole, end_diastole * [1.2, 1.2, 1.0]
+    assert measured(coarse_mesh, np.stack([end_diastole, shortened]))["gls"] == pytest.approx(-0.1)
+    assert measured(coarse_mesh, np.stack([end_diastole, widened]))["wall_thickening"] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("kind", "shape"), [("rigid", "ellipsoid"), ("affine", "ellipsoid"), ("tube", "tube")])
+def test_a_prescribed_motion_has_what_it_moves_by_and_no_pressures_or_phases(kind, shape):
+    counts = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1, "shape": shape}
+    arrays = prescribed_motion(Config(geometry=counts, loop={"frames": 6}, motion={"kind": kind}))
+    found = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"])
+    assert set(found) == {array.name for array in PHYSIOLOGY}
+    without = {name for name, value in found.items() if np.isnan(value).any()}
+    of_phases = {"twist_ivc", "strain_ivc", "layer_strain_ivc", "ivc_time", "ejection_time", "ivr_time", "tei_index"}
+    of_pressures = {"dpdt_max", "dpdt_min", "tau", "ejection_fraction", "tension_min", "tension_es"}
+    assert without == of_phases | of_pressures | {"layer_strain_es"} & without  # thin layers have no centroid
+    if kind == "rigid":
+        assert found["gls"] == pytest.approx(0, abs=1e-9)
+    if kind == "tube":
+        assert np.degrees(found["twist_peak"]) == pytest.approx(np.degrees(found["twist_es"]))
+        assert found["twist_es"] > 0 and found["wall_thickening"] > 0
 
 
 def test_a_heart_within_all_bounds_violates_none():
@@ -110,26 +202,129 @@ def test_a_heart_within_all_bounds_violates_none():
         ({"ejection_fraction": 0.95}, "must be at most 0.9"),
     ],
 )
-def test_a_violated_bound_is_reported_in_one_sentence(change, part):
-    reason = violated_bound(WELL | change, Physiology())
+@pytest.mark.parametrize("healthy", [True, False])
+def test_a_violated_bound_is_reported_in_one_sentence(change, part, healthy):
+    reason = violated_bound(WELL | change, Physiology(), healthy)
     assert part in reason
     assert reason.endswith(".") and "\n" not in reason
 
 
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        (
+            {"twist_ivc": np.radians(-13.8)},
+            "isovolumic contraction (deg) is -13.8 and must be at least -8 (physiology.tw",
+        ),
+        ({"twist_ivc": np.radians(9)}, "is 9 and must be at most 8 (physiology.twist_ivc_max_deg)"),
+        ({"twist_es": np.radians(-3.2)}, "twist at end-systole (deg) is -3.2 and must be at least 0"),
+        ({"twist_es": np.radians(24)}, "is 24 and must be at most 20 (physiology.twist_es_max_deg)"),
+        ({"strain_ivc": strain(RR=0.17)}, "the mean radial strain at the end of isovolumic contraction is 0.17"),
+        ({"layer_strain_ivc": np.stack([strain(RC=-0.14), strain(RL=0.1)])}, "E_RC or E_RL over a layer at the end of"),
+        (
+            {"layer_strain_ivc": np.stack([strain(RL=0.15), strain()])},
+            "0.15 and must be at most 0.12 (physiology.trans",
+        ),
+        ({"strain_es": strain(CC=-0.3)}, "circumferential strain at end-systole is -0.3 and must be at least -0.25"),
+        ({"strain_es": strain(CC=-0.05)}, "must be at most -0.07 (physiology.circumferential_strain_max)"),
+        ({"gls": -0.02}, "the global longitudinal strain is -0.02 and must be at most -0.08 (physiology.gls_max)"),
+        ({"strain_es": strain(CC=-0.15, CL=-0.06)}, "shear strain E_CL at end-systole is -0.06 and must be at least"),
+        ({"tei_index": 1.1}, "the Tei index is 1.1 and must be at most 0.8 (physiology.tei_index_max)"),
+    ],
+)
+def test_a_bound_of_healthy_hearts_is_signed_and_not_one_of_diseased_hearts(change, part):
+    reason = violated_bound(WELL | change, Physiology())
+    assert part in reason and reason.endswith(".")
+    assert violated_bound(WELL | change, Physiology(), healthy=False) == ""
+
+
+def test_what_could_not_be_measured_violates_no_bound_of_healthy_hearts():
+    layers = np.full((6, 6), np.nan)
+    assert violated_bound(WELL | {"tei_index": np.nan, "layer_strain_ivc": layers}, Physiology()) == ""
+    layers[2] = strain(RC=0.2)
+    assert "is 0.2" in violated_bound(WELL | {"layer_strain_ivc": layers}, Physiology())
+
+
 def test_a_bound_that_is_null_is_not_used():
     everything = Physiology(**{bound.key: None for bound in BOUNDS})
-    assert violated_bound({name: np.nan for name in WELL}, everything) == ""
+    assert violated_bound({name: np.full_like(value, np.nan) for name, value in WELL.items()}, everything) == ""
 
 
 def test_every_bound_of_the_section_is_checked():
     assert {bound.key for bound in BOUNDS} == set(Physiology.model_fields) - {"exclude_implausible"}
 
 
+PAIRS = [(key, upper) for key in Physiology.model_fields if (upper := key.replace("_min", "_max")) != key]
+
+
+@pytest.mark.parametrize(("lower", "upper"), [pair for pair in PAIRS if pair[1] in Physiology.model_fields])
+def test_bounds_the_wrong_way_round_are_refused(lower, upper):
+    with pytest.raises(ValueError, match=f"must be smaller than {upper} = 0.1"):
+        Physiology(**{lower: 0.15, upper: 0.1})
+
+
+def test_bounds_are_those_of_the_species():
+    """By echo, people shorten more than mice along the long axis, and old ones twist more."""
+    mouse, human = (Config(geometry={"preset": name}).physiology for name in ("mouse", "human"))
+    assert (mouse.twist_es_max_deg, human.twist_es_max_deg) == (20, 25)
+    assert human.gls_max < mouse.gls_max
+    assert Config(geometry={"preset": "human"}, physiology={"gls_max": None}).physiology.gls_max is None
+
+
+FREE_HEART = {
+    "fibres.endo_deg": 84.0,
+    "fibres.epi_deg": -42.0,
+    "fibres.transverse_endo_deg": 0.0,
+    "fibres.transverse_epi_deg": 0.0,
+    "fibres.sheet_endo_deg": 0.0,
+    "fibres.sheet_epi_deg": 0.0,
+    "mechanics.material.law": "fung",
+    "mechanics.material.fibre": 9.2,
+    "mechanics.material.transverse": 2.0,
+    "mechanics.material.shear": 3.7,
+    "mechanics.active.sheet_share": 0.0,
+    "mechanics.active.normal_share": 0.0,
+    "mechanics.active.length_dependence": 1.4,
+    "mechanics.base": "radial_free",
+    "mechanics.pericardium.spring_kPa_per_mm": 0.0,
+    "mechanics.pericardium.dashpot_kPa_s_per_mm": 0.0,
+    "mechanics.hold": "base",
+}
+"""Linear fibres, no pericardium and stress along the fibres alone: such a heart unwinds in ejection."""
+
+
+@pytest.fixture(scope="module")
+def free_heart():
+    return beat(override(Config(geometry=COARSE), FREE_HEART))
+
+
+def test_a_free_heart_that_twists_backwards_before_it_ejects_is_implausible(free_heart):
+    found = measures(*(free_heart[name] for name in ("geometry", "mechanics", "kinematics")))
+    assert np.degrees(found["twist_ivc"]) < -10 and np.degrees(found["twist_es"]) < 0
+    failed = {
+        bound.key
+        for bound in BOUNDS
+        if violated_bound(found, Physiology(**{other.key: None for other in BOUNDS if other != bound}))
+    }
+    expected = {"twist_ivc_min_deg", "twist_es_min_deg", "radial_strain_ivc_max", "transmural_shear_ivc_max"}
+    assert failed == expected
+    assert "the twist at the end of isovolumic contraction (deg) is -1" in violated_bound(found, Physiology())
+
+
 @pytest.mark.parametrize(
-    ("fibres", "said"),
-    [(Fibres(), ""), (Fibres(endo_deg=60.0, epi_deg=-30.0), "the mean longitudinal strain at end-systole is 0.0")],
+    "species", ["mouse", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rat", "human"))]
 )
-def test_default_heart_is_plausible_and_one_whose_fibres_make_it_lengthen_is_not(fibres, said):
-    case = beat(Config(geometry=COARSE, loop=Loop(frames=10), fibres=fibres))
-    reason = violated_bound(measures(*(case[name] for name in ("geometry", "mechanics", "kinematics"))), Physiology())
-    assert reason.startswith(said) and bool(reason) == bool(said)
+def test_the_heart_of_a_species_is_within_its_bounds(species):
+    counts = COARSE.model_dump(include={"circumferential_elements", "longitudinal_elements", "transmural_elements"})
+    config = Config(geometry={"preset": species} | counts)
+    case = beat(config)
+    found = measures(*(case[name] for name in ("geometry", "mechanics", "kinematics")))
+    assert violated_bound(found, config.physiology) == ""
+
+
+def test_a_heart_whose_fibres_make_it_lengthen_is_implausible_even_if_diseased():
+    fibres = {"fibres.endo_deg": 60.0, "fibres.epi_deg": -30.0}
+    case = beat(override(Config(geometry=COARSE, loop={"frames": 10}), FREE_HEART | fibres))
+    found = measures(*(case[name] for name in ("geometry", "mechanics", "kinematics")))
+    reason = violated_bound(found, Physiology(), healthy=False)
+    assert reason.startswith("the mean longitudinal strain at end-systole is 0.0")

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from echotruth.evaluation.leaderboard import best, standings
-from echotruth.report import bullseye, error, leaderboard, loop, resolutions, strain, views
+from echotruth.report import bullseye, error, leaderboard, loop, physiology, resolutions, strain, style, views
 
 TIME = np.arange(10) * 3e-3
 WAVE = np.sin(np.pi * np.arange(10) / 10) ** 2
@@ -36,6 +36,43 @@ def test_strain(tmp_path, layers):
     mean = WAVE[:, None] * [0.5, -0.18, -0.1, 0, 0, 0]
     by_layer = np.repeat(mean[:, None], layers, axis=1)
     seen(strain.draw(tmp_path / "strain.png", TIME, 5, mean, 0.2 * abs(mean), by_layer))
+
+
+def cycle(pressure, intervals):
+    """A heart that twists, shortens and moves its base as a raised cosine."""
+    return physiology.Cycle(
+        TIME,
+        5,
+        intervals,
+        {"base": -0.05 * WAVE, "apex": 0.1 * WAVE, "twist": 0.15 * WAVE},
+        WAVE[:, None] * [0.4, -0.17, -0.15, 0.0, 0.02, 0.03],
+        {"base": -5e-4 * WAVE, "apex": 1e-4 * WAVE},
+        pressure,
+        50e-9 - 0 * TIME + 0 * pressure,
+    )
+
+
+def coloured(picture, colour):
+    """Number of pixels of a colour."""
+    wanted = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+    return np.count_nonzero((abs(picture.astype(int) - wanted) < 4).all(axis=-1))
+
+
+@pytest.mark.parametrize("species", [*physiology.PUBLISHED, "none"])
+def test_physiology(tmp_path, species):
+    published = physiology.PUBLISHED.get(species, {})
+    assert set(published) <= {"twist", *physiology.COMPONENTS}
+    drawn = seen(physiology.draw(tmp_path / "a.png", cycle(500 + 13000 * WAVE, (6e-3, 9e-3, 4e-3)), published))
+    shades = coloured(drawn, physiology.SHADE)
+    bare = seen(physiology.draw(tmp_path / "b.png", cycle(500 + 13000 * WAVE, (np.nan,) * 3), published))
+    assert shades > 10000 + coloured(bare, physiology.SHADE), "isovolumic phases are shaded where there are any"
+
+
+def test_physiology_of_a_prescribed_motion_has_words_in_place_of_pressure_and_volume(tmp_path):
+    nothing = physiology.draw(tmp_path / "a.png", cycle(np.full(10, np.nan), (np.nan,) * 3), {})
+    curves = physiology.draw(tmp_path / "b.png", cycle(500 + 13000 * WAVE, (np.nan,) * 3), {})
+    of_curve = [coloured(seen(path)[500:], style.SOLVED) for path in (nothing, curves)]
+    assert of_curve[1] > 500 + of_curve[0]
 
 
 def test_resolutions(tmp_path):

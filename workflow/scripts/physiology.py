@@ -2,16 +2,19 @@
 
 import logging
 
+from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.physiology import measures, violated_bound
 from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
-    geometry = job.read("geometry", "node_position", "endo")
-    kinematics = job.read("kinematics", "strain_mean", "volume_ratio_min")
-    measured = measures(geometry, job.read("mechanics"), kinematics)
+    kinematics = job.read("kinematics", "strain_mean", "layer_strain", "volume_ratio_min")
+    depth = job.read("fibres", "wall_depth")["wall_depth"]
+    mechanics = job.read("mechanics") | {"time": read_loop(job.case.config.loop).time}
+    measured = measures(job.read("geometry"), mechanics, kinematics, depth)
     solved = job.case.config.motion.kind == "beat"  # the bounds do not apply to prescribed motions
-    if solved and (reason := violated_bound(measured, job.case.config.physiology)):
+    healthy = not job.read("pathology", "region")["region"].any()
+    if solved and (reason := violated_bound(measured, job.case.config.physiology, healthy)):
         job.set_verdict("implausible", reason)
         logging.getLogger("echotruth").warning("implausible: %s", reason)
     return {"physiology": measured}

@@ -6,11 +6,17 @@ from typing import Annotated
 
 from pydantic import Field, FiniteFloat, model_validator
 
-from echotruth.section import Fraction, Section, invalid
+from echotruth.section import Angle, Fraction, Section, invalid
 
 
 class Physiology(Section):
-    """Bounds on a solved heart; a heart outside is kept and marked with the reason. `null` switches a bound off."""
+    """Bounds on a solved heart; a heart outside is kept and marked with the reason. `null` switches a bound off.
+
+    Those of twist, of the strains since ED, of GLS and of the Tei index (from `twist_ivc_min_deg` on) mark motion that
+    no healthy heart has: they enclose with a margin what the named sources measured. They are not checked in a heart
+    with an infarct or late activation (section `pathology`). Defaults are those of mice and rats; `human` has others
+    where people were measured to differ.
+    """
 
     exclude_implausible: bool = True
     """Do not image and track a heart outside the bounds; `false` images and tracks it. In both cases it is marked
@@ -23,14 +29,15 @@ class Physiology(Section):
     healthy hearts (Young & Cowan 2012, doi 10.1186/1532-429X-14-49); with the wrong fibres it is 60 to 90 deg."""
     volume_ratio_min: Fraction | None = 0.2
     """Smallest det F at any point in any frame. Lower values mean that elements nearly collapse, whereas myocardium
-    hardly changes its volume; the default heart has 0.45 at the apex."""
+    hardly changes its volume; the default heart has about 0.5 at the apex."""
     loop_error_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.005
     """Largest relative difference between prescribed and solved pressure or volume in any frame."""
     tension_min_kPa: FiniteFloat | None = -1.0
     """Smallest active tension in any frame. Muscle does not push, but solving for a loop may give slightly negative
     values."""
     tension_es_min_kPa: FiniteFloat | None = 20.0
-    """Smallest active tension at end-systole; the default heart ejects between 20 and 90 kPa (43 kPa for its loop)."""
+    """Smallest active tension at end-systole; the default heart ejects between 20 and 90 kPa (about 50 for its
+    loop)."""
     tension_es_max_kPa: FiniteFloat | None = 90.0
     """Largest active tension at end-systole."""
     ejection_fraction_min: Fraction | None = 0.2
@@ -38,14 +45,54 @@ class Physiology(Section):
     table 1), failing hearts less."""
     ejection_fraction_max: Fraction | None = 0.9
     """Largest ejection fraction."""
+    twist_ivc_min_deg: Angle | None = -8.0
+    """Smallest twist at the end of isovolumic contraction, counter-clockwise seen from the apex. Base and apex turn
+    together before ejection, so that it is near 0 (Young & Cowan 2012); in children the twist early in systole is
+    -8.4 to -0.1 deg (doi 10.4070/kcj.2015.45.2.131)."""
+    twist_ivc_max_deg: Angle | None = 8.0
+    """Largest twist at the end of isovolumic contraction."""
+    twist_es_min_deg: Angle | None = 0.0
+    """Smallest twist at end-systole. Healthy hearts wind up counter-clockwise: mice by 5.6 +- 0.9 deg, normalised
+    (Zhong 2011), people by 7.7 +- 3.5 deg (Takeuchi 2006, doi 10.1016/j.echo.2006.04.011)."""
+    twist_es_max_deg: Angle | None = 20.0
+    """Largest twist at end-systole; `human` 25, because it is 18.6 +- 3.1 deg in people over 65 by 3-D speckle tracking
+    (PubMed 23887954)."""
+    radial_strain_ivc_max: FiniteFloat | None = 0.12
+    """Largest wall-mean radial strain at the end of isovolumic contraction, which is no thickening but the square of
+    transmural shear, because the volume of the cavity has not changed; at end-systole it is 0.29 (Zhong 2011)."""
+    transmural_shear_ivc_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.12
+    """Largest mean of E_RC or E_RL over a layer, in either direction, at the end of isovolumic contraction. E_RC
+    virtually does not change in this phase, and its amplitude over the cycle is about 0.1 in people (Bovendeerd 2009,
+    Am J Physiol 297, H1058); at end-systole E_RC is 0.00 +- 0.08 and E_RL 0.04 +- 0.12 in mice (Zhong 2011)."""
+    circumferential_strain_min: FiniteFloat | None = -0.25
+    """Smallest wall-mean circumferential strain at end-systole. In mice it is -0.13 +- 0.03 by MRI (Zhong 2011) and
+    -16.9 +- 3.1 % by echo (Tee 2015, doi 10.1155/2015/148501); `human` -0.26, because the prediction
+    intervals of people reach from -12.5 to -21.3 % (Venkatesh 2015, doi 10.1002/jmri.24749)."""
+    circumferential_strain_max: FiniteFloat | None = -0.07
+    """Largest wall-mean circumferential strain at end-systole; `human` -0.1."""
+    gls_min: FiniteFloat | None = -0.28
+    """Smallest global longitudinal strain (relative change of length) at end-systole. In mice it is -16.8 +- 1.7 % and
+    -18.7 +- 3.1 % on two scanners (Tee 2015), in people -20.4 +- 2.2 % (NORMAL study, PMC5234340)."""
+    gls_max: FiniteFloat | None = -0.08
+    """Largest global longitudinal strain at end-systole; `human` -0.13."""
+    torsional_shear_min: FiniteFloat | None = -0.03
+    """Smallest wall-mean shear strain E_CL at end-systole, which is positive throughout the ventricle of mice (Zhong
+    2008, PMC2849988): 0.03 +- 0.07 (Zhong 2011)."""
+    torsional_shear_max: FiniteFloat | None = 0.15
+    """Largest wall-mean shear strain E_CL at end-systole."""
+    tei_index_min: Annotated[FiniteFloat, Field(ge=0)] | None = 0.2
+    """Smallest Tei index, isovolumic over ejection time. It is 0.40 +- 0.04 in mice ("Evaluation of tissue Doppler Tei
+    index for global left ventricular function in mice after myocardial infarction", pulsed Doppler), 0.37 +- 0.03 in
+    rats (doi 10.1016/j.echo.2005.01.030) and 0.47 +- 0.09 in people (Copenhagen City Heart Study, doi
+    10.1007/s00392-023-02269-2)."""
+    tei_index_max: Annotated[FiniteFloat, Field(ge=0)] | None = 0.8
+    """Largest Tei index; 0.7 in mice and rats after an infarction (the same studies)."""
 
     @model_validator(mode="after")
     def _check_order(self) -> Physiology:
-        for lower_key, upper_key in (
-            ("tension_es_min_kPa", "tension_es_max_kPa"),
-            ("ejection_fraction_min", "ejection_fraction_max"),
-        ):
-            lower, upper = getattr(self, lower_key), getattr(self, upper_key)
-            if lower is not None and upper is not None and lower >= upper:
+        for lower_key in type(self).model_fields:
+            upper_key = lower_key.replace("_min", "_max")
+            lower, upper = getattr(self, lower_key), getattr(self, upper_key, None)
+            if lower_key != upper_key and lower is not None and upper is not None and lower >= upper:
                 raise invalid(lower_key, lower, f"must be smaller than {upper_key} = {upper:g}")
         return self

@@ -12,8 +12,8 @@ BASAL_SLICE, APICAL_SLICE = 0.2, 0.8
 _HALF_SLICE = 0.1
 
 
-def twist(unloaded: Floats, endo: NDArray[np.integer], positions: Floats) -> Floats:
-    """Rotation of the apex less that of the base since end-diastole.
+def rotation(unloaded: Floats, endo: NDArray[np.integer], positions: Floats, centre: float) -> Floats:
+    """Rotation of a short-axis slice since end-diastole.
 
     Parameters
     ----------
@@ -21,17 +21,36 @@ def twist(unloaded: Floats, endo: NDArray[np.integer], positions: Floats) -> Flo
     endo : ndarray of shape (n_facets, 6)
         Nodes of the endocardial triangles.
     positions : ndarray of shape (n_frames, n_nodes, 3), m
+    centre : float
+        Of the slice of material: `BASAL_SLICE` or `APICAL_SLICE`.
+
+    Returns
+    -------
+    ndarray of shape (n_frames,), rad
+        Positive counter-clockwise seen from the apex; between frames it may turn by less than half a turn.
+    """
+    height = unloaded[:, 2] / unloaded[endo, 2].min()
+    nodes = np.abs(height - centre) <= _HALF_SLICE
+    # The long axis points to the base: seen from the apex, rotation about it is clockwise.
+    return -slice_rotation(positions[:, nodes, :2])
+
+
+def twist(unloaded: Floats, endo: NDArray[np.integer], positions: Floats) -> Floats:
+    """Rotation of the apex less that of the base since end-diastole.
+
+    Parameters
+    ----------
+    unloaded, endo, positions : ndarray
+        As of :func:`rotation`.
 
     Returns
     -------
     ndarray of shape (n_frames,), rad
         Positive where the apex turns counter-clockwise seen from the apex, as it does in health
-        (Young & Cowan 2012); between frames it may turn by less than half a turn.
+        (Young & Cowan 2012, doi 10.1186/1532-429X-14-49).
     """
-    height = unloaded[:, 2] / unloaded[endo, 2].min()
-    slices = (np.abs(height - centre) <= _HALF_SLICE for centre in (APICAL_SLICE, BASAL_SLICE))
-    apex, base = (slice_rotation(positions[:, nodes, :2]) for nodes in slices)
-    return base - apex  # the long axis points to the base: seen from the apex, rotation about it is clockwise
+    apex, base = (rotation(unloaded, endo, positions, centre) for centre in (APICAL_SLICE, BASAL_SLICE))
+    return apex - base
 
 
 def slice_rotation(points: Floats) -> Floats:

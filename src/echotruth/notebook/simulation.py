@@ -63,8 +63,10 @@ def beat(config: Source = None, progress: bool = True) -> Heart:
         raise ValueError(f"cases sweeps {', '.join(settings.cases)}: beat one, as echotruth.expand(config)[0].config")
     with _progress_line("beat", progress):
         arrays = simulate(settings)
-    arrays["physiology"] = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"])
-    reason = violated_bound(dict(arrays["physiology"]), settings.physiology)
+    depth = arrays["fibres"]["wall_depth"]
+    arrays["physiology"] = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"], depth)
+    healthy = not arrays["pathology"]["region"].any()
+    reason = violated_bound(dict(arrays["physiology"]), settings.physiology, healthy)
     if reason and settings.motion.kind == "beat":
         warnings.warn(f"implausible heart: {reason}", stacklevel=2)
     return Heart.of(arrays, settings)

@@ -11,7 +11,7 @@ import xarray as xr
 
 from echotruth.config import Config
 from echotruth.evaluation.leaderboard import best, rows, standings
-from echotruth.report import bullseye, clip, error, heart, leaderboard, loop, resolutions, strain, views
+from echotruth.report import bullseye, clip, error, heart, leaderboard, loop, physiology, resolutions, strain, views
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +20,7 @@ ARROW_SPACING = 0.45e-3
 """Smallest distance between the points whose motion is drawn on a clip, m."""
 
 PARTS = {
-    "motion": ("heart", "loop", "strain", "bullseye", "error", "leaderboard"),
+    "motion": ("heart", "loop", "strain", "physiology", "bullseye", "error", "leaderboard"),
     "images": ("clip", "resolutions", "views"),
 }
 """Figures that one job draws together, by the name of the part."""
@@ -90,6 +90,24 @@ class Figures:
         data = self.group("kinematics")
         arrays = (data[name].values for name in ("strain_mean", "strain_sd", "layer_strain"))
         strain.draw(self.folder / "strain.png", data.time.values, self.es, *arrays)
+
+    def physiology(self) -> None:
+        """Rotation, strain, axial motion, pressure and volume over the cycle."""
+        measures, mechanics, kinematics = map(self.group, ("physiology", "mechanics", "kinematics"))
+        ivc, ejection, ivr = (float(measures[name]) for name in ("ivc_time", "ejection_time", "ivr_time"))
+        cycle = physiology.Cycle(
+            mechanics.time.values,
+            self.es,
+            (ivc, ejection, ivr),
+            {name: measures[key].values for name, key in physiology.ROTATIONS.items()},
+            kinematics.strain_mean.values,
+            {side: measures[f"{side}_motion"].values for side in ("base", "apex")},
+            mechanics.pressure.values,
+            mechanics.volume.values,
+        )
+        geometry, loop = self.config.geometry, self.config.loop
+        species = loop.file if geometry.file else geometry.preset
+        physiology.draw(self.folder / "physiology.png", cycle, physiology.PUBLISHED.get(species, {}))
 
     def clip(self) -> None:
         """The clip with its true motion, as a GIF and as a video."""

@@ -70,8 +70,38 @@ KINEMATICS = (
     _array("volume_ratio_mean", "case frame", "float64", "1", "wall mean of det F"),
 )
 
+_CCW = "counter-clockwise seen from the apex"
+_IVC = "at the end of isovolumic contraction"
+_MEAN_STRAIN = "case strain_component"
 PHYSIOLOGY = (
-    _array("twist", "case frame", "float64", "rad", "rotation of apex less base since ED, counter-clockwise from apex"),
+    _array("rotation_base", "case frame", "float64", "rad", f"rotation of the basal slice since ED, {_CCW}"),
+    _array("rotation_apex", "case frame", "float64", "rad", f"rotation of the apical slice since ED, {_CCW}"),
+    _array("twist", "case frame", "float64", "rad", f"rotation of apex less base since ED, {_CCW}"),
+    _array("twist_ivc", "case", "float64", "rad", f"twist {_IVC}"),
+    _array("twist_es", "case", "float64", "rad", "twist at ES"),
+    _array(
+        "twist_peak", "case", "float64", "rad", "twist of largest magnitude from ED to the opening of the mitral valve"
+    ),
+    _array("twist_peak_delay", "case", "float64", "s", "time of the peak of twist less that of ES"),
+    _array("strain_ivc", _MEAN_STRAIN, "float64", "1", f"wall mean of the strain from ED {_IVC}"),
+    _array("strain_es", _MEAN_STRAIN, "float64", "1", "wall mean of the strain from ED at ES"),
+    _array(
+        "layer_strain_ivc", "case layer strain_component", "float64", "1", f"mean strain from ED of each layer {_IVC}"
+    ),
+    _array("layer_strain_es", "case layer strain_component", "float64", "1", "mean strain from ED of each layer at ES"),
+    _array("apex_motion", "case frame", "float64", "m", "displacement along z of the epicardial apex since ED"),
+    _array(
+        "base_motion", "case frame", "float64", "m", "displacement along z of the base since ED, mean over its area"
+    ),
+    _array("wall_thickening", "case", "float64", "1", "relative increase of the wall thickness in the mid slice to ES"),
+    _array("gls", "case", "float64", "1", "global longitudinal strain, that of the length of the mid-wall line at ES"),
+    _array("ivc_time", "case", "float64", "s", "duration of isovolumic contraction"),
+    _array("ejection_time", "case", "float64", "s", "duration of ejection"),
+    _array("ivr_time", "case", "float64", "s", "duration of isovolumic relaxation"),
+    _array("tei_index", "case", "float64", "1", "isovolumic times over the ejection time"),
+    _array("dpdt_max", "case", "float64", "Pa s-1", "largest rate of the cavity pressure"),
+    _array("dpdt_min", "case", "float64", "Pa s-1", "smallest rate of the cavity pressure"),
+    _array("tau", "case", "float64", "s", "time constant of the pressure in relaxation, with the asymptote zero"),
     _array("longitudinal_strain", "case", "float64", "1", "wall mean of the longitudinal strain from ED at ES"),
     _array("circumferential_strain", "case", "float64", "1", "wall mean of the circumferential strain from ED at ES"),
     _array("ejection_fraction", "case", "float64", "1", "ejection fraction"),

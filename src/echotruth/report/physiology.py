@@ -1,0 +1,204 @@
+"""Motion of the heart over the cycle, beside what was measured in animals and people."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from echotruth.report import style
+
+Published = dict[str, tuple[float, float]]
+
+PUBLISHED: dict[str, Published] = {
+    "mouse": {
+        "twist": (5.6, 0.9),
+        "RR": (29.0, 17.0),
+        "CC": (-13.0, 3.0),
+        "LL": (-18.0, 14.0),
+        "RC": (0.0, 8.0),
+        "RL": (4.0, 12.0),
+        "CL": (3.0, 7.0),
+    },
+    "human": {"twist": (7.7, 3.5), "CC": (-17.0, 1.9), "LL": (-18.3, 1.8)},
+}
+"""Species -> mean and standard deviation at end-systole of the twist (deg) and of strains since end-diastole (%).
+
+Mouse: Zhong et al., J Cardiovasc Magn Reson 13 (2011) 83, doi 10.1186/1532-429X-13-83, n = 7; its torsion is
+normalised. Human: peak twist of 113 volunteers, Takeuchi et al., J Am Soc Echocardiogr 19 (2006) 1077, doi
+10.1016/j.echo.2006.04.011; E_CC by the prediction interval of -20.8 to -13.2 % of women aged 45 to 59, Venkatesh et
+al., J Magn Reson Imaging 42 (2015) 153, doi 10.1002/jmri.24749; E_LL = e + e^2 / 2 of the GLS e = -20.4 +- 2.2 % of
+501 people, PMC5234340.
+"""
+
+ROTATIONS = {"base": "rotation_base", "apex": "rotation_apex", "twist": "twist"}
+"""Curve -> array of the group `physiology`."""
+
+COMPONENTS = ("RR", "CC", "LL", "RC", "RL", "CL")
+NORMAL = {"RR": style.RADIAL, "CC": style.CIRCUMFERENTIAL, "LL": style.LONGITUDINAL}
+SHEAR = {"RC": "#8a4f9e", "RL": "#c98a1b", "CL": "#2f9aa0"}
+"""Component -> colour."""
+
+SHADE = "#f1ede4"
+"""Colour of the isovolumic phases."""
+
+_GREY = "#555555"
+_UL, _MM = 1e-9, 1e-3
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Curves of one cycle.
+
+    Attributes
+    ----------
+    time : ndarray of shape (frame,), s
+        Since end-diastole.
+    es : int
+        Frame of end-systole.
+    intervals : tuple of float, s
+        Durations of isovolumic contraction, ejection and isovolumic relaxation; not a number where there are none.
+    rotation : dict of ndarray of shape (frame,), rad
+        `base`, `apex` and `twist`.
+    strain : ndarray of shape (frame, 6)
+        Wall means of `COMPONENTS`.
+    axial : dict of ndarray of shape (frame,), m
+        `base` and `apex`: displacement towards the base.
+    pressure, volume : ndarray of shape (frame,), Pa and m^3
+        Not a number for a prescribed motion.
+    """
+
+    time: np.ndarray
+    es: int
+    intervals: tuple[float, float, float]
+    rotation: dict[str, np.ndarray]
+    strain: np.ndarray
+    axial: dict[str, np.ndarray]
+    pressure: np.ndarray
+    volume: np.ndarray
+
+
+@style.styled
+def draw(path: str | Path, cycle: Cycle, published: Published) -> Path:
+    """Draw rotation, strain, axial motion, pressure and volume over one cycle.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write.
+    cycle : Cycle
+    published : dict
+        Entry of `PUBLISHED`, or empty.
+
+    Returns
+    -------
+    Path
+        The file.
+    """
+    figure = style.figure(8.6, 6.0)
+    panels = figure.subplots(2, 3, sharex=True)
+    (turn, normal, shear), (axial, pressure, volume) = panels
+    _rotations(turn, cycle, published)
+    _strains(normal, cycle, NORMAL, published)
+    _strains(shear, cycle, SHEAR, published)
+    _axial_motion(axial, cycle)
+    _curve(pressure, cycle, cycle.pressure / style.MMHG, "Pressure (mmHg)")
+    _curve(volume, cycle, cycle.volume / _UL, "Volume (µL)")
+    for panel, title in zip(panels.flat, _TITLES, strict=True):
+        panel.set_title(title, loc="left")
+        _phases(panel, cycle)
+    for panel in panels[1]:
+        panel.set_xlabel("Time since end-diastole (ms)")
+    return style.save(figure, path)
+
+
+_TITLES = ("Rotation", "Normal strain", "Shear strain", "Axial motion", "Pressure", "Volume")
+
+
+def _rotations(axes: Axes, cycle: Cycle, published: Published) -> None:
+    colours = {"base": style.CIRCUMFERENTIAL, "apex": style.RADIAL, "twist": style.SOLVED}
+    for name, colour in colours.items():
+        values = np.degrees(cycle.rotation[name])
+        axes.plot(cycle.time * 1e3, values, color=colour, label=_at_es(name, values[cycle.es]))
+    _measured(axes, cycle, {"twist": style.SOLVED}, published)
+    axes.set_ylabel("Counter-clockwise from apex (deg)")
+    _finish(axes, 0.1)
+
+
+def _strains(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Published) -> None:
+    for name, colour in colours.items():
+        values = 100 * cycle.strain[:, COMPONENTS.index(name)]
+        axes.plot(cycle.time * 1e3, values, color=colour, label=_at_es(f"$E_{{{name}}}$", values[cycle.es]))
+    _measured(axes, cycle, colours, published)
+    axes.set_ylabel("Wall mean since ED (%)")
+    _finish(axes, 0.1)
+
+
+def _axial_motion(axes: Axes, cycle: Cycle) -> None:
+    for name, colour in (("base", style.CIRCUMFERENTIAL), ("apex", style.RADIAL)):
+        values = cycle.axial[name] / _MM
+        axes.plot(cycle.time * 1e3, values, color=colour, label=_at_es(name, values[cycle.es], 2))
+    axes.set_ylabel("Towards the base (mm)")
+    _finish(axes, 0.01, 0.2)
+
+
+def _curve(axes: Axes, cycle: Cycle, values: np.ndarray, label: str) -> None:
+    axes.set_ylabel(label)
+    if not np.isfinite(values).any():
+        axes.text(0.5, 0.5, "none: the motion is prescribed", color=_GREY, ha="center", transform=axes.transAxes)
+        axes.set_yticks([])
+        return
+    axes.plot(cycle.time * 1e3, values, color=style.SOLVED)
+    axes.set_ylim(0, 1.15 * np.max(values))
+
+
+def _measured(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Published) -> None:
+    """Bars of mean and standard deviation beside end-systole, and a circle at 0 at the end of IVC."""
+    step, end = 0.045 * 1e3 * cycle.time[-1], 1e3 * cycle.time[cycle.es]
+    shown = [name for name in colours if name in published]
+    for k, name in enumerate(shown):
+        mean, sd = published[name]
+        at = end + (k - (len(shown) - 1) / 2) * step
+        axes.plot([at, at], [mean - sd, mean + sd], color=colours[name], linewidth=5, alpha=0.35, solid_capstyle="butt")
+        axes.plot(at, mean, "_", color=colours[name], markersize=7, markeredgewidth=1.6)
+    if shown and np.isfinite(cycle.intervals[0]):
+        axes.plot(1e3 * cycle.intervals[0], 0, "o", color=_GREY, markersize=6, markerfacecolor="none", zorder=5)
+
+
+def _phases(axes: Axes, cycle: Cycle) -> None:
+    """Shade the isovolumic phases and mark end-systole."""
+    axes.axhline(0, color=_GREY, linewidth=0.6)
+    axes.margins(x=0.01)
+    top = axes.get_xaxis_transform()
+    end = 1e3 * cycle.time[cycle.es]
+    axes.axvline(end, color=_GREY, linewidth=0.9, linestyle=":")
+    axes.text(end, 0.985, "ES ", color=_GREY, fontsize=7, ha="right", va="top", transform=top)
+    if not np.isfinite(cycle.intervals).all():
+        return
+    opening, closing, mitral = 1e3 * np.cumsum(cycle.intervals)
+    for name, start, stop in (("IVC", 0, opening), ("IVR", closing, mitral)):
+        axes.axvspan(start, stop, color=SHADE, zorder=0, linewidth=0)
+        axes.text((start + stop) / 2, 0.015, name, color=_GREY, fontsize=6.5, ha="center", va="bottom", transform=top)
+
+
+def _at_es(name: str, value: float, decimals: int = 1) -> str:
+    rounded = round(float(value), decimals) + 0.0  # not -0
+    return f"{name} {rounded:+.{decimals}f}".replace("-", "−")
+
+
+def _finish(axes: Axes, smallest: float, below: float = 0.02) -> None:
+    """Give the axis a smallest limit to both sides, lest it show rounding errors, and values at ES below it."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(min(low, -smallest), max(high, smallest))
+    axes.legend(
+        loc="upper center",
+        bbox_to_anchor=(0.5, -below),
+        ncols=3,
+        fontsize=8,
+        columnspacing=0.9,
+        handlelength=1,
+        handletextpad=0.5,
+        borderaxespad=0.2,
+    )
