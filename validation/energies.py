@@ -108,9 +108,9 @@ def passive(f: NDArray, material: Material) -> NDArray:
     return PASSIVE_ENERGIES[name(material)](e, material)
 
 
-def active(f: NDArray, beta: float, power: float) -> NDArray:
-    """Active energy over T_Ca, shape (...): the integral of S_ff = [1 + beta (l - 1)] / l^power over E_ff."""
-    stretch = np.sqrt(np.sum(f[..., 0] ** 2, axis=-1))
+def active(f: NDArray, beta: float, power: float, axis: int = 0) -> NDArray:
+    """Active energy over T_Ca, shape (...), along an axis: the integral of S = [1 + beta (l - 1)] / l^power over E."""
+    stretch = np.sqrt(np.sum(f[..., axis] ** 2, axis=-1))
     if power == 2:
         return (1 - beta) * np.log(stretch) + beta * (stretch - 1)
     return (1 - beta) * stretch ** (2 - power) / (2 - power) + beta * stretch ** (3 - power) / (3 - power)

@@ -1,14 +1,16 @@
-"""The default heart, solved on a mesh of any size, with the states that its viscous stress depends on."""
+"""The default heart and the paper's, solved on a mesh of any size, with the states that viscous forces depend on."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from echotruth.config import Config, Geometry
+from echotruth.config.loading import load
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats
 from echotruth.loop.cycle import read_loop
@@ -20,6 +22,8 @@ from echotruth.mechanics.solver.checkpoint import SolvedFrame
 from echotruth.mechanics.solver.cycle import SolvedCycle, solve
 from echotruth.mechanics.solver.equilibrium import Equilibrium, PreviousState
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
+
+PAPERS = Path(__file__).parents[1] / "config" / "paper.yaml"
 
 DEFAULT_MESH = (24, 12, 3)
 """Elements around, along and through the wall."""
@@ -82,8 +86,22 @@ class _PreviousStates:
 @cache
 def solved(around: int, along: int, through: int) -> SolvedBeat:
     """The default heart on a mesh of elements around, along and through the wall; solved once in a run."""
-    counts = {"circumferential_elements": around, "longitudinal_elements": along, "transmural_elements": through}
-    config = Config(geometry=Geometry(**counts))
+    return solved_heart(Config(geometry=_geometry(around, along, through)))
+
+
+@cache
+def solved_papers(around: int, along: int, through: int) -> SolvedBeat:
+    """The paper's heart on such a mesh: its fibres pull along themselves alone, and nothing surrounds it."""
+    config = load(PAPERS).model_copy(update={"geometry": _geometry(around, along, through)})
+    return solved_heart(config)
+
+
+def _geometry(around: int, along: int, through: int) -> Geometry:
+    return Geometry(circumferential_elements=around, longitudinal_elements=along, transmural_elements=through)
+
+
+def solved_heart(config: Config) -> SolvedBeat:
+    """The heart of a configuration."""
     cycle, unloaded = read_loop(config.loop), wall(config, left_ventricle(config.geometry))
     equations = equilibrium(config, unloaded)
     record = _PreviousStates(equations)

@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from echotruth.fem.quadrature import tetrahedron
-from echotruth.fem.tetrahedra import Floats
+from echotruth.fem.quadrature import tetrahedron, triangle
+from echotruth.fem.tetrahedra import Floats, Integers, Mesh
 from echotruth.mechanics.fibres import fibre_frames, material_gradients
-from echotruth.mechanics.solver.cavity import cavity_volume
+from echotruth.mechanics.solver.cavity import cavity_volume, triangle_shape
 from echotruth.report import style
 from validation import energies, heart
 from validation.report import Report, Row
+
+PERICARDIUM = "#8a5aa8"
+"""Colour of its work."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +29,10 @@ class Results:
     time : ndarray of shape (n_frames,), s
     blood : ndarray of shape (n_frames,), J
         Work of the cavity pressure for the motion from the frame before to the frame after.
-    wall : ndarray of shape (n_frames, 4), J
-        Work of the passive, active, volumetric and viscous stress for the same motion.
-    loop : ndarray of shape (5,), J
-        Over the beat: the work of the heart on the blood, and what the four took up.
+    wall : ndarray of shape (n_frames, 5), J
+        Work of the passive, active, volumetric and viscous stress, and of the surroundings, for the same motion.
+    loop : ndarray of shape (6,), J
+        Over the beat: the work of the heart on the blood, and what the five took up.
     """
 
     cells: int
@@ -46,7 +49,11 @@ class Results:
 
 def measure(quick: bool = False) -> Results:
     """Works of the default heart, or of a coarse one if `quick`."""
-    solved = heart.solved(*((12, 6, 1) if quick else heart.DEFAULT_MESH))
+    return balance(heart.solved(*((12, 6, 1) if quick else heart.DEFAULT_MESH)))
+
+
+def balance(solved: heart.SolvedBeat) -> Results:
+    """Works of a solved heart."""
     virtual_work, displacement = _VirtualWork(solved), solved.beat.displacement
     changes = np.roll(displacement, -1, axis=0) - np.roll(displacement, 1, axis=0)
     works = np.array([virtual_work.of_frame(frame, change) for frame, change in enumerate(changes)])
@@ -73,8 +80,8 @@ class _VirtualWork:
         return np.einsum("cai,cqaj->cqij", displacement[self.mesh.cells], self.dN_dX)
 
     def of_frame(self, frame: int, change: Floats) -> tuple[float, ...]:
-        """Work of the blood, and of the passive, active, volumetric and viscous stress, for a change (n_nodes, 3), m,
-        of the displacement of a frame, J."""
+        """Work of the blood, of the passive, active, volumetric and viscous stress and of the surroundings, J, for a
+        change (n_nodes, 3), m, of the displacement of a frame."""
         u, beat = self.beat.displacement[frame], self.beat
         step = 1j * energies.COMPLEX_STEP
         f = np.swapaxes(self.frames, -1, -2) + self.gradient(u) + step * self.gradient(change)
@@ -85,7 +92,7 @@ class _VirtualWork:
             self._viscous(f, frame),
         )
         of_wall = (float(part.imag / energies.COMPLEX_STEP) for part in parts)
-        return self._blood(u, change, beat.pressure[frame]), *of_wall
+        return self._blood(u, change, beat.pressure[frame]), *of_wall, self._surroundings(u, change, frame)
 
     def _blood(self, u: Floats, change: Floats, pressure: float) -> float:
         """Pressure times the derivative of the volume V(u + s change) by s, by differences: V is cubic in s."""
@@ -101,8 +108,12 @@ class _VirtualWork:
         return np.sum((energies.passive(f, self.section.material) + local) * self.volume)
 
     def _active(self, f: Floats) -> complex:
-        power = 2.0 if self.section.active.stress == "cauchy" else 0.0
-        return np.sum(energies.active(f, self.section.active.length_dependence, power) * self.volume)
+        section = self.section.active
+        power, shares = 2.0 if section.stress == "cauchy" else 0.0, (1.0, section.sheet_share, section.normal_share)
+        return sum(
+            share * np.sum(energies.active(f, section.length_dependence, power, axis) * self.volume)
+            for axis, share in enumerate(shares)
+        )
 
     def _volumetric(self, f: Floats) -> complex:
         """Energy of the mean dilatation of each cell."""
@@ -120,6 +131,38 @@ class _VirtualWork:
         viscosity = self.section.si().viscosity
         return viscosity / (2 * previous.time) * np.sum(np.sum(strain**2, axis=(-2, -1)) * self.volume)
 
+    def _surroundings(self, u: Floats, change: Floats, frame: int) -> float:
+        """Work against the pericardium, which rests at end-diastole, and against the springs of an elastic base."""
+        pericardium, base = self.section.pericardium.si(), self.section.elastic_base.si()
+        work, at_ed = 0.0, self.beat.displacement[0]
+        if frame:
+            previous = self.previous_states[frame]
+            rate = (u - self.displacement(previous.state.solution)) / previous.time
+            traction = pericardium.spring * (u - at_ed) + pericardium.dashpot * rate
+            work += _surface_work(self.mesh, self.mesh.epi, traction, change, None)
+        if self.section.base == "elastic":
+            work += _surface_work(self.mesh, self.mesh.base, base.axial_spring * u, change, "axial")
+            work += _surface_work(self.mesh, self.mesh.base, base.circumferential_spring * u, change, "circumferential")
+        return work
+
+
+def _surface_work(mesh: Mesh, facets: Integers, traction: Floats, change: Floats, along: str | None) -> float:
+    """int (d . traction) (d . change) dA of nodal vectors (n_nodes, 3) over unloaded facets, J.
+
+    d is the normal, or a direction by name.
+    """
+    work = 0.0
+    for xi, weight in zip(*triangle(), strict=True):
+        value, slope = (part[0] for part in triangle_shape(xi[None]))
+        at, moved, changed = (np.einsum("a,fai->fi", value, nodal[facets]) for nodal in (mesh.nodes, traction, change))
+        first, second = (np.einsum("a,fai->fi", slope[:, k], mesh.nodes[facets]) for k in (0, 1))
+        area = np.cross(first, second)
+        size = np.linalg.norm(area, axis=1)
+        axis = {None: area, "axial": 0 * at + [0, 0, 1], "circumferential": np.cross([0, 0, 1], at)}[along]
+        axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+        work += weight * np.sum(np.sum(axis * moved, axis=1) * np.sum(axis * changed, axis=1) * size)
+    return float(work)
+
 
 def _right_cauchy_green(f: Floats) -> Floats:
     """C = F^T F of F of shape (..., 3, 3), real or complex."""
@@ -128,7 +171,7 @@ def _right_cauchy_green(f: Floats) -> Floats:
 
 def report(results: Results) -> Report:
     """Rows of the page."""
-    blood, passive, active, volumetric, viscous = results.loop * 1e6
+    blood, passive, active, volumetric, viscous, surroundings = results.loop * 1e6
     source = "virtual work, with independently implemented energies"
     exact = "a closed loop of an elastic energy; what is left is the step of the frames"
     by_wall, allowed = -1e6 * float(results.loop[1:].sum()), abs(blood)
@@ -139,13 +182,14 @@ def report(results: Results) -> Report:
         Row(loop, blood, by_wall, 1e-5 * allowed, source, ".2f"),
         Row("of it, work of the fibres (uJ)", -active, None, None, "", ".2f"),
         Row("lost to viscosity (uJ)", viscous, None, None, "", ".2f"),
+        Row("lost to the pericardium (uJ)", surroundings, None, None, "", ".2f"),
         Row("left in the passive wall (uJ)", passive, None, 0.03 * allowed, exact, ".2f"),
         Row("left in the change of volume (uJ)", volumetric, None, 0.01 * allowed, exact, "z.2f"),
     )
     text = (
         "At every frame the motion from the frame before to the frame after is taken as a virtual one: the cavity "
-        "pressure must do the work that passive, active, volumetric and viscous stress take up. Each of these is the "
-        "rate of an energy, by a complex step."
+        "pressure must do the work that passive, active, volumetric and viscous stress and the pericardium take up. "
+        "Each stress is the rate of an energy, by a complex step."
     )
     caption = "Work for the motion about each frame: of the blood (line) and of the stresses of the wall (bars)."
     return Report("Work of blood and wall", text, rows, caption)
@@ -156,8 +200,9 @@ def draw(results: Results) -> Figure:
     """Works of each frame."""
     figure = style.figure(7.2, 3.2)
     axes = figure.add_subplot()
-    colours = (style.LONGITUDINAL, style.RADIAL, style.TARGET, style.CIRCUMFERENTIAL)
-    names, width = ("passive", "active", "volume", "viscous"), np.diff(results.time[:2])[0] * 1e3 * 0.8
+    colours = (style.LONGITUDINAL, style.RADIAL, style.TARGET, style.CIRCUMFERENTIAL, PERICARDIUM)
+    names = ("passive", "active", "volume", "viscous", "pericardium")
+    width = np.diff(results.time[:2])[0] * 1e3 * 0.8
     low, high = np.zeros((2, len(results.time)))
     for part, name, colour in zip(results.wall.T * 1e6, names, colours, strict=True):
         bottom = np.where(part > 0, high, low)

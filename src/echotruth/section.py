@@ -24,6 +24,7 @@ UNITS: dict[str, float] = {
     "kPa": 1e3,
     "Pa": 1.0,
     "kPa_per_mm": 1e6,
+    "kPa_s_per_mm": 1e6,
     "Pa_s": 1.0,
     "MHz": 1e6,
     "m_per_s": 1.0,

@@ -9,7 +9,7 @@ from echotruth.fem.tetrahedra import Mesh
 from echotruth.materials import LAWS, compiled
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver import element
-from echotruth.mechanics.solver.stress_point import TOTAL
+from echotruth.mechanics.solver.stress_point import ACTIVE, TOTAL, VOLUMETRIC
 
 
 @pytest.fixture(scope="module")
@@ -17,10 +17,10 @@ def mesh() -> Mesh:
     return left_ventricle(Geometry(circumferential_elements=6, longitudinal_elements=4, transmural_elements=2))
 
 
-def law(name="fung", power=2.0):
-    return element.WallLaw(
-        compiled(name), LAWS[name].Law().constants(), np.array([1.4, power]), 2e6, pointwise_bulk_ratio=20.0
-    )
+def law(name="fung", power=2.0, beta=1.4, cross_fibre=(0.0, 0.0)):
+    constants, active = LAWS[name].Law().constants(), np.array([beta, power])
+    laws = element.WallLaw(compiled(name), constants, active, 2e6, pointwise_bulk_ratio=20.0)
+    return laws._replace(cross_fibre=np.array(cross_fibre))
 
 
 def cell_state(mesh, pressure=0.0, stiffness=1.1e3, tension=4e4, viscosity=0.0):
@@ -73,9 +73,12 @@ def test_cell_that_is_inside_out_has_no_volume(mesh):
     assert np.all(np.isnan(response(mesh, mesh.nodes * [1, 1, -1], cell_state(mesh)).volume))
 
 
-@pytest.mark.parametrize(("name", "power"), [*((name, 2.0) for name in LAWS), ("fung", 0.0)])
-def test_tangent_is_the_derivative_of_the_condensed_force(mesh, name, power):
-    rng, laws = np.random.default_rng(5), law(name, power)
+@pytest.mark.parametrize(
+    ("name", "power", "cross_fibre"),
+    [*((name, 2.0, (0.0, 0.0)) for name in LAWS), ("fung", 0.0, (0.0, 0.0)), ("fung", 2.0, (0.3, 0.2))],
+)
+def test_tangent_is_the_derivative_of_the_condensed_force(mesh, name, power, cross_fibre):
+    rng, laws = np.random.default_rng(5), law(name, power, cross_fibre=cross_fibre)
     directions = np.linalg.qr(rng.normal(size=(len(mesh.nodes), 3, 3)))[0]
     directions[::2] = np.eye(3)
     nodes, change = mesh.nodes + 1e-5 * rng.normal(size=mesh.nodes.shape), rng.normal(size=mesh.nodes.shape)
@@ -108,6 +111,21 @@ def test_each_cell_bears_its_own_stiffness_tension_pressure_and_viscosity(mesh):
     expected = parts + state.viscous_modulus[:, None] * viscous
     np.testing.assert_allclose(mixed.force[:, TOTAL], expected, atol=1e-10 * np.abs(parts).max())
     assert not np.allclose(mixed.tangent, response(mesh, nodes, same).tangent)
+
+
+def test_tension_that_is_the_same_in_all_directions_is_a_pressure(mesh):
+    """With full shares and no length dependence the Cauchy stress of stretched fibre axes is T I."""
+    frame = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    nodes = mesh.nodes @ (frame.T @ np.diag([1.25, 0.8, 1.0]) @ frame).T
+
+    def parts(*cross_fibre):
+        return response(mesh, nodes, cell_state(mesh), laws=law(beta=0.0, cross_fibre=cross_fibre)).force
+
+    tension, scale = parts(1.0, 1.0), np.abs(parts(1.0, 1.0)[:, ACTIVE]).max()
+    np.testing.assert_allclose(tension[:, ACTIVE], tension[:, VOLUMETRIC], atol=1e-12 * scale)
+    along_fibre, sheet, normal = (parts(*shares)[:, ACTIVE] for shares in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    mixed = along_fibre + 0.5 * (sheet - along_fibre) + 0.25 * (normal - along_fibre)
+    np.testing.assert_allclose(parts(0.5, 0.25)[:, ACTIVE], mixed, atol=1e-12 * scale)
 
 
 def test_viscous_force_does_the_work_of_the_strain_increment(mesh):

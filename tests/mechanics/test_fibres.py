@@ -21,6 +21,7 @@ ORTHOTROPIC = Fibres(
     sheet_endo_deg=-65.0,
     sheet_epi_deg=25.0,
 )
+HELIX = Fibres(endo_deg=84.0, epi_deg=-42.0, transverse_endo_deg=0.0, transverse_epi_deg=0.0)
 
 
 @pytest.fixture(scope="module")
@@ -88,10 +89,10 @@ def test_depth_and_frames_are_finite_with_a_ragged_base(wall):
     assert_right_handed(fibres.fibre_frames(rough, depth, ORTHOTROPIC, VERTICES))
 
 
-def test_default_fibres_are_those_of_a_helix_in_the_wall(wall):
+def test_fibres_without_transverse_and_sheet_angles_are_those_of_a_helix_in_the_wall(wall):
     mesh, depth = wall
     xi, _ = tetrahedron()
-    frames, axes = fibres.fibre_frames(mesh, depth, Fibres(), xi), fibres.wall_axes(mesh, depth, xi)
+    frames, axes = fibres.fibre_frames(mesh, depth, HELIX, xi), fibres.wall_axes(mesh, depth, xi)
     helix = np.radians(84 - 126 * fibres.interpolate_in_cells(mesh, depth, xi))[..., None]
     along = np.cos(helix) * axes[..., 1, :] + np.sin(helix) * axes[..., 2, :]
     np.testing.assert_allclose(frames[..., 0, :], along, atol=1e-14)
@@ -114,7 +115,9 @@ def test_angles_of_both_sides_come_back(wall):
 
 def test_stepwise_rule_gives_one_angle_a_layer():
     depth = np.linspace(0, 1, 601)
-    helix, transverse, sheet = fibres.rule_angles(Fibres(stepwise=True, sheet_epi_deg=60.0), depth)
+    helix, transverse, sheet = fibres.rule_angles(
+        HELIX.model_copy(update={"stepwise": True, "sheet_epi_deg": 60.0}), depth
+    )
     np.testing.assert_allclose(np.degrees(np.unique(helix)), np.arange(-31.5, 74, 21))
     np.testing.assert_allclose(np.degrees(np.unique(sheet)), np.arange(5, 60, 10))
     assert not transverse.any()
@@ -166,8 +169,8 @@ def test_a_file_that_lacks_directions_is_refused(wall, fibre, sheet, sentence):
 @pytest.mark.parametrize("source", ["rule", "file"])
 def test_disarray_turns_the_fibres_in_the_wall_by_as_much_as_asked_for(wall, source):
     mesh, depth = wall
-    mesh = replace(mesh, fibre=fibres.fibre_frames(mesh, depth, Fibres(), fibres.CENTROID)[:, 0, 0])
-    straight = Fibres(source=source)
+    mesh = replace(mesh, fibre=fibres.fibre_frames(mesh, depth, HELIX, fibres.CENTROID)[:, 0, 0])
+    straight = HELIX.model_copy(update={"source": source})
     disarrayed = straight.model_copy(update={"disarray_deg": 12.0, "disarray_length_mm": 0.2})
     xi, _ = tetrahedron()
     axes, before = fibres.wall_axes(mesh, depth, xi), fibres.fibre_frames(mesh, depth, straight, xi)

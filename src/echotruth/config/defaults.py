@@ -14,10 +14,24 @@ from typing import Any
 
 from echotruth.config.tracking import DEFAULT, METHODS, default_trackers, name_of
 
-HEART_DEFAULTS = {
+HEART_DEFAULTS: dict[str, dict[str, Any]] = {
     "mouse": {"loop.file": "mouse", "probe.preset": "mouse_25MHz"},
-    "rat": {"loop.file": "rat", "probe.preset": "rat_15MHz"},
-    "human": {"loop.file": "human", "probe.preset": "human_2_7MHz"},
+    "rat": {
+        "loop.file": "rat",
+        "probe.preset": "rat_15MHz",
+        "mechanics.pericardium.spring_kPa_per_mm": 0.5,
+    },
+    "human": {
+        "loop.file": "human",
+        "probe.preset": "human_2_7MHz",
+        "fibres.endo_deg": 70.0,
+        "fibres.epi_deg": -53.0,
+        "mechanics.pericardium.spring_kPa_per_mm": 0.1,
+        "physiology.twist_es_max_deg": 25.0,
+        "physiology.circumferential_strain_min": -0.26,
+        "physiology.circumferential_strain_max": -0.1,
+        "physiology.gls_max": -0.13,
+    },
 }
 """`geometry.preset` -> default of dotted keys."""
 
@@ -38,6 +52,9 @@ _SCANS = {
 }
 ARRAY_DEFAULTS: dict[str, dict[str, float]] = {n: dict(zip(_KEYS, row, strict=True)) for n, row in _SCANS.items()}
 """`probe.preset` -> default of dotted keys."""
+
+ARRAY_SUFFIXES = (".npy", ".npz")
+"""Files of positions without a mesh."""
 
 REFERENCE_FIELD_OF_VIEW_MM = 12.0
 """Field of view for which the sections of the trackers give their default lengths."""
@@ -60,7 +77,19 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
     """
     values = _fill(values, HEART_DEFAULTS.get(_preset(values, "geometry"), HEART_DEFAULTS["mouse"]))
     values = _fill(values, ARRAY_DEFAULTS.get(_preset(values, "probe"), {}))
+    values = _fill(values, _mesh_of_motion(values.get("motion")))
     return _scale_trackers(values, _length_scale(values))
+
+
+def _mesh_of_motion(motion: Any) -> dict[str, Any]:
+    """`geometry.file` of a motion from files that hold meshes too."""
+    if isinstance(motion, dict):
+        kind, file = motion.get("kind"), motion.get("file")
+        path = file.get("path") if isinstance(file, dict) else getattr(file, "path", None)
+    else:
+        kind, path = getattr(motion, "kind", None), getattr(getattr(motion, "file", None), "path", None)
+    holds_mesh = kind == "file" and isinstance(path, str) and not path.lower().endswith(ARRAY_SUFFIXES)
+    return {"geometry.file": path} if holds_mesh else {}
 
 
 def _preset(values: dict[str, Any], name: str) -> str:
@@ -71,11 +100,18 @@ def _preset(values: dict[str, Any], name: str) -> str:
 
 def _fill(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
     for dotted_key, default in defaults.items():
-        name, key = dotted_key.split(".")
-        section = values.get(name, {})
-        if isinstance(section, dict):
-            values = values | {name: {key: default} | section}
+        values = _with_default(values, dotted_key.split("."), default)
     return values
+
+
+def _with_default(section: Any, keys: list[str], default: Any) -> Any:
+    """Section with a default for a key in it, however deep, unless it is given; a model is not changed."""
+    if not isinstance(section, dict):
+        return section
+    key, *rest = keys
+    if not rest:
+        return {key: default} | section
+    return section | {key: _with_default(section.get(key, {}), rest, default)}
 
 
 def _length_scale(values: dict[str, Any]) -> float:

@@ -7,7 +7,9 @@ from typing import Annotated, Literal
 from pydantic import Field, FiniteFloat
 
 from echotruth.materials import DEFAULT, LAWS, AnyLaw
-from echotruth.section import Section
+from echotruth.section import Fraction, Section
+
+NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 
 class Active(Section):
@@ -17,6 +19,31 @@ class Active(Section):
     """beta."""
     stress: Literal["cauchy", "second_piola_kirchhoff"] = "cauchy"
     """Meaning of T_a: the paper's tension per deformed area (S_ff = T_a / lambda^2), or S_ff itself."""
+    sheet_share: Fraction = 0.4
+    """Share of the tension that acts along the sheet direction too, by the stretch there, since fibres are dispersed. A
+    share of 0.4 across the fibre in the wall brings a sheep's heart closest to its tagged MRI (Walker 2005, Am J
+    Physiol 289, H692)."""
+    normal_share: Fraction = 0.2
+    """Share of the tension that acts along the sheet normal too, likewise."""
+
+
+class Pericardium(Section):
+    """Surroundings of the epicardium: they resist its motion along its normal, out or in, from end-diastole on."""
+
+    spring_kPa_per_mm: NotNegative = 1.0
+    """Stiffness per area; at rest at end-diastole. `rat` 0.5, `human` 0.1: the heart cycle of the solver Ambit has
+    0.075 and a dashpot of 0.005 for people, and at equal strains the stiffness grows as the heart gets smaller."""
+    dashpot_kPa_s_per_mm: NotNegative = 0.005
+    """Viscosity per area, against the velocity."""
+
+
+class ElasticBase(Section):
+    """Springs of `base: elastic`, from the unloaded state; the base moves along its radius freely."""
+
+    axial_spring_kPa_per_mm: NotNegative = 50.0
+    """Stiffness per area against motion along the long axis: lets the base tilt and curve."""
+    circumferential_spring_kPa_per_mm: NotNegative = 1.0
+    """Stiffness per area against motion around the long axis: lets the base turn."""
 
 
 class Mechanics(Section):
@@ -33,7 +60,12 @@ class Mechanics(Section):
     viscosity_Pa_s: Annotated[FiniteFloat, Field(ge=0)] = 1.0
     """Viscous stress over the rate of Green-Lagrange strain. It lets a wall whose fibres weaken as they shorten pass to
     the next equilibrium where none is near; otherwise it is a fraction of a per cent of the stress."""
-    base: Literal["radial_free", "fixed"] = "radial_free"
-    """Support of the base: free to move radially in its plane, or fixed."""
-    epicardial_spring_kPa_per_mm: Annotated[FiniteFloat, Field(ge=0)] = 0.0
-    """Stiffness per area with which the surroundings resist the outward or inward motion of the epicardium."""
+    base: Literal["radial_free", "fixed", "elastic"] = "radial_free"
+    """Support of the base: free to move radially in its plane, fixed, or on the springs of `elastic_base`."""
+    elastic_base: ElasticBase = ElasticBase()
+    """Springs of `base: elastic`, with which the base may turn and tilt."""
+    pericardium: Pericardium = Pericardium()
+    """Surroundings of the epicardium."""
+    hold: Literal["apex", "base"] = "apex"
+    """What stays in place along the long axis: the solved heart is shifted along it as a whole, which changes neither
+    strain nor pressure. In life the apex of the epicardium stays and the base descends."""

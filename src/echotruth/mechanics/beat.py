@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.loop import phases
 from echotruth.loop.cycle import Cycle, read_loop
-from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
 from echotruth.mechanics.history import Arrays, collect_outputs
+from echotruth.mechanics.motion_file.motion import motion_from_file
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.checkpoint import Checkpoints
@@ -49,11 +51,15 @@ def beat(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
     cycle = read_loop(config.loop)
     unloaded = unloaded_wall(config, cycle)
     solved = _solve(config, unloaded, cycle, scratch)
-    return collect_outputs(config, unloaded, _mechanics_arrays(solved, cycle))
+    return collect_outputs(config, unloaded, _mechanics_arrays(solved, cycle, _held(config, unloaded, solved)))
 
 
 def simulate(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
-    """Move the heart of a configuration: by its beat (:func:`beat`), or by a formula (:func:`.prescribed_motion`)."""
+    """Move the heart of a configuration: by its beat (:func:`beat`), by a formula (:func:`.prescribed_motion`), or as
+    its files do (:func:`.motion_from_file`).
+    """
+    if config.motion.kind == "file":
+        return motion_from_file(config)
     return beat(config, scratch) if config.motion.kind == "beat" else prescribed_motion(config)
 
 
@@ -85,7 +91,15 @@ def _fingerprint(config: Config, unloaded: Wall, cycle: Cycle) -> str:
     return sha256(pickle.dumps((settings, unloaded, cycle))).hexdigest()[:16]
 
 
-def _mechanics_arrays(solved: SolvedCycle, cycle: Cycle) -> Arrays:
+def _held(config: Config, unloaded: Wall, solved: SolvedCycle) -> Floats:
+    """Displacements (n_frames, n_nodes, 3), m, with what `mechanics.hold` names in place along the axis since ED."""
+    if config.mechanics.hold == "base":
+        return solved.displacement
+    axial = solved.displacement[:, epicardial_apex(unloaded.mesh), 2]
+    return solved.displacement - (axial - axial[0])[:, None, None] * [0.0, 0.0, 1.0]
+
+
+def _mechanics_arrays(solved: SolvedCycle, cycle: Cycle, displacement: Floats) -> Arrays:
     return {
         "time": cycle.time,
         "pressure": solved.pressure,
@@ -93,7 +107,7 @@ def _mechanics_arrays(solved: SolvedCycle, cycle: Cycle) -> Arrays:
         "pressure_target": solved.pressure_target,
         "volume_target": solved.volume_target,
         "active_tension": solved.tension,
-        "displacement": solved.displacement,
+        "displacement": displacement,
         "stiffness": np.array(solved.stiffness),
         "es_frame": np.array(phases.es_frame(solved.pressure, solved.volume)),
         "phase": phases.phases(solved.pressure, solved.volume),

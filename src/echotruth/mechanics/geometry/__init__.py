@@ -11,7 +11,7 @@ from echotruth.mechanics.geometry.ellipsoid import ellipsoid
 from echotruth.mechanics.geometry.mesh_quality import GeometryError, jacobians
 from echotruth.mechanics.geometry.tube import tube
 
-__all__ = ["GeometryError", "cell_volumes", "left_ventricle"]
+__all__ = ["GeometryError", "cell_volumes", "epicardial_apex", "left_ventricle"]
 
 
 def left_ventricle(geometry: Geometry) -> Mesh:
@@ -37,6 +37,11 @@ def left_ventricle(geometry: Geometry) -> Mesh:
     from echotruth.mechanics.geometry.file import ventricle_from_file
 
     return ventricle_from_file(geometry)
+
+
+def epicardial_apex(mesh: Mesh) -> int:
+    """Node of the epicardium that is farthest from the base."""
+    return int(mesh.epi.ravel()[np.argmin(mesh.nodes[mesh.epi, 2])])
 
 
 def cell_volumes(mesh: Mesh) -> Floats:

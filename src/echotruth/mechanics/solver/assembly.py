@@ -14,8 +14,8 @@ from echotruth.arrays import Floats
 from echotruth.fem.tetrahedra import Integers, Mesh
 from echotruth.mechanics.solver.support import Support
 
-CELLS, ENDO, EPI = 0, 1, 2
-"""Groups of elements: cells, facets of the endocardium and of the epicardium."""
+CELLS, ENDO, EPI, BASE = range(4)
+"""Groups of elements: cells, and facets of endocardium, epicardium and base."""
 
 
 class Assembly:
@@ -24,18 +24,21 @@ class Assembly:
     Attributes
     ----------
     n_equations : int
+    groups : tuple of int
+        Groups of elements whose matrices are summed.
     equation : ndarray of shape (n_nodes, 3)
         Number of the equation of each displacement, -1 where it is fixed.
     """
 
-    def __init__(self, mesh: Mesh, support: Support) -> None:
+    def __init__(self, mesh: Mesh, support: Support, surfaces: tuple[int, ...] = ()) -> None:
         self.directions = support.directions
         self.n_equations = int(support.free.sum())
         self.equation = np.full(support.free.shape, -1, dtype=np.int64)
         self.equation[support.free] = np.arange(self.n_equations)
-        groups = (mesh.cells, mesh.endo, mesh.epi) if support.spring else (mesh.cells, mesh.endo)
-        self._groups = [self.equation[group].reshape(len(group), -1) for group in groups]
-        self._find_pattern(self._groups)
+        elements = {CELLS: mesh.cells, ENDO: mesh.endo, EPI: mesh.epi, BASE: mesh.base}
+        self.groups = (CELLS, ENDO, *surfaces)
+        self._groups = {n: self.equation[elements[n]].reshape(len(elements[n]), -1) for n in self.groups}
+        self._find_pattern(list(self._groups.values()))
 
     def _find_pattern(self, groups: list[NDArray[np.int64]]) -> None:
         """Find the matrix entry of each entry of the packed blocks; an extra one takes those of fixed displacements."""
@@ -57,7 +60,7 @@ class Assembly:
         ----------
         blocks : ndarray of shape (n_cells, 30), or (n_facets, 18) for a group of facets
             Along `directions`.
-        group : CELLS, ENDO or EPI
+        group : CELLS, ENDO, EPI or BASE
 
         Returns
         -------
@@ -73,8 +76,7 @@ class Assembly:
         Parameters
         ----------
         *blocks : ndarray of shape (n_cells, 465) or (n_facets, 171)
-            Upper triangles, row by row, along `directions`: cells, endocardium and,
-            where there are springs, epicardium.
+            Upper triangles, row by row, along `directions`, in the order of `groups`.
 
         Returns
         -------

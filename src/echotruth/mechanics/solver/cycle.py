@@ -94,9 +94,11 @@ def solve(
     frames = checkpoints.load() if checkpoints else []
     if frames:
         logger.info("resuming after %d of %d frames", len(frames), len(cycle.time))
+        stepper.rest(frames[0].state)
         stepper.resume(frames[-1])
     else:
         fill_to_end_diastole(stepper, cycle, stiffness)
+        stepper.rest(stepper.state)
         frames = [_checkpoint(stepper, checkpoints)]
     if stiffness is not None and cycle.prescribed == "pressure_volume":
         cycle = cycle.scaled(frames[0].load.volume / cycle.edv)

@@ -73,6 +73,8 @@ class WallLaw(NamedTuple):
     pointwise_bulk_ratio : float
         Pointwise bulk modulus divided by C.
     viscosity : float, Pa s
+    cross_fibre : ndarray of shape (2,)
+        Shares of the active tension that act along sheet and normal too.
     """
 
     energy: Any
@@ -81,6 +83,7 @@ class WallLaw(NamedTuple):
     bulk_modulus: float
     pointwise_bulk_ratio: float = 0.0
     viscosity: float = 0.0
+    cross_fibre: Floats = np.zeros(2)
 
 
 class CellState(NamedTuple):

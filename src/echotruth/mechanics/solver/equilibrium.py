@@ -4,13 +4,15 @@ Unknowns are the free displacements u, the pressure p_c of each cell (positive i
 s: the active tension, the stiffness or the cavity pressure P. With v_c and V_c the deformed and unloaded volume of a
 cell and V(u) that of the cavity, the residuals are
 
-    r = f(u, p, s) + K_e u - P dV/du,    r_c = v_c(u) / V_c - 1 - p_c / kappa,    r_V = V(u) - V_target.
+    r = f(u, p, s) + K_e (u - u_rest) + D_e (u - u_previous) / dt - P dV/du,
+    r_c = v_c(u) / V_c - 1 - p_c / kappa,    r_V = V(u) - V_target.
 
-K_e are the springs of the epicardium (:func:`.support.spring_stiffness`). P is work-conjugate to V: its load P dV/du
-does the work P dV. Newton's method eliminates p_c in its cell and borders
-the tangent with s, so that one factorization of K serves both right-hand sides. With G_c = dv_c/du and g = dV/du:
+K_e and D_e are the springs and dashpots of the surroundings (:mod:`.surroundings`), dt the time since the previous
+state. P is work-conjugate to V: its load P dV/du does the work P dV. Newton's method eliminates p_c in its cell and
+borders the tangent with s, so that one factorization of K serves both right-hand sides. With G_c = dv_c/du and
+g = dV/du:
 
-    K = d(f + K_e u - P g)/du + sum_c kappa / V_c G_c G_c^T,
+    K = df/du + K_e + D_e / dt - P dg/du + sum_c kappa / V_c G_c G_c^T,
     K du_0 = -r - sum_c kappa r_c G_c,    K du_s = -dr/ds,
     ds = -(r_V + g . du_0) / (g . du_s),    du = du_0 + ds du_s,    dp_c = kappa (r_c + G_c . du / V_c).
 """
@@ -26,9 +28,10 @@ from echotruth.arrays import Floats
 from echotruth.fem.sparse import factorization
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.mechanics.solver import cavity, element
-from echotruth.mechanics.solver.assembly import CELLS, ENDO, EPI, Assembly
+from echotruth.mechanics.solver.assembly import CELLS, ENDO, Assembly
 from echotruth.mechanics.solver.stress_point import ACTIVE, PASSIVE, TOTAL, VOLUMETRIC
-from echotruth.mechanics.solver.support import Support, spring_stiffness
+from echotruth.mechanics.solver.support import Support
+from echotruth.mechanics.solver.surroundings import Springs
 
 Unknown = Literal["stiffness", "tension", "cavity_pressure"] | None
 """The scalar unknown."""
@@ -171,6 +174,8 @@ class Equilibrium:
     support : Support
     stiffness_scale : ndarray of shape (n_cells,), optional
         Factor of the stiffness of each cell.
+    springs : tuple of Springs, optional
+        Surroundings of the heart.
     """
 
     def __init__(
@@ -180,17 +185,19 @@ class Equilibrium:
         law: element.WallLaw,
         support: Support,
         stiffness_scale: Floats | None = None,
+        springs: tuple[Springs, ...] = (),
     ):
-        self.mesh, self.law, self.support = mesh, law, support
-        self.assembly = Assembly(mesh, support)
+        self.mesh, self.law, self.support, self.springs = mesh, law, support, springs
+        self.assembly = Assembly(mesh, support, tuple(surface.group for surface in springs))
         self.elements = element.build_elements(mesh, fibre_frames, support.directions)
         self.unloaded_volume = np.sum(self.elements.weight, axis=1)
         self.stiffness_scale = np.ones(len(mesh.cells)) if stiffness_scale is None else stiffness_scale
         self._response = element.allocate_response(len(mesh.cells), with_tangent=True)
         self._facets = np.empty((len(mesh.endo), 18, 18))
-        self._springs = spring_stiffness(mesh, support.spring) if support.spring else None
         self._solver = factorization(single=True)
         self.previous: PreviousState | None = None
+        self._end_diastole: Floats | None = None
+        self._previous_nodes, self._rate = mesh.nodes, 0.0
         self._viscous_modulus = np.zeros(len(mesh.cells))
         self._previous_c = np.zeros((*self.elements.weight.shape, 6))
 
@@ -199,9 +206,14 @@ class Equilibrium:
         self.previous = previous
         elastic = previous.time <= 0 or self.law.viscosity == 0
         self._viscous_modulus[:] = 0.0 if elastic else self.law.viscosity / previous.time
+        self._previous_nodes = self.positions(previous.state, previous.prescribed_fraction)
+        self._rate = 1 / previous.time if previous.time > 0 else 0.0
         if not elastic:
-            nodes = self.positions(previous.state, previous.prescribed_fraction)
-            element.right_cauchy_green(nodes, self.elements, self._previous_c)
+            element.right_cauchy_green(self._previous_nodes, self.elements, self._previous_c)
+
+    def rest_at(self, state: State) -> None:
+        """Set the state of end-diastole, where the pericardium is at rest and from which on it acts."""
+        self._end_diastole = self.positions(state)
 
     def close(self) -> None:
         """Free the memory of the factors."""
@@ -237,7 +249,9 @@ class Equilibrium:
         element.evaluate(nodes, self.elements, self.law, cell_state, response)
         gradient = cavity.volume_gradient(nodes, self.mesh.endo)
         self._volume_gradient = self.assembly.vector(self.assembly.rotate(self.mesh.endo, gradient), ENDO)
-        internal = self.assembly.vector(response.force[:, TOTAL]) + self._spring_force(nodes)
+        internal = self.assembly.vector(response.force[:, TOTAL])
+        for surface in self._acting():
+            internal += self._spring_force(surface, nodes)
         external = (state.cavity_pressure if unknown == "cavity_pressure" else load.pressure) * self._volume_gradient
         volumetric = response.volume / self.unloaded_volume - 1 - state.cell_pressure / self.law.bulk_modulus
         # V is of third degree in the positions x: V = x . dV/dx / 3 (Euler's theorem).
@@ -246,13 +260,18 @@ class Equilibrium:
         errors = norm(internal - external) / force_scale, abs(volume) / load.volume if unknown else 0.0
         return Residual(internal - external, volumetric, volume, *errors, norm(volumetric) / np.sqrt(len(volumetric)))
 
-    def _spring_force(self, nodes: Floats) -> Floats | float:
-        """K_e u: force of the springs of the epicardium on the free displacements."""
-        if self._springs is None:
-            return 0.0
-        displacement = (nodes - self.mesh.nodes)[self.mesh.epi].reshape(-1, 18)
-        force = np.einsum("frs,fs->fr", self._springs, displacement).reshape(-1, 6, 3)
-        return self.assembly.vector(self.assembly.rotate(self.mesh.epi, force), EPI)
+    def _spring_force(self, surface: Springs, nodes: Floats) -> Floats:
+        """K_e (u - u_rest) + D_e (u - u_previous) / dt of a surface, on the free displacements."""
+        rest = self._end_diastole if surface.rest_at_end_diastole else self.mesh.nodes
+        assert rest is not None
+        moved, since = ((nodes - at)[surface.facets].reshape(-1, 18) for at in (rest, self._previous_nodes))
+        force = np.einsum("frs,fs->fr", surface.spring, moved)
+        force += self._rate * np.einsum("frs,fs->fr", surface.dashpot, since)
+        return self.assembly.vector(self.assembly.rotate(surface.facets, force.reshape(-1, 6, 3)), surface.group)
+
+    def _acting(self) -> list[Springs]:
+        """The springs that act now."""
+        return [one for one in self.springs if not one.rest_at_end_diastole or self._end_diastole is not None]
 
     def linearize(self, state: State, load: Load, unknown: Unknown) -> Tangent:
         """Factor the tangent at a state."""
@@ -260,8 +279,10 @@ class Equilibrium:
         pressure = state.cavity_pressure if unknown == "cavity_pressure" else load.pressure
         cavity.volume_hessian(self.positions(state, load.prescribed_fraction), self.mesh.endo, self._facets)
         blocks = [self.assembly.pack(self.mesh.endo, -pressure * self._facets)]
-        if self._springs is not None:
-            blocks.append(self.assembly.pack(self.mesh.epi, self._springs))
+        for surface in self.springs:
+            acts = surface in self._acting()
+            matrix = surface.spring + self._rate * surface.dashpot if acts else np.zeros_like(surface.spring)
+            blocks.append(self.assembly.pack(surface.facets, matrix))
         self._solver.factor(self.assembly.matrix(self._response.tangent, *blocks))
         return Tangent(self, unknown, load, state)
 

@@ -115,6 +115,11 @@ class LoadStepper:
         linearization = Linearization(at.state, at.load, at.unknown, at.previous) if at and at.previous else None
         return SolvedFrame(self.state, self.load, self.factorizations, self.max_error, linearization)
 
+    def rest(self, state: State) -> None:
+        """Let the surroundings act from a state on, at which they are at rest."""
+        self.equations.rest_at(state)
+        self._tangent = None
+
     def resume(self, frame: SolvedFrame) -> None:
         """Continue from a solved frame."""
         self.state, self.load, self.factorizations = frame.state, frame.load, frame.factorizations

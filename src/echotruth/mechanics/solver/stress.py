@@ -108,7 +108,7 @@ def add_volumetric(inverse: Floats, j: float, pressure: float, bulk: float, tang
 
 @njit(cache=True, error_model="numpy")
 def active(c_ff: float, beta: float, power: float) -> tuple[float, float]:
-    """Active fibre stress for T_Ca = 1: S_ff = [1 + beta (lambda - 1)] / lambda^power with lambda^2 = C_ff = 2 E_f + 1.
+    """Active stress along an axis for T_Ca = 1: S_ff = [1 + beta (lambda - 1)] / lambda^power with lambda^2 = C_ff.
 
     Power 2 is the tension per deformed area of the paper's equations 2 and 3; power 0 the tension as second
     Piola-Kirchhoff stress, as in Land et al. 2015.

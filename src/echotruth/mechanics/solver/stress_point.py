@@ -32,6 +32,8 @@ class Point(NamedTuple):
         Right Cauchy-Green tensor, its inverse, and the isochoric strain.
     passive : ndarray of shape (6,)
         Passive stress for a stiffness of one.
+    active_stiffness : ndarray of shape (3,)
+        Derivative of the active stress along f, s and n by the strain there, for a tension of one.
     stress : ndarray of shape (4, 6)
         Parts of the second Piola-Kirchhoff stress S.
     dS_dE : ndarray of shape (6, 6), Pa
@@ -46,6 +48,7 @@ class Point(NamedTuple):
     inverse: Floats
     strain: Floats
     passive: Floats
+    active_stiffness: Floats
     stress: Floats
     dS_dE: Floats
     dP_dF: Floats
@@ -60,6 +63,7 @@ def allocate():
         np.empty(6),
         np.empty(6),
         np.empty(6),
+        np.empty(3),
         np.empty((4, 6)),
         np.empty((6, 6)),
         np.empty((9, 9)),
@@ -92,32 +96,38 @@ def evaluate(j, law, scale, previous_c, work, with_tangent):
 
     S = C S_passive + T_Ca S_active + (p + C pointwise_bulk_ratio (J - 1)) J C^-1
     + viscous modulus (C - C_previous) / 2; the last term is viscous (Kelvin-Voigt), with the growth of C since the
-    previous state.
+    previous state. S_active acts along the fibre, and by its shares along sheet and normal, in each direction as the
+    stretch there demands: the stress of fibres that are dispersed into these directions.
     """
     stiffness, tension, pressure, viscous_modulus = scale
     c, inverse, passive, stress, tangent = work.c, work.inverse, work.passive, work.stress, work.dS_dE
+    active_stiffness = work.active_stiffness
     laws.invert(c, inverse)
     factor = laws.isochoric_strain(c, abs(j), work.strain)
     law.energy(work.strain, law.constants, passive, tangent)
     trace = laws.isochoric_stress(c, inverse, factor, passive)
-    active, active_tangent = laws.active(c[0], law.active[0], law.active[1])
     bulk = stiffness * law.pointwise_bulk_ratio
     hydrostatic = bulk * (j - 1) + pressure
     for k in range(6):
         viscous = viscous_modulus * (c[k] - previous_c[k]) / 2
         stress[TOTAL, k] = stiffness * passive[k] + hydrostatic * j * inverse[k] + viscous
-    stress[TOTAL, 0] += tension * active
+    for k in range(3):
+        share = 1.0 if k == 0 else law.cross_fibre[k - 1]
+        active, active_tangent = laws.active(c[k], law.active[0], law.active[1])
+        stress[TOTAL, k] += tension * share * active
+        stress[ACTIVE, k], stress[ACTIVE, k + 3] = share * active, 0.0
+        active_stiffness[k] = share * active_tangent
     if with_tangent:
         laws.isochoric_tangent(c, inverse, factor, trace, passive, tangent)
         tangent *= stiffness
         laws.add_volumetric(inverse, j, hydrostatic, bulk, tangent)
-        tangent[0, 0] += tension * active_tangent
+        for k in range(3):
+            tangent[k, k] += tension * active_stiffness[k]
         for k in range(6):
             tangent[k, k] += viscous_modulus / laws.MULTIPLICITY[k]
             for m in range(k):
                 tangent[k, m] = tangent[m, k]
             stress[PASSIVE, k] = passive[k] + law.pointwise_bulk_ratio * (j - 1) * j * inverse[k]
-            stress[ACTIVE, k] = active if k == 0 else 0.0
             stress[VOLUMETRIC, k] = j * inverse[k]
 
 

@@ -16,6 +16,7 @@ from echotruth.mechanics.pathology import Tissue, tissue
 from echotruth.mechanics.solver import element
 from echotruth.mechanics.solver.equilibrium import Equilibrium
 from echotruth.mechanics.solver.support import base_support
+from echotruth.mechanics.solver.surroundings import surroundings
 
 
 @dataclass(frozen=True)
@@ -57,8 +58,9 @@ def equilibrium(config: Config, wall: Wall) -> Equilibrium:
     """
     section = config.mechanics
     frames = fibres.fibre_frames(wall.mesh, wall.depth, config.fibres, tetrahedron()[0], config.seed)
-    support = base_support(wall.mesh, section.base, section.si().epicardial_spring)
-    return Equilibrium(wall.mesh, frames, wall_law(section), support, wall.tissue.stiffness_scale)
+    support = base_support(wall.mesh, section.base)
+    springs = surroundings(wall.mesh, section)
+    return Equilibrium(wall.mesh, frames, wall_law(section), support, wall.tissue.stiffness_scale, springs)
 
 
 def wall_law(section: Mechanics) -> element.WallLaw:
@@ -67,4 +69,5 @@ def wall_law(section: Mechanics) -> element.WallLaw:
     active = np.array([section.active.length_dependence, power])
     material, si = section.material, section.si()
     bulk = si.bulk_modulus, si.pointwise_bulk_ratio
-    return element.WallLaw(compiled(material.law), material.constants(), active, *bulk, si.viscosity)
+    cross_fibre = np.array([section.active.sheet_share, section.active.normal_share])
+    return element.WallLaw(compiled(material.law), material.constants(), active, *bulk, si.viscosity, cross_fibre)
