@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import land
@@ -10,6 +11,7 @@ import numpy as np
 from worker import Clock, serve
 
 from echotruth.config import Config, Geometry, Loop, Mechanics
+from echotruth.config.loading import load
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats, Mesh, shape
 from echotruth.loop.cycle import Cycle, read_loop
@@ -22,8 +24,10 @@ from echotruth.mechanics.solver.newton import LoadStepper
 from echotruth.mechanics.solver.support import base_support
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall, wall_law
 
-ELASTIC = Mechanics(viscosity_Pa_s=0.0)
-"""The wall that ships, less its viscosity, which the peer's has not."""
+PAPERS = load(Path(__file__).parents[1] / "config" / "paper.yaml")
+"""The paper's heart, whose fibres pull along themselves alone and which nothing surrounds, as the peer's."""
+ELASTIC = PAPERS.mechanics.model_copy(update={"viscosity_Pa_s": 0.0})
+"""Its wall, less its viscosity, which the peer's has not."""
 
 LAND_BULK_KPA = 1e5
 """Bulk modulus for Land et al., whose wall is incompressible."""
@@ -38,8 +42,9 @@ class Ours:
     _heart: Equilibrium | None = None
 
     def mesh(self, elements: list[int] | None = None) -> dict[str, int]:
-        """Mesh the ventricle that ships, or one with other numbers of elements around, along and through the wall."""
-        config = Config(geometry=Geometry(**_elements(elements)), mechanics=ELASTIC)
+        """Mesh the paper's ventricle, or one with other numbers of elements around, along and through the wall."""
+        geometry = Geometry(**_elements(elements))
+        config = PAPERS.model_copy(update={"geometry": geometry, "mechanics": ELASTIC})
         self._use(config)
         return {"cells": len(self._wall.mesh.cells)}
 
@@ -127,7 +132,12 @@ class Ours:
         exponents = {name: problem["law"][name] for name in ("fibre", "transverse", "shear")}
         section = Mechanics(
             material={"law": "fung", **exponents},
-            active={"length_dependence": 0.0, "stress": "second_piola_kirchhoff"},
+            active={
+                "length_dependence": 0.0,
+                "stress": "second_piola_kirchhoff",
+                "sheet_share": 0.0,
+                "normal_share": 0.0,
+            },
             bulk_modulus_kPa=LAND_BULK_KPA,
             viscosity_Pa_s=0.0,
         )

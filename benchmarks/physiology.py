@@ -1,14 +1,15 @@
 """Search for the heart that moves as an animal's: what each means does, and which targets oppose each other.
 
-    python benchmarks/physiology.py search --hearts 320 --processes 2
+    python benchmarks/physiology.py search --hearts 256 --processes 2
     python benchmarks/physiology.py levers
     python benchmarks/physiology.py confirm
+    python benchmarks/physiology.py refine
     python benchmarks/physiology.py page
 
 Hearts are drawn by a scrambled Sobol sequence over the levers (`search`), varied one lever at a time around the chosen
-one (`levers`), and solved on the mesh that ships (`confirm`, the paper's heart `paper`). The search mesh has six
-elements around: shape, fibres and supports are the same all around, and its wall means are those of the full mesh to
-the second digit. `page` writes benchmarks/results/physiology.md and its figures from the rows.
+one (`levers`), and solved on the mesh that ships (`confirm`, the paper's heart `paper`) and a finer one (`refine`). The
+search mesh has six elements around: shape, fibres and supports are the same all around, and its wall means are those of
+the full mesh to the second digit. `page` writes benchmarks/results/physiology.md and its figures from the rows.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 RESULTS = Path("benchmarks/results")
-SEARCH_MESH, SHIPPED_MESH = (6, 8, 2), (24, 12, 3)
+SEARCH_MESH, SHIPPED_MESH, FINE_MESH = (6, 8, 2), (24, 12, 3), (30, 16, 4)
 SEED = 2026
 
 
@@ -43,13 +44,14 @@ class Lever(NamedTuple):
     name: str
 
 
+SPRING = ("mechanics.pericardium.spring_kPa_per_mm",)
 LEVERS = (
     Lever(("fibres.endo_deg",), 50.0, 84.0, "endocardial angle (deg)"),
     Lever(("fibres.epi_deg",), -60.0, -36.0, "epicardial angle (deg)"),
     Lever(("fibres.transverse_endo_deg", "fibres.transverse_epi_deg"), -8.0, 8.0, "transverse angle (deg)"),
     Lever(("mechanics.active.sheet_share",), 0.0, 0.5, "share of tension, sheet"),
     Lever(("mechanics.active.normal_share",), 0.0, 0.4, "share of tension, normal"),
-    Lever(("mechanics.pericardium.spring_kPa_per_mm",), 0.0, 4.0, "pericardium (kPa/mm)"),
+    Lever(SPRING, 0.0, 4.0, "pericardium (kPa/mm)"),
     Lever(("mechanics.pericardium.dashpot_kPa_s_per_mm",), 0.0, 0.02, "pericardium (kPa s/mm)"),
     Lever(("mechanics.material.shear",), 2.0, 12.0, "passive shear b_fs"),
     Lever(("mechanics.elastic_base.circumferential_spring_kPa_per_mm",), 0.1, 10.0, "elastic base, turning (kPa/mm)"),
@@ -109,7 +111,20 @@ near none in life (doi 10.1186/1532-429X-12-48). Human: twist and its course doi
 TARGETS["rat"] = TARGETS["mouse"]
 
 
-def drawn(hearts: int) -> list[dict[str, Any]]:
+SPRING_SCALE = {"mouse": 1.0, "rat": 0.5, "human": 0.1}
+"""Factor of the pericardial spring: at equal strains it is as stiff in any heart."""
+
+
+def levers_of(species: str) -> tuple[Lever, ...]:
+    """The levers, with ranges for a species."""
+    factor = SPRING_SCALE[species]
+    return tuple(
+        lever._replace(low=factor * lever.low, high=factor * lever.high) if lever.keys == SPRING else lever
+        for lever in LEVERS
+    )
+
+
+def drawn(species: str, hearts: int) -> list[dict[str, Any]]:
     """Settings of hearts drawn over the levers."""
     from scipy.stats.qmc import Sobol
 
@@ -117,16 +132,17 @@ def drawn(hearts: int) -> list[dict[str, Any]]:
     rows = []
     for point in unit:
         values: dict[str, Any] = {"mechanics.base": "elastic" if point[-1] < 0.5 else "radial_free"}
-        for lever, at in zip(LEVERS, point, strict=False):
+        for lever, at in zip(levers_of(species), point, strict=False):
             values |= dict.fromkeys(lever.keys, round(lever.low + float(at) * (lever.high - lever.low), 4))
         rows.append(values)
     return rows
 
 
-def varied(chosen: dict[str, Any], steps: int) -> list[dict[str, Any]]:
+def varied(species: str, steps: int) -> list[dict[str, Any]]:
     """Settings that differ from the chosen ones in one lever, and the chosen ones first."""
+    chosen = shipped({"geometry": {"preset": species}})
     rows = [dict(chosen)]
-    for lever in LEVERS:
+    for lever in levers_of(species):
         base = {"mechanics.base": "elastic"} if lever.keys[0].startswith("mechanics.elastic_base") else {}
         for value in np.linspace(lever.low, lever.high, steps):
             rows.append(chosen | base | dict.fromkeys(lever.keys, round(float(value), 4)))
@@ -239,7 +255,7 @@ def shipped(source: Any) -> dict[str, Any]:
 def main() -> None:
     """Search, vary, confirm or write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("search", "levers", "confirm", "paper", "page"))
+    parser.add_argument("what", choices=("search", "levers", "confirm", "refine", "paper", "page"))
     parser.add_argument("--species", default="mouse", choices=tuple(TARGETS))
     parser.add_argument("--hearts", type=int, default=320)
     parser.add_argument("--steps", type=int, default=5)
@@ -254,12 +270,13 @@ def main() -> None:
         return
     species, out = arguments.species, arguments.rows / f"{arguments.species}_{arguments.what}.json"
     settings = {
-        "search": lambda: drawn(arguments.hearts),
-        "levers": lambda: varied(shipped({"geometry": {"preset": species}}), arguments.steps),
+        "search": lambda: drawn(species, arguments.hearts),
+        "levers": lambda: varied(species, arguments.steps),
         "confirm": lambda: [{}],
+        "refine": lambda: [{}],
         "paper": lambda: [shipped("config/paper.yaml")],
     }[arguments.what]()
-    mesh = SEARCH_MESH if arguments.what in ("search", "levers") else SHIPPED_MESH
+    mesh = {"search": SEARCH_MESH, "levers": SEARCH_MESH, "refine": FINE_MESH}.get(arguments.what, SHIPPED_MESH)
     run(species, settings, mesh, arguments.processes, out)
 
 

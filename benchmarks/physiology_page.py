@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from physiology import LEVERS, TARGETS, misfit, missed
+from physiology import LEVERS, TARGETS, levers_of, misfit, missed
 
 from echotruth.report import style
 
@@ -67,7 +67,7 @@ def rows_of(folder: Path, species: str, what: str) -> list[Row]:
 def effects(rows: list[Row]) -> dict[str, list[float]]:
     """Change of each quantity over the range of each lever, by a linear fit over all hearts: quantity -> levers."""
     design = np.array([[row["values"][lever.keys[0]] for lever in LEVERS] for row in rows])
-    low, high = np.array([(lever.low, lever.high) for lever in LEVERS]).T
+    low, high = np.array([(lever.low, lever.high) for lever in levers_of(rows[0]["species"])]).T
     unit = np.column_stack([np.ones(len(rows)), (design - low) / (high - low)])
     return {
         name: np.linalg.lstsq(unit, np.array([row[name] for row in rows]), rcond=None)[0][1:].tolist()
@@ -148,7 +148,7 @@ def effects_table(rows: list[Row]) -> str:
     lines = [
         [f"{lever.name}, {lever.low:g} to {lever.high:g}"]
         + [f"{found[name][k]:+.{digits}f}" for name, (_, digits) in EFFECTS.items()]
-        for k, lever in enumerate(LEVERS)
+        for k, lever in enumerate(levers_of(rows[0]["species"]))
     ]
     return table(header, lines)
 
@@ -172,14 +172,14 @@ def write(folder: Path, results: Path) -> None:
     text = [INTRODUCTION]
     for species in TARGETS:
         search, levers = rows_of(folder, species, "search"), rows_of(folder, species, "levers")
-        confirmed, paper = rows_of(folder, species, "confirm"), rows_of(folder, species, "paper")
+        confirmed, fine, paper = (rows_of(folder, species, what) for what in ("confirm", "refine", "paper"))
         if not search:
             continue
         text.append(f"## {species.capitalize()}: {len(search)} hearts\n")
         within = sum(not missed(row) for row in search)
         text.append(f"{within} of {len(search)} hearts are within all that is asked.\n")
         chosen = levers[:1] or confirmed
-        columns = {"paper's": paper, "chosen, search mesh": levers, "chosen, mesh that ships": confirmed}
+        columns = {"paper's": paper, "chosen, search mesh": levers, "mesh that ships": confirmed, "finer mesh": fine}
         text.append(asked_table(species, {name: rows[0] for name, rows in columns.items() if rows}))
         text.append("\n### What each means does\n\nChange over the range, by a linear fit over all hearts.\n")
         text.append(effects_table(search))
