@@ -54,7 +54,7 @@ LEVERS = (
     Lever(SPRING, 0.0, 4.0, "pericardium (kPa/mm)"),
     Lever(("mechanics.pericardium.dashpot_kPa_s_per_mm",), 0.0, 0.02, "pericardium (kPa s/mm)"),
     Lever(("mechanics.material.shear",), 2.0, 12.0, "passive shear b_fs"),
-    Lever(("mechanics.elastic_base.circumferential_spring_kPa_per_mm",), 0.1, 10.0, "elastic base, turning (kPa/mm)"),
+    Lever(("mechanics.elastic_base.circumferential_spring_kPa_per_mm",), 0.1, 10.0, "elastic base (kPa/mm)"),
 )
 """Helix angles: from the mid-ventricle of five mice, +52 +- 5 and -41 +- 3 deg (Angeli et al., J Cardiovasc Magn Reson
 16 (2014) 77, doi 10.1186/s12968-014-0077-x), to the paper's 84 and beyond 42, since voxels at the wall's edges average

@@ -183,7 +183,7 @@ def write(folder: Path, results: Path) -> None:
         text.append(asked_table(species, {name: rows[0] for name, rows in columns.items() if rows}))
         text.append("\n### What each means does\n\nChange over the range, by a linear fit over all hearts.\n")
         text.append(effects_table(search))
-        if len(levers) > 1:
+        if len(levers) > 2 * len(LEVERS):
             draw_levers(levers).savefig(results / f"physiology_{species}_levers.png", dpi=100)
             text.append(f"\nVaried alone around the chosen heart:\n\n![levers](physiology_{species}_levers.png)")
         if chosen:
