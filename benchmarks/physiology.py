@@ -205,8 +205,7 @@ def quantities(found: dict[str, Any], arrays: dict[str, Any]) -> dict[str, Any]:
         "tension_es_kPa": found["tension_es"] / 1e3,
         "tension_min_kPa": found["tension_min"] / 1e3,
     }
-    course = np.degrees(found["twist"]).round(3).tolist()
-    return {name: float(np.round(value, 5)) for name, value in row.items()} | {"twist": course}
+    return {name: float(np.round(value, 5)) for name, value in row.items()}
 
 
 def misfit(row: dict[str, Any]) -> float:
@@ -234,7 +233,8 @@ def run(species: str, settings: list[dict[str, Any]], mesh: tuple[int, int, int]
         for task in as_completed(tasks):
             rows[tasks[task]] = row = task.result()
             print(len(rows), "of", len(tasks), f"misfit {misfit(row):.2f}", *missed(row), flush=True)
-            out.write_text(json.dumps([rows[number] for number in sorted(rows)], indent=0) + "\n")
+            lines = (json.dumps(rows[number]) for number in sorted(rows))
+            out.write_text("[\n" + ",\n".join(lines) + "\n]\n")
 
 
 def shipped(source: Any) -> dict[str, Any]:
