@@ -169,7 +169,7 @@ def _fibres_of_paper(mesh: Mesh) -> Floats:
 
 def _fibres_by_rule(mesh: Mesh) -> Floats:
     """Fibre axes of the same angles by the rule of the heart."""
-    rule = Fibres(endo_deg=90.0, epi_deg=-90.0)
+    rule = Fibres(endo_deg=90.0, epi_deg=-90.0, transverse_endo_deg=0.0, transverse_epi_deg=0.0)
     return fibres.fibre_frames(mesh, fibres.wall_depth(mesh), rule, tetrahedron()[0])
 
 
