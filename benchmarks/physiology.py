@@ -82,13 +82,18 @@ class Target(NamedTuple):
 
 
 INFINITY = float("inf")
+BEFORE_EJECTION = {
+    "rr_ivc": Target("E_RR at the end of IVC", 0, 0.05, -INFINITY, 0.08),
+    "rc_ivc": Target("largest layer mean of E_RC, end of IVC", 0, 0.04, 0, 0.08),
+    "rl_ivc": Target("largest layer mean of E_RL, end of IVC", 0, 0.04, 0, 0.08),
+}
+"""Of any species: next to no thickening or shear through the wall."""
+
 TARGETS = {
     "mouse": {
         "twist_es": Target("twist at ES (deg)", 5.6, 0.9, 3, 9),
         "twist_ivc": Target("twist at the end of IVC (deg)", 0, 1.5, -3, 3),
-        "rr_ivc": Target("E_RR at the end of IVC", 0, 0.05, -INFINITY, 0.08),
-        "rc_ivc": Target("largest layer mean of E_RC, end of IVC", 0, 0.04, 0, 0.08),
-        "rl_ivc": Target("largest layer mean of E_RL, end of IVC", 0, 0.04, 0, 0.08),
+        **BEFORE_EJECTION,
         "rc_es": Target("E_RC at ES", 0, 0.08, -0.05, 0.05),
         "rl_es": Target("E_RL at ES", 0.04, 0.12, -0.05, 0.05),
         "cl_es": Target("E_CL at ES", 0.03, 0.07, 0.01, 0.08),
@@ -99,9 +104,7 @@ TARGETS = {
     "human": {
         "twist_es": Target("twist at ES (deg)", 13, 4, 6, 16),
         "twist_ivc": Target("twist at the end of IVC (deg)", 0, 2, -3, 3),
-        "rr_ivc": Target("E_RR at the end of IVC", 0, 0.05, -INFINITY, 0.08),
-        "rc_ivc": Target("largest layer mean of E_RC, end of IVC", 0, 0.04, 0, 0.08),
-        "rl_ivc": Target("largest layer mean of E_RL, end of IVC", 0, 0.04, 0, 0.08),
+        **BEFORE_EJECTION,
         "cc_es": Target("E_CC at ES", -0.19, 0.03, -0.24, -0.15),
         "gls": Target("GLS", -0.19, 0.02, -0.22, -0.16),
     },

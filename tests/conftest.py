@@ -26,6 +26,14 @@ def coarse_mesh() -> Mesh:
 
 
 @pytest.fixture(scope="session")
+def half_sphere() -> Mesh:
+    """Half a sphere with radii of 2 and 3 mm."""
+    size = {"endo_radius_mm": 2.0, "endo_length_mm": 2.0, "wall_mm": 1.0, "apex_wall_mm": 1.0, "base_mm": 0.0}
+    elements = {"circumferential_elements": 24, "longitudinal_elements": 8, "transmural_elements": 1}
+    return left_ventricle(Geometry(**size, **elements))
+
+
+@pytest.fixture(scope="session")
 def affine() -> tuple[np.ndarray, np.ndarray]:
     """A turn by 9 degrees about the long axis, a squeeze, and a lift: deformation gradient and shift (m)."""
     turn = np.radians(9)

@@ -16,16 +16,6 @@ from echotruth.mechanics.twist import slice_rotation
 from validation.heart import solved_heart
 from validation.work import balance
 
-HEMISPHERE = Geometry(
-    endo_radius_mm=2.0,
-    endo_length_mm=2.0,
-    wall_mm=1.0,
-    apex_wall_mm=1.0,
-    base_mm=0.0,
-    circumferential_elements=24,
-    longitudinal_elements=8,
-    transmural_elements=1,
-)
 INNER, RADIUS = 2e-3, 3e-3
 COARSE = Geometry(circumferential_elements=6, longitudinal_elements=4, transmural_elements=1)
 ALONE = {
@@ -48,18 +38,17 @@ def total_force(matrix, motion):
     return np.einsum("frs,fr,fs->", matrix, motion, motion)
 
 
-def test_pericardium_pushes_back_by_the_normal_part_of_a_shift():
+def test_pericardium_pushes_back_by_the_normal_part_of_a_shift(half_sphere):
     """Over half a sphere the mean square of any component of the normal is a third: 2 pi R^2 / 3 in each direction."""
-    mesh = left_ventricle(HEMISPHERE)
-    matrix = surface_matrix(mesh, mesh.epi, normal)
+    matrix = surface_matrix(half_sphere, half_sphere.epi, normal)
     np.testing.assert_allclose(matrix, matrix.transpose(0, 2, 1), atol=1e-18)
     for axis in range(3):
-        shift = np.tile(np.eye(3)[axis], (len(mesh.epi), 6, 1))
+        shift = np.tile(np.eye(3)[axis], (len(half_sphere.epi), 6, 1))
         assert total_force(matrix, shift) == pytest.approx(2 * np.pi * RADIUS**2 / 3, rel=1e-3)
 
 
-def test_base_resists_axial_motion_by_its_area_and_turning_by_its_polar_moment():
-    mesh = left_ventricle(HEMISPHERE)
+def test_base_resists_axial_motion_by_its_area_and_turning_by_its_polar_moment(half_sphere):
+    mesh = half_sphere
     rise = np.tile([0.0, 0.0, 1.0], (len(mesh.base), 6, 1))
     turn = np.cross([0.0, 0.0, 1.0], mesh.nodes[mesh.base])
     area, moment = np.pi * (RADIUS**2 - INNER**2), np.pi / 2 * (RADIUS**4 - INNER**4)

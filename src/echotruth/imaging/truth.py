@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from echotruth.aha import segment
 from echotruth.arrays import Floats
 from echotruth.fem.location import locate
-from echotruth.fem.tetrahedra import MaterialPoints, gradient, interpolate
+from echotruth.fem.tetrahedra import MaterialPoints, gradient, interpolate, straight_triangles
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
 from echotruth.mechanics import kinematics
@@ -155,7 +155,7 @@ def cavity_centroid(heart: Heart, plane: Plane) -> Floats:
     The plane cuts the endocardial triangles in segments a b. With m the mean of their ends, the polygon that they
     enclose consists of triangles m a b: centroid = sum(area (m + a + b) / 3) / sum(area).
     """
-    triangles = plane.to_image(heart.positions(0)[_straight_triangles(heart.endo)])
+    triangles = plane.to_image(heart.positions(0)[straight_triangles(heart.endo)])
     segments = np.array([cut for triangle in triangles if (cut := _intersection(triangle)) is not None])
     if not len(segments):
         return np.full(2, np.nan)
@@ -163,11 +163,6 @@ def cavity_centroid(heart: Heart, plane: Plane) -> Floats:
     a, b = (segments - mean).transpose(1, 0, 2)
     area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
     return mean + (area[:, None] * (a + b) / 3).sum(axis=0) / area.sum()
-
-
-def _straight_triangles(facets: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Split each quadratic triangle into four straight ones, through the middles of its edges."""
-    return facets[:, [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)]].reshape(-1, 3)
 
 
 def _intersection(triangle: Floats) -> Floats | None:

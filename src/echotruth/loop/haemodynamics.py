@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from echotruth.arrays import Floats
 from echotruth.loop.phases import EJECTION, FILLING, leak
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 _MAX_SHARE = 0.25
 """Volume, over the stroke volume, up to which the curve is extrapolated back to the motion of a valve."""
@@ -136,6 +138,8 @@ def pressure_rates(time: Floats, pressure: Floats, mitral_opening: float) -> Pre
     PressureRates
         Not a number without pressures; `tau` also where there is no relaxation between the two times.
     """
+    from scipy.interpolate import CubicSpline
+
     if not np.isfinite(pressure).all() or len(time) < _PARABOLA:
         return PressureRates(np.nan, np.nan, np.nan)
     closed = np.append(time, 2 * time[-1] - time[-2]), np.append(pressure, pressure[0])

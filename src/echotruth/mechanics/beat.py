@@ -15,7 +15,6 @@ from echotruth.loop import phases
 from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
 from echotruth.mechanics.history import Arrays, collect_outputs
-from echotruth.mechanics.motion_file.motion import motion_from_file
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.checkpoint import Checkpoints
@@ -59,6 +58,8 @@ def simulate(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
     its files do (:func:`.motion_from_file`).
     """
     if config.motion.kind == "file":
+        from echotruth.mechanics.motion_file.motion import motion_from_file
+
         return motion_from_file(config)
     return beat(config, scratch) if config.motion.kind == "beat" else prescribed_motion(config)
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.fem.tetrahedra import Integers
+from echotruth.fem.tetrahedra import Integers, straight_triangles
 
 LONG_AXIS_PLANES = 6
 """Planes through the long axis, at equal angles, over which the global longitudinal strain is averaged."""
@@ -21,8 +21,6 @@ MID_WALL = 0.5
 MID_SLICE = 0.5
 """Position of the short-axis plane of the wall thickness: 0 at the base plane, 1 at the endocardial apex, at ED."""
 
-_TRIANGLES = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
-"""Linear triangles of a quadratic one."""
 _TETRAHEDRA = np.array(
     [(0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3), (4, 6, 7, 8), (4, 5, 6, 8), (6, 7, 8, 9), (5, 6, 8, 9)]
 )
@@ -146,8 +144,7 @@ def _crossings(edges: NDArray[np.integer], value: Floats) -> Cut:
 
 def _area_inside(facets: Integers, positions: Floats, height: float) -> float:
     """Area, m^2, that a surface encloses in a plane of constant z, of which every ray from the centre meets it once."""
-    triangles = facets[:, _TRIANGLES].reshape(-1, 3)
-    segments = cut_triangles(triangles, positions[:, 2] - height).values(positions)[..., :2]
+    segments = cut_triangles(straight_triangles(facets), positions[:, 2] - height).values(positions)[..., :2]
     if not len(segments):
         return np.nan
     length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=-1)

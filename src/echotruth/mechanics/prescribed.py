@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.config import Config
 from echotruth.config.motion import Affine, Rigid, TimeCourse, TubeMotion
@@ -43,17 +44,34 @@ def prescribed_motion(config: Config) -> dict[str, Arrays]:
     amplitude = motion_amplitude(config.motion.time_course, config.loop.frames)
     displacement = np.stack([displacement_at(config, mesh, mesh.nodes, a) for a in amplitude])
     _check_clearance(config, mesh, displacement)
+    phase = np.full(len(amplitude), FILLING, np.uint8)
+    mechanics = unsolved(config, displacement, int(np.argmax(amplitude)), phase)
+    return collect_outputs(config, wall(config, mesh), mechanics)
+
+
+def unsolved(config: Config, displacement: Floats, es: int, phase: NDArray[np.uint8]) -> Arrays:
+    """The group `mechanics` of a motion that is not solved: what a solution alone has is not a number.
+
+    Parameters
+    ----------
+    config : Config
+        Only the section loop is used.
+    displacement : ndarray of shape (n_frames, n_nodes, 3), m
+    es : int
+        Frame of end-systole.
+    phase : ndarray of shape (n_frames,)
+    """
+    frames = len(displacement)
     undefined = ("pressure", "volume", "pressure_target", "volume_target", "active_tension", "residual")
-    mechanics = {
+    return {
         "time": read_loop(config.loop).time,
-        **dict.fromkeys(undefined, np.full(len(amplitude), np.nan)),
+        **dict.fromkeys(undefined, np.full(frames, np.nan)),
         "displacement": displacement,
         "stiffness": np.array(np.nan),
-        "es_frame": np.array(np.argmax(amplitude)),
-        "phase": np.full(len(amplitude), FILLING, np.uint8),
-        "newton_steps": np.zeros(len(amplitude), np.int32),
+        "es_frame": np.array(es),
+        "phase": phase,
+        "newton_steps": np.zeros(frames, np.int32),
     }
-    return collect_outputs(config, wall(config, mesh), mechanics)
 
 
 def motion_amplitude(name: TimeCourse, frames: int) -> Floats:

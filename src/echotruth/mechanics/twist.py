@@ -35,24 +35,6 @@ def rotation(unloaded: Floats, endo: NDArray[np.integer], positions: Floats, cen
     return -slice_rotation(positions[:, nodes, :2])
 
 
-def twist(unloaded: Floats, endo: NDArray[np.integer], positions: Floats) -> Floats:
-    """Rotation of the apex less that of the base since end-diastole.
-
-    Parameters
-    ----------
-    unloaded, endo, positions : ndarray
-        As of :func:`rotation`.
-
-    Returns
-    -------
-    ndarray of shape (n_frames,), rad
-        Positive where the apex turns counter-clockwise seen from the apex, as it does in health
-        (Young & Cowan 2012, doi 10.1186/1532-429X-14-49).
-    """
-    apex, base = (rotation(unloaded, endo, positions, centre) for centre in (APICAL_SLICE, BASAL_SLICE))
-    return apex - base
-
-
 def slice_rotation(points: Floats) -> Floats:
     """Least-squares rotation of a slice about its centroid since the first frame.
 

@@ -9,11 +9,10 @@ import numpy as np
 from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.loop import phases
-from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.history import Arrays, collect_outputs
 from echotruth.mechanics.motion_file.cycle import periodic_weights
 from echotruth.mechanics.motion_file.wall import MovingWall, moving_wall
-from echotruth.mechanics.prescribed import MotionError
+from echotruth.mechanics.prescribed import MotionError, unsolved
 from echotruth.mechanics.solver.wall import wall
 
 logger = logging.getLogger("echotruth.mechanics")
@@ -44,22 +43,13 @@ def motion_from_file(config: Config) -> dict[str, Arrays]:
     weights = periodic_weights(moving.cycle.phase, frames)
     positions = np.tensordot(weights, moving.positions, 1)
     _check_clearance(config, moving, positions)
-    volume, undefined = moving.cavity_volumes(positions), np.full(frames, np.nan)
+    volume = moving.cavity_volumes(positions)
     # With a constant for the pressure, end-systole is the frame of the smallest volume.
     no_pressure = np.ones(frames)
     es = phases.es_frame(no_pressure, volume)
     logger.info("%s", _summary(config, moving, volume, es))
-    not_known = ("pressure", "pressure_target", "volume_target", "active_tension", "residual")
-    mechanics = {
-        "time": read_loop(config.loop).time,
-        "volume": volume,
-        **dict.fromkeys(not_known, undefined),
-        "displacement": positions - moving.mesh.nodes,
-        "stiffness": np.array(np.nan),
-        "es_frame": np.array(es),
-        "phase": phases.phases(no_pressure, volume),
-        "newton_steps": np.zeros(frames, np.int32),
-    }
+    phase = phases.phases(no_pressure, volume)
+    mechanics = unsolved(config, positions - moving.mesh.nodes, es, phase) | {"volume": volume}
     arrays = collect_outputs(config, wall(config, moving.mesh), mechanics)
     _check_interpolated(config, arrays["kinematics"]["volume_ratio_min"])
     return arrays

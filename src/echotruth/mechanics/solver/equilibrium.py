@@ -250,7 +250,7 @@ class Equilibrium:
         gradient = cavity.volume_gradient(nodes, self.mesh.endo)
         self._volume_gradient = self.assembly.vector(self.assembly.rotate(self.mesh.endo, gradient), ENDO)
         internal = self.assembly.vector(response.force[:, TOTAL])
-        for surface in self._acting():
+        for surface in filter(self._acts, self.springs):
             internal += self._spring_force(surface, nodes)
         external = (state.cavity_pressure if unknown == "cavity_pressure" else load.pressure) * self._volume_gradient
         volumetric = response.volume / self.unloaded_volume - 1 - state.cell_pressure / self.law.bulk_modulus
@@ -269,9 +269,9 @@ class Equilibrium:
         force += self._rate * np.einsum("frs,fs->fr", surface.dashpot, since)
         return self.assembly.vector(self.assembly.rotate(surface.facets, force.reshape(-1, 6, 3)), surface.group)
 
-    def _acting(self) -> list[Springs]:
-        """The springs that act now."""
-        return [one for one in self.springs if not one.rest_at_end_diastole or self._end_diastole is not None]
+    def _acts(self, surface: Springs) -> bool:
+        """Whether the springs of a surface act already."""
+        return not surface.rest_at_end_diastole or self._end_diastole is not None
 
     def linearize(self, state: State, load: Load, unknown: Unknown) -> Tangent:
         """Factor the tangent at a state."""
@@ -280,8 +280,9 @@ class Equilibrium:
         cavity.volume_hessian(self.positions(state, load.prescribed_fraction), self.mesh.endo, self._facets)
         blocks = [self.assembly.pack(self.mesh.endo, -pressure * self._facets)]
         for surface in self.springs:
-            acts = surface in self._acting()
-            matrix = surface.spring + self._rate * surface.dashpot if acts else np.zeros_like(surface.spring)
+            matrix = surface.spring + self._rate * surface.dashpot
+            # Those that do not act yet keep their place in the pattern.
+            matrix = matrix if self._acts(surface) else np.zeros_like(matrix)
             blocks.append(self.assembly.pack(surface.facets, matrix))
         self._solver.factor(self.assembly.matrix(self._response.tangent, *blocks))
         return Tangent(self, unknown, load, state)
