@@ -7,7 +7,7 @@ from echotruth.repository.provenance import code_version
 from echotruth.workflow.compiled import CACHE_GROUPS, cache_folder, lock_cache_writes
 
 ROOT = Path(__file__).parents[1]
-SCRIPTS = ROOT / "workflow/scripts"
+SCRIPTS = ROOT / "src/echotruth/workflow/scripts"
 # A compiled function is cached by the file it stands in, not by those it calls from: one cache a version of the code.
 CACHE = ROOT / ".snakemake/numba" / code_version(*map(str, SCRIPTS.glob("*.py")))
 os.environ["NUMBA_CACHE_DIR"] = str(CACHE)

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -40,22 +39,21 @@ tracking:
 cases:
   seed: [1, 2]
 """
+SNAKEMAKE = ("-m", "snakemake", "--snakefile", str(ROOT / "src/echotruth/workflow/Snakefile"))
+"""The workflow, without the command that runs it."""
 RUN = "from echotruth.cli import main; main()"
 """The command `echotruth`, without its entry point."""
 
 
-class Checkout:
-    """Copy of the workflow, run with the package of this checkout.
+class Workspace:
+    """Empty folder with a configuration, in which the workflow of the package is run.
 
     It uses the compiled functions of the tests, unless `share_cache` is false.
     """
 
     def __init__(self, folder, share_cache=True):
         self.folder = folder
-        for name in ("Snakefile", "rules", "workflow", "profiles"):
-            copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
-            folder.mkdir(exist_ok=True)
-            copy(ROOT / name, folder / name)
+        folder.mkdir(exist_ok=True)
         if share_cache:
             cores.lend(folder / ".snakemake/numba")
         (folder / "tiny.yaml").write_text(CONFIG)
@@ -82,7 +80,7 @@ class Checkout:
         return output
 
     def snakemake(self, *options):
-        return self.run("-m", "snakemake", "--configfile", "tiny.yaml", *options)
+        return self.run(*SNAKEMAKE, "--configfile", "tiny.yaml", *options)
 
     @property
     def bytes(self):
@@ -94,10 +92,10 @@ class Checkout:
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A checkout in which the workflow ran on two cores."""
-    checkout = Checkout(tmp_path_factory.mktemp("first") / "echotruth")
-    checkout.snakemake("--cores", "2")
-    return checkout
+    """A folder in which the workflow ran on two cores."""
+    workspace = Workspace(tmp_path_factory.mktemp("first") / "echotruth")
+    workspace.snakemake("--cores", "2")
+    return workspace
 
 
 @pytest.fixture(scope="module")
@@ -208,7 +206,7 @@ def test_figures_stand_beside_the_repository_and_scratch_does_not(made):
 @pytest.mark.slow
 def test_jobs_of_a_view_find_all_that_they_call_compiled(tmp_path):
     """The miniature compiles all functions that the jobs call, with the same types."""
-    made = Checkout(tmp_path / "echotruth", share_cache=False)
+    made = Workspace(tmp_path / "echotruth", share_cache=False)
     made.snakemake("--cores", "2", "--until", "tracking")
     records = [json.loads(path.read_text()) for path in made.out.glob("ledger/*/*/*.json")]
     assert {record["stage"] for record in records} == {"phantom", "truth", "rf", "bmode", "tracking", "evaluation"}
@@ -223,7 +221,7 @@ def test_second_run_has_nothing_to_do(made):
 def planned(made, text):
     """Rule -> number of jobs that a configuration would run."""
     (made.folder / "changed.yaml").write_text(text)
-    output = made.run("-m", "snakemake", "-n", "--configfile", "changed.yaml", "--cores", "2")
+    output = made.run(*SNAKEMAKE, "-n", "--configfile", "changed.yaml", "--cores", "2")
     return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", output, re.MULTILINE)}
 
 
@@ -267,25 +265,25 @@ def test_record_that_a_failed_job_lost_is_made_again(made, stage, rule):
 @pytest.fixture(scope="module")
 def killed(made, tmp_path_factory):
     """Checkout whose run on one core was killed during imaging, after mechanics, and then continued."""
-    checkout = Checkout(tmp_path_factory.mktemp("second") / "echotruth")
-    process = checkout.start("-m", "snakemake", "--configfile", "tiny.yaml", "--cores", "1")
+    workspace = Workspace(tmp_path_factory.mktemp("second") / "echotruth")
+    process = workspace.start(*SNAKEMAKE, "--configfile", "tiny.yaml", "--cores", "1")
     end = time.monotonic() + 600
-    while not list(checkout.out.glob("scratch/*/*/phantom.npz")):
+    while not list(workspace.out.glob("scratch/*/*/phantom.npz")):
         assert process.poll() is None and time.monotonic() < end
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
-    before = {path: path.stat().st_mtime_ns for path in checkout.out.glob("ledger/mechanics/*.json")}
-    unfinished = len(list(checkout.out.glob("ledger/bmode/*/*.json")))
-    checkout.run("-c", RUN, "run", "tiny.yaml", "--cores", "1")
-    return checkout, before, unfinished
+    before = {path: path.stat().st_mtime_ns for path in workspace.out.glob("ledger/mechanics/*.json")}
+    unfinished = len(list(workspace.out.glob("ledger/bmode/*/*.json")))
+    workspace.run("-c", RUN, "run", "tiny.yaml", "--cores", "1")
+    return workspace, before, unfinished
 
 
 @pytest.mark.slow
 def test_killed_run_taken_up_again_gives_the_bytes_of_an_unbroken_run_on_more_cores(made, killed):
-    checkout, _, unfinished = killed
+    workspace, _, unfinished = killed
     assert unfinished < 4
-    first, second = made.bytes, checkout.bytes
+    first, second = made.bytes, workspace.bytes
     assert not [path for path in sorted({*first, *second}) if first.get(path) != second.get(path)]
 
 

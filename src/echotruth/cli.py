@@ -53,13 +53,12 @@ def run(path: str, config: Config, options: list[str]) -> int:
     options : list of str
         Options for Snakemake, such as `--cores 4` or `-n`.
     """
-    if not Path("Snakefile").is_file():
-        return _fail("no Snakefile in this folder: run this in a checkout of echotruth")
     from echotruth.workflow.execution import execute
     from echotruth.workflow.progress import measured_seconds
 
     folder = Path("out") / config.name
-    snakemake = [sys.executable, "-m", "snakemake", "--configfile", path]
+    snakemake = [sys.executable, "-m", "snakemake", "--snakefile", str(WORKFLOW / "Snakefile"), "--configfile", path]
+    options = [str(WORKFLOW / "profiles" / option) if option in PROFILES else option for option in options]
     with _locked(folder):
         # A killed run leaves Snakemake's lock behind. Our lock ends with its process, so no other run is active.
         if any(Path(".snakemake/locks").glob("*")):
@@ -78,6 +77,12 @@ def run(path: str, config: Config, options: list[str]) -> int:
         print(f"\nRepository: {folder / f'{config.name}.zarr'}\nReport:     {folder / 'report.html'}")
     return status
 
+
+WORKFLOW = Path(echotruth.__file__).parent / "workflow"
+"""Folder of the Snakefile, which travels with the package."""
+
+PROFILES = tuple(path.name for path in (WORKFLOW / "profiles").iterdir())
+"""Profiles of the package, which `--profile` takes by their name."""
 
 CORE_OPTIONS = ("--cores", "-c", "--jobs", "-j", "all")
 """Options (and values) that do not restrict what Snakemake makes."""

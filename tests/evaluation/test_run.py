@@ -318,7 +318,7 @@ def test_option_that_looks_like_a_number_is_one(tracker, text, value):
 def worked(made, evaluate):
     """Job and result of the workflow's own script on one view of the first heart."""
     job = Job(made, "tracking", expand(CONFIG)[0].id, "mid")
-    return job, runpy.run_path(str(ROOT / "workflow/scripts/tracking.py"))["work"](job)
+    return job, runpy.run_path(str(ROOT / "src/echotruth/workflow/scripts/tracking.py"))["work"](job)
 
 
 def test_external_tracker_of_the_configuration_gets_the_scores_it_gets_on_the_command_line(made, worked, evaluate):

@@ -40,7 +40,7 @@ def test_another_statement_changes_the_version(tmp_path):
 
 def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_path):
     def dependencies(stage):
-        return _dependencies((str(ROOT / f"workflow/scripts/{stage}.py"),))
+        return _dependencies((str(ROOT / f"src/echotruth/workflow/scripts/{stage}.py"),))
 
     assert "echotruth.mechanics.solver.newton" in dependencies("mechanics")
     assert "echotruth.materials.neo_hooke" in dependencies("mechanics"), "found in its folder, not by an import"
@@ -49,7 +49,7 @@ def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_
 
 
 def test_cache_of_compiled_functions_has_the_version_of_all_modules_that_compile():
-    scripts = tuple(str(script) for script in (ROOT / "workflow/scripts").glob("*.py"))
+    scripts = tuple(str(script) for script in (ROOT / "src/echotruth/workflow/scripts").glob("*.py"))
     texts = {path: path.read_text() for path in (ROOT / "src").rglob("*.py")}
     files = [path.relative_to(ROOT / "src") for path, text in texts.items() if "njit(" in text or "intrinsic" in text]
     compiled = {".".join(file.with_suffix("").parts).removesuffix(".__init__") for file in files}

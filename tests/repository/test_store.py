@@ -28,7 +28,7 @@ GROUPS = ("geometry", "mechanics", "kinematics", "phantom", "truth/64", "bmode/3
 
 
 def lay_out(path: Path, seeds: list[int], **changes) -> Store:
-    """A store for hearts that differ in their seed, as workflow/scripts/cases.py makes it."""
+    """A store for hearts that differ in their seed, as src/echotruth/workflow/scripts/cases.py makes it."""
     config = Config(**(SMALL | changes), cases={"seed": seeds})
     cases = expand(config)
     rows = [case.id for case in cases]

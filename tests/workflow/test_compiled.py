@@ -7,7 +7,7 @@ from pathlib import Path
 
 from echotruth.workflow.compiled import CACHE_GROUPS, cache_folder
 
-SCRIPTS = Path(__file__).parents[2] / "workflow/scripts"
+SCRIPTS = Path(__file__).parents[2] / "src/echotruth/workflow/scripts"
 FORMS = """\
 import sys
 import numba

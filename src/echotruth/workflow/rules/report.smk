@@ -1,11 +1,11 @@
 """Figures of a repository, for the page that `snakemake --report` writes."""
 
 FIGURES = FOLDER / "figures"
-CAPTIONS = Path(workflow.basedir) / "workflow/report"
+CAPTIONS = WORKFLOW / "captions"
 
 
 def figure(name, category, title):
-    """Figure with its caption, the file of the same name in workflow/report."""
+    """Figure with its caption, the file of the same name in captions."""
     caption = CAPTIONS / f"{Path(name).stem}.rst"
     return report(FIGURES / name, caption=str(caption), category=category, labels={"figure": title})
 
