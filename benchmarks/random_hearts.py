@@ -22,8 +22,8 @@ import numpy as np
 RANGES = {
     "geometry.scale": (0.88, 1.12),
     "geometry.wall_mm": (0.7, 1.3),
-    "fibres.endo_deg": (66.0, 78.0),
-    "fibres.epi_deg": (-50.0, -38.0),
+    "fibres.endo_deg": (60.0, 72.0),
+    "fibres.epi_deg": (-48.0, -36.0),
     "mechanics.material.stiffness_kPa": (0.5, 4.0),
     "mechanics.material.fibre": (6.0, 20.0),
     "mechanics.active.length_dependence": (0.0, 2.0),

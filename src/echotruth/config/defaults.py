@@ -19,6 +19,8 @@ HEART_DEFAULTS: dict[str, dict[str, Any]] = {
     "rat": {
         "loop.file": "rat",
         "probe.preset": "rat_15MHz",
+        "fibres.endo_deg": 72.0,
+        "fibres.epi_deg": -44.0,
         "mechanics.pericardium.spring_kPa_per_mm": 0.5,
     },
     "human": {
@@ -118,7 +120,8 @@ def _length_scale(values: dict[str, Any]) -> float:
     """Field of view over the reference one; 1 if it is invalid, because the models refuse it later."""
     bmode = values.get("bmode", {})
     default = REFERENCE_FIELD_OF_VIEW_MM
-    side = bmode.get("field_of_view_mm", default) if isinstance(bmode, dict) else bmode.field_of_view_mm
+    side = bmode.get("field_of_view_mm") if isinstance(bmode, dict) else getattr(bmode, "field_of_view_mm", None)
+    side = default if side is None else side
     return side / default if isinstance(side, int | float) and side > 0 else 1.0
 
 
