@@ -33,7 +33,8 @@ UNITS: dict[str, float] = {
 }
 """Unit suffix of a key -> factor to SI (mmHg: NIST SP 811, appendix B.8)."""
 
-Positive = Annotated[FiniteFloat, Field(gt=0)]
+Positive = Annotated[FiniteFloat, Field(gt=0, le=1e12)]
+"""Bounded, so that no product of a few of them overflows."""
 Fraction = Annotated[FiniteFloat, Field(ge=0, le=1)]
 Angle = Annotated[FiniteFloat, Field(ge=-90, le=90)]
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=40)]

@@ -46,14 +46,14 @@ BAD = {
     "rf: {f_number: -1}": "rf.f_number = -1",
     "rf: {lines: 4}": "rf.lines = 4",
     "mechanics: {material: {law: fungi}}": "mechanics.material.law = 'fungi': should be 'fung', 'guccione', ",
-    "mechanics: {material: {law: null}}": "mechanics.material.law = None: should be 'fung', 'guccione', ",
+    "mechanics: {material: {law: null}}": "mechanics.material.law = null: should be 'fung', 'guccione', ",
     "mechanics: {material: {fiber: 9}}": "fiber is not a key of the law fung (others: guccione, holzapfel_ogden, "
     "neo_hooke): did you mean mechanics.material.fibre?",
     "mechanics: {material: {law: neo_hooke, fibre: 9.0}}": "is not a key of the law neo_hooke (others: fung, ",
     "mechanics: {material: fung}": "mechanics.material = 'fung': must be a mapping of keys to values",
     "mechanics: {material: {shear: -1.0}}": "mechanics.material.shear = -1.0: should be greater than 0",
     "name: a/b": "name = 'a/b': use letters, digits",
-    "a: [": "line 1: expected the node content",
+    "a: [": "line 1: did not find expected node content: correct the YAML",
     "seed: 1\nseed: 2": "key 'seed' is given twice",
     "- 3": "contains a list: write a mapping",
 }

@@ -27,7 +27,7 @@ ALL_VIEWS = "all"
 class Phantom(Section):
     """Scatterers in the wall."""
 
-    density_per_mm3: Positive = 2800.0
+    density_per_mm3: Annotated[FiniteFloat, Field(gt=0, le=1e6)] = 2800.0
     """Scatterers per cubic millimetre of unloaded wall. At 2800 with mouse_25MHz, speckle SNR is 1.816 (1.913 if fully
     developed); tracker error shows no consistent trend with density. Default: from `probe.preset`, at least ten per
     resolution cell."""
@@ -103,7 +103,7 @@ class Rf(Section):
 class Bmode(Section):
     """Conversion of RF to 8-bit images."""
 
-    field_of_view_mm: Positive = 12.0
+    field_of_view_mm: Annotated[FiniteFloat, Field(gt=0, le=1000)] = 12.0
     """Side of the square image; the array is in the middle of its upper edge. Default: from `probe.preset`."""
     size_px: Annotated[int, Field(ge=32, le=4096)] = 512
     """Pixels along a side of the full image."""

@@ -5,34 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
+from reprlib import Repr
 from typing import Any, get_args, get_origin
 
-import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from echotruth.config.reading import ConfigError, check_size, read_yaml, shown_key
 from echotruth.config.sections import Config
 from echotruth.materials import Material
 from echotruth.section import Section, discriminator, variants
-
-
-class ConfigError(ValueError):
-    """Raised if a configuration cannot be run; the message names file, key, value and remedy."""
-
-
-class _StrictLoader(yaml.SafeLoader):
-    """YAML loader that refuses duplicate keys in a mapping."""
-
-
-def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict[Any, Any]:
-    keys = [loader.construct_object(key, deep=True) for key, _ in node.value]
-    for key in keys:
-        if keys.count(key) > 1:
-            raise yaml.MarkedYAMLError(problem=f"key {key!r} is given twice", problem_mark=node.start_mark)
-    return dict(zip(keys, (loader.construct_object(value, deep=True) for _, value in node.value), strict=True))
-
-
-_StrictLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
 
 
 def load(path: str | Path) -> Config:
@@ -54,6 +36,8 @@ def load(path: str | Path) -> Config:
 
 def validate(values: dict[str, Any], source: str) -> Config:
     """Check the values of a configuration; errors name their `source`."""
+    if isinstance(values, dict):
+        check_size(values, source)
     try:
         return Config.model_validate(_with_tuples(values))
     except ValidationError as error:
@@ -62,7 +46,14 @@ def validate(values: dict[str, Any], source: str) -> Config:
 
 def override(config: Config, changes: dict[str, Any], source: str = "cases") -> Config:
     """Configuration with the values of some dotted keys (such as `fibres.endo_deg`) replaced."""
-    values = config.model_dump()
+    return validate(replace_values(config.model_dump(), changes), source)
+
+
+def replace_values(values: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Replace the values of some dotted keys in a dumped section, in place.
+
+    Another law leaves out the parameters of the present one, so that its own take their defaults.
+    """
     # The law comes first, because it determines which other keys the section has.
     for dotted_key, value in sorted(changes.items(), key=lambda change: not change[0].endswith(".law")):
         *parents, key = dotted_key.split(".")
@@ -73,25 +64,6 @@ def override(config: Config, changes: dict[str, Any], source: str = "cases") -> 
             for parameter in set(section) - set(Material.model_fields):
                 del section[parameter]
         section[key] = value
-    return validate(values, source)
-
-
-def read_yaml(path: Path) -> dict[str, Any]:
-    try:
-        values = yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}): give the path of a YAML file") from None
-    except UnicodeDecodeError:
-        raise ConfigError(f"{path}: is not UTF-8 text: give the path of a YAML file") from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f", line {mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or "is not YAML"
-        raise ConfigError(f"{path}{line}: {problem}: correct the YAML") from None
-    if values is None:
-        return {}
-    if not isinstance(values, dict):
-        raise ConfigError(f"{path}: contains a {type(values).__name__}: write a mapping of keys to values")
     return values
 
 
@@ -111,13 +83,19 @@ def _message(error: ErrorDetails) -> str:
         keys.append(context["key"])
     if error["type"] in _UNKNOWN_VARIANT:
         selector = discriminator(sections)
-        return f"{'.'.join(keys)}.{selector} = {error['input'][selector]!r}: should be {_alternatives(sections)}"
-    dotted_key = ".".join(str(part) for part in keys)
+        value = _shown_value(error["input"][selector])
+        return f"{shown_key(keys)}.{selector} = {value}: should be {_alternatives(sections)}"
+    dotted_key = shown_key(keys)
     if error["type"] == "extra_forbidden":
         return f"{dotted_key} is not a key{_variant(model, sections)}{_suggestion(keys, list(model.model_fields))}"
     value = context["value"] if error["type"] == "invalid" else error["input"]
-    text = "null" if value is None else repr(value)
-    return f"{dotted_key} = {text[:80]}: {_remedy(error, context)}"
+    return f"{dotted_key} = {_shown_value(value)}: {_remedy(error, context)}"
+
+
+def _shown_value(value: Any) -> str:
+    """The value in one line of at most 80 characters, as it is in the file."""
+    text = "null" if value is None else _REPR.repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def _variant(model: type[BaseModel], sections: dict[str, type[Section]]) -> str:
@@ -133,8 +111,16 @@ def _remedy(error: ErrorDetails, context: dict[str, Any]) -> str:
     message = _MESSAGES.get(error["type"], error["msg"])
     if error["type"] == "string_pattern_mismatch":
         return f"use letters, digits and underscores only (pattern {context['pattern']})"
-    return message.removeprefix("Input ").removeprefix("Value error, ")
+    if error["type"] == "too_long":
+        return f"must have at most {context['max_length']} entries"
+    if error["type"] == "too_short" and context["min_length"] > 1:
+        return f"must have {context['min_length']} entries or more"
+    return message.removeprefix("Input ").removeprefix("String ").removeprefix("Value error, ")
 
+
+_REPR = Repr()
+_REPR.maxlevel, _REPR.maxlist, _REPR.maxdict, _REPR.maxtuple = 4, 12, 12, 12
+_REPR.maxstring = _REPR.maxother = _REPR.maxlong = 80
 
 _MESSAGES = {
     "model_type": "must be a mapping of keys to values",
@@ -142,6 +128,7 @@ _MESSAGES = {
     "list_type": "must be a list, such as [1, 2]",
     "tuple_type": "must be a list, such as [1, 2, 4]",
     "too_short": "must have at least one entry",
+    "invalid_key": "is not a key: keys are text",
 }
 """Error type of pydantic -> message in the terms of YAML."""
 
@@ -150,7 +137,7 @@ _UNKNOWN_VARIANT = ("union_tag_invalid", "union_tag_not_found")
 
 
 def _suggestion(keys: list[Any], known: list[str]) -> str:
-    close = get_close_matches(str(keys[-1]), known, n=1, cutoff=0.5)
+    close = get_close_matches(str(keys[-1])[:200], known, n=1, cutoff=0.5)
     if close:
         return f": did you mean {'.'.join(map(str, [*keys[:-1], close[0]]))}?"
     return f": the keys here are {', '.join(known)}"

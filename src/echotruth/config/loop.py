@@ -6,8 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat, model_validator
 
-from echotruth.section import Positive, Section, invalid
+from echotruth.section import Section, invalid
 
+Volume = Annotated[FiniteFloat, Field(gt=0, le=1e8)]
+Pressure = Annotated[FiniteFloat, Field(gt=0, le=1e4)]
 Prescribed = Literal["pressure_volume", "pressure", "volume"]
 
 
@@ -22,15 +24,15 @@ class Loop(Section):
     """A shipped cycle (`mouse`, `rat`, `human`; `twitch` for `prescribed: volume`) or a CSV file with columns of time
     and of the prescribed quantities, each named with its unit: time_ms or _s; pressure_mmHg, _kPa or _Pa; volume_uL,
     _mL or _m3; tension_kPa or _Pa."""
-    heart_rate_per_min: Annotated[FiniteFloat, Field(gt=0)] | None = None
+    heart_rate_per_min: Annotated[FiniteFloat, Field(ge=1, le=10_000)] | None = None
     """Heart rate; the cycle's time is scaled to it. Default: that of the file."""
-    edv_uL: Positive | None = None
+    edv_uL: Volume | None = None
     """End-diastolic volume; the cycle's volumes are mapped linearly to it. Default: that of the file."""
-    esv_uL: Positive | None = None
+    esv_uL: Volume | None = None
     """End-systolic volume, likewise."""
-    edp_mmHg: Positive | None = None
+    edp_mmHg: Pressure | None = None
     """End-diastolic pressure; pressures up to it are scaled, those above mapped linearly. Default: that of the file."""
-    esp_mmHg: Positive | None = None
+    esp_mmHg: Pressure | None = None
     """End-systolic pressure, likewise."""
     frames: Annotated[int, Field(ge=2, le=1000)] = 40
     """Frames of one cycle; frame 0 is end-diastole."""

@@ -16,6 +16,8 @@ else:
     Filled = Optional[T]  # noqa: UP045
 """Type of a key that may be null in a file; the section then has the value of the preset."""
 
+Frequency = Annotated[FiniteFloat, Field(gt=0, le=1000)]
+
 FROM_PRESET: Any = None
 
 
@@ -26,7 +28,7 @@ class Probe(Section):
     """Array whose values are the defaults of the keys below. Default: the array for `geometry.preset`."""
     elements: Filled[Annotated[int, Field(ge=2, le=512)]] = FROM_PRESET
     """Number of elements. Default: from `preset`."""
-    frequency_MHz: Filled[Positive] = FROM_PRESET
+    frequency_MHz: Filled[Frequency] = FROM_PRESET
     """Centre frequency. Default: from `preset`."""
     bandwidth: Filled[Annotated[FiniteFloat, Field(gt=0.05, lt=1.5)]] = FROM_PRESET
     """Two-way -6 dB bandwidth of burst and array over centre frequency. Default: from `preset`."""
@@ -42,7 +44,7 @@ class Probe(Section):
     """Speed of sound."""
     attenuation_dB_per_cm_MHz: Annotated[FiniteFloat, Field(ge=0, le=3)] = 0.0
     """Attenuation of the tissue on each way, proportional to frequency; 0.5 is common for muscle."""
-    sampling_MHz: Filled[Positive] = FROM_PRESET
+    sampling_MHz: Filled[Annotated[FiniteFloat, Field(gt=0, le=10_000)]] = FROM_PRESET
     """Sampling frequency of the RF. Default: four times the centre frequency, or more if the bandwidth requires it."""
 
     def resolved(self) -> Probe:

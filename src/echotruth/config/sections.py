@@ -10,6 +10,7 @@ from echotruth.config.defaults import apply_presets
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import ALL_VIEWS, Bmode, Phantom, Rf, View, standard_views
+from echotruth.config.limits import MAX_VIEWS, check_amounts
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
 from echotruth.config.motion import Motion
@@ -19,6 +20,9 @@ from echotruth.config.probe import Probe
 from echotruth.config.realism import Realism
 from echotruth.config.tracking import PhaseCorrelation, Tracking
 from echotruth.section import Name, Section, invalid
+
+_TRACKER_LENGTHS = ("window_mm", "windows_mm", "subset_mm", "knots_mm")
+"""Keys of trackers that must not exceed the image."""
 
 
 class Config(Section):
@@ -35,7 +39,9 @@ class Config(Section):
     mechanics: Mechanics = Mechanics()
     motion: Motion = Motion()
     physiology: Physiology = Physiology()
-    views: Annotated[dict[Name, View], Field(min_length=1)] = Field(default_factory=standard_views)
+    views: Annotated[dict[Name, View], Field(min_length=1, max_length=MAX_VIEWS)] = Field(
+        default_factory=standard_views
+    )
     """Imaging planes by name."""
     phantom: Phantom = Phantom()
     probe: Probe = Probe()
@@ -44,7 +50,7 @@ class Config(Section):
     bmode: Bmode = Bmode()
     tracking: Tracking = Tracking()
     cases: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
-    """Sweep: values of dotted keys such as `fibres.endo_deg`; the cases are all combinations."""
+    """Sweep: values of dotted keys such as `fibres.endo_deg`; the cases are all combinations, 100 000 at most."""
 
     @model_validator(mode="before")
     @classmethod
@@ -72,8 +78,8 @@ class Config(Section):
         if isinstance(tracker, PhaseCorrelation) and (tracker.window_px or 0) > smallest:
             remedy = f"must not exceed the smallest image, {smallest} px"
             raise invalid(f"{path}.window_px", tracker.window_px, remedy)
-        for key in ("window_mm", "windows_mm", "subset_mm", "knots_mm"):
-            length = getattr(tracker, key, None)
+        for key in filter(type(tracker).model_fields.__contains__, _TRACKER_LENGTHS):
+            length = getattr(tracker, key)
             if max(length if isinstance(length, list) else [length or 0]) > side:
                 raise invalid(f"{path}.{key}", length, f"must not exceed bmode.field_of_view_mm = {side:g}")
 
@@ -162,4 +168,9 @@ class Config(Section):
         if end_diastolic and prescribed == "volume":
             remedy = "needs geometry.given_state = unloaded, because there is no pressure to unload from"
             raise invalid("loop.prescribed", prescribed, remedy)
+        return self
+
+    @model_validator(mode="after")
+    def _check_amounts(self) -> Config:
+        check_amounts(self)
         return self

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import BeforeValidator, Discriminator, Field, FiniteFloat, Tag, model_validator
 
+from echotruth.config.limits import MAX_TRACKERS
 from echotruth.section import Name, Positive, Section, invalid
 
 Reference = Annotated[
@@ -252,6 +253,8 @@ class Tracking(Section):
     grid_px: Annotated[int, Field(ge=1, le=128)] = 5
     """Spacing of the points at which displacement is reported, in pixels of the largest image; the points are the same
     at all image sizes and lie in the wall at end-diastole."""
-    trackers: Annotated[dict[Name, Tracker], Field(min_length=1)] = Field(default_factory=default_trackers)
+    trackers: Annotated[dict[Name, Tracker], Field(min_length=1, max_length=MAX_TRACKERS)] = Field(
+        default_factory=default_trackers
+    )
     """Settings by name: `as_published` is the tracker as the paper prints it; `corrected` has tapered windows with the
     same size in tissue for every image size, leaves out frequencies without speckle, and is bidirectional."""
