@@ -38,10 +38,16 @@ outside the wall, and in the row of a case that failed (`cases/status`).
 Axes, signs and reference states are in `conventions.md`.
 
 The root has the attributes title, summary, references, config (the whole configuration), seed, code (version of
-each stage's source) and packages (their versions). Every group has the coordinates of its dimensions.
+each stage's source) and packages (their versions). Every group has the coordinates of its dimensions, and the
+attribute `labels` (dimension -> labels) for readers that cannot read arrays of strings; the labels of `case`, in the
+order of the rows, are in that of the group `cases` only.
 
-The folder of the repository also contains `cases.csv` (the table of the group `cases`), `registry.txt` (row of every
-case), `ledger/` (a record of every finished job: checksums, seed, time taken), `figures/` and `logs/`.
+Cases and views keep their place for good: new ones are appended, whatever their order in the configuration, and those
+that leave it stay, a case as `retired`. Find them by their labels.
+
+The folder of the repository also contains `cases.csv` (the present cases with all keys), `registry.txt` (row of every
+case) and `views.txt` (index of every view), `ledger/` (a record of every finished job: checksums, seed, time taken;
+`structure.json`: checksums of all other files of the tree), `figures/` and `logs/`.
 
 This page is generated from `src/echotruth/repository/schema.py` by `make reference`.
 
@@ -64,7 +70,10 @@ def config_page() -> str:
 def schema_page() -> str:
     """Page of the arrays, group by group."""
     parts = [_SCHEMA_HEAD]
-    cases = "One more array for every key of the configuration that can be swept, with the key's name and unit.\n"
+    cases = (
+        "One more array for `seed` and for every key that differs among the cases, with the key's name and unit. The\n"
+        "attribute `constants` holds the keys that do not; `echotruth.open` gives the table with all of them.\n"
+    )
     sized = {f"{name}/SIZE": arrays for name, arrays in schema.SIZED.items()}
     groups = {"cases": schema.CASES} | schema.STAGES | schema.OPTIONAL | sized
     notes = {"cases": cases, "rf": _RF}

@@ -131,7 +131,7 @@ def tree():
         if "tracker" in array.dims:
             values[:, :, 1] *= 2
         data[array.name] = (array.dims, values)
-    hearts = xr.Dataset(data, coords={"case": ["a", "b", "c"]})
+    hearts = xr.Dataset(data, coords={"case": ["a", "b", "c"], "view": list(CONFIG.views)})
     return xr.DataTree.from_dict({"/evaluation/64": hearts})
 
 
@@ -140,6 +140,16 @@ def test_rows_are_of_the_hearts_that_count(tree, tmp_path):
     assert list(table["case"]) == ["a"] * 4 + ["c"] * 4 and list(table["tracker"]) == ["one", "two"] * 4
     assert list(table["nrmse_percent"][:2]) == [10, 20] and (table["failure"] == "").all()
     assert table["e_cc_rms_pp"].isna().tolist() == [False, False, True, True] * 2
+
+
+def test_scores_of_a_view_are_found_by_its_name(tree, tmp_path):
+    """Whatever the order in the store, and beside views that have left the configuration."""
+    data = tree["evaluation/64"].to_dataset()
+    former = data.isel(view=[1]).assign_coords(view=["former"]) * 3
+    other = xr.concat([former, data.isel(view=[1]) * 2, data.isel(view=[0])], "view")
+    table = rows(xr.DataTree.from_dict({"/evaluation/64": other}), CONFIG, np.array([0]), tmp_path)
+    assert list(table["view"]) == ["mid", "mid", "long_axis", "long_axis"]
+    np.testing.assert_allclose(table["nrmse_percent"], [10, 20, 20, 40])
 
 
 def test_a_failure_is_read_from_the_ledger(tree, tmp_path):

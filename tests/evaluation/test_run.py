@@ -120,6 +120,7 @@ def made(affine, tmp_path_factory):
     (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG.model_dump(mode="json"), sort_keys=False))
     cases = [case.id for case in expand(CONFIG)]
     ledger.register(folder / "registry.txt", cases)
+    ledger.register(folder / "views.txt", list(CONFIG.views))
     beating, mesh = heart(affine)
     store = Store(folder / "small.zarr")
     labels = layout.labels(CONFIG, cases, np.zeros((2, len(COURSE)))) | layout.positions(CONFIG, pixel_centres, grid)
@@ -346,7 +347,7 @@ REFUSED = {
     "its own name": (["--command", "./2d {input} {output}"], "'2d' cannot be the name of a tracker: use letters"),
     "path": (["--tracker", "code/own.py:track"], "write package.module:function (dots, no path, no .py)"),
     "date": (["--tracker", "a:b", "--option", "a=2026-01-01"], "must be finite numbers, text"),
-    "case": (["--tracker", "a:b", "--case", "seed9"], "seed9 is not a case of {made}: use seed1_"),
+    "case": (["--tracker", "a:b", "--case", "seed9"], "seed9 is not a case of {made}: use heart, seed2_"),
     "view": (["--tracker", "a:b", "--view", "base"], "base is not a view of {made}: use mid, apex"),
     "size": (["--tracker", "a:b", "--size", "512"], "512 is not a size of {made}: use 128, 64"),
     "option": (["--tracker", "a:b", "--option", "window"], "--option window: has no value: write key=value"),
@@ -379,7 +380,7 @@ def test_folder_that_is_no_repository_is_refused_in_one_sentence(evaluate, name)
 
 
 def test_repository_that_was_not_run_is_refused_in_one_sentence(made, evaluate, tmp_path):
-    for name in ("config.yaml", "registry.txt"):
+    for name in ("config.yaml", "registry.txt", "views.txt"):
         (tmp_path / name).write_text((made / name).read_text())
     status, _, errors = evaluate("--tracker", "custom:still", repository=tmp_path)
     assert (status, errors.count("\n")) == (2, 1) and "no complete clip" in errors

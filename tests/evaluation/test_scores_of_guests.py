@@ -29,7 +29,8 @@ def board(tmp_path):
     """Rows of the leaderboard of one heart and two views."""
     lengths = LENGTHS | {name: len(labels) for name, labels in LABELS.items()}
     data = {array.name: (array.dims, np.full([lengths[dim] for dim in array.dims], 0.1)) for array in EVALUATION}
-    tree = xr.DataTree.from_dict({"/evaluation/64": xr.Dataset(data, coords={"case": ["a"]})})
+    labels = {"case": ["a"], "view": list(CONFIG.views)}
+    tree = xr.DataTree.from_dict({"/evaluation/64": xr.Dataset(data, coords=labels)})
     (tmp_path / "external").mkdir()
     for view in CONFIG.views:
         for stage in ("bmode", "truth"):

@@ -1,5 +1,6 @@
-"""A small repository that keeps RF."""
+"""A small repository that keeps RF, and what tests of records need."""
 
+import sys
 from functools import cache
 
 import numpy as np
@@ -78,3 +79,11 @@ def rf_repository(tmp_path_factory):
         return folder
 
     return make
+
+
+@pytest.fixture(scope="module")
+def script(request):
+    """The version in a record is that of the script that runs: here, of the module of the tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", [request.module.__file__])
+        yield

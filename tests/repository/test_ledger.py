@@ -1,7 +1,8 @@
 """Records are complete or absent, and rows never change."""
 
-import json
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -26,18 +27,17 @@ def test_record_takes_its_name_whole_and_after_it_is_on_disk(tmp_path, monkeypat
     replace = type(path).replace
 
     def synced(_):
-        events.append("on disk")
-        assert not path.exists()
+        events.append("name on disk" if path.exists() else "on disk")
 
     def named(draft, target):
         events.append("named")
-        assert json.loads(draft.read_text()) == {"stage": "rf"}
+        assert ledger.read(draft) == {"stage": "rf"}
         return replace(draft, target)
 
     monkeypatch.setattr(os, "fsync", synced)
     monkeypatch.setattr(type(path), "replace", named)
     ledger.commit(path, {"stage": "rf"})
-    assert events == ["on disk", "named"]
+    assert events == ["on disk", "named", "name on disk"]
 
 
 def test_failed_commit_leaves_the_earlier_record(tmp_path, monkeypatch):
@@ -59,6 +59,63 @@ def test_register_never_moves_a_row(tmp_path):
     assert ledger.register(registry, ["a", "c"]) == {"b": 0, "c": 1, "a": 2}
     assert ledger.register(registry, ["d"]) == {"b": 0, "c": 1, "a": 2, "d": 3}
     assert registry.read_text() == "b\nc\na\nd\n"
+
+
+REGISTER = """
+import sys
+from pathlib import Path
+from echotruth.repository.ledger import register
+print("ready", flush=True)
+sys.stdin.readline()
+for number in range(60):
+    register(Path(sys.argv[1]), [f"common{number}", f"{sys.argv[2]}{number}"])
+"""
+
+
+def test_processes_that_register_at_once_lose_no_row(tmp_path):
+    registry = tmp_path / "registry.txt"
+    start = [sys.executable, "-c", REGISTER, str(registry)]
+    names = ("a", "b", "c")
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    processes = [subprocess.Popen([*start, name], **pipes) for name in names]
+    assert [process.stdout.readline() for process in processes] == ["ready\n"] * 3
+    for process in processes:
+        process.stdin.write("\n")
+        process.stdin.flush()
+    assert [process.communicate()[0] for process in processes] == [""] * 3
+    lines = registry.read_text().splitlines()
+    assert sorted(lines) == sorted(f"{name}{number}" for name in (*names, "common") for number in range(60))
+    for name in names:  # in the order in which each registered them
+        assert [line for line in lines if line[0] == name and line[1].isdigit()] == [f"{name}{k}" for k in range(60)]
+
+
+def test_draft_of_a_killed_process_is_not_taken_for_a_record(tmp_path):
+    path = tmp_path / "registry.txt"
+    ledger.register(path, ["a"])
+    (tmp_path / ".registry.txt.other.1.0.partial").write_text("half")
+    assert ledger.register(path, ["b"]) == {"a": 0, "b": 1}
+
+
+def test_registering_what_is_known_leaves_the_file_untouched(tmp_path):
+    path = tmp_path / "views.txt"
+    ledger.register(path, ["mid", "apex"])
+    before = path.stat()
+    ledger.register(path, ["apex", "mid"])
+    assert (path.stat().st_mtime_ns, path.stat().st_ino) == (before.st_mtime_ns, before.st_ino)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [None, b"", b"mid\n", b"mad\nbase\n", b"mid\nbase\ntop\n", b"mie\nbase\ntop\n", b"mid\nmid\n", b"m\xe9d\n"],
+)
+def test_lost_or_damaged_registry_is_made_again_from_the_store(tmp_path, content):
+    path = tmp_path / "views.txt"
+    if content is not None:
+        path.write_bytes(content)
+    known = ["mid", "base", *(["top"] if content and b"top" in content else [])]
+    expected = {name: row for row, name in enumerate([*known, "apex"])}
+    assert ledger.register(path, ["apex", "mid"], stored=["mid", "base"]) == expected
+    assert path.read_text().split() == list(expected)
 
 
 def test_rows_of_a_repository_not_yet_made_are_none(tmp_path):

@@ -6,25 +6,35 @@ from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
+import pytest
+
 from echotruth.config import Bmode, PhaseCorrelation
-from echotruth.repository.provenance import (
-    _canonical_source,
-    _dependencies,
-    _imports,
-    _tree,
-    code_version,
-    packages,
-    settings_version,
-)
+from echotruth.repository import provenance
+from echotruth.repository.provenance import _dependencies, _parsed, _source, code_version, packages, settings_version
 
 ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(autouse=True)
+def kept(tmp_path, monkeypatch):
+    """File in which what is found in texts is kept; that of the package stays as it is."""
+    file = tmp_path / "kept.json"
+    monkeypatch.setattr(provenance, "_PARSED", file)
+    _forget()
+    yield file
+    _forget()
+
+
+def _forget():
+    """As a new process would start."""
+    for cached in (code_version, _source, _parsed):
+        cached.cache_clear()
 
 
 def _version(tmp_path, text):
     script = tmp_path / "script.py"
     script.write_text(text)
-    for cached in (code_version, _imports, _canonical_source, _tree):  # one file, two texts
-        cached.cache_clear()
+    _forget()
     return code_version(str(script))
 
 
@@ -36,6 +46,44 @@ def test_comments_layout_and_docstrings_do_not_change_the_version(tmp_path):
 
 def test_another_statement_changes_the_version(tmp_path):
     assert _version(tmp_path, "x = 1\n") != _version(tmp_path, "x = 2\n")
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("f(1, 2)", "f((1, 2))"),
+        ("x = None", "x = 'None'"),
+        ("x = 1", "x = True"),
+        ("x = 1", "x = 1.0"),
+        ("f(*x)", "f(**x)"),
+        ("{**x}", "{None: x}"),
+        ("if x:\n    a()\nb()", "if x:\n    a()\n    b()"),
+        ("if x:\n    a()\nelse:\n    b()", "if x:\n    a()\n    b()"),
+        ("def f(a, /, b): ...", "def f(a, b): ..."),
+        ("def f(*, a): ...", "def f(a): ..."),
+        ("x[1:]", "x[:1]"),
+    ],
+)
+def test_statements_that_mean_something_else_have_another_version(tmp_path, one, other):
+    assert _version(tmp_path, f"{one}\n") != _version(tmp_path, f"{other}\n")
+
+
+def test_version_is_the_same_from_what_an_earlier_process_kept(tmp_path, kept, monkeypatch):
+    text = "from echotruth.fem import sparse\n\nx = 1\n"
+    first = _version(tmp_path, text)
+    monkeypatch.setattr(provenance, "_parse", None)  # parses nothing
+    assert _version(tmp_path, text) == first
+    monkeypatch.undo()
+    monkeypatch.setattr(provenance, "_PARSED", kept)
+    for damaged in ("", "{", "[]", '{"a": 1}'):
+        kept.write_text(damaged)
+        assert _version(tmp_path, text) == first
+
+
+def test_version_does_not_need_a_folder_that_can_be_written(tmp_path, monkeypatch):
+    first = _version(tmp_path, "x = 1\n")
+    monkeypatch.setattr(provenance, "_PARSED", Path("/proc/none/kept.json"))
+    assert _version(tmp_path, "x = 1\n") == first
 
 
 def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_path):

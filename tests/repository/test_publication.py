@@ -1,16 +1,15 @@
 """A repository is published when every file is what its job wrote."""
 
-import sys
 from pathlib import Path
 from shutil import copytree
 
 import numpy as np
-import pandas as pd
 import pytest
 import xarray as xr
 import yaml
 import zarr
 
+import echotruth as et
 from echotruth.cases import expand, table
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Physiology, Tracking, View
 from echotruth.imaging.bmode import pixel_centres
@@ -45,12 +44,7 @@ def blank(store: Store, group: str) -> dict:
     return {array.name: np.ones(opened[array.name].shape[array.leading :]) for array in schema_of(group)}
 
 
-@pytest.fixture(scope="module", autouse=True)
-def script():
-    """The version in a record is that of the script that runs: here, of this file."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", [__file__])
-        yield
+pytestmark = pytest.mark.usefixtures("script")
 
 
 @pytest.fixture(scope="module")
@@ -59,10 +53,13 @@ def done(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("done")
     (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG.model_dump(mode="json")))
     rows = list(ledger.register(folder / "registry.txt", [case.id for case in CASES]))
+    ledger.register(folder / "views.txt", list(CONFIG.views))
     columns = layout.columns(table(CASES), rows)
+    constants = {"cases": {"constants": layout.constants(table(CASES))}}
     labels = layout.labels(CONFIG, rows, np.zeros((len(rows), 4))) | layout.positions(CONFIG, pixel_centres, grid)
     groups = schema.groups(CONFIG) | {"cases": schema.parameters(columns)}
-    Store(folder / "small.zarr").lay_out(groups, layout.sizes(left_ventricle(CONFIG.geometry)), labels | columns)
+    sizes = layout.sizes(left_ventricle(CONFIG.geometry))
+    Store(folder / "small.zarr").lay_out(groups, sizes, labels | columns, constants)
     for case in CASES:
         for stage, view in JOBS:
             job = Job(folder, stage, case.id, view)
@@ -84,16 +81,33 @@ def test_whole_repository_is_verified_and_opens(folder):
     assert set(tree.attrs["code"]) == {*GATES, *VIEW_STAGES}
 
 
-def test_every_file_that_a_job_wrote_is_verified(folder):
-    written = {
-        path
-        for stage in GROUPS.values()
-        for group in stage
-        for array in schema_of(group)
-        for path in (folder / "small.zarr" / group / array.name / "c").rglob("*")
-        if path.is_file()
-    }
+def test_every_file_of_the_hierarchy_is_verified(folder):
+    written = {path for path in (folder / "small.zarr").rglob("*") if path.is_file()}
     assert publish(folder)["files"] == len(written)
+    records = [ledger.read(path)["sha256"] for path in (folder / "ledger").rglob("*.json")]
+    recorded = [name for record in records for name in record]
+    assert len(recorded) == len(set(recorded))
+    assert {folder / "small.zarr" / name for name in recorded} == written
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "bmode/64/image/zarr.json", "truth/32/view/c/0", "cases/status/c/0"])
+def test_damaged_structure_is_named(folder, name):
+    publish(folder)
+    file = folder / "small.zarr" / name
+    file.write_bytes(file.read_bytes()[:-1])
+    with pytest.raises(ChecksumError, match="differs from what was laid out: run again") as caught:
+        publish(folder)
+    assert str(file) in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [None, "", "{", "[]", "{}"])
+def test_repository_whose_structure_nothing_vouches_for_is_not_published(folder, content):
+    record = folder / "ledger/structure.json"
+    record.unlink()
+    if content is not None:
+        record.write_text(content)
+    with pytest.raises(ChecksumError, match=r"structure\.json: is missing or damaged"):
+        publish(folder)
 
 
 def test_publishing_twice_gives_the_same_bytes(folder):
@@ -182,6 +196,16 @@ def test_what_is_skipped_leaves_nothing_of_an_earlier_run(folder, stage, view):
         assert other.store.files(group, *other.index)
 
 
+def test_job_of_a_view_has_its_place_whatever_is_put_in_front_of_it(folder):
+    before = {view: Job(folder, "bmode", CASES[1].id, view).index for view in CONFIG.views}
+    assert before == {"mid": (1, 0), "long_axis": (1, 1)}
+    changed = CONFIG.model_copy(update={"views": {"apex": View(position=0.8), **CONFIG.views}})
+    (folder / "config.yaml").write_text(yaml.safe_dump(changed.model_dump(mode="json"), sort_keys=False))
+    ledger.register(folder / "views.txt", list(changed.views))
+    assert {view: Job(folder, "bmode", CASES[1].id, view).index for view in CONFIG.views} == before
+    assert Job(folder, "bmode", CASES[1].id, "apex").index == (1, 2)
+
+
 def test_case_that_left_the_configuration_is_retired(folder):
     fewer = CONFIG.model_copy(update={"cases": {"seed": [1]}})
     (folder / "config.yaml").write_text(yaml.safe_dump(fewer.model_dump(mode="json")))
@@ -189,8 +213,37 @@ def test_case_that_left_the_configuration_is_retired(folder):
     assert list(xr.open_datatree(folder / "small.zarr")["cases/status"].values) == ["complete", "retired"]
 
 
-def test_table_of_cases_has_a_row_a_case(folder):
+def test_table_of_cases_has_a_row_a_case_and_a_column_a_key(folder):
     publish(folder)
-    tree = xr.open_datatree(folder / "small.zarr")
-    frame = pd.DataFrame({"seed": tree["cases/seed"].values}, index=tree["cases/case"].values)
-    assert frame["seed"].to_dict() == {case.id: case.config.seed for case in CASES}
+    tree = et.open(folder)
+    frame = tree["cases"].to_dataset().to_dataframe()
+    expected = table(CASES).set_index("case")
+    assert list(frame.index) == list(expected.index)
+    assert set(frame.columns) == {"status", "reason", *expected.columns}
+    for key in expected:
+        text = isinstance(expected[key].iloc[0], str)
+        values = list(expected[key]) if text else expected[key].astype(float).to_numpy()
+        np.testing.assert_array_equal(frame[key], values, err_msg=key)
+    assert tree["cases/fibres.endo_deg"].attrs == {"units": "degree", "long_name": "fibres.endo_deg"}
+
+
+def test_retired_case_has_no_values_in_the_table(folder):
+    fewer = CONFIG.model_copy(update={"cases": {"seed": [1]}})
+    (folder / "config.yaml").write_text(yaml.safe_dump(fewer.model_dump(mode="json")))
+    publish(folder)
+    frame = et.open(folder)["cases"].to_dataset().to_dataframe()
+    assert np.isnan(frame["fibres.endo_deg"].iloc[1]) and frame["geometry.preset"].iloc[1] == ""
+    assert frame["fibres.endo_deg"].iloc[0] == CONFIG.fibres.endo_deg
+
+
+def test_groups_opened_together_have_the_labels_and_indexes_that_each_has_alone(folder):
+    publish(folder)
+    tree = et.open(folder)
+    for group in schema.groups(CONFIG):
+        alone = xr.open_zarr(folder / "small.zarr", group=group, chunks=None)
+        together = tree[group].to_dataset(inherit=False)
+        assert set(together.xindexes) == set(alone.xindexes) and set(alone.coords) == set(together.coords)
+        for name in alone.coords:
+            assert together.coords[name].variable.identical(alone.coords[name].variable), name
+            assert name not in alone.xindexes or together.indexes[name].equals(alone.indexes[name])
+        assert "labels" not in together.attrs

@@ -1,18 +1,24 @@
 """A store is laid out once and grown, written by shards, and says so when one is damaged."""
 
+import json
+import os
+from hashlib import sha256
 from pathlib import Path
 from shutil import copytree
 
 import numpy as np
 import pytest
+import xarray as xr
+import zarr
 
 from echotruth.cases import expand, table
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tracking, View
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.repository import layout, schema
-from echotruth.repository.store import Store, schema_of
+from echotruth.repository import layout, ledger, schema
+from echotruth.repository.checksums import ChecksumError, verify_structure
+from echotruth.repository.store import NotWritten, Store, schema_of
 from echotruth.tracking import grid
 
 SMALL = {
@@ -31,12 +37,17 @@ def lay_out(path: Path, seeds: list[int], **changes) -> Store:
     """A store for hearts that differ in their seed, as src/echotruth/workflow/scripts/cases.py makes it."""
     config = Config(**(SMALL | changes), cases={"seed": seeds})
     cases = expand(config)
-    rows = [case.id for case in cases]
-    times = np.stack([read_loop(case.config.loop).time for case in cases])
-    columns = layout.columns(table(cases), rows)
-    labels = layout.labels(config, rows, times) | layout.positions(config, pixel_centres, grid) | columns
+    rows = ledger.register(path.parent / "registry.txt", [case.id for case in cases])
+    views = ledger.register(path.parent / "views.txt", list(config.views))
+    times = np.full((len(rows), config.loop.frames), np.nan)
+    for case in cases:
+        times[rows[case.id]] = read_loop(case.config.loop).time
+    columns = layout.columns(table(cases), list(rows))
+    labels = layout.labels(config, list(rows), times, list(views)) | layout.positions(config, pixel_centres, grid)
+    arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
     store = Store(path)
-    store.lay_out(schema.groups(config) | {"cases": schema.parameters(columns)}, layout.sizes(MESH), labels)
+    constants = {"cases": {"constants": layout.constants(table(cases))}}
+    store.lay_out(arrays, layout.sizes(MESH), labels | columns, constants)
     return store
 
 
@@ -72,7 +83,8 @@ def laid_out(tmp_path_factory) -> Store:
 @pytest.fixture
 def store(laid_out, tmp_path) -> Store:
     """A copy of its own for every test: laying out takes much longer."""
-    return Store(copytree(laid_out.path, tmp_path / "small.zarr"))
+    copytree(laid_out.path.parent, tmp_path, dirs_exist_ok=True)
+    return Store(tmp_path / "small.zarr")
 
 
 @pytest.mark.parametrize("group", GROUPS)
@@ -166,10 +178,213 @@ def test_another_image_size_leaves_the_others_and_drops_what_is_gone(store):
     assert not (store.path / "bmode/64").exists()
 
 
-def test_describing_removes_what_a_killed_job_left_and_gathers_the_metadata(store):
-    stray = store.path / "mechanics/pressure/c/0/0.abc.partial"
-    stray.parent.mkdir(parents=True)
-    stray.write_bytes(b"half")
+def every_file(store: Store) -> dict:
+    """Path to hash and time of writing of every file of the hierarchy."""
+    files = [path for path in store.path.rglob("*") if path.is_file()]
+    return {
+        path.relative_to(store.path).as_posix(): (sha256(path.read_bytes()).hexdigest(), path.stat().st_mtime_ns)
+        for path in files
+    }
+
+
+def vouched(store: Store) -> dict:
+    """Checksums in the record of the structure."""
+    return ledger.read(store.record)["sha256"]
+
+
+def test_laying_out_what_is_there_writes_nothing(store):
     store.describe({"title": "small"})
-    assert not stray.exists()
-    assert b"consolidated_metadata" in (store.path / "zarr.json").read_bytes()
+    before, record = every_file(store), store.record.stat().st_mtime_ns
+    lay_out(store.path, [1, 2])
+    assert every_file(store) == before
+    assert store.record.stat().st_mtime_ns == record
+
+
+def test_record_of_the_structure_vouches_for_every_file_that_no_job_wrote(store):
+    assert vouched(store) == {path: content for path, (content, _) in every_file(store).items()}
+    shards = set()
+    for group in GROUPS:
+        fill(store, group, *job(group, 0))
+        shards |= {path.relative_to(store.path).as_posix() for path in store.files(group, *job(group, 0))}
+    store.write_column("status", ["complete", "failed"])
+    store.describe({"title": "small"})
+    files = {path: content for path, (content, _) in every_file(store).items()}
+    assert set(files) == shards | set(vouched(store))
+    assert vouched(store) == {path: content for path, content in files.items() if path not in shards}
+
+
+def test_damaged_structure_is_found_and_mended_byte_for_byte_without_loss_of_a_shard(store):
+    for group in GROUPS:
+        fill(store, group, *job(group, 0))
+    store.describe({"title": "small"})
+    before = {path: content for path, (content, _) in every_file(store).items()}
+    random = np.random.default_rng(0)
+    for harmed in random.permutation(sorted(vouched(store)))[:60].reshape(3, 20):
+        for path in harmed:
+            file, content = store.path / path, bytearray((store.path / path).read_bytes())
+            content[random.integers(len(content))] ^= 1 << random.integers(8)
+            harms = (None, b"", content[: len(content) // 2], content)
+            harm(file, harms[random.integers(4)])
+            with pytest.raises(ChecksumError, match="is missing or differs from what was laid out"):
+                verify_structure(store.path, store.record)
+        lay_out(store.path, [1, 2])
+        store.describe({"title": "small"})  # the attributes of the root are those of publication
+        assert {path: content for path, (content, _) in every_file(store).items()} == before
+
+
+def harm(file: Path, content: bytes | None) -> None:
+    """Replace the content of a file, or delete it."""
+    file.unlink()
+    if content is not None:
+        file.write_bytes(content)
+
+
+def test_shape_that_a_flipped_bit_changed_does_not_cost_the_shards(store):
+    """A larger image in the metadata would mean that the shards are of another size."""
+    values = fill(store, "bmode/64", 0, 0)
+    metadata = store.path / "bmode/64/image/zarr.json"
+    metadata.write_text(metadata.read_text().replace("64", "65"))
+    lay_out(store.path, [1, 2])
+    np.testing.assert_array_equal(store.read("bmode/64", 0, 0)["image"], values["image"])
+
+
+@pytest.mark.parametrize("group", ["bmode/64", "mechanics", "phantom"])
+def test_shard_of_length_zero_is_an_error_and_not_fill(store, group):
+    fill(store, group, *job(group, 0))
+    for file in store.files(group, *job(group, 0)):
+        content = file.read_bytes()
+        file.write_bytes(b"")
+        with pytest.raises(NotWritten, match="is empty"):
+            store.read(group, *job(group, 0))
+        file.write_bytes(content)
+
+
+def test_view_in_front_of_the_others_moves_nothing_and_all_are_found_by_name(store):
+    values = {group: fill(store, group, 0, 1) for group in GROUPS if len(job(group, 0)) == 2}
+    shards = {path for group in values for path in store.files(group, 0, 1)}
+    before = snapshot(store)
+    views = {"apex": View(position=0.8), **SMALL["views"]}
+    lay_out(store.path, [1, 2], views=views)
+    after = snapshot(store)
+    assert {path: after[path] for path in shards} == {path: before[path] for path in shards}
+    assert store.labels("view") == ["mid", "long_axis", "apex"]
+    fill(store, "bmode/32", 0, 2)
+    with xr.open_datatree(store.path, engine="zarr") as tree:
+        for group, written in values.items():
+            found = tree[group].to_dataset().isel(case=0).sel(view="long_axis")
+            for name, value in written.items():
+                np.testing.assert_array_equal(found[name].values, value, err_msg=name)
+        assert (tree["bmode/32/image"].isel(case=0).sel(view="apex") > 0).all()
+
+
+def test_view_that_leaves_and_returns_keeps_its_place_and_its_bytes(store):
+    fill(store, "truth/64", 1, 0)
+    before = every_file(store)
+    long_axis = {"long_axis": SMALL["views"]["long_axis"]}
+    lay_out(store.path, [1, 2], views=long_axis)
+    assert every_file(store) == before
+    lay_out(store.path, [1, 2], views=long_axis | {"mid": SMALL["views"]["mid"]})
+    assert every_file(store) == before
+
+
+def test_cases_that_leave_and_come_move_nothing(store):
+    fill(store, "bmode/64", 1, 0)
+    (shard,) = store.files("bmode/64", 1, 0)
+    before = every_file(store)
+    lay_out(store.path, [3, 2])
+    assert len(store.labels("case")) == 3
+    assert (
+        every_file(store)[shard.relative_to(store.path).as_posix()] == before[shard.relative_to(store.path).as_posix()]
+    )
+    seeds = zarr.open_array(store.path, path="cases/seed", mode="r")[...]
+    np.testing.assert_array_equal(seeds, [np.nan, 2, 3])
+
+
+def test_labels_are_in_the_attributes_of_every_group_as_in_its_coordinates(store):
+    root = zarr.open_group(store.path, mode="r")
+    strings = {array.name for array in schema.COORDINATES if array.dtype == "string"}
+    groups = {path for path, item in root.members(max_depth=None) if "labels" in item.attrs}
+    assert groups == set(schema.groups(Config(**SMALL)))
+    for path in groups:
+        there = {name for name, _ in root[path].arrays()} & strings - (set() if path == "cases" else {"case"})
+        expected = {name: [str(label) for label in root[path][name][...]] for name in there}
+        assert root[path].attrs["labels"] == expected
+        assert there or path in ("fibres", "pathology")
+
+
+def test_table_of_cases_has_arrays_of_what_differs_and_an_attribute_for_the_rest(store):
+    cases = zarr.open_group(store.path, path="cases", mode="r")
+    assert set(cases.array_keys()) == {"case", "status", "reason", "seed"}
+    constants = cases.attrs["constants"]
+    assert constants["fibres.endo_deg"] == Config().fibres.endo_deg and constants["geometry.preset"] == "mouse"
+    assert {*constants, "case", "seed"} == set(table(expand(Config(**SMALL))).columns)
+
+
+def test_many_cases_are_laid_out_in_few_files(tmp_path):
+    """One file a column, and none a case."""
+    rows = [f"case{number}" for number in range(10_000)]
+    columns = {"cases:seed": np.arange(10_000.0), "cases:loop.file": np.repeat(["mouse", "rat"], 5_000)}
+    arrays = {"cases": schema.parameters(columns), "physiology": schema.PHYSIOLOGY}
+    labels = columns | {"case": rows, "time": np.zeros((10_000, 4)), "frame": np.arange(4), "layer": np.arange(1, 4)}
+    Store(tmp_path / "many.zarr").lay_out(arrays, {}, labels | schema.LABELS)
+    files = [path for path in (tmp_path / "many.zarr").rglob("*") if path.is_file()]
+    whole = len(schema.coordinates(schema.PHYSIOLOGY)) + len(arrays["cases"]) + 1
+    assert len(files) == 3 + len(schema.PHYSIOLOGY) + 2 * whole
+    tree = xr.open_datatree(tmp_path / "many.zarr", engine="zarr")
+    assert str(tree["cases"].sel(case="case7654")["loop.file"].values) == "rat"
+
+
+def test_shard_and_its_folders_are_synced_once_each_after_they_are_written(store, monkeypatch):
+    synced, sync = [], os.fsync
+
+    def record(descriptor):
+        synced.append(Path(os.readlink(f"/proc/self/fd/{descriptor}")))
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", record)
+    fill(store, "bmode/64", 0, 1)
+    (shard,) = store.files("bmode/64", 0, 1)
+    array = store.path / "bmode/64/image"
+    assert sorted(synced) == sorted(
+        [shard, *(folder for folder in shard.parents if array in (folder, *folder.parents))]
+    )
+    assert {shard, shard.parent, array / "c/0/1", array / "c/0", array / "c", array} <= set(synced)
+
+
+def test_draft_of_a_living_writer_stays_and_that_of_a_killed_one_goes_when_its_job_runs_again(store):
+    living = store.path / "mechanics/pressure/c/1/0.abc.partial"
+    killed = store.path / "mechanics/pressure/c/0/0.abc.partial"
+    for draft in (living, killed):
+        draft.parent.mkdir(parents=True)
+        draft.write_bytes(b"half")
+    store.describe({"title": "small"})
+    assert living.exists() and killed.exists()
+    fill(store, "mechanics", 0)
+    assert living.exists() and not killed.exists()
+
+
+def test_draft_of_structure_is_removed_when_it_is_laid_out(store):
+    draft = store.path / "mechanics/.zarr.json.host.1.0.partial"
+    draft.write_bytes(b"half")
+    lay_out(store.path, [1, 2])
+    assert not draft.exists()
+
+
+def test_metadata_of_all_arrays_are_gathered_and_current(store):
+    lay_out(store.path, [1, 2, 3])
+    store.describe({"title": "small"})
+    gathered = json.loads((store.path / "zarr.json").read_text())["consolidated_metadata"]["metadata"]
+    single = {path.parent.relative_to(store.path).as_posix(): path for path in store.path.rglob("zarr.json")}
+    del single["."]
+    assert gathered == {path: json.loads(file.read_text()) for path, file in single.items()}
+    with xr.open_datatree(store.path, engine="zarr") as tree:
+        assert tree.attrs["title"] == "small" and tree["bmode/64"].sizes["case"] == 3
+
+
+def test_verdicts_stay_when_cases_are_added(store):
+    store.write_column("status", ["complete", "failed"])
+    store.write_column("reason", ["", "no equilibrium"])
+    lay_out(store.path, [1, 2, 3])
+    cases = zarr.open_group(store.path, path="cases", mode="r")
+    assert list(cases["status"][...]) == ["complete", "failed", ""]
+    assert list(cases["reason"][...]) == ["", "no equilibrium", ""]

@@ -184,7 +184,8 @@ def _means_of_hearts(clips: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
 
 def _builtin_rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path, size: int) -> list[dict]:
     """Rows of the repository's own trackers at one image size."""
-    data = tree[f"evaluation/{size}"].to_dataset().isel(case=complete)
+    # The store also holds views that have left the configuration, and in its own order.
+    data = tree[f"evaluation/{size}"].to_dataset().isel(case=complete).sel(view=list(config.views))
     names = [array.name for array in EVALUATION if "tracker" in array.dims and "frame" not in array.dims]
     values = {name: data[name].values for name in names}
     rows = []

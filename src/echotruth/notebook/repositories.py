@@ -5,9 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
 from echotruth.notebook.datasets import clip_dataset, image_size
+from echotruth.repository import schema
 from echotruth.repository.ledger import rows
 from echotruth.workflow.job import Job
 
@@ -27,7 +31,8 @@ def open(repository: str | Path) -> xr.DataTree:
     -------
     DataTree
         One group per stage (docs/schema.md), read when used; `tree["cases"].to_dataset().to_dataframe()` is the table
-        of cases.
+        of cases, with all keys that can be swept. Cases and views that have left the configuration stay: the status
+        of such a case is `retired`, and `tree.attrs["config"]["views"]` are the present views.
 
     Raises
     ------
@@ -37,7 +42,10 @@ def open(repository: str | Path) -> xr.DataTree:
     import xarray as xr
 
     folder = _folder(repository)
-    return xr.open_datatree(folder / f"{folder.resolve().name}.zarr", engine="zarr")
+    store = folder / f"{folder.resolve().name}.zarr"
+    groups = xr.open_groups(store, engine="zarr", create_default_indexes=False)
+    groups["/cases"] = _with_constants(groups["/cases"])
+    return xr.DataTree.from_dict(_indexed(groups))
 
 
 def load_heart(repository: str | Path, case: str = "heart") -> Heart:
@@ -81,6 +89,48 @@ def load_clip(repository: str | Path, case: str = "heart", view: str = "mid", si
     size = image_size(config, size)
     values = {group: job.read(group) for group in (f"bmode/{size}", f"truth/{size}")}
     return clip_dataset(job.heart, job.case, view, Plane(**job.read("phantom", "origin", "axes")), values)
+
+
+def _with_constants(cases: xr.Dataset) -> xr.Dataset:
+    """Table of cases with a column for every key: those that do not differ have no array.
+
+    A retired case has no values.
+    """
+    retired = cases["status"].values == "retired"
+    columns = {f"cases:{key}": _column(value, retired) for key, value in cases.attrs["constants"].items()}
+    arrays = [array for array in schema.parameters(columns) if array not in schema.CASES]
+    about = [{"units": array.units, "long_name": array.long_name} for array in arrays]
+    values = zip(arrays, columns.values(), about, strict=True)
+    return cases.assign({array.name: ("case", column, attributes) for array, column, attributes in values})
+
+
+def _column(value: str | float | None, retired: NDArray[np.bool_]) -> NDArray[np.generic]:
+    if isinstance(value, str):
+        return np.where(retired, "", value) if retired.any() else np.full(len(retired), value)
+    return np.where(retired, np.nan, np.nan if value is None else float(value))
+
+
+def _indexed(groups: dict[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """The groups with indexes of their labels; groups share those that are the same, which are read once.
+
+    The attribute `labels` is left out: it is for readers without coordinates.
+    """
+    import xarray as xr
+
+    shared: dict[str, xr.Coordinates] = {}
+    indexed = {}
+    for path, group in groups.items():
+        own = {}
+        for name in (name for name, array in group.coords.items() if array.dims == (name,)):
+            key = f"{path}/{name}" if name in ("axial", "lateral") else str(name)
+            if key not in shared:
+                shared[key] = xr.Coordinates({name: group.variables[name].load()})
+            own[key] = shared[key]
+        variables = {name: array for coords in own.values() for name, array in coords.items()}
+        indexes = {name: index for coords in own.values() for name, index in coords.xindexes.items()}
+        indexed[path] = group.assign_coords(xr.Coordinates(variables, indexes))
+        indexed[path].attrs.pop("labels", None)
+    return indexed
 
 
 def _folder(repository: str | Path) -> Path:

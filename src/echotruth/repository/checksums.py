@@ -1,4 +1,6 @@
-"""Checksums of shards: taken when a job writes them, kept in its record, and verified before publication.
+"""Checksums of files: taken when they are written, kept in a record, and verified before publication.
+
+The record of a job holds those of its shards, and `ledger/structure.json` those of all other files of the store.
 
 Beside these, every chunk in a shard carries a crc32c (see :mod:`.store`), which raises when damaged data are read.
 """
@@ -9,9 +11,11 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from echotruth.repository import ledger
+
 
 class ChecksumError(ValueError):
-    """Raised if a file is missing or differs from what its job wrote."""
+    """Raised if a file is missing or differs from what was written."""
 
 
 def checksums(files: list[Path], root: Path) -> dict[str, str]:
@@ -44,5 +48,37 @@ def verify(root: Path, path: Path, record: dict[str, Any]) -> int:
     for name, expected in record.get("sha256", {}).items():
         file = root / name
         if not file.is_file() or sha256(file.read_bytes()).hexdigest() != expected:
-            raise ChecksumError(f"{file}: is missing or differs from what its job wrote: delete {path} and run again")
+            raise ChecksumError(f"{file}: is missing or differs from what was written: delete {path} and run again")
     return len(record.get("sha256", {}))
+
+
+def verify_structure(root: Path, path: Path) -> int:
+    """Compare all files that no job wrote with their checksums.
+
+    Parameters
+    ----------
+    root : Path
+        Folder of the store.
+    path : Path
+        Path of the record of the structure.
+
+    Returns
+    -------
+    int
+        Number of files.
+
+    Raises
+    ------
+    ChecksumError
+        If the record is missing or damaged, or a file is missing or differs.
+    """
+    try:
+        expected = dict(ledger.read(path)["sha256"])
+    except (OSError, ValueError, KeyError, TypeError):
+        raise ChecksumError(f"{path}: is missing or damaged: run again, which lays the repository out anew") from None
+    for name, checksum in expected.items():
+        file = root / name
+        if not file.is_file() or sha256(file.read_bytes()).hexdigest() != checksum:
+            remedy = "run again, which lays the repository out anew"
+            raise ChecksumError(f"{file}: is missing or differs from what was laid out: {remedy}")
+    return len(expected)

@@ -68,7 +68,7 @@ def positions(
     return coordinates
 
 
-def labels(config: Config, rows: list[str], times: ArrayLike) -> dict[str, ArrayLike]:
+def labels(config: Config, rows: list[str], times: ArrayLike, views: list[str] | None = None) -> dict[str, ArrayLike]:
     """Values of the coordinates that are the same in every group.
 
     Parameters
@@ -77,11 +77,13 @@ def labels(config: Config, rows: list[str], times: ArrayLike) -> dict[str, Array
     rows : list of str
         Case ids, in the order of the rows.
     times : ndarray of shape (case, frame), s
+    views : list of str, optional
+        Views in the order of their indices (default: those of the configuration, as in a new repository).
     """
     layers = np.arange(1, config.fibres.layers + 1)
     common: dict[str, ArrayLike] = {
         "case": rows,
-        "view": list(config.views),
+        "view": list(config.views) if views is None else views,
         "frame": np.arange(config.loop.frames),
         "time": times,
         "tracker": list(config.tracking.trackers),
@@ -93,10 +95,40 @@ def labels(config: Config, rows: list[str], times: ArrayLike) -> dict[str, Array
 
 
 def columns(table: pd.DataFrame, rows: list[str]) -> dict[str, NDArray[Any]]:
-    """Columns of the table of cases as `cases:KEY`, one value per row; NaN or "" for retired cases."""
+    """Columns of the table of cases as `cases:KEY`, one value per row; NaN or "" for retired cases.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As :func:`echotruth.cases.table` returns it.
+    rows : list of str
+        Case ids, in the order of the rows.
+
+    Returns
+    -------
+    dict
+        The seed, and every key whose value differs among the cases.
+    """
+    keys = [key for key in table if key == "seed" or (key != "case" and not _is_constant(table[key]))]
     arrays = {}
-    for key, column in table.set_index("case").reindex(rows).items():
-        text = column.map(lambda value: isinstance(value, str)).any()
+    for key, column in table.set_index("case")[keys].reindex(rows).items():
+        text = any(isinstance(value, str) for value in column)
         values = column.fillna("") if text else column.astype(float)
         arrays[f"cases:{key}"] = np.asarray(values, dtype=str if text else float)
     return arrays
+
+
+def constants(table: pd.DataFrame) -> dict[str, str | float | None]:
+    """Value of every key that is the same in all cases, as the table of cases holds it.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As :func:`echotruth.cases.table` returns it.
+    """
+    keys = [key for key in table if key not in ("case", "seed") and _is_constant(table[key])]
+    return {str(key): table[key].iloc[:1].tolist()[0] for key in keys}
+
+
+def _is_constant(column: pd.Series) -> bool:
+    return column.nunique(dropna=False) < 2

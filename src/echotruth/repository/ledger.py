@@ -1,11 +1,14 @@
-"""The ledger: one record for every finished job, which commits its results, and the rows of the cases."""
+"""The ledger: one record for every finished job, which commits its results, and the rows of cases and views."""
 
 from __future__ import annotations
 
 import json
-import os
+from collections.abc import Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
+
+from echotruth.repository import durable
 
 GATES = ("mechanics", "physiology")
 """Stages that decide whether the later ones process a heart."""
@@ -21,46 +24,68 @@ def record_path(folder: Path, stage: str, case: str, view: str | None = None) ->
 
 
 def commit(path: Path, record: dict[str, Any]) -> None:
-    """Write a record atomically: its content is on disk before the file gets its name."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    with draft.open("w", encoding="utf-8") as file:
-        json.dump(record, file, indent=1, sort_keys=True)
-        file.write("\n")
-        file.flush()
-        os.fsync(file.fileno())
-    draft.replace(path)
+    """Write a record atomically: its content is on disk before the file gets its name; `seal` is a hash of it."""
+    durable.write(path, f"{json.dumps(record | {'seal': _seal(record)}, indent=1, sort_keys=True)}\n".encode())
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Read a record."""
-    return json.loads(path.read_text(encoding="utf-8"))
+    """Read a record, without its seal; one made before records had seals is taken as it is.
+
+    Raises
+    ------
+    JSONDecodeError, UnicodeDecodeError
+        If it is not what was written.
+    """
+    text = path.read_text(encoding="utf-8")
+    record = json.loads(text)
+    if isinstance(record, dict) and (seal := record.pop("seal", None)) is not None and seal != _seal(record):
+        raise json.JSONDecodeError("the record is not what was written", text, 0)
+    return record
+
+
+def _seal(record: dict[str, Any]) -> str:
+    return sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def rows(registry: Path) -> dict[str, int]:
-    """Row of every case ever registered: the number of the line with its id."""
-    known = registry.read_text(encoding="utf-8").split() if registry.exists() else []
-    return {id: row for row, id in enumerate(known)}
-
-
-def register(registry: Path, ids: list[str]) -> dict[str, int]:
-    """Append new cases to the registry; the row of a case never changes.
+    """Row of every case, or index of every view, ever registered: the number of the line with its name.
 
     Parameters
     ----------
     registry : Path
+        `registry.txt` (cases) or `views.txt` in the folder of the repository.
+    """
+    return {id: row for row, id in enumerate(_lines(registry))}
+
+
+def register(registry: Path, ids: list[str], stored: Sequence[str] = ()) -> dict[str, int]:
+    """Append new cases or views to the registry; the row of one never changes.
+
+    Processes that register at the same time wait for each other, and none loses a row.
+
+    Parameters
+    ----------
+    registry : Path
+        `registry.txt` (cases) or `views.txt` in the folder of the repository.
     ids : list of str
-        Cases of the configuration.
+        Cases or views of the configuration.
+    stored : sequence of str
+        Those in the store, in their order: a registry that is lost or damaged is made again from them.
 
     Returns
     -------
     dict
-        Row of every case ever registered.
+        Row of every case, or index of every view, ever registered.
     """
-    known = list(rows(registry))
-    known += [id for id in ids if id not in set(known)]
-    draft = registry.with_name(f".{registry.name}")
-    registry.parent.mkdir(parents=True, exist_ok=True)
-    draft.write_text("".join(f"{id}\n" for id in known), encoding="utf-8")
-    draft.replace(registry)
-    return rows(registry)
+    with durable.lock(registry.with_name(f".{registry.name}.lock")):
+        before = _lines(registry)
+        damaged = before[: len(stored)] != list(stored)
+        known = [*stored, *before[len(stored) :]] if damaged else before
+        new = list(dict.fromkeys([*known, *ids]))
+        if new != before or not registry.exists():
+            durable.write(registry, "".join(f"{id}\n" for id in new).encode())
+        return rows(registry)
+
+
+def _lines(registry: Path) -> list[str]:
+    return registry.read_text(encoding="utf-8", errors="replace").split() if registry.exists() else []

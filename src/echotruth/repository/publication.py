@@ -9,14 +9,14 @@ from echotruth.cases import expand
 from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.repository import ledger
-from echotruth.repository.checksums import verify
+from echotruth.repository.checksums import verify, verify_structure
 from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
 from echotruth.repository.provenance import packages
 from echotruth.repository.store import Store
 
 
 def publish(folder: Path) -> dict[str, Any]:
-    """Verify every shard against the ledger, then write the verdicts and the attributes of the repository.
+    """Verify every file of the store against the ledger, then write the verdicts and the attributes of the repository.
 
     Parameters
     ----------
@@ -31,13 +31,14 @@ def publish(folder: Path) -> dict[str, Any]:
     Raises
     ------
     ChecksumError
-        If a file is missing or differs from what its job wrote.
+        If a file is missing or differs from what was written.
     """
     config = load(folder / "config.yaml")
     store = Store(folder / f"{config.name}.zarr")
     rows = ledger.rows(folder / "registry.txt")
     records = {case.id: _records(folder, config, case.id) for case in expand(config)}
-    files = sum(verify(store.path, path, ledger.read(path)) for paths in records.values() for path in paths)
+    files = verify_structure(store.path, store.record)
+    files += sum(verify(store.path, path, ledger.read(path)) for paths in records.values() for path in paths)
     verdicts = {case: _verdict(paths) for case, paths in records.items()}
     retired = {"status": "retired", "reason": "not a case of this configuration"}
     for column in ("status", "reason"):

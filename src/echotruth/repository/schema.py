@@ -221,7 +221,8 @@ CASES = (
     ),
     _array("reason", "case", "string", "1", "why a case is not complete"),
 )
-"""The group `cases` also holds one array for every key that cases can vary, in the unit of the key."""
+"""Verdicts on the cases. The group `cases` also holds `seed` and one array for every key that differs among the cases,
+in the unit of the key; its attribute `constants` holds the keys that do not."""
 
 
 def parameters(columns: dict[str, NDArray[Any]]) -> tuple[Array, ...]:

@@ -1,30 +1,25 @@
-"""The Zarr hierarchy: laid out once, then written by jobs, one whole shard at a time.
-
-Every array is rectangular over (case, view, ...). A shard holds all that one job writes of one array, so that parallel
-jobs never touch the same file, and a clip is one file. Chunks carry a crc32c checksum: a flipped bit is an error, not a
-wrong number.
-"""
+"""The Zarr hierarchy on disk: laid out once, then written by jobs, one whole shard at a time."""
 
 from __future__ import annotations
 
 import json
-import warnings
+import os
 from collections.abc import Mapping
+from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
+from shutil import rmtree
 from typing import Any, cast
 
 import numpy as np
 import zarr
 from numpy.typing import ArrayLike, NDArray
-from zarr.codecs import BloscCodec, Crc32cCodec, ZstdCodec
 
-from echotruth.repository import schema
+from echotruth.repository import durable, hierarchy, ledger, schema
+from echotruth.repository.hierarchy import ROOT, Document, Files
 from echotruth.repository.schema import Array
 
 Values = dict[str, ArrayLike]
-
-# A shard that holds only fill values is a result too and must exist on disk.
-zarr.config.set({"array.write_empty_chunks": True})
 
 
 class NotWritten(ValueError):
@@ -43,6 +38,11 @@ class Store:
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
 
+    @property
+    def record(self) -> Path:
+        """Path of the record of the structure: the checksums of all files that no job wrote, by their path."""
+        return self.path.parent / "ledger/structure.json"
+
     def lay_out(
         self,
         arrays: dict[str, tuple[Array, ...]],
@@ -50,7 +50,10 @@ class Store:
         labels: Values,
         attributes: dict[str, dict[str, Any]] | None = None,
     ) -> None:
-        """Create or extend all arrays; those that already match are left untouched.
+        """Create or extend all arrays; files that are as they should be are left untouched, damaged ones are mended.
+
+        No job may be running. Shards stay where they are, unless the arrays of one case and view have another shape or
+        type than before.
 
         Parameters
         ----------
@@ -59,30 +62,23 @@ class Store:
         sizes : dict
             Length of every dimension without coordinates.
         labels : dict
-            Values of every coordinate; `group:name` takes precedence over `name`.
+            Values of every coordinate and column of the table of cases; `group:name` takes precedence over `name`.
         attributes : dict, optional
             Attributes of each group, by its path.
         """
-        root = zarr.open_group(self.path, mode="a", zarr_format=3, use_consolidated=False)
-        for obsolete in set(_groups(root)) - set(arrays):
-            del root[obsolete]
-        for path, members in arrays.items():
-            group = root.require_group(path)
-            values = {name.removeprefix(f"{path}:"): np.asarray(value) for name, value in labels.items()}
-            lengths = sizes | {name: len(value) for name, value in values.items() if value.ndim == 1}
-            coordinates = schema.coordinates(members)
-            columns = [array for array in members if f"{path}:{array.name}" in labels]
-            for obsolete in set(group.array_keys()) - {array.name for array in (*members, *coordinates)}:
-                del group[obsolete]
-            group.attrs.put((attributes or {}).get(path, {}))
-            for array in members:
-                if array not in columns:
-                    _require(group, array, lengths, coordinates)
-            for array in (*coordinates, *columns):
-                _write_all(group, array, values[array.name])
+        rows = len(np.asarray(labels["case"]))
+        verdicts = {f"cases:{array.name}": self._verdicts(array.name, rows) for array in schema.CASES}
+        wanted = hierarchy.structure(arrays, sizes, labels | verdicts, attributes or {})
+        old = self._documents()
+        self._remove_obsolete({path.rpartition("/")[0] for path in wanted})
+        for path in hierarchy.sharded(wanted) & set(old):
+            wanted[path] = self._adapt(path, old[path], wanted[path])
+        wanted[ROOT] = hierarchy.root(wanted, old.get(ROOT, {}).get("attributes", {}))
+        self._put(wanted)
+        self._commit(_checksums(wanted))
 
     def write(self, group: str, values: Values, *row: int) -> None:
-        """Write the shards of one job.
+        """Write the shards of one job; they are on disk when this returns.
 
         Parameters
         ----------
@@ -94,12 +90,18 @@ class Store:
             Row of the case, and index of the view.
         """
         arrays = self._open(group, "r+")
+        by_name = {array.name: array for array in schema_of(group)}
+        written: dict[Path, None] = {}
         for name, value in values.items():
-            array = arrays[name]
+            array, shard = arrays[name], self._shard(group, by_name[name], row)
+            _remove_drafts(shard)
             array[row] = np.asarray(value, dtype=array.dtype)
+            # The name of a file is in its folder, and that of the folder in the one above.
+            written |= dict.fromkeys([shard, *shard.parents[: len(array.shape) + 1]])
+        durable.sync(*written)
 
     def read(self, group: str, *row: int, names: tuple[str, ...] | None = None) -> dict[str, NDArray[Any]]:
-        """Arrays of a group for one case (and view); a missing or damaged shard is an error."""
+        """Arrays of a group for one case (and view); a missing, empty or damaged shard is an error."""
         opened = self._open(group, "r")
         by_name = {array.name: array for array in schema_of(group)}
         # Only a part of the RF may be stored.
@@ -108,16 +110,12 @@ class Store:
             self._require_written(group, array, row[: array.leading])
         return {array.name: np.asarray(opened[array.name][row[: array.leading]]) for array in arrays}
 
-    def _require_written(self, group: str, array: Array, row: tuple[int, ...]) -> None:
-        """Raise an error for a missing shard, which Zarr reads as fill values."""
-        if not self._shard(group, array, row).is_file():
-            remedy = f"run the stage {group.partition('/')[0]} first"
-            raise NotWritten(f"{self.path}: {group}/{array.name} has no data in row {row}: {remedy}")
+    def labels(self, dimension: str) -> list[str]:
+        """Labels of `case` or `view` in the order of their rows, from the table of cases or the phantoms.
 
-    def _shard(self, group: str, array: Array, row: tuple[int, ...]) -> Path:
-        """File that holds the part of an array written by one job."""
-        indices = (*row, *[0] * (len(array.dims) - len(row)))
-        return self.path.joinpath(group, array.name, "c", *map(str, indices))
+        Empty if there is no such array, or it cannot be read.
+        """
+        return self._strings({"case": "cases/case", "view": "phantom/view"}[dimension])
 
     def files(self, group: str, *row: int) -> list[Path]:
         """Files that one job wrote in a group, sorted."""
@@ -125,20 +123,89 @@ class Store:
         return sorted(shard for shard in shards if shard.is_file())
 
     def write_column(self, name: str, values: ArrayLike) -> None:
-        """Write a column of the table of cases, one value per row."""
-        column = self._open("cases", "r+")[name]
-        column[...] = np.asarray(values)
+        """Write the status or the reason of all cases, one value per row of the table of cases."""
+        self._replace(hierarchy.column(next(array for array in schema.CASES if array.name == name), values))
 
     def describe(self, attributes: dict[str, Any]) -> None:
-        """Write the attributes of the repository and consolidate the metadata of all arrays in one file."""
-        root = zarr.open_group(self.path, mode="r+", use_consolidated=False)
-        root.attrs.put(json.loads(json.dumps(attributes)))
-        for partial in self.path.rglob("*.partial"):  # a killed job leaves the file it was writing
-            partial.unlink()
-        with warnings.catch_warnings():
-            # Readers that do not know consolidated metadata read those of each array.
-            warnings.filterwarnings("ignore", "Consolidated metadata")
-            zarr.consolidate_metadata(self.path)
+        """Write the attributes of the repository."""
+        document = json.loads((self.path / ROOT).read_bytes())
+        self._replace({ROOT: hierarchy.as_bytes(document | {"attributes": attributes})})
+
+    def _require_written(self, group: str, array: Array, row: tuple[int, ...]) -> None:
+        """Raise an error for a missing or empty shard, which Zarr reads as fill values."""
+        shard = self._shard(group, array, row)
+        if not shard.is_file() or not shard.stat().st_size:
+            what = "is empty" if shard.is_file() else "has no data"
+            remedy = f"run the stage {group.partition('/')[0]} first"
+            raise NotWritten(f"{self.path}: {group}/{array.name} {what} in row {row}: {remedy}")
+
+    def _shard(self, group: str, array: Array, row: tuple[int, ...]) -> Path:
+        """File that holds the part of an array written by one job."""
+        indices = (*row, *[0] * (len(array.dims) - len(row)))
+        return self.path.joinpath(group, array.name, "c", *map(str, indices))
+
+    def _verdicts(self, name: str, rows: int) -> list[str]:
+        """Column of the table of cases that publication writes, with "" for new rows."""
+        known = self._strings(f"cases/{name}")[:rows]
+        return known + [""] * (rows - len(known))
+
+    def _strings(self, path: str) -> list[str]:
+        try:
+            opened = zarr.open_array(self.path, path=path, mode="r")
+            return [str(value) for value in np.asarray(opened[...])]
+        except Exception:  # absent, or damaged in one of the many ways for which Zarr and its codecs have errors
+            return []
+
+    def _documents(self) -> dict[str, Document]:
+        """Metadata on disk of all groups and arrays by path, except those that differ from the record: damaged ones."""
+        recorded, documents = self._recorded(), {}
+        for file in (node / ROOT for node in _nodes(self.path)):
+            if not file.is_file():
+                continue
+            path, content = file.relative_to(self.path).as_posix(), file.read_bytes()
+            if recorded is None or recorded.get(path) == sha256(content).hexdigest():
+                with suppress(ValueError):
+                    documents[path] = json.loads(content)
+        return documents
+
+    def _remove_obsolete(self, wanted: set[str]) -> None:
+        """Remove groups and arrays that are not wanted any more, and drafts that a killed process left."""
+        for node in _nodes(self.path):
+            path = node.relative_to(self.path).as_posix()
+            if node != self.path and path not in wanted:
+                rmtree(node, ignore_errors=True)
+            for draft in node.glob(".*.partial"):
+                draft.unlink()
+
+    def _adapt(self, path: str, old: Document, content: bytes) -> bytes:
+        """Metadata of an array of the jobs that keep its shards readable; shards that cannot be kept are removed."""
+        new = json.loads(content)
+        if hierarchy.keeps_shards(old, new):
+            return hierarchy.as_bytes(new | {key: old[key] for key in ("chunk_grid", "codecs", "fill_value")})
+        rmtree(self.path / Path(path).parent / "c", ignore_errors=True)
+        return content
+
+    def _replace(self, files: Files) -> None:
+        """Write some files of the structure, and their checksums in its record."""
+        self._put(files)
+        self._commit((self._recorded() or {}) | _checksums(files))
+
+    def _put(self, files: Files) -> None:
+        """Write the files that differ from those on disk."""
+        durable.update_all({self.path / name: content for name, content in files.items()})
+
+    def _recorded(self) -> dict[str, str] | None:
+        """Checksums in the record of the structure; None if there is no record, empty if it is damaged."""
+        if not self.record.is_file():
+            return None
+        try:
+            return dict(ledger.read(self.record)["sha256"])
+        except (ValueError, KeyError, TypeError):
+            return {}
+
+    def _commit(self, sha256: dict[str, str]) -> None:
+        if sha256 != self._recorded():
+            ledger.commit(self.record, {"sha256": sha256})
 
     def _open(self, group: str, mode: Any) -> Mapping[str, zarr.Array[Any]]:
         return cast(Any, zarr.open_group(self.path, path=group, mode=mode, use_consolidated=False))
@@ -150,67 +217,21 @@ def schema_of(group: str) -> tuple[Array, ...]:
     return schema.ALL[stage]
 
 
-def _groups(root: zarr.Group) -> list[str]:
-    """Paths of the groups that hold arrays."""
-    arrays = [name for name, item in root.members(max_depth=None) if isinstance(item, zarr.Array)]
-    return sorted({name.rpartition("/")[0] for name in arrays})
+def _nodes(folder: Path) -> list[Path]:
+    """Folders of groups and arrays, without those of shards."""
+    if not folder.is_dir():
+        return []
+    below = sorted(child for child in folder.iterdir() if child.is_dir() and child.name != "c")
+    return [folder, *(node for child in below for node in _nodes(child))]
 
 
-def _require(group: zarr.Group, array: Array, sizes: dict[str, int], coordinates: tuple[Array, ...]) -> zarr.Array[Any]:
-    """The array of the schema: the existing one, extended if need be, or a new one."""
-    shape = tuple(sizes[dim] for dim in array.dims)
-    old = group.get(array.name)
-    if not isinstance(old, zarr.Array) or not _matches(old, array, shape):
-        return _create(group, array, shape, coordinates)
-    if old.shape != shape and array.dtype == "string":
-        return _create(group, array, shape, coordinates)  # one chunk, which is rewritten at publication
-    if old.shape != shape:
-        old.resize(shape)
-    return old
+def _checksums(files: Files) -> dict[str, str]:
+    return {path: sha256(content).hexdigest() for path, content in files.items()}
 
 
-def _write_all(group: zarr.Group, array: Array, values: NDArray[Any]) -> None:
-    """Write an array that belongs to no job, in one chunk: a coordinate or a column of the table of cases."""
-    old = group.get(array.name)
-    if not isinstance(old, zarr.Array) or old.shape != values.shape or not _matches(old, array, values.shape):
-        old = _create(group, array, values.shape, ())
-    old[...] = values
-
-
-def _matches(old: zarr.Array[Any], array: Array, shape: tuple[int, ...]) -> bool:
-    """Whether an array on disk is that of the schema except for the number of cases and views."""
-    same_type = array.dtype == "string" or old.dtype == np.dtype(array.dtype)
-    same_dims = getattr(old.metadata, "dimension_names", None) == array.dims
-    return same_type and same_dims and old.shape[array.leading :] == shape[array.leading :]
-
-
-def _create(group: zarr.Group, array: Array, shape: tuple[int, ...], coordinates: tuple[Array, ...]) -> zarr.Array[Any]:
-    attributes: dict[str, Any] = {"units": array.units, "long_name": array.long_name}
-    dims = set(array.dims)
-    auxiliary = [other.name for other in coordinates if other.dims != (other.name,) and set(other.dims) <= dims]
-    if auxiliary:
-        attributes["coordinates"] = " ".join(auxiliary)
-    image = array.dtype == "uint8" and array.dims[-2:] == ("axial", "lateral")
-    compressor = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle") if image else ZstdCodec(level=3)
-    shard, chunk = _shard_and_chunk(array, shape)
-    return group.create_array(
-        array.name,
-        shape=shape,
-        dtype=str if array.dtype == "string" else array.dtype,
-        shards=shard,
-        chunks=chunk,
-        compressors=[compressor, Crc32cCodec()],
-        fill_value=array.fill,
-        dimension_names=array.dims,
-        attributes=attributes,
-        overwrite=True,
-    )
-
-
-def _shard_and_chunk(array: Array, shape: tuple[int, ...]) -> tuple[tuple[int, ...] | None, tuple[int, ...]]:
-    """Shapes of a shard, which one job writes, and of a chunk, one frame of it."""
-    if array.dtype == "string" or not array.leading or array in schema.COORDINATES:
-        return None, tuple(max(size, 1) for size in shape)
-    shard = tuple(1 if dim in ("case", "view") else size for dim, size in zip(array.dims, shape, strict=True))
-    chunk = tuple(1 if dim == "frame" else size for dim, size in zip(array.dims, shard, strict=True))
-    return (None, shard) if chunk == shard or np.prod(shard) < 4096 else (shard, chunk)
+def _remove_drafts(shard: Path) -> None:
+    """Remove what a killed job left of this shard; no other job writes it."""
+    with suppress(FileNotFoundError), os.scandir(shard.parent) as entries:
+        for entry in entries:
+            if entry.name.startswith(f"{shard.name}.") and entry.name.endswith(".partial"):
+                os.unlink(entry.path)

@@ -1,0 +1,196 @@
+"""Check of a job: its record, its files, and their values."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from hashlib import file_digest, sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+
+from echotruth.repository import ledger, schema, values
+from echotruth.repository.inventory import Fault, JobRecord, Repository, reason
+from echotruth.repository.ledger import GATES, record_path
+from echotruth.repository.store import schema_of
+
+STATUSES = ("complete", "implausible", "failed", "skipped")
+"""What a record can say; the jobs of the last two have no files."""
+
+BLOCK_BYTES = 64_000_000
+"""Most bytes of values that one thread reads at a time."""
+
+
+@dataclass
+class JobFaults:
+    """What was found of a job: its faults, its number of files, and their arrays; None if its record is unreadable."""
+
+    faults: list[Fault]
+    files: int = 0
+    arrays: frozenset[str] | None = None
+
+
+def check_job(repository: Repository, job: JobRecord, quick: bool) -> JobFaults:
+    """Record of a job, its files, and their values unless it is to be quick."""
+    name = repository.name(job.path)
+    remedy = f"run makes it again ({job.job})"
+    record, problem = _read_record(job)
+    if record is None:
+        return JobFaults([Fault(name, problem, remedy, (job.path,))])
+    row = repository.row(job)
+    if row is None:
+        return JobFaults(
+            [Fault(name, "is of a case or view that registry.txt or views.txt does not have", remedy, (job.path,))]
+        )
+    expected = repository.shards(job) if record["status"] in ("complete", "implausible") else set()
+    listed = {path: hash for path, hash in record.get("sha256", {}).items() if _is_current(repository, path)}
+    found = JobFaults([], len(listed), frozenset(path.partition("/c/")[0] for path in listed if path in expected))
+    if set(listed) != expected and job.case in repository.cases:
+        odd = sorted(set(listed) ^ expected)[0]
+        wrong = "names a file that is not of its job" if odd in listed else "does not name a file of its job"
+        found.faults.append(Fault(name, f"{wrong}, {odd}", remedy, (job.path,)))
+    for path, hash in listed.items():
+        if problem := damage(repository.store / path, hash):
+            file = repository.store / path
+            found.faults.append(Fault(repository.name(file), problem, remedy, (job.path,), (file,)))
+    if not quick and not found.faults and job.case in repository.cases:
+        found.faults = [
+            Fault(f"{repository.name(repository.store)}/{array}", f"{problem} ({job.job})", _not_healed(name))
+            for array, problem in _check_values(repository, job, row, {path.partition("/c/")[0] for path in listed})
+            if array not in COMPRESSED or _is_complete(repository, job.case)
+        ]
+    return found
+
+
+COMPRESSED = ("kinematics/deformation_gradient", "kinematics/volume_ratio_min", "physiology/volume_ratio_min")
+"""Arrays that tell that elements collapse, for which a heart is found implausible."""
+
+
+def _is_complete(repository: Repository, case: str) -> bool:
+    """Whether a heart is within its bounds, as far as it is known."""
+    record, _ = _read_record(JobRecord(record_path(repository.folder, GATES[-1], case), GATES[-1], case))
+    return record is None or record["status"] == "complete"
+
+
+def _not_healed(record: str) -> str:
+    """Remedy for values that are as their job wrote them."""
+    return f"look at the configuration, or delete {record} and run again if it was made by other code"
+
+
+def _read_record(job: JobRecord) -> tuple[dict[str, Any] | None, str]:
+    """A record, or None and what is wrong with it."""
+    try:
+        record = ledger.read(job.path)
+    except (OSError, ValueError) as error:
+        return None, f"cannot be read ({reason(error)})"
+    identity = {"stage": job.stage, "case": job.case, "view": job.view}
+    if not isinstance(record, dict) or any(record.get(key, "") != value for key, value in identity.items()):
+        return None, f"is not the record of {job.job}"
+    if record.get("status") not in STATUSES:
+        return None, f"has the status {record.get('status')!r}, not one of {', '.join(STATUSES)}"
+    hashes = record.get("sha256", {})
+    has_files = record["status"] in ("complete", "implausible")
+    if (has_files and "sha256" not in record) or not are_checksums(hashes):
+        return None, "has no checksums of the files of its job"
+    return record, ""
+
+
+def are_checksums(hashes: object) -> bool:
+    return isinstance(hashes, dict) and all(isinstance(hash, str) and len(hash) == 64 for hash in hashes.values())
+
+
+def _is_current(repository: Repository, path: str) -> bool:
+    """Whether the hierarchy still has the array of a shard, or the path is of none at all.
+
+    A case that left the configuration keeps its record, which may name groups that left it later.
+    """
+    group = path.partition("/c/")[0].rpartition("/")[0]
+    return group in repository.groups or group.partition("/")[0] not in schema.ALL
+
+
+def damage(file: Path, hash: str) -> str:
+    """What is wrong with a file that must have a SHA-256; empty if nothing is."""
+    try:
+        with file.open("rb") as opened:
+            if file_digest(opened, sha256).hexdigest() == hash:
+                return ""
+            return "differs from what was written" if os.fstat(opened.fileno()).st_size else "is empty"
+    except FileNotFoundError:
+        return "is missing"
+    except OSError as error:
+        return f"cannot be read ({error.strerror})"
+
+
+def _check_values(
+    repository: Repository, job: JobRecord, row: tuple[int, ...], arrays: set[str]
+) -> Iterator[tuple[str, str]]:
+    """Array and problem of the values of a job."""
+    config = repository.cases[job.case].config
+    for group in sorted({path.rpartition("/")[0] for path in arrays}):
+        opened = {
+            path.rpartition("/")[2]: repository.opened.get(path) for path in arrays if path.startswith(f"{group}/")
+        }
+        if any(array is None for array in opened.values()):
+            continue  # its metadata are damaged
+        found: dict[tuple[str, str], None] = {}
+        for first, part in _blocks(group, {name: array for name, array in opened.items() if array is not None}, row):
+            found |= dict.fromkeys(values.faults(group, part, first, config))
+        yield from ((f"{group}/{name}", problem) for name, problem in _first_of_each(found))
+
+
+def _first_of_each(found: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    """The first problem of each array: that of the first part of its frames."""
+    first: dict[str, str] = {}
+    for name, problem in found:
+        first.setdefault(name, problem)
+    yield from first.items()
+
+
+def _blocks(
+    group: str, opened: dict[str, zarr.Array[Any]], row: tuple[int, ...]
+) -> Iterator[tuple[int, values.Arrays]]:
+    """First frame and arrays of parts of the frames, which fit into memory."""
+    by_name = {array.name: array for array in schema_of(group)}
+    with_frames = [name for name in opened if "frame" in by_name[name].dims]
+    whole = {name: np.asarray(opened[name][row[: by_name[name].leading]]) for name in opened if name not in with_frames}
+    if not with_frames:
+        yield 0, whole
+        return
+    axes = {name: by_name[name].dims.index("frame") for name in with_frames}
+    frames = opened[with_frames[0]].shape[axes[with_frames[0]]]
+    bytes_a_frame = sum(_bytes_of_a_job(opened[name], by_name[name].leading) for name in with_frames) / frames
+    step = max(1, int(BLOCK_BYTES / bytes_a_frame))
+    for first in range(0, frames, step):
+        part = {}
+        for name in with_frames:
+            leading = by_name[name].leading
+            index: tuple[int | slice, ...] = (*row[:leading], *[slice(None)] * (axes[name] - leading))
+            part[name] = np.asarray(opened[name][(*index, slice(first, first + step))])
+        yield first, whole | part
+
+
+def _bytes_of_a_job(array: zarr.Array[Any], leading: int) -> float:
+    return float(np.prod(array.shape[leading:])) * array.dtype.itemsize
+
+
+def check_loop(repository: Repository, job: JobRecord) -> list[Fault]:
+    """Loop and det F of a heart whose record says that it is complete."""
+    record, _ = _read_record(job)
+    row = repository.row(job)
+    if record is None or record["status"] != "complete" or row is None or job.case not in repository.cases:
+        return []
+    curves = {f"mechanics/{name}": name for name in ("pressure", "volume", "pressure_target", "volume_target")}
+    curves |= {"kinematics/volume_ratio_min": "volume_ratio_min"}
+    measured = {f"physiology/{name}": name for name in ("loop_error", "volume_ratio_min")}
+    if not {*curves, *measured} <= set(repository.opened):
+        return []
+    arrays = {name: np.asarray(repository.opened[path][row[0]]) for path, name in curves.items()}
+    found = {name: np.asarray(repository.opened[path][row[0]]) for path, name in measured.items()}
+    store = repository.name(repository.store)
+    return [
+        Fault(f"{store}/physiology/{name}", f"{problem} ({job.job})", _not_healed(repository.name(job.path)))
+        for name, problem in values.loop_faults(arrays, found, repository.cases[job.case].config)
+    ]

@@ -1,0 +1,161 @@
+"""Check of what belongs to no job: the structure of the hierarchy, registries, and files of no record."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+
+from echotruth.repository import ledger
+from echotruth.repository.array import Array
+from echotruth.repository.check_jobs import are_checksums, damage
+from echotruth.repository.inventory import Fault, Repository, files_below, reason
+from echotruth.repository.provenance import settings_version
+from echotruth.repository.store import Store
+
+
+def check_structure(repository: Repository, pool: ThreadPoolExecutor) -> tuple[set[str] | None, list[Fault]]:
+    """Files that no job wrote, and their faults; None if no record of them can be read."""
+    record, remedy, publish = repository.structure_record, "run writes it again", (repository.publication_record,)
+    if repository.is_older:
+        return None, []
+    try:
+        hashes = ledger.read(record)["sha256"]
+        if not are_checksums(hashes):
+            raise ValueError("has no checksums")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        problem = "is missing" if isinstance(error, FileNotFoundError) else f"cannot be read ({reason(error)})"
+        # Nothing else vouches for the files of the structure, and a run makes all of them.
+        unproved = (record, *_structure_files(repository))
+        return None, [Fault(repository.name(record), problem, remedy, publish, unproved)]
+    files = [repository.store / path for path in hashes]
+    problems = pool.map(damage, files, hashes.values())
+    return set(hashes), [
+        Fault(repository.name(file), problem, remedy, publish, (file,))
+        for file, problem in zip(files, problems, strict=True)
+        if problem
+    ]
+
+
+def _structure_files(repository: Repository) -> Iterator[Path]:
+    """Files that are not shards of jobs."""
+    for path in files_below(repository.store):
+        if not ("/c/" in path and path.partition("/c/")[0] in repository.shard_paths):
+            yield repository.store / path
+
+
+def check_registries(repository: Repository) -> Iterator[Fault]:
+    """Rows of cases and views against their labels in the store, which then count."""
+    store = Store(repository.store)
+    for name, dimension in (("registry.txt", "case"), ("views.txt", "view")):
+        labels, path = store.labels(dimension), repository.folder / name
+        known = repository.rows if dimension == "case" else repository.views
+        # A killed start may have registered more than it laid out.
+        if labels and list(known)[: len(labels)] != labels:
+            known.clear()
+            known.update({label: row for row, label in enumerate(labels)})
+            problem = f"does not have the {dimension}s of the store in their order" if path.is_file() else "is missing"
+            yield Fault(name, problem, "run writes it again", (repository.publication_record,), (path,))
+
+
+def check_others(repository: Repository) -> Iterator[Fault]:
+    """Record of the publication, and the configurations that jobs were handed."""
+    if repository.publication_record.is_file():
+        try:
+            ledger.read(repository.publication_record)
+        except ValueError as error:
+            path, problem = repository.publication_record, f"cannot be read ({reason(error)})"
+            yield Fault(repository.name(path), problem, "run writes it again", (path,))
+    for path in sorted(repository.folder.glob("configs/*.json")):
+        if _content_version(path) != path.stem:
+            yield Fault(repository.name(path), "differs from what was written", "run writes it again", files=(path,))
+
+
+def _content_version(path: Path) -> str:
+    try:
+        return settings_version(*[json.loads(path.read_text(encoding="utf-8"))])
+    except ValueError:
+        return ""
+
+
+def check_metadata(repository: Repository) -> Iterator[Fault]:
+    """Metadata of the arrays of the jobs against the schema, and times against their order."""
+    remedy = "run the configuration with this version of echotruth"
+    for path, array in repository.shard_paths.items():
+        name = f"{repository.name(repository.store)}/{path}"
+        opened = repository.opened.get(path)
+        if opened is None:
+            yield Fault(name, "is not an array that can be opened", remedy, (repository.publication_record,))
+        elif problem := _metadata_problem(opened, array, repository):
+            yield Fault(name, problem, remedy)
+    yield from _check_times(repository)
+
+
+def _metadata_problem(opened: zarr.Array[Any], array: Array, repository: Repository) -> str:
+    """How the metadata of an array differ from the schema; empty if they do not."""
+    found = {
+        "dimensions": tuple(getattr(opened.metadata, "dimension_names", None) or ()),
+        "type": str(opened.dtype),
+        "units": opened.attrs.get("units"),
+        "long_name": opened.attrs.get("long_name"),
+        "rows": opened.shape[0] >= len(repository.cases),
+    }
+    right = {
+        "dimensions": array.dims,
+        "type": array.dtype,
+        "units": array.units,
+        "long_name": array.long_name,
+        "rows": True,
+    }
+    return next((f"has {key} {found[key]!r}, not {right[key]!r}" for key in right if found[key] != right[key]), "")
+
+
+def _check_times(repository: Repository) -> Iterator[Fault]:
+    try:
+        times = np.asarray(zarr.open_array(repository.store, path="mechanics/time", mode="r")[...])
+    except Exception:  # a repository that was not laid out, or in an earlier layout
+        return
+    rows = [repository.rows[case] for case in repository.cases if repository.rows.get(case, len(times)) < len(times)]
+    wrong = [row for row in rows if times[row, 0] != 0 or not (np.diff(times[row]) > 0).all()]
+    if wrong:
+        name = f"{repository.name(repository.store)}/mechanics/time"
+        yield Fault(name, f"does not increase from 0 in row {wrong[0]}", "look at the loop of the configuration")
+
+
+Listed = dict[tuple[str, tuple[int, ...]], frozenset[str]]
+"""Stage and row of a job -> arrays of which its record lists the shard."""
+
+
+def strangers(repository: Repository, listed: Listed, structure: set[str] | None) -> Iterator[Fault]:
+    """Files that belong to no record; those of jobs that have none yet are left out."""
+    for path in files_below(repository.store):
+        file = repository.store / path
+        array, _, index = path.partition("/c/")
+        if path.endswith(".partial"):
+            problem = "is what a killed process left of a file"
+        elif index and array in repository.shard_paths:
+            problem = "" if _has_owner(repository, array, index, listed) else "belongs to no job"
+        else:
+            problem = "" if structure is None or path in structure else "belongs to nothing"
+        if problem:
+            yield Fault(repository.name(file), problem, "--heal deletes it", files=(file,))
+
+
+def _has_owner(repository: Repository, path: str, index: str, listed: Listed) -> bool:
+    """Whether a shard is that of a job, or of one that has no record yet."""
+    array = repository.shard_paths[path]
+    if not all(part.isdecimal() for part in index.split("/")):
+        return False
+    place = [int(part) for part in index.split("/")]
+    row, rest = tuple(place[: array.leading]), place[array.leading :]
+    if len(place) != len(array.dims) or any(rest):
+        return False
+    if row[0] >= len(repository.rows) or (len(row) == 2 and row[1] >= len(repository.views)):
+        return False
+    arrays = listed.get((repository.stages[path.rpartition("/")[0]], row))
+    return arrays is None or path in arrays

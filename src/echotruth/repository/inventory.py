@@ -1,0 +1,211 @@
+"""What a check needs to know of a repository: its configuration, records, rows and arrays."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import zarr
+
+from echotruth.cases import Case, Sweep
+from echotruth.config import Config
+from echotruth.config.loading import ConfigError, load
+from echotruth.repository import ledger, schema
+from echotruth.repository.array import Array
+from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
+
+
+class CheckError(ValueError):
+    """Raised if a folder is not a repository that can be checked."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something that is not as it should be.
+
+    Attributes
+    ----------
+    path : str
+        Of the file, below the folder of the repository.
+    problem : str
+        What is wrong with it.
+    remedy : str
+        What heals it.
+    records : tuple of Path
+        Records to drop, so that their jobs run again.
+    files : tuple of Path
+        Files to delete.
+    """
+
+    path: str
+    problem: str
+    remedy: str
+    records: tuple[Path, ...] = ()
+    files: tuple[Path, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.problem}: {self.remedy}"
+
+
+@dataclass(frozen=True)
+class JobRecord:
+    """A record of the ledger.
+
+    Attributes
+    ----------
+    path : Path
+    stage, case : str
+    view : str or None
+    """
+
+    path: Path
+    stage: str
+    case: str
+    view: str | None = None
+
+    @property
+    def job(self) -> str:
+        """The job in words."""
+        return f"{self.stage} of {self.case}" + (f", {self.view}" if self.view else "")
+
+
+class Repository:
+    """Folder of a repository, with what a check needs to know of it.
+
+    Parameters
+    ----------
+    folder : Path
+        `out/NAME`.
+
+    Raises
+    ------
+    CheckError
+        If it has no configuration that can be read.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        if not (folder / "config.yaml").is_file():
+            raise CheckError(f"{folder}: is not a repository: give the folder that a run made, as out/demo")
+        try:
+            self.config: Config = load(folder / "config.yaml")
+            self.cases = _cases(self.config)
+        except ConfigError as error:
+            raise CheckError(f"{error}: run the configuration again, which writes it") from None
+        self.folder = folder
+        self.store = folder / f"{self.config.name}.zarr"
+        self.structure_record = folder / "ledger/structure.json"
+        self.publication_record = folder / "ledger/repository.json"
+        self.groups = schema.groups(self.config)
+
+        self.rows, self.views = _registered(folder / "registry.txt"), _registered(folder / "views.txt")
+        if self.is_older:
+            self.views = {view: index for index, view in enumerate(self.config.views)}
+
+    @property
+    def is_older(self) -> bool:
+        """Whether it was made before views had a registry, and files of the structure a record."""
+        return not any((self.folder / name).exists() for name in ("views.txt", "ledger/structure.json"))
+
+    @cached_property
+    def stages(self) -> dict[str, str]:
+        """Group -> stage whose jobs write it."""
+        stages = (*GATES, *VIEW_STAGES)
+        return {group: stage for stage in stages for group in schema.written_by(stage, self.config)}
+
+    @cached_property
+    def shard_paths(self) -> dict[str, Array]:
+        """Path of every array of the jobs below the store -> its description."""
+        return {
+            f"{group}/{array.name}": array for group in self.stages for array in self.groups[group] if array.leading
+        }
+
+    @cached_property
+    def opened(self) -> dict[str, zarr.Array[Any]]:
+        """Arrays of the jobs that can be opened, by path."""
+        arrays = {}
+        for path in self.shard_paths:
+            try:
+                arrays[path] = zarr.open_array(self.store, path=path, mode="r")
+            except Exception:  # damaged metadata, which is a fault of its own, fail in many ways
+                continue
+        return arrays
+
+    def records(self) -> list[JobRecord]:
+        """Records that exist, sorted."""
+        gates = (path for stage in GATES for path in self.folder.glob(f"ledger/{stage}/*.json"))
+        views = (path for stage in VIEW_STAGES for path in self.folder.glob(f"ledger/{stage}/*/*.json"))
+        found = [JobRecord(path, path.parent.name, path.stem) for path in gates]
+        found += [JobRecord(path, path.parents[1].name, path.parent.name, path.stem) for path in views]
+        return sorted((record for record in found if not record.path.name.startswith(".")), key=lambda one: one.path)
+
+    def wanted(self) -> list[Path]:
+        """Paths of the records of all jobs of the configuration."""
+        return wanted_records(self.folder, list(self.cases), list(self.config.views))
+
+    def gates(self, record: JobRecord) -> tuple[Path, ...]:
+        """Paths of the records of the heart of a job."""
+        return tuple(record_path(self.folder, stage, record.case) for stage in GATES)
+
+    def row(self, record: JobRecord) -> tuple[int, ...] | None:
+        """Row of the case, and index of the view if there is one; None if the registry does not have them."""
+        row, index = self.rows.get(record.case), self.views.get(record.view or "")
+        if row is None or (record.view is not None and index is None):
+            return None
+        return (row,) if record.view is None else (row, index or 0)
+
+    def shards(self, record: JobRecord) -> set[str]:
+        """Paths below the store of the shards that a job writes; none if its row is not known."""
+        row, groups = self.row(record), schema.written_by(record.stage, self.config)
+        if row is None:
+            return set()
+        arrays = ((group, array) for group in groups for array in self.groups[group])
+        return {_shard(group, array, row) for group, array in arrays if array.leading == len(row)}
+
+    def name(self, path: Path) -> str:
+        """Path below the folder."""
+        return path.relative_to(self.folder).as_posix()
+
+
+def _cases(config: Config) -> dict[str, Case]:
+    """Cases by id; the files that a configuration names need not be there any more."""
+    sweep = Sweep(config, config.name)
+    combinations = (dict(zip(config.cases, values, strict=True)) for values in product(*config.cases.values()))
+    return {case.id: case for case in map(sweep.case, combinations)}
+
+
+def wanted_records(folder: Path, cases: list[str], views: list[str]) -> list[Path]:
+    """Paths of the records of all jobs of some cases and views."""
+    gates = [record_path(folder, stage, case) for stage in GATES for case in cases]
+    return gates + [record_path(folder, stage, case, view) for stage in VIEW_STAGES for case in cases for view in views]
+
+
+def _shard(group: str, array: Array, row: tuple[int, ...]) -> str:
+    """Path of the shard of a job below the store."""
+    indices = (*row, *[0] * (len(array.dims) - len(row)))
+    return "/".join((group, array.name, "c", *map(str, indices)))
+
+
+def files_below(folder: Path) -> Iterator[str]:
+    """Paths of all files below a folder, of which only one folder at a time is kept in memory."""
+    length = len(str(folder)) + 1
+    for parent, _, names in os.walk(folder):
+        below = parent[length:].replace(os.sep, "/")
+        yield from (f"{below}/{name}" if below else name for name in names)
+
+
+def _registered(registry: Path) -> dict[str, int]:
+    """Rows of a registry; none if it cannot be read."""
+    try:
+        return ledger.rows(registry)
+    except ValueError:
+        return {}
+
+
+def reason(error: BaseException) -> str:
+    """What an error says, in one line and without a place in the text."""
+    return str(getattr(error, "msg", error)).partition("\n")[0]

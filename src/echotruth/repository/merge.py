@@ -1,0 +1,212 @@
+"""Merging of repositories: hearts of one become further rows of another, with their files and records.
+
+What was there before keeps its place and its bytes. The structure is not of a job; whoever merges lays it out again.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from echotruth.config import Config
+from echotruth.config.loading import ConfigError, load, validate
+from echotruth.repository import durable, ledger
+from echotruth.repository.checksums import ChecksumError, verify
+from echotruth.repository.inventory import JobRecord, Repository
+from echotruth.section import Section
+
+OWN = ("name", "cases")
+"""Keys in which repositories that are merged may differ."""
+
+
+class MergeError(ValueError):
+    """Raised if repositories cannot be merged."""
+
+
+def spanning(into: str, configs: dict[Path, Config]) -> Config:
+    """Configuration of all cases of several repositories.
+
+    A key that one of them does not sweep has the value there that it has without the sweep.
+
+    Parameters
+    ----------
+    into : str
+        Name of the new configuration.
+    configs : dict
+        Configuration of each repository, by its folder.
+
+    Raises
+    ------
+    MergeError
+        If they differ in more than their cases.
+    """
+    (folder, first), *others = configs.items()
+    for other, config in others:
+        if key := _difference(first, config):
+            raise MergeError(f"{other}: {key} differs from that of {folder}: only name and cases may differ")
+    keys = list(dict.fromkeys(key for config in configs.values() for key in config.cases))
+    cases: dict[str, list[Any]] = {}
+    for key in keys:
+        cases[key] = []
+        for config in configs.values():
+            cases[key] += [value for value in config.cases.get(key, [_value(config, key)]) if value not in cases[key]]
+    try:
+        return validate(first.model_dump(mode="json") | {"name": into, "cases": cases}, into)
+    except ConfigError as error:
+        raise MergeError(str(error)) from None
+
+
+def compare(source: Path, target: Path) -> None:
+    """Make sure that jobs which two repositories have both made have the same bytes in them.
+
+    Parameters
+    ----------
+    source, target : Path
+        Folders of the repositories.
+
+    Raises
+    ------
+    MergeError
+        If a job has other bytes.
+    """
+    giving, receiving = Repository(source), Repository(target)
+    for record in _records(giving):
+        if _in(record, giving, receiving).is_file():
+            _compare(record, giving, receiving)
+
+
+def verify_files(source: Path) -> None:
+    """Compare all files of the jobs of a repository with their checksums.
+
+    Raises
+    ------
+    MergeError
+        If one is damaged.
+    """
+    giving = Repository(source)
+    for record in _records(giving):
+        try:
+            verify(giving.store, record.path, ledger.read(record.path))
+        except (ChecksumError, ValueError) as error:
+            raise MergeError(f"{error}: heal {source} before it is merged") from None
+
+
+def take_over(source: Path, target: Path) -> tuple[list[JobRecord], int]:
+    """Take over the jobs of a repository that another one lacks; what the other has stays as it is.
+
+    Parameters
+    ----------
+    source : Path
+        Folder of the repository that has them, and stays as it is; see :func:`verify_files`.
+    target : Path
+        Folder of the repository that receives them; laid out for all cases and views of both.
+
+    Returns
+    -------
+    taken : list of JobRecord
+        Records of the jobs that were taken over.
+    known : int
+        Number of those that the other one had already.
+    """
+    giving, receiving = Repository(source), Repository(target)
+    records = _records(giving)
+    new = [record for record in records if not _in(record, giving, receiving).is_file()]
+    for record in new:
+        _copy(record, giving, receiving)
+    taken = [replace(record, path=_in(record, giving, receiving)) for record in new]
+    return taken, len(records) - len(new)
+
+
+def check_sources(sources: list[Path]) -> dict[Path, Config]:
+    """Configurations of repositories by their folders.
+
+    Raises
+    ------
+    MergeError
+        If one is not a repository, or was made before views had a registry.
+    """
+    for source in sources:
+        if not (source / "config.yaml").is_file():
+            raise MergeError(f"{source}: is not a repository: give the folder that a run made, as out/demo")
+        if not (source / "views.txt").is_file():
+            raise MergeError(f"{source}: was made by an earlier version: run it again before it is merged")
+    try:
+        return {source: load(source / "config.yaml") for source in sources}
+    except ConfigError as error:
+        raise MergeError(str(error)) from None
+
+
+def _difference(first: Section, second: Section, prefix: str = "") -> str:
+    """Dotted key in which two configurations differ; empty if they do in none, besides name and cases."""
+    for key in type(first).model_fields:
+        one, other = getattr(first, key), getattr(second, key)
+        if one == other or f"{prefix}{key}" in OWN:
+            continue
+        if isinstance(one, Section) and isinstance(other, Section) and type(one) is type(other):
+            return _difference(one, other, f"{prefix}{key}.")
+        return f"{prefix}{key}"
+    return ""
+
+
+def _value(config: Config, key: str) -> Any:
+    """Value of a dotted key without the sweep."""
+    value: Any = config
+    for part in key.split("."):
+        value = getattr(value, part)
+    return value
+
+
+def _records(repository: Repository) -> list[JobRecord]:
+    """Records of the cases and views of the configuration."""
+    views = (None, *repository.config.views)
+    return [record for record in repository.records() if record.case in repository.cases and record.view in views]
+
+
+def _in(record: JobRecord, giving: Repository, receiving: Repository) -> Path:
+    """Place of a record in the other ledger."""
+    return receiving.folder / record.path.relative_to(giving.folder)
+
+
+def _renamed(record: JobRecord, giving: Repository, receiving: Repository) -> Iterator[tuple[str, str, str]]:
+    """Path of each shard of a job in both stores, and its SHA-256."""
+    before, after = giving.row(record), receiving.row(record)
+    if before is None or after is None:
+        raise MergeError(f"{record.path}: its case or view has no row: check {giving.folder} and {receiving.folder}")
+    for path, hash in ledger.read(record.path).get("sha256", {}).items():
+        array, _, index = path.partition("/c/")
+        rest = index.split("/")[len(before) :]
+        yield path, "/".join((array, "c", *map(str, after), *rest)), hash
+
+
+def _compare(record: JobRecord, giving: Repository, receiving: Repository) -> None:
+    """Both must have the same bytes of a job that both have."""
+    mine = ledger.read(_in(record, giving, receiving))
+    theirs = ledger.read(record.path)
+    same = {path: hash for _, path, hash in _renamed(record, giving, receiving)} == mine.get("sha256", {})
+    if not same or any(mine.get(key) != theirs.get(key) for key in ("status", "reason")):
+        kinds = [str(found.get("instructions")) for found in (theirs, mine)]
+        cause = f", as it was made with other instructions ({' and '.join(kinds)})" if kinds[0] != kinds[1] else ""
+        raise MergeError(
+            f"{record.path}: {record.job} has other bytes than in {receiving.folder}{cause}: "
+            f"make both by the same code on machines of one kind, or delete the case in one of them"
+        )
+
+
+def _copy(record: JobRecord, giving: Repository, receiving: Repository) -> None:
+    """Copy the shards of a job to their row, then its record, which keeps its time."""
+    paths = list(_renamed(record, giving, receiving))
+    for old, new, _ in paths:
+        durable.link(giving.store / old, receiving.store / new)
+    target = _in(record, giving, receiving)
+    ledger.commit(target, ledger.read(record.path) | _checksums(record, paths))
+    time = record.path.stat().st_mtime_ns
+    os.utime(target, ns=(time, time))
+
+
+def _checksums(record: JobRecord, paths: list[tuple[str, str, str]]) -> dict[str, dict[str, str]]:
+    """Checksums by the new paths, if the record has any."""
+    has_files = "sha256" in ledger.read(record.path)
+    return {"sha256": {new: hash for _, new, hash in paths}} if has_files else {}

@@ -1,0 +1,278 @@
+"""What the values of a job must be: finite where they mean something, in the range of their quantity, and physical.
+
+A fault that is found here stands in bytes that are as their job wrote them: it is one of the code or of its settings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.config import Config
+from echotruth.repository import schema
+
+Arrays = dict[str, NDArray[Any]]
+"""Arrays of a group for one case (and view), by name; those with frames may be a part of them."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """What the values of an array may be; never infinite.
+
+    Attributes
+    ----------
+    low, high : float
+        In the unit of the array.
+    finite : bool
+        Whether every value must be a number.
+    """
+
+    low: float = -inf
+    high: float = inf
+    finite: bool = False
+
+
+NUMBER = Range(finite=True)
+NOT_NEGATIVE = Range(low=0, finite=True)
+POSITIVE = Range(low=np.finfo(float).tiny, finite=True)
+SEGMENT = Range(0, 17)
+REGION = Range(0, 3)
+ANY = Range()
+MAGNITUDE = Range(low=0)
+"""An RMS, or a ratio of two; not a number where there is nothing to average."""
+
+COMPLEMENT = 1e-6
+"""Rounding of a fraction near 0 or 1, and of the length of a unit vector, in single precision."""
+
+OVERSHOOT = 0.05
+"""Largest excess over 0 to 1 of the wall depth, a Laplace solution, interpolated by quadratic functions."""
+
+RANGES: dict[str, dict[str, Range]] = {
+    "geometry": {"cell_node": NOT_NEGATIVE, "endo": NOT_NEGATIVE, "epi": NOT_NEGATIVE, "base": NOT_NEGATIVE},
+    "fibres": {"wall_depth": Range(-COMPLEMENT, 1 + COMPLEMENT, finite=True), "layer": Range(1), "segment": SEGMENT},
+    "pathology": {"region": REGION, "stiffness_scale": NOT_NEGATIVE, "tension_scale": NOT_NEGATIVE},
+    # A prescribed motion has no forces, and may have no cavity; a loop may prescribe pressure or volume in some frames.
+    "mechanics": {
+        "volume": Range(low=np.finfo(float).tiny),
+        "pressure": ANY,
+        "pressure_target": ANY,
+        "volume_target": MAGNITUDE,
+        "active_tension": ANY,
+        "stiffness": MAGNITUDE,
+        "residual": MAGNITUDE,
+        "phase": Range(0, 3),
+        "newton_steps": NOT_NEGATIVE,
+        "es_frame": NOT_NEGATIVE,
+    },
+    "kinematics": {"volume_ratio_min": POSITIVE, "volume_ratio_mean": POSITIVE, "strain_sd": NOT_NEGATIVE},
+    # A measure that a heart does not have is not a number.
+    "physiology": {array.name: ANY for array in schema.PHYSIOLOGY}
+    | {"volume_ratio_min": POSITIVE, "loop_error": NOT_NEGATIVE, "longitudinal_strain": NUMBER},
+    "phantom": {"scatterer_count": NOT_NEGATIVE, "centre": ANY},
+    "truth": {
+        "displacement": ANY,
+        "strain": ANY,
+        "wall_depth": Range(-OVERSHOOT, 1 + OVERSHOOT),
+        "segment": SEGMENT,
+        "region": REGION,
+    },
+    "rf": {"channels_step": POSITIVE},
+    "tracking": {"displacement": ANY, "quality": Range(-COMPLEMENT, 1 + COMPLEMENT)},
+    "evaluation": {array.name: ANY for array in schema.SIZED["evaluation"]}
+    | {array.name: MAGNITUDE for array in schema.SIZED["evaluation"] if "rms" in array.name or "nrmse" in array.name}
+    | {
+        "segment": SEGMENT,
+        "coverage": Range(0, 1, finite=True),
+        "strain_correlation": Range(-1 - COMPLEMENT, 1 + COMPLEMENT),
+        "through_plane_correlation": Range(-1 - COMPLEMENT, 1 + COMPLEMENT),
+        "end_point_error": MAGNITUDE,
+        "drift": MAGNITUDE,
+    },
+}
+"""Arrays that may be other than any number, by stage; those without an entry must be numbers."""
+
+LOWEST_STRAIN = -0.5 - 1e-5
+"""E = (F^T F - I) / 2 along an axis is above -1/2, because F^T F is positive; with the rounding of single precision."""
+
+NORMAL_STRAINS = {
+    "kinematics": {"strain": 3, "strain_unloaded": 3, "fibre_strain": 3, "fibre_strain_unloaded": 3},
+    "truth": {"strain": 3},
+    "evaluation": {"true_strain": 2, "tracked_strain": 2},
+}
+"""Number of leading components that are strains along an axis."""
+
+
+def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+    """What is wrong with the values of a group.
+
+    Parameters
+    ----------
+    group : str
+        As "truth/512".
+    arrays : dict of ndarray
+        All arrays of the group for one case (and view); of those with frames, frames from `first` on.
+    first : int
+        Number of their first frame.
+    config : Config
+        Configuration of the case.
+
+    Yields
+    ------
+    name, problem : str
+        Name of the array, and what is wrong with it.
+    """
+    stage = group.partition("/")[0]
+    for name, values in arrays.items():
+        for problem in _in_range(values, RANGES.get(stage, {}).get(name, NUMBER)):
+            yield name, problem
+    for name, count in NORMAL_STRAINS.get(stage, {}).items():
+        if name in arrays and bool((arrays[name][..., :count] < LOWEST_STRAIN).any()):
+            yield name, "has a strain below -1/2 along an axis"
+    yield from _labels(arrays, config)
+    if stage in RELATIONS:
+        yield from RELATIONS[stage](arrays, first, config)
+
+
+def _in_range(values: NDArray[Any], range: Range) -> Iterator[str]:
+    if values.dtype.kind in "fc" and not np.isfinite(values).all():
+        if np.isinf(values).any():
+            yield "has infinite values"
+        elif range.finite:
+            yield "has values that are not numbers"
+    if range.low > -inf and bool((values < range.low).any()):
+        yield f"has a value of {np.nanmin(values):g}, below {range.low:g}"
+    if range.high < inf and bool((values > range.high).any()):
+        yield f"has a value of {np.nanmax(values):g}, above {range.high:g}"
+
+
+def _labels(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
+    layers = config.fibres.layers
+    if "layer" in arrays and int(arrays["layer"].max(initial=0)) > layers:
+        yield "layer", f"has a layer of {arrays['layer'].max()}, but fibres.layers is {layers}"
+    frames = config.loop.frames
+    if "es_frame" in arrays and int(arrays["es_frame"]) >= frames:
+        yield "es_frame", f"is {int(arrays['es_frame'])}, but loop.frames is {frames}"
+
+
+def _geometry(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+    nodes = len(arrays["node_position"])
+    for name in ("cell_node", "endo", "epi", "base"):
+        if int(arrays[name].max(initial=0)) >= nodes:
+            yield name, f"names node {arrays[name].max()} of {nodes}"
+
+
+def _fibres(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+    for name in ("fibre", "sheet"):
+        if not _is_one(np.linalg.norm(arrays[name], axis=-1)):
+            yield name, "has vectors whose length is not 1"
+    if not _is_one(1 + np.sum(arrays["fibre"] * arrays["sheet"], axis=-1)):
+        yield "sheet", "has sheets that are not normal to the fibres"
+
+
+def _mechanics(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+    if config.motion.kind != "beat":
+        return
+    for name in ("pressure", "volume", "active_tension", "residual", "stiffness"):
+        if not np.isfinite(arrays[name]).all():
+            yield name, "has values that are not numbers, although the heart is solved"
+
+
+def _kinematics(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+    determinant = np.linalg.det(arrays["deformation_gradient"])
+    if not (determinant > 0).all():
+        yield "deformation_gradient", f"has det F of {determinant.min():g}, but tissue cannot be turned inside out"
+    if first == 0 and np.abs(arrays["strain"][0]).max(initial=0) > COMPLEMENT:
+        yield "strain", "is not 0 at end-diastole, from which it is taken"
+
+
+def _phantom(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+    axes = arrays["axes"]
+    if not np.allclose(axes @ axes.T, np.eye(3), atol=COMPLEMENT):
+        yield "axes", "are not unit vectors normal to each other"
+
+
+def _truth(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+    mask = arrays["mask"]
+    for name in ("displacement", "strain", "wall_depth"):
+        known = np.isfinite(arrays[name])
+        if bool(((known.all(-1) if known.ndim > mask.ndim else known) != mask).any()):
+            yield name, "is not a number in a pixel of the wall, or is one outside"
+    for name in ("layer", "segment"):
+        if bool(((arrays[name] > 0) != mask).any()):
+            yield name, "is 0 in a pixel of the wall, or is not outside"
+    if bool(arrays["region"][~mask].any()):
+        yield "region", "is not 0 outside the wall"
+    yield from _still_at_ed("displacement", arrays, first)
+
+
+def _evaluation(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+    wall = arrays["layer"] > 0
+    for name in ("true_displacement", "through_plane"):
+        known = np.isfinite(arrays[name])
+        if bool(((known.all(-1) if name == "true_displacement" else known) != wall).any()):
+            yield name, "is not a number at a point of the wall, or is one outside"
+        yield from _still_at_ed(name, arrays, first)
+    if not _is_one(np.linalg.norm(arrays["wall_axes"][wall], axis=-1)):
+        yield "wall_axes", "has axes whose length is not 1 in the wall"
+
+
+def _tracking(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+    if bool((np.isfinite(arrays["displacement"]).all(-1) != np.isfinite(arrays["quality"])).any()):
+        yield "quality", "is given where there is no displacement, or the reverse"
+
+
+def _still_at_ed(name: str, arrays: Arrays, first: int) -> Iterator[tuple[str, str]]:
+    """Displacement is taken from end-diastole, which is frame 0."""
+    if first == 0 and bool(np.nan_to_num(arrays[name][0]).any()):
+        yield name, "is not 0 at end-diastole, from which it is taken"
+
+
+def _is_one(values: NDArray[Any]) -> bool:
+    return bool((np.abs(values - 1) <= COMPLEMENT).all())
+
+
+RELATIONS: dict[str, Callable[[Arrays, int, Config], Iterator[tuple[str, str]]]] = {
+    "geometry": _geometry,
+    "fibres": _fibres,
+    "mechanics": _mechanics,
+    "kinematics": _kinematics,
+    "phantom": _phantom,
+    "truth": _truth,
+    "tracking": _tracking,
+    "evaluation": _evaluation,
+}
+"""Stage -> faults of its arrays in relation to each other."""
+
+
+def loop_faults(arrays: Arrays, measured: Arrays, config: Config) -> Iterator[tuple[str, str]]:
+    """Whether a heart that was found complete follows its loop, by its curves and not by what was measured then.
+
+    Parameters
+    ----------
+    arrays : dict of ndarray
+        pressure, volume, pressure_target and volume_target of `mechanics`, and volume_ratio_min of `kinematics`,
+        all (frame,).
+    measured : dict of ndarray
+        loop_error and volume_ratio_min of `physiology`, scalars.
+    config : Config
+        Configuration of the case.
+    """
+    error = max(_largest_error(arrays[name], arrays[f"{name}_target"]) for name in ("pressure", "volume"))
+    limit = config.physiology.loop_error_max
+    if not np.isclose(error, measured["loop_error"], rtol=1e-6, atol=1e-12):
+        yield "loop_error", f"is {float(measured['loop_error']):g}, but the curves give {error:g}"
+    if limit is not None and config.motion.kind == "beat" and error > limit:
+        yield "loop_error", f"is {error:g} in a complete heart, above physiology.loop_error_max = {limit:g}"
+    lowest = float(arrays["volume_ratio_min"].min())
+    if lowest != float(measured["volume_ratio_min"]):
+        yield "volume_ratio_min", f"is {float(measured['volume_ratio_min']):g}, but kinematics has {lowest:g}"
+
+
+def _largest_error(solved: NDArray[Any], target: NDArray[Any]) -> float:
+    prescribed = np.isfinite(target)
+    return float(np.max(np.abs(solved[prescribed] / target[prescribed] - 1), initial=0.0))

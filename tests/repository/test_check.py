@@ -1,0 +1,237 @@
+"""A check finds every fault of a repository, and healing it makes just what was damaged, byte for byte."""
+
+from pathlib import Path
+from shutil import copytree
+
+import finished_repository as finished
+import numpy as np
+import pytest
+import zarr
+
+from echotruth.repository import ledger
+from echotruth.repository.check import check
+from echotruth.repository.checksums import checksums
+from echotruth.repository.healing import heal, remake
+from echotruth.repository.inventory import CheckError
+from echotruth.repository.ledger import record_path
+from echotruth.repository.store import Store
+from echotruth.workflow import lease
+from echotruth.workflow.integrity import check_repository
+
+CONFIG = finished.configured()
+CASES = [case.id for case in finished.expand(CONFIG)]
+
+
+pytestmark = pytest.mark.usefixtures("script")
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory) -> Path:
+    return finished.finish(tmp_path_factory.mktemp("done") / "small", CONFIG)
+
+
+@pytest.fixture
+def folder(done, tmp_path) -> Path:
+    return copytree(done, tmp_path / "small")
+
+
+def faults(folder) -> dict[str, str]:
+    return {fault.path: fault.problem for fault in check(folder).faults}
+
+
+def flip(path: Path, random: np.random.Generator) -> None:
+    """Flip one bit at a random place."""
+    content = bytearray(path.read_bytes())
+    bit = int(random.integers(8 * len(content)))
+    content[bit // 8] ^= 1 << bit % 8
+    replace(path, bytes(content))
+
+
+def replace(path: Path, content: bytes) -> None:
+    """Write a file of its own: others may be further names of the same data."""
+    path.unlink()
+    path.write_bytes(content)
+
+
+def truncate(path: Path, random: np.random.Generator) -> None:
+    content = path.read_bytes()
+    replace(path, content[: int(random.integers(1, len(content)))])
+
+
+def empty(path: Path, random: np.random.Generator) -> None:
+    replace(path, b"")
+
+
+def delete(path: Path, random: np.random.Generator) -> None:
+    path.unlink()
+
+
+def run(folder) -> list[str]:
+    """Make what was dropped, as `echotruth run` does; give the records that were made."""
+    made: list[str] = []
+    assert remake(folder, CONFIG, finished.maker(folder, CONFIG, made)) == 0
+    return made
+
+
+def test_whole_repository_has_no_fault(folder):
+    report = check(folder)
+    assert report.faults == [] and report.notes == []
+    assert report.files == len(finished.content(folder))
+    assert report.jobs == len(CASES) * (2 + 6 * len(CONFIG.views))
+
+
+@pytest.mark.parametrize("harm, count", [(flip, 120), (truncate, 40), (empty, 40), (delete, 40)])
+def test_every_damaged_file_is_found_wherever_it_is(folder, harm, count):
+    random = np.random.default_rng(count)
+    files = random.choice(sorted(finished.content(folder)), count, replace=False)
+    for name in files:
+        harm(folder / name, random)
+    assert set(faults(folder)) == set(files)
+
+
+@pytest.mark.parametrize("seed, harm", list(enumerate([flip, truncate, empty, delete])))
+def test_healing_makes_the_damaged_jobs_again_and_no_others_byte_for_byte(folder, seed, harm):
+    before, owners, random = finished.content(folder), finished.owners(folder), np.random.default_rng(seed)
+    times = {path: path.stat().st_mtime_ns for path in (folder / "ledger").rglob("*.json")}
+    files = random.choice(sorted(before), 5, replace=False)
+    for name in files:
+        harm(folder / name, random)
+    heal(folder, check(folder))
+    concerned = {owners[name].replace("structure.json", "repository.json") for name in files}
+    assert set(run(folder)) == concerned
+    assert finished.content(folder) == before
+    assert check(folder).faults == []
+    # What depends on a record is not run again, because it is not older than before.
+    unproved = {folder / "ledger/structure.json"}
+    assert {path: path.stat().st_mtime_ns for path in times if path not in unproved} == {
+        path: time for path, time in times.items() if path not in unproved
+    }
+    assert not (folder / "healing.json").exists()
+
+
+@pytest.mark.parametrize("seed, harm", list(enumerate([flip, flip, flip, truncate, empty])))
+def test_damaged_records_are_found_and_made_again(folder, seed, harm):
+    before, random = finished.content(folder), np.random.default_rng(seed)
+    gates = [record_path(folder, stage, CASES[1]) for stage in ("mechanics", "physiology")]
+    paths = [*gates, *(record_path(folder, stage, CASES[0], "mid") for stage in ("rf", "truth", "evaluation"))]
+    names = {path.relative_to(folder).as_posix() for path in paths}
+    times = {path: path.stat().st_mtime_ns for path in paths}
+    for path in paths:
+        harm(path, random)
+    assert set(faults(folder)) == names
+    heal(folder, check(folder))
+    assert set(run(folder)) == names
+    assert finished.content(folder) == before
+    # Not newer than before, so that nothing that depends on them is run again.
+    assert all(path.stat().st_mtime_ns <= time for path, time in times.items())
+
+
+@pytest.mark.parametrize("harm", [flip, delete])
+@pytest.mark.parametrize("name", ["ledger/structure.json", "ledger/repository.json", "registry.txt", "views.txt"])
+def test_damaged_record_of_the_structure_and_registries_are_found_and_written_again(folder, harm, name):
+    before, whole = finished.content(folder), (folder / name).read_bytes()
+    harm(folder / name, np.random.default_rng(5))
+    if (harm, name) == (delete, "ledger/repository.json"):
+        assert check(folder).notes == ["the repository has not been published yet: echotruth run does so"]
+        return
+    assert set(faults(folder)) == {name}
+    heal(folder, check(folder))
+    assert run(folder) == ["ledger/repository.json"]
+    assert finished.content(folder) == before and (folder / name).read_bytes() == whole
+    assert check(folder).faults == []
+
+
+def test_strangers_are_found_and_deleted_and_what_is_not_made_yet_is_no_stranger(folder):
+    before = finished.content(folder)
+    strays = ["bmode/64/image/c/0/0/0/0/0.0123.partial", "bmode/64/image/c/7/0/0/0/0", "mechanics/note.txt", "stray"]
+    for name in strays:
+        (folder / "small.zarr" / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "small.zarr" / name).write_bytes(b"half")
+    assert set(faults(folder)) == {f"small.zarr/{name}" for name in strays}
+    assert heal(folder, check(folder)) == (0, len(strays))
+    assert finished.content(folder) == before
+    record_path(folder, "bmode", CASES[0], "mid").unlink()
+    assert faults(folder) == {}
+
+
+def test_jobs_that_were_not_run_yet_are_told_and_are_no_damage(folder, capsys):
+    record_path(folder, "tracking", CASES[0], "mid").unlink()
+    assert check_repository(folder, healing=False) == 0
+    assert "1 of 28 jobs have not been run yet" in capsys.readouterr().out
+
+
+def test_command_names_each_fault_in_one_line_and_what_heals_it(folder, capsys):
+    delete(folder / "small.zarr/bmode/64/image/c/0/0/0/0/0", None)
+    assert check_repository(folder, healing=True) == 1
+    lines = capsys.readouterr().out.splitlines()
+    job = f"bmode of {CASES[0]}, mid"
+    assert lines[0] == f"small.zarr/bmode/64/image/c/0/0/0/0/0: is missing: run makes it again ({job})"
+    assert lines[-1] == "dropped: 1 records, 0 files: echotruth run makes them again"
+    assert check_repository(folder, healing=False) == 0
+
+
+def test_folder_that_is_no_repository_is_refused_in_a_sentence(tmp_path, capsys):
+    with pytest.raises(CheckError):
+        check(tmp_path)
+    assert [check_repository(tmp_path, healing=healing) for healing in (False, True)] == [2, 2]
+    assert capsys.readouterr().err.count("is not a repository") == 2
+    assert not list(tmp_path.iterdir())
+
+
+def test_repository_that_a_run_is_writing_is_not_healed(folder, capsys):
+    held = lease.acquire(folder, "another", wait=False)
+    try:
+        assert check_repository(folder, healing=True) == 2
+        assert check_repository(folder, healing=False) == 0
+    finally:
+        held.release()
+    told = capsys.readouterr()
+    assert "is in use by another run" in told.err and "is in use by another run" in told.out
+
+
+def rewrite(folder, stage, group, view=None, **values) -> None:
+    """Write other values with right checksums, as wrong code would."""
+    store, row = Store(folder / "small.zarr"), (0,) if view is None else (0, 0)
+    store.write(group, values, *row)
+    path = record_path(folder, stage, CASES[0], view)
+    record = ledger.read(path)
+    record["sha256"] |= checksums(store.files(group, *row), store.path)
+    ledger.commit(path, record)
+
+
+def stored(folder, group, name, *row):
+    return np.array(zarr.open_array(folder / "small.zarr", path=f"{group}/{name}", mode="r")[row])
+
+
+def test_impossible_value_is_found_and_is_not_taken_for_damage(folder):
+    motion = stored(folder, "truth/64", "displacement", 0, 0)
+    motion[0, 8, 9] = 1e-4
+    rewrite(folder, "truth", "truth/64", "mid", displacement=motion)
+    report = check(folder)
+    assert [fault.path for fault in report.faults] == ["small.zarr/truth/64/displacement"]
+    assert "is not 0 at end-diastole" in report.faults[0].problem
+    assert heal(folder, report) == (0, 0)
+
+
+def test_measured_loop_error_that_the_curves_do_not_have_is_found(folder):
+    rewrite(folder, "physiology", "physiology", loop_error=0.001)
+    assert faults(folder) == {
+        "small.zarr/physiology/loop_error": f"is 0.001, but the curves give 0 (physiology of {CASES[0]})"
+    }
+
+
+def test_units_that_are_not_those_of_the_schema_are_found(folder):
+    file = folder / "small.zarr/mechanics/pressure/zarr.json"
+    replace(file, file.read_bytes().replace(b'"units": "Pa"', b'"units": "kPa"'))
+    record = ledger.read(folder / "ledger/structure.json")
+    record["sha256"] |= checksums([file], folder / "small.zarr")
+    ledger.commit(folder / "ledger/structure.json", record)
+    assert faults(folder) == {"small.zarr/mechanics/pressure": "has units 'kPa', not 'Pa'"}
+
+
+def test_repository_made_before_structure_had_a_record_says_so(folder):
+    for name in ("views.txt", "ledger/structure.json"):
+        (folder / name).unlink()
+    report = check(folder)
+    assert report.faults == []
+    assert "no ledger/structure.json" in report.notes[0]

@@ -1,0 +1,132 @@
+"""Merging gives one repository the hearts of several, and leaves what was there as it was."""
+
+from pathlib import Path
+from shutil import copytree
+
+import finished_repository as finished
+import numpy as np
+import pytest
+import xarray as xr
+
+from echotruth.config import Probe
+from echotruth.config.loading import load
+from echotruth.repository import ledger
+from echotruth.repository.check import check
+from echotruth.repository.checksums import checksums
+from echotruth.repository.ledger import record_path
+from echotruth.repository.merge import MergeError, spanning
+from echotruth.repository.store import Store
+from echotruth.workflow.merging import merge_repositories
+
+FIRST = finished.configured("first", seeds=(1, 2))
+SECOND = finished.configured("second", seeds=(2, 3), views=("long_axis", "mid"))
+
+
+pytestmark = pytest.mark.usefixtures("script")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """Folder of two repositories with one heart in common, and their views in another order."""
+    folder = tmp_path_factory.mktemp("out")
+    for config in (FIRST, SECOND):
+        finished.finish(folder / config.name, config)
+    return folder
+
+
+@pytest.fixture
+def out(made, tmp_path) -> Path:
+    return copytree(made, tmp_path / "out")
+
+
+def clips(folder: Path) -> dict[tuple[str, str], bytes]:
+    """Case and view -> all images, by their labels."""
+    images = xr.open_datatree(folder / f"{folder.name}.zarr")["bmode/64/image"]
+    cases, views = (images[name].values for name in ("case", "view"))
+    return {(case, view): images.sel(case=case, view=view).values.tobytes() for case in cases for view in views}
+
+
+def test_merged_repository_has_the_hearts_of_both_and_is_whole(out):
+    before = {folder: finished.content(out / folder) for folder in ("first", "second")}
+    assert merge_repositories(out / "both", [out / "first", out / "second"]) == 0
+    report = check(out / "both")
+    assert report.faults == [] and report.notes == []
+    assert load(out / "both/config.yaml").cases == {"seed": [1, 2, 3]}
+    assert clips(out / "both") == clips(out / "first") | clips(out / "second")
+    assert len(clips(out / "both")) == 6
+    assert {folder: finished.content(out / folder) for folder in before} == before
+    tree = xr.open_datatree(out / "both/both.zarr")
+    assert list(tree["cases/seed"].values) == [1, 2, 3]
+    assert list(tree["cases/status"].values) == 3 * ["complete"]
+
+
+def test_hearts_are_added_without_a_change_of_what_was_there(out):
+    before, owners, times = finished.content(out / "first"), finished.owners(out / "first"), {}
+    for path in (out / "first/ledger").glob("*/**/*.json"):
+        times[path] = path.stat().st_mtime_ns
+    assert merge_repositories(out / "first", [out / "second"]) == 0
+    after = finished.content(out / "first")
+    shards = [name for name in before if not owners[name].endswith("structure.json")]
+    assert {name: after[name] for name in shards} == {name: before[name] for name in shards}
+    assert {path: path.stat().st_mtime_ns for path in times} == times
+    assert (out / "first/registry.txt").read_text().split()[:2] == [case.id for case in finished.expand(FIRST)]
+    assert check(out / "first").faults == []
+
+
+def test_records_keep_their_times_so_that_nothing_is_run_again(out):
+    merge_repositories(out / "both", [out / "first", out / "second"])
+    for folder, case in (("first", 0), ("second", 1)):
+        id = [case.id for case in finished.expand({"first": FIRST, "second": SECOND}[folder])][case]
+        paths = [record_path(out / name, "bmode", id, "mid") for name in (folder, "both")]
+        assert paths[0].stat().st_mtime_ns == paths[1].stat().st_mtime_ns
+
+
+def test_same_heart_with_other_bytes_is_refused_by_name_before_anything_changes(out, capsys):
+    case = finished.expand(FIRST)[1]
+    store = Store(out / "first/first.zarr")
+    store.write("bmode/64", {"image": np.zeros((finished.FRAMES, 64, 64))}, 1, 0)
+    path = record_path(out / "first", "bmode", case.id, "mid")
+    files = store.files("bmode/64", 1, 0)
+    changed = {"sha256": checksums(files, store.path), "instructions": "native older"}
+    ledger.commit(path, ledger.read(path) | changed)
+    assert merge_repositories(out / "both", [out / "first", out / "second"]) == 2
+    message = capsys.readouterr().err
+    assert f"bmode of {case.id}, mid has other bytes" in message and " and native older): make both" in message
+    assert not (out / "both").exists()
+
+
+def test_damaged_repository_is_not_merged(out, capsys):
+    (out / "second/second.zarr/bmode/64/image/c/1/0/0/0/0").write_bytes(b"")
+    assert merge_repositories(out / "first", [out / "second"]) == 2
+    assert "heal" in capsys.readouterr().err
+    assert check(out / "first").faults == []
+
+
+def test_repositories_of_other_settings_are_refused_with_the_key(out, capsys):
+    other = finished.configured("third", probe=Probe(elements=48))
+    with pytest.raises(MergeError, match=r"out/third: probe.elements differs from that of out/first"):
+        spanning("both", {Path("out/first"): FIRST, Path("out/third"): other})
+    with pytest.raises(MergeError, match="views differs"):
+        spanning("both", {Path("out/first"): FIRST, Path("out/third"): finished.configured(views=("mid",))})
+
+
+def test_sweep_of_all_cases_spans_keys_that_one_repository_does_not_sweep():
+    other = finished.configured("other", cases={"fibres.endo_deg": [60, 70]})
+    joint = spanning("both", {Path("a"): FIRST, Path("b"): other})
+    assert joint.cases == {"seed": [1, 2], "fibres.endo_deg": [FIRST.fibres.endo_deg, 60, 70]}
+    ids = {case.id for case in finished.expand(joint)}
+    assert {case.id for config in (FIRST, other) for case in finished.expand(config)} <= ids
+
+
+def test_hearts_of_the_joint_sweep_that_neither_has_are_left_to_a_run(out, capsys):
+    finished.finish(out / "third", finished.configured("third", cases={"fibres.endo_deg": [60]}))
+    assert merge_repositories(out / "first", [out / "third"]) == 0
+    assert "jobs of the joint sweep were not made" in capsys.readouterr().out
+    report = check(out / "first")
+    assert report.faults == [] and "have not been run yet" in report.notes[0]
+
+
+def test_what_is_no_repository_is_refused_in_a_sentence(out, capsys):
+    assert merge_repositories(out / "both", [out / "first", out / "absent"]) == 2
+    assert merge_repositories(out / "first", [out / "first"]) == 2
+    assert capsys.readouterr().err.count("\n") == 2
