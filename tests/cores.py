@@ -1,6 +1,12 @@
-"""What the processes of the tests share: the cores, and what is compiled. To be imported before numpy and numba."""
+"""What the processes of the tests share: the cores, the instructions, and what is compiled.
 
+To be imported before numpy and numba.
+"""
+
+import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 from echotruth.repository.provenance import code_version
@@ -13,6 +19,9 @@ CACHE = ROOT / ".snakemake/numba" / code_version(*map(str, SCRIPTS.glob("*.py"))
 os.environ["NUMBA_CACHE_DIR"] = str(CACHE)
 # Threads of BLAS that wait for a core that is taken spin: a decomposition of a matrix then costs twenty times its work.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
+# The instructions of jobs, so that what is compiled here serves jobs too; another process asks numpy for its names.
+_CODE = "import json; from echotruth.workflow.instructions import environment; print(json.dumps(environment()))"
+os.environ.update(json.loads(subprocess.run([sys.executable, "-c", _CODE], check=True, stdout=subprocess.PIPE).stdout))
 
 
 def lend(caches):

@@ -108,7 +108,7 @@ def test_run_needs_no_checkout(tmp_path):
 def test_help_names_every_command():
     status, output, _ = run_cli("--help")
     assert status == 0
-    assert all(command in output for command in ("check", "cases", "run", "validate", "export", "evaluate"))
+    assert all(command in output for command in ("check", "cases", "run", "merge", "validate", "export", "evaluate"))
 
 
 def test_version():

@@ -17,6 +17,7 @@ import pytest
 import xarray as xr
 
 import echotruth as et
+from echotruth.workflow.instructions import LEVEL, environment
 
 ROOT = Path(__file__).parents[1]
 CONFIG = """\
@@ -149,9 +150,10 @@ def test_tree_holds_what_the_schema_page_says_and_nothing_else(made, tree):
     assert set(nodes) == {*paths, "cases"}
     for path, rows in paths.items():
         assert {name: found(variable) for name, variable in nodes[path].items()} == expected(coordinates, rows), path
-    keys = set(pd.read_csv(made.out / "cases.csv").columns) - {"case"}
-    assert set(nodes["cases"]) == {*cases, *keys, "case"}
-    assert all(nodes["cases"][name].dims == ("case",) for name in keys)
+    keys = set(pd.read_csv(made.out / "cases.csv").columns) - {"case", "seed"}
+    assert set(nodes["cases"]) == {*cases, "case", "seed"}  # only the seed differs
+    assert set(tree["cases"].attrs["constants"]) == keys
+    assert all(variable.dims == ("case",) for variable in nodes["cases"].values())
 
 
 def test_every_array_has_named_dimensions_units_and_a_long_name(tree):
@@ -198,9 +200,10 @@ def test_a_tracker_that_fails_is_a_row_of_the_leaderboard_and_not_the_end_of_the
     assert board.loc[(128, "all", "wall"), "rank"] == 1
 
 
-def test_figures_stand_beside_the_repository_and_scratch_does_not(made):
+def test_figures_stand_beside_the_repository_and_of_scratch_only_checkpoints_stay(made):
     assert {path.suffix for path in (made.out / "figures").iterdir()} == {".png", ".gif", ".csv", ".mp4"}
-    assert not [path for path in made.out.glob("scratch/*/*") if any(path.iterdir())]
+    left = {path.name for path in made.out.glob("scratch/**/*") if path.is_file()}
+    assert left == {"checkpoint.json"}
 
 
 @pytest.mark.slow
@@ -212,6 +215,13 @@ def test_jobs_of_a_view_find_all_that_they_call_compiled(tmp_path):
     assert {record["stage"] for record in records} == {"phantom", "truth", "rf", "bmode", "tracking", "evaluation"}
     assert {record["stage"]: record["compile_seconds"] for record in records if record["compile_seconds"]} == {}
     assert "miniature failed" not in "".join(path.read_text() for path in made.out.glob("logs/compile_*.log"))
+
+
+def test_every_record_names_the_instructions_that_its_job_used(made):
+    records = [json.loads(path.read_text()) for path in (made.out / "ledger").rglob("*.json")]
+    used = {record["instructions"] for record in records if "stage" in record}
+    assert len(used) == 1
+    assert used.pop().startswith(LEVEL if environment() else "native ")
 
 
 def test_second_run_has_nothing_to_do(made):

@@ -1,15 +1,14 @@
-"""Command line: `echotruth check`, `cases`, `run`, `validate`, `export` and `evaluate`."""
+"""Command line: `echotruth check`, `cases`, `run`, `merge`, `validate`, `export` and `evaluate`."""
 
 from __future__ import annotations
 
 import argparse
-import fcntl
 import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import echotruth
@@ -23,7 +22,7 @@ def main() -> None:
     arguments, options = _parser().parse_known_args()
     if options and arguments.command != "run":
         sys.exit(f"echotruth {arguments.command}: unknown option {options[0]}: see echotruth --help")
-    if command := {"validate": validate, "export": export, "evaluate": evaluate}.get(arguments.command):
+    if command := _command(arguments):
         sys.exit(command(arguments))
     try:
         config = load(arguments.config)
@@ -39,6 +38,15 @@ def main() -> None:
             sys.exit(run(arguments.config, config, options))
         except KeyboardInterrupt:
             sys.exit("echotruth: interrupted; run the same command again to continue")
+        except OSError as error:
+            sys.exit(f"echotruth: {error.filename or arguments.config}: {error.strerror or error}: {WRITABLE}")
+
+
+def _command(arguments: argparse.Namespace) -> Callable[[argparse.Namespace], int] | None:
+    """Function of a command that does not start from a configuration."""
+    if arguments.command == "check":
+        return check if arguments.heal or Path(arguments.config).is_dir() else None
+    return {"validate": validate, "export": export, "evaluate": evaluate, "merge": merge}.get(arguments.command)
 
 
 def run(path: str, config: Config, options: list[str]) -> int:
@@ -53,36 +61,82 @@ def run(path: str, config: Config, options: list[str]) -> int:
     options : list of str
         Options for Snakemake, such as `--cores 4` or `-n`.
     """
+    from echotruth.workflow import lease
     from echotruth.workflow.execution import execute
     from echotruth.workflow.progress import measured_seconds
 
     folder = Path("out") / config.name
-    snakemake = [sys.executable, "-m", "snakemake", "--snakefile", str(WORKFLOW / "Snakefile"), "--configfile", path]
-    options = [str(WORKFLOW / "profiles" / option) if option in PROFILES else option for option in options]
-    with _locked(folder):
-        # A killed run leaves Snakemake's lock behind. Our lock ends with its process, so no other run is active.
-        if any(Path(".snakemake/locks").glob("*")):
-            _run_quietly([*snakemake, "--unlock"])
-        if any(map(_is_query, options)):
-            return subprocess.call([*snakemake, *options])
+    # Snakemake's own lock is that of the working folder, where other names may run; a repository has its lease.
+    snakemake = [sys.executable, "-m", "snakemake", "--snakefile", str(WORKFLOW / "Snakefile"), "--nolock"]
+    snakemake += ["--configfile", path]
+    options = with_profiles(options)
+    if any(map(_is_query, options)):
+        return subprocess.call([*snakemake, *options])
+    with lease.held(folder) as name:
+        environment = os.environ | {lease.VARIABLE: name}
         report = ["--report", str(folder / "report.html")]
         # If everything is made, Snakemake writes the report in the same process, which saves a second start.
         makes_all = not [option for option in options if option not in CORE_OPTIONS and not option.isdigit()]
         command = [*snakemake, *options, *(["--report-after-run", *report] if makes_all else [])]
-        status = execute(command, folder / "logs/snakemake.log", config.name, measured_seconds(folder / "ledger"))
+        log, expected = folder / "logs/snakemake.log", measured_seconds(folder / "ledger")
+        if status := _remake(folder, config, [*snakemake, *options], environment):
+            return status
+        status = execute(command, log, config.name, expected, environment)
         if status or not (folder / "figures/leaderboard.csv").is_file():
             return status
-        status = 0 if makes_all else _run_quietly([*snakemake, *report])
+        status = 0 if makes_all else _run_quietly([*snakemake, *report], environment)
     if status == 0:
         print(f"\nRepository: {folder / f'{config.name}.zarr'}\nReport:     {folder / 'report.html'}")
     return status
 
 
+def _remake(folder: Path, config: Config, command: list[str], environment: dict[str, str]) -> int:
+    """Make what `echotruth check --heal` dropped, and nothing that depends on it; return the exit status."""
+    if not (folder / "healing.json").is_file():
+        return 0
+    from echotruth.repository.healing import remake
+    from echotruth.workflow.execution import execute
+    from echotruth.workflow.series import ALONE
+
+    def make(paths: list[str]) -> int:
+        stage = Path(paths[0]).relative_to(folder / "ledger").parts[0].removesuffix(".json")
+        log = folder / f"logs/healing_{stage}.log"
+        return execute([*command, *paths], log, config.name, {}, environment | {ALONE: "1"})
+
+    return remake(folder, config, make)
+
+
+WRITABLE = "the working folder must be writable and have space"
+
 WORKFLOW = Path(echotruth.__file__).parent / "workflow"
 """Folder of the Snakefile, which travels with the package."""
 
-PROFILES = tuple(path.name for path in (WORKFLOW / "profiles").iterdir())
+PROFILES = sorted(path.name for path in (WORKFLOW / "profiles").iterdir())
 """Profiles of the package, which `--profile` takes by their name."""
+
+PROFILE_OPTIONS = ("--profile", "--workflow-profile")
+
+
+def with_profiles(options: list[str]) -> list[str]:
+    """Options for Snakemake in which the name of a profile of the package is replaced by its folder.
+
+    Such a profile takes the place of the package's default one, so that a profile of the user can be given beside it.
+    """
+    joined = tuple(f"{flag}=" for flag in PROFILE_OPTIONS)
+    options = [part for option in options for part in (option.split("=", 1) if option.startswith(joined) else [option])]
+    for place, (flag, name) in enumerate(pairwise(tuple(options))):
+        if flag in PROFILE_OPTIONS and name in PROFILES and not Path(name).is_dir():
+            options[place : place + 2] = ["--workflow-profile", str(WORKFLOW / "profiles" / name)]
+    return options
+
+
+RUN_OPTIONS = f"""options of Snakemake that are useful here:
+  --cores N             number of processor cores (default: all)
+  -n                    only list the jobs
+  --profile NAME        where jobs run: {", ".join(PROFILES)}, or a folder with a profile (docs/cluster.md)
+  --batch repository=1/10  only the first tenth of the hearts, then 2/10 and so on: plans a large sweep in pieces
+  --rerun-triggers mtime  do not make again what other settings or code would change
+"""
 
 CORE_OPTIONS = ("--cores", "-c", "--jobs", "-j", "all")
 """Options (and values) that do not restrict what Snakemake makes."""
@@ -96,6 +150,20 @@ QUERY_OPTIONS = {
 
 def _is_query(option: str) -> bool:
     return option in QUERY_OPTIONS or re.fullmatch(r"-[a-z]*n[a-z]*", option) is not None
+
+
+def check(arguments: argparse.Namespace) -> int:
+    """Check a repository; return 0, 1 if something is damaged, or 2 if it cannot be checked."""
+    from echotruth.workflow.integrity import check_repository
+
+    return check_repository(Path(arguments.config), arguments.heal, arguments.quick)
+
+
+def merge(arguments: argparse.Namespace) -> int:
+    """Take over the hearts of repositories into another; return 0, or 2 if they cannot be merged."""
+    from echotruth.workflow.merging import merge_repositories
+
+    return merge_repositories(arguments.into, arguments.sources)
 
 
 def validate(arguments: argparse.Namespace) -> int:
@@ -145,26 +213,14 @@ def evaluate(arguments: argparse.Namespace) -> int:
     return 0 if any(not row["failure"] for row in rows) else 1
 
 
-def _run_quietly(command: list[str]) -> int:
+def _run_quietly(command: list[str], environment: dict[str, str]) -> int:
     """Run a command and show its output only if it fails."""
-    result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    result = subprocess.run(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
+    )
     if result.returncode:
         print(result.stdout, file=sys.stderr)
     return result.returncode
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold a file lock on the folder of a repository; wait for another process that holds it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / ".lock").open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            print(f"echotruth: another run is using {folder}; waiting until it ends", file=sys.stderr)
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        os.set_inheritable(lock.fileno(), True)
-        yield
 
 
 def _fail(message: str) -> int:
@@ -177,12 +233,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=echotruth.__version__)
     commands = parser.add_subparsers(dest="command", required=True)
     for name, text in (
-        ("check", "check a configuration"),
         ("cases", "print the cases of a configuration as CSV"),
         ("run", "make the repository and the report of a configuration; other options are passed to Snakemake"),
     ):
-        command = commands.add_parser(name, help=text, description=text)
+        epilog = RUN_OPTIONS if name == "run" else None
+        form = argparse.RawDescriptionHelpFormatter
+        command = commands.add_parser(name, help=text, description=text, epilog=epilog, formatter_class=form)
         command.add_argument("config", help="YAML file, such as config/demo.yaml")
+    _add_upkeep(commands)
     text = "compare the heart with exact solutions, published problems and conservation laws, and write the page"
     command = commands.add_parser("validate", help=text, description=text)
     command.add_argument("--quick", action="store_true", help="use coarse meshes; takes a few minutes")
@@ -196,6 +254,31 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--out", type=Path, help="file to write (default: CASE_VIEW in the folder export)")
     _add_evaluate(commands)
     return parser
+
+
+def _add_upkeep(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    text = "check a configuration, or all files and values of a repository"
+    command = commands.add_parser(
+        "check",
+        help=text,
+        description=f"{text}. A repository is checked to the end, with one line for each fault.",
+        epilog="examples: echotruth check config/demo.yaml; echotruth check out/demo; echotruth check out/demo --heal. "
+        "Exit status: 0 nothing is damaged (jobs not run yet are no damage), 1 something is, 2 it cannot be checked.",
+    )
+    command.add_argument("config", metavar="path", help="YAML file, or folder of a repository, such as out/demo")
+    command.add_argument("--heal", action="store_true", help="drop what is damaged, so that the next run makes just it")
+    command.add_argument(
+        "--quick", action="store_true", help="leave out the values of a repository: bytes at disk speed"
+    )
+    text = "take over the hearts of other repositories of the same settings"
+    command = commands.add_parser(
+        "merge",
+        help=text,
+        description=f"{text}. Their configurations may differ in their cases and their name only.",
+        epilog="example: echotruth merge out/both out/first out/second",
+    )
+    command.add_argument("into", type=Path, help="folder of the repository that receives them; made if need be")
+    command.add_argument("sources", type=Path, nargs="+", help="folders of repositories, which stay as they are")
 
 
 def _add_evaluate(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

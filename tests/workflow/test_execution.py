@@ -9,6 +9,7 @@ import time
 import psutil
 import pytest
 
+from echotruth.workflow import lease
 from echotruth.workflow.execution import LOG_LINES, execute
 
 
@@ -76,3 +77,101 @@ def test_signal_ends_all_jobs(tmp_path, number):
     run.communicate(timeout=30)
     assert run.returncode != 0
     assert not is_running(job)
+
+
+WRITER = """
+import os, sys, time
+from pathlib import Path
+from echotruth.workflow import lease
+lease.follow(Path(sys.argv[1]))
+with open(sys.argv[2], "a", buffering=1) as file:
+    for _ in range(int(sys.argv[3])):
+        file.write(f"{os.getpid()}\\n")
+        time.sleep(0.02)
+"""
+FAKE_SNAKEMAKE = f"""
+import subprocess, sys
+from pathlib import Path
+from echotruth.workflow import lease
+lease.join(Path(sys.argv[1]))
+job = [sys.executable, "-c", {WRITER!r}, *sys.argv[1:]]
+# As in a rule: the parent of a job is a shell.
+subprocess.run(["bash", "-c", 'set -eu; {{ true; "$@"; true; }}', "job", *job], check=True)
+"""
+RUNNER = """
+import os, sys
+from pathlib import Path
+from echotruth.workflow import execution, lease
+folder = Path(sys.argv[2])
+with lease.held(folder) as run:
+    environment = os.environ | {lease.VARIABLE: run}
+    command = [sys.executable, "-c", sys.argv[1], *sys.argv[2:]]
+    sys.exit(execution.execute(command, folder / "snakemake.log", "demo", {}, environment))
+"""
+
+
+def written(file):
+    return file.read_text().split() if file.exists() else []
+
+
+def wait_for(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def members(folder):
+    """Numbers of the other processes that have a folder among their arguments."""
+    named = [process for process in psutil.process_iter() if str(folder) in _arguments(process)]
+    return {process.pid for process in named if process.pid != os.getpid()}
+
+
+def _arguments(process):
+    try:
+        return process.cmdline()
+    except psutil.Error:
+        return []
+
+
+def run_writer(folder, file, lines):
+    return subprocess.Popen(
+        [*python(RUNNER), FAKE_SNAKEMAKE, str(folder), str(file), str(lines)], stderr=subprocess.PIPE
+    )
+
+
+def test_nothing_outlives_a_runner_that_was_killed_alone(tmp_path):
+    file = tmp_path / "written"
+    run = run_writer(tmp_path, file, 3000)
+    wait_for(lambda: written(file))
+    run.kill()
+    run.communicate()
+    assert members(tmp_path)
+    wait_for(lambda: not any(map(is_running, members(tmp_path))), 20)
+
+
+def test_run_started_at_once_after_its_runner_was_killed_alone_is_the_only_writer(tmp_path):
+    file = tmp_path / "written"
+    first = run_writer(tmp_path, file, 3000)
+    wait_for(lambda: written(file))
+    first.kill()
+    second = run_writer(tmp_path, file, 50)
+    _, errors = second.communicate(timeout=60)
+    first.communicate()
+    assert second.returncode == 0, errors
+    assert b"continuing in its place" in errors
+    writers = written(file)
+    later = writers.index(writers[-1])  # all lines of the second come after all of the first
+    assert len(set(writers[:later])) == 1 and set(writers[later:]) == {writers[-1]} and len(writers) - later == 50
+
+
+def test_nothing_outlives_a_snakemake_that_was_killed_alone(tmp_path):
+    file = tmp_path / "written"
+    run = run_writer(tmp_path, file, 3000)
+    wait_for(lambda: written(file))
+    (snakemake,) = psutil.Process(run.pid).children()
+    snakemake.kill()
+    run.communicate(timeout=60)
+    assert run.returncode != 0
+    assert not any(map(is_running, members(tmp_path)))
+    assert '"released": true' in next((tmp_path / lease.NAME).glob("*.json")).read_text()

@@ -69,6 +69,15 @@ def test_a_slow_machine_is_known_by_the_first_job_and_a_stage_by_its_own():
     assert run.progress.fraction_done == pytest.approx((80 + 100) / (80 + 200))
 
 
+def test_work_that_is_done_ahead_counts_once():
+    run = Run(mechanics=40, imaging=100, tracking=60)
+    run.read(PLAN + "tracking                5\n")
+    assert run.progress.seconds_left == pytest.approx(40 + 4 * 160 / 2 + 5 * 60 / 5 / 2), "one clip is only tracked"
+    run = Run(mechanics=40, imaging=100, tracking=60)
+    run.read("Provided cores: 2\ntracking                4\n")
+    assert run.progress.seconds_left == pytest.approx(4 * 60 / 2)
+
+
 def test_share_never_falls_and_ends_at_one():
     run, before = Run(mechanics=40, imaging=1), 0.0
     run.read(PLAN)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import ast
 import json
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+from echotruth.repository import durable
+from echotruth.section import Section
 
 PACKAGE = Path(__file__).parents[1]
 """Folder of echotruth."""
@@ -47,14 +51,35 @@ def code_version(*modules: str) -> str:
     """
     digest = sha256()
     for name in sorted(_dependencies(modules)):
-        digest.update(_canonical_source(name))
+        digest.update(_source(name).digest.encode())
+    _keep_parsed()
     return digest.hexdigest()[:16]
 
 
 def settings_version(*settings: Any) -> str:
-    """Hash of settings: sections or plain values."""
-    values = [item.model_dump(mode="json") if hasattr(item, "model_dump") else item for item in settings]
-    return sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
+    """Hash of settings: sections or plain values. Their order counts, as that of the trackers is that of the arrays."""
+    texts = (_text(_Same(item)) if isinstance(item, Section) else json.dumps(item) for item in settings)
+    return sha256("\n".join(texts).encode()).hexdigest()[:16]
+
+
+class _Same:
+    """A section that equals only itself: thousands of cases share sections, whose values need not be compared."""
+
+    __slots__ = ("section",)
+
+    def __init__(self, section: Section) -> None:
+        self.section = section
+
+    def __hash__(self) -> int:
+        return id(self.section)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.section is other.section
+
+
+@lru_cache(maxsize=1000)
+def _text(same: _Same) -> str:
+    return json.dumps(same.section.model_dump(mode="json"))
 
 
 def packages() -> dict[str, str]:
@@ -82,16 +107,10 @@ def _dependencies(modules: tuple[str, ...]) -> set[str]:
     return visited
 
 
-@cache
 def _imports(importer: str) -> list[str]:
     """Modules of echotruth, and their packages, that a module imports anywhere in its source."""
-    names: set[str] = set()
-    for node in _statements(_tree(importer)):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-            names |= _discovered(importer) if node.module == "pkgutil" else set()
+    names = set(_source(importer).imports)
+    names |= _discovered(importer) if "pkgutil" in names else set()
     return sorted(name for name in names if name.startswith("echotruth.") and name != importer and _path(name))
 
 
@@ -111,16 +130,92 @@ def _path(name: str) -> Path | None:
     return next((file for file in files if file.is_file()), None)
 
 
+class _Source(NamedTuple):
+    """What is to be known of a source file.
+
+    Attributes
+    ----------
+    digest : str
+        Hash of its statements, without docstrings.
+    imports : list of str
+        Modules of echotruth that it imports, and pkgutil.
+    """
+
+    digest: str
+    imports: list[str]
+
+
+_PARSED = PACKAGE / "__pycache__" / f"provenance.{sys.implementation.cache_tag}.json"
+"""Hash of the text of a file -> what was found in it, so that no text is parsed twice."""
+_OWN_TEXT = Path(__file__).read_bytes()
+"""What is found depends on this module too."""
+_LARGEST = 1000
+"""Number of texts that are kept."""
+
+
 @cache
-def _tree(name: str) -> ast.Module:
+def _source(name: str) -> _Source:
     path = _path(name)
-    return ast.parse(path.read_text(encoding="utf-8") if path else "")
+    text = path.read_bytes() if path else b""
+    known, key = _parsed(), sha256(_OWN_TEXT + text).hexdigest()
+    if key not in known:
+        known[key] = _parse(text)
+    return known[key]
 
 
 @cache
-def _canonical_source(name: str) -> bytes:
-    """Syntax tree of a script or module, without docstrings, as text."""
-    return ast.dump(_without_docstrings(_tree(name))).encode()
+def _parsed() -> dict[str, _Source]:
+    """What is known of texts; it grows as others are parsed."""
+    return _kept()
+
+
+def _kept() -> dict[str, _Source]:
+    """What earlier processes found; empty if it cannot be read."""
+    with suppress(OSError, ValueError, TypeError, AttributeError):
+        kept = json.loads(_PARSED.read_text(encoding="utf-8"))
+        return {key: _Source(*source) for key, source in kept.items()}
+    return {}
+
+
+def _keep_parsed() -> None:
+    """Save what is known of texts, if that is more than before; where it cannot be saved, it is found again."""
+    known = dict(list(_parsed().items())[-_LARGEST:])
+    if not known.keys() <= _kept().keys():
+        with suppress(OSError):
+            durable.write(_PARSED, json.dumps(known).encode())
+
+
+def _parse(text: bytes) -> _Source:
+    tree = ast.parse(text)
+    imports: set[str] = set()
+    for node in _statements(tree):
+        if isinstance(node, ast.Import):
+            imports |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            imports |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    ours = sorted(name for name in imports if name == "pkgutil" or name.startswith("echotruth."))
+    return _Source(sha256(_canonical(_without_docstrings(tree)).encode()).hexdigest(), ours)
+
+
+def _canonical(tree: ast.AST) -> str:
+    """Syntax tree as text, without positions and empty fields, so that it is the same in all versions of Python.
+
+    Each node is followed by its fields, and a list by its length and its items.
+    """
+    text: list[str] = []
+    pending: list[Any] = [tree]
+    while pending:
+        node = pending.pop()
+        if isinstance(node, ast.AST):
+            fields = [(name, value) for name in node._fields if (value := getattr(node, name, None)) not in (None, [])]
+            text.append(f"{type(node).__name__}({' '.join(name for name, _ in fields)})")
+            pending.extend(value for _, value in reversed(fields))
+        elif isinstance(node, list):
+            text.append(f"[{len(node)}]")
+            pending.extend(reversed(node))
+        else:
+            text.append(repr(node))
+    return "\n".join(text)
 
 
 def _without_docstrings(tree: ast.Module) -> ast.Module:

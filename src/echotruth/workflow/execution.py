@@ -28,7 +28,9 @@ MAX_LOGS = 3
 """Largest number of logs shown."""
 
 
-def execute(command: list[str], log: Path, name: str, expected: dict[str, float]) -> int:
+def execute(
+    command: list[str], log: Path, name: str, expected: dict[str, float], environment: dict[str, str] | None = None
+) -> int:
     """Run Snakemake, show its progress or what failed on stderr, and return its exit status.
 
     Parameters
@@ -40,11 +42,13 @@ def execute(command: list[str], log: Path, name: str, expected: dict[str, float]
         Name of the repository.
     expected : dict
         Rule -> expected duration of its job, s.
+    environment : dict, optional
+        Environment variables of Snakemake (default: those of this process).
     """
     log.parent.mkdir(parents=True, exist_ok=True)
     progress = Progress(expected)
     with log.open("w") as output:
-        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
+        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, env=environment)
     with _terminate_on_exit(process), log.open(errors="replace") as output:
         _follow(process, output, progress, ProgressLine(name, sys.stderr))
     if process.returncode:

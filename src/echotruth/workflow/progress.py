@@ -22,16 +22,18 @@ DEFAULT_SECONDS = {
 """Rule -> duration of its job for a heart of 40 frames, s; used until one has been measured."""
 STAGES = {"imaging": ("phantom", "truth", "rf", "bmode"), "tracking": ("tracking", "evaluation")}
 """Rule -> stages of its job, if there are several."""
+AHEAD = {"mechanics": "physiology", "imaging": "tracking"}
+"""Rule -> rule whose work its jobs do as well; the jobs of that rule then only move their records."""
 MAX_RECORDS = 20
 """Largest number of records from which the mean duration of a stage is taken."""
 
 _COUNT = re.compile(r"^(\w+) +(\d+)$")
-_RULE = re.compile(r"^(?:local)?rule (\w+):$")
-_FAILED = re.compile(r"^Error in rule (\w+):$")
+_RULE = re.compile(r"^ *(?:local)?rule (\w+):$")  # indented in a group of jobs on a cluster
+_FAILED = re.compile(r"^ *Error in rule (\w+):$")
 _JOB = re.compile(r"^ +jobid: (\d+)$")
 _LOG = re.compile(r"^ +log: (\S+)")
 _FINISHED = re.compile(r"^Finished jobid: (\d+) \(Rule: (\w+)\)$")
-_CORES = re.compile(r"^Provided (?:cores|jobs): (\d+)")
+_CORES = re.compile(r"^Provided (?:cores|jobs|remote nodes): (\d+)")
 
 
 def measured_seconds(ledger: Path) -> dict[str, float]:
@@ -148,12 +150,23 @@ class Progress:
     def _expected_seconds(self, rule: str) -> float:
         """Mean duration of a job in this run, s; without one, the expected one scaled to the speed of this run."""
         durations = self._durations[rule]
-        return sum(durations) / len(durations) if durations else self._expected[rule] * self._slowdown
+        return sum(durations) / len(durations) if durations else self._usual_seconds(rule) * self._slowdown
+
+    def _usual_seconds(self, rule: str) -> float:
+        """Expected duration of a job, s, with the work that it does ahead, and without that which was done ahead."""
+        seconds = self._expected[rule]
+        for first, later in AHEAD.items():
+            both = min(self._planned[first], self._planned[later])
+            if rule == first and both:
+                seconds += self._expected[later]
+            elif rule == later and both:
+                seconds *= 1 - both / self._planned[later]
+        return seconds
 
     @property
     def _slowdown(self) -> float:
         """Measured over expected duration of the finished jobs."""
-        expected = sum(self._expected[rule] * len(durations) for rule, durations in self._durations.items())
+        expected = sum(self._usual_seconds(rule) * len(durations) for rule, durations in self._durations.items())
         return sum(map(sum, self._durations.values())) / expected if expected else 1.0
 
     def _remaining_work(self, rule: str) -> float:

@@ -5,8 +5,9 @@ again, and runs again whatever has other inputs than before. Instead, every job 
 fills the cache if the mark does not exist.
 """
 
+HANDED = quote(str(configuration_path(FOLDER, CONFIG)))
 CACHE = {group: f".snakemake/numba/{cache_folder(group, SCRIPTS)}" for group in CACHE_GROUPS}
-MINI = miniature(next(iter(CASES.values())).config)
+MINI = miniature(single(CONFIG))
 COMPILE_SETTINGS = {
     "imaging": (*MINI.views.values(), MINI.phantom, MINI.probe, MINI.rf, MINI.realism, MINI.bmode, MINI.motion),
     "tracking": (MINI.tracking, MINI.bmode),
@@ -19,7 +20,7 @@ def compile_command(group):
     variable = f"export NUMBA_CACHE_DIR={quote(str(Path(CACHE[group]).absolute()))}"
     if group not in MARKS:
         return variable
-    return f"{variable}; [ -e {MARKS[group]} ] || {RUN}/compile.py {FOLDER} {group} {MARKS[group]}"
+    return f"{variable}; [ -e {MARKS[group]} ] || {RUN}/compile.py {FOLDER} {group} {MARKS[group]} --config {HANDED}"
 
 
 COMPILE = {group: compile_command(group) for group in CACHE_GROUPS}
@@ -31,6 +32,9 @@ rule compile_imaging:
     log:
         FOLDER / "logs/compile_imaging.log",
     priority: 2
+    resources:
+        runtime=10,
+        mem_mb=2000,
     shell:
         "{{ {COMPILE[imaging]}; }} &> {log}"
 
@@ -41,5 +45,8 @@ rule compile_tracking:
     log:
         FOLDER / "logs/compile_tracking.log",
     priority: 1
+    resources:
+        runtime=10,
+        mem_mb=2000,
     shell:
         "{{ {COMPILE[tracking]}; }} &> {log}"

@@ -1,7 +1,11 @@
 """One job per heart and view: phantom, truth, RF and B-mode of all frames and image sizes.
 
-The stages are one job because starting a job takes longer than passing arrays through a scratch folder.
+The stages are one job because starting a process takes longer than passing arrays through a scratch folder. What a stage
+made stands if the next one is killed, and is taken up. The process also tracks and scores the clips; the rule tracking
+finds the records.
 """
+
+IMAGING = handed("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
 
 
 rule imaging:
@@ -13,24 +17,21 @@ rule imaging:
         rf=record("rf", view="{view}"),
         bmode=record("bmode", view="{view}"),
     params:
-        # A string, because Snakemake replaces wildcards only in strings.
-        scratch=str(FOLDER / "scratch/{case}/{view}"),
         code=code("phantom", "truth", "rf", "bmode"),
         settings=lambda wildcards: imaging_settings(CASES[wildcards.case].config, wildcards.view),
+    group:
+        "view"
     log:
         FOLDER / "logs/imaging/{case}/{view}.log",
+    resources:
+        runtime=minutes(demand.images),
+        mem_mb=megabytes(demand.images),
     shell:
         """
         {{
-            rm -rf {params.scratch}
+            {COMPILE[tracking]}
             {COMPILE[imaging]}
-            {RUN}/series.py {FOLDER} {wildcards.case} {wildcards.view} phantom truth rf bmode --threads {threads}
-            rm -rf {params.scratch}
+            {RUN}/series.py {FOLDER} {wildcards.case} phantom truth rf bmode --view {wildcards.view} {IMAGING:{wildcards.case}} \\
+                --threads {threads} --then tracking evaluation --ahead {TRACKING_AHEAD:{wildcards.case}/{wildcards.view}/} --cache {TRACKING_CACHE}
         }} &> {log}
         """
-
-
-def imaging_settings(config, view):
-    index = list(config.views).index(view)
-    stages = (config.phantom, config.probe.resolved(), config.rf, config.realism, config.bmode)
-    return settings_version(config.seed, config.views[view], index, *stages)

@@ -1,42 +1,52 @@
-"""One job per heart: geometry, fibres, mechanics and kinematics."""
+"""One job per heart: geometry, fibres, mechanics and kinematics.
+
+Of hearts with the same motion only the first is solved; the others take over its files. The process also measures the
+heart, because starting another takes longer than that; the rule physiology finds the record.
+"""
+
+MOTIONS = motions({id: case.config for id, case in CASES.items()})
+SAME_AS = first_with_same(MOTIONS, rows(FOLDER / "registry.txt"))
+
+
+def heart_group(wildcards):
+    """Group of the jobs of a heart on a cluster; those that only take over files are many to a group."""
+    return "shared" if wildcards.case in SAME_AS else "heart"
+
+MECHANICS = handed("mechanics", "physiology")
 
 
 rule mechanics:
+    input:
+        # Not `ancient`: if the first is to be solved again, Snakemake does not look for reasons to run the others.
+        lambda wildcards: [record("mechanics", case) for case in same_as(wildcards)],
     output:
         record("mechanics"),
     params:
         code=code("mechanics"),
-        settings=lambda wildcards: mechanics_settings(CASES[wildcards.case].config),
+        settings=lambda wildcards: MOTIONS[wildcards.case],
+    group:
+        heart_group
     log:
         FOLDER / "logs/mechanics/{case}.log",
     # One core is left for the jobs that compile at the same time.
     threads: max(1, ((workflow.cores or 1) - any(not Path(mark).exists() for mark in MARKS.values())) // len(CASES))
     priority: 3
+    resources:
+        runtime=minutes(demand.mechanics),
+        mem_mb=megabytes(demand.mechanics),
     shell:
         """
         {{
             {COMPILE[mechanics]}
-            {RUN}/mechanics.py {FOLDER} {wildcards.case} --threads {threads}
+            {RUN}/series.py {FOLDER} {wildcards.case} mechanics {SOURCE_OF_MOTION:{wildcards.case}} {MECHANICS:{wildcards.case}} --threads {threads} \\
+                --then physiology --ahead {PHYSIOLOGY_AHEAD:{wildcards.case}}
         }} &> {log}
         """
 
 
-@cache
-def loop_curves(loop):
-    """Time and prescribed curves of a loop, read once for all hearts that share it."""
-    cycle = read_loop(loop)
-    curves = (cycle.time, cycle.pressure, cycle.volume, cycle.tension)
-    return [None if values is None else values.tolist() for values in curves]
+def same_as(wildcards):
+    """The case from which a case takes over its motion, if there is one."""
+    return [SAME_AS[wildcards.case]] if wildcards.case in SAME_AS else []
 
 
-def mechanics_settings(config):
-    # Only fibre disarray depends on the seed.
-    seed = config.seed if config.fibres.disarray_deg else None
-    anatomy = (config.geometry.resolved(), fingerprint(config.geometry), config.fibres, seed, config.pathology)
-    if config.motion.kind == "beat":
-        return settings_version(*anatomy, config.loop, loop_curves(config.loop), config.mechanics)
-    formula = getattr(config.motion, config.motion.kind)
-    if config.motion.kind == "file":
-        formula = settings_version(formula, content_hash(config.motion.file.path))
-    amplitude = (loop_curves(config.loop)[0], config.motion.time_course)
-    return settings_version(*anatomy, *amplitude, formula, config.rf.focus_mm)
+SOURCE_OF_MOTION = OfCase(lambda case: f"--same-as {SAME_AS[case]}" if case in SAME_AS else "")

@@ -27,6 +27,11 @@ rule report:
         code=code("report"),
     log:
         FOLDER / "logs/report.log",
+    group:
+        "report"
+    resources:
+        runtime=15,
+        mem_mb=lambda wildcards, attempt: attempt * 2000,
     shell:
         "{{ {COMPILE[report]}; {RUN}/report.py {FOLDER} motion; }} &> {log}"
 
@@ -43,5 +48,10 @@ rule report_images:
         code=code("report"),
     log:
         FOLDER / "logs/report_images.log",
+    group:
+        "report"
+    resources:
+        runtime=15,
+        mem_mb=lambda wildcards, attempt: attempt * 2000,
     shell:
         "{{ {COMPILE[report]}; {RUN}/report.py {FOLDER} images; }} &> {log}"

@@ -4,20 +4,21 @@
 # Not a rule: every heart would depend on it, and Snakemake does not check the inputs of a rule that it runs again
 # (even if they are `ancient`), so that it would miss a changed tracker. Existing values stay.
 onstart:
+    try:
+        lease.hold(FOLDER)
+    except OSError as error:
+        raise WorkflowError(str(error))
+    write_configuration(FOLDER, CONFIG)
+    # Jobs in a queue read the configuration again, which may have changed by then.
+    workflow.config_settings.configfiles = [write_sweep(FOLDER, CONFIG).absolute()]
     command = [sys.executable, str(SCRIPTS / "cases.py"), str(FOLDER), "-"]
     subprocess.run(command, input=CONFIG.model_dump_json(), text=True, check=True)
 
 
-# All records are named, so that one that a failed job lost is made again even if its dependants exist.
-RECORDS = [
-    *(record(stage, case) for stage in GATES for case in CASES),
-    *(record(stage, case, view) for stage in VIEW_STAGES for case in CASES for view in CONFIG.views),
-]
-
-
 rule repository:
     input:
-        RECORDS,
+        # A function, because Snakemake keeps every path that a rule names twice.
+        lambda wildcards: requested_records(FOLDER, CASES, CONFIG.views),
     output:
         FOLDER / "ledger/repository.json",
     params:
@@ -25,5 +26,10 @@ rule repository:
         code=code("cases", "repository"),
     log:
         FOLDER / "logs/repository.log",
+    group:
+        "report"
+    resources:
+        runtime=lambda wildcards, attempt: attempt * demand.publication(len(CASES), len(CONFIG.views)).minutes,
+        mem_mb=lambda wildcards, attempt: attempt * demand.publication(len(CASES), len(CONFIG.views)).megabytes,
     shell:
         "{RUN}/repository.py {FOLDER} &> {log}"

@@ -1,4 +1,12 @@
-"""One job per heart and view: every tracker at every image size, scored against the truth."""
+"""One job per heart and view: every tracker at every image size, scored against the truth.
+
+The job of the images has mostly done this already. Then its records are only moved to the ledger.
+"""
+
+TRACKING_CACHE = quote(str(Path(CACHE["tracking"]).absolute()))
+TRACKING_VERSION = f"{code('tracking', 'evaluation')}-{settings_version(CONFIG.tracking)}"
+
+TRACKING = handed("tracking", "evaluation")
 
 
 rule tracking:
@@ -10,12 +18,29 @@ rule tracking:
     params:
         code=code("tracking", "evaluation"),
         settings=settings_version(CONFIG.tracking),
+    group:
+        "view"
     log:
         FOLDER / "logs/tracking/{case}/{view}.log",
+    resources:
+        runtime=minutes(demand.tracking),
+        mem_mb=megabytes(demand.tracking),
     shell:
         """
         {{
-            {COMPILE[tracking]}
-            {RUN}/series.py {FOLDER} {wildcards.case} {wildcards.view} tracking evaluation --threads {threads}
+            ahead={TRACKING_AHEAD:{wildcards.case}/{wildcards.view}/}
+            if [ -e $ahead/tracking.json ] && [ -e $ahead/evaluation.json ] && [ ! -e $ahead/begun ]; then
+                mv $ahead/tracking.json {output.tracking}
+                mv $ahead/evaluation.json {output.evaluation}
+            else
+                {COMPILE[tracking]}
+                {RUN}/series.py {FOLDER} {wildcards.case} tracking evaluation --view {wildcards.view} {TRACKING:{wildcards.case}} \\
+                    --threads {threads}
+            fi
+            rm -rf $(dirname $ahead)/ahead-*
         }} &> {log}
         """
+
+
+# Folder in which the job of the images leaves the records, if they are of this code and these settings.
+TRACKING_AHEAD = OfCase(lambda path: str(FOLDER / "scratch" / path / f"ahead-{TRACKING_VERSION}"))

@@ -17,9 +17,10 @@ from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.geometry import GeometryError, left_ventricle
 from echotruth.mechanics.motion_file.wall import moving_wall
 from echotruth.mechanics.prescribed import MotionError
-from echotruth.repository import layout, ledger, schema
+from echotruth.repository import durable, layout, ledger, schema
 from echotruth.repository.store import Store
 from echotruth.tracking import grid
+from echotruth.workflow import superseded
 
 
 def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
@@ -35,7 +36,9 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     """
     mesh = moving_wall(config).mesh if config.motion.kind == "file" else left_ventricle(config.geometry)
     folder.mkdir(parents=True, exist_ok=True)
-    rows = ledger.register(folder / "registry.txt", [case.id for case in cases])
+    store = Store(folder / f"{config.name}.zarr")
+    rows = ledger.register(folder / "registry.txt", [case.id for case in cases], store.labels("case"))
+    views = ledger.register(folder / "views.txt", list(config.views), store.labels("view"))
     times = np.full((len(rows), config.loop.frames), np.nan)
     loops = {loop: read_loop(loop) for loop in {case.config.loop for case in cases}}
     for case in cases:
@@ -45,12 +48,15 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     scanner = config.rf.keep and Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
     values, lengths, settings = metadata(config, scanner) if scanner else ({}, {}, {})
     sizes = layout.sizes(mesh) | lengths
-    labels = layout.labels(config, list(rows), times) | layout.positions(config, pixel_centres, grid) | columns
+    labels = layout.labels(config, list(rows), times, list(views)) | columns
+    labels |= layout.positions(config, pixel_centres, grid)
     labels |= {f"rf:{name}": value for name, value in values.items()}
     arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
-    Store(folder / f"{config.name}.zarr").lay_out(arrays, sizes, labels, {"rf": settings})
-    case_table.to_csv(folder / "cases.csv", index=False)
-    (folder / "config.yaml").write_text(yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False))
+    superseded.set_aside(folder, config)
+    store.lay_out(arrays, sizes, labels, {"rf": settings, "cases": {"constants": layout.constants(case_table)}})
+    settings_file = yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False)
+    texts = {"cases.csv": case_table.to_csv(index=False), "config.yaml": settings_file}
+    durable.update_all({folder / name: text.encode() for name, text in texts.items()})
 
 
 def main() -> None:

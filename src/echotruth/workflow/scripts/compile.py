@@ -3,6 +3,7 @@
 import argparse
 import fcntl
 import logging
+import sys
 import tempfile
 from importlib import import_module
 from pathlib import Path
@@ -16,6 +17,8 @@ from echotruth.config.loading import load
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.seeds import generator
+from echotruth.workflow import lease
+from echotruth.workflow.assignment import single
 from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job, Result, parser, run
 from echotruth.workflow.miniature import miniature
@@ -37,8 +40,8 @@ def image_all_ranges(config: Config) -> None:
     Scanner(config.probe, config.rf, depth).lines(position, np.ones(100))
 
 
-def run_miniature(group: str, folder: Path) -> None:
-    config = miniature(expand(load(folder / "config.yaml"))[0].config)
+def run_miniature(group: str, path: Path) -> None:
+    config = miniature(single(load(path)))
     with tempfile.TemporaryDirectory() as repository:
         cases = expand(config)
         lay_out(Path(repository), config, cases)
@@ -60,7 +63,12 @@ def main() -> None:
     command.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     command.add_argument("group", choices=STAGES)
     command.add_argument("mark", type=Path, help="empty file written at the end; if it exists, nothing is done")
+    command.add_argument("--config", type=Path, help="file with the configuration (default: config.yaml there)")
     arguments = command.parse_args()
+    try:
+        lease.follow(arguments.repository)
+    except lease.LeaseError as error:
+        sys.exit(str(error))
     arguments.mark.parent.mkdir(parents=True, exist_ok=True)
     with arguments.mark.with_suffix(".lock").open("w") as lock:
         # A second process waits here, and then finds the functions compiled.
@@ -68,7 +76,7 @@ def main() -> None:
         if arguments.mark.exists():
             return
         try:
-            run_miniature(arguments.group, arguments.repository)
+            run_miniature(arguments.group, arguments.config or arguments.repository / "config.yaml")
         except (Exception, SystemExit):
             logging.getLogger("echotruth").exception("the miniature failed: every job compiles its functions itself")
         arguments.mark.touch()

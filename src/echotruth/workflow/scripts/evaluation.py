@@ -7,7 +7,8 @@ from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
-    truth, result = ground_truth(job), {}
+    truth = ground_truth(job)
+    result: dict[str, dict[str, np.ndarray]] = {}
     for size in job.case.config.bmode.sizes:
         tracked = job.read(f"tracking/{size}", "displacement")["displacement"]
         scores = [score(displacement, truth) for displacement in tracked]

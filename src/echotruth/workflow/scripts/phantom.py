@@ -12,7 +12,7 @@ from echotruth.workflow.job import Job, Result, main
 def work(job: Job) -> Result:
     heart, config = job.heart, job.case.config
     plane = imaging_plane(job.view, config.rf, heart.endo_at_ed)
-    scatterers = Sequence(config, heart, plane, partial(generator, job.case, job.view_name)).scatterers()
+    scatterers = Sequence(config, heart, plane, partial(generator, job.case, str(job.view_name))).scatterers()
     job.save_scratch(**scatterers)
     centre, number = cavity_centroid(heart, plane), len(scatterers["amplitude"])
     return {"phantom": {"scatterer_count": number, "origin": plane.origin, "axes": plane.axes, "centre": centre}}

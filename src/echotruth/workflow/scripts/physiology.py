@@ -2,6 +2,8 @@
 
 import logging
 
+from numpy.typing import ArrayLike
+
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.physiology import measures, violated_bound
 from echotruth.workflow.job import Job, Result, main
@@ -11,7 +13,7 @@ def work(job: Job) -> Result:
     kinematics = job.read("kinematics", "strain_mean", "layer_strain", "volume_ratio_min")
     depth = job.read("fibres", "wall_depth")["wall_depth"]
     mechanics = job.read("mechanics") | {"time": read_loop(job.case.config.loop).time}
-    measured = measures(job.read("geometry"), mechanics, kinematics, depth)
+    measured: dict[str, ArrayLike] = {**measures(job.read("geometry"), mechanics, kinematics, depth)}
     solved = job.case.config.motion.kind == "beat"  # the bounds do not apply to prescribed motions
     healthy = not job.read("pathology", "region")["region"].any()
     if solved and (reason := violated_bound(measured, job.case.config.physiology, healthy)):

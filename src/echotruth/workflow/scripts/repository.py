@@ -3,10 +3,12 @@
 import argparse
 import sys
 from pathlib import Path
+from shutil import rmtree
 
 from echotruth.repository import ledger
 from echotruth.repository.checksums import ChecksumError
 from echotruth.repository.publication import publish
+from echotruth.workflow import superseded
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
@@ -16,5 +18,6 @@ try:
 except ChecksumError as error:
     sys.exit(str(error))
 ledger.commit(folder / "ledger/repository.json", summary)
+rmtree(folder / superseded.FOLDER, ignore_errors=True)
 files = summary.pop("files")
 print("repository:", ", ".join(f"{number} {status}" for status, number in summary.items()), f"({files} files verified)")

@@ -1,12 +1,12 @@
-"""Run several stages of one heart and view in one process, so that modules are loaded only once."""
+"""Run several stages of one heart, or of one of its views, in one process, so that modules are loaded only once."""
 
-from importlib import import_module
+import os
 
 from echotruth.workflow.cost import Cost
-from echotruth.workflow.job import parser, run
+from echotruth.workflow.series import ALONE, command, run_ahead, run_series
 
-command = parser("series", __doc__)
-command.add_argument("stages", nargs="+", help="names of scripts in this folder, such as phantom truth rf bmode")
-arguments, cost = command.parse_args(), Cost()
-for stage in arguments.stages:
-    run(stage, import_module(stage).work, arguments, cost)
+if __name__ == "__main__":
+    arguments, cost = command().parse_args(), Cost()
+    run_series(arguments, cost)
+    if arguments.then and ALONE not in os.environ:
+        run_ahead(arguments, cost)

@@ -1,33 +1,45 @@
-"""Track the clips of one view, at every image size, with every tracker."""
+"""Track the clips of one view, at every image size, with every tracker; what stands already is taken over."""
 
 import logging
 
 import numpy as np
 
 from echotruth.evaluation.clip import Clip, clips
+from echotruth.evaluation.pieces import Piece, Pieces, known
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
-    result: Result = {}
+    trackers, earlier = job.case.config.tracking.trackers, Pieces(job)
+    result: dict[str, dict[str, np.ndarray]] = {}
+    pieces: dict[int, dict[str, Piece]] = {}
     for size, clip in clips(job).items():
-        estimates = [_track(job, name, clip) for name in job.case.config.tracking.trackers]
-        displacement, quality = zip(*estimates, strict=True)
-        result[f"tracking/{size}"] = {"displacement": np.stack(displacement), "quality": np.stack(quality)}
+        pieces[size] = made = {name: _piece(job, name, clip, earlier) for name in trackers}
+        displacement = np.stack([piece.displacement for piece in made.values()])
+        result[f"tracking/{size}"] = {
+            "displacement": displacement,
+            "quality": np.stack([piece.quality for piece in made.values()]),
+        }
         logging.getLogger("echotruth").info("%d px", size)
+    job.remember(pieces=known(pieces), index=list(job.index))
     return result
 
 
-def _track(job: Job, name: str, clip: Clip) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement and quality of one tracker; if it fails, no estimate, and the reason in the record."""
+def _piece(job: Job, name: str, clip: Clip, earlier: Pieces) -> Piece:
+    """What a tracker found before; else what it finds now, or no estimate, and the reason in the record."""
+    tracker = job.case.config.tracking.trackers[name]
+    fingerprint = earlier.fingerprint(tracker, clip)
+    if piece := earlier.find(clip.size, name, fingerprint):
+        logging.getLogger("echotruth").info("%s at %d px: taken up", name, clip.size)
+        return piece
     try:
-        return clip.on_grid(*track(*clip.tracker_arguments, job.case.config.tracking.trackers[name]))
+        return Piece(*clip.on_grid(*track(*clip.tracker_arguments, tracker)), fingerprint)
     except TrackerFailed as error:
         logging.getLogger("echotruth").warning("%s at %d px: %s", name, clip.size, error)
         job.verdict.setdefault("failures", {})[f"{name}/{clip.size}"] = str(error)
-        return clip.on_grid(*clip.no_estimate)
+        return Piece(*clip.on_grid(*clip.no_estimate), fingerprint, str(error))
 
 
 if __name__ == "__main__":

@@ -2,6 +2,8 @@
 
 import logging
 
+import numpy as np
+
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import Plane
@@ -11,7 +13,7 @@ from echotruth.workflow.job import Job, Result, main
 def work(job: Job) -> Result:
     heart, bmode = job.heart, job.case.config.bmode
     plane = Plane(**job.read("phantom", "origin", "axes"))
-    result: Result = {}
+    result: dict[str, dict[str, np.ndarray]] = {}
     for size in bmode.sizes:
         axial, lateral = pixel_centres(bmode, size)
         result[f"truth/{size}"] = pixel_truth(heart, plane, axial, lateral)

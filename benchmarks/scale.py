@@ -1,0 +1,210 @@
+"""Cost of large sweeps: planning them, taking them up again, and laying out their repository.
+
+    python benchmarks/scale.py            # 100 and 1 000 hearts, minutes
+    python benchmarks/scale.py --hearts 100 1000 10000 --batches 10
+
+Each measurement is one process in an empty folder: CPU seconds of it and its children, and the memory of the largest of
+them. No heart is solved. The results stand in benchmarks/results/scale.md and scale.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import psutil
+import yaml
+
+import echotruth.workflow
+from echotruth.cases import expand
+from echotruth.config import Config
+from echotruth.config.loading import validate
+from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
+
+RESULTS = Path(__file__).parent / "results"
+WORKFLOW = Path(echotruth.workflow.__file__).parent
+SNAKEMAKE = (
+    sys.executable,
+    "-m",
+    "snakemake",
+    "--snakefile",
+    str(WORKFLOW / "Snakefile"),
+    "--configfile",
+    "scale.yaml",
+)
+PLAN = (*SNAKEMAKE, "--cores", "1", "--dry-run", "--quiet")
+"""Builds the graph of jobs, decides what is to be made, and prints nothing."""
+HEARTS_PER_SEED = 20
+"""Hearts that differ in more than the seed: 4 materials x 5 fibre angles."""
+
+
+NOTHING = "Nothing to be done"
+"""What Snakemake says of a finished sweep."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Cost of one process.
+
+    Attributes
+    ----------
+    name : str
+    hearts : int
+    cpu_s : float
+        User and system time, of its children too, s.
+    memory_MiB : float
+        Largest resident set of the process or one of its children, MiB.
+    """
+
+    name: str
+    hearts: int
+    cpu_s: float
+    memory_MiB: float
+
+
+def sweep(hearts: int) -> Config:
+    """Sweep of small hearts in the four standard views."""
+    size = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
+    values = {
+        "name": "scale",
+        "geometry": size,
+        "loop": {"frames": 4},
+        "bmode": {"size_px": 64, "downsampling": [1]},
+        "tracking": {"trackers": {"phase": {"window_px": 16}}},
+        "cases": {
+            "mechanics.material.stiffness_kPa": [0.8, 1.1, 1.6, 2.4],
+            "fibres.endo_deg": [60, 64, 68, 72, 76],
+            "seed": list(range(1, hearts // HEARTS_PER_SEED + 1)),
+        },
+    }
+    return validate(values, "scale")
+
+
+def measure(name: str, hearts: int, folder: Path, command: tuple[str, ...], says: str = "") -> Measurement:
+    """Run a command in a folder and measure it; its output is shown only if it fails or does not say what it should."""
+    with tempfile.TemporaryFile("w+") as output:
+        environment = os.environ | {"OMP_NUM_THREADS": "1"}
+        process = subprocess.Popen(command, cwd=folder, stdout=output, stderr=subprocess.STDOUT, env=environment)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        output.seek(0)
+        said = output.read()
+        if process.returncode or says not in said:
+            sys.exit(f"{name}: {' '.join(command)} failed:\n{said[-3000:]}")
+    measured = Measurement(name, hearts, round(used.ru_utime + used.ru_stime, 1), round(used.ru_maxrss / 1024))
+    print(f"{name}, {hearts} hearts: {measured.cpu_s:.1f} CPU s, {measured.memory_MiB:.0f} MiB", flush=True)
+    return measured
+
+
+def plan(hearts: int, batches: int) -> list[Measurement]:
+    """Plan a sweep of which nothing is made: whole, and the first of some batches."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        (folder / "scale.yaml").write_text(yaml.safe_dump(sweep(hearts).model_dump(mode="json")))
+        batch = ("--batch", f"repository=1/{batches}")
+        return [
+            measure("plan", hearts, folder, PLAN),
+            measure(f"plan 1/{batches}", hearts, folder, (*PLAN, *batch)),
+        ]
+
+
+def resume(hearts: int) -> Measurement:
+    """Find that nothing is to be done in a finished sweep, whose records are made without its results."""
+    config = sweep(hearts)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        (folder / "scale.yaml").write_text(yaml.safe_dump(config.model_dump(mode="json")))
+        out = folder / "out" / config.name
+        for case in expand(config):
+            records = [record_path(out, stage, case.id) for stage in GATES]
+            records += [record_path(out, stage, case.id, view) for view in config.views for stage in VIEW_STAGES]
+            for path in records:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text("{}")
+        (out / "ledger/repository.json").write_text("{}")
+        touch = (
+            *SNAKEMAKE,
+            "--cores",
+            "1",
+            "--touch",
+            "--forceall",
+            "--no-hooks",
+            "--quiet",
+            "all",
+            "--",
+            "repository",
+        )
+        measure("mark as finished", hearts, folder, touch)
+        again = (*SNAKEMAKE, "--cores", "1", "--dry-run", "--", "repository")
+        said = subprocess.run(
+            again, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=True
+        )
+        if "Nothing to be done" not in said.stdout:
+            sys.exit(f"the sweep of {hearts} hearts is not finished:\n{said.stdout[-3000:]}")
+        return measure("resume", hearts, folder, again)
+
+
+def lay_out(hearts: int) -> list[Measurement]:
+    """Lay out the repository of a sweep, as before the first job, and again when it stands."""
+    command = (sys.executable, str(WORKFLOW / "scripts/cases.py"), "out/scale", "scale.yaml")
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        (folder / "scale.yaml").write_text(yaml.safe_dump(sweep(hearts).model_dump(mode="json")))
+        return [measure(name, hearts, folder, command) for name in ("lay out", "lay out again")]
+
+
+def write(measured: list[Measurement]) -> None:
+    """Write the table and its numbers; measurements of other sizes stay."""
+    file = RESULTS / "scale.json"
+    kept = [Measurement(**row) for row in json.loads(file.read_text())["measurements"]] if file.exists() else []
+    new = {(item.name, item.hearts) for item in measured}
+    rows = sorted([*measured, *(item for item in kept if (item.name, item.hearts) not in new)], key=_order)
+    machine = f"{os.cpu_count()} cores, load {psutil.getloadavg()[0]:.0f}"
+    values = {"machine": machine, "measurements": [asdict(item) for item in rows]}
+    file.write_text(json.dumps(values, indent=1) + "\n")
+    lines = [
+        "# Large sweeps",
+        "",
+        "Made by `python benchmarks/scale.py`. Hearts x 4 views; CPU seconds of a process and its children, and the",
+        f"memory of the largest of them. Python {sys.version.split()[0]}, {machine} while it was measured.",
+        "",
+        "| | hearts | CPU s | MiB |",
+        "|---|---|---|---|",
+        *(f"| {item.name} | {item.hearts} | {item.cpu_s:.1f} | {item.memory_MiB:.0f} |" for item in rows),
+        "",
+        "*plan*: the graph of all jobs of a sweep of which nothing is made; *plan 1/10*: of its first batch alone",
+        "(`--batch repository=1/10`); *resume*: nothing is to be done; *lay out*: arrays, coordinates and table of the",
+        "cases, before the first job.",
+    ]
+    (RESULTS / "scale.md").write_text("\n".join(lines) + "\n")
+
+
+def _order(item: Measurement) -> tuple[str, int]:
+    return item.name, item.hearts
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--hearts", type=int, nargs="+", default=[100, 1000], help="multiples of 20")
+    parser.add_argument("--batches", type=int, default=10, help="number of batches of a plan")
+    parser.add_argument("--only", choices=("plan", "resume", "layout"), help="measure this alone")
+    arguments = parser.parse_args()
+    for hearts in arguments.hearts:
+        measured: list[Measurement] = []
+        if arguments.only in (None, "plan"):
+            measured += plan(hearts, arguments.batches)
+        if arguments.only in (None, "resume") and hearts <= 1000:
+            measured.append(resume(hearts))
+        if arguments.only in (None, "layout"):
+            measured += lay_out(hearts)
+        write(measured)
+
+
+if __name__ == "__main__":
+    main()

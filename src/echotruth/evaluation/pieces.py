@@ -1,0 +1,121 @@
+"""Results of trackers that stand already, one piece for each tracker and image size: only others are tracked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+import zarr
+
+from echotruth.evaluation.clip import Clip
+from echotruth.repository.provenance import settings_version
+from echotruth.workflow import superseded
+
+if TYPE_CHECKING:
+    from echotruth.section import Section
+    from echotruth.workflow.job import Job
+
+ARRAYS = ("displacement", "quality")
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What one tracker found in one clip.
+
+    Attributes
+    ----------
+    displacement : ndarray of shape (frame, grid rows, grid columns, 2)
+        Lateral, axial, m; NaN outside the wall.
+    quality : ndarray of shape (frame, grid rows, grid columns)
+    fingerprint : str
+        Of all that it was made from; empty if that is not known.
+    failure : str
+        Why there is no estimate; empty if there is one.
+    """
+
+    displacement: np.ndarray
+    quality: np.ndarray
+    fingerprint: str
+    failure: str = ""
+
+
+class Pieces:
+    """Pieces of one view, as the last job that tracked it left them.
+
+    Parameters
+    ----------
+    job : Job
+        Job of the stage tracking.
+    """
+
+    def __init__(self, job: Job) -> None:
+        entry = job.checkpoints.entry(job.stage)
+        self._job, self._sha256 = job, entry.get("record", {}).get("sha256", {})
+        # A piece is read at the place of this job, which must be that at which it was written.
+        self._known = entry.get("pieces", {}) if entry.get("index") == list(job.index) else {}
+        self._read: dict[int, tuple[np.ndarray, ...] | None] = {}
+
+    def fingerprint(self, tracker: Section, clip: Clip) -> str:
+        """Hash of all that a piece is made from: code, settings of the tracker, and what the tracker is given.
+
+        Empty for a tracker from outside, whose code is not known: it is never taken for the same.
+        """
+        if getattr(tracker, "method", None) == "external":
+            return ""
+        return settings_version(self._job.code, tracker, digest(clip))
+
+    def find(self, size: int, name: str, fingerprint: str) -> Piece | None:
+        """Find the piece of a tracker at an image size, if it was made from the same and its files are whole."""
+        pieces = self._known.get(str(size), {})
+        known = pieces.get(name, {})
+        if not fingerprint or known.get("fingerprint") != fingerprint or known["failure"]:
+            return None
+        if size not in self._read:
+            self._read[size] = self._arrays(size)
+        arrays = self._read[size]
+        if arrays is None:
+            return None
+        displacement, quality = (array[list(pieces).index(name)] for array in arrays)
+        return Piece(displacement, quality, fingerprint)
+
+    def _arrays(self, size: int) -> tuple[np.ndarray, ...] | None:
+        """Arrays of all trackers at an image size; None if a file is missing or differs from what was written."""
+        found = []
+        for array in ARRAYS:
+            group = f"tracking/{size}/{array}"
+            files = {name: value for name, value in self._sha256.items() if name.startswith(f"{group}/")}
+            roots = superseded.roots(self._job.folder, self._job.store.path)
+            root = next((root for root in roots if files and _whole(root, files)), None)
+            if root is None:
+                return None
+            opened = cast(Any, zarr.open_array(root / group, mode="r"))
+            found.append(np.asarray(opened[self._job.index]))
+        return tuple(found)
+
+
+def digest(clip: Clip) -> str:
+    """Hash of all that a tracker is given."""
+    content = sha256()
+    for value in (*clip.tracker_arguments, clip.inside):
+        array = np.ascontiguousarray(value)
+        content.update(f"{array.dtype} {array.shape} ".encode())
+        content.update(array.tobytes())
+    return content.hexdigest()
+
+
+def known(pieces: dict[int, dict[str, Piece]]) -> dict[str, dict[str, dict[str, str]]]:
+    """What the checkpoint keeps of pieces, by image size and tracker, in the order of the arrays."""
+    return {
+        str(size): {
+            name: {"fingerprint": piece.fingerprint, "failure": piece.failure} for name, piece in trackers.items()
+        }
+        for size, trackers in pieces.items()
+    }
+
+
+def _whole(root: Path, files: dict[str, str]) -> bool:
+    paths = ((root / name, expected) for name, expected in files.items())
+    return all(path.is_file() and sha256(path.read_bytes()).hexdigest() == expected for path, expected in paths)

@@ -1,0 +1,88 @@
+"""One set of processor instructions for all jobs, so that machines of several kinds give the same bytes.
+
+OpenBLAS, NumPy and OpenCV choose their code by the processor. With other vectors, sums are taken in another order, and
+the last bits of a result change. The jobs of the workflow therefore use the instructions of x86-64-v3, AVX2 and FMA (a
+level of the System V ABI, AMD64 supplement), and no others. MKL is set in :mod:`echotruth.fem.sparse`; it has that
+branch on Intel's processors only. docs/determinism.md says what was measured.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from shlex import quote
+
+LEVEL = "x86-64-v3"
+
+_FEATURES = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+"""Features of the level by their names in LLVM; older levels are implied."""
+
+
+_AMD = ("znver", "bdver", "btver", "amdfam")
+"""Beginnings of LLVM's names of AMD's processors."""
+
+
+def environment() -> dict[str, str]:
+    """Environment variables with which libraries use the instructions of `LEVEL`.
+
+    They must be set before the libraries are loaded, on the machine that runs the job.
+
+    Returns
+    -------
+    dict
+        Name -> value; empty if the processor lacks these instructions.
+    """
+    features = _host_features()
+    if not all(features.get(name) for name in _FEATURES):
+        return {}
+    variables = {
+        # Numba's bytes do not depend on it, but the keys of its cache do: one serves all machines.
+        "NUMBA_CPU_NAME": LEVEL,
+        "NUMBA_CPU_FEATURES": "",
+        "NUMBA_DISABLE_INTEL_SVML": "1",
+        "OPENBLAS_CORETYPE": "Haswell",
+        "NPY_DISABLE_CPU_FEATURES": " ".join(_numpy_features_beyond()),
+        "OPENCV_IPP": "avx2",
+    }
+    # OpenCV prints a warning about features that the processor does not have.
+    return variables | ({"OPENCV_CPU_DISABLE": "AVX512-SKX"} if features.get("avx512f") else {})
+
+
+def exports() -> str:
+    """Shell command that exports :func:`environment`; empty if there is nothing to set."""
+    variables = environment()
+    return f"export {' '.join(f'{name}={quote(value)}' for name, value in variables.items())}; " if variables else ""
+
+
+@cache
+def kind() -> str:
+    """Instructions that this process uses; results of one kind agree byte for byte.
+
+    Returns
+    -------
+    str
+        `x86-64-v3`; with the processor's name after it where MKL takes whatever that processor offers; or `native` and
+        the name where all libraries do.
+    """
+    import llvmlite.binding
+
+    variables, processor = environment(), llvmlite.binding.get_host_cpu_name()
+    if not variables or any(os.environ.get(name) != value for name, value in variables.items()):
+        return f"native {processor}"
+    return f"{LEVEL}, MKL for {processor}" if processor.startswith(_AMD) else LEVEL
+
+
+def _host_features() -> dict[str, bool]:
+    import llvmlite.binding
+
+    try:
+        return dict(llvmlite.binding.get_host_cpu_features())
+    except RuntimeError:  # LLVM does not know the features of every processor
+        return {}
+
+
+def _numpy_features_beyond() -> list[str]:
+    """NumPy's names of the instructions beyond the level for which it has code."""
+    from numpy._core._multiarray_umath import __cpu_dispatch__
+
+    return [name for name in __cpu_dispatch__ if name.startswith("AVX512") or name == "X86_V4"]

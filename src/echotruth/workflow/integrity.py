@@ -1,0 +1,74 @@
+"""The command `echotruth check FOLDER`: a line for every fault of a repository, and its healing."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from uuid import uuid4
+
+from echotruth.repository.check import Report, check
+from echotruth.repository.healing import heal
+from echotruth.repository.inventory import CheckError
+from echotruth.workflow import lease
+
+
+def check_repository(folder: Path, healing: bool, quick: bool = False) -> int:
+    """Check a repository and print what was found.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository, `out/NAME`.
+    healing : bool
+        Whether to drop what is damaged.
+    quick : bool
+        Whether to leave out the values in the files of the jobs.
+
+    Returns
+    -------
+    int
+        0 if nothing is damaged, 1 if something is, 2 if the folder cannot be checked or healed.
+    """
+    try:
+        if not (folder / "config.yaml").is_file():
+            raise CheckError(f"{folder}: is not a repository: give the folder that a run made, as out/demo")
+        if not healing:
+            _tell_of_run(folder)
+            return _print(folder, check(folder, progress=_progress, quick=quick))
+        held = lease.acquire(folder, uuid4().hex, wait=False)
+        try:
+            return _heal(folder, quick)
+        finally:
+            held.release()
+    except (CheckError, OSError) as error:
+        print(f"echotruth: {error}", file=sys.stderr)
+        return 2
+
+
+def _tell_of_run(folder: Path) -> None:
+    try:
+        lease.follow(folder)
+    except lease.LeaseError as error:
+        print(f"{error}: what it is just making may be told as a fault")
+
+
+def _heal(folder: Path, quick: bool) -> int:
+    report = check(folder, progress=_progress, quick=quick)
+    status = _print(folder, report)
+    records, files = heal(folder, report)
+    if records or files:
+        print(f"dropped: {records} records, {files} files: echotruth run makes them again")
+    return status
+
+
+def _print(folder: Path, report: Report) -> int:
+    for line in (*report.faults, *report.notes):
+        print(line)
+    found = f"{len(report.faults)} faults" if report.faults else "no faults"
+    print(f"{folder}: {found} in {report.files} files of {report.jobs} jobs and of the structure")
+    return 1 if report.faults else 0
+
+
+def _progress(done: int, total: int) -> None:
+    if sys.stderr.isatty():
+        print(f"\rchecked: {done} of {total} jobs", end="\n" if done == total else "", file=sys.stderr, flush=True)

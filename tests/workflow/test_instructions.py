@@ -1,0 +1,81 @@
+"""Jobs use one set of instructions, so that machines of several kinds give the same bytes, and records say which."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from echotruth.workflow import instructions
+from echotruth.workflow.instructions import LEVEL, environment, exports, kind
+
+needs_level = pytest.mark.skipif(not environment(), reason=f"this processor has no {LEVEL}")
+
+
+def clean_environment():
+    names = [*environment(), "OPENCV_CPU_DISABLE", "PYTEST_CURRENT_TEST"]
+    return {name: value for name, value in os.environ.items() if name not in names}
+
+
+def in_job(code):
+    """Output of Python code in a shell that begins as those of the rules do."""
+    command = ["bash", "-c", f'set -euo pipefail; {exports()}"$0" -W error -c "$1"', sys.executable, code]
+    result = subprocess.run(command, env=clean_environment(), check=True, capture_output=True, text=True)
+    assert result.stderr == ""
+    return result.stdout.strip()
+
+
+@needs_level
+def test_numba_compiles_for_the_level_and_keys_its_cache_by_it():
+    code = "from numba.core.registry import cpu_target as t; print(*t.target_context.codegen().magic_tuple()[1:])"
+    assert in_job(code) == LEVEL
+
+
+@needs_level
+def test_numpy_openblas_and_opencv_have_no_code_beyond_the_level():
+    code = (
+        "import numpy, cv2, json; from numpy._core._multiarray_umath import __cpu_features__ as features;"
+        "from threadpoolctl import threadpool_info;"
+        "print(json.dumps([[n for n, has in features.items() if has], [i['architecture'] for i in threadpool_info()"
+        " if i['internal_api'] == 'openblas'], cv2.getCPUFeaturesLine(), cv2.ipp.getIppVersion()]))"
+    )
+    numpy_features, cores, opencv_features, ipp = json.loads(in_job(code))
+    assert "AVX2" in numpy_features
+    assert not [name for name in numpy_features if name == "X86_V4" or name.startswith("AVX512")]
+    assert set(cores) == {"Haswell"}
+    assert "*AVX512-SKX " not in f"{opencv_features} "
+    assert "AVX2" in ipp
+
+
+@needs_level
+def test_kind_is_the_level_in_a_job_and_the_processor_elsewhere():
+    code = "from echotruth.workflow.instructions import kind; print(kind())"
+    assert in_job(code).startswith(LEVEL)
+    result = subprocess.run([sys.executable, "-c", code], env=clean_environment(), check=True, capture_output=True)
+    assert result.stdout.decode().startswith("native ")
+
+
+@pytest.mark.parametrize("features", [{}, {"avx": True, "fma": True, "avx2": False}, {"neon": True}])
+def test_processor_without_the_level_keeps_its_own_instructions_and_is_named(monkeypatch, features):
+    monkeypatch.setattr(instructions, "_host_features", lambda: features)
+    assert environment() == {}
+    assert exports() == ""
+    assert kind.__wrapped__().startswith("native ")
+
+
+@needs_level
+@pytest.mark.parametrize("processor, expected", [("znver3", f"{LEVEL}, MKL for znver3"), ("skylake-avx512", LEVEL)])
+def test_kind_names_the_processor_where_mkl_has_no_fixed_branch(monkeypatch, processor, expected):
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: processor)
+    for name, value in environment().items():
+        monkeypatch.setenv(name, value)
+    assert kind.__wrapped__() == expected
+
+
+def test_wider_vectors_of_opencv_are_disabled_only_where_there_are_some(monkeypatch):
+    level = dict.fromkeys(instructions._FEATURES, True)
+    monkeypatch.setattr(instructions, "_host_features", lambda: level)
+    assert "OPENCV_CPU_DISABLE" not in environment()
+    monkeypatch.setattr(instructions, "_host_features", lambda: level | {"avx512f": True})
+    assert environment()["OPENCV_CPU_DISABLE"] == "AVX512-SKX"

@@ -1,0 +1,104 @@
+"""The command `echotruth run` on the way to Snakemake: profiles, folders that cannot be written, names side by side."""
+
+import shutil
+import subprocess
+import sys
+from contextlib import chdir
+from pathlib import Path
+
+import pytest
+
+from echotruth.cli import PROFILES, WORKFLOW, with_profiles
+
+PACKAGED = ["--workflow-profile", str(WORKFLOW / "profiles/slurm")]
+
+
+@pytest.mark.parametrize("options", [["--profile", "slurm"], ["--profile=slurm"], ["--workflow-profile", "slurm"]])
+def test_profile_of_the_package_is_found_by_its_name(tmp_path, options):
+    with chdir(tmp_path):
+        assert with_profiles(["--cores", "2", *options, "-p"]) == ["--cores", "2", *PACKAGED, "-p"]
+
+
+@pytest.mark.parametrize("options", [["slurm"], ["--config", "slurm"], ["--profile", "mine"], ["--profile"], ["-n"]])
+def test_other_options_stay_as_they_are(tmp_path, options):
+    with chdir(tmp_path):
+        assert with_profiles(options) == options
+
+
+def test_folder_of_the_user_is_preferred_to_a_profile_of_its_name(tmp_path):
+    (tmp_path / "slurm").mkdir()
+    with chdir(tmp_path):
+        assert with_profiles(["--profile", "slurm"]) == ["--profile", "slurm"]
+
+
+def run(folder, *options):
+    command = [sys.executable, "-c", "from echotruth.cli import main; main()", "run", "tiny.yaml", *options]
+    (folder / "tiny.yaml").exists() or (folder / "tiny.yaml").write_text("name: tiny")
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
+
+
+def is_refused(done):
+    """Whether a run ended with one line on stderr."""
+    one_line = done.stderr.count("\n") == 1 and done.stderr.startswith("echotruth: ")
+    return done.returncode != 0 and not done.stdout and one_line
+
+
+def test_file_in_the_place_of_the_folder_is_told_in_one_line(tmp_path):
+    (tmp_path / "out").write_text("")
+    done = run(tmp_path)
+    assert is_refused(done) and "out/tiny" in done.stderr, done.stderr
+
+
+def mounted(folder, options):
+    """Mount a small file system in memory, if this machine allows it."""
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
+    if shutil.which("mount") is None or subprocess.run(command, capture_output=True, check=False).returncode:
+        pytest.skip("file systems cannot be mounted here")
+
+
+@pytest.fixture
+def read_only(tmp_path):
+    folder = tmp_path / "read_only"
+    mounted(folder, "size=1m")
+    (folder / "tiny.yaml").write_text("name: tiny")
+    subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_folder_that_cannot_be_written_is_told_in_one_line(read_only):
+    done = run(read_only)
+    assert is_refused(done) and "Read-only file system" in done.stderr, done.stderr
+
+
+@pytest.fixture
+def full(tmp_path):
+    folder = tmp_path / "full"
+    mounted(folder, "size=64k")
+    (folder / "tiny.yaml").write_text("name: tiny")
+    with (folder / "rest").open("wb", buffering=0) as file:
+        while True:
+            try:
+                file.write(bytes(4096))
+            except OSError:
+                break
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_full_disk_is_told_in_one_line(full):
+    done = run(full)
+    assert is_refused(done) and "No space left on device" in done.stderr, done.stderr
+
+
+def test_help_of_run_names_profiles_and_options_of_snakemake():
+    command = [sys.executable, "-c", "from echotruth.cli import main; main()", "run", "--help"]
+    text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert all(word in text for word in (*PROFILES, "--profile", "--cores", "--batch", "-n"))
+
+
+def test_dry_run_leaves_no_repository(tmp_path):
+    (tmp_path / "tiny.yaml").write_text((Path(__file__).parents[2] / "config/demo.yaml").read_text())
+    assert run(tmp_path, "-n").returncode == 0
+    assert not (tmp_path / "out").exists()
