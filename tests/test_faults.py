@@ -81,7 +81,6 @@ def damage(path: Path) -> None:
     [
         ("geometry/node_position/c/0/0/0", "mechanics", 1),
         ("truth/64/strain/c/0/1/0/0/0/0", "truth", 1),
-        ("evaluation/64/layer/c/0/0/0/0", "evaluation", 1),
     ],
 )
 def test_damaged_shard_is_made_again_and_nothing_else(workspace, name, stage, jobs):

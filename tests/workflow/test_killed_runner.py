@@ -2,11 +2,11 @@
 
 import hashlib
 import os
-import shutil
 import subprocess
 import sys
 import time
 
+import cores
 import psutil
 import pytest
 from rigid_hearts import CONFIG
@@ -20,7 +20,6 @@ SECONDS = 900
 
 
 def start(folder):
-    folder.mkdir(exist_ok=True)
     (folder / "tiny.yaml").write_text(CONFIG)
     command = [sys.executable, "-c", "from echotruth.cli import main; main()", "run", "tiny.yaml", "--cores", "2"]
     environment = {name: value for name, value in os.environ.items() if name != VARIABLE}
@@ -53,9 +52,9 @@ def wait_for(condition):
 
 def test_next_run_works_alone_and_makes_the_same_bytes(tmp_path):
     whole, killed = tmp_path / "whole", tmp_path / "killed"
+    for folder in (whole, killed):
+        cores.lend(folder / ".snakemake/numba")
     assert start(whole).wait(SECONDS) == 0
-    killed.mkdir()
-    shutil.copytree(whole / ".snakemake/numba", killed / ".snakemake/numba")
     run = start(killed)
     for stage in ("mechanics", "imaging"):
         wait_for(lambda stage=stage: any((killed / "out/tiny/logs").glob(f"{stage}/**/*.log")) and writers(killed))
