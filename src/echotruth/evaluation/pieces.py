@@ -11,6 +11,7 @@ import numpy as np
 import zarr
 
 from echotruth.evaluation.clip import Clip
+from echotruth.repository.checksums import is_whole
 from echotruth.repository.provenance import settings_version
 from echotruth.workflow import superseded
 
@@ -117,5 +118,4 @@ def known(pieces: dict[int, dict[str, Piece]]) -> dict[str, dict[str, dict[str, 
 
 
 def _whole(root: Path, files: dict[str, str]) -> bool:
-    paths = ((root / name, expected) for name, expected in files.items())
-    return all(path.is_file() and sha256(path.read_bytes()).hexdigest() == expected for path, expected in paths)
+    return all(is_whole(root / name, expected) for name, expected in files.items())

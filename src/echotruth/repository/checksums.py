@@ -23,6 +23,11 @@ def checksums(files: list[Path], root: Path) -> dict[str, str]:
     return {file.relative_to(root).as_posix(): sha256(file.read_bytes()).hexdigest() for file in files}
 
 
+def is_whole(file: Path, expected: str) -> bool:
+    """Whether a file is there and has a SHA-256."""
+    return file.is_file() and sha256(file.read_bytes()).hexdigest() == expected
+
+
 def verify(root: Path, path: Path, record: dict[str, Any]) -> int:
     """Compare the files of a record with their checksums.
 
@@ -47,7 +52,7 @@ def verify(root: Path, path: Path, record: dict[str, Any]) -> int:
     """
     for name, expected in record.get("sha256", {}).items():
         file = root / name
-        if not file.is_file() or sha256(file.read_bytes()).hexdigest() != expected:
+        if not is_whole(file, expected):
             raise ChecksumError(f"{file}: is missing or differs from what was written: delete {path} and run again")
     return len(record.get("sha256", {}))
 
@@ -78,7 +83,7 @@ def verify_structure(root: Path, path: Path) -> int:
         raise ChecksumError(f"{path}: is missing or damaged: run again, which lays the repository out anew") from None
     for name, checksum in expected.items():
         file = root / name
-        if not file.is_file() or sha256(file.read_bytes()).hexdigest() != checksum:
+        if not is_whole(file, checksum):
             remedy = "run again, which lays the repository out anew"
             raise ChecksumError(f"{file}: is missing or differs from what was laid out: {remedy}")
     return len(expected)

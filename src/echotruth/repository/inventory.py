@@ -164,7 +164,7 @@ class Repository:
         if row is None:
             return set()
         arrays = ((group, array) for group in groups for array in self.groups[group])
-        return {_shard(group, array, row) for group, array in arrays if array.leading == len(row)}
+        return {f"{group}/{array.shard(row)}" for group, array in arrays if array.leading == len(row)}
 
     def name(self, path: Path) -> str:
         """Path below the folder."""
@@ -182,12 +182,6 @@ def wanted_records(folder: Path, cases: list[str], views: list[str]) -> list[Pat
     """Paths of the records of all jobs of some cases and views."""
     gates = [record_path(folder, stage, case) for stage in GATES for case in cases]
     return gates + [record_path(folder, stage, case, view) for stage in VIEW_STAGES for case in cases for view in views]
-
-
-def _shard(group: str, array: Array, row: tuple[int, ...]) -> str:
-    """Path of the shard of a job below the store."""
-    indices = (*row, *[0] * (len(array.dims) - len(row)))
-    return "/".join((group, array.name, "c", *map(str, indices)))
 
 
 def files_below(folder: Path) -> Iterator[str]:

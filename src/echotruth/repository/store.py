@@ -141,8 +141,7 @@ class Store:
 
     def _shard(self, group: str, array: Array, row: tuple[int, ...]) -> Path:
         """File that holds the part of an array written by one job."""
-        indices = (*row, *[0] * (len(array.dims) - len(row)))
-        return self.path.joinpath(group, array.name, "c", *map(str, indices))
+        return self.path / group / array.shard(row)
 
     def _verdicts(self, name: str, rows: int) -> list[str]:
         """Column of the table of cases that publication writes, with "" for new rows."""
