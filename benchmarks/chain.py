@@ -178,8 +178,7 @@ class Parts:
 
     def evaluation(self) -> float:
         job = self._job(stage="evaluation")
-        largest = self._config.bmode.sizes[0]
-        tracked, true = job.read(f"tracking/{largest}", "displacement")["displacement"], ground_truth(job)
+        tracked, true = job.read("tracking", "displacement")["displacement"][0], ground_truth(job)
         times = len(self._config.bmode.sizes) * len(tracked)
         return timed(lambda: ground_truth(job)) + times * timed(lambda: score(tracked[-1], true))
 

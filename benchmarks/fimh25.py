@@ -110,7 +110,7 @@ def of_store(repository: Path) -> dict[str, float]:
     mean = heart["kinematics/strain_mean"].isel(frame=es).values
     volume = 1e9 * heart["mechanics/volume"].values
     found = {f"E_{name}": float(value) for name, value in zip(("RR", "CC", "LL", "RC", "RL", "CL"), mean, strict=True)}
-    twist = float(np.degrees(heart["physiology/twist"].values[es]))
+    twist = float(np.degrees(heart["physiology/courses"].sel(course="twist").values[es]))
     return found | {"twist (deg)": twist, "EDV (uL)": float(volume[0]), "ESV (uL)": float(volume[es])}
 
 

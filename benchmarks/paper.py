@@ -199,7 +199,7 @@ def numbers(hearts: Hearts) -> dict[str, float | str]:
         "as_published": mid["authors"][AS_PRINTED],
         "mean_motion": 1e3 * heart.mean_motion("mid"),
         "largest_px": heart.largest_displacement("mid"),
-        "twist_ivc": float(np.degrees(hearts["printed"].group("physiology").twist_ivc)),
+        "twist_ivc": hearts["printed"].measured("twist_ivc"),
         "spread": spread,
         "spread_centred": spread_centred,
         "fall": heart.fall(("mid",)),

@@ -103,7 +103,12 @@ class Heart:
     @cached_property
     def sizes(self) -> list[int]:
         """Image sizes, px, the largest first."""
-        return sorted(map(int, self.tree["evaluation"].children), reverse=True)
+        return sorted(map(int, self.tree["bmode"].children), reverse=True)
+
+    @cached_property
+    def trackers(self) -> list[str]:
+        """Names of the trackers."""
+        return [str(name) for name in self.tree["tracking"].tracker.values]
 
     @cached_property
     def field_of_view(self) -> float:
@@ -140,11 +145,15 @@ class Heart:
     @cached_property
     def twist(self) -> float:
         """Twist at end-systole, deg, counter-clockwise seen from the apex."""
-        return float(np.degrees(self.group("physiology").twist_es))
+        return self.measured("twist_es")
+
+    def measured(self, name: str) -> float:
+        """A measure that is an angle, deg."""
+        return float(np.degrees(self.group("physiology").scalars.sel(scalar=name)))
 
     def scores(self, view: str, tracker: str, size: int) -> xr.Dataset:
-        """Group evaluation of one clip."""
-        return self.group(f"evaluation/{size}").sel(view=view, tracker=tracker)
+        """Scores of one clip."""
+        return et.unpack(self.group("evaluation")[["scores"]].sel(view=view, tracker=tracker, size=size))
 
     def circumferential(
         self, view: str, size: int, tracker: str | None = None, centred: bool = False
@@ -183,13 +192,11 @@ class Heart:
 
     def _displacement(self, view: str, size: int, tracker: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Displacement at end-systole and position (point, 2), m, and layer of the points of a view."""
-        truth = self.group(f"evaluation/{size}").sel(view=view)
-        vector = truth.true_displacement
-        if tracker is not None:
-            vector = self.group(f"tracking/{size}").displacement.sel(view=view, tracker=tracker)
-        vector = vector.isel(frame=self.es).transpose("axial", "lateral", "plane").values
-        lateral, axial = np.meshgrid(truth.lateral.values, truth.axial.values)
-        layer = truth.layer.values
+        found = et.load_points(self.repository, self.case, view, tracker or self.trackers[0], size).isel(frame=self.es)
+        true = found.true_displacement.sel(vector=list(found["plane"].values)).transpose("axial", "lateral", "vector")
+        vector = (true if tracker is None else found.displacement.transpose("axial", "lateral", "plane")).values
+        lateral, axial = np.meshgrid(found.lateral.values, found.axial.values)
+        layer = found.layer.values
         inside = np.isfinite(vector).all(-1) & (layer > 0)
         return vector[inside], np.column_stack([lateral[inside], axial[inside]]), layer[inside]
 
@@ -228,8 +235,9 @@ class Heart:
 
     def segments(self, tracker: str) -> tuple[np.ndarray, np.ndarray]:
         """True and tracked circumferential displacement of the AHA segments in the largest images, m, (17,) each."""
-        data = self.group(f"evaluation/{self.sizes[0]}").sel(view=list(SLICES), tracker=tracker, polar="tangential")
-        # A segment at a boundary may be visible in two planes; their mean is shown.
         names = "true_segment_displacement", "tracked_segment_displacement"
+        scores = self.group("evaluation").sel(view=list(SLICES), tracker=tracker, size=self.sizes[0])
+        data = et.unpack(scores, *names).sel(polar="tangential")
+        # A segment at a boundary may be visible in two planes; their mean is shown.
         true, tracked = (data[name].mean("view").values for name in names)
         return true, tracked

@@ -9,6 +9,6 @@ heart = et.beat(
         "pathology": {"infarct": {"segments": [7, 12]}},
     }
 )
-fibre_strain = heart.arrays["kinematics"]["fibre_strain"][heart.es, :, 0]  # Green-Lagrange, since end-diastole
-infarct, remote = (fibre_strain[heart.region == region].mean() for region in (1, 0))
+strain = et.kinematics(heart).fibre_strain.isel(frame=heart.es).sel(fibre_component="ff")  # Green-Lagrange, since ED
+infarct, remote = (float(strain[heart.region == region].mean()) for region in (1, 0))
 print(f"fibre strain at end-systole: infarct {100 * infarct:+.1f} %, remote {100 * remote:+.1f} %")

@@ -10,10 +10,10 @@ import zarr
 
 from echotruth.cases import expand
 from echotruth.config import Bmode, Config, Geometry, Loop, Motion, PhaseCorrelation, Tracking, View
-from echotruth.repository import ledger, schema
+from echotruth.repository import ledger, packing, schema
 from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.repository.publication import publish
-from echotruth.repository.store import Store, schema_of
+from echotruth.repository.store import Store, packs_of, schema_of
 from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job
 from echotruth.workflow.scripts.cases import lay_out
@@ -37,20 +37,22 @@ def configured(name="small", seeds=(1, 2), views=("mid", "long_axis"), **changes
 VALUES = {
     "fibres": {"fibre": [1, 0, 0], "sheet": [0, 1, 0], "layer": 1, "segment": 1},
     "mechanics": {"volume": 1, "volume_target": 1, "pressure": 1, "pressure_target": 1},
-    "kinematics": {"deformation_gradient": np.eye(3), "volume_ratio_min": 1, "volume_ratio_mean": 1},
+    "kinematics": {"volume_ratio_min": 1, "volume_ratio_mean": 1},
     "physiology": {"volume_ratio_min": 1},
     "phantom": {"axes": np.eye(3)},
     "truth": {"mask": 1, "layer": 1, "segment": 1},
-    "evaluation": {"layer": 1, "segment": 1, "wall_axes": np.eye(2)},
+    "evaluation": {"wall_axes": np.eye(2)},
 }
 """Values that are not 0: of a heart that does not move, and fills its images."""
 
 
 @cache
 def shapes(store: Path, group: str) -> dict[str, tuple[int, ...]]:
-    """Shape of what one job writes of each array of a group."""
+    """Shape of what one job writes of each array of a group, by the names of those in packs."""
     opened = zarr.open_group(store, path=group, mode="r", use_consolidated=False)
-    return {array.name: opened[array.name].shape[array.leading :] for array in schema_of(group)}
+    blank = {array.name: np.zeros(opened[array.name].shape[array.leading :]) for array in schema_of(group)}
+    found = packing.unpack(packs_of(group), blank, opened.attrs["labels"])
+    return {name: values.shape for name, values in found.items()}
 
 
 def result(store: Store, stage: str, config: Config, seed: int) -> dict:

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -143,6 +144,21 @@ def test_groups_of_a_heart_have_dimensions_and_units(heart):
     assert data["strain_mean"].dims == ("frame", "strain_component")
     assert list(data["strain_component"].values[:3]) == ["RR", "CC", "LL"]
     assert et.heart_dataset(heart, "mechanics")["displacement"].attrs["units"] == "m"
+
+
+def test_strains_and_angles_of_a_heart_follow_from_its_motion():
+    stretch = {"gradient": [[1.1, 0, 0], [0, 1.1, 0], [0, 0, 1.1]]}
+    found = et.kinematics(et.beat(TUBE | {"motion": {"kind": "affine", "affine": stretch}}))
+    assert found.fibre_strain.dims == ("frame", "cell", "fibre_component")
+    largest = found.isel(frame=int(found.deformation_gradient.max(("cell", "row", "column")).argmax()))
+    expected = (1.1**2 - 1) / 2
+    for name, component in (("fibre_strain", "fibre_component"), ("strain", "strain_component")):
+        normal, shear = (largest[name].isel({component: part}) for part in (slice(3), slice(3, None)))
+        np.testing.assert_allclose(normal, expected, atol=1e-9)
+        np.testing.assert_allclose(shear, 0, atol=1e-9)
+    assert {found[name].attrs["units"] for name in ("helix_angle", "transverse_angle", "sheet_angle")} == {"rad"}
+    with pytest.raises(ValueError, match=r"^The heart has no fibres: make it by"):
+        et.kinematics(replace(et.beat(TUBE), arrays={}))
 
 
 def test_given_keys_are_merged_into_a_file(tmp_path):

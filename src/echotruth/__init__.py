@@ -19,8 +19,11 @@ if TYPE_CHECKING:
     from echotruth.imaging.beamforming.scanner import Scanner
     from echotruth.imaging.rf.full_matrix import FullMatrix
     from echotruth.notebook.datasets import heart_dataset
+    from echotruth.notebook.kinematics import kinematics
+    from echotruth.notebook.points import load_points
     from echotruth.notebook.repositories import load_clip, load_heart, open
     from echotruth.notebook.simulation import beat, evaluate, image, track
+    from echotruth.repository.unpacking import unpack
     from echotruth.tracking.failure import TrackerFailed
 
 __version__ = "0.1.0"
@@ -41,10 +44,13 @@ __all__ = [
     "expand",
     "heart_dataset",
     "image",
+    "kinematics",
     "load_clip",
     "load_heart",
+    "load_points",
     "open",
     "track",
+    "unpack",
 ]
 
 _ORIGIN = {
@@ -56,8 +62,11 @@ _ORIGIN = {
     "imaging.beamforming.scanner": ("Scanner",),
     "imaging.rf.full_matrix": ("FullMatrix",),
     "notebook.datasets": ("heart_dataset",),
+    "notebook.kinematics": ("kinematics",),
+    "notebook.points": ("load_points",),
     "notebook.repositories": ("load_clip", "load_heart", "open"),
     "notebook.simulation": ("beat", "evaluate", "image", "track"),
+    "repository.unpacking": ("unpack",),
     "tracking.failure": ("TrackerFailed",),
 }
 """Module to the public names that come from it; it is imported when one of them is first used."""

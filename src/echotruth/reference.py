@@ -8,6 +8,7 @@ writes config/schema.json, config/README.md and docs/schema.md in the current fo
 from __future__ import annotations
 
 import json
+from math import log2
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
@@ -32,10 +33,20 @@ This page is generated from `src/echotruth/config` by `make reference`.
 _SCHEMA_HEAD = """# The tree on disk
 
 The repository is one Zarr hierarchy (format 3) that `xarray.open_datatree` opens. Every array is rectangular over
-case, view and frame; one job writes a shard, and a chunk is one frame with a crc32c checksum.
+case, view and frame; one job writes a shard, and a chunk is one component of one frame (of what was tracked: of the
+whole cycle) with a crc32c checksum. Numbers are compressed by Blosc (zstd, bytes shuffled).
 `SIZE` stands for each image size of the configuration (512, 256, 128 px). Missing values are `nan`, 0 or "":
 outside the wall, and in the row of a case that failed (`cases/status`).
 Axes, signs and reference states are in `conventions.md`.
+
+Arrays with a **step** hold ordinary numbers rounded to multiples of it, so that they take less place: they are off by
+half a step at most, and the attribute `quantum` has the step in the unit of the array. `pixel/256` is the largest power
+of two, in metres, not above 1/256 pixel of the largest image. Scores are computed from the rounded numbers: whoever
+reads the truth and the tracked motion finds the same.
+
+A **pack** is one array of many small numbers, with a label for each, such as `nrmse[0,total]`, and its unit beside it:
+`tree["evaluation/scores"].sel(score="nrmse[0,total]")`. `echotruth.unpack(tree["evaluation"].to_dataset(), "nrmse")`
+gives the array itself, with the dimensions that are listed under its pack.
 
 The root has the attributes title, summary, references, config (the whole configuration), seed, code (version of
 each stage's source) and packages (their versions). Every group has the coordinates of its dimensions, and the
@@ -62,6 +73,12 @@ accuracy_from (range from which that holds).
 """
 
 
+_DERIVED = """What follows from the stored arrays is not stored. `echotruth.kinematics(heart)` gives the arrays
+below, for a heart that `echotruth.load_heart` reads or `echotruth.beat` makes. `echotruth.load_points` gives, at the
+points of the trackers, the strain of a tracked motion by the operator of `tracking.md`, and their layer and segment.
+"""
+
+
 def config_page() -> str:
     """Page of the configuration keys: unit, default and meaning of each."""
     return _CONFIG_HEAD + "\n".join(_section(Config, "", "Top level"))
@@ -79,7 +96,10 @@ def schema_page() -> str:
     notes = {"cases": cases, "rf": _RF}
     for path, arrays in groups.items():
         parts += [f"## {path}\n", *_arrays(arrays), notes.get(path, "")]
-    return "\n".join([*parts, "## Coordinates\n", *_arrays(schema.COORDINATES)])
+        for pack in schema.PACKS.get(path, ()):
+            parts += [f"### In the pack {path}/{pack.array.name}\n", *_arrays(pack.members)]
+    parts += ["## Coordinates\n", *_arrays(schema.COORDINATES)]
+    return "\n".join([*parts, "## Computed on reading\n", _DERIVED, *_arrays(schema.DERIVED)])
 
 
 def json_schema() -> str:
@@ -94,10 +114,18 @@ def files() -> dict[str, str]:
 
 def _arrays(arrays: tuple[schema.Array, ...]) -> list[str]:
     rows = [
-        f"| `{array.name}` | {', '.join(array.dims)} | {array.dtype} | {array.units} | {array.long_name} |"
+        f"| `{array.name}` | {', '.join(array.dims)} | {array.dtype} | {array.units} | {_step(array)} "
+        f"| {array.long_name} |"
         for array in arrays
     ]
-    return ["| array | dimensions | type | units | meaning |", "|---|---|---|---|---|", *rows, ""]
+    return ["| array | dimensions | type | units | step | meaning |", "|---|---|---|---|---|---|", *rows, ""]
+
+
+def _step(array: schema.Array) -> str:
+    """Step of the numbers of an array; empty if they are not rounded."""
+    if isinstance(array.quantum, float):
+        return f"2^{round(log2(array.quantum))}"
+    return array.quantum or ""
 
 
 def _section(model: type[BaseModel], prefix: str, title: str, meaning: str = "") -> list[str]:

@@ -9,7 +9,8 @@ import xarray as xr
 
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking, View
 from echotruth.evaluation.leaderboard import best, interval, ranks, rows, standings
-from echotruth.repository.schema import EVALUATION, LABELS
+from echotruth.repository import layout
+from echotruth.repository.schema import PACKS
 
 
 def scores(values, views=("mid",), failure=""):
@@ -118,21 +119,18 @@ CONFIG = Config(
     bmode=Bmode(size_px=64, downsampling=(1,)),
     tracking=Tracking(trackers={name: PhaseCorrelation(window_px=16) for name in ("one", "two")}),
 )
-LENGTHS = {"case": 3, "view": 2, "tracker": 2, "frame": 4, "axial": 2, "lateral": 2, "region": 7, "aha": 17, "plane": 2}
 
 
 @pytest.fixture
 def tree():
     """Three hearts of which everything is 0.1 or, of the second tracker, 0.2."""
-    lengths = LENGTHS | {name: len(labels) for name, labels in LABELS.items()}
-    data = {}
-    for array in EVALUATION:
-        values = np.full([lengths[dim] for dim in array.dims], 0.1)
-        if "tracker" in array.dims:
-            values[:, :, 1] *= 2
-        data[array.name] = (array.dims, values)
-    hearts = xr.Dataset(data, coords={"case": ["a", "b", "c"], "view": list(CONFIG.views)})
-    return xr.DataTree.from_dict({"/evaluation/64": hearts})
+    labels = layout.labels(CONFIG, ["a", "b", "c"], [])
+    coords = {name: labels[name] for name in ("case", "view", "size", "tracker")}
+    coords["score"] = labels["evaluation:score"]
+    scores = next(pack.array for pack in PACKS["evaluation"] if pack.array.name == "scores")
+    values = np.full([len(coords[dim]) for dim in scores.dims], 0.1)
+    values[:, :, :, 1] *= 2
+    return xr.DataTree.from_dict({"/evaluation": xr.Dataset({"scores": (scores.dims, values)}, coords)})
 
 
 def test_rows_are_of_the_hearts_that_count(tree, tmp_path):
@@ -144,10 +142,10 @@ def test_rows_are_of_the_hearts_that_count(tree, tmp_path):
 
 def test_scores_of_a_view_are_found_by_its_name(tree, tmp_path):
     """Whatever the order in the store, and beside views that have left the configuration."""
-    data = tree["evaluation/64"].to_dataset()
+    data = tree["evaluation"].to_dataset()
     former = data.isel(view=[1]).assign_coords(view=["former"]) * 3
     other = xr.concat([former, data.isel(view=[1]) * 2, data.isel(view=[0])], "view")
-    table = rows(xr.DataTree.from_dict({"/evaluation/64": other}), CONFIG, np.array([0]), tmp_path)
+    table = rows(xr.DataTree.from_dict({"/evaluation": other}), CONFIG, np.array([0]), tmp_path)
     assert list(table["view"]) == ["mid", "mid", "long_axis", "long_axis"]
     np.testing.assert_allclose(table["nrmse_percent"], [10, 20, 20, 40])
 

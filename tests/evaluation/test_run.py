@@ -327,7 +327,7 @@ def test_external_tracker_of_the_configuration_gets_the_scores_it_gets_on_the_co
     evaluate("--tracker", "custom:drawn", "--case", job.case.id, "--view", "mid")
     truth = scoring.ground_truth(job)
     for _, found in scores(made, "custom_drawn").iterrows():
-        tracked = result[f"tracking/{found['size_px']}"]["displacement"][1]
+        tracked = result["tracking"]["displacement"][CONFIG.bmode.sizes.index(found["size_px"]), 1]
         for name, value in scoring.metrics(scoring.score(tracked, truth), "short_axis").items():
             np.testing.assert_allclose(found[name], value, rtol=1e-9, err_msg=name)
 
@@ -335,7 +335,7 @@ def test_external_tracker_of_the_configuration_gets_the_scores_it_gets_on_the_co
 def test_external_tracker_of_the_configuration_that_fails_leaves_the_others_their_motion(worked):
     job, result = worked
     assert list(job.verdict["failures"]) == ["poor/128"] and "no room" in job.verdict["failures"]["poor/128"]
-    large, small = (result[f"tracking/{size}"]["displacement"] for size in (128, 64))
+    large, small = result["tracking"]["displacement"]
     assert np.isnan(large[2]).all() and not np.nanmax(abs(small[2]))
     for tracked in (large[0], large[1], small[0], small[1]):
         assert np.nanmax(abs(tracked)) > 0

@@ -7,16 +7,15 @@ import xarray as xr
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking, View
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.leaderboard import rows
-from echotruth.repository import ledger
+from echotruth.repository import layout, ledger
 from echotruth.repository.ledger import record_path
-from echotruth.repository.schema import EVALUATION, LABELS
+from echotruth.repository.schema import PACKS
 
 CONFIG = Config(
     views={"mid": View(), "null": View(position=0.7)},
     bmode=Bmode(size_px=64, downsampling=(1,)),
     tracking=Tracking(trackers={"ours": PhaseCorrelation(window_px=16)}),
 )
-LENGTHS = {"case": 1, "view": 2, "tracker": 1, "frame": 4, "axial": 2, "lateral": 2, "region": 7, "aha": 17, "plane": 2}
 
 
 def commit(folder, stage, view, content):
@@ -27,10 +26,12 @@ def commit(folder, stage, view, content):
 @pytest.fixture
 def board(tmp_path):
     """Rows of the leaderboard of one heart and two views."""
-    lengths = LENGTHS | {name: len(labels) for name, labels in LABELS.items()}
-    data = {array.name: (array.dims, np.full([lengths[dim] for dim in array.dims], 0.1)) for array in EVALUATION}
-    labels = {"case": ["a"], "view": list(CONFIG.views)}
-    tree = xr.DataTree.from_dict({"/evaluation/64": xr.Dataset(data, coords=labels)})
+    labels = layout.labels(CONFIG, ["a"], [])
+    coords = {name: labels[name] for name in ("case", "view", "size", "tracker")}
+    coords["score"] = labels["evaluation:score"]
+    scores = next(pack.array for pack in PACKS["evaluation"] if pack.array.name == "scores")
+    values = np.full([len(coords[dim]) for dim in scores.dims], 0.1)
+    tree = xr.DataTree.from_dict({"/evaluation": xr.Dataset({"scores": (scores.dims, values)}, coords)})
     (tmp_path / "external").mkdir()
     for view in CONFIG.views:
         for stage in ("bmode", "truth"):

@@ -51,16 +51,19 @@ def test_the_truth_itself_has_no_error(truth):
         assert value == pytest.approx(perfect, abs=1e-6, nan_ok=True), name
 
 
-def test_a_rigid_shift_kept_in_single_precision_has_no_correlations(truth):
+@pytest.mark.parametrize("quantum", [0.0, 2.0**-24])
+def test_a_rigid_shift_has_no_correlations_in_single_precision_or_rounded_to_a_quantum(truth, quantum):
     """Neither strain, nor motion out of the plane, nor the error differs between points but by rounding."""
     shift = np.arange(5)[:, None] * np.array([2.3e-4, -1.7e-4, 1.1e-4])
     lateral, axial, out = np.moveaxis(np.tile(shift[:, None], (len(truth.wall.layer), 1)), -1, 0)
     random = np.random.default_rng(0)
-    rounding = np.spacing(np.float32(1e-3)) * random.uniform(-0.5, 0.5, (2, *out.shape, 2))
+    step = quantum or np.spacing(np.float32(1e-3))
+    rounding = step * random.uniform(-0.5, 0.5, (2, *out.shape, 2))
     moved = np.stack([lateral, axial], -1)
     operator = truth.operator.strain(moved + rounding[0])
     strain = np.stack([*random.normal(scale=5e-15, size=(2, *operator.shape)), operator])
     rigid = replace(truth, displacement=moved + rounding[0], through_plane=out + rounding[1, ..., 0], strain=strain)
+    rigid = replace(rigid, quantum=quantum)
     shaky = moved + random.normal(scale=3e-6, size=moved.shape)
     for answer in (rigid.displacement, 1.1 * moved + rounding[1], shaky):
         found = score(tracked(truth, answer), rigid)
@@ -119,13 +122,22 @@ def test_errors_that_grow_with_motion_out_of_the_plane_correlate_with_it(truth):
     assert truth.arrays["through_plane_rms"] == pytest.approx(1e-4 * np.sin(2))
 
 
+def test_tracked_motion_is_scored_as_the_store_rounds_it(truth):
+    quantum = 2.0**-20
+    rounded = replace(truth, displacement=np.round(truth.displacement / quantum) * quantum, quantum=quantum)
+    answer = 0.9 * truth.displacement
+    exact, found = (score(tracked(truth, moved), rounded) for moved in (np.round(answer / quantum) * quantum, answer))
+    assert all(np.array_equal(found[name], value, equal_nan=True) for name, value in exact.items())
+    assert score(tracked(truth, rounded.displacement + 0.4 * quantum), rounded)["nrmse_all"] == 0
+
+
 def test_maps_stand_on_the_grid_and_nowhere_else(truth):
-    strain = score(tracked(truth, truth.displacement), truth)["tracked_strain"]
-    assert strain.shape == (5, 45, 45, 3)
-    assert np.isfinite(strain[:, truth.inside]).all() and np.isnan(strain[:, ~truth.inside]).all()
     arrays = truth.arrays
+    moved = arrays["true_displacement"]
+    assert moved.shape == (5, 45, 45, 3)
+    assert np.isfinite(moved[:, truth.inside]).all() and np.isnan(moved[:, ~truth.inside]).all()
+    np.testing.assert_array_equal(moved[:, truth.inside, 2], truth.through_plane)
     assert arrays["true_strain"].shape == (3, 5, 45, 45, 3) and arrays["wall_axes"].shape == (45, 45, 2, 2)
-    assert (arrays["layer"][truth.inside] > 0).all() and not arrays["layer"][~truth.inside].any()
 
 
 @pytest.mark.parametrize("count", [0, 1, 5])

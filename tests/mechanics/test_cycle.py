@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config, Geometry, Loop, Mechanics, Pathology
+from echotruth.heart import Heart
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat
+from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.checkpoint import Checkpoints
@@ -84,7 +86,7 @@ def test_infarct_stretches_where_healthy_wall_shortens():
     diseased = CONFIG.model_copy(update={"pathology": Pathology(infarct={"segments": [7, 12], "stiffness_scale": 2.0})})
     arrays = beat(diseased)
     es = int(arrays["mechanics"]["es_frame"])
-    fibre = arrays["kinematics"]["fibre_strain"][es, :, 0]
+    fibre = centroid_kinematics(Heart.of(arrays, diseased), [es])["fibre_strain"][0, :, 0]
     region = arrays["pathology"]["region"]
     assert fibre[region == 1].mean() > 0
     assert fibre[region == 0].mean() < -0.08
@@ -94,7 +96,8 @@ def test_infarct_stretches_where_healthy_wall_shortens():
 def test_late_wall_is_stretched_first():
     late = CONFIG.model_copy(update={"pathology": Pathology(late_activation={"preset": "lbbb"}), "loop": Loop()})
     arrays = beat(late)
-    delay, fibre = arrays["pathology"]["activation_delay"], arrays["kinematics"]["fibre_strain"][..., 0]
+    fibre = centroid_kinematics(Heart.of(arrays, late))["fibre_strain"][..., 0]
+    delay = arrays["pathology"]["activation_delay"]
     early = fibre[2]
     assert early[delay == delay.max()].mean() > 0.02
     assert early[delay == 0].mean() < 0

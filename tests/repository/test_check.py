@@ -214,10 +214,20 @@ def test_impossible_value_is_found_and_is_not_taken_for_damage(folder):
 
 
 def test_measured_loop_error_that_the_curves_do_not_have_is_found(folder):
-    rewrite(folder, "physiology", "physiology", loop_error=0.001)
+    measured = Store(folder / "small.zarr").read("physiology", 0)
+    rewrite(folder, "physiology", "physiology", **measured | {"loop_error": 0.001})
     assert faults(folder) == {
-        "small.zarr/physiology/loop_error": f"is 0.001, but the curves give 0 (physiology of {CASES[0]})"
+        "small.zarr/physiology/scalars": f"loop_error is 0.001, but the curves give 0 (physiology of {CASES[0]})"
     }
+
+
+def test_quantum_that_is_not_that_of_the_configuration_is_found(folder):
+    file = folder / "small.zarr/tracking/quality/zarr.json"
+    replace(file, file.read_bytes().replace(b'"quantum": 0.00390625', b'"quantum": 0.5'))
+    record = ledger.read(folder / "ledger/structure.json")
+    record["sha256"] |= checksums([file], folder / "small.zarr")
+    ledger.commit(folder / "ledger/structure.json", record)
+    assert faults(folder) == {"small.zarr/tracking/quality": "has quantum 0.5, not 0.00390625"}
 
 
 def test_units_that_are_not_those_of_the_schema_are_found(folder):

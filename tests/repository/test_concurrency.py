@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import zarr
 
-from echotruth.repository import ledger, schema
+from echotruth.config import Config
+from echotruth.repository import layout, ledger, schema
 from echotruth.repository.checksums import verify, verify_structure
 from echotruth.repository.store import Store
 
@@ -23,7 +24,7 @@ from echotruth.repository.checksums import checksums, verify_structure
 from echotruth.repository.store import Store
 warnings.simplefilter("error")
 store, ledger_folder = Store(Path(sys.argv[1]) / "small.zarr"), Path(sys.argv[1]) / "ledger"
-lengths = {"frame": FRAMES, "layer": 3, "strain_component": 6}
+lengths = {"frame": FRAMES} | {name: store._open("physiology", "r")[name].size for name in ("scalar", "course")}
 print("ready", flush=True)
 sys.stdin.readline()
 """.replace("FRAMES", str(FRAMES))
@@ -65,7 +66,7 @@ while not select.select([sys.stdin], [], [], 0)[0]:
     names = [path.name for path in store.path.rglob("*") if path.is_file()]
     with xr.open_datatree(store.path, engine="zarr") as tree:
         status = tree["cases/status"].values
-        twist = tree["physiology/twist"].values
+        twist = tree["physiology/courses"].sel(course="twist").values
     written = np.isfinite(twist).all(1)
     assert (twist[written] == np.flatnonzero(written)[:, None]).all() and np.isnan(twist[~written]).all()
     assert written[status == "complete"].all()
@@ -80,8 +81,8 @@ def start(script: str, *arguments: object) -> subprocess.Popen:
 
 
 def lay_out(folder: Path, cases: int) -> Store:
-    labels = {"case": [f"case{row}" for row in range(cases)], "time": np.zeros((cases, FRAMES))}
-    labels |= {"frame": np.arange(FRAMES), "layer": np.arange(1, 4)} | schema.LABELS
+    rows = [f"case{row}" for row in range(cases)]
+    labels = layout.labels(Config(loop={"frames": FRAMES}), rows, np.zeros((cases, FRAMES)))
     store = Store(folder / "small.zarr")
     store.lay_out({"cases": schema.CASES, "physiology": schema.PHYSIOLOGY}, {}, labels)
     return store
@@ -109,5 +110,5 @@ def test_writers_beside_a_reader_and_a_publisher_lose_nothing(tmp_path, writers,
     assert shards == cases * len(schema.PHYSIOLOGY)
     assert {path: path.read_bytes() for path in before} == before
     assert not list(store.path.rglob("*.partial"))
-    gls = zarr.open_array(store.path, path="physiology/gls", mode="r")[...]
-    np.testing.assert_array_equal(gls, np.arange(cases))
+    measured = zarr.open_array(store.path, path="physiology/scalars", mode="r")[...]
+    np.testing.assert_array_equal(measured, np.broadcast_to(np.arange(cases)[:, None], measured.shape))

@@ -126,6 +126,17 @@ def test_hearts_of_the_joint_sweep_that_neither_has_are_left_to_a_run(out, capsy
     assert report.faults == [] and "have not been run yet" in report.notes[0]
 
 
+def test_repository_of_another_layout_is_refused_in_a_sentence(out, capsys):
+    """A store whose trackers had a group for every image size."""
+    store = out / "second/second.zarr"
+    (store / "tracking").rename(store / "64")
+    (store / "tracking").mkdir()
+    (store / "64").rename(store / "tracking/64")
+    assert merge_repositories(out / "first", [out / "second"]) == 2
+    told = capsys.readouterr().err
+    assert f"{out / 'second'}: was made by an earlier version: run it again" in told and told.count("\n") == 1
+
+
 def test_what_is_no_repository_is_refused_in_a_sentence(out, capsys):
     assert merge_repositories(out / "both", [out / "first", out / "absent"]) == 2
     assert merge_repositories(out / "first", [out / "first"]) == 2

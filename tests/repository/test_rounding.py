@@ -45,14 +45,14 @@ def test_quantum_of_lengths_is_the_power_of_two_below_a_256th_of_the_finest_pixe
 def test_store_rounds_what_a_job_writes_to_the_quantum_that_its_metadata_state(tmp_path):
     config = Config(**SMALL)
     store = lay_out(tmp_path / "small.zarr", [1])
-    opened = store._open("tracking/64", "r")
+    opened = store._open("tracking", "r")
     random, values = np.random.default_rng(2), {}
     for array in schema.TRACKING:
         values[array.name] = random.normal(scale=1e-3, size=opened[array.name].shape[2:])
-    store.write("tracking/64", values, 0, 1)
-    read = store.read("tracking/64", 0, 1)
+    store.write("tracking", values, 0, 1)
+    read = store.read("tracking", 0, 1)
     stated = {
-        name: json.loads((store.path / f"tracking/64/{name}/zarr.json").read_bytes())["attributes"]["quantum"]
+        name: json.loads((store.path / f"tracking/{name}/zarr.json").read_bytes())["attributes"]["quantum"]
         for name in values
     }
     assert stated == {"displacement": rounding.length_quantum(config), "quality": rounding.QUALITY}
@@ -62,7 +62,11 @@ def test_store_rounds_what_a_job_writes_to_the_quantum_that_its_metadata_state(t
         assert not np.array_equal(read[name], values[name].astype("float32"))
 
 
-def test_one_component_of_one_frame_is_a_chunk(tmp_path):
-    chunks = lay_out(tmp_path / "small.zarr", [1])._open("truth/64", "r")
+def test_chunk_is_one_component_of_one_frame_or_of_the_cycle_that_one_tracker_found(tmp_path):
+    tracking = SMALL["tracking"].model_copy(update={"grid_px": 2})
+    store = lay_out(tmp_path / "small.zarr", [1], tracking=tracking)
     for name in ("displacement", "strain"):
-        assert chunks[name].chunks == (1, 1, 1, 64, 64, 1)
+        assert store._open("truth/64", "r")[name].chunks == (1, 1, 1, 64, 64, 1)
+    tracked = store._open("tracking", "r")["displacement"]
+    assert tracked.shape[2:4] == (2, 1)
+    assert tracked.chunks == (1, 1, 1, 1, *tracked.shape[4:7], 1)

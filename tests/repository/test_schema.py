@@ -7,7 +7,8 @@ from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking
 from echotruth.repository import schema
 
 ALL = [*schema.CASES, *schema.COORDINATES]
-ALL += [array for arrays in (schema.STAGES | schema.SIZED).values() for array in arrays]
+ALL += [array for stage in schema.STAGES | schema.SIZED for array in schema.named(stage)]
+ALL += schema.DERIVED
 
 
 @pytest.mark.parametrize("array", ALL, ids=lambda array: f"{array.name}-{len(array.dims)}")
@@ -19,9 +20,17 @@ def test_array_is_whole(array):
 
 
 def test_names_stand_once_in_a_group():
-    for arrays in (schema.STAGES | schema.SIZED).values():
-        names = [array.name for array in (*arrays, *schema.coordinates(arrays))]
-        assert len(names) == len(set(names))
+    for stage, arrays in (schema.STAGES | schema.SIZED).items():
+        for kind in (arrays, schema.named(stage)):
+            names = [array.name for array in (*kind, *schema.coordinates(arrays))]
+            assert len(names) == len(set(names))
+
+
+def test_members_of_a_pack_have_all_its_dimensions_and_its_type():
+    for packs in schema.PACKS.values():
+        for pack in packs:
+            for member in pack.members:
+                assert set(member.dims) >= set(pack.array.dims[:-1]) and member.dtype == pack.array.dtype, member.name
 
 
 def test_labels_belong_to_coordinates():

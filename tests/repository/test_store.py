@@ -16,9 +16,10 @@ from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tr
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.repository import layout, ledger, schema
+from echotruth.repository import layout, ledger, packing, schema
 from echotruth.repository.checksums import ChecksumError, verify_structure
-from echotruth.repository.store import NotWritten, Store, schema_of
+from echotruth.repository.store import NotWritten, Store, packs_of, schema_of
+from echotruth.repository.unpacking import unpack
 from echotruth.tracking import grid
 
 SMALL = {
@@ -30,7 +31,17 @@ SMALL = {
     "tracking": Tracking(trackers={"one": PhaseCorrelation(window_px=16)}),
 }
 MESH = left_ventricle(SMALL["geometry"])
-GROUPS = ("geometry", "mechanics", "kinematics", "phantom", "truth/64", "bmode/32", "tracking/32", "evaluation/64")
+GROUPS = (
+    "geometry",
+    "mechanics",
+    "kinematics",
+    "physiology",
+    "phantom",
+    "truth/64",
+    "bmode/32",
+    "tracking",
+    "evaluation",
+)
 
 
 def lay_out(path: Path, seeds: list[int], **changes) -> Store:
@@ -60,7 +71,7 @@ def fill(store: Store, group: str, *row: int) -> dict:
         shape = there.shape[array.leading :]
         values[array.name] = random.integers(1, 200, shape).astype(there.dtype)
     store.write(group, values, *row)
-    return values
+    return packing.unpack(packs_of(group), values, opened.attrs["labels"])
 
 
 def job(group: str, case: int) -> tuple[int, ...]:
@@ -271,7 +282,7 @@ def test_view_in_front_of_the_others_moves_nothing_and_all_are_found_by_name(sto
     fill(store, "bmode/32", 0, 2)
     with xr.open_datatree(store.path, engine="zarr") as tree:
         for group, written in values.items():
-            found = tree[group].to_dataset().isel(case=0).sel(view="long_axis")
+            found = unpack(tree[group].to_dataset().isel(case=0).sel(view="long_axis"))
             for name, value in written.items():
                 np.testing.assert_array_equal(found[name].values, value, err_msg=name)
         assert (tree["bmode/32/image"].isel(case=0).sel(view="apex") > 0).all()
@@ -325,8 +336,8 @@ def test_many_cases_are_laid_out_in_few_files(tmp_path):
     rows = [f"case{number}" for number in range(10_000)]
     columns = {"cases:seed": np.arange(10_000.0), "cases:loop.file": np.repeat(["mouse", "rat"], 5_000)}
     arrays = {"cases": schema.parameters(columns), "physiology": schema.PHYSIOLOGY}
-    labels = columns | {"case": rows, "time": np.zeros((10_000, 4)), "frame": np.arange(4), "layer": np.arange(1, 4)}
-    Store(tmp_path / "many.zarr").lay_out(arrays, {}, labels | schema.LABELS)
+    labels = columns | layout.labels(Config(**SMALL), rows, np.zeros((10_000, 4)))
+    Store(tmp_path / "many.zarr").lay_out(arrays, {}, labels)
     files = [path for path in (tmp_path / "many.zarr").rglob("*") if path.is_file()]
     whole = len(schema.coordinates(schema.PHYSIOLOGY)) + len(arrays["cases"]) + 1
     assert len(files) == 3 + len(schema.PHYSIOLOGY) + 2 * whole

@@ -5,14 +5,20 @@ import shutil
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from hashlib import sha256
+from itertools import product
 
+import numpy as np
 import pytest
 
 from echotruth.cases import expand
 from echotruth.config.loading import validate
+from echotruth.evaluation.scoring import ground_truth, score
+from echotruth.notebook.points import load_points
 from echotruth.repository import ledger
 from echotruth.workflow.cost import Cost
+from echotruth.workflow.job import Job
 from echotruth.workflow.scripts.cases import lay_out
 from echotruth.workflow.series import BEGUN, command, run_ahead, run_series
 
@@ -231,12 +237,45 @@ def test_only_a_new_size_is_tracked(repository, monkeypatch):
     assert tracked(repository, monkeypatch) == [("none", 32), ("hann", 32)]
 
 
-def test_only_the_size_with_a_damaged_shard_is_tracked(repository, monkeypatch):
+def test_view_with_a_damaged_shard_is_tracked_again(repository, monkeypatch):
     before = repository.shards
-    shard = repository.folder / "small.zarr" / next(name for name in before if name.startswith("tracking/64/quality"))
+    shard = repository.folder / "small.zarr" / next(name for name in before if name.startswith("tracking/quality"))
     shard.write_bytes(b"")
-    assert tracked(repository, monkeypatch) == [("none", 64), ("hann", 64)]
+    assert tracked(repository, monkeypatch) == [(taper, size) for size in (128, 64) for taper in ("none", "hann")]
     assert repository.shards == before
+
+
+def test_scores_are_those_of_the_motion_that_the_store_has(repository):
+    """Whoever reads the truth and the tracked motion there finds the scores, to the last bit."""
+    job = Job(repository.folder, "evaluation", "heart", "mid")
+    stored, tracked_motion = job.read("evaluation"), job.read("tracking", "displacement")["displacement"]
+    truth = ground_truth(job)
+    inside = np.isfinite(stored["wall_axes"]).all((-2, -1))
+    read = replace(
+        truth,
+        operator=replace(truth.operator, axes=stored["wall_axes"][inside].astype(float)),
+        displacement=stored["true_displacement"][:, inside, :2].astype(float),
+        through_plane=stored["true_displacement"][:, inside, 2].astype(float),
+        strain=stored["true_strain"][:, :, inside].astype(float),
+    )
+    for size, tracker in product(range(2), range(2)):
+        for name, value in score(tracked_motion[size, tracker], read).items():
+            found = stored[name][size, tracker]
+            np.testing.assert_array_equal(found, np.asarray(value).astype(found.dtype), err_msg=name)
+
+
+def test_points_of_a_clip_are_read_with_their_strain_and_layer(repository):
+    job = Job(repository.folder, "evaluation", "heart", "mid")
+    found, truth = load_points(repository.folder, "heart", "mid", "tapered", 64), ground_truth(job)
+    np.testing.assert_array_equal(found.displacement, job.read("tracking", "displacement")["displacement"][1, 1])
+    np.testing.assert_array_equal(found.layer.values[truth.inside], truth.wall.layer)
+    np.testing.assert_array_equal(found.segment.values[truth.inside], truth.wall.segment)
+    assert not found.layer.values[~truth.inside].any()
+    mean = np.nanmean(found.strain.isel(frame=truth.es).values[truth.inside], axis=0)
+    expected = job.read("evaluation", "tracked_global_strain")["tracked_global_strain"][1, 1, truth.es]
+    np.testing.assert_allclose(mean, expected, rtol=1e-5, atol=1e-7)
+    with pytest.raises(ValueError, match=r"^tracker = 'other': use one of plain, tapered\.$"):
+        load_points(repository.folder, "heart", "mid", "other")
 
 
 def test_failure_of_a_tracker_is_tried_again(repository, monkeypatch):

@@ -11,14 +11,15 @@ import numpy as np
 
 from echotruth.evaluation import statistics
 from echotruth.evaluation.displacement_error import WallPoints
+from echotruth.repository.rounding import STRAIN
 
 REFERENCES = ("heart", "plane", "operator")
 """Reference strains, all at the same material points: E = (F^T F - I) / 2 in space along the wall's axes; E of the part
 of F in the image plane along the wall's axes there; the strain operator applied to the true displacement."""
 
-STRAIN_ROUNDING = 1e-6
-"""Standard deviation of strain that rounding can cause. A shift by 1 mm, stored in single precision, gives 1e-7 through
-the operator (radius 0.45 mm, 35 points)."""
+STRAIN_ROUNDING = STRAIN
+"""Standard deviation of strain that rounding can cause. Displacements rounded to 1/256 pixel give half of it through
+the operator, whose radius is 19 pixels at 512 px."""
 
 
 def compare(tracked: np.ndarray, true: np.ndarray, wall: WallPoints, es: int) -> dict[str, np.ndarray]:

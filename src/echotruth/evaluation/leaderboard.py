@@ -22,7 +22,7 @@ from echotruth.evaluation.digest import digest
 from echotruth.evaluation.scoring import metrics
 from echotruth.repository import ledger
 from echotruth.repository.ledger import record_path
-from echotruth.repository.schema import EVALUATION
+from echotruth.repository.unpacking import unpack
 from echotruth.tracking.external_program import in_one_line
 
 log = logging.getLogger("echotruth")
@@ -185,11 +185,11 @@ def _means_of_hearts(clips: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
 def _builtin_rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path, size: int) -> list[dict]:
     """Rows of the repository's own trackers at one image size."""
     # The store also holds views that have left the configuration, and in its own order.
-    data = tree[f"evaluation/{size}"].to_dataset().isel(case=complete).sel(view=list(config.views))
-    names = [array.name for array in EVALUATION if "tracker" in array.dims and "frame" not in array.dims]
-    values = {name: data[name].values for name in names}
+    data = tree["evaluation"].to_dataset()[["scores"]].isel(case=complete).sel(view=list(config.views), size=size)
+    scored = unpack(data)
+    values = {str(name): array.values for name, array in scored.items()}
     rows = []
-    for i, case in enumerate(map(str, data.case.values)):
+    for i, case in enumerate(map(str, scored.case.values)):
         for j, (view, settings) in enumerate(config.views.items()):
             record = record_path(folder, "tracking", case, view)
             failures = ledger.read(record).get("failures", {}) if record.is_file() else {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -57,7 +58,6 @@ class Pieces:
         self._job, self._sha256 = job, entry.get("record", {}).get("sha256", {})
         # A piece is read at the place of this job, which must be that at which it was written.
         self._known = entry.get("pieces", {}) if entry.get("index") == list(job.index) else {}
-        self._read: dict[int, tuple[np.ndarray, ...] | None] = {}
 
     def fingerprint(self, tracker: Section, clip: Clip) -> str:
         """Hash of all that a piece is made from: code, settings of the tracker, and what the tracker is given.
@@ -74,19 +74,18 @@ class Pieces:
         known = pieces.get(name, {})
         if not fingerprint or known.get("fingerprint") != fingerprint or known["failure"]:
             return None
-        if size not in self._read:
-            self._read[size] = self._arrays(size)
-        arrays = self._read[size]
-        if arrays is None:
+        if self._arrays is None:
             return None
-        displacement, quality = (array[list(pieces).index(name)] for array in arrays)
+        place = list(self._known).index(str(size)), list(pieces).index(name)
+        displacement, quality = (array[place] for array in self._arrays)
         return Piece(displacement, quality, fingerprint)
 
-    def _arrays(self, size: int) -> tuple[np.ndarray, ...] | None:
-        """Arrays of all trackers at an image size; None if a file is missing or differs from what was written."""
+    @cached_property
+    def _arrays(self) -> tuple[np.ndarray, ...] | None:
+        """Arrays of all image sizes and trackers; None if a file is missing or differs from what was written."""
         found = []
         for array in ARRAYS:
-            group = f"tracking/{size}/{array}"
+            group = f"tracking/{array}"
             files = {name: value for name, value in self._sha256.items() if name.startswith(f"{group}/")}
             roots = superseded.roots(self._job.folder, self._job.store.path)
             root = next((root for root in roots if files and _whole(root, files)), None)

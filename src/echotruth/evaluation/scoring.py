@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echotruth.config import Config
 from echotruth.evaluation import statistics
 from echotruth.evaluation.agreement import REFERENCES, compare
 from echotruth.evaluation.clip import grid_positions
@@ -18,17 +19,23 @@ from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.heart import Heart
 from echotruth.imaging.truth import cavity_centroid, material_truth
 from echotruth.imaging.view import Plane
+from echotruth.repository import rounding
+from echotruth.repository.rounding import length_quantum
 
 if TYPE_CHECKING:
     from echotruth.workflow.job import Job
 
+
 DISTANCE_ROUNDING = 1e-9
-"""Standard deviation of distances that rounding can cause, m: that of a motion of 20 mm in single precision."""
+"""Standard deviation of distances that rounding can cause if they are not rounded to a quantum, m: that of a motion of
+20 mm in single precision."""
 
 
 @dataclass(frozen=True)
 class Truth:
     """True motion of the tissue at the grid points of one view of one heart; the same for all image sizes.
+
+    It is rounded as the store rounds it, so that whoever reads it there finds the same scores.
 
     Attributes
     ----------
@@ -44,6 +51,8 @@ class Truth:
         Radial, tangential, shear; references as in :data:`echotruth.evaluation.agreement.REFERENCES`.
     es : int
         Frame of end-systole.
+    quantum : float
+        Displacements are multiples of it, m; 0 if they are not rounded.
     """
 
     inside: np.ndarray
@@ -53,6 +62,7 @@ class Truth:
     through_plane: np.ndarray
     strain: np.ndarray
     es: int
+    quantum: float = 0.0
 
     def on_grid(self, values: np.ndarray, axis: int) -> np.ndarray:
         """Values of the points on the whole grid: (..., point, ...) to (..., grid rows, grid columns, ...).
@@ -70,12 +80,9 @@ class Truth:
         """Arrays of the truth in the group `evaluation` of the store, on the grid."""
         operator = compare(self.strain[-1], self.strain, self.wall, self.es)
         return {
-            "true_displacement": self.on_grid(self.displacement, 1),
-            "through_plane": self.on_grid(self.through_plane, 1),
+            "true_displacement": self.on_grid(np.dstack([self.displacement, self.through_plane]), 1),
             "true_strain": self.on_grid(self.strain, 2),
             "wall_axes": self.on_grid(self.operator.axes, 0),
-            "layer": self.on_grid(self.wall.layer, 0),
-            "segment": self.on_grid(self.wall.segment, 0),
             "through_plane_rms": statistics.rms(self.through_plane[self.es][:, None], self.wall.regions[:1])[0, 0],
             "operator_bias": operator["strain_bias"],
             "operator_rms": operator["strain_rms"],
@@ -96,10 +103,10 @@ def ground_truth(job: Job) -> Truth:
     """
     heart, config = job.heart, job.case.config
     plane = Plane(**job.read("phantom", "origin", "axes"))
-    return truth_at(heart, plane, job.view.plane, grid_positions(config), config.bmode.si().field_of_view)
+    return truth_at(heart, plane, job.view.plane, grid_positions(config), config)
 
 
-def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, field_of_view: float) -> Truth:
+def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, config: Config) -> Truth:
     """True motion of the tissue at points of the image.
 
     Parameters
@@ -110,18 +117,28 @@ def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, field_
         Orientation of the plane.
     position : ndarray of shape (grid rows, grid columns, 2), m
         Lateral, axial, at end-diastole.
-    field_of_view : float
-        Side of the image, m.
+    config : Config
+        Its section bmode gives the field of view, and the quantum of lengths.
     """
+    quantum = length_quantum(config)
     motion = material_truth(heart, plane, position, kind)
     inside = motion["layer"] > 0
     layer, segment = (motion[name][inside] for name in ("layer", "segment"))
     wall = WallPoints(position[inside], layer, segment, cavity_centroid(heart, plane), kind, heart.layers)
-    operator = StrainOperator(wall.position, motion["wall_axes"][inside], RADIUS * field_of_view)
-    displacement = motion["true_displacement"][:, inside]
+    radius = RADIUS * config.bmode.si().field_of_view
+    operator = StrainOperator(wall.position, _single(motion["wall_axes"][inside]), radius)
+    displacement, through_plane = (
+        _single(motion[name][:, inside], quantum) for name in ("true_displacement", "through_plane")
+    )
     strain = [motion[f"{name}_strain"][:, inside] for name in REFERENCES[:2]]
     strain.append(operator.strain(displacement))
-    return Truth(inside, wall, operator, displacement, motion["through_plane"][:, inside], np.stack(strain), heart.es)
+    stored = _single(np.stack(strain), rounding.STRAIN)
+    return Truth(inside, wall, operator, displacement, through_plane, stored, heart.es, quantum)
+
+
+def _single(values: np.ndarray, quantum: float | None = None) -> np.ndarray:
+    """Values as the store has them: of single precision, and rounded to a quantum."""
+    return rounding.rounded(np.asarray(values, np.float32), quantum).astype(float)
 
 
 def score(tracked: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
@@ -137,19 +154,22 @@ def score(tracked: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
     Returns
     -------
     dict of ndarray
-        The results of :func:`.displacement_error.evaluate` and :func:`.agreement.compare`, and tracked_strain (frame,
-        grid rows, grid columns, 3: radial, tangential, shear) and through_plane_correlation (): of the length of the
-        error with the displacement out of the plane, at ES; NaN where either is the same at all points.
+        The results of :func:`.displacement_error.evaluate` and :func:`.agreement.compare` on the displacement rounded
+        as the store rounds it, and through_plane_correlation (): of the length of the error with the displacement out
+        of the plane, at ES; NaN where either is the same at all points.
     """
     displacement = np.asarray(tracked, float)[:, truth.inside]
+    if truth.quantum:
+        displacement = _single(displacement, truth.quantum)
     strain, es = truth.operator.strain(displacement), truth.es
     error = np.linalg.norm(displacement[es] - truth.displacement[es], axis=-1)[:, None]
     through_plane = np.abs(truth.through_plane[es])[:, None]
-    correlation = statistics.correlation(error, through_plane, truth.wall.regions[:1], DISTANCE_ROUNDING)
+    correlation = statistics.correlation(
+        error, through_plane, truth.wall.regions[:1], max(truth.quantum, DISTANCE_ROUNDING)
+    )
     return {
         **evaluate(displacement, truth.displacement, truth.wall, es),
         **compare(strain, truth.strain, truth.wall, es),
-        "tracked_strain": truth.on_grid(strain, 1),
         "through_plane_correlation": correlation[0, 0],
     }
 

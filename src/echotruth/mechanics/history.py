@@ -9,7 +9,7 @@ from echotruth.aha import segment
 from echotruth.config import Config
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats, Mesh, shape
-from echotruth.mechanics import angles, fibres, kinematics
+from echotruth.mechanics import fibres, kinematics
 from echotruth.mechanics.solver.wall import Wall
 
 Arrays = dict[str, NDArray]
@@ -46,18 +46,19 @@ def collect_outputs(config: Config, wall: Wall, mechanics: Arrays) -> dict[str, 
     frames = fibres.fibre_frames(mesh, depth, config.fibres, fibres.CENTROID, config.seed)[:, 0]
     displacement = mechanics["displacement"]
     smallest, mean = kinematics.volume_ratios(mesh, displacement)
-    strains = kinematics.centroid_strains(mesh, displacement, axes, frames)
+    gradient = kinematics.deformation_gradient(mesh, displacement)[:, :, 0]
+    strain = kinematics.strain_since_ed(gradient, axes)
     return {
         "geometry": {
             "node_position": mesh.nodes,
             "cell_node": mesh.cells,
             **{side: getattr(mesh, side) for side in ("endo", "epi", "base")},
         },
-        "fibres": _fibre_arrays(mesh, depth, axes, frames, config.fibres.layers),
+        "fibres": _fibre_arrays(mesh, depth, frames, config.fibres.layers),
         "pathology": dict(vars(wall.tissue)),
         "mechanics": mechanics,
         "kinematics": {
-            **{name: values.astype(np.float32) for name, values in strains.items()},
+            "strain": strain.astype(np.float32),
             **_wall_strain_statistics(mesh, displacement, depth, config.fibres.layers),
             "volume_ratio_min": smallest,
             "volume_ratio_mean": mean,
@@ -65,16 +66,12 @@ def collect_outputs(config: Config, wall: Wall, mechanics: Arrays) -> dict[str, 
     }
 
 
-def _fibre_arrays(mesh: Mesh, depth: Floats, axes: Floats, frames: Floats, layers: int) -> Arrays:
-    helix, transverse, sheet = angles.angles_from_frames(frames, axes)
+def _fibre_arrays(mesh: Mesh, depth: Floats, frames: Floats, layers: int) -> Arrays:
     centroid = shape(fibres.CENTROID)[0] @ mesh.nodes[mesh.cells]
     return {
         "wall_depth": depth,
         "fibre": frames[:, 0],
         "sheet": frames[:, 1],
-        "helix_angle": helix,
-        "transverse_angle": transverse,
-        "sheet_angle": sheet,
         "layer": fibres.layer(fibres.interpolate_in_cells(mesh, depth, fibres.CENTROID)[:, 0], layers).astype(np.uint8),
         "segment": segment(centroid, mesh.nodes[mesh.endo, 2].min()),
     }

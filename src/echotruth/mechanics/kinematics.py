@@ -186,10 +186,29 @@ def centroid_strains(mesh: Mesh, displacement: Floats, axes: Floats, frames: Flo
     return {
         "deformation_gradient": gradient,
         "strain_unloaded": strain(gradient, axes, RCL_COMPONENTS),
-        "strain": strain(relative, deformed_wall_axes(axes, gradient[0]), RCL_COMPONENTS),
+        "strain": strain_since_ed(gradient, axes),
         "fibre_strain_unloaded": strain(gradient, frames, FIBRE_COMPONENTS),
         "fibre_strain": strain(relative, deformed_fibre_frames(frames, gradient[0]), FIBRE_COMPONENTS),
     }
+
+
+def strain_since_ed(gradient: Floats, axes: Floats) -> Floats:
+    """Strain since ED along the wall axes deformed to ED.
+
+    Parameters
+    ----------
+    gradient : ndarray of shape (n_frames, n_cells, 3, 3)
+        F from the unloaded state; ED is the first frame.
+    axes : ndarray of shape (n_cells, 3, 3)
+        Rows R, C, L of the unloaded wall.
+
+    Returns
+    -------
+    ndarray of shape (n_frames, n_cells, 6)
+        RR, CC, LL, RC, RL, CL.
+    """
+    relative = gradient @ np.linalg.inv(gradient[0])
+    return strain(relative, deformed_wall_axes(axes, gradient[0]), RCL_COMPONENTS)
 
 
 def layer_strain(strains: Floats, weight: Floats, layer: NDArray[np.integer], layers: int) -> Floats:

@@ -18,7 +18,7 @@ from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
-from echotruth.repository import schema
+from echotruth.repository import rounding, schema
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,13 +80,13 @@ def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str
     """Arrays of one case, or of one of its views, with the dimensions, units and meanings of the repository."""
     import xarray as xr
 
-    found, arrays = {}, schema.groups(case.config)
+    found = {}
     for group, values in groups.items():
-        for array in arrays[group]:
+        for array in schema.named(group.partition("/")[0]):
             if array.name in values:
-                dims = [dim for dim in array.dims if dim not in ("case", "view", "tracker")]
+                dims = [dim for dim in array.dims if dim not in ("case", "view", "size", "tracker")]
                 about = {"units": array.units, "long_name": array.long_name}
-                found[array.name] = (dims, np.asarray(values[array.name], array.dtype), about)
+                found[array.name] = (dims, rounding.as_stored(values[array.name], array, case.config), about)
     data, labels = xr.Dataset(found), schema.LABELS | coordinates
     data = data.assign_coords({name: (name, np.asarray(labels[name])) for name in data.dims if name in labels})
     if "frame" in data.dims:

@@ -62,7 +62,7 @@ def load_heart(repository: str | Path, case: str = "heart") -> Heart:
     FileNotFoundError, ValueError
         If there is no such repository or case.
     """
-    return _job(repository, case).heart
+    return job_of(repository, case).heart
 
 
 def load_clip(repository: str | Path, case: str = "heart", view: str = "mid", size: int | None = None) -> xr.Dataset:
@@ -82,13 +82,15 @@ def load_clip(repository: str | Path, case: str = "heart", view: str = "mid", si
     FileNotFoundError, ValueError
         If there is no such repository, case, view or size.
     """
-    job = _job(repository, case, view)
+    job = job_of(repository, case, view)
     config = job.case.config
-    if view not in config.views:
-        raise ValueError(f"view = {view!r}: use one of {', '.join(config.views)}.")
     size = image_size(config, size)
     values = {group: job.read(group) for group in (f"bmode/{size}", f"truth/{size}")}
     return clip_dataset(job.heart, job.case, view, Plane(**job.read("phantom", "origin", "axes")), values)
+
+
+OF_GROUP = ("axial", "lateral", "course")
+"""Coordinates that differ between groups."""
 
 
 def _with_constants(cases: xr.Dataset) -> xr.Dataset:
@@ -122,7 +124,7 @@ def _indexed(groups: dict[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     for path, group in groups.items():
         own = {}
         for name in (name for name, array in group.coords.items() if array.dims == (name,)):
-            key = f"{path}/{name}" if name in ("axial", "lateral") else str(name)
+            key = f"{path}/{name}" if name in OF_GROUP else str(name)
             if key not in shared:
                 shared[key] = xr.Coordinates({name: group.variables[name].load()})
             own[key] = shared[key]
@@ -141,9 +143,19 @@ def _folder(repository: str | Path) -> Path:
     return folder
 
 
-def _job(repository: str | Path, case: str, view: str | None = None) -> Job:
+def job_of(repository: str | Path, case: str, view: str | None = None) -> Job:
+    """The job that tracks a view of a heart, through which a repository is read.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        If there is no such repository, case or view.
+    """
     folder = _folder(repository)
     known = rows(folder / "registry.txt")
     if case not in known:
         raise ValueError(f"case = {case!r}: use one of {', '.join(list(known)[:20])}.")
-    return Job(folder, "tracking", case, view)
+    job = Job(folder, "tracking", case, view)
+    if view is not None and view not in job.case.config.views:
+        raise ValueError(f"view = {view!r}: use one of {', '.join(job.case.config.views)}.")
+    return job

@@ -176,7 +176,7 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     found = track_points(*arguments.tracker_arguments, _settings(case.config, tracker, options))
     displacement, quality = arguments.on_grid(*found)
     coordinates = {"axial": clip["grid_axial"].values, "lateral": clip["grid_lateral"].values}
-    values = {f"tracking/{size}": {"displacement": displacement, "quality": quality}}
+    values = {"tracking": {"displacement": displacement, "quality": quality}}
     return dataset(case, values, coordinates).assign_attrs(clip.attrs, tracker=_name(tracker))
 
 
@@ -213,7 +213,7 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
     plane = Plane(np.array(attributes["plane_origin"]), np.reshape(attributes["plane_axes"], (3, 3)))
     lateral, axial = np.meshgrid(tracked["lateral"].values, tracked["axial"].values)
     position = np.stack([lateral, axial], axis=-1)
-    truth = truth_at(heart, plane, kind, position, case.config.bmode.si().field_of_view)
+    truth = truth_at(heart, plane, kind, position, case.config)
     displacement = tracked["displacement"].transpose("frame", "axial", "lateral", "plane").values
     return pd.Series(metrics(score(displacement, truth), kind), name=attributes.get("tracker"))
 

@@ -11,7 +11,11 @@ import xarray as xr
 
 from echotruth.config import Config
 from echotruth.evaluation.leaderboard import best, rows, standings
+from echotruth.heart import Heart
+from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
+from echotruth.mechanics.physiology import CC
 from echotruth.report import bullseye, clip, error, heart, leaderboard, loop, physiology, resolutions, strain, views
+from echotruth.repository.unpacking import unpack
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,15 +72,16 @@ class Figures:
 
     def heart(self) -> None:
         """The heart in space, unloaded, at end-diastole and end-systole."""
-        geometry, fibres, mechanics, kinematics = map(self.group, ("geometry", "fibres", "mechanics", "kinematics"))
-        nodes, fibre = geometry.node_position.values, fibres.fibre.values
-        states = [heart.State("Unloaded", nodes, fibre, np.zeros(len(fibre)))]
-        for name, frame in (("End-diastole", 0), ("End-systole", self.es)):
-            deformed = nodes + mechanics.displacement.isel(frame=frame).values
-            carried = np.einsum("cij,cj->ci", kinematics.deformation_gradient.isel(frame=frame).values, fibre)  # F f
-            circumferential = kinematics.strain_unloaded.isel(frame=frame).sel(strain_component="CC").values
-            states.append(heart.State(name, deformed, carried, circumferential))
-        heart.draw(self.folder / "heart.png", geometry.cell_node.values, fibres.helix_angle.values, states)
+        groups = ("geometry", "fibres", "pathology", "mechanics")
+        arrays = {name: {str(key): array.values for key, array in self.group(name).items()} for name in groups}
+        solved, fibre, frames = Heart.of(arrays, self.config), arrays["fibres"]["fibre"], (0, self.es)
+        kinematics = centroid_kinematics(solved, frames)
+        states = [heart.State("Unloaded", solved.nodes, fibre, np.zeros(len(fibre)))]
+        for number, name in enumerate(("End-diastole", "End-systole")):
+            carried = np.einsum("cij,cj->ci", kinematics["deformation_gradient"][number], fibre)  # F f
+            circumferential = kinematics["strain_unloaded"][number, :, CC]
+            states.append(heart.State(name, solved.positions(frames[number]), carried, circumferential))
+        heart.draw(self.folder / "heart.png", solved.cells, fibre_angles(solved)["helix_angle"], states)
 
     def loop(self) -> None:
         """The target and the solved loop, and the active tension."""
@@ -93,7 +98,8 @@ class Figures:
 
     def physiology(self) -> None:
         """Rotation, strain, axial motion, pressure and volume over the cycle."""
-        measures, mechanics, kinematics = map(self.group, ("physiology", "mechanics", "kinematics"))
+        mechanics, kinematics = map(self.group, ("mechanics", "kinematics"))
+        measures = unpack(self.group("physiology"))
         ivc, ejection, ivr = (float(measures[name]) for name in ("ivc_time", "ejection_time", "ivr_time"))
         cycle = physiology.Cycle(
             mechanics.time.values,
@@ -113,9 +119,9 @@ class Figures:
         """The clip with its true motion, as a GIF and as a video."""
         size = self.sizes[0]
         images = self.group(f"bmode/{size}").sel(view=self.view)
-        truth = self.group(f"evaluation/{size}").sel(view=self.view)
-        motion = truth.true_displacement.stack(point=("axial", "lateral")).transpose("frame", "point", "plane")
-        motion = motion.isel(point=np.isfinite(motion.isel(frame=0, plane=0).values))
+        truth = self.group("evaluation").true_displacement.sel(view=self.view, vector=["lateral", "axial"])
+        motion = truth.stack(point=("axial", "lateral")).transpose("frame", "point", "vector")
+        motion = motion.isel(point=np.isfinite(motion.isel(frame=0, vector=0).values))
         spacing = float(images.lateral[1] - images.lateral[0])
         points = np.column_stack([motion.lateral - images.lateral[0], motion.axial - images.axial[0]]) / spacing
         chosen = clip.thin(points, ARROW_SPACING / spacing)
@@ -162,11 +168,11 @@ class Figures:
     def bullseye(self) -> None:
         """Circumferential displacement of the segments in the short-axis views, true and of the best tracker."""
         short = [name for name, view in self.config.views.items() if view.plane == "short_axis"]
-        data = self.group(f"evaluation/{self.sizes[0]}").sel(tracker=self.order[0], polar="tangential", view=short)
+        names = ("true_segment_displacement", "tracked_segment_displacement")
+        scores = self.group("evaluation").sel(tracker=self.order[0], size=self.sizes[0], view=short)
+        data = unpack(scores, *names).sel(polar="tangential")
         # A segment at a boundary may be visible in two planes; their mean is shown.
-        true, tracked = (
-            data[name].mean("view").values for name in ("true_segment_displacement", "tracked_segment_displacement")
-        )
+        true, tracked = (data[name].mean("view").values for name in names)
         bullseye.draw(self.folder / "bullseye.png", true, tracked, self.order[0])
 
     def error(self) -> None:
@@ -176,10 +182,9 @@ class Figures:
         """
         first = next(iter(self.config.tracking.trackers))
         trackers = dict.fromkeys((first, self.order[0]))
-        layers = {}
-        for size in self.sizes:
-            data = self.tree[f"evaluation/{size}"].to_dataset().isel(case=self.complete)
-            layers[size] = data.rms_error.sel(component="tangential").isel(region=slice(1, None))
+        data = unpack(self.tree["evaluation"].to_dataset().isel(case=self.complete), "rms_error").rms_error
+        tangential = data.sel(component="tangential").isel(region=slice(1, None))
+        layers = {size: tangential.sel(size=size) for size in self.sizes}
         errors = {
             view: {
                 tracker: {size: rms.sel(view=view, tracker=tracker).mean("case").values for size, rms in layers.items()}

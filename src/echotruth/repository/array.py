@@ -17,7 +17,7 @@ class Array:
         Names of the dimensions, in order.
     dtype : str
     units : str
-        SI, as UDUNITS writes them; "1" for dimensionless numbers.
+        SI, as UDUNITS writes them; "1" for dimensionless numbers, "mixed" where a coordinate has the unit of each.
     long_name : str
         Content, for readers and plots.
     quantum : float or "pixel/256", optional

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import zarr
 
-from echotruth.repository import ledger, schema, values
+from echotruth.repository import ledger, packing, schema, values
 from echotruth.repository.inventory import Fault, JobRecord, Repository, reason
 from echotruth.repository.ledger import GATES, record_path
-from echotruth.repository.store import schema_of
+from echotruth.repository.store import packs_of, schema_of
 
 STATUSES = ("complete", "implausible", "failed", "skipped")
 """What a record can say; the jobs of the last two have no files."""
@@ -58,14 +58,14 @@ def check_job(repository: Repository, job: JobRecord, quick: bool) -> JobFaults:
             found.faults.append(Fault(repository.name(file), problem, remedy, (job.path,), (file,)))
     if not quick and not found.faults and job.case in repository.cases:
         found.faults = [
-            Fault(f"{repository.name(repository.store)}/{array}", f"{problem} ({job.job})", _not_healed(name))
-            for array, problem in _check_values(repository, job, row, {path.partition("/c/")[0] for path in listed})
-            if array not in COMPRESSED or _is_complete(repository, job.case)
+            _fault_of_value(repository, job, group, array, problem)
+            for group, array, problem in _check_values(repository, job, row, listed)
+            if f"{group}/{array}" not in COMPRESSED or _is_complete(repository, job.case)
         ]
     return found
 
 
-COMPRESSED = ("kinematics/deformation_gradient", "kinematics/volume_ratio_min", "physiology/volume_ratio_min")
+COMPRESSED = ("kinematics/volume_ratio_min", "physiology/volume_ratio_min")
 """Arrays that tell that elements collapse, for which a heart is found implausible."""
 
 
@@ -73,6 +73,14 @@ def _is_complete(repository: Repository, case: str) -> bool:
     """Whether a heart is within its bounds, as far as it is known."""
     record, _ = _read_record(JobRecord(record_path(repository.folder, GATES[-1], case), GATES[-1], case))
     return record is None or record["status"] == "complete"
+
+
+def _fault_of_value(repository: Repository, job: JobRecord, group: str, name: str, problem: str) -> Fault:
+    """A value of an array, or of a member of a pack, that no heart can have."""
+    packs = {member: pack.array.name for pack in packs_of(group) for member in pack.names}
+    text = f"{name} {problem}" if name in packs else problem
+    path = f"{repository.name(repository.store)}/{group}/{packs.get(name, name)}"
+    return Fault(path, f"{text} ({job.job})", _not_healed(repository.name(job.path)))
 
 
 def _not_healed(record: str) -> str:
@@ -125,10 +133,10 @@ def damage(file: Path, hash: str) -> str:
 
 
 def _check_values(
-    repository: Repository, job: JobRecord, row: tuple[int, ...], arrays: set[str]
-) -> Iterator[tuple[str, str]]:
-    """Array and problem of the values of a job."""
-    config = repository.cases[job.case].config
+    repository: Repository, job: JobRecord, row: tuple[int, ...], files: Iterable[str]
+) -> Iterator[tuple[str, str, str]]:
+    """Group, array and problem of the values of a job."""
+    config, arrays = repository.cases[job.case].config, {path.partition("/c/")[0] for path in files}
     for group in sorted({path.rpartition("/")[0] for path in arrays}):
         opened = {
             path.rpartition("/")[2]: repository.opened.get(path) for path in arrays if path.startswith(f"{group}/")
@@ -137,8 +145,9 @@ def _check_values(
             continue  # its metadata are damaged
         found: dict[tuple[str, str], None] = {}
         for first, part in _blocks(group, {name: array for name, array in opened.items() if array is not None}, row):
-            found |= dict.fromkeys(values.faults(group, part, first, config))
-        yield from ((f"{group}/{name}", problem) for name, problem in _first_of_each(found))
+            named = packing.unpack(packs_of(group), part, repository.pack_labels(group))
+            found |= dict.fromkeys(values.faults(group, named, first, config))
+        yield from ((group, name, problem) for name, problem in _first_of_each(found))
 
 
 def _first_of_each(found: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
@@ -184,13 +193,12 @@ def check_loop(repository: Repository, job: JobRecord) -> list[Fault]:
         return []
     curves = {f"mechanics/{name}": name for name in ("pressure", "volume", "pressure_target", "volume_target")}
     curves |= {"kinematics/volume_ratio_min": "volume_ratio_min"}
-    measured = {f"physiology/{name}": name for name in ("loop_error", "volume_ratio_min")}
-    if not {*curves, *measured} <= set(repository.opened):
+    if not {*curves, "physiology/scalars"} <= set(repository.opened):
         return []
     arrays = {name: np.asarray(repository.opened[path][row[0]]) for path, name in curves.items()}
-    found = {name: np.asarray(repository.opened[path][row[0]]) for path, name in measured.items()}
-    store = repository.name(repository.store)
+    scalars = {"scalars": np.asarray(repository.opened["physiology/scalars"][row[0]])}
+    found = packing.unpack(packs_of("physiology"), scalars, repository.pack_labels("physiology"))
     return [
-        Fault(f"{store}/physiology/{name}", f"{problem} ({job.job})", _not_healed(repository.name(job.path)))
+        _fault_of_value(repository, job, "physiology", name, problem)
         for name, problem in values.loop_faults(arrays, found, repository.cases[job.case].config)
     ]

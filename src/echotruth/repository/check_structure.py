@@ -103,6 +103,7 @@ def _metadata_problem(opened: zarr.Array[Any], array: Array, repository: Reposit
         "type": str(opened.dtype),
         "units": opened.attrs.get("units"),
         "long_name": opened.attrs.get("long_name"),
+        "quantum": opened.attrs.get("quantum"),
         "rows": opened.shape[0] >= len(repository.cases),
     }
     right = {
@@ -110,6 +111,7 @@ def _metadata_problem(opened: zarr.Array[Any], array: Array, repository: Reposit
         "type": array.dtype,
         "units": array.units,
         "long_name": array.long_name,
+        "quantum": array.quantum,
         "rows": True,
     }
     return next((f"has {key} {found[key]!r}, not {right[key]!r}" for key in right if found[key] != right[key]), "")

@@ -4,9 +4,9 @@ It is what belongs to no job. It is made in memory as a whole, so that the same 
 whatever was on disk before, and a file is written only if it differs.
 
 Every array of the jobs is rectangular over (case, view, ...). A shard holds all that one job writes of one array, so
-that parallel jobs never touch the same file, and a clip is one file. In it, a chunk is one frame of one component, so
-that one component can be read alone and its bytes compress together. Coordinates and columns of the table are one chunk
-each. Chunks carry a crc32c checksum: a flipped bit is an error, not a wrong number.
+that parallel jobs never touch the same file, and a clip is one file. In it, a chunk is one component of one frame or,
+of what was tracked, of one cycle, so that it can be read alone and its bytes compress together. Coordinates and columns
+of the table are one chunk each. Chunks carry a crc32c checksum: a flipped bit is an error, not a wrong number.
 """
 
 from __future__ import annotations
@@ -33,8 +33,11 @@ Document = dict[str, Any]
 ROOT = "zarr.json"
 """Path of the metadata of the root, which hold those of all groups and arrays once more."""
 
-ALONE = ("frame", "vector", "strain_component", "plane", "wall_component", "label", "to")
-"""Dimensions along which a chunk of an array of the jobs holds one element: frames and components."""
+COMPONENTS = ("vector", "strain_component", "plane", "wall_component", "label", "to")
+"""Dimensions along which a chunk of an array of the jobs holds one element; so it does along those of `IMAGED`, or of
+`TRACKED` if the array has them all."""
+IMAGED = ("frame",)
+TRACKED = ("size", "tracker")
 
 # A shard that holds only fill values is a result too and must exist on disk.
 zarr.config.set({"array.write_empty_chunks": True})
@@ -147,13 +150,14 @@ def _labels(path: str, coordinates: tuple[Array, ...], values: dict[str, NDArray
 
 
 def _create_sharded(group: zarr.Group, array: Array, shape: tuple[int, ...], coordinates: tuple[Array, ...]) -> None:
-    """Create an array of the jobs: one shard a job, one chunk a frame and component."""
+    """Create an array of the jobs: one shard a job, and chunks in it if it has frames."""
     dims = set(array.dims)
     auxiliary = [other.name for other in coordinates if other.dims != (other.name,) and set(other.dims) <= dims]
     attributes = {"coordinates": " ".join(auxiliary)} if auxiliary else {}
+    alone = (*COMPONENTS, *(TRACKED if dims >= set(TRACKED) else IMAGED))
     shard = tuple(1 if dim in ("case", "view") else size for dim, size in zip(array.dims, shape, strict=True))
-    chunk = tuple(1 if dim in ALONE else size for dim, size in zip(array.dims, shard, strict=True))
-    if chunk == shard or np.prod(shard) < 4096:
+    chunk = tuple(1 if dim in alone else size for dim, size in zip(array.dims, shard, strict=True))
+    if "frame" not in dims or chunk == shard or np.prod(shard) < 4096:
         _create(group, array, shape, shard, None, attributes)
     else:
         _create(group, array, shape, chunk, shard, attributes)

@@ -10,12 +10,13 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import zarr
 
 from echotruth.cases import Case, Sweep
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, load
-from echotruth.repository import ledger, schema
+from echotruth.repository import layout, ledger, schema
 from echotruth.repository.array import Array
 from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
 
@@ -134,6 +135,12 @@ class Repository:
             except Exception:  # damaged metadata, which is a fault of its own, fail in many ways
                 continue
         return arrays
+
+    def pack_labels(self, group: str) -> dict[str, list[str]]:
+        """Labels along the dimension of each pack of a group."""
+        coordinates = layout.labels(self.config, [], [])
+        dimensions = [pack.dimension for pack in schema.PACKS.get(group, ())]
+        return {name: np.asarray(coordinates[f"{group}:{name}"]).tolist() for name in dimensions}
 
     def records(self) -> list[JobRecord]:
         """Records that exist, sorted."""

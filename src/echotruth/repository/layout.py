@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,15 +32,13 @@ def sizes(mesh: Mesh) -> dict[str, int]:
         "endo_facet": len(mesh.endo),
         "epi_facet": len(mesh.epi),
         "base_facet": len(mesh.base),
-        "row": 3,
-        "column": 3,
     }
 
 
 def positions(
     config: Config, pixel_centres: Callable[..., tuple[ArrayLike, ArrayLike]], grid: Callable[..., ArrayLike]
 ) -> dict[str, ArrayLike]:
-    """Positions of the pixels and the tracked points of every image size.
+    """Positions of the pixels of every image size, and of the tracked points.
 
     Parameters
     ----------
@@ -53,7 +51,7 @@ def positions(
     Returns
     -------
     dict
-        `group:axial` and `group:lateral`, m.
+        `group:axial` and `group:lateral`, m; the tracked points are the same at every size.
     """
     coordinates: dict[str, ArrayLike] = {}
     centres = {size: tuple(map(np.asarray, pixel_centres(config.bmode, size))) for size in config.bmode.sizes}
@@ -62,14 +60,14 @@ def positions(
     for size, (axial, lateral) in centres.items():
         for stage in ("truth", "bmode"):
             coordinates |= {f"{stage}/{size}:axial": axial, f"{stage}/{size}:lateral": lateral}
-        for stage in ("tracking", "evaluation"):
-            coordinates[f"{stage}/{size}:axial"] = centres[largest][0][points[:, 0, 1]]
-            coordinates[f"{stage}/{size}:lateral"] = centres[largest][1][points[0, :, 0]]
+    for stage in ("tracking", "evaluation"):
+        coordinates[f"{stage}:axial"] = centres[largest][0][points[:, 0, 1]]
+        coordinates[f"{stage}:lateral"] = centres[largest][1][points[0, :, 0]]
     return coordinates
 
 
 def labels(config: Config, rows: list[str], times: ArrayLike, views: list[str] | None = None) -> dict[str, ArrayLike]:
-    """Values of the coordinates that are the same in every group.
+    """Values of the coordinates that are the same in every group, and of the labels of packs.
 
     Parameters
     ----------
@@ -86,12 +84,29 @@ def labels(config: Config, rows: list[str], times: ArrayLike, views: list[str] |
         "view": list(config.views) if views is None else views,
         "frame": np.arange(config.loop.frames),
         "time": times,
+        "size": list(config.bmode.sizes),
         "tracker": list(config.tracking.trackers),
         "layer": layers,
         "region": [0, *layers],
         "aha": np.arange(1, 18),
     }
-    return schema.LABELS | common
+    return schema.LABELS | common | pack_labels(schema.LABELS | common)
+
+
+def pack_labels(coordinates: Mapping[str, ArrayLike]) -> dict[str, ArrayLike]:
+    """Labels and units of the numbers of every pack, by `group:dimension`.
+
+    Parameters
+    ----------
+    coordinates : dict
+        Values of the coordinates of their members.
+    """
+    return {
+        f"{group}:{name}": labels
+        for group, packs in schema.PACKS.items()
+        for pack in packs
+        for name, labels in pack.labels(coordinates).items()
+    }
 
 
 def columns(table: pd.DataFrame, rows: list[str]) -> dict[str, NDArray[Any]]:

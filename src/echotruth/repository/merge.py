@@ -126,17 +126,26 @@ def check_sources(sources: list[Path]) -> dict[Path, Config]:
     Raises
     ------
     MergeError
-        If one is not a repository, or was made before views had a registry.
+        If one is not a repository, or was made when the store had other arrays or views had no registry.
     """
     for source in sources:
         if not (source / "config.yaml").is_file():
             raise MergeError(f"{source}: is not a repository: give the folder that a run made, as out/demo")
         if not (source / "views.txt").is_file():
-            raise MergeError(f"{source}: was made by an earlier version: run it again before it is merged")
+            raise _older(source)
     try:
-        return {source: load(source / "config.yaml") for source in sources}
+        configs = {source: load(source / "config.yaml") for source in sources}
     except ConfigError as error:
         raise MergeError(str(error)) from None
+    for source in sources:
+        repository = Repository(source)
+        if not all((repository.store / path / "zarr.json").is_file() for path in repository.shard_paths):
+            raise _older(source)
+    return configs
+
+
+def _older(source: Path) -> MergeError:
+    return MergeError(f"{source}: was made by an earlier version: run it again before it is merged")
 
 
 def _difference(first: Section, second: Section, prefix: str = "") -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import floor, log2
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,7 +47,12 @@ def of(arrays: tuple[Array, ...], config: Config) -> tuple[Array, ...]:
     return tuple(replace(array, quantum=quantum(array, config)) for array in arrays)
 
 
-def rounded(values: ArrayLike, quantum: float | None) -> NDArray[np.floating]:
+def as_stored(values: ArrayLike, array: Array, config: Config) -> NDArray[Any]:
+    """Values of an array as the store has them: of its type, and rounded."""
+    return rounded(np.asarray(values, dtype=array.dtype), quantum(array, config))
+
+
+def rounded(values: ArrayLike, quantum: float | None) -> NDArray[Any]:
     """Round values to the nearest multiple of a quantum, halves to the even one.
 
     Parameters
@@ -65,5 +70,5 @@ def rounded(values: ArrayLike, quantum: float | None) -> NDArray[np.floating]:
     if quantum is None:
         return values
     # Division and multiplication by a power of two are exact, so that only `rint` rounds. Adding 0 makes -0 to 0.
-    result: NDArray[np.floating] = np.rint(values / values.dtype.type(quantum)) * values.dtype.type(quantum) + 0
+    result: NDArray[Any] = np.rint(values / values.dtype.type(quantum)) * values.dtype.type(quantum) + 0
     return result

@@ -10,7 +10,10 @@ from echotruth.config import Config
 from echotruth.repository import rounding
 from echotruth.repository.array import Array
 from echotruth.repository.array import array as _array
-from echotruth.repository.tracked import EVALUATION, TRACKING
+from echotruth.repository.measured import PHYSIOLOGY, PHYSIOLOGY_PACKS
+from echotruth.repository.packing import Pack
+from echotruth.repository.rounding import STRAIN
+from echotruth.repository.tracked import EVALUATION, EVALUATION_PACKS, TRACKING
 from echotruth.section import unit_of
 
 GEOMETRY = (
@@ -25,9 +28,6 @@ FIBRES = (
     _array("wall_depth", "case node", "float64", "1", "wall depth, 0 at the endocardium and 1 at the epicardium"),
     _array("fibre", "case cell xyz", "float64", "1", "unit vector along the fibres at cell centroids, unloaded"),
     _array("sheet", "case cell xyz", "float64", "1", "unit vector along the sheets at cell centroids, unloaded"),
-    _array("helix_angle", "case cell", "float64", "rad", "helix angle at cell centroids"),
-    _array("transverse_angle", "case cell", "float64", "rad", "transverse angle at cell centroids"),
-    _array("sheet_angle", "case cell", "float64", "rad", "sheet angle at cell centroids"),
     _array("layer", "case cell", "uint8", "1", "transmural layer of the cell centroid, 1 at the endocardium"),
     _array("segment", "case cell", "uint8", "1", "AHA segment of the cell centroid"),
 )
@@ -56,60 +56,17 @@ MECHANICS = (
     _array("residual", "case frame", "float64", "1", "relative residual of force, cavity volume and cell volume"),
 )
 
-_STRAIN = "case frame cell strain_component"
-_FIBRE_STRAIN = "case frame cell fibre_component"
 KINEMATICS = (
-    _array("deformation_gradient", "case frame cell row column", "float32", "1", "F at cell centroids, from unloaded"),
-    _array("strain", _STRAIN, "float32", "1", "strain from ED along wall axes at cell centroids"),
-    _array("strain_unloaded", _STRAIN, "float32", "1", "strain from unloaded along wall axes at cell centroids"),
-    _array("fibre_strain", _FIBRE_STRAIN, "float32", "1", "strain from ED along fibre axes at cell centroids"),
-    _array("fibre_strain_unloaded", _FIBRE_STRAIN, "float32", "1", "strain from unloaded along fibre axes"),
+    _array(
+        *("strain", "case frame cell strain_component", "float32", "1"),
+        "strain from ED along wall axes at cell centroids",
+        STRAIN,
+    ),
     _array("strain_mean", "case frame strain_component", "float64", "1", "wall mean of the strain from ED"),
     _array("strain_sd", "case frame strain_component", "float64", "1", "standard deviation of the strain from ED"),
     _array("layer_strain", "case frame layer strain_component", "float64", "1", "mean strain from ED of each layer"),
     _array("volume_ratio_min", "case frame", "float64", "1", "smallest det F of all quadrature points"),
     _array("volume_ratio_mean", "case frame", "float64", "1", "wall mean of det F"),
-)
-
-_CCW = "counter-clockwise seen from the apex"
-_IVC = "at the end of isovolumic contraction"
-_MEAN_STRAIN = "case strain_component"
-PHYSIOLOGY = (
-    _array("rotation_base", "case frame", "float64", "rad", f"rotation of the basal slice since ED, {_CCW}"),
-    _array("rotation_apex", "case frame", "float64", "rad", f"rotation of the apical slice since ED, {_CCW}"),
-    _array("twist", "case frame", "float64", "rad", f"rotation of apex less base since ED, {_CCW}"),
-    _array("twist_ivc", "case", "float64", "rad", f"twist {_IVC}"),
-    _array("twist_es", "case", "float64", "rad", "twist at ES"),
-    _array(
-        "twist_peak", "case", "float64", "rad", "twist of largest magnitude from ED to the opening of the mitral valve"
-    ),
-    _array("twist_peak_delay", "case", "float64", "s", "time of the peak of twist less that of ES"),
-    _array("strain_ivc", _MEAN_STRAIN, "float64", "1", f"wall mean of the strain from ED {_IVC}"),
-    _array("strain_es", _MEAN_STRAIN, "float64", "1", "wall mean of the strain from ED at ES"),
-    _array(
-        "layer_strain_ivc", "case layer strain_component", "float64", "1", f"mean strain from ED of each layer {_IVC}"
-    ),
-    _array("layer_strain_es", "case layer strain_component", "float64", "1", "mean strain from ED of each layer at ES"),
-    _array("apex_motion", "case frame", "float64", "m", "displacement along z of the epicardial apex since ED"),
-    _array(
-        "base_motion", "case frame", "float64", "m", "displacement along z of the base since ED, mean over its area"
-    ),
-    _array("wall_thickening", "case", "float64", "1", "relative increase of the wall thickness in the mid slice to ES"),
-    _array("gls", "case", "float64", "1", "global longitudinal strain, that of the length of the mid-wall line at ES"),
-    _array("ivc_time", "case", "float64", "s", "duration of isovolumic contraction"),
-    _array("ejection_time", "case", "float64", "s", "duration of ejection"),
-    _array("ivr_time", "case", "float64", "s", "duration of isovolumic relaxation"),
-    _array("tei_index", "case", "float64", "1", "isovolumic times over the ejection time"),
-    _array("dpdt_max", "case", "float64", "Pa s-1", "largest rate of the cavity pressure"),
-    _array("dpdt_min", "case", "float64", "Pa s-1", "smallest rate of the cavity pressure"),
-    _array("tau", "case", "float64", "s", "time constant of the pressure in relaxation, with the asymptote zero"),
-    _array("longitudinal_strain", "case", "float64", "1", "wall mean of the longitudinal strain from ED at ES"),
-    _array("circumferential_strain", "case", "float64", "1", "wall mean of the circumferential strain from ED at ES"),
-    _array("ejection_fraction", "case", "float64", "1", "ejection fraction"),
-    _array("volume_ratio_min", "case", "float64", "1", "smallest det F of all quadrature points and frames"),
-    _array("loop_error", "case", "float64", "1", "largest relative error of the prescribed pressure or volume"),
-    _array("tension_min", "case", "float64", "Pa", "smallest active tension of all frames"),
-    _array("tension_es", "case", "float64", "Pa", "active tension at ES"),
 )
 
 PHANTOM = (
@@ -155,6 +112,7 @@ COORDINATES = (
     _array("view", "view", "string", "1", "imaging plane"),
     _array("frame", "frame", "int32", "1", "frame of the cycle, 0 at end-diastole"),
     _array("time", "case frame", "float64", "s", "time since end-diastole"),
+    _array("size", "size", "int32", "1", "pixels along a side of the image"),
     _array("tracker", "tracker", "string", "1", "tracker"),
     _array("axial", "axial", "float64", "m", "depth below the array"),
     _array("lateral", "lateral", "float64", "m", "lateral position"),
@@ -179,6 +137,14 @@ COORDINATES = (
     _array("receiver", "receiver", "float64", "m", "lateral position of the receiving element"),
     _array("polar", "polar", "string", "1", "radial, tangential (long axis: transverse, longitudinal)"),
     _array("component", "component", "string", "1", "polar component, or the whole vector"),
+    *(
+        coordinate
+        for dim in ("scalar", "course", "limit", "score")
+        for coordinate in (
+            _array(dim, dim, "string", "1", "name of the array that the number belongs to, and its place there"),
+            _array(f"{dim}_units", dim, "string", "1", "unit of the number"),
+        )
+    ),
 )
 
 LABELS: dict[str, tuple[str, ...]] = {
@@ -204,14 +170,31 @@ STAGES = {
     "kinematics": KINEMATICS,
     "physiology": PHYSIOLOGY,
     "phantom": PHANTOM,
+    "tracking": TRACKING,
+    "evaluation": EVALUATION,
 }
 """Stages whose arrays exist once."""
 
-SIZED = {"truth": TRUTH, "bmode": BMODE, "tracking": TRACKING, "evaluation": EVALUATION}
+PACKS: dict[str, tuple[Pack, ...]] = {"physiology": PHYSIOLOGY_PACKS, "evaluation": EVALUATION_PACKS}
+"""Arrays of a stage that hold several others."""
+
+SIZED = {"truth": TRUTH, "bmode": BMODE}
 """Stages whose arrays exist once per image size, in a group named after it."""
 
 OPTIONAL = {"rf": RF}
 """Stages whose arrays exist only as `rf.keep` requests."""
+
+DERIVED = (
+    _array("deformation_gradient", "case frame cell row column", "float64", "1", "F at cell centroids, from unloaded"),
+    _array("strain", "case frame cell strain_component", "float64", "1", "strain from ED along wall axes"),
+    _array("strain_unloaded", "case frame cell strain_component", "float64", "1", "strain from unloaded, wall axes"),
+    _array("fibre_strain", "case frame cell fibre_component", "float64", "1", "strain from ED along fibre axes"),
+    _array("fibre_strain_unloaded", "case frame cell fibre_component", "float64", "1", "the same from unloaded"),
+    _array("helix_angle", "case cell", "float64", "rad", "helix angle at cell centroids"),
+    _array("transverse_angle", "case cell", "float64", "rad", "transverse angle at cell centroids"),
+    _array("sheet_angle", "case cell", "float64", "rad", "sheet angle at cell centroids"),
+)
+"""Arrays that follow from those of a heart; :func:`echotruth.kinematics` computes them."""
 
 ALL = STAGES | OPTIONAL | SIZED
 
@@ -272,6 +255,12 @@ def written_by(stage: str, config: Config) -> list[str]:
     if stage in SIZED:
         return [f"{stage}/{size}" for size in config.bmode.sizes]
     return [stage] if stage in STAGES or (stage == "rf" and config.rf.keep) else []
+
+
+def named(stage: str) -> tuple[Array, ...]:
+    """Arrays of a stage by the names that jobs and readers use: the members of a pack in place of the pack."""
+    members = {pack.array.name: pack.members for pack in PACKS.get(stage, ())}
+    return tuple(one for array in ALL[stage] for one in members.get(array.name, (array,)))
 
 
 def coordinates(arrays: tuple[Array, ...]) -> tuple[Array, ...]:

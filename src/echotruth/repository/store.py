@@ -15,7 +15,7 @@ import numpy as np
 import zarr
 from numpy.typing import ArrayLike, NDArray
 
-from echotruth.repository import durable, hierarchy, ledger, schema
+from echotruth.repository import durable, hierarchy, ledger, packing, schema
 from echotruth.repository.hierarchy import ROOT, Document, Files
 from echotruth.repository.rounding import rounded
 from echotruth.repository.schema import Array
@@ -86,14 +86,14 @@ class Store:
         group : str
             As "bmode/512".
         values : dict
-            Values for this case (and view), by the name of the array.
+            Values for this case (and view), by the name of the array; of a pack, all its members or the pack itself.
         *row : int
             Row of the case, and index of the view.
         """
         arrays = self._open(group, "r+")
         by_name = {array.name: array for array in schema_of(group)}
         written: dict[Path, None] = {}
-        for name, value in values.items():
+        for name, value in packing.pack(packs_of(group), values).items():
             array, shard = arrays[name], self._shard(group, by_name[name], row)
             _remove_drafts(shard)
             array[row] = rounded(np.asarray(value, dtype=array.dtype), cast("float | None", array.attrs.get("quantum")))
@@ -102,14 +102,28 @@ class Store:
         durable.sync(*written)
 
     def read(self, group: str, *row: int, names: tuple[str, ...] | None = None) -> dict[str, NDArray[Any]]:
-        """Arrays of a group for one case (and view); a missing, empty or damaged shard is an error."""
+        """Arrays of a group for one case (and view); a missing, empty or damaged shard is an error.
+
+        Parameters
+        ----------
+        group : str
+            As "bmode/512".
+        *row : int
+            Row of the case, and index of the view.
+        names : tuple of str, optional
+            Names of arrays and of members of packs. Default: all.
+        """
         opened = self._open(group, "r")
-        by_name = {array.name: array for array in schema_of(group)}
+        by_name, packs = {array.name: array for array in schema_of(group)}, packs_of(group)
+        holder = {name: pack.array.name for pack in packs for name in pack.names}
         # Only a part of the RF may be stored.
-        arrays = [by_name[name] for name in names or by_name if names or name in opened]
+        stored = [name for name in by_name if name in opened] if names is None else names
+        arrays = [by_name[name] for name in dict.fromkeys(holder.get(name, name) for name in stored)]
         for array in arrays:
             self._require_written(group, array, row[: array.leading])
-        return {array.name: np.asarray(opened[array.name][row[: array.leading]]) for array in arrays}
+        values = {array.name: np.asarray(opened[array.name][row[: array.leading]]) for array in arrays}
+        found = packing.unpack(packs, values, cast(Any, opened).attrs["labels"]) if packs else values
+        return found if names is None else {name: found[name] for name in names}
 
     def labels(self, dimension: str) -> list[str]:
         """Labels of `case` or `view` in the order of their rows, from the table of cases or the phantoms.
@@ -215,6 +229,11 @@ def schema_of(group: str) -> tuple[Array, ...]:
     """Arrays of a group, as "bmode/512"."""
     stage = group.partition("/")[0]
     return schema.ALL[stage]
+
+
+def packs_of(group: str) -> tuple[packing.Pack, ...]:
+    """Packs of a group, as "evaluation"."""
+    return schema.PACKS.get(group.partition("/")[0], ())
 
 
 def _nodes(folder: Path) -> list[Path]:

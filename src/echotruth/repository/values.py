@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.config import Config
-from echotruth.repository import schema
+from echotruth.repository import rounding, schema
 
 Arrays = dict[str, NDArray[Any]]
 """Arrays of a group for one case (and view), by name; those with frames may be a part of them."""
@@ -71,7 +71,7 @@ RANGES: dict[str, dict[str, Range]] = {
     },
     "kinematics": {"volume_ratio_min": POSITIVE, "volume_ratio_mean": POSITIVE, "strain_sd": NOT_NEGATIVE},
     # A measure that a heart does not have is not a number.
-    "physiology": {array.name: ANY for array in schema.PHYSIOLOGY}
+    "physiology": {array.name: ANY for array in schema.named("physiology")}
     | {"volume_ratio_min": POSITIVE, "loop_error": NOT_NEGATIVE, "longitudinal_strain": NUMBER},
     "phantom": {"scatterer_count": NOT_NEGATIVE, "centre": ANY},
     "truth": {
@@ -83,10 +83,9 @@ RANGES: dict[str, dict[str, Range]] = {
     },
     "rf": {"channels_step": POSITIVE},
     "tracking": {"displacement": ANY, "quality": Range(-COMPLEMENT, 1 + COMPLEMENT)},
-    "evaluation": {array.name: ANY for array in schema.SIZED["evaluation"]}
-    | {array.name: MAGNITUDE for array in schema.SIZED["evaluation"] if "rms" in array.name or "nrmse" in array.name}
+    "evaluation": {array.name: ANY for array in schema.named("evaluation")}
+    | {array.name: MAGNITUDE for array in schema.named("evaluation") if "rms" in array.name or "nrmse" in array.name}
     | {
-        "segment": SEGMENT,
         "coverage": Range(0, 1, finite=True),
         "strain_correlation": Range(-1 - COMPLEMENT, 1 + COMPLEMENT),
         "through_plane_correlation": Range(-1 - COMPLEMENT, 1 + COMPLEMENT),
@@ -96,13 +95,13 @@ RANGES: dict[str, dict[str, Range]] = {
 }
 """Arrays that may be other than any number, by stage; those without an entry must be numbers."""
 
-LOWEST_STRAIN = -0.5 - 1e-5
-"""E = (F^T F - I) / 2 along an axis is above -1/2, because F^T F is positive; with the rounding of single precision."""
+LOWEST_STRAIN = -0.5 - rounding.STRAIN
+"""E = (F^T F - I) / 2 along an axis is above -1/2, because F^T F is positive; with the rounding of the store."""
 
 NORMAL_STRAINS = {
-    "kinematics": {"strain": 3, "strain_unloaded": 3, "fibre_strain": 3, "fibre_strain_unloaded": 3},
+    "kinematics": {"strain": 3},
     "truth": {"strain": 3},
-    "evaluation": {"true_strain": 2, "tracked_strain": 2},
+    "evaluation": {"true_strain": 2},
 }
 """Number of leading components that are strains along an axis."""
 
@@ -115,7 +114,8 @@ def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[t
     group : str
         As "truth/512".
     arrays : dict of ndarray
-        All arrays of the group for one case (and view); of those with frames, frames from `first` on.
+        All arrays of the group for one case (and view), the members of packs among them; of those with frames, frames
+        from `first` on.
     first : int
         Number of their first frame.
     config : Config
@@ -183,9 +183,6 @@ def _mechanics(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str
 
 
 def _kinematics(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
-    determinant = np.linalg.det(arrays["deformation_gradient"])
-    if not (determinant > 0).all():
-        yield "deformation_gradient", f"has det F of {determinant.min():g}, but tissue cannot be turned inside out"
     if first == 0 and np.abs(arrays["strain"][0]).max(initial=0) > COMPLEMENT:
         yield "strain", "is not 0 at end-diastole, from which it is taken"
 
@@ -211,12 +208,10 @@ def _truth(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, st
 
 
 def _evaluation(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
-    wall = arrays["layer"] > 0
-    for name in ("true_displacement", "through_plane"):
-        known = np.isfinite(arrays[name])
-        if bool(((known.all(-1) if name == "true_displacement" else known) != wall).any()):
-            yield name, "is not a number at a point of the wall, or is one outside"
-        yield from _still_at_ed(name, arrays, first)
+    wall = np.isfinite(arrays["wall_axes"]).all((-2, -1))
+    if bool((np.isfinite(arrays["true_displacement"]).all(-1) != wall).any()):
+        yield "true_displacement", "is not a number at a point of the wall, or is one outside"
+    yield from _still_at_ed("true_displacement", arrays, first)
     if not _is_one(np.linalg.norm(arrays["wall_axes"][wall], axis=-1)):
         yield "wall_axes", "has axes whose length is not 1 in the wall"
 

@@ -21,11 +21,11 @@ from echotruth.cases import Case, find_case
 from echotruth.config import View
 from echotruth.config.loading import load
 from echotruth.heart import Heart
-from echotruth.repository import ledger, schema
+from echotruth.repository import ledger, packing, schema
 from echotruth.repository.checksums import ChecksumError, checksums, verify
 from echotruth.repository.ledger import GATES, record_path
 from echotruth.repository.provenance import code_version, settings_version
-from echotruth.repository.store import NotWritten, Store, schema_of
+from echotruth.repository.store import NotWritten, Store, packs_of, schema_of
 from echotruth.seeds import generator
 from echotruth.workflow import instructions, lease
 from echotruth.workflow.assignment import add_options, handed_case
@@ -191,12 +191,13 @@ class Job:
         files: list[Path] = []
         for group, values in result.items():
             # Coordinates, such as the times of a motion, belong to no job: they stand since the arrays were laid out.
-            own = {array.name for array in schema_of(group)} & values.keys()
+            stored = packing.pack(packs_of(group), values)
+            own = {array.name for array in schema_of(group)} & stored.keys()
             for file in self.store.files(group, *self.index):
                 # Zarr would read a damaged shard before it replaces all of its chunks.
                 if file.relative_to(self.store.path / group).parts[0] in own:
                     file.unlink()
-            self.store.write(group, {name: values[name] for name in own}, *self.index)
+            self.store.write(group, {name: stored[name] for name in own}, *self.index)
             files += self.store.files(group, *self.index)
         sha256 = checksums(files, self.store.path)
         spent = cost.stop()

@@ -1,7 +1,7 @@
 """Arrays of trackers that no longer fit the configuration, set aside until their results were taken over.
 
-The number of trackers is a length of their arrays. If it changes, the arrays are created anew and empty, but the
-results of trackers that stay the same need not be made anew: jobs find them here.
+The numbers of trackers and of image sizes are lengths of their arrays. If one changes, the arrays are created anew and
+empty, but the results of trackers at sizes that stay the same need not be made anew: jobs find them here.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ FOLDER = "scratch/superseded"
 
 
 def set_aside(folder: Path, config: Config) -> None:
-    """Set aside the arrays whose number of trackers is not that of a configuration.
+    """Set aside the arrays whose number of trackers or of image sizes is not that of a configuration.
 
     Parameters
     ----------
@@ -27,13 +27,13 @@ def set_aside(folder: Path, config: Config) -> None:
         The configuration for which arrays are about to be laid out.
     """
     generation = folder / FOLDER / str(len(list(folder.glob(f"{FOLDER}/*"))))
-    for size in config.bmode.sizes:
-        for array in TRACKING:
-            name = f"tracking/{size}/{array.name}"
-            stored = folder / f"{config.name}.zarr" / name
-            if _length(stored, "tracker") not in (None, len(config.tracking.trackers)):
-                (generation / name).parent.mkdir(parents=True, exist_ok=True)
-                stored.rename(generation / name)
+    wanted = {"size": len(config.bmode.sizes), "tracker": len(config.tracking.trackers)}
+    for array in TRACKING:
+        name = f"tracking/{array.name}"
+        stored = folder / f"{config.name}.zarr" / name
+        if any(_length(stored, dimension) not in (None, length) for dimension, length in wanted.items()):
+            (generation / name).parent.mkdir(parents=True, exist_ok=True)
+            stored.rename(generation / name)
 
 
 def roots(folder: Path, store: Path) -> Iterator[Path]:

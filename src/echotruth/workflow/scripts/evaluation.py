@@ -8,13 +8,10 @@ from echotruth.workflow.job import Job, Result, main
 
 def work(job: Job) -> Result:
     truth = ground_truth(job)
-    result: dict[str, dict[str, np.ndarray]] = {}
-    for size in job.case.config.bmode.sizes:
-        tracked = job.read(f"tracking/{size}", "displacement")["displacement"]
-        scores = [score(displacement, truth) for displacement in tracked]
-        stacked = {name: np.stack([arrays[name] for arrays in scores]) for name in scores[0]}
-        result[f"evaluation/{size}"] = truth.arrays | stacked
-    return result
+    tracked = job.read("tracking", "displacement")["displacement"]
+    scores = [[score(displacement, truth) for displacement in of_size] for of_size in tracked]
+    stacked = {name: np.array([[found[name] for found in of_size] for of_size in scores]) for name in scores[0][0]}
+    return {"evaluation": truth.arrays | stacked}
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import logging
 import numpy as np
 
 from echotruth.evaluation.clip import Clip, clips
-from echotruth.evaluation.pieces import Piece, Pieces, known
+from echotruth.evaluation.pieces import ARRAYS, Piece, Pieces, known
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job, Result, main
@@ -13,18 +13,17 @@ from echotruth.workflow.job import Job, Result, main
 
 def work(job: Job) -> Result:
     trackers, earlier = job.case.config.tracking.trackers, Pieces(job)
-    result: dict[str, dict[str, np.ndarray]] = {}
     pieces: dict[int, dict[str, Piece]] = {}
     for size, clip in clips(job).items():
-        pieces[size] = made = {name: _piece(job, name, clip, earlier) for name in trackers}
-        displacement = np.stack([piece.displacement for piece in made.values()])
-        result[f"tracking/{size}"] = {
-            "displacement": displacement,
-            "quality": np.stack([piece.quality for piece in made.values()]),
-        }
+        pieces[size] = {name: _piece(job, name, clip, earlier) for name in trackers}
         logging.getLogger("echotruth").info("%d px", size)
     job.remember(pieces=known(pieces), index=list(job.index))
-    return result
+    return {"tracking": {name: _stacked(pieces, name) for name in ARRAYS}}
+
+
+def _stacked(pieces: dict[int, dict[str, Piece]], name: str) -> np.ndarray:
+    """An array of all pieces, (size, tracker, ...)."""
+    return np.stack([np.stack([getattr(piece, name) for piece in made.values()]) for made in pieces.values()])
 
 
 def _piece(job: Job, name: str, clip: Clip, earlier: Pieces) -> Piece:

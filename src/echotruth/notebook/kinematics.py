@@ -1,0 +1,50 @@
+"""Deformation and strain of a heart, which the repository does not hold since its mesh and its motion give them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echotruth.heart import Heart
+from echotruth.loop.cycle import read_loop
+from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
+from echotruth.repository import schema
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def kinematics(heart: Heart) -> xr.Dataset:
+    """Compute deformation, strain and fibre angles at the centroids of the cells of a heart.
+
+    Parameters
+    ----------
+    heart : Heart
+        As :func:`echotruth.beat` or :func:`echotruth.load_heart` returns it.
+
+    Returns
+    -------
+    Dataset
+        deformation_gradient (frame, cell, row, column) from the unloaded state; strain and strain_unloaded (frame,
+        cell, strain_component) along the wall axes, from end-diastole and from the unloaded state; fibre_strain and
+        fibre_strain_unloaded (frame, cell, fibre_component) along the fibre axes; and helix_angle, transverse_angle and
+        sheet_angle (cell), rad (docs/conventions.md).
+
+    Raises
+    ------
+    ValueError
+        If the heart was not made by echotruth.beat or echotruth.load_heart.
+    """
+    import xarray as xr
+
+    if heart.config is None or not {"geometry", "fibres"} <= set(heart.arrays):
+        raise ValueError("The heart has no fibres: make it by echotruth.beat or echotruth.load_heart.")
+    values = centroid_kinematics(heart) | fibre_angles(heart)
+    variables = {
+        array.name: (array.dims[1:], values[array.name], {"units": array.units, "long_name": array.long_name})
+        for array in schema.DERIVED
+    }
+    labels = {name: list(schema.LABELS[name]) for name in ("strain_component", "fibre_component")}
+    times = ("frame", read_loop(heart.config.loop).time, {"units": "s"})
+    return xr.Dataset(variables, {**labels, "frame": np.arange(len(heart.displacement)), "time": times})
