@@ -99,6 +99,7 @@ def test_selection_is_unpacked_as_far_as_it_goes(written):
         data = tree["evaluation"].to_dataset()
         one = unpacked(data.sel(view="long_axis", size=32, tracker="one").isel(case=0), "strain_rms", "wall_axes")
         assert set(one.data_vars) == {"strain_rms", "wall_axes"}
+        assert "time" not in one.coords and one.coords["tracker"] == "one"
         assert one.strain_rms.dims == ("reference", "region", "wall_component")
         np.testing.assert_array_equal(one.strain_rms, values["evaluation"]["strain_rms"][1, 0])
         with pytest.raises(ValueError, match=r"^nrmse: the selection has a part of its numbers"):

@@ -34,6 +34,8 @@ def unpack(data: xr.Dataset, *names: str) -> xr.Dataset:
     ValueError
         If there is no such array, or the selection has a part of its numbers only.
     """
+    import xarray as xr
+
     found: dict[str, xr.DataArray] = {}
     packs = _packs(data)
     for pack in packs:
@@ -50,7 +52,7 @@ def unpack(data: xr.Dataset, *names: str) -> xr.Dataset:
     for name in names:
         if name not in found:
             raise ValueError(f"{name} is not an array of this group: see docs/schema.md")
-    return data.drop_dims([pack.dimension for pack in packs]).drop_vars(plain).assign(found)
+    return xr.Dataset(found, attrs=data.attrs)
 
 
 def _packs(data: xr.Dataset) -> list[Pack]:
