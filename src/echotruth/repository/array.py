@@ -20,6 +20,9 @@ class Array:
         SI, as UDUNITS writes them; "1" for dimensionless numbers.
     long_name : str
         Content, for readers and plots.
+    quantum : float or "pixel/256", optional
+        Stored values are multiples of it, a power of two in the unit of the array, or the power of two that
+        :func:`echotruth.repository.rounding.length_quantum` gives; None if they are stored as they are computed.
     """
 
     name: str
@@ -27,6 +30,7 @@ class Array:
     dtype: str
     units: str
     long_name: str
+    quantum: float | str | None = None
 
     @property
     def leading(self) -> int:
@@ -44,6 +48,13 @@ class Array:
         return fills.get(self.dtype[0], 0)
 
 
-def array(name: str, dims: str, dtype: str, units: str, long_name: str) -> Array:
+def array(
+    name: str,
+    dims: str,
+    dtype: str,
+    units: str,
+    long_name: str,
+    quantum: float | str | None = None,
+) -> Array:
     """Description of an array whose dimensions are given as one string."""
-    return Array(name, tuple(dims.split()), dtype, units, long_name)
+    return Array(name, tuple(dims.split()), dtype, units, long_name, quantum)

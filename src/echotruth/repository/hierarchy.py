@@ -4,7 +4,8 @@ It is what belongs to no job. It is made in memory as a whole, so that the same 
 whatever was on disk before, and a file is written only if it differs.
 
 Every array of the jobs is rectangular over (case, view, ...). A shard holds all that one job writes of one array, so
-that parallel jobs never touch the same file, and a clip is one file. Coordinates and columns of the table are one chunk
+that parallel jobs never touch the same file, and a clip is one file. In it, a chunk is one frame of one component, so
+that one component can be read alone and its bytes compress together. Coordinates and columns of the table are one chunk
 each. Chunks carry a crc32c checksum: a flipped bit is an error, not a wrong number.
 """
 
@@ -31,6 +32,9 @@ Document = dict[str, Any]
 
 ROOT = "zarr.json"
 """Path of the metadata of the root, which hold those of all groups and arrays once more."""
+
+ALONE = ("frame", "vector", "strain_component", "plane", "wall_component", "label", "to")
+"""Dimensions along which a chunk of an array of the jobs holds one element: frames and components."""
 
 # A shard that holds only fill values is a result too and must exist on disk.
 zarr.config.set({"array.write_empty_chunks": True})
@@ -143,12 +147,12 @@ def _labels(path: str, coordinates: tuple[Array, ...], values: dict[str, NDArray
 
 
 def _create_sharded(group: zarr.Group, array: Array, shape: tuple[int, ...], coordinates: tuple[Array, ...]) -> None:
-    """Create an array of the jobs: one shard a job, one chunk a frame."""
+    """Create an array of the jobs: one shard a job, one chunk a frame and component."""
     dims = set(array.dims)
     auxiliary = [other.name for other in coordinates if other.dims != (other.name,) and set(other.dims) <= dims]
     attributes = {"coordinates": " ".join(auxiliary)} if auxiliary else {}
     shard = tuple(1 if dim in ("case", "view") else size for dim, size in zip(array.dims, shape, strict=True))
-    chunk = tuple(1 if dim == "frame" else size for dim, size in zip(array.dims, shard, strict=True))
+    chunk = tuple(1 if dim in ALONE else size for dim, size in zip(array.dims, shard, strict=True))
     if chunk == shard or np.prod(shard) < 4096:
         _create(group, array, shape, shard, None, attributes)
     else:
@@ -165,16 +169,25 @@ def _create(
 ) -> zarr.Array[Any]:
     """Create an array; without shapes of chunk and shard, in one chunk."""
     about: Document = {"units": array.units, "long_name": array.long_name} | (attributes or {})
-    image = array.dtype == "uint8" and array.dims[-2:] == ("axial", "lateral")
-    compressor = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle") if image else ZstdCodec(level=3)
+    if array.quantum is not None:
+        about["quantum"] = array.quantum
     return group.create_array(
         array.name,
         shape=shape,
         dtype=str if array.dtype == "string" else array.dtype,
         shards=shard,
         chunks=chunk or tuple(max(size, 1) for size in shape),
-        compressors=[compressor, Crc32cCodec()],
+        compressors=[_compressor(array), Crc32cCodec()],
         fill_value=array.fill,
         dimension_names=array.dims,
         attributes=about,
     )
+
+
+def _compressor(array: Array) -> BloscCodec | ZstdCodec:
+    """Compressor that suits the content: bits of images side by side, bytes of numbers, text as it is."""
+    if array.dtype == "uint8" and array.dims[-2:] == ("axial", "lateral"):
+        return BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
+    if array.dtype in ("string", "bool", "uint8"):
+        return ZstdCodec(level=3)
+    return BloscCodec(cname="zstd", clevel=5, shuffle="shuffle")

@@ -7,6 +7,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from echotruth.config import Config
+from echotruth.repository import rounding
 from echotruth.repository.array import Array
 from echotruth.repository.array import array as _array
 from echotruth.repository.tracked import EVALUATION, TRACKING
@@ -252,9 +253,10 @@ _UNITS = {
 
 
 def groups(config: Config) -> dict[str, tuple[Array, ...]]:
-    """Arrays of every group, without coordinates, by the path of the group."""
+    """Arrays of every group, without coordinates, by the path of the group; each quantum is a number."""
     sized = {f"{stage}/{size}": arrays for stage, arrays in SIZED.items() for size in config.bmode.sizes}
-    return {"cases": CASES} | STAGES | sized | ({"rf": rf_arrays(config)} if config.rf.keep else {})
+    every = {"cases": CASES} | STAGES | sized | ({"rf": rf_arrays(config)} if config.rf.keep else {})
+    return {path: rounding.of(arrays, config) for path, arrays in every.items()}
 
 
 def rf_arrays(config: Config) -> tuple[Array, ...]:

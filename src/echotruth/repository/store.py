@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from echotruth.repository import durable, hierarchy, ledger, schema
 from echotruth.repository.hierarchy import ROOT, Document, Files
+from echotruth.repository.rounding import rounded
 from echotruth.repository.schema import Array
 
 Values = dict[str, ArrayLike]
@@ -78,7 +79,7 @@ class Store:
         self._commit(_checksums(wanted))
 
     def write(self, group: str, values: Values, *row: int) -> None:
-        """Write the shards of one job; they are on disk when this returns.
+        """Write the shards of one job, rounded to the quantum of each array; they are on disk when this returns.
 
         Parameters
         ----------
@@ -95,7 +96,7 @@ class Store:
         for name, value in values.items():
             array, shard = arrays[name], self._shard(group, by_name[name], row)
             _remove_drafts(shard)
-            array[row] = np.asarray(value, dtype=array.dtype)
+            array[row] = rounded(np.asarray(value, dtype=array.dtype), cast("float | None", array.attrs.get("quantum")))
             # The name of a file is in its folder, and that of the folder in the one above.
             written |= dict.fromkeys([shard, *shard.parents[: len(array.shape) + 1]])
         durable.sync(*written)

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from echotruth.repository.array import array
+from echotruth.repository.rounding import LENGTH, QUALITY
 
 TRACKING = (
     array(
-        "displacement", "case view tracker frame axial lateral plane", "float32", "m", "tracked displacement from ED"
+        *("displacement", "case view tracker frame axial lateral plane", "float32", "m"),
+        "tracked displacement from ED",
+        LENGTH,
     ),
-    array("quality", "case view tracker frame axial lateral", "float32", "1", "confidence of the tracker, 0 to 1"),
+    array(
+        *("quality", "case view tracker frame axial lateral", "float32", "1"),
+        "confidence of the tracker, 0 to 1",
+        QUALITY,
+    ),
 )
 
 _POINT = "case view frame axial lateral"

@@ -1,0 +1,69 @@
+"""Rounding of stored numbers to a multiple of a power of two, their quantum.
+
+The bits below the quantum are zero, and so take next to no place once they are compressed. The numbers are ordinary
+floating-point numbers, which every reader reads; rounding moves each by half its quantum at most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import floor, log2
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from echotruth.config import Config
+from echotruth.repository.array import Array
+
+LENGTH = "pixel/256"
+"""Quantum of lengths in the image: the largest power of two, in metres, not above 1/256 pixel of the largest image."""
+
+STRAIN = 2.0**-12
+WALL_DEPTH = 2.0**-10
+QUALITY = 2.0**-8
+
+
+def quantum(array: Array, config: Config) -> float | None:
+    """Quantum of an array, in its unit; None if it is stored as it is computed.
+
+    Parameters
+    ----------
+    array : Array
+    config : Config
+        Configuration of the repository.
+    """
+    return length_quantum(config) if array.quantum == LENGTH else cast("float | None", array.quantum)
+
+
+def length_quantum(config: Config) -> float:
+    """Largest power of two that is not above 1/256 of the pixel of the largest image, m."""
+    pixel = config.bmode.si().field_of_view / max(config.bmode.sizes)
+    return float(2.0 ** floor(log2(pixel / 256)))
+
+
+def of(arrays: tuple[Array, ...], config: Config) -> tuple[Array, ...]:
+    """Arrays with each quantum as a number."""
+    return tuple(replace(array, quantum=quantum(array, config)) for array in arrays)
+
+
+def rounded(values: ArrayLike, quantum: float | None) -> NDArray[np.floating]:
+    """Round values to the nearest multiple of a quantum, halves to the even one.
+
+    Parameters
+    ----------
+    values : array_like of floating-point numbers
+    quantum : float or None
+        A power of two, in the unit of the values; None leaves them as they are.
+
+    Returns
+    -------
+    ndarray of the same shape and type
+        Without negative zeros; what is not finite stays so.
+    """
+    values = np.asarray(values)
+    if quantum is None:
+        return values
+    # Division and multiplication by a power of two are exact, so that only `rint` rounds. Adding 0 makes -0 to 0.
+    result: NDArray[np.floating] = np.rint(values / values.dtype.type(quantum)) * values.dtype.type(quantum) + 0
+    return result
