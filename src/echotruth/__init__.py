@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from echotruth import learning
     from echotruth.cases import expand
     from echotruth.config import Config, Probe, Rf, View
     from echotruth.config.building import configure
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from echotruth.imaging.beamforming.scanner import Scanner
     from echotruth.imaging.rf.full_matrix import FullMatrix
     from echotruth.notebook.datasets import heart_dataset
+    from echotruth.notebook.point_tracks import point_tracks
     from echotruth.notebook.repositories import load_clip, load_heart, open
     from echotruth.notebook.simulation import beat, evaluate, image, track
     from echotruth.tracking.failure import TrackerFailed
@@ -41,9 +43,11 @@ __all__ = [
     "expand",
     "heart_dataset",
     "image",
+    "learning",
     "load_clip",
     "load_heart",
     "open",
+    "point_tracks",
     "track",
 ]
 
@@ -56,6 +60,7 @@ _ORIGIN = {
     "imaging.beamforming.scanner": ("Scanner",),
     "imaging.rf.full_matrix": ("FullMatrix",),
     "notebook.datasets": ("heart_dataset",),
+    "notebook.point_tracks": ("point_tracks",),
     "notebook.repositories": ("load_clip", "load_heart", "open"),
     "notebook.simulation": ("beat", "evaluate", "image", "track"),
     "tracking.failure": ("TrackerFailed",),
@@ -64,6 +69,8 @@ _ORIGIN = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "learning":
+        return import_module("echotruth.learning")
     for module, names in _ORIGIN.items():
         if name in names:
             return getattr(import_module(f"echotruth.{module}"), name)
