@@ -154,9 +154,9 @@ class Parts:
 
     def rf(self) -> float:
         scanner = self._sequence.scanner
-        position, amplitude = self._sequence.medium(self._sequence.scatterers())(0)
+        position, amplitude, exponent = self._sequence.medium(self._sequence.scatterers())(0)
         even = np.random.default_rng(0).uniform(position.min(0), position.max(0), position.shape)
-        scatterers = validate_scatterers(even, amplitude)
+        scatterers = validate_scatterers(even, amplitude, exponent)
         matrix = scanner.matrix(*scatterers)
         return self._frames * (timed(lambda: scanner.matrix(*scatterers)) + timed(lambda: scanner.beamform(matrix)))
 

@@ -22,6 +22,7 @@ from echotruth.evaluation.clip import Clip, grid_points
 from echotruth.evaluation.scoring import ground_truth, score
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import bmode_clip
+from echotruth.imaging.labels import unpack
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
@@ -65,7 +66,7 @@ def errors(job: Job, images: dict[int, np.ndarray], tracker: str) -> list[float]
     """NRMSE of a tracker at ES at every size, %."""
     truth, config, found = ground_truth(job), job.case.config, []
     for size, frames in images.items():
-        mask = job.read(f"truth/{size}", "mask")["mask"][0]
+        mask = unpack(job.read(f"truth/{size}", "labels")["labels"][0])["mask"]
         given = Clip(
             frames=frames,
             mask=mask,
@@ -96,7 +97,7 @@ def main() -> None:
     arguments = parser.parse_args()
     job = Job(arguments.repository, "rf", "heart", arguments.view)
     sizes = job.case.config.bmode.sizes
-    mask = job.read(f"truth/{sizes[0]}", "mask")["mask"][0]
+    mask = unpack(job.read(f"truth/{sizes[0]}", "labels")["labels"][0])["mask"]
     rows = []
     for density in arguments.densities:
         images = clips(job, density)

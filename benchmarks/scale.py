@@ -18,6 +18,7 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import numpy as np
 import psutil
 import yaml
 
@@ -86,6 +87,16 @@ def sweep(hearts: int) -> Config:
     return validate(values, "scale")
 
 
+def table(hearts: int) -> str:
+    """Table of hearts that differ in all of their keys, and so in their motion; each has a loop of its own."""
+    random = np.random.default_rng(1)
+    lines = ["case,fibres.endo_deg,fibres.epi_deg,mechanics.material.stiffness_kPa,loop.heart_rate_per_min,label.group"]
+    for heart in range(hearts):
+        endo, epi, stiffness, rate = random.uniform((60, -46, 0.8, 400), (72, -38, 2.4, 560))
+        lines.append(f"m{heart},{endo:.3f},{epi:.3f},{stiffness:.4f},{rate:.2f},{'ab'[heart % 2]}")
+    return "\n".join(lines)
+
+
 def measure(name: str, hearts: int, folder: Path, command: tuple[str, ...], says: str = "") -> Measurement:
     """Run a command in a folder and measure it; its output is shown only if it fails or does not say what it should."""
     with tempfile.TemporaryFile("w+") as output:
@@ -112,6 +123,18 @@ def plan(hearts: int, batches: int) -> list[Measurement]:
             measure("plan", hearts, folder, PLAN),
             measure(f"plan 1/{batches}", hearts, folder, (*PLAN, *batch)),
         ]
+
+
+def plan_table(hearts: int) -> list[Measurement]:
+    """Expand, and plan, the hearts of a table of which nothing is made."""
+    config = sweep(hearts)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        (folder / "hearts.csv").write_text(table(hearts))
+        values = config.model_dump(mode="json") | {"cases": {"file": "hearts.csv"}}
+        (folder / "scale.yaml").write_text(yaml.safe_dump(values))
+        check = (sys.executable, "-c", "from echotruth.cli import main; main()", "check", "scale.yaml")
+        return [measure("check of a table", hearts, folder, check), measure("plan of a table", hearts, folder, PLAN)]
 
 
 def resume(hearts: int) -> Measurement:
@@ -179,8 +202,8 @@ def write(measured: list[Measurement]) -> None:
         *(f"| {item.name} | {item.hearts} | {item.cpu_s:.1f} | {item.memory_MiB:.0f} |" for item in rows),
         "",
         "*plan*: the graph of all jobs of a sweep of which nothing is made; *plan 1/10*: of its first batch alone",
-        "(`--batch repository=1/10`); *resume*: nothing is to be done; *lay out*: arrays, coordinates and table of the",
-        "cases, before the first job.",
+        "(`--batch repository=1/10`); *check* and *plan of a table*: of hearts that all differ in motion and loop;",
+        "*resume*: nothing is to be done; *lay out*: arrays, coordinates and table of the cases, before the first job.",
     ]
     (RESULTS / "scale.md").write_text("\n".join(lines) + "\n")
 
@@ -193,12 +216,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--hearts", type=int, nargs="+", default=[100, 1000], help="multiples of 20")
     parser.add_argument("--batches", type=int, default=10, help="number of batches of a plan")
-    parser.add_argument("--only", choices=("plan", "resume", "layout"), help="measure this alone")
+    parser.add_argument("--only", choices=("plan", "table", "resume", "layout"), help="measure this alone")
     arguments = parser.parse_args()
     for hearts in arguments.hearts:
         measured: list[Measurement] = []
         if arguments.only in (None, "plan"):
             measured += plan(hearts, arguments.batches)
+        if arguments.only in (None, "table"):
+            measured += plan_table(hearts)
         if arguments.only in (None, "resume") and hearts <= 1000:
             measured.append(resume(hearts))
         if arguments.only in (None, "layout"):

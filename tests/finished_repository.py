@@ -34,13 +34,17 @@ def configured(name="small", seeds=(1, 2), views=("mid", "long_axis"), **changes
     return Config(name=name, views={view: planes[view] for view in views}, **settings | swept | changes)
 
 
+FLOW = np.zeros((FRAMES, 2, 1, 1, 1))
+FLOW[0, 0] = FLOW[-1, 1] = np.nan
+"""No motion; there is no frame before the first and none after the last."""
+
 VALUES = {
     "fibres": {"fibre": [1, 0, 0], "sheet": [0, 1, 0], "layer": 1, "segment": 1},
     "mechanics": {"volume": 1, "volume_target": 1, "pressure": 1, "pressure_target": 1},
     "kinematics": {"volume_ratio_min": 1, "volume_ratio_mean": 1},
     "physiology": {"volume_ratio_min": 1},
     "phantom": {"axes": np.eye(3)},
-    "truth": {"mask": 1, "layer": 1, "segment": 1},
+    "truth": {"labels": np.reshape([1, 1, 0], (3, 1, 1)), "flow": FLOW},
     "evaluation": {"wall_axes": np.eye(2)},
 }
 """Values that are not 0: of a heart that does not move, and fills its images."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from echotruth.cases import case_id, expand, find_case, table
-from echotruth.config import Config
+from echotruth.config import Cases, Config
 from echotruth.config.loading import ConfigError, override
 from echotruth.seeds import generator
 
@@ -16,7 +16,7 @@ SWEEP = {"fibres.endo_deg": [60.0, 84.0], "seed": [1, 2]}
 
 
 def ids(sweep, config=None):
-    return [case.id for case in expand((config or Config()).model_copy(update={"cases": sweep}))]
+    return [case.id for case in expand((config or Config()).model_copy(update={"cases": Cases(**sweep)}))]
 
 
 def test_ids_are_what_they_were_when_first_published():

@@ -45,7 +45,7 @@ def is_refused(status, output, errors):
     return status != 0 and not output and errors.count("\n") == 1 and "Traceback" not in errors
 
 
-@pytest.mark.parametrize("name, cases", [("demo", 1), ("sweep", 108), ("human", 1)])
+@pytest.mark.parametrize("name, cases", [("demo", 1), ("sweep", 108), ("human", 1), ("hearts", 24)])
 def test_check_accepts_a_shipped_configuration(name, cases):
     status, output, errors = run_cli("check", f"config/{name}.yaml")
     assert (status, errors) == (0, "")

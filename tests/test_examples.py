@@ -62,7 +62,7 @@ def test_blocks_of_the_page_about_python_run_one_after_the_other():
     blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     for block in blocks:
         exec(block, names)
-    assert len(blocks) == 4
+    assert len(blocks) == 5
     assert names["clip"]["image"].shape == (5, 128, 128)
     assert float(names["mechanics"]["volume"][0]) == pytest.approx(50e-9, rel=1e-3)
 

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import learning_repository
 import numpy as np
 import pytest
 
@@ -57,11 +58,110 @@ def test_every_public_name_is_found_and_a_wrong_one_is_refused():
 
 def test_clip_carries_the_exact_shift_and_its_units(clip):
     moved = clip["displacement"].isel(frame=1).where(clip["mask"].isel(frame=1))
-    assert float(moved.sel(vector="lateral").mean()) == pytest.approx(60e-6, rel=1e-6)
-    assert float(moved.sel(vector="axial").mean()) == pytest.approx(40e-6, rel=1e-6)
+    quantum = clip["displacement"].attrs["quantum"]
+    assert quantum <= 12e-3 / 128 / 256
+    assert np.abs(moved.sel(vector="lateral") - 60e-6).max() <= quantum / 2
+    assert np.abs(moved.sel(vector="axial") - 40e-6).max() <= quantum / 2
     assert clip["displacement"].attrs["units"] == "m"
     assert clip["image"].dtype == np.uint8
     assert clip["image"].values.max() == 255
+
+
+def test_flow_of_a_clip_is_the_change_of_its_displacement_where_all_tissue_moves_alike(clip):
+    moved = clip["displacement"].where(clip["mask"]).mean(["axial", "lateral"])
+    flow, quantum = clip["flow"], clip["flow"].attrs["quantum"]
+    assert flow.dims == ("frame", "to", "axial", "lateral", "vector") and flow.attrs["units"] == "m"
+    for frame in range(2):
+        step = moved.isel(frame=frame + 1) - moved.isel(frame=frame)
+        forth = flow.isel(frame=frame).sel(to="next")
+        back = flow.isel(frame=frame + 1).sel(to="previous")
+        assert np.abs(forth - step).max() <= 2 * quantum and np.abs(back + step).max() <= 2 * quantum
+        assert (forth.isel(vector=0).notnull() == clip["mask"].isel(frame=frame)).all()
+
+
+@pytest.fixture(scope="module")
+def repository(tmp_path_factory):
+    """Hearts whose wall is lifted out of the short-axis plane on one side and lowered on the other."""
+    return learning_repository.made(tmp_path_factory.mktemp("clips") / "small")
+
+
+@pytest.fixture(scope="module")
+def lifted(repository):
+    return et.load_clip(repository)
+
+
+def test_clip_of_a_repository_has_the_labels_by_name(repository, lifted):
+    stored = et.open(repository)["truth/64"].sel(case="heart", view="mid")["labels"]
+    for name in ("layer", "segment", "region"):
+        np.testing.assert_array_equal(lifted[name], stored.sel(label=name))
+    np.testing.assert_array_equal(lifted["mask"], lifted["displacement"].notnull().all("vector"))
+    assert set(np.unique(lifted["region"])) == {0} and "label" not in lifted.dims
+
+
+def test_tissue_leaves_and_enters_where_it_moves_farther_than_half_the_slice(lifted):
+    for mask, to in (("leaves", "next"), ("enters", "previous")):
+        elevation = lifted["flow"].sel(to=to, vector="elevation")
+        np.testing.assert_array_equal(lifted[mask], np.abs(elevation) > lifted["thickness"] / 2)
+        assert lifted[mask].any() and (lifted["mask"] & ~lifted[mask] & elevation.notnull()).any()
+    assert not lifted["enters"].isel(frame=0).any() and not lifted["leaves"].isel(frame=-1).any()
+    assert lifted["thickness"].attrs["units"] == "m"
+
+
+def test_only_the_variables_asked_for_are_read(repository, lifted):
+    pair = et.load_clip(repository, variables=("image", "flow"))
+    assert set(pair.data_vars) == {"image", "flow", "leaves", "enters", "thickness", "grid_mask"}
+    mask = et.load_clip(repository, variables="mask")
+    assert set(mask.data_vars) == {"mask", "layer", "segment", "region", "grid_mask"}
+    for name, values in {**pair.data_vars, **mask.data_vars}.items():
+        np.testing.assert_array_equal(values, lifted[name])
+
+
+@pytest.mark.parametrize("variables, words", [(("image", "speed"), "'speed': use any of"), ((), "none: use any of")])
+def test_variables_that_a_clip_does_not_have_are_refused(repository, variables, words):
+    with pytest.raises(ValueError, match=words):
+        et.load_clip(repository, variables=variables)
+
+
+def test_tracks_of_points_are_the_affine_motion_in_all_frames(repository, lifted):
+    heart, start = et.load_heart(repository), 1
+    rows, columns = np.nonzero(lifted["mask"].values[start])
+    tracks = et.point_tracks(heart, lifted, np.column_stack([columns, rows]), frame=start)
+    np.testing.assert_allclose(tracks["pixel"].isel(frame=start), np.column_stack([columns, rows]), atol=1e-9)
+    for frame, to in ((0, "previous"), (2, "next")):
+        flow = lifted["flow"].sel(to=to).values[start, rows, columns]
+        moved = tracks["position"].values[frame] - tracks["position"].values[start]
+        np.testing.assert_allclose(moved, flow[:, :2], atol=lifted["flow"].attrs["quantum"])
+        np.testing.assert_allclose(tracks["elevation"].values[frame], flow[:, 2], atol=lifted["flow"].attrs["quantum"])
+    assert tracks["visible"].isel(frame=start).all()
+    assert tracks["visible"].any("point").all() and not tracks["visible"].all()
+    assert tracks["pixel"].attrs["units"] == "px" and tracks["time"].dims == ("frame",)
+
+
+def test_each_point_may_have_its_own_frame_and_one_beside_the_wall_has_no_track(repository, lifted):
+    heart = et.load_heart(repository)
+    rows, columns = np.nonzero(lifted["mask"].values.all(0))
+    given = np.array([[columns[0], rows[0]], [columns[-1], rows[-1]], [0, 0]])
+    tracks = et.point_tracks(heart, lifted, given, frame=[0, 2, 1])
+    np.testing.assert_allclose(tracks["pixel"].values[[0, 2], [0, 1]], given[:2], atol=1e-9)
+    assert tracks["position"].isel(point=2).isnull().all() and not tracks["visible"].isel(point=2).any()
+    assert et.point_tracks(heart, lifted, np.zeros((0, 2)))["visible"].shape == (3, 0)
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        ({"points": [[1.0, 2.0, 3.0]]}, "shape .n, 2."),
+        ({"points": [[1.0, np.nan]]}, "finite"),
+        ({"points": [[1.0, 2.0]], "frame": 3}, "from 0 to 2, not 3"),
+        ({"points": [[1.0, 2.0]], "frame": -1}, "from 0 to 2, not -1"),
+        ({"points": [[1.0, 2.0]], "frame": [0, 1]}, "one for each of the 1 points"),
+        ({"points": [[1.0, 2.0]], "frame": 0.5}, "one whole number"),
+        ({"points": [[1.0, 2.0]], "thickness": 0.0}, "thickness = 0.0: give a positive length"),
+    ],
+)
+def test_points_that_cannot_be_followed_are_refused(heart, clip, arguments, words):
+    with pytest.raises(ValueError, match=words):
+        et.point_tracks(heart, clip, **arguments)
 
 
 def test_tracker_that_sees_no_motion_misses_all_of_it(clip, heart):
@@ -120,6 +220,8 @@ def test_another_heart_than_the_one_imaged_is_refused(clip):
     other = et.beat(TUBE | {"motion": {"kind": "rigid", "rigid": {"lateral_um": 30.0}}})
     with pytest.raises(ValueError, match="made of another heart"):
         et.evaluate(et.track(clip, "dis"), other)
+    with pytest.raises(ValueError, match="made of another heart"):
+        et.point_tracks(other, clip, [[1.0, 2.0]])
 
 
 def test_scores_of_smaller_images_are_at_the_same_points_of_the_tissue(clip, heart):

@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from echotruth import learning
     from echotruth.cases import expand
     from echotruth.config import Config, Probe, Rf, View
     from echotruth.config.building import configure
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from echotruth.imaging.rf.full_matrix import FullMatrix
     from echotruth.notebook.datasets import heart_dataset
     from echotruth.notebook.kinematics import kinematics
+    from echotruth.notebook.point_tracks import point_tracks
     from echotruth.notebook.points import load_points
     from echotruth.notebook.repositories import load_clip, load_heart, open
     from echotruth.notebook.simulation import beat, evaluate, image, track
@@ -45,10 +47,12 @@ __all__ = [
     "heart_dataset",
     "image",
     "kinematics",
+    "learning",
     "load_clip",
     "load_heart",
     "load_points",
     "open",
+    "point_tracks",
     "track",
     "unpack",
 ]
@@ -63,6 +67,7 @@ _ORIGIN = {
     "imaging.rf.full_matrix": ("FullMatrix",),
     "notebook.datasets": ("heart_dataset",),
     "notebook.kinematics": ("kinematics",),
+    "notebook.point_tracks": ("point_tracks",),
     "notebook.points": ("load_points",),
     "notebook.repositories": ("load_clip", "load_heart", "open"),
     "notebook.simulation": ("beat", "evaluate", "image", "track"),
@@ -73,6 +78,8 @@ _ORIGIN = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "learning":
+        return import_module("echotruth.learning")
     for module, names in _ORIGIN.items():
         if name in names:
             return getattr(import_module(f"echotruth.{module}"), name)

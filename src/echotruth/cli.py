@@ -1,4 +1,6 @@
-"""Command line: `echotruth check`, `cases`, `run`, `merge`, `validate`, `export` and `evaluate`."""
+"""Command line: `echotruth check`, `cases`, `run`, `merge`, `validate`, `export`, `describe`, `upload` and
+`evaluate`.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -35,7 +37,7 @@ def main() -> None:
         table(cases).to_csv(sys.stdout, index=False)
     else:
         try:
-            sys.exit(run(arguments.config, config, options))
+            sys.exit(run(arguments.config, config, options, arguments.upload))
         except KeyboardInterrupt:
             sys.exit("echotruth: interrupted; run the same command again to continue")
         except OSError as error:
@@ -46,11 +48,14 @@ def _command(arguments: argparse.Namespace) -> Callable[[argparse.Namespace], in
     """Function of a command that does not start from a configuration."""
     if arguments.command == "check":
         return check if arguments.heal or Path(arguments.config).is_dir() else None
-    return {"validate": validate, "export": export, "evaluate": evaluate, "merge": merge}.get(arguments.command)
+    commands = {"validate": validate, "export": export, "describe": describe, "evaluate": evaluate, "merge": merge}
+    return (commands | {"upload": upload}).get(arguments.command)
 
 
-def run(path: str, config: Config, options: list[str]) -> int:
+def run(path: str, config: Config, options: list[str], url: str | None = None) -> int:
     """Run the workflow of a configuration and write its report; return the exit status of Snakemake.
+
+    If all went well but the upload, the status is :data:`echotruth.workflow.uploading.NOT_UPLOADED`.
 
     Parameters
     ----------
@@ -60,10 +65,10 @@ def run(path: str, config: Config, options: list[str]) -> int:
         The configuration in that file.
     options : list of str
         Options for Snakemake, such as `--cores 4` or `-n`.
+    url : str, optional
+        Address in object storage to which everything is uploaded when it is committed.
     """
     from echotruth.workflow import lease
-    from echotruth.workflow.execution import execute
-    from echotruth.workflow.progress import measured_seconds
 
     folder = Path("out") / config.name
     # Snakemake's own lock is that of the working folder, where other names may run; a repository has its lease.
@@ -72,19 +77,38 @@ def run(path: str, config: Config, options: list[str]) -> int:
     options = with_profiles(options)
     if any(map(_is_query, options)):
         return subprocess.call([*snakemake, *options])
-    with lease.held(folder) as name:
-        environment = os.environ | {lease.VARIABLE: name}
-        report = ["--report", str(folder / "report.html")]
-        # If everything is made, Snakemake writes the report in the same process, which saves a second start.
-        makes_all = not [option for option in options if option not in CORE_OPTIONS and not option.isdigit()]
-        command = [*snakemake, *options, *(["--report-after-run", *report] if makes_all else [])]
-        log, expected = folder / "logs/snakemake.log", measured_seconds(folder / "ledger")
-        if status := _remake(folder, config, [*snakemake, *options], environment):
-            return status
-        status = execute(command, log, config.name, expected, environment)
-        if status or not (folder / "figures/leaderboard.csv").is_file():
-            return status
-        status = 0 if makes_all else _run_quietly([*snakemake, *report], environment)
+    if url is None:
+        with lease.held(folder) as name:
+            return _make(folder, config, snakemake, options, os.environ | {lease.VARIABLE: name})
+    from echotruth.repository.remote import Remote, RemoteError
+    from echotruth.workflow.uploading import uploading
+
+    try:
+        remote = Remote(url)
+    except RemoteError as error:
+        return _fail(str(error))
+    with lease.held(folder) as name, uploading(folder, remote) as upload:
+        status = _make(folder, config, snakemake, options, os.environ | {lease.VARIABLE: name})
+        not_uploaded = upload.finish()
+    return status or not_uploaded
+
+
+def _make(folder: Path, config: Config, snakemake: list[str], options: list[str], environment: dict[str, str]) -> int:
+    """Make a repository and its report; return the exit status."""
+    from echotruth.workflow.execution import execute
+    from echotruth.workflow.progress import measured_seconds
+
+    report = ["--report", str(folder / "report.html")]
+    # If everything is made, Snakemake writes the report in the same process, which saves a second start.
+    makes_all = not [option for option in options if option not in CORE_OPTIONS and not option.isdigit()]
+    command = [*snakemake, *options, *(["--report-after-run", *report] if makes_all else [])]
+    log, expected = folder / "logs/snakemake.log", measured_seconds(folder / "ledger")
+    if status := _remake(folder, config, [*snakemake, *options], environment):
+        return status
+    status = execute(command, log, config.name, expected, environment)
+    if status or not (folder / "figures/leaderboard.csv").is_file():
+        return status
+    status = 0 if makes_all else _run_quietly([*snakemake, *report], environment)
     if status == 0:
         print(f"\nRepository: {folder / f'{config.name}.zarr'}\nReport:     {folder / 'report.html'}")
     return status
@@ -138,6 +162,8 @@ RUN_OPTIONS = f"""options of Snakemake that are useful here:
   --rerun-triggers mtime  do not make again what other settings or code would change
 """
 
+UPLOAD = "upload all that is committed (docs/storage.md); exit status 3 if all but that went well"
+
 CORE_OPTIONS = ("--cores", "-c", "--jobs", "-j", "all")
 """Options (and values) that do not restrict what Snakemake makes."""
 
@@ -166,6 +192,13 @@ def merge(arguments: argparse.Namespace) -> int:
     return merge_repositories(arguments.into, arguments.sources)
 
 
+def upload(arguments: argparse.Namespace) -> int:
+    """Upload a repository; return 0, 1 if something is damaged, or 2 if it cannot be uploaded."""
+    from echotruth.workflow.uploading import upload_repository
+
+    return upload_repository(arguments.repository, arguments.url, arguments.verify)
+
+
 def validate(arguments: argparse.Namespace) -> int:
     """Validate the mechanics and write the page of results; return 1 if a check fails, otherwise 0."""
     if not Path("validation/page.py").is_file():
@@ -180,15 +213,59 @@ def validate(arguments: argparse.Namespace) -> int:
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write the RF of one case and view as a USTB or zea file; return 0, or 2 if it cannot be exported."""
-    from echotruth.repository.export import ExportError
-    from echotruth.repository.export import export as write
+    """Write clips, hearts or RF as files of another format; return 0, or 2 if they cannot be exported."""
+    from echotruth.export import Export, ExportError, Selection, source
+
+    chosen = Selection(arguments.case, arguments.view, arguments.size, arguments.tracker)
+    try:
+        opened = source(arguments.repository, chosen)
+        work = Export(opened, arguments.format, arguments.overlay, arguments.rate, arguments.output)
+        clips, left_out = work.clips()
+        _print_counted(work.write(clips), len(clips))
+    except (ExportError, ConfigError) as error:
+        return _fail(str(error))
+    except OSError as error:
+        place, said = error.filename or arguments.output or arguments.repository, error.strerror or str(error)
+        return _fail(f"{place}: {' '.join(said.split())}: the folder for the files must be writable and have space")
+    except KeyboardInterrupt:
+        return _fail("interrupted; the files that were named are whole")
+    if left_out:
+        print(f"echotruth: left out {len(left_out)} that are not finished, first: {left_out[0]}", file=sys.stderr)
+    return 0
+
+
+def _print_counted(paths: Iterator[Path], total: int) -> None:
+    """Print each path when its file is written; below them, where a person watches, how many of many there are."""
+    watched = sys.stderr.isatty() and total > 1
+
+    def show(line: str) -> None:
+        if watched:
+            print(f"\r\033[K{line}", end="", file=sys.stderr, flush=True)
 
     try:
-        file = write(arguments.repository, arguments.format, arguments.case, arguments.view, arguments.out)
-    except ExportError as error:
+        show(f"0 of {total}")
+        for done, path in enumerate(paths, start=1):
+            show("")
+            print(path, flush=True)
+            show(f"{done} of {total}")
+    finally:
+        show("")
+
+
+def describe(arguments: argparse.Namespace) -> int:
+    """Write the documents that describe a repository; return 0, or 2 if it cannot be described."""
+    from echotruth.repository.description import DescriptionError, attribution
+    from echotruth.repository.description import describe as write
+    from echotruth.workflow import lease
+
+    try:
+        given = attribution(arguments.author, arguments.license, arguments.url, arguments.release, arguments.date)
+        lease.follow(arguments.repository)
+        documents = write(arguments.repository, arguments.output, given)
+    except (DescriptionError, lease.LeaseError) as error:
         return _fail(str(error))
-    print(file)
+    for path in documents:
+        print(path)
     return 0
 
 
@@ -240,18 +317,16 @@ def _parser() -> argparse.ArgumentParser:
         form = argparse.RawDescriptionHelpFormatter
         command = commands.add_parser(name, help=text, description=text, epilog=epilog, formatter_class=form)
         command.add_argument("config", help="YAML file, such as config/demo.yaml")
+        if name == "run":
+            command.add_argument("--upload", metavar="s3://BUCKET/FOLDER", help=UPLOAD)
     _add_upkeep(commands)
+    _add_upload(commands)
     text = "compare the heart with exact solutions, published problems and conservation laws, and write the page"
     command = commands.add_parser("validate", help=text, description=text)
     command.add_argument("--quick", action="store_true", help="use coarse meshes; takes a few minutes")
     command.add_argument("--folder", default="docs", help="folder for validation.md (default: docs)")
-    text = "write the RF of a repository as a file for USTB (uff) or zea"
-    command = commands.add_parser("export", help=text, description=text)
-    command.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
-    command.add_argument("--format", choices=("uff", "zea"), required=True, help="file format (both are HDF5)")
-    command.add_argument("--case", required=True, help="case id from cases.csv")
-    command.add_argument("--view", required=True, help="name of the view")
-    command.add_argument("--out", type=Path, help="file to write (default: CASE_VIEW in the folder export)")
+    _add_export(commands)
+    _add_describe(commands)
     _add_evaluate(commands)
     return parser
 
@@ -279,6 +354,66 @@ def _add_upkeep(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -
     )
     command.add_argument("into", type=Path, help="folder of the repository that receives them; made if need be")
     command.add_argument("sources", type=Path, nargs="+", help="folders of repositories, which stay as they are")
+
+
+EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap", "flo", "uff", "zea")
+"""Formats of `echotruth export`."""
+
+
+def _add_upload(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    text = "upload a repository to object storage, and compare what is there by its checksums"
+    command = commands.add_parser(
+        "upload",
+        help=text,
+        description=f"{text} (docs/storage.md). What is there already is not sent again.",
+        epilog="example: echotruth upload out/demo s3://bucket/demo. "
+        "Exit status: 0 everything is there, 1 something is damaged, 2 it cannot be uploaded.",
+    )
+    command.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
+    command.add_argument("url", metavar="s3://BUCKET/FOLDER", help="where it has the same files; empty at first")
+    command.add_argument("--verify", action="store_true", help="read back all that is there, and compare it")
+
+
+def _add_export(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    text = "write clips, hearts or RF of a repository as files of other programs"
+    command = commands.add_parser(
+        "export",
+        help=text,
+        description=f"{text} (docs/export.md), one for each clip: CASE_VIEW_SIZE.",
+        epilog="example: echotruth export out/demo --format mp4 --view mid --overlay wall",
+    )
+    command.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
+    command.add_argument("--format", choices=EXPORTED, required=True, help="format of the files")
+    for option, kind, text in (
+        ("case", str, "case id from cases.csv; can be repeated (default: all)"),
+        ("view", str, "name of the view; can be repeated (default: all)"),
+        ("size", int, "image size, px; can be repeated (default: the largest)"),
+        ("tracker", str, "tracker for matlab and csv; can be repeated (default: all)"),
+        ("overlay", str, "wall, segments or displacement over mp4, gif and png; can be repeated (default: none)"),
+    ):
+        command.add_argument(f"--{option}", type=kind, action="append", default=[], help=text)
+    command.add_argument("--rate", type=float, help="frames per second of mp4 and gif (default: 20)")
+    command.add_argument(
+        "-o", "--output", type=Path, help="folder, or the file if it is one (default: export/FORMAT in the repository)"
+    )
+
+
+def _add_describe(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    text = "write a data card, a citation, Croissant and RO-Crate metadata of a repository"
+    command = commands.add_parser(
+        "describe",
+        help=text,
+        description=f"{text} (docs/description.md) into its folder.",
+        epilog="example: echotruth describe out/demo --license CC-BY-4.0 --author 'Doe, Jane; 0000-0002-1825-0097'",
+    )
+    command.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
+    command.add_argument("-o", "--output", type=Path, help="another folder for the documents")
+    command.add_argument("--license", help="identifier of SPDX, such as CC-BY-4.0, or an address (default: none)")
+    text = "'Family, Given; ORCID; affiliation; its address', or a group as 'Name; address'; can be repeated"
+    command.add_argument("--author", action="append", default=[], help=text)
+    command.add_argument("--url", help="address at which the repository is published")
+    command.add_argument("--release", default="1.0.0", help="version of the data (default: 1.0.0)")
+    command.add_argument("--date", help="day of publication, as 2026-01-31 (default: that of the last job)")
 
 
 def _add_evaluate(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

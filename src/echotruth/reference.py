@@ -56,9 +56,9 @@ order of the rows, are in that of the group `cases` only.
 Cases and views keep their place for good: new ones are appended, whatever their order in the configuration, and those
 that leave it stay, a case as `retired`. Find them by their labels.
 
-The folder of the repository also contains `cases.csv` (the present cases with all keys), `registry.txt` (row of every
-case) and `views.txt` (index of every view), `ledger/` (a record of every finished job: checksums, seed, time taken;
-`structure.json`: checksums of all other files of the tree), `figures/` and `logs/`.
+The folder of the repository also contains `cases.csv` (the present cases with labels and all keys), `registry.txt`
+(row of every case) and `views.txt` (index of every view), `ledger/` (a record of every finished job: checksums, seed,
+time taken; `structure.json`: checksums of all other files of the tree), `figures/` and `logs/`.
 
 This page is generated from `src/echotruth/repository/schema.py` by `make reference`.
 
@@ -88,8 +88,9 @@ def schema_page() -> str:
     """Page of the arrays, group by group."""
     parts = [_SCHEMA_HEAD]
     cases = (
-        "One more array for `seed` and for every key that differs among the cases, with the key's name and unit. The\n"
-        "attribute `constants` holds the keys that do not; `echotruth.open` gives the table with all of them.\n"
+        "One more array for `seed` and for every key that differs among the cases, with the key's name and unit, and\n"
+        "likewise for `diagnosis`, `label.NAME` and `note` (docs/cases.md). The attribute `constants` holds what does\n"
+        "not differ; `echotruth.open` gives the table with all of them.\n"
     )
     sized = {f"{name}/SIZE": arrays for name, arrays in schema.SIZED.items()}
     groups = {"cases": schema.CASES} | schema.STAGES | schema.OPTIONAL | sized

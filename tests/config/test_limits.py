@@ -200,7 +200,7 @@ def test_largest_sweep_is_accepted_and_one_value_more_is_not(tmp_path):
     file = tmp_path / "sweep.yaml"
     angles = [round(0.5 * n, 1) for n in range(100)]
     file.write_text(f"cases: {{fibres.endo_deg: {angles}, seed: {list(range(MAX_CASES // 100))}}}")
-    assert len(load(file).cases["seed"]) == MAX_CASES // 100
+    assert len(load(file).cases.grid["seed"]) == MAX_CASES // 100
     file.write_text(f"cases: {{fibres.endo_deg: {angles}, seed: {list(range(MAX_CASES // 100 + 1))}}}")
     with pytest.raises(ConfigError, match="makes 100 x 1001 cases"):
         load(file)

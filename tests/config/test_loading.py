@@ -16,7 +16,7 @@ BAD = {
     "geometry: {file: a.vtu, wall_mm: 1}": "geometry.wall_mm = 1.0: applies to the ellipsoid: leave it out",
     "geometry: {file: a.vtu, dilation: 2}": "geometry.dilation = 2.0: needs remesh: true",
     "geometry: {file: a.vtu, sheet: s}": "geometry.sheet = 's': needs the fibre directions too",
-    "geometry: {file: a.vtu, wall_cells: {values: [1]}}": "geometry.wall_cells.array = ",
+    "geometry: {file: a.vtu, wall_cells: {values: [1]}}": "geometry.wall_cells.array is missing",
     "geometry: {file: a.vtu, unit: inch}": "geometry.unit = 'inch': should be 'm', 'cm', 'mm' or 'um'",
     "loop: {esv_uL: 60, edv_uL: 50}": "loop.esv_uL = 60.0: must be smaller than edv_uL = 50.0",
     "fibres: {endo_deg: 95}": "fibres.endo_deg = 95: should be less than or equal to 90",
@@ -76,7 +76,7 @@ def test_missing_file_is_named(tmp_path):
         load(tmp_path / "nowhere.yaml")
 
 
-@pytest.mark.parametrize("name", ["demo", "fimh25", "paper", "realistic", "rodero", "sweep"])
+@pytest.mark.parametrize("name", ["demo", "fimh25", "hearts", "paper", "realistic", "rodero", "sweep"])
 def test_shipped_configurations_are_accepted(name):
     assert load(ROOT / f"config/{name}.yaml").name == name
 

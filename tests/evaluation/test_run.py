@@ -103,8 +103,8 @@ def write_clip(folder, store, case, index, beating, view):
     write(store, "phantom", index, origin=where.origin, axes=where.axes, centre=[0, CONFIG.rf.si().focus])
     random = np.random.default_rng(index)
     for size in CONFIG.bmode.sizes:
-        mask = pixel_truth(beating, where, *pixel_centres(CONFIG.bmode, size))["mask"][0]
-        store.write(f"truth/{size}", {"mask": np.broadcast_to(mask, (len(COURSE), size, size))}, *index)
+        label = pixel_truth(beating, where, *pixel_centres(CONFIG.bmode, size))["labels"][0]
+        store.write(f"truth/{size}", {"labels": np.broadcast_to(label, (len(COURSE), *label.shape))}, *index)
         store.write(f"bmode/{size}", {"image": random.integers(0, 256, (len(COURSE), size, size))}, *index)
     for stage in ("truth", "bmode"):
         files = [file for size in CONFIG.bmode.sizes for file in store.files(f"{stage}/{size}", *index)]

@@ -75,6 +75,24 @@ def test_the_scatterers_of_the_wall_are_the_same_whatever_is_around_them(acquire
         assert len(together) > 2 * len(alone)
 
 
+def test_every_tissue_has_the_exponent_of_its_own_key(twisting_heart, scanner):
+    keys = {"phantom": {"scattering_exponent": 1.5, "density_per_mm3": 300.0}}
+    tissues = {"blood": {"scattering_exponent": 2.0}, "surroundings": {"scattering_exponent": 0.5}}
+    realism = {name: ALL[name] | values for name, values in tissues.items()}
+    config = Config.model_validate(SMALL | keys | {"realism": realism})
+    where = imaging_plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+    seeded = seed_medium(config, twisting_heart, where, random, scanner.matrix.in_beam)
+    medium = Medium(config, twisting_heart, where, time=TIME, seeded=seeded, random=random)
+    position, _, exponent = medium(1)
+    wall = len(seeded["cell"])
+    assert (exponent[:wall] == 1.5).all() and (medium.wall(1)[2] == 1.5).all()
+    assert 0 < (exponent == 2.0).sum() <= len(seeded["blood_cell"])
+    assert 0 < (exponent == 0.5).sum() <= len(seeded["surroundings_position"])
+    assert len(position) == wall + (exponent == 2.0).sum() + (exponent == 0.5).sum()
+    one = Acquisition(config, scanner, medium, random)(1)
+    assert one.tobytes() == scanner.matrix(*medium(1)).tobytes()
+
+
 @pytest.mark.parametrize("snr", [10.0, 30.0])
 def test_the_lines_have_the_ratio_of_signal_to_noise_asked_for(acquire, scanner, snr):
     acquisition, medium = acquire(noise={"snr_dB": snr})

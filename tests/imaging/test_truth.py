@@ -8,6 +8,7 @@ import pytest
 from echotruth.config import Config, Phantom
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import interpolate
+from echotruth.imaging.labels import unpack
 from echotruth.imaging.medium.phantom import seed_volume
 from echotruth.imaging.truth import cavity_centroid, displacement, material_truth, pixel_truth
 from echotruth.imaging.view import imaging_plane
@@ -27,7 +28,7 @@ def moved(twisting_heart, mid):
 
 
 def _frame(clip, number):
-    return {name: each[number] for name, each in clip.items()}
+    return {name: each[number] for name, each in (clip | unpack(clip["labels"])).items()}
 
 
 def _positions(mask, mid):

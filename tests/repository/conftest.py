@@ -67,6 +67,8 @@ def rf_repository(tmp_path_factory):
         config = configured(list(keep), **rf)
         folder = tmp_path_factory.mktemp("small")
         (folder / "config.yaml").write_text(yaml.safe_dump(config.model_dump(mode="json")))
+        (folder / "registry.txt").write_text("heart\n")
+        (folder / "views.txt").write_text("mid\napex\n")
         store = Store(folder / "small.zarr")
         lay_out(store, config, **rf)
         scan = scanner(**rf)

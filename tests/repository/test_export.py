@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from echotruth.repository.export import FORMATS, ExportError, export
+from echotruth.export import Export, ExportError, Selection, source
 
 ELEMENTS, FRAMES, SPEED = 24, 2, 1540.0
 
@@ -21,6 +21,12 @@ def folder(rf_repository):
 def rf(folder):
     with xr.open_zarr(folder / "small.zarr", group="rf", consolidated=False) as group:
         return group.sel(case="heart", view="mid").load()
+
+
+def export(folder, name, case, view, output=None):
+    work = Export(source(folder, Selection([case], [view])), name, output=output)
+    (file,) = work.write(work.clips()[0])
+    return file
 
 
 def written(folder, name):
@@ -156,14 +162,14 @@ def test_uff_is_laid_out_as_the_toolbox_writes_it(folder, rf):
         assert sorted(file["beamformed_data/data"]) == ["imag", "real"]
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name, suffix", [("uff", ".uff"), ("zea", ".hdf5")])
 @pytest.mark.parametrize(
     "keep, there, absent", [("lines", "beamformed_data", "a"), ("channels", "a", "beamformed_data")]
 )
-def test_only_what_is_kept_is_written(rf_repository, tmp_path, name, keep, there, absent):
+def test_only_what_is_kept_is_written(rf_repository, tmp_path, name, suffix, keep, there, absent):
     h5py = pytest.importorskip("h5py")
     found = []
-    with h5py.File(export(rf_repository([keep]), name, "heart", "mid", tmp_path / "a.h5")) as file:
+    with h5py.File(export(rf_repository([keep]), name, "heart", "mid", tmp_path / f"a{suffix}")) as file:
         file.visit(found.append)
     leaves = {path.rpartition("/")[2] for path in found}
     assert ("beamformed_data" in leaves) == (keep == "lines")
@@ -173,7 +179,7 @@ def test_only_what_is_kept_is_written(rf_repository, tmp_path, name, keep, there
 REFUSED = {
     ("nowhere", "heart", "mid"): "is not a repository",
     ("small", "hart", "mid"): "hart is not a case of .*: use heart",
-    ("small", "heart", "middle"): "middle is not a view of .*: use mid, apex",
+    ("small", "heart", "middle"): "middle is not a view of .*: use apex, mid",
     ("small", "heart", "apex"): "heart has no RF of apex",
 }
 
@@ -207,7 +213,7 @@ def test_missing_h5py_is_said_in_one_line(folder):
 def test_command_writes_the_file_and_says_where(folder, tmp_path):
     pytest.importorskip("h5py")
     file = tmp_path / "new/a.uff"
-    command = ["export", folder, "--format", "uff", "--case", "heart", "--view", "mid", "--out", file]
+    command = ["export", folder, "--format", "uff", "--case", "heart", "--view", "mid", "--output", file]
     code = "from echotruth.cli import main; main()"
     done = subprocess.run([sys.executable, "-c", code, *map(str, command)], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, f"{file}\n", "")

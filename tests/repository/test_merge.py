@@ -51,7 +51,7 @@ def test_merged_repository_has_the_hearts_of_both_and_is_whole(out):
     assert merge_repositories(out / "both", [out / "first", out / "second"]) == 0
     report = check(out / "both")
     assert report.faults == [] and report.notes == []
-    assert load(out / "both/config.yaml").cases == {"seed": [1, 2, 3]}
+    assert load(out / "both/config.yaml").cases.grid == {"seed": [1, 2, 3]}
     assert clips(out / "both") == clips(out / "first") | clips(out / "second")
     assert len(clips(out / "both")) == 6
     assert {folder: finished.content(out / folder) for folder in before} == before
@@ -113,7 +113,7 @@ def test_repositories_of_other_settings_are_refused_with_the_key(out, capsys):
 def test_sweep_of_all_cases_spans_keys_that_one_repository_does_not_sweep():
     other = finished.configured("other", cases={"fibres.endo_deg": [60, 70]})
     joint = spanning("both", {Path("a"): FIRST, Path("b"): other})
-    assert joint.cases == {"seed": [1, 2], "fibres.endo_deg": [FIRST.fibres.endo_deg, 60, 70]}
+    assert joint.cases.grid == {"seed": [1, 2], "fibres.endo_deg": [FIRST.fibres.endo_deg, 60, 70]}
     ids = {case.id for case in finished.expand(joint)}
     assert {case.id for config in (FIRST, other) for case in finished.expand(config)} <= ids
 

@@ -11,7 +11,7 @@ import zarr
 
 import echotruth as et
 from echotruth.cases import expand, table
-from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Physiology, Tracking, View
+from echotruth.config import Bmode, Cases, Config, Geometry, Loop, PhaseCorrelation, Physiology, Tracking, View
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
@@ -207,7 +207,7 @@ def test_job_of_a_view_has_its_place_whatever_is_put_in_front_of_it(folder):
 
 
 def test_case_that_left_the_configuration_is_retired(folder):
-    fewer = CONFIG.model_copy(update={"cases": {"seed": [1]}})
+    fewer = CONFIG.model_copy(update={"cases": Cases(seed=[1])})
     (folder / "config.yaml").write_text(yaml.safe_dump(fewer.model_dump(mode="json")))
     assert publish(folder)["complete"] == 1
     assert list(xr.open_datatree(folder / "small.zarr")["cases/status"].values) == ["complete", "retired"]
@@ -228,7 +228,7 @@ def test_table_of_cases_has_a_row_a_case_and_a_column_a_key(folder):
 
 
 def test_retired_case_has_no_values_in_the_table(folder):
-    fewer = CONFIG.model_copy(update={"cases": {"seed": [1]}})
+    fewer = CONFIG.model_copy(update={"cases": Cases(seed=[1])})
     (folder / "config.yaml").write_text(yaml.safe_dump(fewer.model_dump(mode="json")))
     publish(folder)
     frame = et.open(folder)["cases"].to_dataset().to_dataframe()

@@ -17,6 +17,7 @@ DIMENSIONS = {
     "node": NODES,
     "size": 1,
     "tracker": 1,
+    "label": 3,
 }
 """Lengths of dimensions; 2 where nothing is given, and 3 for axes of space."""
 
@@ -76,7 +77,11 @@ def test_heart_that_does_not_move_has_no_fault(stage):
         ("truth", "displacement", (0, 2, 3, 0), 1e-4, "is not 0 at end-diastole"),
         ("truth", "strain", (2, 2, 3, 4), INFINITE, "infinite"),
         ("truth", "wall_depth", (2, 2, 3), 1.5, "above 1.05"),
-        ("truth", "segment", (2, 2, 3), 0, "is 0 in a pixel of the wall"),
+        ("truth", "labels", (2, 1, 2, 3), 0, "a pixel of the wall without a segment"),
+        ("truth", "labels", (2, 1, 2, 3), 18, "has a segment of 18, above 17"),
+        ("truth", "labels", (2, 0, 2, 3), 7, "has a layer of 7, above 6"),
+        ("truth", "flow", (1, 0, 2, 3, 2), NAN, "in a pixel of the wall from which there is a frame"),
+        ("truth", "flow", (2, 1, 2, 3), 0.0, "or is one elsewhere"),
         ("tracking", "quality", (0, 0, 1, 2, 2), 1.5, "above 1"),
         ("tracking", "quality", (0, 0, 1, 2, 2), NAN, "where there is no displacement, or the reverse"),
         ("evaluation", "coverage", (0, 0), NAN, "not numbers"),
@@ -93,10 +98,10 @@ def test_value_that_no_heart_can_have_is_found(stage, name, place, value, proble
     assert problem in found(stage, arrays)[name]
 
 
-@pytest.mark.parametrize("name", ["displacement", "strain", "wall_depth", "layer", "segment"])
+@pytest.mark.parametrize("name", ["displacement", "strain", "wall_depth", "labels", "flow"])
 def test_pixel_outside_the_wall_has_no_motion(name):
     arrays = heart("truth")
-    arrays["mask"][1, 2, 3] = False
+    arrays["labels"][1, 0, 2, 3] = 0
     assert name in found("truth", arrays)
 
 
@@ -123,7 +128,7 @@ def test_solved_heart_has_a_pressure_in_every_frame():
 
 
 def test_only_the_first_frame_is_end_diastole():
-    arrays = heart("truth")
+    arrays = {name: array[2:] for name, array in heart("truth").items()}
     arrays["displacement"][0] = 1e-4
     assert found("truth", arrays, first=2) == {}
 

@@ -118,7 +118,7 @@ def test_whole_view_that_lost_its_records_is_taken_up_without_any_work(repositor
     assert ledger.read(repository.record("rf"))["seconds"] == seconds
 
 
-@pytest.mark.parametrize("stage, array", [("truth", "mask"), ("bmode", "image")])
+@pytest.mark.parametrize("stage, array", [("truth", "labels"), ("bmode", "image")])
 def test_damaged_shard_is_healed_by_its_own_stage(repository, work_done, stage, array):
     before = repository.shards
     shard = next(name for name in before if name.startswith(f"{stage}/64/{array}/"))

@@ -1,5 +1,6 @@
 """Configuration: models, reading of files, generated reference."""
 
+from echotruth.config.cases import Cases
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import Bmode, Phantom, Rf, View
@@ -17,6 +18,7 @@ from echotruth.section import Section
 __all__ = [
     "Active",
     "Bmode",
+    "Cases",
     "Config",
     "Fibres",
     "Geometry",

@@ -24,6 +24,17 @@ ALL_VIEWS = "all"
 """Name of the mean over all views in the leaderboard; no view may have it."""
 
 
+ScatteringExponent = Annotated[FiniteFloat, Field(ge=0, le=4)]
+"""Power n of f / f0 that the amplitude of an echo follows, f0 being the centre frequency of the probe.
+
+0 is the same echo at all frequencies. 2 is the limit of scatterers much smaller than the wavelength (Rayleigh): the
+power of the echo goes with f^4, as measured in blood from 5 to 15 MHz (Shung, Sigelmann, Reid 1976, IEEE Trans Biomed
+Eng 23:460); from 30 to 90 MHz and at higher haematocrits it rises less (Maruvada, Shung, Wang 2002, Ultrasound Med Biol
+28:1081). The power from thin cylinders goes with f^3 if they are much longer than the wavelength, and with f^4 if they
+are much shorter (Wear & Harris 2008, doi:10.1121/1.2980524): 1.5 to 2 for fibres of muscle across the beam.
+"""
+
+
 class Phantom(Section):
     """Scatterers in the wall."""
 
@@ -31,6 +42,9 @@ class Phantom(Section):
     """Scatterers per cubic millimetre of unloaded wall. At 2800 with mouse_25MHz, speckle SNR is 1.816 (1.913 if fully
     developed); tracker error shows no consistent trend with density. Default: from `probe.preset`, at least ten per
     resolution cell."""
+    scattering_exponent: ScatteringExponent = 0.0
+    """Power of f / f0 that the amplitude of the echo of muscle follows, f0 being `probe.frequency_MHz`: 0 for the same
+    echo at all frequencies, 1.5 for thin long fibres, 2 for Rayleigh scattering."""
     in_plane_only: bool = False
     """Scatterers lie in the imaging plane and move within it, as in the paper."""
 

@@ -5,7 +5,7 @@ They lie a hundred times and more above the default heart, and are checked befor
 
 from __future__ import annotations
 
-from math import floor, isqrt, pi, prod
+from math import floor, isqrt, pi
 from typing import TYPE_CHECKING
 
 from echotruth.config.anatomy import Lengths
@@ -15,7 +15,19 @@ if TYPE_CHECKING:
     from echotruth.config.sections import Config
 
 MAX_CASES = 100_000
-"""Largest number of cases of a repository."""
+"""Largest number of cases of a repository, also of those that conditions leave out."""
+MAX_TABLE_BYTES = 2 * 2**20
+"""Size of the largest table of hearts: 10 000 rows of 200 characters."""
+MAX_TABLE_COLUMNS = 256
+"""Largest number of columns of a table; each may become an array of the repository."""
+MAX_CELL = 4000
+"""Longest cell of a table, as a note may be, characters."""
+MAX_DRAWN_KEYS = 64
+"""Largest number of keys that are drawn."""
+MAX_CONDITIONS = 100
+"""Largest number of conditions."""
+MAX_CONDITION = 1000
+"""Longest condition, characters."""
 MAX_VIEWS = 64
 """Largest number of views of a heart."""
 MAX_TRACKERS = 64
@@ -45,12 +57,11 @@ def check_amounts(config: Config) -> None:
 
 
 def _check_cases(config: Config) -> None:
-    lengths = [len(values) for values in config.cases.values()]
-    number = prod(lengths)
-    if number > MAX_CASES:
-        product = " x ".join(map(str, lengths[:8])) + (" x ..." if len(lengths) > 8 else "")
+    if config.cases.number > MAX_CASES:
+        shape = config.cases.shape
+        product = " x ".join(map(str, shape[:8])) + (" x ..." if len(shape) > 8 else "")
         remedy = f"makes {product} cases: list fewer values, because a repository has at most {MAX_CASES}"
-        raise invalid("cases", list(config.cases), remedy)
+        raise invalid("cases", config.cases.keys, remedy)
 
 
 def _check_pixels(config: Config) -> None:

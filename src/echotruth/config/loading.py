@@ -88,6 +88,8 @@ def _message(error: ErrorDetails) -> str:
     dotted_key = shown_key(keys)
     if error["type"] == "extra_forbidden":
         return f"{dotted_key} is not a key{_variant(model, sections)}{_suggestion(keys, list(model.model_fields))}"
+    if error["type"] == "missing":
+        return f"{dotted_key} is missing: it must be given"
     value = context["value"] if error["type"] == "invalid" else error["input"]
     return f"{dotted_key} = {_shown_value(value)}: {_remedy(error, context)}"
 

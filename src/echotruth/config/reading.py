@@ -29,7 +29,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
     ConfigError
         If the file cannot be read, holds no mapping, or exceeds `MAX_BYTES`, `MAX_DEPTH` or `MAX_VALUES`.
     """
-    text = _read_text(path)
+    text = read_text(path, MAX_BYTES, "YAML file", "a configuration")
     try:
         _check_events(text)
         values = yaml.load(text, Loader=_Loader)
@@ -90,24 +90,41 @@ def _children(value: Any) -> Iterable[Any]:
     return value if isinstance(value, list | tuple) else ()
 
 
-def _read_text(path: Path) -> str:
+def read_text(path: Path, most: int, file: str, what: str) -> str:
+    """Read a file of UTF-8 text.
+
+    Parameters
+    ----------
+    path : Path
+    most : int
+        Size of the largest file that is read, bytes.
+    file, what : str
+        What it should be, for errors: "YAML file", "a configuration".
+
+    Raises
+    ------
+    ConfigError
+        If it is no file, cannot be read, is too large, or is not UTF-8.
+    """
     # A pipe or a device could be read for ever.
-    if path.exists() and not path.is_file():
-        raise ConfigError(f"{path}: is not a file: give the path of a YAML file")
     try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"{path}: is not a file: give the path of a {file}")
+        with path.open("rb") as opened:
+            content = opened.read(most + 1)
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}): give the path of a YAML file") from None
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}): give the path of a {file}") from None
+    except ConfigError:
+        raise
     except ValueError:
-        raise ConfigError(f"{str(path)!r}: cannot be read: give the path of a YAML file") from None
-    if len(content) > MAX_BYTES:
+        raise ConfigError(f"{str(path)!r}: cannot be read: give the path of a {file}") from None
+    if len(content) > most:
         size = path.stat().st_size / 2**20
-        raise ConfigError(f"{path}: holds {size:.1f} MiB: a configuration has at most {MAX_BYTES // 2**20} MiB")
+        raise ConfigError(f"{path}: holds {size:.1f} MiB: {what} has at most {most // 2**20} MiB")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ConfigError(f"{path}: is not UTF-8 text: give the path of a YAML file") from None
+        raise ConfigError(f"{path}: is not UTF-8 text: give the path of a {file}") from None
 
 
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
+from echotruth.config.imaging import ScatteringExponent
 from echotruth.section import Positive, Section
 
 Level = Annotated[FiniteFloat, Field(ge=-80, le=20)]
@@ -18,9 +19,11 @@ class Tissue(Section):
     """Scatterers other than those of muscle."""
 
     level_dB: Level | None = None
-    """Mean echo power relative to muscle; null for no scatterers."""
+    """Mean echo power relative to muscle, at the centre frequency; null for no scatterers."""
     density: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.4
     """Density of scatterers relative to muscle; it does not change the echo power."""
+    scattering_exponent: ScatteringExponent = 0.0
+    """Power of f / f0 that the amplitude of the echo follows, as `phantom.scattering_exponent`; that of blood is 2."""
 
     @property
     def amplitude_std(self) -> float:

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints, model_validator
 
+from echotruth.config.cases import Cases
 from echotruth.config.defaults import apply_presets
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
@@ -49,8 +50,9 @@ class Config(Section):
     realism: Realism = Realism()
     bmode: Bmode = Bmode()
     tracking: Tracking = Tracking()
-    cases: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
-    """Sweep: values of dotted keys such as `fibres.endo_deg`; the cases are all combinations, 100 000 at most."""
+    cases: Cases = Cases()
+    """The hearts: values of dotted keys such as `fibres.endo_deg: [60, 70]`, of which all combinations are made, a
+    table, random draws, and conditions; they multiply, 100 000 hearts at most (docs/cases.md)."""
 
     @model_validator(mode="before")
     @classmethod

@@ -9,6 +9,7 @@ import numpy as np
 
 from echotruth.config import Config
 from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.labels import unpack
 from echotruth.loop.cycle import read_loop
 from echotruth.tracking.windows import grid
 
@@ -113,7 +114,8 @@ def grid_positions(config: Config) -> np.ndarray:
 def clips(job: Job) -> dict[int, Clip]:
     """Clips of the heart and view of a job, by image size."""
     config, largest = job.case.config, job.case.config.bmode.sizes[0]
-    masks = {size: job.read(f"truth/{size}", "mask")["mask"][0] for size in config.bmode.sizes}
+    labels = {size: job.read(f"truth/{size}", "labels")["labels"][0] for size in config.bmode.sizes}
+    masks = {size: unpack(label)["mask"] for size, label in labels.items()}
     lateral, axial = np.moveaxis(grid_points(config, largest).round().astype(int), -1, 0)
     inside = masks[largest][axial, lateral]
     seed, time = int(job.random.integers(2**31)), read_loop(config.loop).time

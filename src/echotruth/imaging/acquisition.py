@@ -55,24 +55,28 @@ class Acquisition:
             record += np.float32(self.noise) * self.unit_noise(frame)
         return record
 
-    def echoes(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
-        """Record of scatterers, their positions (n, 3), m, and amplitudes (n,), without noise."""
+    def echoes(self, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray | float = 0.0) -> np.ndarray:
+        """Record of scatterers, their positions (n, 3), m, amplitudes (n,) and exponents (n,), without noise."""
         if self._filter is None:
-            return self.direct(position, amplitude)
+            return self.direct(position, amplitude, exponent)
+        exponent = np.broadcast_to(exponent, amplitude.shape)
         near = np.linalg.norm(position, axis=1) < self._haze_range
-        record = self.direct(position[near], amplitude[near])
+        record = self.direct(position[near], amplitude[near], exponent[near])
         record *= self._filter.astype(np.complex64)[:, None, None]
-        record += self.direct(position[~near], amplitude[~near])
+        record += self.direct(position[~near], amplitude[~near], exponent[~near])
         return record
 
-    def direct(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+    def direct(self, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray | float = 0.0) -> np.ndarray:
         """Echoes without reverberation."""
         matrix = self._scanner.matrix
         if self._rib is None:
-            return matrix(position, amplitude)
+            return matrix(position, amplitude, exponent)
+        exponent = np.broadcast_to(exponent, amplitude.shape)
         record = np.zeros((len(matrix.frequency), len(matrix.centres), len(matrix.centres)), np.complex64)
         for strip, transmission in self._rib.strips(position):
-            record += np.multiply.outer(transmission, transmission) * matrix(position[strip], amplitude[strip])
+            record += np.multiply.outer(transmission, transmission) * matrix(
+                position[strip], amplitude[strip], exponent[strip]
+            )
         return record
 
     def unit_noise(self, frame: int) -> np.ndarray:

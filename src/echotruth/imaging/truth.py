@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from echotruth.arrays import Floats
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import MaterialPoints, gradient, interpolate, straight_triangles
 from echotruth.heart import Heart
+from echotruth.imaging.flow import flow
+from echotruth.imaging.labels import pack
 from echotruth.imaging.view import Plane
 from echotruth.mechanics import kinematics
 from echotruth.mechanics.fibres import axes_from_normal, layer, unit
@@ -21,7 +24,18 @@ IMAGE_AXES = {"short_axis": (0, 1, 2), "long_axis": (0, 2, 1)}
 
 
 def pixel_truth(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> dict[str, NDArray[np.generic]]:
-    """Motion since end-diastole and labels of the tissue at each pixel of each frame.
+    """All arrays of :class:`PixelTruth`, whose parameters these are."""
+    return dict(PixelTruth(heart, plane, axial, lateral))
+
+
+class PixelTruth(Mapping[str, NDArray[np.generic]]):
+    """Motion and labels of the tissue at each pixel of each frame; an array is made when it is asked for.
+
+    They are displacement (frame, n_axial, n_lateral, 3; lateral, axial, elevation; m) and strain (frame, n_axial,
+    n_lateral, 6; RR, CC, LL, RC, RL, CL) since end-diastole, wall_depth (frame, n_axial, n_lateral), labels (frame, 3,
+    n_axial, n_lateral; see :mod:`echotruth.imaging.labels`), and flow (frame, 2, n_axial, n_lateral, 3; m) to the
+    previous and to the next frame (see :func:`echotruth.imaging.flow.flow`); in single precision. Outside the wall, and
+    in flow to where there is no frame: NaN or 0.
 
     Parameters
     ----------
@@ -29,29 +43,62 @@ def pixel_truth(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> d
     plane : Plane
     axial, lateral : ndarray of shape (n_axial,), (n_lateral,), m
         Pixel centres.
+    """
+
+    def __init__(self, heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> None:
+        self._heart, self._axes, self._shape = heart, plane.axes, (len(axial), len(lateral))
+        pixels, frames = _pixels(plane, axial, lateral), range(len(heart.displacement))
+        self._tissue = [_locate_in_wall(heart, frame, pixels) for frame in frames]
+        self._fields: dict[str, tuple[int, Callable[[int, MaterialPoints], NDArray[np.generic]]]] = {
+            "displacement": (0, lambda frame, points: displacement(heart, frame, points) @ plane.axes.T),
+            "strain": (0, lambda frame, points: strain(heart, frame, points)),
+            "wall_depth": (0, lambda _, points: wall_depth(heart, points)),
+            "labels": (1, lambda _, points: pack(labels(heart, points))),
+            "flow": (1, lambda frame, points: flow(heart, frame, points) @ plane.axes.T),
+        }
+        """Number of dimensions of the values before that of the pixels, and the values at the tissue of a frame."""
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._fields)
+
+    def __len__(self) -> int:
+        return len(self._fields)
+
+    def __getitem__(self, name: str) -> NDArray[np.generic]:
+        before, values_at = self._fields[name]
+        images: NDArray[np.generic] = np.empty(0)
+        for frame, (inside, points) in enumerate(self._tissue):
+            values = values_at(frame, points)
+            if not frame:
+                shape = (*values.shape[:before], self._shape[0] * self._shape[1], *values.shape[before + 1 :])
+                images = _empty((len(self._tissue), *shape), values.dtype)
+            images[frame][(slice(None),) * before + (inside,)] = values
+        at = 1 + before
+        return images.reshape(*images.shape[:at], *self._shape, *images.shape[at + 1 :])
+
+
+def wall_mask(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> NDArray[np.bool_]:
+    """Whether points of the image are in the wall at end-diastole.
+
+    Parameters
+    ----------
+    heart : Heart
+    plane : Plane
+    axial, lateral : ndarray of shape (n_axial,), (n_lateral,), m
 
     Returns
     -------
-    dict of ndarray of shape (frame, n_axial, n_lateral, ...)
-        displacement (3; lateral, axial, elevation; m), strain (6; RR, CC, LL, RC, RL, CL), mask, layer,
-        segment, region, wall_depth. Outside the wall: NaN, False or 0.
+    ndarray of shape (n_axial, n_lateral), bool
     """
-    pixels = plane.to_heart(np.stack(np.broadcast_arrays(lateral, axial[:, None], 0.0), axis=-1).reshape(-1, 3))
-    frames, clip = len(heart.displacement), {}
-    for frame in range(frames):
-        inside, points = _locate_in_wall(heart, frame, pixels)
-        arrays = {
-            "displacement": displacement(heart, frame, points) @ plane.axes.T,
-            "strain": strain(heart, frame, points),
-            "mask": np.ones(len(points), bool),
-            **labels(heart, points),
-        }
-        for name, values in arrays.items():
-            if name not in clip:
-                clip[name] = _empty((frames, len(pixels), *values.shape[1:]), values.dtype)
-            clip[name][frame, inside] = values
-    shape = frames, len(axial), len(lateral)
-    return {name: values.reshape(*shape, *values.shape[2:]) for name, values in clip.items()}
+    inside = _locate_in_wall(heart, 0, _pixels(plane, axial, lateral))[0]
+    mask = np.zeros(len(axial) * len(lateral), bool)
+    mask[inside] = True
+    return mask.reshape(len(axial), len(lateral))
+
+
+def _pixels(plane: Plane, axial: Floats, lateral: Floats) -> Floats:
+    """Pixel centres in the heart frame, (n_axial n_lateral, 3), m."""
+    return plane.to_heart(np.stack(np.broadcast_arrays(lateral, axial[:, None], 0.0), axis=-1).reshape(-1, 3))
 
 
 def _locate_in_wall(heart: Heart, frame: int, positions: Floats) -> tuple[NDArray[np.int64], MaterialPoints]:
@@ -137,13 +184,17 @@ def strain(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
     return kinematics.strain(gradients[:, :3], axes_from_normal(gradients[:, 3]), kinematics.RCL_COMPONENTS)
 
 
+def wall_depth(heart: Heart, points: MaterialPoints) -> Floats:
+    """Wall depth (0 to 1) of material points, (n,)."""
+    depth: Floats = np.clip(interpolate(heart.wall_depth, heart.cells, points), 0, 1)
+    return depth
+
+
 def labels(heart: Heart, points: MaterialPoints) -> dict[str, NDArray[np.generic]]:
-    """Wall depth (0 to 1), layer, AHA segment and region of disease of material points, each (n,)."""
-    depth = np.clip(interpolate(heart.wall_depth, heart.cells, points), 0, 1)
+    """Layer, AHA segment and region of disease of material points, each (n,)."""
     unloaded = interpolate(heart.nodes, heart.cells, points)
     return {
-        "wall_depth": depth,
-        "layer": layer(depth, heart.layers).astype(np.uint8),
+        "layer": layer(wall_depth(heart, points), heart.layers).astype(np.uint8),
         "segment": segment(unloaded, heart.apex),
         "region": np.zeros(len(points), np.uint8) if heart.region is None else heart.region[points.cell],
     }

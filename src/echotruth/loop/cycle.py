@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -87,40 +88,81 @@ def read_loop(loop: Loop) -> Cycle:
         If the file cannot be read or holds no valid cycle: one sentence with the file, the row and the remedy.
     """
     recording = _read_recording(loop)
-    _check_time(recording)
-    for quantity in _CURVES:
-        if quantity in recording.names:
-            _check_curve(recording, quantity)
-    _check_end_diastole(recording)
-    time, si = recording.si("time"), loop.si()
+    time, curves = recording.si("time"), _scaled_curves(recording, loop)
     assert time is not None
-    curves = {quantity: recording.si(quantity) for quantity in _CURVES}
-    if curves["pressure"] is not None:
-        curves["pressure"] = _map_pressure(recording.path, curves["pressure"], curves["volume"], si)
-    if curves["volume"] is not None:
-        curves["volume"] = _map_volume(recording.path, curves["volume"], si)
-    period = float(time[-1]) if si.heart_rate is None else 1 / si.heart_rate
-    phase = np.arange(loop.frames) / loop.frames
-    sampled = {
-        name: None if values is None else _resample(time / time[-1], values, phase) for name, values in curves.items()
+    period, phase = _period(recording, loop), np.arange(loop.frames) / loop.frames
+    given = {name: values for name, values in curves.items() if values is not None}
+    samples = _resample(time / time[-1], np.stack(list(given.values()), axis=1), phase).T
+    sampled: dict[str, Floats | None] = dict.fromkeys(curves) | {
+        name: np.ascontiguousarray(values) for name, values in zip(given, samples, strict=True)
     }
     if loop.prescribed == "volume" and sampled["tension"] is None:
         sampled["tension"] = np.zeros(loop.frames)
     return Cycle(str(recording.path), loop.prescribed, period, phase * period, **sampled)
 
 
+def check_loop(loop: Loop) -> None:
+    """Check all that :func:`read_loop` does, in less time.
+
+    Raises
+    ------
+    LoopError
+        If the file cannot be read or holds no valid cycle.
+    """
+    _scaled_curves(_read_recording(loop), loop)
+
+
+def frame_times(loop: Loop) -> Floats:
+    """Times of the frames of a cycle, (n_frames,), s.
+
+    Raises
+    ------
+    LoopError
+        If the file cannot be read or its curves are not valid.
+    """
+    return np.arange(loop.frames) / loop.frames * _period(_read_recording(loop), loop)
+
+
+def _scaled_curves(recording: Recording, loop: Loop) -> dict[str, Floats | None]:
+    """Curves at the rows of the file, mapped to the volumes and pressures of the loop, SI units."""
+    si, curves = loop.si(), {quantity: recording.si(quantity) for quantity in _CURVES}
+    if curves["pressure"] is not None:
+        curves["pressure"] = _map_pressure(recording.path, curves["pressure"], curves["volume"], si)
+    if curves["volume"] is not None:
+        curves["volume"] = _map_volume(recording.path, curves["volume"], si)
+    return curves
+
+
+def _period(recording: Recording, loop: Loop) -> float:
+    """Duration of a cycle, s."""
+    time, rate = recording.si("time"), loop.si().heart_rate
+    assert time is not None
+    return float(time[-1]) if rate is None else 1 / rate
+
+
 def _read_recording(loop: Loop) -> Recording:
-    """Columns of the file that `loop.prescribed` needs, and no others."""
+    """Columns of the file that `loop.prescribed` needs, and no others; its curves are checked."""
     path = SHIPPED / f"{loop.file}.csv"
     path = path if path.is_file() else Path(loop.file)
     if not path.is_file():
         shipped = ", ".join(sorted(file.stem for file in SHIPPED.glob("*.csv")))
         remedy = f"give the path of a CSV file or the name of a shipped loop ({shipped})"
         raise LoopError(f"{path}: there is no readable loop of this name; {remedy}.")
-    needed = ("time", *PRESCRIBED[loop.prescribed])
-    return read(
-        path, f"loop.prescribed = {loop.prescribed}", needed, ("tension",) if loop.prescribed == "volume" else ()
-    )
+    state = path.stat()
+    return _checked(path, loop.prescribed, (str(path.resolve()), state.st_ino, state.st_mtime_ns, state.st_size))
+
+
+@lru_cache(maxsize=64)
+def _checked(path: Path, prescribed: Prescribed, version: tuple[str | int, ...]) -> Recording:
+    """Recording in a file, read once as long as the file does not change: thousands of hearts may share it."""
+    needed = ("time", *PRESCRIBED[prescribed])
+    recording = read(path, f"loop.prescribed = {prescribed}", needed, ("tension",) if prescribed == "volume" else ())
+    _check_time(recording)
+    for quantity in _CURVES:
+        if quantity in recording.names:
+            _check_curve(recording, quantity)
+    _check_end_diastole(recording)
+    return recording
 
 
 def _check_time(recording: Recording) -> None:
@@ -188,9 +230,9 @@ def _map_pressure(path: Path, pressure: Floats, volume: Floats | None, si: Simpl
 
 
 def _resample(phase: Floats, values: Floats, at: Floats) -> Floats:
-    """Periodic monotone cubic interpolation (Fritsch & Butland 1984)."""
+    """Periodic monotone cubic interpolation (Fritsch & Butland 1984) of curves (row, curve)."""
     from scipy.interpolate import PchipInterpolator
 
-    values = np.append(values[:-1], values[0])
+    values = np.concatenate([values[:-1], values[:1]])
     three_periods = np.concatenate([phase[:-1] - 1, phase[:-1], phase + 1])
     return PchipInterpolator(three_periods, np.concatenate([values[:-1], values[:-1], values]))(at)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.cases import Case
 from echotruth.config import Config
@@ -15,10 +15,12 @@ from echotruth.config.building import configure
 from echotruth.evaluation.clip import grid_positions
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.truth import pixel_truth
+from echotruth.imaging.truth import wall_mask
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
+from echotruth.notebook.derived import derived
 from echotruth.repository import rounding, schema
+from echotruth.repository.rounding import quantum, rounded
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,16 +57,14 @@ def clip_dataset(heart: Heart, case: Case, view: str, plane: Plane, values: dict
         Name of the view.
     plane : Plane
     values : dict of dict of ndarray
-        Groups `bmode/SIZE` and `truth/SIZE`.
+        Groups `bmode/SIZE` and `truth/SIZE`, or some of their arrays.
     """
     axial, lateral = pixel_centres(case.config.bmode, int(next(iter(values)).rpartition("/")[2]))
-    found = dataset(case, values, {"axial": axial, "lateral": lateral})
+    found = derived(dataset(case, values, {"axial": axial, "lateral": lateral}), case.config)
     grid = grid_positions(case.config)
     lateral, axial = grid[0, :, 0], grid[:, 0, 1]
-    first = replace(heart, displacement=heart.displacement[:1])
-    at_ed = pixel_truth(first, plane, axial, lateral)["mask"][0]
     about = {"long_name": "whether a point that trackers follow is in the wall at ED", "units": "1"}
-    points = {"grid_mask": (("grid_axial", "grid_lateral"), at_ed, about)}
+    points = {"grid_mask": (("grid_axial", "grid_lateral"), wall_mask(heart, plane, axial, lateral), about)}
     found = found.assign(points).assign_coords(grid_axial=axial, grid_lateral=lateral)
     return found.assign_attrs(
         case=case.id,
@@ -76,6 +76,19 @@ def clip_dataset(heart: Heart, case: Case, view: str, plane: Plane, values: dict
     )
 
 
+def as_stored(case: Case, groups: dict[str, dict[str, Any]]) -> dict[str, dict[str, NDArray[np.generic]]]:
+    """Arrays of groups, rounded as a repository has them."""
+    arrays = schema.groups(case.config)
+    return {
+        group: {
+            array.name: rounded(np.asarray(values[array.name], array.dtype), quantum(array, case.config))
+            for array in arrays[group]
+            if array.name in values
+        }
+        for group, values in groups.items()
+    }
+
+
 def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str, np.ndarray]) -> xr.Dataset:
     """Arrays of one case, or of one of its views, with the dimensions, units and meanings of the repository."""
     import xarray as xr
@@ -85,7 +98,9 @@ def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str
         for array in schema.named(group.partition("/")[0]):
             if array.name in values:
                 dims = [dim for dim in array.dims if dim not in ("case", "view", "size", "tracker")]
-                about = {"units": array.units, "long_name": array.long_name}
+                about: dict[str, Any] = {"units": array.units, "long_name": array.long_name}
+                step = rounding.quantum(array, case.config)
+                about |= {} if step is None else {"quantum": step}
                 found[array.name] = (dims, rounding.as_stored(values[array.name], array, case.config), about)
     data, labels = xr.Dataset(found), schema.LABELS | coordinates
     data = data.assign_coords({name: (name, np.asarray(labels[name])) for name in data.dims if name in labels})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,12 +12,15 @@ from numpy.typing import NDArray
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
 from echotruth.notebook.datasets import clip_dataset, image_size
+from echotruth.notebook.derived import MEANING, stored
 from echotruth.repository import schema
 from echotruth.repository.ledger import rows
+from echotruth.repository.remote import hierarchy, is_url
 from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
     import xarray as xr
+    from zarr.storage import ObjectStore
 
 
 def open(repository: str | Path) -> xr.DataTree:
@@ -25,7 +29,7 @@ def open(repository: str | Path) -> xr.DataTree:
     Parameters
     ----------
     repository : str or Path
-        `out/NAME` or `out/NAME/NAME.zarr`.
+        `out/NAME` or `out/NAME/NAME.zarr`, or the address `s3://BUCKET/FOLDER` to which one was uploaded.
 
     Returns
     -------
@@ -38,12 +42,17 @@ def open(repository: str | Path) -> xr.DataTree:
     ------
     FileNotFoundError
         If the folder holds no repository.
+    RemoteError
+        If the address cannot be reached.
     """
     import xarray as xr
 
-    folder = _folder(repository)
-    store = folder / f"{folder.resolve().name}.zarr"
-    groups = xr.open_groups(store, engine="zarr", create_default_indexes=False)
+    if is_url(repository):
+        store: Path | ObjectStore = hierarchy(str(repository))
+    else:
+        folder = _folder(repository)
+        store = folder / f"{folder.resolve().name}.zarr"
+    groups = xr.open_groups(store, engine="zarr", create_default_indexes=False)  # type: ignore[arg-type]  # it may be a store
     groups["/cases"] = _with_constants(groups["/cases"])
     return xr.DataTree.from_dict(_indexed(groups))
 
@@ -65,7 +74,13 @@ def load_heart(repository: str | Path, case: str = "heart") -> Heart:
     return job_of(repository, case).heart
 
 
-def load_clip(repository: str | Path, case: str = "heart", view: str = "mid", size: int | None = None) -> xr.Dataset:
+def load_clip(
+    repository: str | Path,
+    case: str = "heart",
+    view: str = "mid",
+    size: int | None = None,
+    variables: Iterable[str] | None = None,
+) -> xr.Dataset:
     """Read a clip of a repository with its truth, as :func:`echotruth.image` returns it.
 
     Parameters
@@ -76,17 +91,33 @@ def load_clip(repository: str | Path, case: str = "heart", view: str = "mid", si
     view : str
     size : int, optional
         Pixels along a side. Default: the largest.
+    variables : iterable of str, optional
+        Those to read, as `("image", "flow")`, and what follows from them. Default: all.
 
     Raises
     ------
     FileNotFoundError, ValueError
-        If there is no such repository, case, view or size.
+        If there is no such repository, case, view, size or variable.
     """
     job = job_of(repository, case, view)
     config = job.case.config
     size = image_size(config, size)
-    values = {group: job.read(group) for group in (f"bmode/{size}", f"truth/{size}")}
+    arrays = {f"bmode/{size}": schema.BMODE, f"truth/{size}": schema.TRUTH}
+    wanted = _arrays(variables, {array.name for group in arrays.values() for array in group})
+    names = {group: [array.name for array in members if array.name in wanted] for group, members in arrays.items()}
+    values = {group: job.read(group, *members) for group, members in names.items() if members}
     return clip_dataset(job.heart, job.case, view, Plane(**job.read("phantom", "origin", "axes")), values)
+
+
+def _arrays(variables: Iterable[str] | None, known: set[str]) -> set[str]:
+    """Names of the stored arrays that variables are made from: all, if none are given."""
+    if variables is None:
+        return known
+    asked = stored([variables] if isinstance(variables, str) else variables)
+    if not asked or not asked <= known:
+        unknown = ", ".join(map(repr, sorted(asked - known))) or "none"
+        raise ValueError(f"variables: {unknown}: use any of {', '.join(sorted({*known, *MEANING} - {'label'}))}.")
+    return asked
 
 
 OF_GROUP = ("axial", "lateral", "course")

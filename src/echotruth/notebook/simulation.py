@@ -25,7 +25,7 @@ from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.physiology import measures, violated_bound
-from echotruth.notebook.datasets import case_of, clip_dataset, dataset, fingerprint, image_size
+from echotruth.notebook.datasets import as_stored, case_of, clip_dataset, dataset, fingerprint, image_size
 from echotruth.seeds import generator
 from echotruth.tracking.tracker import track as track_points
 
@@ -60,7 +60,9 @@ def beat(config: Source = None, progress: bool = True) -> Heart:
     """
     settings = config if isinstance(config, Config) else configure(config)
     if settings.cases:
-        raise ValueError(f"cases sweeps {', '.join(settings.cases)}: beat one, as echotruth.expand(config)[0].config")
+        raise ValueError(
+            f"cases sweeps {', '.join(settings.cases.keys)}: beat one, as echotruth.expand(config)[0].config"
+        )
     with _progress_line("beat", progress):
         arrays = simulate(settings)
     depth = arrays["fibres"]["wall_depth"]
@@ -102,8 +104,10 @@ def image(
     -------
     Dataset
         The clip `image` (frame, axial, lateral), uint8, and the truth at every pixel: displacement since end-diastole
-        (m), strain, mask, layer, segment, region and wall_depth; units are attributes of each array. `grid_mask` says
-        which points of the trackers' grid are in the wall.
+        (m), strain, mask, layer, segment, region, wall_depth, and flow to the previous and to the next frame (m). The
+        image shows a slice of tissue of a `thickness` (m); `leaves` and `enters` say which tissue is beside it in the
+        next frame, and was in the previous one. Units are attributes of each array. `grid_mask` says which points of
+        the trackers' grid are in the wall.
 
     Raises
     ------
@@ -125,7 +129,7 @@ def image(
         f"bmode/{size}": {"image": bmode_clip(lines, sequence.scanner.scan, range_, config.bmode, gain)[size]},
         f"truth/{size}": pixel_truth(heart, plane, *pixel_centres(config.bmode, size)),
     }
-    clip = clip_dataset(heart, case, name, plane, values)
+    clip = clip_dataset(heart, case, name, plane, as_stored(case, values))
     if keep_lines:
         about = {"long_name": "lines, demodulated by exp(-4 pi i f range / c)", "frequency": sequence.scanner.frequency}
         clip["lines"] = (("frame", "line", "range"), lines, about)

@@ -139,10 +139,11 @@ class Figures:
     def views(self) -> None:
         """Every view at end-diastole and end-systole."""
         images, truth = (self.group(f"{stage}/{self.sizes[0]}") for stage in ("bmode", "truth"))
+        layer = truth["labels"].sel(label="layer")
         pictures = {
             view: [
                 views.Picture(
-                    images.image.sel(view=view, frame=frame).values, truth.mask.sel(view=view, frame=frame).values
+                    images.image.sel(view=view, frame=frame).values, layer.sel(view=view, frame=frame).values > 0
                 )
                 for frame in (0, self.es)
             ]

@@ -6,14 +6,13 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import zarr
 
-from echotruth.cases import Case, Sweep
+from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, load
 from echotruth.repository import layout, ledger, schema
@@ -94,7 +93,7 @@ class Repository:
             raise CheckError(f"{folder}: is not a repository: give the folder that a run made, as out/demo")
         try:
             self.config: Config = load(folder / "config.yaml")
-            self.cases = _cases(self.config)
+            self.cases = all_cases(self.config)
         except ConfigError as error:
             raise CheckError(f"{error}: run the configuration again, which writes it") from None
         self.folder = folder
@@ -176,13 +175,6 @@ class Repository:
     def name(self, path: Path) -> str:
         """Path below the folder."""
         return path.relative_to(self.folder).as_posix()
-
-
-def _cases(config: Config) -> dict[str, Case]:
-    """Cases by id; the files that a configuration names need not be there any more."""
-    sweep = Sweep(config, config.name)
-    combinations = (dict(zip(config.cases, values, strict=True)) for values in product(*config.cases.values()))
-    return {case.id: case for case in map(sweep.case, combinations)}
 
 
 def wanted_records(folder: Path, cases: list[str], views: list[str]) -> list[Path]:

@@ -11,7 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from echotruth.config import Config
+from echotruth.cases import Case, all_cases, as_table
+from echotruth.config import Cases, Config
 from echotruth.config.loading import ConfigError, load, validate
 from echotruth.repository import durable, ledger
 from echotruth.repository.checksums import ChecksumError, verify
@@ -47,16 +48,36 @@ def spanning(into: str, configs: dict[Path, Config]) -> Config:
     for other, config in others:
         if key := _difference(first, config):
             raise MergeError(f"{other}: {key} differs from that of {folder}: only name and cases may differ")
-    keys = list(dict.fromkeys(key for config in configs.values() for key in config.cases))
-    cases: dict[str, list[Any]] = {}
-    for key in keys:
-        cases[key] = []
-        for config in configs.values():
-            cases[key] += [value for value in config.cases.get(key, [_value(config, key)]) if value not in cases[key]]
+    are_grids = all(config.cases == Cases.model_validate(config.cases.grid) for config in configs.values())
+    cases = _joint_grid(list(configs.values())) if are_grids else _joint_table(configs)
     try:
         return validate(first.model_dump(mode="json") | {"name": into, "cases": cases}, into)
     except ConfigError as error:
         raise MergeError(str(error)) from None
+
+
+def _joint_grid(configs: list[Config]) -> dict[str, list[Any]]:
+    """All values of each key that one of the configurations sweeps."""
+    keys = list(dict.fromkeys(key for config in configs for key in config.cases.grid))
+    cases: dict[str, list[Any]] = {}
+    for key in keys:
+        cases[key] = []
+        for config in configs:
+            values = config.cases.grid.get(key, [_value(config, key)])
+            cases[key] += [value for value in values if value not in cases[key]]
+    return cases
+
+
+def _joint_table(configs: dict[Path, Config]) -> dict[str, str]:
+    """Table of all hearts, under the ids that they have."""
+    cases: dict[str, Case] = {}
+    for folder, config in configs.items():
+        for id, case in all_cases(config).items():
+            same = cases.setdefault(id, case).config
+            if same != case.config.model_copy(update={"name": same.name}):
+                remedy = "give it another id in one of them"
+                raise MergeError(f"{folder}: {id} is another heart than that of the same id: {remedy}")
+    return {"table": as_table(list(cases.values()))}
 
 
 def compare(source: Path, target: Path) -> None:

@@ -69,6 +69,10 @@ def rounded(values: ArrayLike, quantum: float | None) -> NDArray[Any]:
     values = np.asarray(values)
     if quantum is None:
         return values
-    # Division and multiplication by a power of two are exact, so that only `rint` rounds. Adding 0 makes -0 to 0.
-    result: NDArray[Any] = np.rint(values / values.dtype.type(quantum)) * values.dtype.type(quantum) + 0
+    step, result = values.dtype.type(quantum), np.empty_like(values)
+    # Part by part and in place, because memory is what this takes.
+    for given, part in zip(np.atleast_2d(values), np.atleast_2d(result), strict=True):
+        # Division and multiplication by a power of two are exact, so that only `rint` rounds. Adding 0 makes -0 to 0.
+        np.rint(np.divide(given, step, out=part), out=part)
+        np.add(np.multiply(part, step, out=part), 0, out=part)
     return result

@@ -78,13 +78,30 @@ PHANTOM = (
 
 _PIXEL = "case view frame axial lateral"
 TRUTH = (
-    _array("displacement", f"{_PIXEL} vector", "float32", "m", "displacement from ED of the tissue at the pixel"),
-    _array("strain", f"{_PIXEL} strain_component", "float32", "1", "strain from ED of the tissue at the pixel"),
-    _array("mask", _PIXEL, "bool", "1", "whether the pixel centre is in the wall"),
-    _array("layer", _PIXEL, "uint8", "1", "transmural layer, 1 at the endocardium, 0 outside"),
-    _array("segment", _PIXEL, "uint8", "1", "AHA segment, 0 outside"),
-    _array("region", _PIXEL, "uint8", "1", f"region of disease: {_REGION}"),
-    _array("wall_depth", _PIXEL, "float32", "1", "wall depth, 0 at the endocardium and 1 at the epicardium"),
+    _array(
+        *("displacement", f"{_PIXEL} vector", "float32", "m"),
+        "displacement from ED of the tissue at the pixel",
+        rounding.LENGTH,
+    ),
+    _array(
+        *("strain", f"{_PIXEL} strain_component", "float32", "1"),
+        "strain from ED of the tissue at the pixel",
+        rounding.STRAIN,
+    ),
+    _array(
+        *("wall_depth", _PIXEL, "float32", "1"),
+        "wall depth, 0 at the endocardium and 1 at the epicardium",
+        rounding.WALL_DEPTH,
+    ),
+    _array(
+        *("labels", "case view frame label axial lateral", "uint8", "1"),
+        f"transmural layer, 1 at the endocardium; AHA segment; region of disease: {_REGION}; all 0 outside the wall",
+    ),
+    _array(
+        *("flow", "case view frame to axial lateral vector", "float32", "m"),
+        "displacement of the tissue at the pixel to where it is in the previous and in the next frame",
+        rounding.LENGTH,
+    ),
 )
 
 BMODE = (_array("image", _PIXEL, "uint8", "1", "B-mode grey level"),)
@@ -118,6 +135,8 @@ COORDINATES = (
     _array("lateral", "lateral", "float64", "m", "lateral position"),
     _array("xyz", "xyz", "string", "1", "axis of the heart frame"),
     _array("vector", "vector", "string", "1", "axis of the image"),
+    _array("label", "label", "string", "1", "what a label says of the tissue"),
+    _array("to", "to", "string", "1", "frame that flow leads to"),
     _array("plane", "plane", "string", "1", "axis in the image plane"),
     _array("strain_component", "strain_component", "string", "1", "radial, circumferential, longitudinal"),
     _array("fibre_component", "fibre_component", "string", "1", "fibre, sheet, normal"),
@@ -150,6 +169,8 @@ COORDINATES = (
 LABELS: dict[str, tuple[str, ...]] = {
     "xyz": ("x", "y", "z"),
     "vector": ("lateral", "axial", "elevation"),
+    "label": ("layer", "segment", "region"),
+    "to": ("previous", "next"),
     "plane": ("lateral", "axial"),
     "strain_component": ("RR", "CC", "LL", "RC", "RL", "CL"),
     "fibre_component": ("ff", "ss", "nn", "fs", "fn", "sn"),

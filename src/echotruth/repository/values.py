@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.config import Config
+from echotruth.imaging.labels import unpack
 from echotruth.repository import rounding, schema
 
 Arrays = dict[str, NDArray[Any]]
@@ -78,8 +79,7 @@ RANGES: dict[str, dict[str, Range]] = {
         "displacement": ANY,
         "strain": ANY,
         "wall_depth": Range(-OVERSHOOT, 1 + OVERSHOOT),
-        "segment": SEGMENT,
-        "region": REGION,
+        "flow": ANY,
     },
     "rf": {"channels_step": POSITIVE},
     "tracking": {"displacement": ANY, "quality": Range(-COMPLEMENT, 1 + COMPLEMENT)},
@@ -194,17 +194,27 @@ def _phantom(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, 
 
 
 def _truth(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
-    mask = arrays["mask"]
+    label = unpack(arrays["labels"])
+    mask = label["mask"]
     for name in ("displacement", "strain", "wall_depth"):
         known = np.isfinite(arrays[name])
         if bool(((known.all(-1) if known.ndim > mask.ndim else known) != mask).any()):
             yield name, "is not a number in a pixel of the wall, or is one outside"
-    for name in ("layer", "segment"):
-        if bool(((arrays[name] > 0) != mask).any()):
-            yield name, "is 0 in a pixel of the wall, or is not outside"
-    if bool(arrays["region"][~mask].any()):
-        yield "region", "is not 0 outside the wall"
+    if bool(((label["segment"] > 0) != mask).any()) or bool(label["region"][~mask].any()):
+        yield "labels", "has a pixel of the wall without a segment, or a segment or region outside"
+    for name, highest in (("layer", config.fibres.layers), ("segment", SEGMENT.high), ("region", REGION.high)):
+        if label[name].max(initial=0) > highest:
+            yield "labels", f"has a {name} of {label[name].max()}, above {highest}"
+    if bool((np.isfinite(arrays["flow"]).all(-1) != _has_flow(mask, first, config.loop.frames)).any()):
+        yield "flow", "is not a number in a pixel of the wall from which there is a frame, or is one elsewhere"
     yield from _still_at_ed("displacement", arrays, first)
+
+
+def _has_flow(mask: NDArray[np.bool_], first: int, frames: int) -> NDArray[np.bool_]:
+    """Where there is a flow to the previous and to the next frame, given the wall in frames from `first` on."""
+    frame = np.arange(first, first + len(mask))
+    exists = np.stack([frame > 0, frame < frames - 1], axis=1)
+    return mask[:, None] & exists[..., None, None]
 
 
 def _evaluation(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:

@@ -13,7 +13,7 @@ from shlex import quote
 from typing import Any
 
 from echotruth.cases import Case
-from echotruth.config import Config
+from echotruth.config import Cases, Config
 from echotruth.config.loading import ConfigError, override, validate
 from echotruth.repository import durable
 from echotruth.repository.provenance import settings_version
@@ -21,7 +21,7 @@ from echotruth.repository.provenance import settings_version
 
 def single(config: Config) -> Config:
     """The configuration without its sweep: what all its cases have in common."""
-    return config.model_copy(update={"cases": {}})
+    return config.model_copy(update={"cases": Cases()})
 
 
 def configuration_path(folder: Path, config: Config) -> Path:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
-from echotruth.config import Config, Loop
+from echotruth.config import Config, Geometry, Loop
 from echotruth.loop.cycle import read_loop
 from echotruth.repository.provenance import settings_version
 
@@ -16,7 +16,7 @@ LINES = ("phantom", "rf")
 """Stages up to the lines; of the section bmode they depend on the depth alone."""
 
 
-@cache
+@lru_cache(maxsize=1000)
 def _curves(loop: Loop) -> list[Any]:
     """Time and prescribed curves of a loop, read once for all hearts that share it."""
     cycle = read_loop(loop)
@@ -32,20 +32,32 @@ def mechanics_settings(config: Config) -> str:
     config : Config
         Configuration of one case.
     """
-    # These read and check meshes, which a view does not need.
-    from echotruth.mechanics.geometry.imported_mesh import fingerprint
-    from echotruth.mechanics.motion_file.files import content_hash
-
     # Only fibre disarray depends on the seed.
     seed = config.seed if config.fibres.disarray_deg else None
-    anatomy = (config.geometry.resolved(), fingerprint(config.geometry), config.fibres, seed, config.pathology)
+    anatomy = (config.geometry.resolved(), _mesh_hash(config.geometry), config.fibres, seed, config.pathology)
     if config.motion.kind == "beat":
         return settings_version(*anatomy, config.loop, _curves(config.loop), config.mechanics)
     formula = getattr(config.motion, config.motion.kind)
     if config.motion.kind == "file":
-        formula = settings_version(formula, content_hash(str(config.motion.file.path)))
+        formula = settings_version(formula, _series_hash(str(config.motion.file.path)))
     amplitude = (_curves(config.loop)[0], config.motion.time_course)
     return settings_version(*anatomy, *amplitude, formula, config.rf.focus_mm)
+
+
+def _mesh_hash(geometry: Geometry) -> str:
+    """Hash of the mesh file, or an empty string; modules that read meshes, and compile, are loaded only for one."""
+    if geometry.file is None:
+        return ""
+    from echotruth.mechanics.geometry.imported_mesh import fingerprint
+
+    return fingerprint(geometry)
+
+
+def _series_hash(path: str) -> str:
+    """Hash of all files of a series."""
+    from echotruth.mechanics.motion_file.files import content_hash
+
+    return content_hash(path)
 
 
 def motions(configs: dict[str, Config]) -> dict[str, str]:

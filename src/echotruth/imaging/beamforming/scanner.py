@@ -64,7 +64,7 @@ class Scanner:
         """Angles of the lines from the axial axis, shape (lines,), rad; the smallest lateral coordinate first."""
         return self.scan.angle
 
-    def lines(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+    def lines(self, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray | float = 0.0) -> np.ndarray:
         """Lines of one frame.
 
         Parameters
@@ -72,14 +72,16 @@ class Scanner:
         position
             Scatterers in the frame of the probe (lateral, axial, elevation), shape (scatterers, 3), m.
         amplitude
-            Their reflectivity, shape (scatterers,), 1.
+            Their reflectivity at the centre frequency, shape (scatterers,), 1.
+        exponent
+            Power of the frequency that it follows, shape (scatterers,) or one for all; 0 for none.
 
         Returns
         -------
         Shape (lines, ranges), complex64, demodulated by exp(-2 pi i frequency 2 range / c): a scatterer that moves
         away by d turns the phase by -4 pi frequency d / c.
         """
-        return self.beamform(self.matrix(*validate_scatterers(position, amplitude)))
+        return self.beamform(self.matrix(*validate_scatterers(position, amplitude, exponent)))
 
     def beamform(self, matrix: np.ndarray) -> np.ndarray:
         """Lines (lines, ranges) of one frame, as :meth:`lines`, of its full matrix (bins, elements, elements)."""
@@ -145,18 +147,23 @@ class _ZoneBeamformer:
         return lines
 
 
-def validate_scatterers(position: np.ndarray, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Scatterers as contiguous float64 arrays; raises a ValueError if they are invalid."""
+def validate_scatterers(
+    position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray | float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, amplitudes and exponents as float64 arrays; raises a ValueError if they are invalid."""
     position = np.ascontiguousarray(position, np.float64)
     amplitude = np.ascontiguousarray(amplitude, np.float64)
+    exponent = np.asarray(exponent, np.float64)
     if position.ndim != 2 or position.shape[1] != 3 or amplitude.shape != position.shape[:1]:
         raise ValueError(
             f"Scatterers need positions (n, 3) and amplitudes (n,); got {position.shape} and {amplitude.shape}."
         )
+    if exponent.shape not in ((), amplitude.shape):
+        raise ValueError(f"Scatterers need one exponent, or exponents {amplitude.shape}; got {exponent.shape}.")
     if not len(position):
         raise ValueError("There are no scatterers to image.")
-    if not (np.isfinite(position).all() and np.isfinite(amplitude).all()):
-        raise ValueError("Positions and amplitudes of scatterers must be finite numbers.")
+    if not all(np.isfinite(values).all() for values in (position, amplitude, exponent)):
+        raise ValueError("Positions, amplitudes and exponents of scatterers must be finite numbers.")
     if position[:, 1].min() <= 0:
         raise ValueError("Scatterers must lie in front of the array: their axial coordinate must be positive.")
-    return position, amplitude
+    return position, amplitude, np.broadcast_to(exponent, amplitude.shape)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.config import Config
+from echotruth.config import Config, Phantom
+from echotruth.config.realism import Tissue
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, MaterialPoints, interpolate
 from echotruth.heart import Heart
@@ -121,10 +122,10 @@ class Medium:
         constant = self._config.realism.decorrelation.si().time
         return (lambda frame: amplitude) if constant is None else ar1(amplitude, time, constant, name, random)
 
-    def wall(self, frame: int) -> tuple[Floats, Floats]:
-        """Positions in the image (n, 3), m, and amplitudes (n,) of the scatterers in the wall."""
+    def wall(self, frame: int) -> tuple[Floats, Floats, Floats]:
+        """Positions in the image (n, 3), m, amplitudes (n,) and exponents (n,) of the scatterers in the wall."""
         position = self._wall.image_positions(self._heart.positions(frame), self._heart.cells, self._plane)
-        return position, self._wall_amplitude(frame)
+        return _of_tissue(self._config.phantom, position, self._wall_amplitude(frame))
 
     def in_wall(self, frame: int, lateral: Floats, axial: Floats) -> NDArray[np.bool_]:
         """Whether points of the image lie in the wall in a frame; all arrays of one shape, coordinates in m."""
@@ -132,16 +133,22 @@ class Medium:
         points = locate(self._heart.positions(frame), self._heart.cells, self._plane.to_heart(position))
         return (points.cell >= 0).reshape(lateral.shape)
 
-    def __call__(self, frame: int) -> tuple[Floats, Floats]:
-        """Positions in the image (n, 3), m, and amplitudes (n,) of all scatterers in a frame."""
-        parts = [self.wall(frame)]
+    def __call__(self, frame: int) -> tuple[Floats, Floats, Floats]:
+        """Positions in the image (n, 3), m, amplitudes (n,) and exponents (n,) of all scatterers in a frame."""
+        parts, realism = [self.wall(frame)], self._config.realism
         if self._blood is not None:
             position, amplitude = self._blood.at(frame, self._heart, self._diffusion)
-            parts.append((self._plane.to_image(position), amplitude))
+            parts.append(_of_tissue(realism.blood, self._plane.to_image(position), amplitude))
         if self._surroundings is not None:
             position, amplitude = self._surroundings(frame), self._surroundings_amplitude(frame)
             present = outside_heart(self._heart, frame, position)
             present &= self._plane.to_image(position)[:, 1] > 0
-            parts.append((self._plane.to_image(position[present]), amplitude[present]))
-        positions, amplitudes = zip(*parts, strict=True)
-        return np.concatenate(positions), np.concatenate(amplitudes)
+            position = self._plane.to_image(position[present])
+            parts.append(_of_tissue(realism.surroundings, position, amplitude[present]))
+        positions, amplitudes, exponents = map(np.concatenate, zip(*parts, strict=True))
+        return positions, amplitudes, exponents
+
+
+def _of_tissue(tissue: Phantom | Tissue, position: Floats, amplitude: Floats) -> tuple[Floats, Floats, Floats]:
+    """Scatterers (n,) with the exponent of their tissue."""
+    return position, amplitude, np.full(len(amplitude), tissue.scattering_exponent)

@@ -2,13 +2,14 @@
 
 It is what :class:`~echotruth.imaging.rf.full_matrix.FullMatrix` approximates, and serves to measure its error:
 
-    S_ij(f) = P(f) sum_k a_k u_ki(f) u_kj(f)
+    S_ij(f) = P(f) sum_k a_k (f / f0)^n_k u_ki(f) u_kj(f)
     u(f)    = D(f) E(f) exp(-alpha f r) exp(-2 pi i f r / c) / r
     D(f)    = sinc(pi w f sin(theta) / c) cos(theta)
     E(f)    = 1/H int exp(-i k [h^2/2 (1/r' - 1/F) - h y/r']) dh,  k = 2 pi f / c,
 
-with the pulse P, the amplitude a, and for each element its distance r and angle theta to a scatterer at elevation y,
-its range r' in the plane of the image, width w, height H and elevation focus F, and the attenuation alpha.
+with the pulse P of centre frequency f0, the amplitude a of a scatterer and its exponent n, and for each element its
+distance r and angle theta to a scatterer at elevation y, its range r' in the plane of the image, width w, height H and
+elevation focus F, and the attenuation alpha.
 """
 
 from __future__ import annotations
@@ -24,7 +25,13 @@ Spectra = NDArray[np.complex128]
 
 
 def exact_matrix(
-    probe: Probe, position: Floats, amplitude: Floats, frequency: Floats, *, elevation: bool = True
+    probe: Probe,
+    position: Floats,
+    amplitude: Floats,
+    frequency: Floats,
+    *,
+    exponent: Floats | float = 0.0,
+    elevation: bool = True,
 ) -> Spectra:
     """Echoes S between all pairs.
 
@@ -34,7 +41,10 @@ def exact_matrix(
     position : ndarray of shape (scatterers, 3), m
         Lateral, axial, elevation.
     amplitude : ndarray of shape (scatterers,)
+        At the centre frequency.
     frequency : ndarray of shape (bins,), Hz
+    exponent : ndarray of shape (scatterers,), or float
+        Power of the frequency that the amplitude follows.
     elevation : bool
         Whether the lens is there; without it E = 1.
 
@@ -44,7 +54,8 @@ def exact_matrix(
     """
     waves = (one_way(probe, position, f, elevation=elevation) for f in frequency)
     pulse = pulse_spectrum(probe, frequency)
-    return np.array([p * (wave * amplitude) @ wave.T for p, wave in zip(pulse, waves, strict=True)])
+    scattered = (amplitude * (f / probe.si().frequency) ** exponent for f in frequency)
+    return np.array([p * (wave * a) @ wave.T for p, a, wave in zip(pulse, scattered, waves, strict=True)])
 
 
 def one_way(probe: Probe, position: Floats, frequency: float, *, elevation: bool = True) -> Spectra:

@@ -2,11 +2,13 @@
 
 At a frequency f of the pulse of spectrum P, the echo between the elements i and j of scatterers of amplitude a_k is
 
-    S_ij(f) = P(f) sum_k a_k u_ki(f) u_kj(f),   u_ki(f) = D_i(f) E_i(f) exp(-alpha f r_i) exp(-2 pi i f r_i / c) / r_i,
+    S_ij(f) = P(f) sum_k a_k (f / f0)^n_k u_ki(f) u_kj(f),
+    u_ki(f) = D_i(f) E_i(f) exp(-alpha f r_i) exp(-2 pi i f r_i / c) / r_i,
 
-with the distance r_i, directivity D, response E of the lens and attenuation alpha of each way; see
-:mod:`~echotruth.imaging.rf.exact`, where it is summed as it stands. Here echoes are spread on a grid in time by short
-kernels (:mod:`~echotruth.imaging.rf.kernel`) and then filtered together. By reciprocity only the pairs i <= j
+with the centre frequency f0, the exponent n of the scattering, the distance r_i, directivity D, response E of the lens
+and attenuation alpha of each way; see :mod:`~echotruth.imaging.rf.exact`, where it is summed as it stands. Here echoes
+are spread on a grid in time by short kernels (:mod:`~echotruth.imaging.rf.kernel`) and then filtered together, those of
+each exponent by a filter that contains the power of the frequency. By reciprocity only the pairs i <= j
 are computed, and of those only the ones between a few elements, from which all others follow for scatterers that are
 close together (:mod:`~echotruth.imaging.rf.clusters`).
 
@@ -15,6 +17,8 @@ for tables: 50 MB for the default array, however many scatterers there are.
 """
 
 from __future__ import annotations
+
+from functools import reduce
 
 import numba
 import numpy as np
@@ -37,7 +41,7 @@ PLANE, LENS, WIDE, NEAR = 2, 1, 3, spreading.SUBAPERTURES
 wider than `MAX_NARROW_WIDTH`; with it for scatterers that have a separate table lookup for each subaperture."""
 PLANE_ACCURACY = 2e-5
 """Relative error (L2) against the exact sum without the lens, within 32 degrees, or within 24 degrees if elements are
-0.88 wavelengths wide (`mouse_30MHz`, `mouse_40MHz`)."""
+0.88 wavelengths wide (`mouse_30MHz`, `mouse_40MHz`); times 1 + n / 2 for echoes with the exponent n."""
 LENS_SPECTRA, PAIR_SPECTRA = (0, 0, 0, 0, 1, 1, 2), (0, 1, 2, 2, 0, 1, 0)
 """Each term is the product of a spectrum of :func:`.lens_spectra` and one of :func:`.directivity.pair_spectra`: their
 indices, by the number of the term."""
@@ -125,6 +129,7 @@ class FullMatrix:
         advance = np.exp(2j * np.pi * cycles[inside] * spreading.LEAD)  # rows begin LEAD samples before time 0
         self._damping = damping.astype(np.float32)
         self._responses = (filters * response * advance).astype(np.complex64)
+        self._ratio = self.frequency / p.frequency
 
     def _tabulate(self, band: Band, ratio: np.ndarray) -> None:
         """Set the tables of kernels without the lens, or the lookup tables from which those with the lens are made."""
@@ -196,13 +201,17 @@ class FullMatrix:
         sine = np.abs(position[:, 0]) / np.linalg.norm(position, axis=1)
         return np.rint(sine * (directivity.ANGLES - 1)).astype(np.int64)
 
-    def __call__(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+    def __call__(self, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray | float = 0.0) -> np.ndarray:
         """Spectra of the echoes of all pairs at `frequency`.
 
         Parameters
         ----------
         position : ndarray of shape (scatterers, 3), m
         amplitude : ndarray of shape (scatterers,)
+            At the centre frequency of the probe.
+        exponent : ndarray of shape (scatterers,), or float
+            Power of the frequency that the amplitude follows; 0 for scattering that is the same at all frequencies. Few
+            different values, because the echoes of each are transformed apart.
 
         Returns
         -------
@@ -211,23 +220,35 @@ class FullMatrix:
         """
         inside = self.in_beam(position)
         position, amplitude = position[inside], amplitude[inside].astype(np.float32)
+        powers = np.broadcast_to(exponent, inside.shape)[inside]
         numbers = self._clusters.numbers(position)
         clusters, spectra = [], []
         for number in np.unique(numbers):
             own, cluster = numbers == number, self._clusters[number]
             clusters.append(cluster)
-            spectra.append(self._spectra(self._traces(cluster.skeleton, position[own], amplitude[own])))
+            scatterers = position[own], amplitude[own], powers[own]
+            spectra.append(self._skeleton_spectra(cluster.skeleton, *scatterers))
         if not clusters:
             return np.zeros((len(self.frequency), *[len(self.centres)] * 2), np.complex64)
         return Expansion(clusters, self.frequency)(np.concatenate(spectra, axis=1))
 
-    def _spectra(self, traces: np.ndarray) -> np.ndarray:
-        """Spectra (bins, pairs) of traces (pairs, samples)."""
+    def _skeleton_spectra(
+        self, elements: np.ndarray, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray
+    ) -> np.ndarray:
+        """Spectra of the echoes of pairs of some elements: (bins, pairs)."""
+        powers = np.unique(exponent)
+        scatterers = ((position[exponent == power], amplitude[exponent == power]) for power in powers)
+        traces = (self._traces(elements, *own) for own in scatterers)
+        return reduce(np.add, map(self._spectra, traces, powers))
+
+    def _spectra(self, traces: np.ndarray, exponent: float) -> np.ndarray:
+        """Spectra (bins, pairs) of traces (pairs, samples) of scatterers with one exponent."""
         band, threads = slice(self.first_bin, self.first_bin + len(self.frequency)), numba.get_num_threads()
+        responses = (self._responses * self._ratio**exponent).astype(np.complex64)
         total = np.zeros((len(self.frequency), len(traces)), np.complex64)
         for start in range(0, len(traces), 64):
             some = traces[start : start + 64]
-            for damping, response in zip(self._damping, self._responses, strict=True):
+            for damping, response in zip(self._damping, responses, strict=True):
                 spectra = fft.rfft(some * damping, axis=1, workers=threads)[:, band] * response
                 total[:, start : start + 64] += spectra.T
         return total

@@ -13,7 +13,7 @@ from echotruth.config.loading import ConfigError, validate
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.recorder import metadata
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times
 from echotruth.mechanics.geometry import GeometryError, left_ventricle
 from echotruth.mechanics.motion_file.wall import moving_wall
 from echotruth.mechanics.prescribed import MotionError
@@ -40,9 +40,8 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     rows = ledger.register(folder / "registry.txt", [case.id for case in cases], store.labels("case"))
     views = ledger.register(folder / "views.txt", list(config.views), store.labels("view"))
     times = np.full((len(rows), config.loop.frames), np.nan)
-    loops = {loop: read_loop(loop) for loop in {case.config.loop for case in cases}}
     for case in cases:
-        times[rows[case.id]] = loops[case.config.loop].time
+        times[rows[case.id]] = frame_times(case.config.loop)
     case_table = table(cases)
     columns = layout.columns(case_table, list(rows))
     scanner = config.rf.keep and Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
@@ -54,9 +53,22 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
     superseded.set_aside(folder, config)
     store.lay_out(arrays, sizes, labels, {"rf": settings, "cases": {"constants": layout.constants(case_table)}})
-    settings_file = yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False)
+    settings_file = yaml.dump(config.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False)
     texts = {"cases.csv": case_table.to_csv(index=False), "config.yaml": settings_file}
     durable.update_all({folder / name: text.encode() for name, text in texts.items()})
+
+
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]  # which of them is not known
+    """Writer of YAML in which the table of hearts keeps its lines."""
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style="|" if "\n" in text else None)
+
+
+_Dumper.add_representer(str, _text)
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""LibYAML is ten times as fast as PyYAML's own parser; a table of hearts may hold a million characters."""
 
 
 def main() -> None:
@@ -65,7 +77,7 @@ def main() -> None:
     parser.add_argument("config", type=argparse.FileType("r"), help="YAML file, or - for standard input")
     arguments = parser.parse_args()
     try:
-        config = validate(yaml.safe_load(arguments.config) or {}, arguments.config.name)
+        config = validate(yaml.load(arguments.config, Loader=_LOADER) or {}, arguments.config.name)
         lay_out(arguments.repository, config, expand(config, arguments.config.name))
     except (ConfigError, GeometryError, MotionError) as error:
         sys.exit(str(error))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from echotruth.repository.export.values import sample_positions, scaled_channels
+from echotruth.export.rf import sample_positions, scaled_channels
 
 if TYPE_CHECKING:
     import xarray as xr

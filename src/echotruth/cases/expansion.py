@@ -1,0 +1,113 @@
+"""Expansion of a configuration into its hearts.
+
+They are the rows of the table, times the grid, times draws, without those that conditions leave out.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import replace
+
+from echotruth.cases import rows
+from echotruth.cases.case import Case, Combination
+from echotruth.cases.checks import check_condition_key, check_files, check_ids, check_keys
+from echotruth.cases.conditions import Condition, ConditionError
+from echotruth.cases.sections import Sweep
+from echotruth.config import Config
+from echotruth.config.loading import ConfigError
+from echotruth.config.table import LABEL
+
+
+def expand(config: Config, source: str = "configuration") -> list[Case]:
+    """Cases of a configuration, in the order of the rows, then of the grid, then of the draws.
+
+    Raises
+    ------
+    ConfigError
+        If a key cannot be swept, a combination is not valid, a file is missing, or conditions leave no case.
+    """
+    hearts = list(_hearts(config, source))
+    if not hearts:
+        raise ConfigError(f"{source}: cases.where leaves out all {config.cases.number} cases: widen a condition")
+    check_ids(hearts, source)
+    check_files(hearts, source)
+    return [case for _, case in hearts]
+
+
+def all_cases(config: Config) -> dict[str, Case]:
+    """Cases by id; the files that they name need not be there any more."""
+    return {case.id: case for _, case in _hearts(config, config.name)}
+
+
+def find_case(config: Config, id: str) -> Case:
+    """Case with an id; the files that it names need not be there any more."""
+    sweep, conditions = Sweep(config, config.name), _conditions(config, config.name)
+    for heart in combinations(config, config.name):
+        if id.startswith(heart.given_id) and _meets(conditions, sweep, heart) and sweep.id(heart) == id:
+            return sweep.case(heart)
+    raise ConfigError(f"{id} is not a case of {config.name}: the ids are in out/{config.name}/cases.csv")
+
+
+def combinations(config: Config, source: str) -> Iterator[Combination]:
+    """All rows, times the grid, times draws.
+
+    Raises
+    ------
+    ConfigError
+        If a cell of the table is not valid.
+    """
+    grid, draws = config.cases.grid, _draws(config)
+    for row in rows.combinations(config, source):
+        for values in itertools.product(*grid.values()):
+            for number, draw in draws:
+                parameters = row.parameters | dict(zip(grid, values, strict=True)) | draw
+                origin = ", ".join(filter(None, [row.origin, number]))
+                yield replace(row, parameters=parameters, origin=origin)
+
+
+def _hearts(config: Config, source: str) -> Iterator[tuple[Combination, Case]]:
+    """Combinations that meet the conditions, and their cases."""
+    check_keys(config, source)
+    sweep, conditions = Sweep(config, source), _conditions(config, source)
+    for heart in combinations(config, source):
+        if _meets(conditions, sweep, heart):
+            yield heart, sweep.case(heart)
+
+
+def _draws(config: Config) -> list[tuple[str, dict]]:
+    """What errors call each draw, and its values; one empty draw if nothing is drawn."""
+    if config.cases.draw is None:
+        return [("", {})]
+    from echotruth.cases.draws import draws
+
+    return [(f"draw {number}", values) for number, values in enumerate(draws(config.cases.draw), 1)]
+
+
+def _conditions(config: Config, source: str) -> list[Condition]:
+    """The conditions, whose keys exist."""
+    table = config.cases.rows
+    conditions = []
+    for text in config.cases.where:
+        place = f"{source}: cases.where = {text[:80]!r}"
+        try:
+            conditions.append(Condition(text))
+        except ConditionError as error:
+            raise ConfigError(f"{place}: {error}") from None
+        for key in sorted(conditions[-1].keys):
+            check_condition_key(config, key, table.labels if table else [], place)
+    return conditions
+
+
+def _meets(conditions: list[Condition], sweep: Sweep, heart: Combination) -> bool:
+    def lookup(key: str) -> object:
+        return heart.labels.get(key.removeprefix(LABEL)) if key.startswith(LABEL) else sweep.value(key, heart)
+
+    for condition in conditions:
+        try:
+            if not condition.holds(lookup):
+                return False
+        except ConditionError as error:
+            place = f"{sweep.source}: cases.where = {condition.text[:80]!r}"
+            raise ConfigError(f"{place}: in {heart.origin or heart.parameters}: {error}") from None
+    return True

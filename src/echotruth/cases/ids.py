@@ -1,0 +1,64 @@
+"""Stable ids of hearts."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from hashlib import sha256
+from typing import Any
+
+from echotruth.section import unit_of
+
+READABLE_LENGTH = 80
+"""Longest readable part of an id, letters."""
+GIVEN = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}"
+"""What an id in a table looks like: it is part of the names of files."""
+
+
+def case_id(parameters: dict[str, Any]) -> str:
+    """Id of a case: readable values of the swept keys in which it differs, and a hash of the exact ones.
+
+    The hash is longer if not all of the readable part fits.
+
+    >>> case_id({"fibres.endo_deg": 70.0, "seed": 2})
+    'endo70_seed2_17059c'
+    """
+    if not parameters:
+        return "heart"
+    values = {key: integer_if_whole(value) for key, value in sorted(parameters.items())}
+    readable = "_".join(f"{_short_key(key)}{_short_value(value)}" for key, value in values.items())
+    digits = 6 if len(readable) <= READABLE_LENGTH else 16
+    return f"{readable[:READABLE_LENGTH]}_{sha256(json.dumps(values).encode()).hexdigest()[:digits]}"
+
+
+def extended_id(given: str, parameters: dict[str, Any]) -> str:
+    """Id of a row of the table with values of the grid or of a draw: its own, and theirs if they differ.
+
+    >>> extended_id("patient7", {"seed": 2})
+    'patient7_seed2_a38f3c'
+    """
+    return f"{given}_{case_id(parameters)}" if parameters else given
+
+
+def exact(value: Any) -> str:
+    """Text that is the same for all spellings of a value, and for no other value."""
+    return json.dumps(integer_if_whole(value), sort_keys=True, default=repr)
+
+
+def integer_if_whole(value: Any) -> Any:
+    """Convert 84.0 to 84, also within lists and mappings, so that both spellings give the same id."""
+    if isinstance(value, dict):
+        return {key: integer_if_whole(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [integer_if_whole(item) for item in value]
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+@cache
+def _short_key(key: str) -> str:
+    name = key.rsplit(".", 1)[-1]
+    return name.removesuffix(f"_{unit_of(name)}").replace("_", "")
+
+
+def _short_value(value: Any) -> str:
+    return "".join(letter for letter in str(value) if letter.isalnum() or letter in ".-")

@@ -1,0 +1,47 @@
+"""Labels of hearts: the diagnosis that a configuration gives, and those that a table carries along."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Any
+
+from echotruth.cases.case import Case
+from echotruth.config import Config
+from echotruth.config.table import LABEL
+
+HEALTHY, UNKNOWN = "healthy", "unknown"
+
+
+def diagnosis(config: Config) -> str:
+    """What the configuration of a heart makes of it, as words joined by +.
+
+    `infarct` and `late_activation` are those of the section pathology, `hypertrophy` and `dilation` factors above 1 in
+    the section geometry. A heart with none of them is `healthy`, or `unknown` if its shape is read from a file.
+    """
+    infarct, late, geometry = config.pathology.infarct, config.pathology.late_activation, config.geometry
+    delayed = late.preset is not None or any(late.delay_ms.values())
+    words = {
+        "infarct": infarct.segments is not None or infarct.radius_mm is not None,
+        "late_activation": delayed and late.scale > 0,
+        "hypertrophy": geometry.hypertrophy > 1,
+        "dilation": geometry.dilation > 1,
+    }
+    found = "+".join(word for word, applies in words.items() if applies)
+    return found or (HEALTHY if geometry.file is None else UNKNOWN)
+
+
+def columns(cases: list[Case]) -> dict[str, list[Any]]:
+    """Columns of the table of cases: `diagnosis`, each label as `label.NAME`, and `note` if there are any.
+
+    A case without a label has NaN, or "" if the label is text; a label that no case has is left out.
+    """
+    found: dict[str, list[Any]] = {"diagnosis": [diagnosis(case.config) for case in cases]}
+    for name in dict.fromkeys(name for case in cases for name in case.labels):
+        values = [case.labels.get(name) for case in cases]
+        if all(value is None for value in values):
+            continue
+        empty = "" if any(isinstance(value, str) for value in values) else nan
+        found[f"{LABEL}{name}"] = [empty if value is None else value for value in values]
+    if any(case.note for case in cases):
+        found["note"] = [case.note for case in cases]
+    return found

@@ -1,0 +1,197 @@
+"""Section `cases`: which hearts a configuration makes, by a grid, a table, random draws and conditions."""
+
+from __future__ import annotations
+
+from math import prod
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
+)
+
+from echotruth.config.limits import MAX_CASES, MAX_CONDITIONS, MAX_DRAWN_KEYS, MAX_TABLE_BYTES
+from echotruth.config.reading import ConfigError, read_text
+from echotruth.config.table import Table, TableError, parse
+from echotruth.section import Section, invalid
+
+Pair = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
+
+KINDS = ("uniform", "log_uniform", "normal", "integers", "choice")
+"""Keys of a distribution of which one is given."""
+
+
+class Distribution(Section):
+    """Distribution of a drawn key: one of `uniform`, `log_uniform`, `normal`, `integers` and `choice`."""
+
+    uniform: Pair | None = None
+    """Lower and upper bound, between which all values are equally likely."""
+    log_uniform: Pair | None = None
+    """Lower and upper bound, both positive, between which the logarithm is uniform."""
+    normal: Pair | None = None
+    """Mean and standard deviation."""
+    limits: Pair | None = None
+    """With `normal`: lower and upper bound at which the distribution is truncated."""
+    integers: Annotated[list[int], Field(min_length=2, max_length=2)] | None = None
+    """First and last of the whole numbers, which are equally likely; for keys such as `seed`."""
+    choice: Annotated[list[Any], Field(min_length=1)] | None = None
+    """Values of which one is drawn."""
+    weights: Annotated[list[Annotated[FiniteFloat, Field(ge=0)]], Field(min_length=1)] | None = None
+    """With `choice`: weight of each value. Default: all are equally likely."""
+
+    @property
+    def kind(self) -> str:
+        """The one of `KINDS` that is given."""
+        return next(kind for kind in KINDS if getattr(self, kind) is not None)
+
+    @model_serializer(mode="wrap")
+    def _given(self, handler: Any) -> dict[str, Any]:
+        return {key: value for key, value in handler(self).items() if value is not None}
+
+    @model_validator(mode="after")
+    def _check_kind(self) -> Distribution:
+        given = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if len(given) != 1:
+            remedy = f"give one of {', '.join(KINDS)}"
+            raise invalid(given[1] if given else "uniform", getattr(self, given[1]) if given else None, remedy)
+        for key, needs in (("limits", "normal"), ("weights", "choice")):
+            if getattr(self, key) is not None and given != [needs]:
+                raise invalid(key, getattr(self, key), f"applies to {needs}: leave it out")
+        return self
+
+    @model_validator(mode="after")
+    def _check_bounds(self) -> Distribution:
+        for key in ("uniform", "log_uniform", "integers", "limits"):
+            bounds = getattr(self, key)
+            if bounds is not None and bounds[0] >= bounds[1]:
+                raise invalid(key, bounds, "must be the lower bound and then a greater upper bound")
+        if self.log_uniform is not None and self.log_uniform[0] <= 0:
+            raise invalid("log_uniform", self.log_uniform, "must have positive bounds")
+        if self.normal is not None and self.normal[1] <= 0:
+            raise invalid("normal", self.normal, "must be the mean and a positive standard deviation")
+        return self
+
+    @model_validator(mode="after")
+    def _check_weights(self) -> Distribution:
+        if self.weights is None or self.choice is None:
+            return self
+        if len(self.weights) != len(self.choice):
+            raise invalid("weights", self.weights, f"must have one entry for each of the {len(self.choice)} of choice")
+        if not 0 < sum(self.weights) < 1e300:
+            raise invalid("weights", self.weights, "must have a positive entry and a finite sum")
+        return self
+
+
+class Draw(Section):
+    """Hearts drawn at random: each has one value of every key in `keys`."""
+
+    number: Annotated[int, Field(ge=1, le=MAX_CASES)]
+    """Number of hearts (of each row of the table and each combination of the grid). With `sobol` and `random` a larger
+    number adds hearts, and those that were there stay; with `latin_hypercube` it changes all of them."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    """Seed of the draws; it is not that of the images."""
+    method: Literal["sobol", "latin_hypercube", "random"] = "sobol"
+    """`sobol`: quasi-random, the most even in all keys together; `latin_hypercube`: even in each key alone; `random`:
+    independent."""
+    keys: Annotated[dict[str, Distribution], Field(min_length=1, max_length=MAX_DRAWN_KEYS)]
+    """Distribution of each dotted key."""
+
+
+def _as_list(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+class Cases(Section):
+    """The hearts. Dotted keys with lists of values make a grid: all combinations. The grid, the rows of a table and the
+    draws multiply, 100 000 hearts at most; conditions then leave out some of them (docs/cases.md)."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(init=False)
+
+    file: str | None = None
+    """CSV file with a row for each heart: columns of dotted keys, `case` (id), `label.NAME` and `note`. An empty cell
+    has the value of the configuration."""
+    table: str | None = None
+    """The text of such a file, in its place: so the configuration of a repository has it, and needs the file no
+    more."""
+    draw: Draw | None = None
+    """Hearts drawn at random: each has one value of every key in `keys`."""
+    where: Annotated[
+        list[str],
+        BeforeValidator(_as_list),
+        Field(max_length=MAX_CONDITIONS),
+        WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+    ] = Field(default=[])
+    """Conditions that all hearts must meet, such as `loop.esv_uL < 0.6 * loop.edv_uL`."""
+
+    @property
+    def grid(self) -> dict[str, list[Any]]:
+        """Dotted key -> its values."""
+        return dict(self.__pydantic_extra__ or {})
+
+    @property
+    def rows(self) -> Table | None:
+        """Rows of the table, if there is one."""
+        return None if self.table is None else parse(self.table)
+
+    @property
+    def keys(self) -> list[str]:
+        """All dotted keys that differ between the hearts, or may."""
+        rows, draw = self.rows, self.draw
+        return list(dict.fromkeys([*(rows.keys if rows else ()), *self.grid, *(draw.keys if draw else ())]))
+
+    @property
+    def shape(self) -> list[int]:
+        """Number of rows, values of each key of the grid, and draws, whose product is the number of hearts."""
+        rows, draws = self.rows, self.draw
+        lengths = [len(values) for values in self.grid.values()]
+        return [*([len(rows.cells)] if rows else ()), *lengths, *([draws.number] if draws else ())]
+
+    @property
+    def number(self) -> int:
+        """Number of hearts before conditions leave out some."""
+        return prod(self.shape)
+
+    def __bool__(self) -> bool:
+        """Whether there is a sweep at all."""
+        return bool(self.grid or self.table is not None or self.draw or self.where)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_file(cls, values: Any) -> Any:
+        """Read the file, so that the configuration is whole, wherever the file is later."""
+        if not isinstance(values, dict) or not isinstance(path := values.get("file"), str):
+            return values
+        if "table" in values:
+            raise invalid("file", path, "give either file or table and leave the other out")
+        try:
+            return values | {"table": read_text(Path(path), MAX_TABLE_BYTES, "CSV file", "a table")}
+        except ConfigError as error:
+            raise invalid("file", path, str(error).partition(": ")[2] or "cannot be read") from None
+
+    @model_validator(mode="after")
+    def _check_table(self) -> Cases:
+        key, shown = ("table", self.table) if self.file is None else ("file", self.file)
+        if self.table is None:
+            return self
+        if len(self.table.encode()) > MAX_TABLE_BYTES:
+            raise invalid(key, shown, f"must have at most {MAX_TABLE_BYTES // 2**20} MiB: give fewer rows or columns")
+        try:
+            parse(self.table)
+        except TableError as error:
+            raise invalid(key, shown, str(error)) from None
+        return self
+
+    @model_serializer(mode="wrap")
+    def _given(self, handler: Any) -> dict[str, Any]:
+        """What is given; the text of the table in place of its file."""
+        values = {key: value for key, value in handler(self).items() if value not in (None, [])}
+        if self.table is not None:
+            values.pop("file", None)
+        return values

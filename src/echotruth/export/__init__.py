@@ -1,0 +1,174 @@
+"""Export of a repository to files that other programs read (docs/export.md): one module a format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Literal
+
+from echotruth.export.clip import Clip
+from echotruth.export.destination import draft
+from echotruth.export.error import ExportError
+from echotruth.export.selection import Selection, Source, source, unfinished
+
+FRAME_RATE = 20.0
+"""Frames per second of a video, slow motion for a mouse."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format.
+
+    Attributes
+    ----------
+    module : str
+        Module of this package with its function `write`.
+    suffix : str
+        Suffix of its files; "" if it writes a folder.
+    stages : tuple of str
+        Stages of which it needs the arrays; none for RF.
+    holds : {"clip", "view", "heart"}
+        What a file is of.
+    options : tuple of {"overlay", "rate", "trackers"}
+        What it can be told.
+    """
+
+    module: str
+    suffix: str
+    stages: tuple[str, ...] = ("phantom", "truth", "bmode")
+    holds: Literal["clip", "view", "heart"] = "clip"
+    options: tuple[str, ...] = ()
+
+    def problem(self, clip: Clip) -> str:
+        """Why a clip, view or heart cannot be exported, in one sentence; "" if it can."""
+        if self.holds == "view":
+            from echotruth.export.rf import missing_rf
+
+            return missing_rf(clip)
+        return unfinished(clip, "mechanics", *self.stages)
+
+    def writer(self) -> Callable[..., None]:
+        """Function that writes a clip, view or heart to a path."""
+        module = import_module(f"echotruth.export.{self.module}")
+        if self.holds == "view":
+            from echotruth.export.rf import write_hdf5
+
+            return partial(write_hdf5, module.write)
+        return module.write
+
+
+FORMATS = {
+    "mp4": Format("mp4", ".mp4", options=("overlay", "rate")),
+    "gif": Format("gif", ".gif", options=("overlay", "rate")),
+    "png": Format("png", "", options=("overlay",)),
+    "nifti": Format("nifti", ".nii.gz"),
+    "dicom": Format("dicom", ".dcm"),
+    "vtk": Format("vtk", "", (), "heart"),
+    "matlab": Format("matlab", ".mat", ("phantom", "truth", "bmode", "tracking"), options=("trackers",)),
+    "csv": Format("curves", ".csv", ("physiology", "tracking", "evaluation"), options=("trackers",)),
+    "tap": Format("tap", ".npz"),
+    "flo": Format("flo", ""),
+    "uff": Format("uff", ".uff", (), "view"),
+    "zea": Format("zea", ".hdf5", (), "view"),
+}
+"""What can be written, by the name of the format."""
+
+OVERLAYS = ("wall", "segments", "displacement")
+"""What can be drawn over the images."""
+
+
+@dataclass(frozen=True)
+class Export:
+    """What is to be written, and where to.
+
+    Attributes
+    ----------
+    source : Source
+    format : str
+        One of :data:`FORMATS`.
+    overlay : sequence of {"wall", "segments", "displacement"}
+        What to draw over the images of mp4, gif and png.
+    rate : float
+        Frames per second of mp4 and gif.
+    output : Path, optional
+        Folder; for a single file also its path. Default: `export/FORMAT` in the folder of the repository.
+    """
+
+    source: Source
+    format: str
+    overlay: Sequence[str] = ()
+    rate: float | None = None
+    output: Path | None = None
+
+    def __post_init__(self) -> None:
+        for name, given in (("overlay", self.overlay), ("rate", self.rate), ("trackers", self._chosen_trackers)):
+            if given and name not in FORMATS[self.format].options:
+                able = ", ".join(key for key, form in FORMATS.items() if name in form.options)
+                raise ExportError(f"--{name.removesuffix('s')} does nothing for {self.format}: it is for {able}")
+        if self.rate is not None and not 0.1 <= self.rate <= 1000:
+            raise ExportError(f"--rate {self.rate:g}: give 0.1 to 1000 frames per second")
+        unknown = [name for name in self.overlay if name not in OVERLAYS]
+        if unknown:
+            raise ExportError(f"--overlay {unknown[0]}: use {', '.join(OVERLAYS)}")
+
+    def clips(self) -> tuple[list[Clip], list[str]]:
+        """What is to be written, and why other things are left out.
+
+        Raises
+        ------
+        ExportError
+            If there is no such thing, or it is not finished.
+        """
+        form = FORMATS[self.format]
+        every = {"heart": self.source.hearts, "view": self.source.views, "clip": self.source.clips}[form.holds]()
+        return self.source.finished(every, form.problem)
+
+    def write(self, clips: Sequence[Clip]) -> Iterator[Path]:
+        """Write a file or folder for each clip, view or heart, and give its path when it is whole.
+
+        Raises
+        ------
+        ExportError
+            If an optional package is missing, or a clip cannot be read.
+        OSError
+            If a file cannot be written.
+        """
+        form = FORMATS[self.format]
+        write = form.writer()
+        options = {"overlay": self.overlay, "rate": self.rate or FRAME_RATE, "trackers": self.source.trackers}
+        chosen = {name: options[name] for name in form.options}
+        for clip, target in zip(clips, self._targets(clips), strict=True):
+            with draft(target) as path:
+                _write_clip(partial(write, clip, path, **chosen), clip)
+            yield target
+
+    @property
+    def _chosen_trackers(self) -> Sequence[str]:
+        return self.source.selection.trackers
+
+    def _targets(self, clips: Sequence[Clip]) -> list[Path]:
+        suffix = FORMATS[self.format].suffix
+        if self.output is not None and suffix and self.output.name.endswith(suffix) and not self.output.is_dir():
+            if len(clips) > 1:
+                remedy = "give a folder, or choose one with --case, --view and --size"
+                raise ExportError(f"{self.output} is one file, but there are {len(clips)} to write: {remedy}")
+            return [self.output]
+        folder = self.output or self.source.folder / "export" / self.format
+        return [folder / f"{clip.name}{suffix}" for clip in clips]
+
+
+def _write_clip(write: Callable[[], None], clip: Clip) -> None:
+    try:
+        write()
+    except ExportError:
+        raise
+    except (ValueError, KeyError, RuntimeError) as error:
+        said = " ".join(str(error).split())
+        remedy = f"see what echotruth check {clip.folder} says"
+        raise ExportError(f"{clip.folder} cannot be read at {clip.name}: {remedy} ({said})") from error
+
+
+__all__ = ["FORMATS", "OVERLAYS", "Export", "ExportError", "Selection", "source"]

@@ -1,0 +1,97 @@
+"""One clip of a repository, of which each part is read when it is used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.arrays import Floats
+from echotruth.cases import Case
+from echotruth.heart import Heart
+from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.view import Plane
+from echotruth.notebook.repositories import load_clip
+from echotruth.workflow.job import Job
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A heart, one of its views, or one of its clips.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder of the repository, `out/NAME`.
+    case : Case
+    view : str
+        Name of the view; "" for the heart itself.
+    size : int
+        Pixels along a side; 0 for the heart or the view itself.
+    """
+
+    folder: Path
+    case: Case
+    view: str = ""
+    size: int = 0
+
+    @property
+    def name(self) -> str:
+        """CASE_VIEW_SIZE, or the part of it that there is."""
+        return "_".join(str(part) for part in (self.case.id, self.view, self.size) if part)
+
+    @cached_property
+    def job(self) -> Job:
+        """What reads the arrays of this case (and view)."""
+        return Job(self.folder, "tracking", self.case, self.view or None, code="export")
+
+    @cached_property
+    def image(self) -> NDArray[np.uint8]:
+        """Grey levels, (frame, axial, lateral)."""
+        return self.job.read(f"bmode/{self.size}", "image")["image"]
+
+    def truth(self, *variables: str) -> xr.Dataset:
+        """Some variables of the clip, or all, as :func:`echotruth.load_clip` returns them."""
+        return load_clip(self.folder, self.case.id, self.view, self.size, variables or None)
+
+    @cached_property
+    def heart(self) -> Heart:
+        """The heart, as :func:`echotruth.load_heart` returns it."""
+        return self.job.heart
+
+    @cached_property
+    def plane(self) -> Plane:
+        """The imaging plane in the heart frame."""
+        return Plane(**self.job.read("phantom", "origin", "axes"))
+
+    @cached_property
+    def time(self) -> Floats:
+        """Time since end-diastole of the frames, (frame,), s."""
+        return self.job.coordinates("mechanics", "time")["time"][self.job.row]
+
+    @property
+    def frame_time(self) -> float:
+        """Time from one frame to the next, s; all steps are equal."""
+        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+
+    @property
+    def spacing(self) -> float:
+        """Distance of pixel centres, m, the same in both directions."""
+        return float(self.case.config.bmode.si().field_of_view) / self.size
+
+    @property
+    def axial(self) -> Floats:
+        """Depth of the pixel centres below the array, (size,), m."""
+        return pixel_centres(self.case.config.bmode, self.size)[0]
+
+    @property
+    def lateral(self) -> Floats:
+        """Lateral coordinate of the pixel centres, (size,), m."""
+        return pixel_centres(self.case.config.bmode, self.size)[1]

@@ -1,0 +1,30 @@
+"""What is said if something cannot be exported."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+
+class ExportError(ValueError):
+    """Raised if something cannot be exported; the message says why, and what to do."""
+
+
+def optional(package: str, module: str = "") -> Any:
+    """Import an optional package.
+
+    Parameters
+    ----------
+    package : str
+    module : str, optional
+        Module of the package to return. Default: the package itself.
+
+    Raises
+    ------
+    ExportError
+        If it is not installed.
+    """
+    try:
+        return import_module(module or package)
+    except ImportError:
+        raise ExportError(f"needs the package {package}: install echotruth[export]") from None

@@ -1,0 +1,43 @@
+"""Flow from frame to frame as .flo, the format of the Middlebury benchmark.
+
+Baker et al., A Database and Evaluation Methodology for Optical Flow, Int J Comput Vis 92 (2011) 1-31: px to the right
+and downwards, larger than 1e9 where it is unknown.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from echotruth.export.clip import Clip
+
+UNKNOWN = 1e10
+"""Flow where there is no tissue."""
+
+MAGIC = b"PIEH"
+"""The number 202021.25 in single precision, then width and height follow."""
+
+NAMES = {"next": "forward", "previous": "backward"}
+"""Frame that the flow leads to -> beginning of the names of its files."""
+
+
+def write(clip: Clip, path: Path) -> None:
+    """Write forward_000.flo (of frame 0, to frame 1) and so on, and backward_001.flo (of frame 1, to frame 0).
+
+    Parameters
+    ----------
+    clip : Clip
+    path : Path
+        Folder.
+    """
+    path.mkdir()
+    flow = clip.truth("flow")["flow"].sel(vector=["lateral", "axial"])
+    flow = flow.transpose("to", "frame", "axial", "lateral", "vector")
+    for to, name in NAMES.items():
+        frames = range(len(clip.time) - 1) if to == "next" else range(1, len(clip.time))
+        for frame in frames:
+            pixels = flow.sel(to=to).values[frame] / clip.spacing
+            known = np.where(np.isnan(pixels), UNKNOWN, pixels).astype("<f4")
+            shape = np.array([clip.size, clip.size], "<i4")
+            (path / f"{name}_{frame:03d}.flo").write_bytes(MAGIC + shape.tobytes() + known.tobytes())

@@ -1,0 +1,70 @@
+"""MATLAB: a MAT-file of version 5, which every MATLAB since 7 and Octave read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from echotruth.export.clip import Clip
+from echotruth.export.error import ExportError
+from echotruth.export.tracked import tracked
+
+HEADER = b"MATLAB 5.0 MAT-file, written by echotruth".ljust(116)
+"""In place of the one that holds the date, so that the bytes are the same twice."""
+
+MAX_BYTES = 2**31 - 1
+"""Largest array of version 5."""
+
+
+def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
+    """Write the struct `clip`: images and truth as (axial, lateral, ..., frame), and the displacement of trackers.
+
+    Rows are axial and columns lateral, as MATLAB shows images. `tracked.TRACKER.displacement` is on the grid of the
+    trackers, whose coordinates are `tracked.axial_m` and `tracked.lateral_m`.
+
+    Parameters
+    ----------
+    clip : Clip
+    path : Path
+    trackers : sequence of str
+
+    Raises
+    ------
+    ExportError
+        If an array is larger than version 5 can hold.
+    """
+    from scipy.io import savemat
+
+    truth = clip.truth()
+    values: dict[str, object] = {
+        str(name): np.moveaxis(array.transpose("frame", "axial", "lateral", ...).values, 0, -1)
+        for name, array in truth.data_vars.items()
+        if {"frame", "axial", "lateral"} <= set(array.dims)
+    }
+    largest = max(array.nbytes for array in values.values() if isinstance(array, np.ndarray))
+    if largest > MAX_BYTES:
+        raise ExportError(
+            f"{clip.name} has an array of {largest / 1e9:.1f} GB, and a MAT-file holds 2.1: use a smaller --size"
+        )
+    values |= {"case": clip.case.id, "view": clip.view, "synthetic": True}
+    values |= {"axial_m": clip.axial, "lateral_m": clip.lateral, "time_s": clip.time, "spacing_m": clip.spacing}
+    values |= {"plane_origin_m": clip.plane.origin, "plane_axes": clip.plane.axes}
+    values["vectors"] = np.array(["lateral", "axial", "elevation"], object)
+    values["strain_components"] = np.array(["RR", "CC", "LL", "RC", "RL", "CL"], object)
+    grid = {f"{name}_m": truth[f"grid_{name}"].values for name in ("axial", "lateral")}
+    values["tracked"] = grid | _tracked(clip, trackers)
+    with path.open("wb") as file:
+        savemat(file, {"clip": values}, long_field_names=True, do_compression=True, oned_as="column")
+        file.seek(0)
+        file.write(HEADER)
+
+
+def _tracked(clip: Clip, trackers: Sequence[str]) -> dict[str, object]:
+    """Displacement since end-diastole by each tracker, (axial, lateral, 2, frame), m."""
+    found: dict[str, object] = {}
+    for tracker in trackers:
+        displacement = tracked(clip, "tracking", "displacement", tracker)
+        found[tracker] = {"displacement": np.moveaxis(displacement, 0, -1)}
+    return found

@@ -1,0 +1,72 @@
+"""RF as uff and zea need it: channels without quantisation step, and positions of the samples of the lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+
+from echotruth.export.clip import Clip
+from echotruth.export.error import optional
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def scaled_channels(rf: xr.Dataset) -> Iterator[NDArray[np.float32]]:
+    """Channels of each frame, (transmitter, receiver, sample): stored integers times their quantisation step."""
+    for channels, step in zip(rf.channels, rf.channels_step, strict=True):
+        yield channels.values * np.float32(step)
+
+
+def sample_positions(rf: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lateral and axial coordinates of the samples of all lines, (line, range), m.
+
+    x = x_0 + r sin(theta), z = r cos(theta) for a line of angle theta from x_0.
+    """
+    distance, angle = rf.range.values, rf.line_angle.values[:, None]
+    return rf.line_origin.values[:, None] + np.sin(angle) * distance, np.cos(angle) * distance
+
+
+def open_rf(clip: Clip) -> xr.Dataset:
+    """Open the group `rf` of one case and view, without reading its arrays."""
+    import xarray as xr
+
+    rf = xr.open_zarr(clip.job.store.path, group="rf", consolidated=False, chunks=None)
+    return rf.sel(case=clip.case.id, view=clip.view)
+
+
+def missing_rf(clip: Clip) -> str:
+    """Why a view has no RF that could be exported, in one sentence; "" if it has."""
+    store = clip.job.store
+    if "rf" not in zarr.open_group(store.path, mode="r", use_consolidated=False):
+        return f"{store.path} keeps no RF: set rf.keep to [lines, channels] and run it again"
+    if not store.files("rf", *clip.job.index):
+        return (
+            f"{clip.case.id} has no RF of {clip.view} in {store.path}: see cases/reason for why, or run it to its end"
+        )
+    return ""
+
+
+def write_hdf5(layout: Callable[[Any, xr.Dataset], None], clip: Clip, path: Path) -> None:
+    """Write an HDF5 file in one of the layouts.
+
+    Parameters
+    ----------
+    layout : callable
+        Writes the RF (a Dataset) to an open file.
+    clip : Clip
+        The view.
+    path : Path
+
+    Raises
+    ------
+    ExportError
+        If h5py is not installed.
+    """
+    with optional("h5py").File(path, "w") as hdf5:
+        layout(hdf5, open_rf(clip))

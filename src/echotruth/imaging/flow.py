@@ -1,0 +1,118 @@
+"""Motion of the tissue from one frame to the next and to the one before, and the slice of tissue that is imaged."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.arrays import Floats
+from echotruth.config import Config, Probe
+from echotruth.fem.tetrahedra import MaterialPoints, interpolate
+from echotruth.heart import Heart
+from echotruth.imaging.rf.exact import fresnel
+
+STEPS = {"previous": -1, "next": 1}
+"""Frames that flow leads to, in their order along the dimension `to`, and their distance in frames."""
+
+_RANGES = 64
+"""Ranges at which the thickness of the slice is computed; it is interpolated between them."""
+_ELEVATIONS = 256
+"""Elevations at which the beam is computed, from the plane outwards."""
+
+
+def flow(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
+    """Displacement of material points from their position in a frame to those in the previous and in the next frame.
+
+    Parameters
+    ----------
+    heart : Heart
+    frame : int
+    points : MaterialPoints of length n
+
+    Returns
+    -------
+    ndarray of shape (2, n, 3), m
+        In the heart frame: to the previous and to the next frame; NaN where there is none.
+    """
+    found = np.full((len(STEPS), len(points), 3), np.nan)
+    for row, step in zip(found, STEPS.values(), strict=True):
+        if 0 <= frame + step < len(heart.displacement):
+            row[:] = interpolate(heart.displacement[frame + step] - heart.displacement[frame], heart.cells, points)
+    return found
+
+
+def out_of_slice(elevation: NDArray[np.floating], thickness: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Whether tissue is beside the slice: farther from the plane than half the thickness.
+
+    Parameters
+    ----------
+    elevation : ndarray, m
+        NaN where there is no tissue, which is nowhere.
+    thickness : ndarray, m
+        Of a shape that broadcasts to that of `elevation`.
+    """
+    return np.abs(elevation) > thickness / 2
+
+
+def slice_thickness(config: Config, range_: Floats) -> Floats:
+    """Thickness of the slice of tissue that an image shows: the two-way -6 dB width of the beam in elevation.
+
+    It is infinite where scatterers echo alike at any elevation, or do not leave the plane: with `rf.elevation_beam:
+    false` and with `phantom.in_plane_only`. Nearer than the height of an element, where no heart is, and beyond the
+    field of view it is as there.
+
+    Parameters
+    ----------
+    config : Config
+    range_ : ndarray of any shape, m
+        Distance from the centre of the array.
+
+    Returns
+    -------
+    ndarray of the same shape, m
+    """
+    if config.phantom.in_plane_only or not config.rf.elevation_beam:
+        return np.full(np.shape(range_), np.inf)
+    side = config.bmode.si().field_of_view
+    return np.interp(range_, *_table(config.probe, hypot(side, side / 2)))
+
+
+@lru_cache(maxsize=64)
+def _table(probe: Probe, farthest: float) -> tuple[Floats, Floats]:
+    """Ranges up to the farthest, m, and the thickness of the beam there, m."""
+    nearest = probe.si().height
+    range_ = np.linspace(nearest, max(nearest, farthest), _RANGES)
+    return range_, beam_thickness(probe, range_)
+
+
+def beam_thickness(probe: Probe, range_: Floats) -> Floats:
+    """Two-way -6 dB width of the beam in elevation at the centre frequency.
+
+    The lens has the same response E on transmit and on receive (:func:`echotruth.imaging.rf.exact.fresnel`), so that an
+    echo has the amplitude |E|^2. In the focus that is sinc^2(H y / (lambda F)), half its maximum at 0.443 lambda F / H.
+
+    Parameters
+    ----------
+    probe : Probe
+    range_ : ndarray of shape (n,), m
+        From the centre of the array.
+
+    Returns
+    -------
+    ndarray of shape (n,), m
+        Twice the greatest elevation at which an echo is at least half of the greatest at that range.
+    """
+    p, one = probe.si(), probe.model_copy(update={"elements": 1})
+    # Beyond the shadow of the element, a beam falls within a wavelength over its height.
+    greatest = p.height / 2 * np.abs(1 - range_ / p.elevation_focus) + range_ * p.sound_speed / p.frequency / p.height
+    elevation = np.linspace(0, greatest, _ELEVATIONS, axis=-1)
+    position = np.stack(np.broadcast_arrays(0.0, range_[:, None], elevation), axis=-1).reshape(-1, 3)
+    echo = np.abs(fresnel(one, position, p.frequency)[0].reshape(elevation.shape)) ** 2
+    over = echo - echo.max(axis=1, keepdims=True) / 2
+    rows, last = np.arange(len(over)), _ELEVATIONS - 1 - np.argmax(over[:, ::-1] >= 0, axis=1)
+    inner, outer = over[rows, last], over[rows, last + 1]
+    thickness: Floats = 2 * (elevation[rows, last] + elevation[:, 1] * inner / (inner - outer))
+    return thickness

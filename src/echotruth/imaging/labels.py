@@ -1,0 +1,45 @@
+"""Labels of the tissue at a pixel: layer, segment and region of disease, packed into one array."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+LABELS = ("layer", "segment", "region")
+"""In their order along the dimension `label`."""
+
+
+def pack(labels: Mapping[str, NDArray[np.generic]]) -> NDArray[np.generic]:
+    """Labels in one array.
+
+    Parameters
+    ----------
+    labels : dict of ndarray of shape (n,), uint8
+        layer, segment and region; others are left out.
+
+    Returns
+    -------
+    ndarray of shape (3, n), uint8
+    """
+    return np.stack([labels[name] for name in LABELS])
+
+
+def unpack(labels: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
+    """Labels by name, as views of the packed array, and the wall.
+
+    Parameters
+    ----------
+    labels : ndarray of shape (..., 3, axial, lateral), uint8
+        As the repository has it: (frame, label, axial, lateral).
+
+    Returns
+    -------
+    dict of ndarray of shape (..., axial, lateral)
+        mask (bool; whether the pixel centre is in the wall), layer (1 at the endocardium, 0 outside of the wall), AHA
+        segment (0 outside) and region of disease (0 healthy or outside), uint8.
+    """
+    named = {name: labels[..., index, :, :] for index, name in enumerate(LABELS)}
+    return {"mask": named["layer"] > 0, **named}

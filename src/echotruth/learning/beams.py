@@ -1,0 +1,58 @@
+"""Beams and scans of the cases, read only where cases differ in them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from echotruth.arrays import Floats
+from echotruth.cases import find_case
+from echotruth.config import Config
+from echotruth.imaging.flow import slice_thickness
+from echotruth.learning.reading import Reader
+
+BEAM = ("probe.", "rf.", "bmode.", "phantom.in_plane_only")
+"""Keys on which it depends what a pixel shows: field of view, scan, and thickness of the slice."""
+_RANGES = 1024
+"""Ranges at which the thickness is kept."""
+
+
+class Beams:
+    """Configurations of the cases of a repository, as far as their beams and scans go.
+
+    Parameters
+    ----------
+    reader : Reader
+    """
+
+    def __init__(self, reader: Reader) -> None:
+        self._reader = reader
+        self._configs: dict[str, Config] = {}
+        self._tables: dict[str, tuple[Floats, Floats]] = {}
+
+    def config(self, case: str) -> Config:
+        """Configuration of a case; that of the repository if no case differs from it in its beam."""
+        key = self.key(case)
+        if key not in self._configs:
+            config = self._reader.config
+            self._configs[key] = find_case(config, case).config if key else config
+        return self._configs[key]
+
+    def thickness(self, case: str, range_: Floats) -> Floats:
+        """Thickness of the slice at ranges within the image, m, of any shape; it is computed once."""
+        key, config = self.key(case), self.config(case)
+        if key not in self._tables:
+            ranges = np.linspace(0, np.sqrt(2) * config.bmode.si().field_of_view, _RANGES)
+            self._tables[key] = ranges, slice_thickness(config, ranges)
+        return np.interp(range_, *self._tables[key])
+
+    def key(self, case: str) -> str:
+        """The same for all cases with the same beam; "" if no case differs from the repository in it."""
+        return case if self.differ else ""
+
+    @cached_property
+    def differ(self) -> bool:
+        """Whether the beams of some cases are not those of others."""
+        columns = (path.name for path in (self._reader.path / "cases").iterdir())
+        return any(name.startswith(BEAM) for name in columns)

@@ -1,0 +1,64 @@
+"""Whole clips, with as much of the truth as is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from echotruth.learning.items import Item, Items, Place, frame_time
+
+TRUTH = ("displacement", "strain", "wall_depth", "labels", "flow")
+"""Arrays of the truth, in the group truth/SIZE of docs/schema.md."""
+
+
+class Clips(Items):
+    """Whole clips.
+
+    An item has `image` (frame, axial, lateral; 0 to 1), `time` (frame; s), and of the truth what is asked for, with
+    vectors and components before the pixels: displacement (frame, 3, axial, lateral; m) and strain (frame, 6, axial,
+    lateral) since end-diastole, wall_depth and labels (docs/schema.md), flow (frame, 2, 3, axial, lateral; m).
+
+    Parameters
+    ----------
+    repository, cases, views, size
+        See :class:`Items`.
+    truth : iterable of str
+        Any of displacement, strain, wall_depth, labels, flow.
+
+    Examples
+    --------
+    >>> clips = Clips("out/demo", views=["mid"], size=256, truth=["displacement"])  # doctest: +SKIP
+    >>> clips[0]["displacement"].shape  # doctest: +SKIP
+    (40, 3, 256, 256)
+    """
+
+    def __init__(
+        self,
+        repository: str | Path,
+        cases: Any = None,
+        views: Iterable[str] | None = None,
+        size: int | None = None,
+        truth: Iterable[str] = (),
+    ) -> None:
+        self.names = tuple(truth)
+        for name in self.names:
+            if name not in TRUTH:
+                raise ValueError(f"truth = {name!r}: use any of {', '.join(TRUTH)}.")
+        super().__init__(repository, cases, views, size)
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        return (*super().arrays, *(f"truth/{self.size}/{name}" for name in self.names))
+
+    def item(self, place: Place, within: int) -> Item:
+        known = {"image": self.image(place), "time": frame_time(self, place)}
+        return known | {name: self._channels_first(name, self.truth(place, name)) for name in self.names}
+
+    @staticmethod
+    def _channels_first(name: str, values: np.ndarray) -> np.ndarray:
+        if name in ("displacement", "strain", "flow"):
+            return np.ascontiguousarray(np.moveaxis(values, -1, -3))
+        return values

@@ -1,0 +1,65 @@
+"""Clips with the disease of the heart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from echotruth.learning.items import Item, Items, Place, frame_time
+from echotruth.learning.measurements import scar_size
+from echotruth.learning.table import cases as read_cases
+
+
+class Diagnosis(Items):
+    """Whole clips with the disease of the heart.
+
+    An item has `image` (frame, axial, lateral), 0 to 1; `time` (frame; s); `es_frame`, that of end-systole;
+    `diagnosis`, text, and `label`, its index in `classes`; and `scar_size`, the fraction of the wall's volume that is
+    infarcted.
+
+    Parameters
+    ----------
+    repository, cases, views, size
+        See :class:`Items`.
+    classes : iterable of str, optional
+        Diagnoses in the order of their labels. Default: all of the repository, healthy first and the others by the
+        alphabet; the label of a heart so depends on the repository, not on the part of a split it is in.
+
+    Raises
+    ------
+    ValueError
+        If a heart has a diagnosis that is not one of the classes.
+    """
+
+    def __init__(
+        self,
+        repository: str | Path,
+        cases: Any = None,
+        views: Iterable[str] | None = None,
+        size: int | None = None,
+        classes: Iterable[str] | None = None,
+    ) -> None:
+        super().__init__(repository, cases, views, size)
+        known = read_cases(repository, measurements=False)["diagnosis"]
+        found = sorted(set(known) - {""}, key=lambda name: (name != "healthy", name))
+        self.classes = found if classes is None else list(classes)
+        self._diagnosis = {place.case: str(known[place.case]) for place in self.places}
+        for case, name in self._diagnosis.items():
+            if name not in self.classes:
+                raise ValueError(
+                    f"classes = {self.classes}: the diagnosis of {case} is {name}: add it, or leave it out."
+                )
+
+    def item(self, place: Place, within: int) -> Item:
+        name = self._diagnosis[place.case]
+        return {
+            "image": self.image(place),
+            "time": frame_time(self, place),
+            "es_frame": int(self.reader.read("mechanics/es_frame", place.row)),
+            "diagnosis": name,
+            "label": self.classes.index(name),
+            "scar_size": np.float32(scar_size(self.reader, place.row)),
+        }

@@ -1,0 +1,82 @@
+"""Pairs of frames with the true motion between them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from echotruth.arrays import Floats
+from echotruth.imaging.flow import STEPS, out_of_slice, slice_thickness
+from echotruth.learning.beams import Beams
+from echotruth.learning.items import Item, Items, Place
+
+NEXT, PREVIOUS = list(STEPS).index("next"), list(STEPS).index("previous")
+ELEVATION = 2
+"""Index along the dimension `vector`."""
+
+
+class FlowPairs(Items):
+    """Each frame with the next one, and the motion of the tissue from one to the other.
+
+    An item has
+
+    - `image` (2, axial, lateral), 0 to 1, `frame`, the index of the first, and `spacing`, m, of pixel centres;
+    - `flow` (2, axial, lateral), px: lateral and axial motion of the tissue at a pixel of the first frame to where it
+      is in the second, and `flow_m` (3, axial, lateral), m, with that out of the plane; 0 outside the wall;
+    - `wall` (axial, lateral), bool: pixels of the first frame that are in the wall, where flow is known;
+    - `leaves`, bool: those of them whose tissue is not in the slice any more in the second frame, and `enters`, bool:
+      pixels of the second frame whose tissue was not in the slice in the first. The slice is as thick as the two-way -6
+      dB width of the beam (docs/flow.md).
+
+    Parameters
+    ----------
+    repository, cases, views, size
+        See :class:`Items`.
+
+    Examples
+    --------
+    >>> pairs = FlowPairs("out/demo", size=128)  # doctest: +SKIP
+    >>> pairs[0]["flow"].shape  # doctest: +SKIP
+    (2, 128, 128)
+    """
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        return (*super().arrays, f"truth/{self.size}/flow")
+
+    @property
+    def per_clip(self) -> int:
+        return self.frames - 1
+
+    def item(self, place: Place, within: int) -> Item:
+        forth = np.ascontiguousarray(np.moveaxis(self.truth(place, "flow", within, NEXT), -1, 0))
+        back = self.truth(place, "flow", within + 1, PREVIOUS, ..., ELEVATION)
+        thickness, wall = self._thickness(place), np.isfinite(forth[0])
+        flow = np.where(wall, forth, np.float32(0))
+        return {
+            "image": self.image(place, slice(within, within + 2)),
+            "frame": within,
+            "spacing": np.float32(self.spacing),
+            "flow": flow[:2] / np.float32(self.spacing),
+            "flow_m": flow,
+            "wall": wall,
+            "leaves": out_of_slice(forth[ELEVATION], thickness),
+            "enters": out_of_slice(back, thickness),
+        }
+
+    def _thickness(self, place: Place) -> Floats:
+        """Thickness of the slice at every pixel, (axial, lateral), m."""
+        key = self._beams.key(place.case)
+        if key not in self._thicknesses:
+            axial, lateral = (self.reader.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
+            self._thicknesses[key] = slice_thickness(self._beams.config(place.case), np.hypot(axial[:, None], lateral))
+        return self._thicknesses[key]
+
+    @cached_property
+    def _thicknesses(self) -> dict[str, Floats]:
+        return {}
+
+    @cached_property
+    def _beams(self) -> Beams:
+        return Beams(self.reader)

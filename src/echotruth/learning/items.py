@@ -1,0 +1,159 @@
+"""What all sequences of items have in common: which clips they are made from, and how these are chosen."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.learning.reading import Reader
+
+Item = dict[str, Any]
+"""Name -> array, number or text."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a clip is in the store.
+
+    Attributes
+    ----------
+    case, view : str
+    row, index : int
+        Row of the case, and index of the view.
+    """
+
+    case: str
+    view: str
+    row: int
+    index: int
+
+
+class Items(Sequence[Item]):
+    """A sequence of items, each read when it is asked for: a dict of NumPy arrays, numbers and texts.
+
+    Items depend on nothing but their index: they are the same in every order and in any number of processes. Images are
+    channels first, and vectors in the order lateral, axial, elevation. Every item has `case` and `view`.
+
+    Parameters
+    ----------
+    repository : str or Path
+        `out/NAME` or `out/NAME/NAME.zarr`.
+    cases : DataFrame or iterable of str, optional
+        A table as :func:`echotruth.learning.cases` or :func:`echotruth.learning.split` returns it, or case ids.
+        Default: all that are complete.
+    views : iterable of str, optional
+        Default: all of the configuration.
+    size : int, optional
+        Pixels along a side. Default: the largest.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the folder holds no repository.
+    ValueError
+        If there is no such case, view or size, or one of the clips was not made.
+    """
+
+    def __init__(
+        self,
+        repository: str | Path,
+        cases: Any = None,
+        views: Iterable[str] | None = None,
+        size: int | None = None,
+    ) -> None:
+        self.reader = Reader(repository)
+        config = self.reader.config
+        self.size = _chosen("size", config.bmode.sizes[0] if size is None else size, config.bmode.sizes)
+        self.frames = config.loop.frames
+        self.spacing = config.bmode.si().field_of_view / self.size
+        """Distance of pixel centres, m."""
+        ids = _complete(self.reader) if cases is None else _listed(cases.index if hasattr(cases, "columns") else cases)
+        names = list(config.views) if views is None else _listed(views)
+        self.places = self._places(ids, [_chosen("view", name, list(config.views)) for name in names])
+
+    def _places(self, cases: list[str], views: list[str]) -> list[Place]:
+        rows, indices = self.reader.cases, self.reader.views
+        pairs = [(_chosen("case", case, rows), view) for case in cases for view in views]
+        places = [Place(case, view, rows[case], indices[view]) for case, view in pairs]
+        for place in places:
+            for path in self.arrays:
+                if not self.reader.is_written(path, place.row, place.index):
+                    raise ValueError(
+                        f"{self.reader.folder}: {place.case} has no {path} in the view {place.view}: "
+                        "finish the run, or choose cases of status complete."
+                    )
+        return places
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        """Paths of the arrays that an item is read from."""
+        return (f"bmode/{self.size}/image",)
+
+    @property
+    def per_clip(self) -> int:
+        """Number of items from each clip."""
+        return 1
+
+    def __len__(self) -> int:
+        return len(self.places) * self.per_clip
+
+    @overload
+    def __getitem__(self, index: int) -> Item: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Item]: ...
+    def __getitem__(self, index: int | slice) -> Item | list[Item]:
+        """One item, read from the store."""
+        if isinstance(index, slice):
+            return [self[number] for number in range(*index.indices(len(self)))]
+        number = int(index) + (len(self) if index < 0 else 0)
+        if not 0 <= number < len(self):
+            raise IndexError(f"item {index} of {len(self)}")
+        clip, within = divmod(number, self.per_clip)
+        place = self.places[clip]
+        return {"case": place.case, "view": place.view} | self.item(place, within)
+
+    def __iter__(self) -> Iterator[Item]:
+        return (self[number] for number in range(len(self)))
+
+    @abstractmethod
+    def item(self, place: Place, within: int) -> Item:
+        """Item number `within` of a clip."""
+
+    def image(self, place: Place, frames: int | slice = slice(None)) -> NDArray[np.float32]:
+        """Grey levels of one frame (axial, lateral) or several (frame, axial, lateral), from 0 to 1."""
+        grey = self.reader.read(f"bmode/{self.size}/image", place.row, place.index, frames)
+        return np.divide(grey, 255, dtype=np.float32)
+
+    def truth(self, place: Place, name: str, *index: Any) -> NDArray[Any]:
+        """Part of an array of the truth of a clip."""
+        return self.reader.read(f"truth/{self.size}/{name}", place.row, place.index, *index)
+
+
+def frame_time(items: Items, place: Place) -> NDArray[np.float32]:
+    """Time of each frame since end-diastole, (frame,), s."""
+    return items.reader.read(f"bmode/{items.size}/time", place.row).astype(np.float32)
+
+
+def _chosen(name: str, value: Any, known: Any) -> Any:
+    if value not in known:
+        listed = ", ".join(map(str, list(known)[:20]))
+        raise ValueError(f"{name} = {value!r}: use one of {listed}.")
+    return value
+
+
+def _listed(names: Any) -> list[str]:
+    return [names] if isinstance(names, str) else list(names)
+
+
+def _complete(reader: Reader) -> list[str]:
+    ids, statuses = reader.labels("cases/case"), reader.labels("cases/status")
+    found = [case for case, status in zip(ids, statuses, strict=True) if status == "complete"]
+    if not found:
+        raise ValueError(f"{reader.folder}: no case is complete: finish the run, or name the cases.")
+    return found

@@ -1,0 +1,76 @@
+"""Measurements of hearts, for the table of cases and as targets of regression."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.arrays import Floats
+from echotruth.fem.quadrature import tetrahedron
+from echotruth.fem.tetrahedra import shape_gradient
+from echotruth.learning.reading import Reader
+
+PHYSIOLOGY = (
+    *("ejection_fraction", "gls", "circumferential_strain", "longitudinal_strain", "wall_thickening"),
+    *("twist_es", "twist_peak", "tei_index", "dpdt_max", "dpdt_min", "tau"),
+)
+"""Columns that are arrays of the group `physiology`, in its units."""
+INFARCT = 1
+"""Region of an infarct in `pathology/region`."""
+
+
+def physiology(
+    reader: Reader, row: int | slice = slice(None), names: tuple[str, ...] = PHYSIOLOGY
+) -> dict[str, Floats]:
+    """Measured function of one heart, or of all of a repository.
+
+    Parameters
+    ----------
+    reader : Reader
+    row : int or slice
+        Row of the case. Default: all.
+    names : tuple of str
+        Scalars of the group `physiology`.
+
+    Returns
+    -------
+    dict of ndarray of shape () or (case,)
+        By name, in the units of docs/schema.md; NaN for hearts that were not measured.
+    """
+    if reader.has("physiology/scalars"):
+        labels, packed = reader.labels("physiology/scalar"), reader.read("physiology/scalars", row)
+        return {name: packed[..., labels.index(name)] for name in names}
+    return {name: reader.read(f"physiology/{name}", row) for name in names}
+
+
+def scar_size(reader: Reader, row: int) -> float:
+    """Fraction of the wall's volume, unloaded, that is infarcted; without the border zone.
+
+    Parameters
+    ----------
+    reader : Reader
+    row : int
+        Row of the case, whose mechanics were solved.
+    """
+    infarct = reader.read("pathology/region", row) == INFARCT
+    if not infarct.any():
+        return 0.0
+    volume = cell_volume(reader.read("geometry/node_position", row), reader.read("geometry/cell_node", row))
+    return float(volume[infarct].sum() / volume.sum())
+
+
+def cell_volume(nodes: Floats, cells: NDArray[np.int32]) -> Floats:
+    """Volume of quadratic tetrahedra, the integral of det dx/dxi.
+
+    Parameters
+    ----------
+    nodes : ndarray of shape (n_nodes, 3), m
+    cells : ndarray of shape (n_cells, 10)
+
+    Returns
+    -------
+    ndarray of shape (n_cells,), m3
+    """
+    xi, weight = tetrahedron()
+    jacobian = np.einsum("can,qax->cqnx", nodes[cells], shape_gradient(xi))
+    return np.linalg.det(jacobian) @ weight

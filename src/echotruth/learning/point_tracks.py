@@ -1,0 +1,109 @@
+"""Clips with points of the tissue that are followed through all frames."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.arrays import Floats
+from echotruth.imaging.labels import LABELS
+from echotruth.imaging.tracks import follow, visible
+from echotruth.imaging.view import Plane
+from echotruth.learning.beams import Beams
+from echotruth.learning.items import Item, Items, Place, frame_time
+
+
+class PointTracks(Items):
+    """Whole clips, and points of the wall followed through all frames, as their tissue moves.
+
+    An item has `image` (frame, axial, lateral), 0 to 1; `time` (frame; s); `start`, the frame in which the points were
+    chosen at random among the pixels of the wall; `position` (frame, point, 2), px: lateral, axial, 0 at the centre of
+    the first pixel; `position_m` (frame, point, 3), m: lateral, axial, elevation; and `visible` (frame, point), bool:
+    whether the point is within the field of view, the scan and the slice, which is as thick as the two-way -6 dB width
+    of the beam (docs/flow.md). Positions are those of the material points, and known where they cannot be seen too.
+
+    Parameters
+    ----------
+    repository, cases, views, size
+        See :class:`Items`.
+    points : int
+        Number of points; of a wall with fewer pixels some occur twice.
+    start : int, optional
+        Frame in which they are chosen. Default: at random, another in every clip.
+    seed : int
+        Of the choice of points and frame, with the case and the view.
+
+    Raises
+    ------
+    ValueError
+        If the number of points or the frame is not possible.
+    """
+
+    def __init__(
+        self,
+        repository: str | Path,
+        cases: Any = None,
+        views: Iterable[str] | None = None,
+        size: int | None = None,
+        points: int = 64,
+        start: int | None = 0,
+        seed: int = 0,
+    ) -> None:
+        super().__init__(repository, cases, views, size)
+        if points < 1:
+            raise ValueError(f"points = {points}: give a positive number.")
+        if start is not None and not 0 <= start < self.frames:
+            raise ValueError(f"start = {start}: give a frame from 0 to {self.frames - 1}.")
+        self.points, self.start, self.seed = points, start, seed
+        self._beams = Beams(self.reader)
+        self._heart: tuple[int, int, dict[str, NDArray[Any]]] = (0, -1, {})
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_heart": (0, -1, {})}
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        return (*super().arrays, f"truth/{self.size}/labels")
+
+    def item(self, place: Place, within: int) -> Item:
+        name = sha256(f"{self.seed} {place.case} {place.view}".encode()).digest()
+        random = np.random.default_rng(np.frombuffer(name[:16], np.uint32))
+        start = int(random.integers(self.frames)) if self.start is None else self.start
+        wall = np.argwhere(self.truth(place, "labels", start, LABELS.index("layer")))
+        pixels = wall[random.choice(len(wall), self.points, replace=len(wall) < self.points)]
+        axial, lateral = (self.reader.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
+        followed = self._followed(place, start, np.column_stack([lateral[pixels[:, 1]], axial[pixels[:, 0]]]))
+        position = (followed[..., :2] - [lateral[0], axial[0]]) / self.spacing
+        thickness = self._beams.thickness(place.case, np.hypot(followed[..., 0], followed[..., 1]))
+        return {
+            "image": self.image(place),
+            "time": frame_time(self, place),
+            "start": start,
+            "position": position.astype(np.float32),
+            "position_m": followed.astype(np.float32),
+            "visible": visible(self._beams.config(place.case), followed, thickness),
+        }
+
+    def _followed(self, place: Place, start: int, points: Floats) -> Floats:
+        """Positions of the tissue in all frames, (frame, point, 3), m, that is at points (n, 2) of the image in one."""
+        heart = self._motion(place.row)
+        positions = heart["node_position"] + heart["displacement"]
+        return follow(positions, heart["cell_node"], self._plane(place), points, start)
+
+    def _motion(self, row: int) -> dict[str, NDArray[Any]]:
+        """Mesh and motion of a heart; that of the last is kept, for its other views."""
+        process = os.getpid()
+        if self._heart[:2] != (process, row):
+            paths = ("geometry/node_position", "geometry/cell_node", "mechanics/displacement")
+            read = {path.rpartition("/")[2]: self.reader.read(path, row) for path in paths}
+            self._heart = (process, row, read)
+        return self._heart[2]
+
+    def _plane(self, place: Place) -> Plane:
+        return Plane(*(self.reader.read(f"phantom/{name}", place.row, place.index) for name in ("origin", "axes")))

@@ -1,0 +1,37 @@
+"""Clips with the strain of the heart, as targets of regression."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echotruth.learning.items import Item, Items, Place, frame_time
+from echotruth.learning.measurements import physiology
+
+INDICES = ("ejection_fraction", "gls", "twist_peak")
+"""Scalars of the group physiology (docs/schema.md)."""
+
+
+class Strain(Items):
+    """Whole clips with the strain of the heart.
+
+    An item has `image` (frame, axial, lateral), 0 to 1; `time` (frame; s); `strain` (frame, 6), the wall's mean
+    Green-Lagrange strain since end-diastole along RR, CC, LL, RC, RL, CL; `layer_strain` (frame, layer, 6); `es_frame`,
+    the frame of end-systole; `ejection_fraction`, `gls` and `twist_peak` (rad). The strain at every pixel is
+    ``Clips(..., truth=["strain"])``.
+
+    Parameters
+    ----------
+    repository, cases, views, size
+        See :class:`Items`.
+    """
+
+    def item(self, place: Place, within: int) -> Item:
+        kinematics = ("strain_mean", "layer_strain")
+        mean, layers = (self.reader.read(f"kinematics/{name}", place.row).astype(np.float32) for name in kinematics)
+        return {
+            "image": self.image(place),
+            "time": frame_time(self, place),
+            "strain": mean,
+            "layer_strain": layers,
+            "es_frame": int(self.reader.read("mechanics/es_frame", place.row)),
+        } | {name: np.float32(value) for name, value in physiology(self.reader, place.row, INDICES).items()}

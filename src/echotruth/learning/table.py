@@ -1,0 +1,133 @@
+"""Table of the cases of a repository, with what is known of each heart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from echotruth.learning.measurements import physiology, scar_size
+from echotruth.learning.reading import Reader
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+UNFINISHED = "unfinished"
+"""Status of a case that no run has published."""
+MOTION = ("geometry.", "fibres.", "pathology.", "loop.", "mechanics.", "motion.")
+"""Keys on which the motion of a heart depends."""
+
+
+def cases(repository: str | Path, query: str | None = None, measurements: bool = True) -> pd.DataFrame:
+    """Table of the cases of a repository.
+
+    Parameters
+    ----------
+    repository : str or Path
+        `out/NAME` or `out/NAME/NAME.zarr`.
+    query : str, optional
+        Condition on the columns, as :meth:`pandas.DataFrame.query` takes it, and on all keys, those too that are the
+        same in all cases: "status == 'complete' and ejection_fraction < 0.5 and `fibres.endo_deg` > 60". Default: all
+        cases.
+    measurements : bool
+        Whether to read the measurements of each heart; without them the table of a large repository is there sooner.
+
+    Returns
+    -------
+    DataFrame
+        A row a case, indexed by `case`: `status` (complete, implausible, failed, retired or unfinished), `reason`,
+        `heart` (the first case with the same motion: cases that differ only in speckle, array or image share one),
+        `diagnosis` and `label.*`; measurements of the group physiology in its units (docs/schema.md), `scar_size`
+        (fraction of the wall's volume that is infarcted), NaN where a heart was not solved; and the keys whose value
+        differs among the cases.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the folder holds no repository.
+    ValueError
+        If the query cannot be evaluated.
+    """
+    reader = Reader(repository)
+    found = _columns(reader)
+    if measurements:
+        known = _measurements(reader, found)
+        found = found.join(known)[[*_first(found), *known, *_keys(found)]]
+    return found if query is None else found.loc[_selected(found, _constants(reader), query)]
+
+
+def _columns(reader: Reader) -> pd.DataFrame:
+    """Verdict, labels and differing keys of each case."""
+    import pandas as pd
+
+    group = reader.path / "cases"
+    names = sorted(path.parent.name for path in group.glob("*/zarr.json"))
+    columns = {name: reader.read(f"cases/{name}", ...) for name in names}
+    found = pd.DataFrame({name: _plain(values) for name, values in columns.items()}).set_index("case")
+    known = {key: value for key, value in _constants(reader).items() if key not in found and _is_label(key)}
+    found = found.assign(**known)
+    found["status"] = found["status"].replace("", UNFINISHED)
+    found["heart"] = _hearts(found)
+    return found[[*_first(found), *_keys(found)]]
+
+
+def _plain(values: np.ndarray) -> np.ndarray:
+    return values if values.dtype.kind in "fiub" else np.array([str(value) for value in values], object)
+
+
+def _first(found: pd.DataFrame) -> list[str]:
+    """Columns that come before the measurements."""
+    return ["status", "reason", "heart", *(str(name) for name in found if _is_label(str(name)))]
+
+
+def _is_label(name: str) -> bool:
+    return name in ("diagnosis", "note") or name.startswith("label.")
+
+
+def _keys(found: pd.DataFrame) -> list[str]:
+    return [str(name) for name in found if name not in _first(found)]
+
+
+def _hearts(found: pd.DataFrame) -> list[str]:
+    """The first case of each row's motion.
+
+    Hearts whose only difference is the seed of their fibres' disarray count as one: they resemble each other.
+    """
+    keys = [name for name in found if str(name).startswith(MOTION)]
+    first: dict[tuple[Any, ...], str] = {}
+    hearts = []
+    for case, status, *values in found[["status", *keys]].fillna("").itertuples():
+        hearts.append(case if status == "retired" else first.setdefault(tuple(values), case))
+    return hearts
+
+
+def _measurements(reader: Reader, found: pd.DataFrame) -> pd.DataFrame:
+    import pandas as pd
+
+    known = pd.DataFrame(physiology(reader), index=found.index)
+    sizes = [
+        scar_size(reader, row) if reader.is_written("pathology/region", row) else np.nan for row in range(len(found))
+    ]
+    return known.assign(scar_size=sizes)
+
+
+def _constants(reader: Reader) -> dict[str, Any]:
+    """Value of every key that is the same in all cases."""
+    import zarr
+
+    attributes: dict[str, Any] = zarr.open_group(reader.path, path="cases", mode="r").attrs.asdict()
+    return dict(attributes["constants"])
+
+
+def _selected(found: pd.DataFrame, constants: dict[str, Any], query: str) -> pd.Index:
+    """Cases for which a condition holds."""
+    import pandas as pd
+
+    same = pd.DataFrame({key: value for key, value in constants.items() if key not in found}, index=found.index)
+    try:
+        return found.join(same).query(query).index
+    except Exception as error:  # pandas, its parser and its engine have many kinds
+        raise ValueError(
+            f"query = {query!r}: {str(error).splitlines()[0]}: write it over columns of the table."
+        ) from None

@@ -1,0 +1,153 @@
+"""A folder in object storage (S3): objects by their name, each with the SHA-256 of what was sent as its metadata.
+
+Requests are signed over their content (AWS Signature Version 4), so that the server refuses what changed on the way; an
+object is there as a whole or not at all. Where it is, and who asks, is said by the environment variables of AWS that
+:class:`obstore.store.S3Store` reads: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION, AWS_ENDPOINT_URL and others.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from datetime import timedelta
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from obstore.store import S3Store
+    from zarr.storage import ObjectStore
+
+T = TypeVar("T")
+
+CHECKSUM = "sha256"
+"""Name of the metadata with the checksum, x-amz-meta-sha256."""
+MAX_RETRIES, RETRY_SECONDS = 3, 60
+"""Failed requests are sent again so often, and no longer than that."""
+CONNECT_SECONDS, REQUEST_SECONDS = 10, 300
+REMEDY = "check the address and the variables AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION and AWS_ENDPOINT_URL"
+
+
+class RemoteError(OSError):
+    """Raised if object storage cannot be reached, or refuses what is asked."""
+
+
+def is_url(place: str | Path) -> bool:
+    """Whether a place is an address rather than a folder."""
+    return isinstance(place, str) and "://" in place
+
+
+class Remote:
+    """A folder in a bucket.
+
+    Parameters
+    ----------
+    url : str
+        s3://BUCKET/FOLDER, or s3://BUCKET.
+
+    Raises
+    ------
+    RemoteError
+        If the address is not one, or the package obstore is missing.
+    """
+
+    def __init__(self, url: str) -> None:
+        if not re.fullmatch(r"s3://[^/\s]+(/\S*)?", url):
+            raise RemoteError(f"{url}: is not an address in object storage: give s3://BUCKET/FOLDER")
+        try:
+            import obstore
+        except ImportError:
+            raise RemoteError(f"{url}: needs the package obstore: pip install 'echotruth[s3]'") from None
+        self.url, self._api = url.rstrip("/"), obstore
+        self.store = self._asked(lambda: _store(self.url))
+
+    def checksum(self, name: str) -> str:
+        """SHA-256 of an object as it was sent; empty if it is not there, or was sent by another program."""
+        try:
+            found = self._asked(lambda: self._api.get(self.store, name, options={"head": True}))
+        except FileNotFoundError:
+            return ""
+        return found.attributes.get(CHECKSUM, "")
+
+    def put(self, name: str, content: bytes) -> None:
+        """Send an object; it is there when this returns."""
+        attributes = {CHECKSUM: sha256(content).hexdigest()}
+        try:
+            self._asked(lambda: self._api.put(self.store, name, content, attributes=attributes))
+        except FileNotFoundError as error:  # of the bucket
+            raise RemoteError(f"{self.url}: {_reason(error)}: {REMEDY}") from None
+
+    def get(self, name: str) -> bytes:
+        """Read an object; a FileNotFoundError is raised if it is not there."""
+        return self._asked(lambda: bytes(self._api.get(self.store, name).bytes()))
+
+    def delete(self, name: str) -> None:
+        """Remove an object, if it is there."""
+        self._asked(lambda: self._api.delete(self.store, name))
+
+    def names(self) -> Iterator[str]:
+        """Names of all objects."""
+        return (entry["path"] for page in self._asked(lambda: list(self._api.list(self.store))) for entry in page)
+
+    def hierarchies(self) -> list[str]:
+        """Names of the Zarr hierarchies, as `demo.zarr`."""
+        found = self._asked(lambda: self._api.list_with_delimiter(self.store))
+        return sorted(name for name in map(_last_part, found["common_prefixes"]) if name.endswith(".zarr"))
+
+    def _asked(self, request: Callable[[], T]) -> T:
+        """Answer to a request; a failure is told in a sentence."""
+        from obstore.exceptions import BaseError
+
+        try:
+            return request()
+        except (BaseError, ValueError) as error:
+            raise RemoteError(f"{self.url}: {_reason(error)}: {REMEDY}") from None
+
+
+def hierarchy(url: str) -> ObjectStore:
+    """Open the Zarr hierarchy of a repository in object storage, to be read.
+
+    Parameters
+    ----------
+    url : str
+        Address of a repository, or of its folder `NAME.zarr`.
+
+    Raises
+    ------
+    RemoteError
+        If it cannot be reached.
+    FileNotFoundError
+        If there is no repository.
+    """
+    from zarr.storage import ObjectStore
+
+    remote = Remote(url)
+    if not remote.url.endswith(".zarr"):
+        names = remote.hierarchies()
+        if len(names) != 1:
+            raise FileNotFoundError(f"{url}: is not a repository: give an address to which one was uploaded")
+        remote = Remote(f"{remote.url}/{names[0]}")
+    return ObjectStore(remote.store, read_only=True)
+
+
+def _store(url: str) -> S3Store:
+    from obstore.store import S3Store
+
+    connecting, request = (timedelta(seconds=seconds) for seconds in (CONNECT_SECONDS, REQUEST_SECONDS))
+    return S3Store.from_url(
+        url,
+        # Whoever gives an endpoint without encryption, as of a server on the own machine, wants that one.
+        client_options={"allow_http": True, "connect_timeout": connecting, "timeout": request},
+        retry_config={"max_retries": MAX_RETRIES, "retry_timeout": timedelta(seconds=RETRY_SECONDS)},
+    )
+
+
+def _reason(error: Exception) -> str:
+    """What went wrong: the message of the server, if it gave one."""
+    text = str(error).partition("\n\nDebug source")[0]
+    found = re.search(r"<Message>(.+?)</Message>", text, re.DOTALL)
+    return " ".join((found[1] if found else text.rpartition(" - ")[2]).split()).rstrip(".:")
+
+
+def _last_part(path: str) -> str:
+    return path.rstrip("/").rpartition("/")[2]

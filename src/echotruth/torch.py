@@ -1,0 +1,136 @@
+"""The sequences of :mod:`echotruth.learning` as PyTorch data sets, whose items are dicts of tensors.
+
+>>> from echotruth import learning
+>>> from echotruth.torch import FlowPairs, loader
+>>> parts = learning.split(learning.cases("out/demo"), {"train": 0.8, "test": 0.2})  # doctest: +SKIP
+>>> batch = next(iter(loader(FlowPairs("out/demo", parts["train"], size=128), 8)))  # doctest: +SKIP
+>>> batch["image"].shape, batch["flow"].shape  # doctest: +SKIP
+(torch.Size([8, 2, 128, 128]), torch.Size([8, 2, 128, 128]))
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from echotruth import learning
+from echotruth.learning import Item, Items
+
+try:
+    import torch
+    from torch.utils.data import DataLoader, Dataset
+except ModuleNotFoundError as error:
+    if error.name != "torch":
+        raise
+    raise ModuleNotFoundError("echotruth.torch needs PyTorch: pip install echotruth[torch]", name="torch") from None
+
+__all__ = ["Clips", "Diagnosis", "FlowPairs", "PointTracks", "Segmentation", "Strain", "Tensors", "loader", "tensors"]
+
+
+def tensors(item: Item) -> Item:
+    """An item with tensors in place of its arrays and of NumPy's numbers; they share the memory of the arrays."""
+    return {name: _tensor(value) for name, value in item.items()}
+
+
+class Tensors(Dataset[Item]):
+    """A sequence of items as a PyTorch data set.
+
+    Parameters
+    ----------
+    items : Items
+    """
+
+    def __init__(self, items: Items) -> None:
+        self.items = items
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def __getitem__(self, index: int) -> Item:
+        return tensors(self.items[index])
+
+
+class _Made(Tensors):
+    """A sequence of items, made and then wrapped."""
+
+    sequence: type[Items]
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(self.sequence(*arguments, **options))
+
+
+class Clips(_Made):
+    """:class:`echotruth.learning.Clips` as tensors; it takes the same parameters."""
+
+    sequence = learning.Clips
+
+
+class FlowPairs(_Made):
+    """:class:`echotruth.learning.FlowPairs` as tensors; it takes the same parameters."""
+
+    sequence = learning.FlowPairs
+
+
+class PointTracks(_Made):
+    """:class:`echotruth.learning.PointTracks` as tensors; it takes the same parameters."""
+
+    sequence = learning.PointTracks
+
+
+class Segmentation(_Made):
+    """:class:`echotruth.learning.Segmentation` as tensors; it takes the same parameters."""
+
+    sequence = learning.Segmentation
+
+
+class Strain(_Made):
+    """:class:`echotruth.learning.Strain` as tensors; it takes the same parameters."""
+
+    sequence = learning.Strain
+
+
+class Diagnosis(_Made):
+    """:class:`echotruth.learning.Diagnosis` as tensors; it takes the same parameters."""
+
+    sequence = learning.Diagnosis
+
+
+def loader(
+    items: Items | Tensors, batch: int, *, shuffle: bool = True, seed: int = 0, workers: int = 0, start: str = "spawn"
+) -> DataLoader[Item]:
+    """Batches in an order that the seed determines, whatever the number of workers.
+
+    Parameters
+    ----------
+    items : Items or Tensors
+    batch : int
+        Items in a batch; the last may have fewer.
+    shuffle : bool
+        Whether each epoch has an order of its own.
+    seed : int
+    workers : int
+        Processes that read; 0 reads in this one.
+    start : {"spawn", "fork", "forkserver"}
+        How they are started. The items are the same; a fork starts sooner, and inherits the locks of this process.
+
+    Returns
+    -------
+    DataLoader
+        Over dicts of tensors with a first dimension for the batch; texts are lists.
+    """
+    return DataLoader(
+        Tensors(items) if isinstance(items, Items) else items,
+        batch_size=batch,
+        shuffle=shuffle,
+        num_workers=workers,
+        generator=torch.Generator().manual_seed(seed),
+        multiprocessing_context=start if workers else None,
+        persistent_workers=workers > 0,
+    )
+
+
+def _tensor(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return torch.tensor(value.item())
+    return torch.from_numpy(np.require(value, requirements=["C", "W"])) if isinstance(value, np.ndarray) else value

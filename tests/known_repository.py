@@ -1,0 +1,129 @@
+"""A repository of a heart that moves as a rigid body, with images of which every pixel is known."""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import finished_repository
+import numpy as np
+
+import echotruth as et
+from echotruth.cases import Case, expand
+from echotruth.config import Config
+from echotruth.heart import Heart
+from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.labels import unpack
+from echotruth.imaging.truth import pixel_truth
+from echotruth.imaging.view import imaging_plane
+from echotruth.repository import ledger
+from echotruth.repository.ledger import GATES, VIEW_STAGES
+from echotruth.repository.publication import publish
+from echotruth.workflow.cost import Cost
+from echotruth.workflow.job import Job
+from echotruth.workflow.scripts.cases import lay_out
+
+SIZES = (128, 64)
+FRAMES = finished_repository.FRAMES
+SHIFT = np.array([300e-6, -200e-6, 150e-6])
+"""Lateral, axial and elevation shift in the last frame of a short-axis view, m."""
+
+SETTINGS = {
+    "name": "known",
+    "geometry": {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1},
+    "motion": {"kind": "rigid", "time_course": "ramp", "rigid": {"rotation_deg": 0.0}},
+    "loop": {"frames": FRAMES},
+    "views": {"mid": {"position": 0.5}, "long": {"plane": "long_axis", "rotation_deg": 30.0}},
+    "bmode": {"size_px": SIZES[0], "downsampling": (1, 2)},
+    "tracking": {"trackers": {name: {"method": "phase_correlation", "window_px": 16} for name in ("one", "two")}},
+}
+SETTINGS["motion"]["rigid"] |= {
+    f"{axis}_um": float(1e6 * shift) for axis, shift in zip(("lateral", "axial", "elevation"), SHIFT, strict=True)
+}
+
+
+TRACKED = {
+    "tracking": {"displacement": np.reshape([1e-4, 2e-4], (2, 1, 1, 1, 1))},
+    "evaluation": {
+        "tracked_global_strain": np.reshape([0.1, 0.2], (2, 1, 1)),
+        "tracked_segment_strain": np.reshape([0.11, 0.21], (2, 1, 1, 1)),
+        "true_global_strain": np.reshape([0.3, 0.4, 0.5], (3, 1, 1)),
+        "true_segment_strain": np.reshape([0.31, 0.41, 0.51], (3, 1, 1, 1)),
+    },
+}
+"""What the two trackers found, and the three references: told apart by their values."""
+
+
+@dataclass(eq=False)
+class Known:
+    """The repository and what it was made of."""
+
+    folder: Path
+    config: Config
+    heart: Heart
+
+    @property
+    def case(self) -> Case:
+        return expand(self.config)[0]
+
+    def images(self, size: int) -> np.ndarray:
+        return known_images(size)
+
+    @property
+    def spacing(self) -> float:
+        """Of the largest image, m."""
+        return 1e-3 * self.config.bmode.field_of_view_mm / SIZES[0]
+
+    def plane(self, view: str):
+        return imaging_plane(self.config.views[view], self.config.rf, self.heart.endo_at_ed)
+
+    def labels(self, view: str, size: int) -> dict[str, np.ndarray]:
+        """Mask, layer, segment and region of the pixels, each (frame, axial, lateral)."""
+        return unpack(self.truth(view, size)["labels"])
+
+    @cache  # noqa: B019 - one object a session
+    def truth(self, view: str, size: int) -> dict[str, np.ndarray]:
+        return pixel_truth(self.heart, self.plane(view), *pixel_centres(self.config.bmode, size))
+
+
+def known_images(size: int) -> np.ndarray:
+    """A bright block near the array on the side of positive lateral, a dim one far from it on the other."""
+    images = np.full((FRAMES, SIZES[0], SIZES[0]), 10, np.uint8)
+    images[:, 16:32, 96:112] = 220
+    images[:, 96:112, 16:32] = 40 + 40 * np.arange(FRAMES)[:, None, None]
+    step = SIZES[0] // size
+    return images[:, ::step, ::step]
+
+
+def make(folder: Path, settings: dict) -> Known:
+    """Write a repository as the workflow does, with known images."""
+    config = et.configure(settings)
+    heart = et.beat(et.configure(settings, cases={}), progress=False)
+    known, cases = Known(folder, config, heart), expand(config)
+    lay_out(folder, config, cases)
+    for case in cases:
+        for stage in GATES:
+            _commit(Job(folder, stage, case, code="1"), heart.arrays)
+        for view in config.views:
+            for stage in VIEW_STAGES:
+                _commit(Job(folder, stage, case, view, code="1"), _arrays(known, view))
+    ledger.commit(folder / "ledger/repository.json", publish(folder))
+    return known
+
+
+def _arrays(known: Known, view: str) -> dict[str, dict[str, np.ndarray]]:
+    plane = known.plane(view)
+    arrays = {"phantom": {"origin": plane.origin, "axes": plane.axes}}
+    for size in SIZES:
+        arrays[f"bmode/{size}"] = {"image": known_images(size)}
+        arrays[f"truth/{size}"] = known.truth(view, size)
+        arrays |= {name: values for group, values in TRACKED.items() for name in (group, f"{group}/{size}")}
+    return arrays
+
+
+def _commit(job: Job, known: dict[str, dict[str, np.ndarray]]) -> None:
+    """Commit a job: known arrays, and zeros for all others."""
+    arrays = finished_repository.result(job.store, job.stage, job.case.config, [1, 2])
+    for group, values in arrays.items():
+        for name in values.keys() & known.get(group, {}).keys():
+            values[name] = np.broadcast_to(known[group][name], np.shape(values[name]))
+    job.commit(arrays, Cost())

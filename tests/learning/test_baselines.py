@@ -1,0 +1,97 @@
+"""The examples that learn: what they compute is right, and each runs on a small repository."""
+
+import re
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from echotruth import learning
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def example(name):
+    pytest.importorskip("torch")
+    return runpy.run_path(str(EXAMPLES / f"{name}.py"))
+
+
+@pytest.fixture(scope="module")
+def hearts(repository):
+    """The healthy heart, and the one with an infarct."""
+    return [learning.cases(repository, f"diagnosis == '{name}'") for name in ("healthy", "infarct")]
+
+
+@pytest.mark.slow
+def test_network_beats_no_motion_on_a_heart_that_it_has_not_seen(repository, hearts):
+    found = example("motion")["compare"](repository, *hearts, epochs=40)
+    assert set(found) == {"no motion", "one", "network"}
+    assert found["network"] < 0.9 * found["no motion"]
+
+
+@pytest.mark.slow
+def test_wall_on_a_black_ground_is_found_by_a_network_and_better_than_by_its_mean_place(repository, hearts):
+    found = example("segmentation")["compare"](repository, *hearts, epochs=20)
+    assert found["network"] > 0.9 > found["mean wall"]
+
+
+@pytest.mark.slow
+def test_every_method_scores_every_heart_once(repository):
+    table = learning.cases(repository)
+    parts = {f"fold {seed}": table[table["seed"] == seed] for seed in (1, 2)}
+    names = example("diagnosis")
+    found = names["compare"](repository, table, parts, steps=2)
+    assert set(found) == {"ejection fraction", "network", "strain by one", "true strain"}
+    assert all(0 <= found[name] <= 1 for name in ("network", "strain by one", "true strain"))
+
+
+@pytest.mark.slow
+def test_area_under_the_curve_is_the_share_of_pairs_in_order():
+    auc = example("diagnosis")["auc"]
+    score, infarct = np.array([0.1, 0.4, 0.35, 0.8]), np.array([False, False, True, True])
+    assert auc(score, infarct) == 0.75
+    assert auc(np.ones(4), infarct) == 0.5
+
+
+@pytest.mark.slow
+def test_sector_that_does_not_shorten_is_found_among_others_that_do():
+    names, random = example("diagnosis"), np.random.default_rng(0)
+    angle, radius = random.uniform(-np.pi, np.pi, 4000), random.uniform(1, 2, 4000)
+    before = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1)
+    before -= before.mean(0)
+    assert names["least_shortening"](before, 0.8 * before) == pytest.approx((0.8**2 - 1) / 2, abs=1e-9)
+    dead = np.abs(angle) < 0.7
+    after = np.where(dead[:, None], before, 0.8 * before)
+    assert names["least_shortening"](before, after) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turns", range(4))
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_motion_away_from_the_centre_stays_so_when_turned_and_mirrored(turns, mirrored):
+    torch = pytest.importorskip("torch")
+
+    names, index = example("motion"), torch.arange(6) - 2.5
+    axial, lateral = torch.meshgrid(index, index, indexing="ij")
+    batch = {
+        "image": torch.stack([lateral, axial])[None],
+        "flow": torch.stack([lateral, axial])[None],
+        "wall": (lateral > 0)[None],
+    }
+    image, flow, wall = names["turned"](batch, turns, mirrored)
+    np.testing.assert_array_equal(flow, batch["flow"])
+    # The first image is the lateral position before: the wall is where it was positive, wherever that is now.
+    np.testing.assert_array_equal(wall, image[:, 0] > 0)
+
+
+def test_blocks_of_the_page_about_learning_run_on_a_repository(repository, tmp_path, monkeypatch):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/learning").symlink_to(repository)
+    monkeypatch.chdir(tmp_path)
+    page, names = (EXAMPLES.parent / "docs/learning.md").read_text(), {}
+    blocks = [block for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "torch" not in block]
+    for block in blocks:
+        exec(block.replace("size=128", "size=64"), names)
+    assert len(blocks) >= 2 and len(blocks[0].strip().splitlines()) == 5
+    assert names["pairs"][0]["flow"].shape == (2, 64, 64)

@@ -1,0 +1,199 @@
+"""Drawn hearts: their distributions, the evenness of quasi-random points, and that they stay."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from echotruth.cases import expand
+from echotruth.cases.draws import draws, sobol, unit_points
+from echotruth.config import Config
+from echotruth.config.cases import Distribution, Draw
+from echotruth.config.loading import ConfigError, validate
+
+METHODS = ("sobol", "latin_hypercube", "random")
+KEYS = {
+    "fibres.endo_deg": Distribution(uniform=[60, 75]),
+    "fibres.epi_deg": Distribution(normal=[-42, 2]),
+    "loop.edv_uL": Distribution(normal=[50, 5], limits=[45, 60]),
+    "mechanics.material.stiffness_kPa": Distribution(log_uniform=[0.8, 2.4]),
+    "seed": Distribution(integers=[1, 6]),
+    "pathology.infarct.segments": Distribution(choice=[None, [7, 8], [1]], weights=[2, 1, 1]),
+}
+
+
+def drawn(method="sobol", number=4096, seed=7, keys=KEYS):
+    values = draws(Draw(number=number, seed=seed, method=method, keys=keys))
+    assert len(values) == number
+    return {key: [value[key] for value in values] for key in keys}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("key", "distribution"),
+    [
+        ("fibres.endo_deg", stats.uniform(60, 15)),
+        ("fibres.epi_deg", stats.norm(-42, 2)),
+        ("loop.edv_uL", stats.truncnorm(-1, 2, 50, 5)),
+        ("mechanics.material.stiffness_kPa", stats.loguniform(0.8, 2.4)),
+    ],
+)
+def test_values_have_their_distribution(method, key, distribution):
+    """By the distance of Kolmogorov and Smirnov, and the mean within four of its standard errors."""
+    values = np.array(drawn(method)[key])
+    assert stats.kstest(values, distribution.cdf).pvalue > 1e-3
+    assert abs(values.mean() - distribution.mean()) < 4 * distribution.std() / math.sqrt(len(values))
+
+
+def test_truncated_values_stay_within_their_limits_and_rounding_within_bounds():
+    values = drawn("random", 20000)
+    assert min(values["loop.edv_uL"]) >= 45 and max(values["loop.edv_uL"]) <= 60
+    narrow = {"fibres.endo_deg": Distribution(uniform=[60.00000011, 60.00000012])}
+    assert set(drawn(keys=narrow)["fibres.endo_deg"]) <= {60.00000011, 60.00000012}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_whole_numbers_and_choices_have_their_frequencies(method):
+    values = drawn(method, 6144)
+    assert all(isinstance(seed, int) for seed in values["seed"])
+    counts = np.bincount(values["seed"], minlength=7)[1:]
+    assert stats.chisquare(counts).pvalue > 1e-3
+    segments = [str(value) for value in values["pathology.infarct.segments"]]
+    counts = [segments.count(name) for name in ("None", "[7, 8]", "[1]")]
+    assert sum(counts) == 6144
+    assert stats.chisquare(counts, [3072, 1536, 1536]).pvalue > 1e-3
+
+
+def points(method, number, seed=7, dimensions=6):
+    keys = {f"key{axis}": Distribution(uniform=[0, 1]) for axis in range(dimensions)}
+    return np.stack(list(unit_points(Draw(number=number, seed=seed, method=method, keys=keys)).values()), axis=1)
+
+
+@pytest.mark.parametrize("number", [64, 100, 256])
+def test_discrepancy_of_sobol_is_below_that_of_random_points(number):
+    found = {
+        method: [stats.qmc.discrepancy(points(method, number, seed)) for seed in range(8)]
+        for method in ("sobol", "random")
+    }
+    assert max(found["sobol"]) < 0.6 * min(found["random"])
+
+
+def test_each_pair_of_keys_has_a_point_in_every_cell_of_sobol_that_is_due():
+    """Of 256 points of a digital net in base 2, every 1/16 of an axis has 16, whatever the shift."""
+    net = points("sobol", 256)
+    for axis in net.T:
+        assert np.all(np.bincount((axis * 256).astype(int), minlength=256) == 1)
+    cells = (net[:, 0] * 16).astype(int) * 16 + (net[:, 1] * 16).astype(int)
+    assert np.all(np.bincount(cells, minlength=256) == 1)
+
+
+def test_sequence_is_that_of_scipy_before_the_shift():
+    with pytest.warns(UserWarning, match="balance"):
+        reference = stats.qmc.Sobol(5, scramble=False).random(100)
+    np.testing.assert_array_equal(sobol(100, 5) / 2**30, reference)
+
+
+def test_latin_hypercube_has_one_point_in_each_interval():
+    for axis in points("latin_hypercube", 100).T:
+        assert sorted((100 * axis).astype(int)) == list(range(100))
+
+
+def test_keys_are_not_correlated():
+    for method in METHODS:
+        correlation = np.corrcoef(points(method, 4096).T) - np.eye(6)
+        assert np.abs(correlation).max() < 4 / math.sqrt(4096), method
+
+
+@pytest.mark.parametrize("method", ["sobol", "random"])
+def test_a_larger_number_keeps_the_hearts_that_were_there(method):
+    for more in (101, 128, 1000):
+        assert draws(Draw(number=more, method=method, keys=KEYS))[:100] == draws(
+            Draw(number=100, method=method, keys=KEYS)
+        )
+    before, after = (
+        [case.id for case in expand(Config(cases={"draw": {"number": n, "method": method, "keys": CONTINUOUS}}))]
+        for n in (5, 12)
+    )
+    assert after[:5] == before and len(set(after)) == 12
+
+
+CONTINUOUS = {"fibres.endo_deg": {"uniform": [60, 75]}, "fibres.epi_deg": {"uniform": [-46, -38]}}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_draws_depend_on_their_seed_and_not_on_the_order_of_keys(method):
+    first = drawn(method, 50)
+    assert drawn(method, 50) == first
+    assert drawn(method, 50, keys=dict(reversed(KEYS.items()))) == first
+    assert drawn(method, 50, seed=8)["fibres.endo_deg"] != first["fibres.endo_deg"]
+
+
+def test_drawn_values_are_what_they_were_when_first_published():
+    """A repository is read by drawing its hearts again, also by other versions of the libraries."""
+    found = {method: drawn(method, 3) for method in METHODS}
+    assert found == PUBLISHED
+
+
+PUBLISHED = {
+    "sobol": {
+        "fibres.endo_deg": [67.567, 60.067, 63.817],
+        "fibres.epi_deg": [-42.0781, -37.6898, -43.4487],
+        "loop.edv_uL": [59.8665, 50.837, 53.7127],
+        "mechanics.material.stiffness_kPa": [0.995205, 1.72375, 1.30976],
+        "seed": [6, 3, 2],
+        "pathology.infarct.segments": [[7, 8], None, None],
+    },
+    "latin_hypercube": {
+        "fibres.endo_deg": [61.5871, 69.5277, 73.6985],
+        "fibres.epi_deg": [-40.6206, -45.0805, -41.6563],
+        "loop.edv_uL": [48.1967, 49.5988, 59.9947],
+        "mechanics.material.stiffness_kPa": [1.91583, 1.01753, 1.53448],
+        "seed": [3, 2, 5],
+        "pathology.infarct.segments": [[1], None, None],
+    },
+    "random": {
+        "fibres.endo_deg": [65.2924, 64.8236, 66.9456],
+        "fibres.epi_deg": [-39.2753, -42.7238, -41.3257],
+        "loop.edv_uL": [58.7442, 57.927, 53.4268],
+        "mechanics.material.stiffness_kPa": [0.939699, 1.37524, 1.44785],
+        "seed": [1, 2, 4],
+        "pathology.infarct.segments": [[7, 8], None, None],
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("draw", "sentence"),
+    [
+        ({"number": 3}, "cases.draw.keys is missing: it must be given"),
+        ({"number": 0, "keys": CONTINUOUS}, "cases.draw.number = 0: should be greater than or equal to 1"),
+        ({"number": 10**6, "keys": CONTINUOUS}, "cases.draw.number = 1000000: should be less than or equal to 100000"),
+        ({"number": 3, "keys": {}}, "cases.draw.keys = {}: must have at least one entry"),
+        ({"number": 3, "method": "halton", "keys": CONTINUOUS}, "cases.draw.method = 'halton'"),
+        (
+            {"number": 3, "keys": {"fibres.endo": {"uniform": [1, 2]}}},
+            "cases.draw.keys.fibres.endo: fibres.endo is not",
+        ),
+        ({"number": 3, "keys": {"seed": {}}}, "give one of uniform, log_uniform, normal, integers, choice"),
+        (
+            {"number": 3, "keys": {"seed": {"uniform": [2, 1]}}},
+            "uniform = [2.0, 1.0]: must be the lower bound and then",
+        ),
+        ({"number": 3, "keys": {"seed": {"log_uniform": [0, 1]}}}, "must have positive bounds"),
+        ({"number": 3, "keys": {"seed": {"normal": [0, 0]}}}, "a positive standard deviation"),
+        (
+            {"number": 3, "keys": {"seed": {"uniform": [0, 1], "limits": [0, 1]}}},
+            "limits = [0.0, 1.0]: applies to normal",
+        ),
+        ({"number": 3, "keys": {"seed": {"choice": [1, 2], "weights": [1]}}}, "one entry for each of the 2 of choice"),
+        ({"number": 3, "keys": {"seed": {"choice": [1, 2], "weights": [0, 0]}}}, "must have a positive entry"),
+        ({"number": 9, "keys": {"seed": {"choice": [1, 2]}}}, "are the same heart"),
+        ({"number": 3, "keys": {"seed": {"uniform": [1, 9]}}}, "draw 1: seed = "),
+        ({"number": 9, "keys": {"fibres.endo_deg": {"uniform": [80, 99]}}}, "should be less than or equal to 90"),
+    ],
+)
+def test_draw_that_cannot_be_made_is_refused(draw, sentence):
+    with pytest.raises(ConfigError) as error:
+        expand(validate({"cases": {"draw": draw}}, "my.yaml"), "my.yaml")
+    assert str(error.value).startswith("my.yaml: ") and sentence in str(error.value)

@@ -1,0 +1,267 @@
+"""Hearts from a table: a row a heart, a column a key, under ids that stay."""
+
+import itertools
+import random
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import pyvista
+
+from echotruth.cases import as_table, diagnosis, expand, find_case, table
+from echotruth.config import Cases, Config, Geometry
+from echotruth.config.limits import MAX_CASES, MAX_TABLE_BYTES, MAX_TABLE_COLUMNS
+from echotruth.config.loading import ConfigError, load, override, validate
+from echotruth.loop.cycle import SHIPPED
+from echotruth.mechanics.geometry import left_ventricle
+from echotruth.seeds import generator
+
+TABLE = """\
+case,fibres.endo_deg,pathology.infarct.segments,seed,label.group,label.age_weeks,note
+m1,60,"[7, 8]",3,sham,12,"first, of two"
+,72.5,,,MI,,
+m3,,null,,sham,14.5,
+"""
+
+
+def test_each_row_is_a_heart_with_the_values_of_its_cells(hearts):
+    first, second, third = hearts(TABLE)
+    assert [case.parameters for case in (first, second, third)] == [
+        {"fibres.endo_deg": 60, "pathology.infarct.segments": [7, 8], "seed": 3},
+        {"fibres.endo_deg": 72.5},
+        {"pathology.infarct.segments": None},
+    ]
+    for case in (first, second, third):
+        assert case.config.model_dump() == override(Config(), case.parameters).model_dump()
+    assert [case.labels for case in (first, third)] == [
+        {"group": "sham", "age_weeks": 12},
+        {"group": "sham", "age_weeks": 14.5},
+    ]
+    assert (first.note, second.note) == ("first, of two", "")
+
+
+def test_ids_are_those_of_the_column_or_else_those_of_the_same_heart_in_a_grid(hearts):
+    grid = expand(Config(cases={"fibres.endo_deg": [72.5]}))
+    assert [case.id for case in hearts(TABLE)] == ["m1", grid[0].id, "m3"]
+
+
+def test_rows_and_columns_in_another_order_are_the_same_hearts(hearts):
+    header, *rows = TABLE.splitlines()
+    before = {case.id: (case.config, case.labels) for case in hearts(TABLE)}
+    for order in itertools.permutations(rows):
+        assert {case.id: (case.config, case.labels) for case in hearts("\n".join([header, *order]))} == before
+    columns = pd.read_csv("hearts.csv", dtype=str, keep_default_na=False)
+    shuffled = columns[random.Random(1).sample(list(columns), len(list(columns)))].to_csv(index=False)
+    assert {case.id: (case.config, case.labels) for case in hearts(shuffled)} == before
+
+
+def test_rows_that_are_added_change_neither_ids_nor_random_numbers_of_those_that_were_there(hearts):
+    before, after = hearts(TABLE), hearts(TABLE.replace("m3,", "new,61,,,,,\n,62,,,,,\nm3,"))
+    assert len(after) == 5
+    kept = {case.id: case for case in after}
+    for case in before:
+        assert kept[case.id].config == case.config
+        numbers = [generator(one, "mid", "rf").random(4) for one in (case, kept[case.id])]
+        assert np.array_equal(*numbers)
+
+
+def test_column_that_is_added_empty_or_at_the_present_value_renames_no_heart(hearts):
+    present = Config().fibres.epi_deg
+    added = "\n".join(
+        f"{line},{cell}" for line, cell in zip(TABLE.splitlines(), ["fibres.epi_deg", "", present, ""], strict=True)
+    )
+    assert [case.id for case in hearts(added)] == [case.id for case in hearts(TABLE)]
+
+
+def test_mesh_and_loop_of_a_row_stay_together(hearts, tmp_path):
+    for name in "ab":
+        (tmp_path / f"{name}.csv").write_text((SHIPPED / "mouse.csv").read_text())
+        (tmp_path / f"{name}.stl").write_text("")
+    rows = "case,geometry.file,geometry.remesh,loop.file\np,a.stl,true,a.csv\nq,b.stl,true,b.csv\nhealthy,,,\n"
+    cases = hearts(rows)
+    pairs = [(case.config.geometry.file, case.config.loop.file) for case in cases]
+    assert pairs == [("a.stl", "a.csv"), ("b.stl", "b.csv"), (None, "mouse")]
+
+
+def test_table_grid_and_draws_multiply_and_ids_of_rows_are_continued(hearts):
+    cases = "seed: [1, 2], draw: {number: 3, keys: {fibres.epi_deg: {uniform: [-46, -38]}}}"
+    found = hearts(TABLE.replace(",seed,", ",fibres.disarray_deg,"), cases=cases)
+    assert len({case.id for case in found}) == 3 * 2 * 3
+    assert sum(case.id.startswith("m1_epi-") for case in found) == 6
+    assert {case.parameters["seed"] for case in found if case.labels["group"] == "MI"} == {1, 2}
+
+
+def test_id_of_a_row_is_continued_only_by_what_differs(hearts):
+    ids = [case.id for case in hearts("case,fibres.endo_deg\nm1,60\n", cases="seed: [1, 2]")]
+    assert ids[0] == "m1" and ids[1].startswith("m1_seed2_")
+    assert [find_case(validate({"cases": {"file": "hearts.csv", "seed": [1, 2]}}, "x"), id).id for id in ids] == ids
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "value"),
+    [
+        ("loop.file", "human", "human"),
+        ("seed", "2.0", 2),
+        ("fibres.endo_deg", "6e1", 60.0),
+        ("fibres.endo_deg", " 60 ", 60),
+        ("physiology.exclude_implausible", "FALSE", False),
+        ("geometry.wall_mm", "null", None),
+    ],
+)
+def test_cell_is_read_as_what_its_key_takes(hearts, column, cell, value):
+    (case,) = hearts(f"case,{column}\none,{cell}\n")
+    found = case.parameters[column]
+    assert found == value and type(found) is type(value)
+
+
+def test_text_of_digits_stays_text_for_a_key_that_takes_text(hearts, tmp_path):
+    (tmp_path / "007").write_text((SHIPPED / "mouse.csv").read_text())
+    assert hearts("loop.file\n007\n")[0].config.loop.file == "007"
+
+
+REFUSED = {
+    "case,fibres.endo_deg\na,60\nb,95\n": "hearts.csv, row 2: fibres.endo_deg = 95: should be less than or equal to 90",
+    "case,fibres.endo\na,60\n": "hearts.csv, column 'fibres.endo': fibres.endo is not a key: did you mean",
+    "case,age\na,60\n": "column 'age': age is not a key: write label.age if it is a label",
+    "case,label.my age\na,60\n": "column 'label.my age': name it label.",
+    "case,fibres\na,60\n": "column 'fibres': fibres is a section",
+    "case,loop.frames\na,60\n": "column 'loop.frames': loop.frames cannot be swept",
+    "case,seed\na b,1\n": "row 1: case = 'a b': use at most 80 letters",
+    "case,seed\n../a,1\n": "row 1: case = '../a'",
+    "case,seed\na,1\n\nb,2\na,3\n": "row 4: case = a is the id of row 1 too",
+    "case,seed\na,1\nA,2\n": "row 1 and hearts.csv, row 2 have ids that differ in capitals alone",
+    "seed,label.x\n2,a\n2,b\n": "row 1 and hearts.csv, row 2 are the same heart, seed2_b105c5: leave one",
+    "case,seed\na,1.5\n": "row 1: seed = 1.5: should be a valid integer",
+    "case,seed\na,nan\n": "row 1: seed = 'nan': should be a valid integer",
+    "case,seed\na,1,2\n": "row 1 has 3 cells and not 2",
+    "case,seed\na\n": "row 1 has 1 cells and not 2",
+    "case;seed\na;1\n": "separated by semicolons: separate them by commas",
+    "case,seed,seed\na,1,2\n": "column 'seed' is given twice",
+    "case,,seed\na,1,2\n": "column 2 has no name",
+    "case,seed\n": "has no rows",
+    "": "has no columns",
+    'case,note\na,"b\n': "is not a table of comma-separated values",
+    "case,pathology.infarct.segments\na,[7\n": "row 1: pathology.infarct.segments = '[7': must be a list",
+    "case,pathology.infarct.segments\na,7\n": "row 1: pathology.infarct.segments = 7: must be a list",
+    "case,loop.file\na,mouse\nb,none.csv\n": "hearts.csv, row 2: loop: none.csv: there is no readable loop",
+    "case,geometry.file,geometry.remesh\na,a.stl,true\n": "row 1: geometry.file = 'a.stl': file not found",
+    "case,loop.edv_uL,loop.esv_uL\na,50,20\nb,20,50\n": "row 2: loop.esv_uL = 50.0: must be smaller than edv_uL",
+    f"case,note\na,{'x' * 4001}\n": "row 1, column note: has 4001 characters: write at most 4000",
+    f"case,{','.join(f'label.a{i}' for i in range(MAX_TABLE_COLUMNS))}\n": "has 257 columns",
+    f"seed\n{'1' * MAX_TABLE_BYTES}\n": "holds 2.0 MiB: a table has at most 2 MiB",
+    "seed\n" + "1\n" * (MAX_CASES + 1): "has more than 100000 rows",
+}
+
+
+@pytest.mark.parametrize("text", REFUSED, ids=lambda text: repr(text[:40]))
+def test_table_that_cannot_be_run_is_refused_with_file_row_and_column(refusal, text):
+    sentence = refusal(text)
+    assert sentence.startswith("my.yaml: ") and "hearts.csv" in sentence
+    assert REFUSED[text] in sentence
+
+
+def test_mesh_of_a_row_without_a_new_mesh_of_the_same_size_is_refused(refusal, tmp_path):
+    (tmp_path / "a.vtu").write_text("")
+    assert "row 1: the meshes may differ in size: set geometry.remesh: true" in refusal("geometry.file\na.vtu\n")
+
+
+def test_key_in_two_places_is_refused(refusal):
+    assert "seed is swept by hearts.csv, column 'seed' too" in refusal("seed\n1\n", "", "seed: [1, 2]")
+
+
+@pytest.mark.parametrize("name", ["absent.csv", ".", "/dev/zero"])
+def test_file_that_is_no_table_is_refused(name):
+    with pytest.raises(ConfigError, match=f"cases.file = '{name}': .*give the path of a CSV file"):
+        validate({"cases": {"file": name}}, "my.yaml")
+
+
+def test_text_that_is_not_unicode_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.csv").write_bytes("case,note\na,é\n".encode("latin-1"))
+    with pytest.raises(ConfigError, match="is not UTF-8 text: give the path of a CSV file"):
+        validate({"cases": {"file": "a.csv"}}, "my.yaml")
+    (tmp_path / "a.csv").write_text("case,note\na,é\n", encoding="utf-8-sig")
+    assert expand(validate({"cases": {"file": "a.csv"}}, "my.yaml"))[0].note == "é"
+
+
+def test_configuration_holds_the_rows_and_not_the_path(hearts, tmp_path):
+    cases = hearts(TABLE)
+    config = validate({"cases": {"file": "hearts.csv"}}, "my.yaml")
+    (tmp_path / "hearts.csv").unlink()
+    again = validate(config.model_dump(mode="json"), "again")
+    assert "hearts.csv" not in again.model_dump_json()
+    assert [(case.id, case.config, case.labels) for case in expand(again)] == [
+        (case.id, case.config, case.labels) for case in cases
+    ]
+
+
+def test_hearts_written_as_a_table_are_the_same_hearts(hearts):
+    cases = hearts(TABLE, cases="draw: {number: 4, keys: {fibres.epi_deg: {normal: [-42, 3]}}}")
+    again = expand(Config(cases={"table": as_table(cases)}))
+    assert [(case.id, case.config, case.labels, case.note) for case in again] == [
+        (case.id, case.config, case.labels, case.note) for case in cases
+    ]
+
+
+def test_table_of_cases_has_labels_and_notes(hearts):
+    frame = table(hearts(TABLE)).set_index("case")
+    assert list(frame.columns[:5]) == ["seed", "diagnosis", "label.group", "label.age_weeks", "note"]
+    assert list(frame["label.group"]) == ["sham", "MI", "sham"]
+    np.testing.assert_array_equal(frame["label.age_weeks"], [12, np.nan, 14.5])
+    assert list(frame["diagnosis"]) == ["infarct", "healthy", "healthy"]
+    assert "note" not in table(expand(Config()))
+    assert "label.empty" not in table(hearts("case,label.empty\na,\n"))
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({}, "healthy"),
+        ({"pathology.infarct.radius_mm": 1.0}, "infarct"),
+        ({"pathology.late_activation.preset": "lbbb"}, "late_activation"),
+        ({"pathology.late_activation.preset": "lbbb", "pathology.late_activation.scale": 0.0}, "healthy"),
+        ({"pathology.late_activation.delay_ms": {5: 0.0}}, "healthy"),
+        ({"geometry.hypertrophy": 1.2, "pathology.infarct.segments": [1]}, "infarct+hypertrophy"),
+        ({"geometry.dilation": 1.2}, "dilation"),
+        ({"geometry.dilation": 0.9}, "healthy"),
+        ({"geometry.file": "a.vtu"}, "unknown"),
+    ],
+)
+def test_diagnosis_is_what_the_configuration_makes_of_the_heart(keys, words):
+    assert diagnosis(override(Config(), keys)) == words
+
+
+def test_grid_alone_is_what_it_was():
+    cases = Cases.model_validate({"seed": [1, 2]})
+    assert cases.model_dump() == {"seed": [1, 2]} and Config().model_dump()["cases"] == {}
+
+
+def test_blocks_of_the_page_are_valid(tmp_path, monkeypatch):
+    page = (Path(__file__).parents[2] / "docs/cases.md").read_text()
+    (settings,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    (meshes,) = re.findall(r"```\n(case,.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hearts.csv").write_text("case,seed\na,1\nb,2\n")
+    (tmp_path / "my.yaml").write_text(settings)
+    assert len(expand(load("my.yaml"), "my.yaml")) > 100
+    for name in re.findall(r"\w+/\w+\.\w+", meshes):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text((SHIPPED / "human.csv").read_text())
+    found = expand(Config(cases={"table": meshes}))
+    assert [(case.id, case.labels["group"]) for case in found] == [("p01", "HCM"), ("p02", "control")]
+
+
+def test_mesh_that_is_remeshed_has_the_topology_of_the_template(tmp_path, monkeypatch):
+    """So hearts with and without a mesh stand in the same arrays."""
+    monkeypatch.chdir(tmp_path)
+    coarse = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
+    template = left_ventricle(Geometry(**coarse))
+    nodes = 1e3 * template.nodes
+    pyvista.UnstructuredGrid({24: template.cells.astype(np.int64)}, nodes).save("a.vtu")
+    config = Config(geometry=coarse, cases={"table": "geometry.file,geometry.remesh\na.vtu,true\n"})
+    (case,) = expand(config)
+    remeshed = left_ventricle(case.config.geometry)
+    for name in ("cells", "endo", "epi", "base"):
+        assert getattr(remeshed, name).shape == getattr(template, name).shape

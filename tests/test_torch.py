@@ -1,0 +1,77 @@
+"""PyTorch data sets hold the items of the sequences, in any number of workers; without PyTorch a sentence says so."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from learning_repository import made
+
+from echotruth import learning
+
+BLOCKED = "import sys; sys.modules['torch'] = None; import echotruth.torch"
+
+
+def test_missing_pytorch_is_told_in_one_sentence_with_the_extra():
+    found = subprocess.run([sys.executable, "-c", BLOCKED], capture_output=True, text=True, check=False)
+    assert found.returncode == 1
+    last = found.stderr.strip().splitlines()[-1]
+    assert last == "ModuleNotFoundError: echotruth.torch needs PyTorch: pip install echotruth[torch]"
+
+
+@pytest.fixture(scope="module")
+def et_torch():
+    pytest.importorskip("torch")
+    import echotruth.torch
+
+    return echotruth.torch
+
+
+@pytest.fixture(scope="module")
+def repository(tmp_path_factory):
+    pytest.importorskip("torch")
+    return made(tmp_path_factory.mktemp("torch") / "small")
+
+
+KINDS = ("Clips", "FlowPairs", "PointTracks", "Segmentation", "Strain", "Diagnosis")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_tensors_hold_the_values_of_the_arrays(et_torch, repository, kind):
+    import torch
+
+    arrays, tensors = (getattr(module, kind)(repository, size=32) for module in (learning, et_torch))
+    assert len(arrays) == len(tensors)
+    for name, value in arrays[1].items():
+        found = tensors[1][name]
+        assert isinstance(found, torch.Tensor) == isinstance(value, np.ndarray | np.generic)
+        np.testing.assert_array_equal(np.asarray(found), value)
+
+
+def content(batches):
+    """All that the batches hold, in their order."""
+    return [{name: np.asarray(value).tolist() for name, value in batch.items()} for batch in batches]
+
+
+@pytest.mark.parametrize("start", ["fork", "spawn"])
+def test_batches_are_the_same_in_any_number_of_workers(et_torch, repository, start):
+    pairs = et_torch.FlowPairs(repository, size=32)
+    alone = content(et_torch.loader(pairs, 3, seed=4))
+    assert content(et_torch.loader(pairs, 3, seed=4, workers=2, start=start)) == alone
+    assert sum(len(batch["frame"]) for batch in alone) == len(pairs)
+
+
+def test_epochs_have_orders_of_their_own_that_the_seed_determines(et_torch, repository):
+    pairs = learning.FlowPairs(repository, size=32)
+    first, again, other = (et_torch.loader(pairs, 4, seed=seed) for seed in (1, 1, 2))
+    epochs = [[batch["frame"].tolist() + batch["case"] for batch in loader] for loader in (first, first, again, other)]
+    assert epochs[0] == epochs[2]
+    assert epochs[0] != epochs[1] and epochs[0] != epochs[3]
+
+
+def test_floats_are_single_precision_and_labels_integers(et_torch, repository):
+    import torch
+
+    batch = next(iter(et_torch.loader(et_torch.Diagnosis(repository, size=32), 2)))
+    assert batch["image"].dtype == batch["scar_size"].dtype == torch.float32
+    assert batch["label"].dtype == torch.int64
