@@ -116,8 +116,7 @@ def _arrays(known: Known, view: str) -> dict[str, dict[str, np.ndarray]]:
     for size in SIZES:
         arrays[f"bmode/{size}"] = {"image": known_images(size)}
         arrays[f"truth/{size}"] = known.truth(view, size)
-        arrays |= {name: values for group, values in TRACKED.items() for name in (group, f"{group}/{size}")}
-    return arrays
+    return arrays | TRACKED
 
 
 def _commit(job: Job, known: dict[str, dict[str, np.ndarray]]) -> None:

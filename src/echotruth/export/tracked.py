@@ -7,7 +7,6 @@ from typing import Any
 from numpy.typing import NDArray
 
 from echotruth.export.clip import Clip
-from echotruth.repository import schema
 
 
 def tracked(clip: Clip, group: str, name: str, tracker: str) -> NDArray[Any]:
@@ -27,8 +26,6 @@ def tracked(clip: Clip, group: str, name: str, tracker: str) -> NDArray[Any]:
         Its dimensions without case, view, size and tracker.
     """
     config = clip.case.config
-    if group in schema.groups(config):  # with the dimension `size`
-        values = clip.job.read(group, name)[name][list(config.bmode.sizes).index(clip.size)]
-    else:
-        values = clip.job.read(f"{group}/{clip.size}", name)[name]
-    return values[list(config.tracking.trackers).index(tracker)]
+    of_size = clip.job.read(group, name)[name][list(config.bmode.sizes).index(clip.size)]
+    values: NDArray[Any] = of_size[list(config.tracking.trackers).index(tracker)]
+    return values

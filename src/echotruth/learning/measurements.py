@@ -37,10 +37,8 @@ def physiology(
     dict of ndarray of shape () or (case,)
         By name, in the units of docs/schema.md; NaN for hearts that were not measured.
     """
-    if reader.has("physiology/scalars"):
-        labels, packed = reader.labels("physiology/scalar"), reader.read("physiology/scalars", row)
-        return {name: packed[..., labels.index(name)] for name in names}
-    return {name: reader.read(f"physiology/{name}", row) for name in names}
+    labels, packed = reader.labels("physiology/scalar"), reader.read("physiology/scalars", row)
+    return {name: packed[..., labels.index(name)] for name in names}
 
 
 def scar_size(reader: Reader, row: int) -> float:

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from echotruth.repository import schema
+
 Metadata = dict[str, dict[str, Any]]
 """Path of every group and array -> its metadata."""
 
@@ -66,8 +68,12 @@ def _members(pack: Quantity, labels: dict[str, list[str]]) -> Iterator[Quantity]
     named, units = labels.get(dimension, []), labels.get(f"{dimension}_units", [])
     if pack.is_coordinate or not named or len(named) != len(units):
         return
+    packs = schema.PACKS.get(pack.group, ())
+    meaning = {array.name: array.long_name for each in packs for array in each.members}
     for name, unit in {label.partition("[")[0]: unit for label, unit in zip(named, units, strict=True)}.items():
-        yield Quantity(pack.group, name, pack.dims, pack.dtype, unit, f"numbers of {pack.name}, by label", False)
+        yield Quantity(
+            pack.group, name, pack.dims, pack.dtype, unit, f"{meaning.get(name, 'number')} (in {pack.name})", False
+        )
 
 
 def _auxiliary(nodes: Metadata) -> set[str]:
