@@ -1,4 +1,4 @@
-"""Data sets of PyTorch hold the items of the sequences, in any number of workers; without PyTorch a sentence says so."""
+"""Data sets of PyTorch hold the items of the sequences, in any number of workers; without it a sentence says so."""
 
 import subprocess
 import sys
