@@ -46,6 +46,7 @@ class Diagnosis(Items):
         known = read_cases(repository, measurements=False)["diagnosis"]
         found = sorted(set(known) - {""}, key=lambda name: (name != "healthy", name))
         self.classes = found if classes is None else list(classes)
+        self._scar_sizes: dict[int, np.float32] = {}
         self._diagnosis = {place.case: str(known[place.case]) for place in self.places}
         for case, name in self._diagnosis.items():
             if name not in self.classes:
@@ -61,5 +62,11 @@ class Diagnosis(Items):
             "es_frame": int(self.reader.read("mechanics/es_frame", place.row)),
             "diagnosis": name,
             "label": self.classes.index(name),
-            "scar_size": np.float32(scar_size(self.reader, place.row)),
+            "scar_size": self._scar_size(place.row),
         }
+
+    def _scar_size(self, row: int) -> np.float32:
+        """That of a case, computed once."""
+        if row not in self._scar_sizes:
+            self._scar_sizes[row] = np.float32(scar_size(self.reader, row))
+        return self._scar_sizes[row]

@@ -7,7 +7,6 @@ from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from echotruth.cases import Case
 from echotruth.config import Config
@@ -20,7 +19,6 @@ from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
 from echotruth.notebook.derived import derived
 from echotruth.repository import rounding, schema
-from echotruth.repository.rounding import quantum, rounded
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,21 +74,8 @@ def clip_dataset(heart: Heart, case: Case, view: str, plane: Plane, values: dict
     )
 
 
-def as_stored(case: Case, groups: dict[str, dict[str, Any]]) -> dict[str, dict[str, NDArray[np.generic]]]:
-    """Arrays of groups, rounded as a repository has them."""
-    arrays = schema.groups(case.config)
-    return {
-        group: {
-            array.name: rounded(np.asarray(values[array.name], array.dtype), quantum(array, case.config))
-            for array in arrays[group]
-            if array.name in values
-        }
-        for group, values in groups.items()
-    }
-
-
 def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str, np.ndarray]) -> xr.Dataset:
-    """Arrays of one case, or of one of its views, with the dimensions, units and meanings of the repository."""
+    """Arrays of one case, or of one of its views, rounded, with the dimensions and units of the repository."""
     import xarray as xr
 
     found = {}

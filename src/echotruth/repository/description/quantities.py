@@ -69,11 +69,9 @@ def _members(pack: Quantity, labels: dict[str, list[str]]) -> Iterator[Quantity]
     if pack.is_coordinate or not named or len(named) != len(units):
         return
     packs = schema.PACKS.get(pack.group, ())
-    meaning = {array.name: array.long_name for each in packs for array in each.members}
+    meaning = {array.name: f"{array.long_name} (in {pack.name})" for each in packs for array in each.members}
     for name, unit in {label.partition("[")[0]: unit for label, unit in zip(named, units, strict=True)}.items():
-        yield Quantity(
-            pack.group, name, pack.dims, pack.dtype, unit, f"{meaning.get(name, 'number')} (in {pack.name})", False
-        )
+        yield Quantity(pack.group, name, pack.dims, pack.dtype, unit, meaning.get(name, ""), False)
 
 
 def _auxiliary(nodes: Metadata) -> set[str]:
