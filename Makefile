@@ -1,10 +1,11 @@
-# make demo and make test set up .venv from requirements.lock first; make test-all runs the slow tests too.
+# make demo and make test set up .venv from requirements.lock first; make test-all runs the slow tests too, and make
+# test-integration those that need PyTorch, an S3 server or the validators of other formats, in an environment of their own.
 
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test test-all reference validation lock clean
+.PHONY: demo test test-all test-integration reference validation lock clean
 
 demo: .venv/ready
 	$(BIN)/echotruth run config/demo.yaml
@@ -17,6 +18,18 @@ test test-all: .venv/ready
 	$(BIN)/lint-imports
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(CHOICE)
+
+INTEGRATION := tests/test_torch.py tests/learning/test_baselines.py tests/description tests/repository/test_upload.py
+
+test-integration: .venv-integration/ready
+	.venv-integration/bin/python -m pytest -n 2 --dist loadscope $(INTEGRATION)
+
+.venv-integration/ready: .venv/ready integration.lock
+	$(BIN)/python -m venv --clear .venv-integration
+	.venv-integration/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r integration.lock
+	.venv-integration/bin/python -m pip install --quiet --disable-pip-version-check "torch==2.13.0"
+	.venv-integration/bin/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .
+	touch $@
 
 .venv/ready: requirements.lock pyproject.toml
 	@test -n "$(PYTHON)" || { echo "echotruth needs Python 3.11, 3.12 or 3.13: install one, or give its path: make PYTHON=/path/to/python"; exit 1; }
@@ -32,9 +45,12 @@ reference: .venv/ready  ## generated pages: schema and tables
 validation: .venv/ready  ## docs/validation.md; takes half an hour on one core
 	$(BIN)/echotruth validate
 
+COMPILE := uv pip compile pyproject.toml --extra test --extra build --universal --python-version 3.11 \
+	--generate-hashes --no-header --no-annotate --quiet
+
 lock:  ## needs uv
-	uv pip compile pyproject.toml --extra test --extra build --universal --python-version 3.11 \
-		--generate-hashes --no-header --no-annotate --quiet --output-file requirements.lock
+	$(COMPILE) --output-file requirements.lock
+	$(COMPILE) --extra integration --output-file integration.lock
 
 clean:
-	rm -rf .venv .snakemake out
+	rm -rf .venv .venv-integration .snakemake out
