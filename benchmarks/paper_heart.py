@@ -16,8 +16,7 @@ from scipy.optimize import brentq
 import echotruth as et
 from echotruth.evaluation.displacement_error import transmural_gradient
 from echotruth.evaluation.polar import resolve
-from echotruth.fem.quadrature import tetrahedron
-from echotruth.mechanics.geometry.mesh_quality import jacobians
+from echotruth.fem.volume import cell_volumes
 
 if TYPE_CHECKING:
     import echotruth.heart
@@ -125,7 +124,7 @@ class Heart:
     def volumes(self) -> dict[str, float]:
         """Volumes of the cavity at end-diastole and end-systole, and of the wall at end-diastole, uL."""
         cavity = self.group("mechanics").volume.values / UL
-        wall = float(np.sum(jacobians(self.mesh.positions(0), self.mesh.cells) @ tetrahedron()[1])) / UL
+        wall = float(np.sum(cell_volumes(self.mesh.positions(0), self.mesh.cells))) / UL
         return {"edv": float(cavity[0]), "esv": float(cavity[self.es]), "wall": wall}
 
     @cached_property

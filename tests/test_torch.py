@@ -69,6 +69,14 @@ def test_epochs_have_orders_of_their_own_that_the_seed_determines(et_torch, repo
     assert epochs[0] != epochs[1] and epochs[0] != epochs[3]
 
 
+def test_order_of_every_epoch_is_the_same_in_any_number_of_workers(et_torch, repository):
+    pairs = learning.FlowPairs(repository, size=32)
+    alone, apart = (et_torch.loader(pairs, 4, seed=1, workers=number, start="fork") for number in (0, 2))
+    for _ in range(3):
+        found, same = ([batch["frame"].tolist() + batch["case"] for batch in loader] for loader in (alone, apart))
+        assert found == same
+
+
 def test_floats_are_single_precision_and_labels_integers(et_torch, repository):
     import torch
 

@@ -19,7 +19,7 @@ from echotruth.learning import Item, Items
 
 try:
     import torch
-    from torch.utils.data import DataLoader, Dataset
+    from torch.utils.data import DataLoader, Dataset, RandomSampler
 except ModuleNotFoundError as error:
     if error.name != "torch":
         raise
@@ -119,10 +119,13 @@ def loader(
     DataLoader
         Over dicts of tensors with a first dimension for the batch; texts are lists.
     """
+    data = Tensors(items) if isinstance(items, Items) else items
+    # A generator for the order alone: from its own DataLoader draws more often without workers than with them.
+    order = RandomSampler(data, generator=torch.Generator().manual_seed(seed)) if shuffle else None
     return DataLoader(
-        Tensors(items) if isinstance(items, Items) else items,
+        data,
         batch_size=batch,
-        shuffle=shuffle,
+        sampler=order,
         num_workers=workers,
         generator=torch.Generator().manual_seed(seed),
         multiprocessing_context=start if workers else None,

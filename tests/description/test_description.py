@@ -64,6 +64,12 @@ def test_clips_have_the_grid_of_the_configuration(described):
         assert float(row["frame_time_s"]) == pytest.approx(60 / 500 / 3, rel=1e-6)  # of the mouse's 500 beats/min
 
 
+def test_characters_that_mean_something_else_in_tables_and_in_latex_are_escaped(finished, tmp_path):
+    describe(finished, tmp_path, plain(authors=["Doe|Roe, Jane", "Heart & Lung_1"]))
+    assert "| authors | Jane Doe\\|Roe, Heart & Lung_1 |" in card(tmp_path)
+    assert r"author = {Doe|Roe, Jane and {Heart \& Lung\_1}}" in card(tmp_path)
+
+
 def test_documents_leave_the_repository_whole(described):
     assert not check(described).faults
 

@@ -66,6 +66,8 @@ REFUSED = {
     ),
     "rate": (["--rate", "0"], "--rate 0: give 0.1 to 1000 frames per second"),
     "rate of images": (["--format", "png", "--rate", "5"], "--rate does nothing for png: it is for mp4, gif"),
+    "view of a heart": (["--format", "vtk", "--view", "mid"], "--view does nothing for vtk: it is for mp4, gif"),
+    "size of RF": (["--format", "zea", "--size", "64"], "--size does nothing for zea: it is for mp4, gif"),
     "RF": (["--format", "uff"], "keeps no RF: set rf.keep to"),
 }
 
@@ -124,6 +126,21 @@ def test_lost_images_are_an_error_and_not_a_black_video(copy, monkeypatch, capsy
     assert call(monkeypatch, copy, "--format", "mp4", "-o", tmp_path / "out") == 2
     assert f"cannot be read at heart_mid_{SIZES[0]}: see what echotruth check" in capsys.readouterr().err
     assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize("name", ["mp4", "uff"])
+def test_heart_without_a_row_is_told_in_one_sentence(copy, monkeypatch, capsys, tmp_path, name):
+    (copy / "registry.txt").write_text("other\n")
+    assert call(monkeypatch, copy, "--format", name, "-o", tmp_path / "out") == 2
+    said = capsys.readouterr().err
+    assert f"{copy} cannot be read at heart_mid" in said and said.count("\n") == 1
+
+
+def test_what_was_read_of_a_clip_goes_when_it_is_written(known, tmp_path):
+    work = Export(source(known.folder, Selection(sizes=[SIZES[1]])), "tap", output=tmp_path)
+    clips = work.clips()[0]
+    assert len(list(work.write(clips))) == len(clips) == 2
+    assert not {"image", "heart", "plane"} & {name for clip in clips for name in vars(clip)}
 
 
 def test_failure_half_way_leaves_nothing_new_and_what_was_there(known, monkeypatch, tmp_path):

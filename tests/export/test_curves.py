@@ -8,8 +8,6 @@ import pytest
 from known_repository import FRAMES, SHIFT
 
 from echotruth.export import Export, Selection, source
-from echotruth.export.curves import cell_volumes
-from echotruth.heart import Heart
 
 
 @pytest.fixture
@@ -51,11 +49,3 @@ def test_only_chosen_trackers_have_columns(known, tmp_path):
     with file.open(newline="") as lines:
         header = next(csv.reader(lines))
     assert any(name.startswith("two_") for name in header) and not any(name.startswith("one_") for name in header)
-
-
-def test_volumes_of_cells_add_up_to_the_wall(half_sphere):
-    """Half a hollow sphere with radii of 2 and 3 mm: 2/3 pi (27 - 8) mm^3."""
-    depth = np.zeros(len(half_sphere.nodes))
-    motion = np.zeros((1, *half_sphere.nodes.shape))
-    heart = Heart(half_sphere.nodes, half_sphere.cells, motion, depth, half_sphere.endo, layers=1, es=0)
-    assert cell_volumes(heart).sum() == pytest.approx(2 / 3 * np.pi * 19e-9, rel=2e-3)

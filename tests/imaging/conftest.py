@@ -18,6 +18,7 @@ class ExactRecord:
         p = probe.si()
         self.samples, self.sampling = 2160, p.sampling
         self.centres = (np.arange(p.elements) - (p.elements - 1) / 2) * p.pitch
+        self.centre_frequency = p.frequency
         half_band = 1.289 * p.bandwidth * p.frequency
         bins = np.arange(self.samples // 2) / self.samples * p.sampling
         bins = np.flatnonzero(np.abs(bins - p.frequency) < half_band)
@@ -25,12 +26,13 @@ class ExactRecord:
         width = p.bandwidth * p.frequency / np.sqrt(8 * np.log(2))
         self.pulse = np.exp(-((self.frequency - p.frequency) ** 2) / (2 * width**2))
 
-    def __call__(self, position, amplitude):
+    def __call__(self, position, amplitude, exponent=0.0):
         distance = np.hypot(position[:, 0] - self.centres[:, None], position[:, 1])
         matrix = np.empty((len(self.frequency), len(self.centres), len(self.centres)), np.complex64)
         for k, frequency in enumerate(self.frequency):
             wave = np.exp(-2j * np.pi * frequency * distance / SPEED) / distance
-            matrix[k] = self.pulse[k] * (wave * amplitude) @ wave.T
+            scattered = amplitude * (frequency / self.centre_frequency) ** exponent
+            matrix[k] = self.pulse[k] * (wave * scattered) @ wave.T
         return matrix
 
 

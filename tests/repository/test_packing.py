@@ -93,6 +93,17 @@ def test_notebook_finds_every_array_with_its_dimensions_coordinates_and_unit(wri
     assert list(nrmse["size"].values) == [64, 32]
 
 
+def test_selection_in_another_order_gives_the_same_numbers(written):
+    store, _ = written
+    with xr.open_datatree(store.path, engine="zarr") as tree:
+        data = tree["evaluation"].to_dataset()[["scores"]]
+        labels = [str(label) for label in data["score"].values if str(label).startswith("nrmse[")]
+        labels[1:] = labels[:0:-1]
+        whole, turned = (unpacked(one, "nrmse").nrmse.load() for one in (data, data.sel(score=labels)))
+    assert list(turned["component"].values) != list(whole["component"].values)
+    np.testing.assert_array_equal(turned.sel(region=whole["region"], component=whole["component"]), whole)
+
+
 def test_selection_is_unpacked_as_far_as_it_goes(written):
     store, values = written
     with xr.open_datatree(store.path, engine="zarr") as tree:

@@ -105,6 +105,13 @@ def test_values_follow_the_preset_of_the_case():
     assert kept == [{"geometry.preset": "mouse"}, {"geometry.preset": "rat"}]
 
 
+def test_parameter_that_the_law_of_a_case_does_not_have_is_null():
+    laws = {"mechanics.material.law": ["guccione", "neo_hooke"]}
+    assert ids(laws | {"where": "mechanics.material.fibre != null"}) == [{"mechanics.material.law": "guccione"}]
+    with pytest.raises(ConfigError, match="needs a number in place of null"):
+        ids(laws | {"where": "mechanics.material.fibre > 1"})
+
+
 def test_ids_do_not_depend_on_conditions():
     cases = {"seed": [1, 2, 3]}
     everyone = [case.id for case in expand(Config(cases=cases))]

@@ -188,7 +188,7 @@ PUBLISHED = {
         ),
         ({"number": 3, "keys": {"seed": {"choice": [1, 2], "weights": [1]}}}, "one entry for each of the 2 of choice"),
         ({"number": 3, "keys": {"seed": {"choice": [1, 2], "weights": [0, 0]}}}, "must have a positive entry"),
-        ({"number": 9, "keys": {"seed": {"choice": [1, 2]}}}, "are the same heart"),
+        ({"number": 9, "keys": {"seed": {"choice": [1, 2]}}}, "are the same heart, heart: draw fewer hearts"),
         ({"number": 3, "keys": {"seed": {"uniform": [1, 9]}}}, "draw 1: seed = "),
         ({"number": 9, "keys": {"fibres.endo_deg": {"uniform": [80, 99]}}}, "should be less than or equal to 90"),
     ],

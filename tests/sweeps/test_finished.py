@@ -21,8 +21,8 @@ from echotruth.workflow.merging import merge_repositories
 TABLE = """\
 case,fibres.endo_deg,pathology.infarct.segments,label.group,label.age_weeks,note
 m1,60,"[7, 8]",sham,12,"first, of ""two"" hearts"
-m2,72.5,,MI,,"two
-lines"
+m2,72.5,,MI,,"zwei
+kürzere"
 ,,,,14,
 """
 
@@ -58,13 +58,13 @@ def test_table_of_cases_has_labels_notes_and_diagnosis(made):
     assert list(frame.index) == ["m1", "m2", expand(Config())[0].id]
     assert list(frame["label.group"]) == ["sham", "MI", ""]
     np.testing.assert_array_equal(frame["label.age_weeks"], [12, np.nan, 14])
-    assert list(frame["note"]) == ['first, of "two" hearts', "two\nlines", ""]
+    assert list(frame["note"]) == ['first, of "two" hearts', "zwei\nkürzere", ""]
     assert list(frame["diagnosis"]) == ["infarct", "healthy", "healthy"]
 
 
 def test_table_of_cases_as_a_file_is_read_back_the_same(made):
     frame = pd.read_csv(made / "cases.csv", keep_default_na=False)
-    assert list(frame["note"]) == ['first, of "two" hearts', "two\nlines", ""]
+    assert list(frame["note"]) == ['first, of "two" hearts', "zwei\nkürzere", ""]
     assert list(frame["diagnosis"]) == ["infarct", "healthy", "healthy"]
 
 

@@ -138,6 +138,7 @@ REFUSED = {
     "case,seed\na,1,2\n": "row 1 has 3 cells and not 2",
     "case,seed\na\n": "row 1 has 1 cells and not 2",
     "case;seed\na;1\n": "separated by semicolons: separate them by commas",
+    "case\tseed\na\t1\n": "separated by tabs: separate them by commas",
     "case,seed,seed\na,1,2\n": "column 'seed' is given twice",
     "case,,seed\na,1,2\n": "column 2 has no name",
     "case,seed\n": "has no rows",
@@ -203,6 +204,23 @@ def test_hearts_written_as_a_table_are_the_same_hearts(hearts):
     assert [(case.id, case.config, case.labels, case.note) for case in again] == [
         (case.id, case.config, case.labels, case.note) for case in cases
     ]
+
+
+def test_longest_ids_of_draws_stand_in_a_table_of_their_own(hearts):
+    """As in that of merged repositories; where the rows are continued, an id must leave room for what follows."""
+    keys = ("fibres.endo_deg", "fibres.epi_deg", "loop.heart_rate_per_min", "mechanics.material.stiffness_kPa")
+    drawn = ", ".join(f"{key}: {{uniform: [1, 2]}}" for key in keys)
+    cases = hearts(f"case\n{'m' * 80}\n", cases=f"draw: {{number: 2, keys: {{{drawn}}}}}")
+    assert min(len(case.id) for case in cases) > 130
+    assert [case.id for case in expand(Config(cases={"table": as_table(cases)}))] == [case.id for case in cases]
+    with pytest.raises(ConfigError, match="use at most 80 letters"):
+        expand(Config(cases={"table": as_table(cases), "bmode.dynamic_range_dB": [50, 60]}))
+
+
+def test_whole_number_is_the_same_label_among_numbers_and_among_text(hearts):
+    numbers, text = hearts("label.group\n3\n"), hearts("case,label.group\nm1,sham\n")
+    both = expand(Config(cases={"table": as_table([*numbers, *text])}))
+    assert [case.labels["group"] for case in both] == ["3", "sham"]
 
 
 def test_table_of_cases_has_labels_and_notes(hearts):

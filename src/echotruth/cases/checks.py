@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 from pathlib import Path
@@ -54,8 +55,16 @@ def check_ids(hearts: list[tuple[Combination, Case]], source: str) -> None:
         if first.id != case.id:
             ids = f"{first.id} and {case.id}"
             raise ConfigError(f"{source}: cases: {given} have ids that differ in capitals alone, {ids}: change one")
-        remedy = "leave one of them out" + (", or give each an id in a column case" if "row" in heart.origin else "")
+        remedy = _remedy_of_twins(other.origin, heart.origin)
         raise ConfigError(f"{source}: cases: {given} are the same heart, {case.id}: {remedy}")
+
+
+def _remedy_of_twins(*origins: str) -> str:
+    """What to do about two combinations that are the same heart, given where they come from."""
+    rows = [re.sub(r"(^|, )draw \d+$", "", origin) for origin in origins]
+    if rows[0] == rows[1] and rows[0] != origins[0]:
+        return "draw fewer hearts, or another key as well"
+    return "leave one of them out" + (", or give each an id in a column case" if rows[1] else "")
 
 
 def check_files(hearts: list[tuple[Combination, Case]], source: str) -> None:
@@ -92,7 +101,7 @@ def check_condition_key(config: Config, key: str, table_labels: list[str], place
     if key.startswith(LABEL):
         raise ConfigError(f"{place}: {key} is not a column of the table: name one, or leave it out")
     value = _section_of(config, key, place)
-    if isinstance(value, Section):
+    if isinstance(value, Section | dict):
         raise ConfigError(f"{place}: {key} is a section: name one of its keys")
 
 

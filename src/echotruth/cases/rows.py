@@ -9,7 +9,7 @@ from typing import Any
 
 from echotruth.cases import cells
 from echotruth.cases.case import Case, Combination, Label
-from echotruth.cases.ids import GIVEN
+from echotruth.cases.ids import GIVEN, GIVEN_LENGTH, LONGEST, integer_if_whole
 from echotruth.config import Config, Section
 from echotruth.config.loading import ConfigError
 from echotruth.config.table import CASE, LABEL, NOTE, Table
@@ -42,7 +42,9 @@ def combinations(config: Config, source: str) -> list[Combination]:
         return [Combination({})]
     name = source_of(config)
     labels = _labels(table, f"{source}: {name}")
-    ids = _ids(table, f"{source}: {name}")
+    # A table that stands alone may hold the ids that another one's draws gave, as that of merged repositories does.
+    is_extended = config.cases.draw is not None or bool(config.cases.grid)
+    ids = _ids(table, f"{source}: {name}", GIVEN_LENGTH if is_extended else LONGEST)
     notes = _column(table, NOTE)
     parameters = _parameters(config, table, f"{source}: {name}")
     return [
@@ -65,9 +67,14 @@ def as_table(cases: list[Case]) -> str:
     writer.writerow([CASE, *keys, *(f"{LABEL}{name}" for name in labels), NOTE])
     for case in cases:
         values = [cells.written(case.parameters[key]) if key in case.parameters else "" for key in keys]
-        carried = ["" if case.labels.get(name) is None else cells.written(case.labels[name]) for name in labels]
+        carried = [_written_label(case.labels.get(name)) for name in labels]
         writer.writerow([case.id, *values, *carried, case.note])
     return text.getvalue()
+
+
+def _written_label(label: Label) -> str:
+    """Cell with a label; a whole number without a decimal point, as it stays so among labels that are text."""
+    return "" if label is None else cells.written(integer_if_whole(label))
 
 
 def _parameters(config: Config, table: Table, source: str) -> list[dict[str, Any]]:
@@ -92,12 +99,12 @@ def _types(config: Config, dotted_key: str) -> frozenset[type]:
     return cells.types(section, key)
 
 
-def _ids(table: Table, source: str) -> list[str]:
-    """Id of each row, empty if it has none."""
+def _ids(table: Table, source: str, longest: int) -> list[str]:
+    """Id of each row, empty if it has none; of so many letters at most."""
     rows: dict[str, int] = {}
     ids = _column(table, CASE)
     for number, id in zip(table.numbers, ids, strict=True):
-        if id and not re.fullmatch(GIVEN, id):
+        if id and (len(id) > longest or not re.fullmatch(GIVEN, id)):
             remedy = "use at most 80 letters without accents, digits, _, - and ., and begin with a letter or digit"
             raise ConfigError(f"{source}, row {number}: case = {id[:80]!r}: {remedy}")
         if id and rows.setdefault(id, number) != number:

@@ -58,7 +58,7 @@ class Sweep:
             raise self._error(heart) from None
 
     def value(self, key: str, heart: Combination) -> Any:
-        """Value of a dotted key in a case, with what follows from a preset.
+        """Value of a dotted key in a case, with what follows from a preset; None if its law has no such key.
 
         A value that is swept need not be valid, so that a condition can leave out those that are not.
 
@@ -75,7 +75,10 @@ class Sweep:
             section = self._section(name, changes) if changes else self._values[name]
         except ValidationError:
             raise self._error(heart) from None
-        return _value(section, rest) if rest else section
+        try:
+            return _value(section, rest) if rest else section
+        except AttributeError:
+            return None  # a parameter of another law
 
     def _error(self, heart: Combination) -> ConfigError:
         """The error of a combination that is not valid, which names the key as the user writes it."""

@@ -84,8 +84,9 @@ def parse(text: str) -> Table:
 def _check_columns(columns: tuple[str, ...]) -> None:
     if not any(columns):
         raise TableError("has no columns: begin with a row of their names, such as case,fibres.endo_deg,note")
-    if len(columns) == 1 and ";" in columns[0]:
-        raise TableError("has its columns separated by semicolons: separate them by commas")
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(columns) == 1 and separator in columns[0]:
+            raise TableError(f"has its columns separated by {name}: separate them by commas")
     if len(columns) > MAX_TABLE_COLUMNS:
         raise TableError(f"has {len(columns)} columns: give at most {MAX_TABLE_COLUMNS}")
     for number, name in enumerate(columns, 1):

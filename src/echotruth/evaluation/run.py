@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from echotruth.cases import expand
+from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load, validate
 from echotruth.evaluation.clip import Clip, clips
@@ -80,7 +80,7 @@ class EvaluationRun:
         EvaluationError
             If the repository does not have one of them, or has no complete clip.
         """
-        cases = self._selected("case", cases, [case.id for case in expand(self.config)])
+        cases = self._selected("case", cases, list(all_cases(self.config)))
         views = self._selected("view", views, list(self.config.views))
         case_views = [(case, view) for case in cases for view in views if self._is_complete(case, view)]
         if not case_views:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -33,7 +34,7 @@ class Format:
     holds : {"clip", "view", "heart"}
         What a file is of.
     options : tuple of {"overlay", "rate", "trackers"}
-        What it can be told.
+        What it can be told, beside which cases, views and sizes to write.
     """
 
     module: str
@@ -42,12 +43,17 @@ class Format:
     holds: Literal["clip", "view", "heart"] = "clip"
     options: tuple[str, ...] = ()
 
+    def takes(self, option: str) -> bool:
+        """Whether an option, or a choice of views or sizes, does something for it."""
+        return option in (*self.options, *{"clip": ("views", "sizes"), "view": ("views",), "heart": ()}[self.holds])
+
     def problem(self, clip: Clip) -> str:
         """Why a clip, view or heart cannot be exported, in one sentence; "" if it can."""
         if self.holds == "view":
             from echotruth.export.rf import missing_rf
 
-            return missing_rf(clip)
+            with _told(clip):
+                return missing_rf(clip)
         return unfinished(clip, "mechanics", *self.stages)
 
     def writer(self) -> Callable[..., None]:
@@ -104,9 +110,10 @@ class Export:
     output: Path | None = None
 
     def __post_init__(self) -> None:
-        for name, given in (("overlay", self.overlay), ("rate", self.rate), ("trackers", self._chosen_trackers)):
-            if given and name not in FORMATS[self.format].options:
-                able = ", ".join(key for key, form in FORMATS.items() if name in form.options)
+        chosen = {name: getattr(self.source.selection, name) for name in ("views", "sizes", "trackers")}
+        for name, given in {"overlay": self.overlay, "rate": self.rate, **chosen}.items():
+            if given and not FORMATS[self.format].takes(name):
+                able = ", ".join(key for key, form in FORMATS.items() if form.takes(name))
                 raise ExportError(f"--{name.removesuffix('s')} does nothing for {self.format}: it is for {able}")
         if self.rate is not None and not 0.1 <= self.rate <= 1000:
             raise ExportError(f"--rate {self.rate:g}: give 0.1 to 1000 frames per second")
@@ -141,13 +148,9 @@ class Export:
         options = {"overlay": self.overlay, "rate": self.rate or FRAME_RATE, "trackers": self.source.trackers}
         chosen = {name: options[name] for name in form.options}
         for clip, target in zip(clips, self._targets(clips), strict=True):
-            with draft(target) as path:
-                _write_clip(partial(write, clip, path, **chosen), clip)
+            with draft(target) as path, _told(clip):
+                write(replace(clip), path, **chosen)  # a copy, with which goes what was read
             yield target
-
-    @property
-    def _chosen_trackers(self) -> Sequence[str]:
-        return self.source.selection.trackers
 
     def _targets(self, clips: Sequence[Clip]) -> list[Path]:
         suffix = FORMATS[self.format].suffix
@@ -160,12 +163,14 @@ class Export:
         return [folder / f"{clip.name}{suffix}" for clip in clips]
 
 
-def _write_clip(write: Callable[[], None], clip: Clip) -> None:
+@contextmanager
+def _told(clip: Clip) -> Iterator[None]:
+    """Tell in a sentence that a clip cannot be read."""
     try:
-        write()
+        yield
     except ExportError:
         raise
-    except (ValueError, KeyError, RuntimeError) as error:
+    except (ValueError, KeyError, RuntimeError, FileNotFoundError) as error:
         said = " ".join(str(error).split())
         remedy = f"see what echotruth check {clip.folder} says"
         raise ExportError(f"{clip.folder} cannot be read at {clip.name}: {remedy} ({said})") from error

@@ -12,10 +12,7 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.export.clip import Clip
 from echotruth.export.tracked import tracked
-from echotruth.fem.quadrature import tetrahedron
-from echotruth.fem.tetrahedra import Mesh
-from echotruth.heart import Heart
-from echotruth.mechanics.fibres import material_gradients
+from echotruth.fem.volume import cell_volumes
 
 COMPONENTS = ("RR", "CC", "LL")
 """Of the heart's strain: radial, circumferential, longitudinal."""
@@ -60,7 +57,7 @@ def _heart_strain(clip: Clip) -> dict[str, Floats]:
     """Strain of the wall and of its segments since end-diastole, %."""
     strain, wall = (clip.job.read("kinematics", name)[name] for name in ("strain", "strain_mean"))
     columns = {f"strain_{name}_percent": 100 * wall[:, k] for k, name in enumerate(COMPONENTS)}
-    volume, segment = cell_volumes(clip.heart), clip.heart.arrays["fibres"]["segment"]
+    volume, segment = cell_volumes(clip.heart.nodes, clip.heart.cells), clip.heart.arrays["fibres"]["segment"]
     for number in range(1, 18):
         share = np.where(segment == number, volume, 0.0)
         for k, name in enumerate(COMPONENTS):
@@ -82,10 +79,3 @@ def _tracked_strain(clip: Clip, tracker: str) -> dict[str, Floats]:
             for number, values in enumerate(segments[..., k].T, start=1):
                 columns[f"{tracker}_segment_{number:02d}_{what}_strain_{name}_percent"] = 100 * values
     return columns
-
-
-def cell_volumes(heart: Heart) -> Floats:
-    """Volume of the cells, unloaded, (n_cells,), m^3."""
-    nothing = np.empty((0, 6), np.int32)
-    xi, weight = tetrahedron()
-    return material_gradients(Mesh(heart.nodes, heart.cells, nothing, nothing, nothing), xi)[1] @ weight

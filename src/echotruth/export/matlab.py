@@ -15,7 +15,7 @@ HEADER = b"MATLAB 5.0 MAT-file, written by echotruth".ljust(116)
 """In place of the one that holds the date, so that the bytes are the same twice."""
 
 MAX_BYTES = 2**31 - 1
-"""Largest array of version 5."""
+"""Largest variable of version 5, as a struct with all its fields is one (MathWorks, MAT-File Versions)."""
 
 
 def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
@@ -33,7 +33,7 @@ def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
     Raises
     ------
     ExportError
-        If an array is larger than version 5 can hold.
+        If the struct is larger than version 5 can hold.
     """
     from scipy.io import savemat
 
@@ -43,11 +43,9 @@ def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
         for name, array in truth.data_vars.items()
         if {"frame", "axial", "lateral"} <= set(array.dims)
     }
-    largest = max(array.nbytes for array in values.values() if isinstance(array, np.ndarray))
-    if largest > MAX_BYTES:
-        raise ExportError(
-            f"{clip.name} has an array of {largest / 1e9:.1f} GB, and a MAT-file holds 2.1: use a smaller --size"
-        )
+    size = sum(array.nbytes for array in values.values() if isinstance(array, np.ndarray))
+    if size > MAX_BYTES:
+        raise ExportError(f"{clip.name} takes {size / 1e9:.1f} GB, and a MAT-file holds 2.1: use a smaller --size")
     values |= {"case": clip.case.id, "view": clip.view, "synthetic": True}
     values |= {"axial_m": clip.axial, "lateral_m": clip.lateral, "time_s": clip.time, "spacing_m": clip.spacing}
     values |= {"plane_origin_m": clip.plane.origin, "plane_axes": clip.plane.axes}

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from echotruth.arrays import Floats
-from echotruth.fem.quadrature import tetrahedron
-from echotruth.fem.tetrahedra import shape_gradient
+from echotruth.fem.volume import cell_volumes
 from echotruth.learning.reading import Reader
 
 PHYSIOLOGY = (
@@ -53,22 +49,5 @@ def scar_size(reader: Reader, row: int) -> float:
     infarct = reader.read("pathology/region", row) == INFARCT
     if not infarct.any():
         return 0.0
-    volume = cell_volume(reader.read("geometry/node_position", row), reader.read("geometry/cell_node", row))
+    volume = cell_volumes(reader.read("geometry/node_position", row), reader.read("geometry/cell_node", row))
     return float(volume[infarct].sum() / volume.sum())
-
-
-def cell_volume(nodes: Floats, cells: NDArray[np.int32]) -> Floats:
-    """Volume of quadratic tetrahedra, the integral of det dx/dxi.
-
-    Parameters
-    ----------
-    nodes : ndarray of shape (n_nodes, 3), m
-    cells : ndarray of shape (n_cells, 10)
-
-    Returns
-    -------
-    ndarray of shape (n_cells,), m3
-    """
-    xi, weight = tetrahedron()
-    jacobian = np.einsum("can,qax->cqnx", nodes[cells], shape_gradient(xi))
-    return np.linalg.det(jacobian) @ weight

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.repository.ledger import rows
-from echotruth.repository.store import Store, schema_of
+from echotruth.repository.store import schema_of
 
 
 class Reader:
@@ -67,6 +67,9 @@ class Reader:
         if self._process != os.getpid():
             self._opened, self._process = {}, os.getpid()
         if path not in self._opened:
+            if not self.has(path):
+                remedy = "run its configuration again with this version of echotruth"
+                raise FileNotFoundError(f"{self.folder}: has no array {path}: {remedy}")
             self._opened[path] = zarr.open_array(self.path, path=path, mode="r")
         return self._opened[path]
 
@@ -87,7 +90,3 @@ class Reader:
     def labels(self, path: str) -> list[str]:
         """Values of a coordinate or column that is text, as "cases/status"; empty if there is none."""
         return [str(value) for value in np.asarray(self.array(path)[...])] if self.has(path) else []
-
-    def store(self) -> Store:
-        """The store, for whole groups of one heart."""
-        return Store(self.path)

@@ -144,8 +144,9 @@ def _check_values(
         if any(array is None for array in opened.values()):
             continue  # its metadata are damaged
         found: dict[tuple[str, str], None] = {}
+        labels = repository.pack_labels(group)
         for first, part in _blocks(group, {name: array for name, array in opened.items() if array is not None}, row):
-            named = packing.unpack(packs_of(group), part, repository.pack_labels(group))
+            named = packing.unpack(packs_of(group), part, labels)
             found |= dict.fromkeys(values.faults(group, named, first, config))
         yield from ((group, name, problem) for name, problem in _first_of_each(found))
 

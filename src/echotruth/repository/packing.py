@@ -146,7 +146,7 @@ def sections(labels: Sequence[str]) -> Iterator[tuple[str, list[int], list[list[
     ------
     name : str
     places : list of int
-        Where its numbers are, in their order.
+        Where its numbers are, in the order of the coordinates, the last one fastest.
     coordinates : list of list of str
         Values of the coordinates along its own dimensions.
     """
@@ -155,8 +155,10 @@ def sections(labels: Sequence[str]) -> Iterator[tuple[str, list[int], list[list[
         found.setdefault(label.partition("[")[0], []).append(number)
     for name, places in found.items():
         indices = [labels[place].partition("[")[2].removesuffix("]") for place in places]
-        keys = [index.split(",") if index else [] for index in indices]
-        yield name, places, [list(dict.fromkeys(column)) for column in zip(*keys, strict=True)]
+        keys = [tuple(index.split(",")) if index else () for index in indices]
+        coordinates = [list(dict.fromkeys(column)) for column in zip(*keys, strict=True)]
+        place_of = dict(zip(keys, places, strict=True))
+        yield name, [place_of[key] for key in product(*coordinates) if key in place_of], coordinates
 
 
 def _flat(one: Pack, member: Array, value: NDArray[Any]) -> NDArray[Any]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from echotruth.config import Geometry
-from echotruth.fem.quadrature import tetrahedron
+from echotruth.fem import volume
 from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.mechanics.geometry.ellipsoid import ellipsoid
-from echotruth.mechanics.geometry.mesh_quality import GeometryError, jacobians
+from echotruth.mechanics.geometry.mesh_quality import GeometryError
 from echotruth.mechanics.geometry.tube import tube
 
 __all__ = ["GeometryError", "cell_volumes", "epicardial_apex", "left_ventricle"]
@@ -55,4 +55,4 @@ def cell_volumes(mesh: Mesh) -> Floats:
     -------
     ndarray of shape (n_cells,), m^3
     """
-    return np.einsum("cq,q->c", jacobians(mesh.nodes, mesh.cells), tetrahedron()[1])
+    return volume.cell_volumes(mesh.nodes, mesh.cells)

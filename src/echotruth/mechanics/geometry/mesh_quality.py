@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from echotruth.fem.quadrature import tetrahedron
-from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape_gradient
+from echotruth.fem.tetrahedra import Floats, Integers, Mesh
+from echotruth.fem.volume import jacobians
 from echotruth.mechanics.solver.cavity import cavity_volume
 
 CAVITY_VOLUMES = (0.1e-9, 5e-3)
@@ -22,21 +21,6 @@ _MIRRORED = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]
 
 class GeometryError(ValueError):
     """Raised if a ventricle cannot be meshed."""
-
-
-def jacobians(nodes: Floats, cells: Integers) -> NDArray[np.float64]:
-    """Determinant of dX/dxi, the volume of tissue per volume of local coordinates, at the quadrature points.
-
-    Parameters
-    ----------
-    nodes : ndarray of shape (n_nodes, 3), m
-    cells : ndarray of shape (n_cells, 10)
-
-    Returns
-    -------
-    ndarray of shape (n_cells, 14), m^3
-    """
-    return np.linalg.det(np.einsum("cai,qaj->cqij", nodes[cells], shape_gradient(tetrahedron()[0])))
 
 
 def straight_volumes(nodes: Floats, cells: Integers) -> Floats:

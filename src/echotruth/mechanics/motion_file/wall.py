@@ -11,6 +11,7 @@ import numpy as np
 from echotruth.arrays import Floats
 from echotruth.config import Config, Geometry
 from echotruth.fem.tetrahedra import Integers, Mesh
+from echotruth.fem.volume import jacobians
 from echotruth.mechanics.geometry.boundary import add_edge_nodes, boundary
 from echotruth.mechanics.geometry.boundary_labels import BoundarySurface, label_boundary
 from echotruth.mechanics.geometry.cut import extract_wall
@@ -22,7 +23,6 @@ from echotruth.mechanics.geometry.mesh_quality import (
     check_cavity,
     check_flat,
     format_volume,
-    jacobians,
     straight_volumes,
 )
 from echotruth.mechanics.motion_file.cycle import RecordedCycle, one_cycle

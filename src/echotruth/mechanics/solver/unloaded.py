@@ -14,7 +14,7 @@ import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.fem.tetrahedra import Mesh
-from echotruth.mechanics.geometry.mesh_quality import jacobians
+from echotruth.fem.volume import jacobians
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load, State
 from echotruth.mechanics.solver.newton import Diverged, LoadStepper
 

@@ -74,7 +74,7 @@ def _about(facts: Facts, attribution: Attribution) -> str:
         "size": f"{_bytes(size)} in {len(facts.files)} files ({_bytes(size / max(len(facts.cases), 1))} a heart)",
         "made by": f"echotruth {facts.run.packages.get('echotruth', '(version not recorded)')}",
     }
-    return _table(("", ""), [(key, value) for key, value in rows.items() if value])
+    return _table(("", ""), [(key, _cell(value)) for key, value in rows.items() if value])
 
 
 def _reading(facts: Facts) -> str:

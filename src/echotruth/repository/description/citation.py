@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import date
 
 import yaml
@@ -70,10 +71,11 @@ def bibtex(facts: Facts, attribution: Attribution) -> str:
     """Citation of a repository for LaTeX."""
     day = published(facts, attribution)
     people = " and ".join(
-        f"{one.family}, {one.given}" if one.is_person else f"{{{one.name}}}" for one in authors(facts, attribution)
+        f"{_latex(one.family)}, {_latex(one.given)}" if one.is_person else f"{{{_latex(one.name)}}}"
+        for one in authors(facts, attribution)
     )
     entries = {
-        "title": f"{{{title(facts)}}}",
+        "title": f"{{{_latex(title(facts))}}}",
         "author": people,
         "year": str(day.year),
         "version": attribution.release,
@@ -81,6 +83,11 @@ def bibtex(facts: Facts, attribution: Attribution) -> str:
     }
     inner = ",\n".join(f"  {key} = {{{value}}}" for key, value in entries.items())
     return f"@misc{{{facts.name},\n{inner}\n}}"
+
+
+def _latex(text: str) -> str:
+    """Text without characters that mean something else to LaTeX."""
+    return re.sub(r"([&%$#_])", r"\\\1", text)
 
 
 def _author(author: Author) -> dict[str, str]:

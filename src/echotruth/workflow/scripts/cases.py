@@ -53,7 +53,7 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
     superseded.set_aside(folder, config)
     store.lay_out(arrays, sizes, labels, {"rf": settings, "cases": {"constants": layout.constants(case_table)}})
-    settings_file = yaml.dump(config.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False)
+    settings_file = yaml.dump(config.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False, allow_unicode=True)
     texts = {"cases.csv": case_table.to_csv(index=False), "config.yaml": settings_file}
     durable.update_all({folder / name: text.encode() for name, text in texts.items()})
 
