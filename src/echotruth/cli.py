@@ -409,7 +409,7 @@ def _add_describe(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     command.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     command.add_argument("-o", "--output", type=Path, help="another folder for the documents")
     command.add_argument("--license", help="identifier of SPDX, such as CC-BY-4.0, or an address (default: none)")
-    text = "'Family, Given; ORCID; affiliation; its address', or a group as 'Name; address'; can be repeated"
+    text = "'Family, Given; ORCID; affiliation; its web address', or a group as 'Name; web address'; can be repeated"
     command.add_argument("--author", action="append", default=[], help=text)
     command.add_argument("--url", help="address at which the repository is published")
     command.add_argument("--release", default="1.0.0", help="version of the data (default: 1.0.0)")

@@ -43,7 +43,7 @@ class Clips(Items):
         size: int | None = None,
         truth: Iterable[str] = (),
     ) -> None:
-        self.names = tuple(truth)
+        self.names = (truth,) if isinstance(truth, str) else tuple(truth)
         for name in self.names:
             if name not in TRUTH:
                 raise ValueError(f"truth = {name!r}: use any of {', '.join(TRUTH)}.")

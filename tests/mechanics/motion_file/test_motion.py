@@ -145,6 +145,7 @@ def test_end_diastole_is_the_first_frame_of_an_isovolumic_contraction():
 def test_beat_that_is_written_and_read_again_moves_as_before(write_series):
     """Displacement, gradient, volume and the truth in an image; the base is plane, and x is the axis of the files."""
     from echotruth.imaging.bmode import pixel_centres
+    from echotruth.imaging.labels import unpack
     from echotruth.imaging.truth import pixel_truth
     from echotruth.imaging.view import Plane, imaging_plane
     from echotruth.mechanics.beat import beat
@@ -177,7 +178,8 @@ def test_beat_that_is_written_and_read_again_moves_as_before(write_series):
     planes = plane, Plane(plane.origin + shift, plane.axes)
     pixels = pixel_centres(config.bmode, 128)
     truths = [pixel_truth(heart, at, *pixels) for heart, at in zip(hearts, planes, strict=True)]
-    both = truths[0]["mask"].astype(bool) & truths[1]["mask"].astype(bool)
-    assert both.sum() > 0.999 * truths[0]["mask"].sum()
+    walls = [unpack(truth["labels"])["mask"] for truth in truths]
+    both = walls[0] & walls[1]
+    assert both.sum() > 0.999 * walls[0].sum()
     displacements = [truth["displacement"][both] for truth in truths]
     np.testing.assert_allclose(*displacements, rtol=0, atol=1e-9)

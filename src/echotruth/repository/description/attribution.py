@@ -134,7 +134,8 @@ def _author(text: str) -> Author:
     for other in filter(None, others):
         key = "orcid" if _is_orcid(other) else "url" if _is_address(other) else "affiliation"
         if key in known:
-            raise DescriptionError(f"--author {text!r}: gives two of {key}: give each author in an option of its own")
+            remedy = "give each author in an option of its own, and the address of an affiliation as https://..."
+            raise DescriptionError(f"--author {text!r}: gives two of {key}: {remedy}")
         known[key] = other.rpartition("/")[2].upper() if key == "orcid" else other
     if (orcid := known.get("orcid")) and not _has_check_digit(orcid):
         raise DescriptionError(f"--author {text!r}: {orcid} is no ORCID iD, its last digit does not fit: correct it")

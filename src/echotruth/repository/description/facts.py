@@ -60,6 +60,10 @@ class Run:
     packages: dict[str, str]
 
 
+UNCHANGED = "that of config.yaml"
+"""Stands for the value of a key that a case leaves as it is in the configuration."""
+
+
 @dataclass(frozen=True)
 class Facts:
     """What is to be known of a repository.
@@ -127,9 +131,12 @@ class Facts:
 
     @property
     def swept(self) -> dict[str, list[object]]:
-        """Keys in which the cases differ -> their distinct values, in the order of the cases."""
+        """Keys in which the cases differ -> their distinct values, in the order of the cases.
+
+        A case that gives a key no value, as an empty cell of a table, has that of the configuration.
+        """
         keys = dict.fromkeys(key for case in self.cases.values() for key in case.parameters)
-        values = {key: [case.parameters.get(key) for case in self.cases.values()] for key in keys}
+        values = {key: [case.parameters.get(key, UNCHANGED) for case in self.cases.values()] for key in keys}
         distinct = {key: list({repr(value): value for value in each}.values()) for key, each in values.items()}
         return {key: each for key, each in distinct.items() if len(each) > 1}
 
