@@ -11,7 +11,7 @@ from echotruth.mechanics.beat import beat
 from echotruth.mechanics.physiology import BOUNDS, measures, violated_bound
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation, slice_rotation
-from echotruth.repository.schema import PHYSIOLOGY
+from echotruth.repository.schema import named
 
 COARSE = Geometry(circumferential_elements=6, longitudinal_elements=8, transmural_elements=2)
 WELL = {
@@ -175,7 +175,7 @@ def test_a_prescribed_motion_has_what_it_moves_by_and_no_pressures_or_phases(kin
     counts = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1, "shape": shape}
     arrays = prescribed_motion(Config(geometry=counts, loop={"frames": 6}, motion={"kind": kind}))
     found = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"])
-    assert set(found) == {array.name for array in PHYSIOLOGY}
+    assert set(found) == {array.name for array in named("physiology")}
     without = {name for name, value in found.items() if np.isnan(value).any()}
     of_phases = {"twist_ivc", "strain_ivc", "layer_strain_ivc", "ivc_time", "ejection_time", "ivr_time", "tei_index"}
     of_pressures = {"dpdt_max", "dpdt_min", "tau", "ejection_fraction", "tension_min", "tension_es"}
