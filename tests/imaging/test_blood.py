@@ -5,10 +5,9 @@ import pytest
 
 from echotruth.config import Config
 from echotruth.fem.location import locate
-from echotruth.fem.tetrahedra import Mesh
+from echotruth.fem.volume import cell_volumes
 from echotruth.imaging.medium.blood import Cavity, seed_blood
 from echotruth.imaging.medium.random_process import brownian
-from echotruth.mechanics.geometry import cell_volumes
 from echotruth.mechanics.solver.cavity import cavity_volume
 
 CONFIG = Config.model_validate({"realism": {"blood": {"level_dB": -20.0, "density": 0.3}}})
@@ -31,8 +30,7 @@ def blood(twisting_heart):
 @pytest.mark.parametrize("frame", [0, 1])
 def test_the_cells_of_the_cavity_have_its_volume(twisting_heart, frame):
     cavity, nodes = Cavity(twisting_heart.endo), twisting_heart.positions(frame)
-    none = np.zeros((0, 6), np.int32)
-    cells = cell_volumes(Mesh(cavity.positions(nodes), cavity.cells, none, none, none))
+    cells = cell_volumes(cavity.positions(nodes), cavity.cells)
     lid = nodes[cavity.rim].mean(axis=0)
     assert cells.min() > 0
     assert cells.sum() == pytest.approx(cavity_volume(nodes - lid, twisting_heart.endo), rel=1e-12)

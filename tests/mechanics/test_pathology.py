@@ -5,7 +5,8 @@ import pytest
 
 from echotruth.config import Geometry, Pathology
 from echotruth.config.pathology import Infarct, LateActivation
-from echotruth.mechanics.geometry import cell_volumes, left_ventricle
+from echotruth.fem.volume import cell_volumes
+from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.pathology import PathologyError, infarct_centre, tissue
 
 CONTRACTING, STIFF = {"tension_scale": 0.2}, {"stiffness_scale": 8.0}
@@ -19,7 +20,7 @@ class Hemisphere:
         elements = {"circumferential_elements": 36, "longitudinal_elements": 12, "transmural_elements": 6}
         self.mesh = left_ventricle(Geometry(**size, **elements))
         self.depth = (np.linalg.norm(self.mesh.nodes, axis=1) - 2e-3) / 2e-3
-        self.volume = cell_volumes(self.mesh)
+        self.volume = cell_volumes(self.mesh.nodes, self.mesh.cells)
         corners = self.mesh.nodes[self.mesh.cells[:, :4]]
         self.centre = corners.mean(axis=1)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from echotruth.config import Config
 from echotruth.config.loading import load
-from echotruth.repository.ledger import rows
+from echotruth.repository.ledger import repository_folder, rows
 from echotruth.repository.store import schema_of
 
 
@@ -35,11 +35,7 @@ class Reader:
     """
 
     def __init__(self, repository: str | Path) -> None:
-        folder = Path(repository)
-        folder = folder.parent if folder.suffix == ".zarr" else folder
-        if not (folder / "registry.txt").is_file():
-            raise FileNotFoundError(f"{repository}: is not a repository: give the folder that a run made, as out/demo")
-        self.folder = folder.resolve()
+        self.folder = repository_folder(repository).resolve()
         self.path = self.folder / f"{self.folder.name}.zarr"
         self._opened: dict[str, zarr.Array[Any]] = {}
         self._process = os.getpid()

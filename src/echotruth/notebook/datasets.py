@@ -41,7 +41,7 @@ def heart_dataset(heart: Heart, group: str) -> xr.Dataset:
     if heart.config is None or group not in heart.arrays:
         raise ValueError(f"group = {group!r}: the heart has {', '.join(heart.arrays) or 'no groups'}.")
     case = Case("heart", {}, heart.config)
-    return dataset(case, {group: heart.arrays[group]}, {})
+    return dataset(case, as_stored(case, {group: heart.arrays[group]}), {})
 
 
 def clip_dataset(heart: Heart, case: Case, view: str, plane: Plane, values: dict[str, dict[str, Any]]) -> xr.Dataset:
@@ -74,8 +74,20 @@ def clip_dataset(heart: Heart, case: Case, view: str, plane: Plane, values: dict
     )
 
 
+def as_stored(case: Case, groups: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Arrays of groups that were just made, rounded as a repository has them; what is read from one is so already."""
+    return {
+        group: {
+            array.name: rounding.as_stored(values[array.name], array, case.config)
+            for array in schema.named(group.partition("/")[0])
+            if array.name in values
+        }
+        for group, values in groups.items()
+    }
+
+
 def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str, np.ndarray]) -> xr.Dataset:
-    """Arrays of one case, or of one of its views, rounded, with the dimensions and units of the repository."""
+    """Arrays of one case, or of one of its views, with the dimensions and units of the repository."""
     import xarray as xr
 
     found = {}
@@ -86,7 +98,7 @@ def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str
                 about: dict[str, Any] = {"units": array.units, "long_name": array.long_name}
                 step = rounding.quantum(array, case.config)
                 about |= {} if step is None else {"quantum": step}
-                found[array.name] = (dims, rounding.as_stored(values[array.name], array, case.config), about)
+                found[array.name] = (dims, np.asarray(values[array.name], array.dtype), about)
     data, labels = xr.Dataset(found), schema.LABELS | coordinates
     data = data.assign_coords({name: (name, np.asarray(labels[name])) for name in data.dims if name in labels})
     if "frame" in data.dims:

@@ -13,7 +13,7 @@ from echotruth.evaluation.clip import grid_positions
 from echotruth.evaluation.scoring import truth_at
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.imaging.view import Plane
-from echotruth.notebook.datasets import dataset, image_size
+from echotruth.notebook.datasets import as_stored, dataset, image_size
 from echotruth.notebook.repositories import job_of
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def load_points(
     true = job.read("evaluation", "true_displacement", "true_strain")
     grid = grid_positions(config)
     points = {"lateral": grid[0, :, 0], "axial": grid[:, 0, 1]}
-    found = dataset(job.case, {"tracking": tracked, "evaluation": true}, points)
+    found = dataset(job.case, as_stored(job.case, {"tracking": tracked, "evaluation": true}), points)
     axes = job.read("evaluation", "wall_axes")["wall_axes"]
     strain = _strain(tracked["displacement"], axes, config)
     at_ed = replace(job.heart, displacement=job.heart.displacement[:1], es=0)

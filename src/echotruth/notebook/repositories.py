@@ -14,7 +14,7 @@ from echotruth.imaging.view import Plane
 from echotruth.notebook.datasets import clip_dataset, image_size
 from echotruth.notebook.derived import MEANING, stored
 from echotruth.repository import schema
-from echotruth.repository.ledger import rows
+from echotruth.repository.ledger import repository_folder, rows
 from echotruth.repository.remote import hierarchy, is_url
 from echotruth.workflow.job import Job
 
@@ -50,7 +50,7 @@ def open(repository: str | Path) -> xr.DataTree:
     if is_url(repository):
         store: Path | ObjectStore = hierarchy(str(repository))
     else:
-        folder = _folder(repository)
+        folder = repository_folder(repository)
         store = folder / f"{folder.resolve().name}.zarr"
     groups = xr.open_groups(store, engine="zarr", create_default_indexes=False)  # type: ignore[arg-type]  # it may be a store
     groups["/cases"] = _with_constants(groups["/cases"])
@@ -166,14 +166,6 @@ def _indexed(groups: dict[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     return indexed
 
 
-def _folder(repository: str | Path) -> Path:
-    folder = Path(repository)
-    folder = folder.parent if folder.suffix == ".zarr" else folder
-    if not (folder / "registry.txt").is_file():
-        raise FileNotFoundError(f"{repository}: is not a repository: give the folder that a run made, as out/demo")
-    return folder
-
-
 def job_of(repository: str | Path, case: str, view: str | None = None) -> Job:
     """The job that tracks a view of a heart, through which a repository is read.
 
@@ -182,7 +174,7 @@ def job_of(repository: str | Path, case: str, view: str | None = None) -> Job:
     FileNotFoundError, ValueError
         If there is no such repository, case or view.
     """
-    folder = _folder(repository)
+    folder = repository_folder(repository)
     known = rows(folder / "registry.txt")
     if case not in known:
         raise ValueError(f"case = {case!r}: use one of {', '.join(list(known)[:20])}.")

@@ -25,7 +25,7 @@ from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.physiology import measures, violated_bound
-from echotruth.notebook.datasets import case_of, clip_dataset, dataset, fingerprint, image_size
+from echotruth.notebook.datasets import as_stored, case_of, clip_dataset, dataset, fingerprint, image_size
 from echotruth.seeds import generator
 from echotruth.tracking.tracker import track as track_points
 
@@ -129,7 +129,7 @@ def image(
         f"bmode/{size}": {"image": bmode_clip(lines, sequence.scanner.scan, range_, config.bmode, gain)[size]},
         f"truth/{size}": pixel_truth(heart, plane, *pixel_centres(config.bmode, size)),
     }
-    clip = clip_dataset(heart, case, name, plane, values)
+    clip = clip_dataset(heart, case, name, plane, as_stored(case, values))
     if keep_lines:
         about = {"long_name": "lines, demodulated by exp(-4 pi i f range / c)", "frequency": sequence.scanner.frequency}
         clip["lines"] = (("frame", "line", "range"), lines, about)
@@ -181,7 +181,7 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     displacement, quality = arguments.on_grid(*found)
     coordinates = {"axial": clip["grid_axial"].values, "lateral": clip["grid_lateral"].values}
     values = {"tracking": {"displacement": displacement, "quality": quality}}
-    return dataset(case, values, coordinates).assign_attrs(clip.attrs, tracker=_name(tracker))
+    return dataset(case, as_stored(case, values), coordinates).assign_attrs(clip.attrs, tracker=_name(tracker))
 
 
 def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:

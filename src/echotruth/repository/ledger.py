@@ -47,6 +47,26 @@ def _seal(record: dict[str, Any]) -> str:
     return sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()[:16]
 
 
+def repository_folder(repository: str | Path) -> Path:
+    """Folder of a repository, given it or its store.
+
+    Parameters
+    ----------
+    repository : str or Path
+        `out/NAME` or `out/NAME/NAME.zarr`.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the folder holds no repository.
+    """
+    folder = Path(repository)
+    folder = folder.parent if folder.suffix == ".zarr" else folder
+    if not (folder / "registry.txt").is_file():
+        raise FileNotFoundError(f"{repository}: is not a repository: give the folder that a run made, as out/demo")
+    return folder
+
+
 def rows(registry: Path) -> dict[str, int]:
     """Row of every case, or index of every view, ever registered: the number of the line with its name.
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.mechanics.geometry import GeometryError, cell_volumes, left_ventricle
+from echotruth.fem.volume import cell_volumes
+from echotruth.mechanics.geometry import GeometryError, left_ventricle
 from echotruth.mechanics.solver.cavity import cavity_volume
 
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
@@ -21,8 +22,8 @@ def test_ellipsoid_and_file_are_the_same_heart(file_heart, write_mesh):
 
 
 def test_cells_add_up_to_the_wall(coarse_mesh):
-    assert cell_volumes(coarse_mesh).min() > 0
-    assert cell_volumes(coarse_mesh).sum() == pytest.approx(71e-9, rel=5e-3)
+    assert cell_volumes(coarse_mesh.nodes, coarse_mesh.cells).min() > 0
+    assert cell_volumes(coarse_mesh.nodes, coarse_mesh.cells).sum() == pytest.approx(71e-9, rel=5e-3)
 
 
 def test_missing_file_is_refused():

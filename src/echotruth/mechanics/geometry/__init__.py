@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from echotruth.config import Geometry
-from echotruth.fem import volume
-from echotruth.fem.tetrahedra import Floats, Mesh
+from echotruth.fem.tetrahedra import Mesh
 from echotruth.mechanics.geometry.ellipsoid import ellipsoid
 from echotruth.mechanics.geometry.mesh_quality import GeometryError
 from echotruth.mechanics.geometry.tube import tube
 
-__all__ = ["GeometryError", "cell_volumes", "epicardial_apex", "left_ventricle"]
+__all__ = ["GeometryError", "epicardial_apex", "left_ventricle"]
 
 
 def left_ventricle(geometry: Geometry) -> Mesh:
@@ -42,17 +41,3 @@ def left_ventricle(geometry: Geometry) -> Mesh:
 def epicardial_apex(mesh: Mesh) -> int:
     """Node of the epicardium that is farthest from the base."""
     return int(mesh.epi.ravel()[np.argmin(mesh.nodes[mesh.epi, 2])])
-
-
-def cell_volumes(mesh: Mesh) -> Floats:
-    """Volume of each tetrahedron.
-
-    Parameters
-    ----------
-    mesh : Mesh
-
-    Returns
-    -------
-    ndarray of shape (n_cells,), m^3
-    """
-    return volume.cell_volumes(mesh.nodes, mesh.cells)
