@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from echotruth.config import Fibres, Geometry
+from echotruth.fem.volume import cell_volumes
 from echotruth.mechanics import fibres, kinematics
-from echotruth.mechanics.geometry import cell_volumes, left_ventricle
+from echotruth.mechanics.geometry import left_ventricle
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +89,7 @@ def test_layers_add_up_to_the_wall(wall):
     mesh, _, _ = wall
     rng = np.random.default_rng(0)
     values, layer = rng.normal(size=(2, len(mesh.cells), 6)), rng.integers(1, 6, len(mesh.cells))
-    weight = cell_volumes(mesh)
+    weight = cell_volumes(mesh.nodes, mesh.cells)
     layers = kinematics.layer_strain(values, weight, layer, 6)
     assert np.isnan(layers[:, 5]).all()
     share = np.array([weight[layer == k].sum() for k in range(1, 6)]) / weight.sum()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.mechanics.geometry import GeometryError, cell_volumes, left_ventricle
+from echotruth.fem.volume import cell_volumes
+from echotruth.mechanics.geometry import GeometryError, left_ventricle
 from echotruth.mechanics.solver.cavity import cavity_volume
 
 FINE = {"circumferential_elements": 48, "longitudinal_elements": 20, "transmural_elements": 1}
@@ -28,7 +29,9 @@ def test_remeshed_ellipsoid_keeps_its_volumes(human, file_heart, write_surface, 
     mesh = left_ventricle(Geometry(file=file, remesh=True))
     # The file's triangles are flat, and the cut takes 0.2 % of the length.
     assert cavity_volume(mesh.nodes, mesh.endo) == pytest.approx(cavity_volume(human.nodes, human.endo), rel=0.015)
-    assert cell_volumes(mesh).sum() == pytest.approx(cell_volumes(human).sum(), rel=0.015)
+    assert cell_volumes(mesh.nodes, mesh.cells).sum() == pytest.approx(
+        cell_volumes(human.nodes, human.cells).sum(), rel=0.015
+    )
     assert np.all(mesh.nodes[mesh.base, 2] == 0)
     assert "the new wall lies 0." in caplog.text
 
@@ -77,7 +80,7 @@ def test_factors_shape_a_wall_from_a_file_too(human, write_surface):
 
     def changed(**factors):
         mesh = left_ventricle(Geometry(file=file, remesh=True, **FEW, **factors))
-        return cavity_volume(mesh.nodes, mesh.endo), cell_volumes(mesh).sum()
+        return cavity_volume(mesh.nodes, mesh.endo), cell_volumes(mesh.nodes, mesh.cells).sum()
 
     cavity, wall = changed()
     assert changed(hypertrophy=1.4) == (pytest.approx(cavity), pytest.approx(1.5 * wall, rel=0.1))
