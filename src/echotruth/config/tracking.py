@@ -16,7 +16,8 @@ Reference = Annotated[
     Field(
         description="Frame with which each frame is compared: `ED`; or the `previous` one, with the steps added along "
         "the path of the tissue; or `bidirectional`, likewise from ED both forwards and, as the cycle closes, "
-        "backwards, and both averaged with weights from the correlation of the frames."
+        "backwards, and both averaged with weights from the correlation of the frames; a clip that is no closed cycle "
+        "is tracked forwards only."
     ),
 ]
 
@@ -88,14 +89,22 @@ class BsplineDic(Section):
     """Size of pixels that resolve the speckle fully: speed of sound / (6 bandwidth). Default: as suits
     `bmode.field_of_view_mm`."""
     smoothness: Positive = 3000.0
-    """Weight of the bending energy of a step from one frame to the next relative to the images, if noise were as strong
-    as speckle and the speckle length equal to the distance between knots."""
+    """Weight of the bending energy of a step from one frame to the next. It is multiplied by the power of the noise
+    over that of the speckle, and by the speckle length over the distance between knots."""
     transmural_scale: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2
     """Scale of lengths through the wall in the bending energy; lengths along the wall have the scale 1."""
     tolerance: Positive = 4.0
     """Residual, in standard deviations, at which the robust weight of a pixel is 1/4."""
     template_update_ncc: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.75
     """Correlation of image and template below which the previous frame becomes the template."""
+    reference: Annotated[
+        Literal["previous", "bidirectional"],
+        Field(
+            description="Forwards from ED only (`previous`), or `bidirectional`: backwards too, as the cycle closes, "
+            "and both averaged with weights from their variances; a clip that is no closed cycle is tracked forwards "
+            "only."
+        ),
+    ] = "bidirectional"
 
 
 class Dis(Section):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -26,7 +27,7 @@ def track(
     Parameters
     ----------
     frames : ndarray of shape (frame, axial, lateral)
-        B-mode clip of one cycle, any real type; frame 0 is end-diastole, and the clip is periodic.
+        B-mode clip, any real type; frame 0 is end-diastole. If it is no closed cycle, it is tracked forwards only.
     points : ndarray of shape (n, 2)
         Positions at end-diastole: lateral, axial, px (0 is the centre of the first pixel).
     mask : ndarray of shape (axial, lateral), bool
@@ -58,7 +59,7 @@ def track(
     clip = (np.asarray(frames), np.asarray(points, float), np.asarray(mask, bool), spacing, np.asarray(frame_time))
     _check(*clip)
     try:
-        displacement, quality = _method(settings)(*clip, seed)
+        displacement, quality = _method(_suited(settings, clip[0], clip[2]))(*clip, seed)
     except ValueError as error:
         raise TrackerFailed(str(error)) from error
     half = np.array(clip[2].shape[::-1]) / 2
@@ -66,6 +67,21 @@ def track(
     lost = ~(np.isfinite(displacement).all(-1) & inside)
     displacement[lost], quality[lost] = np.nan, np.nan
     return displacement, quality
+
+
+def _suited(settings: Section, frames: np.ndarray, mask: np.ndarray) -> Section:
+    """The settings, without the way backwards if the last frame of a clip is not followed by the first."""
+    if getattr(settings, "reference", None) != "bidirectional":
+        return settings
+    from echotruth.tracking.closure import closing_correlation
+
+    closing, consecutive = closing_correlation(frames, mask)
+    # Where neither can be told, the clip is taken for the cycle that it should be.
+    if not closing < consecutive:
+        return settings
+    found = f"its last and first frames correlate by {closing:.2f}, consecutive ones by {consecutive:.2f} or more"
+    logging.getLogger("echotruth").warning(f"the clip is no closed cycle ({found}): tracked forwards only")
+    return settings.model_copy(update={"reference": "previous"})
 
 
 def _method(settings: Any) -> Callable[..., tuple[np.ndarray, np.ndarray]]:

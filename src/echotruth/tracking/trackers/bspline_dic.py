@@ -3,7 +3,7 @@
 The displacement since end-diastole is a cubic B-spline over the wall at end-diastole. Frame by frame, it is fitted so
 that the image at the displaced positions matches a template, an earlier frame at its own displaced positions
 (Gauss-Newton with robust weights, Baker and Matthews 2004, Int J Comput Vis 56:221; B-splines as Rueckert et al. 1999,
-IEEE Trans Med Imaging 18:712). A template is kept until its correlation with the tissue falls too low. Because the
+IEEE Trans Med Imaging 18:712). A template is kept until its correlation with the tissue falls too low. If the
 cycle closes, the clip is tracked from end-diastole both forwards and backwards, and the two are averaged with weights
 from their variances.
 """
@@ -88,8 +88,9 @@ def track(
         images = [spline.coefficients(frame) for frame in blurred]
         coarse = np.array(coarse) / (np.max(coarse) or 1)
         tracker = WallTracker(region, ncc, coarse, block, images, settings)
-        trajectories = list(threads.map(tracker.track, bidirectional.forward_backward(len(frames))))
-    return combine(region, points, *trajectories)
+        orders = bidirectional.forward_backward(len(frames))
+        trajectories = list(threads.map(tracker.track, orders if settings.reference == "bidirectional" else orders[:1]))
+    return combine(region, points, trajectories[0], trajectories[-1])
 
 
 def block_mean(image: np.ndarray, side: int) -> np.ndarray:
@@ -180,7 +181,7 @@ class WallTracker:
 def combine(
     region: WallRegion, points: np.ndarray, forward: WallTrajectory, backward: WallTrajectory
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Inverse-variance weighted mean of two trajectories.
+    """Inverse-variance weighted mean of two trajectories, which may be the same.
 
     Returns
     -------
