@@ -44,10 +44,14 @@ SETTINGS["motion"]["rigid"] |= {
 TRACKED = {
     "tracking": {"displacement": np.reshape([1e-4, 2e-4], (2, 1, 1, 1, 1))},
     "evaluation": {
-        "tracked_global_strain": np.reshape([0.1, 0.2], (2, 1, 1)),
-        "tracked_segment_strain": np.reshape([0.11, 0.21], (2, 1, 1, 1)),
-        "true_global_strain": np.reshape([0.3, 0.4, 0.5], (3, 1, 1)),
-        "true_segment_strain": np.reshape([0.31, 0.41, 0.51], (3, 1, 1, 1)),
+        "tracked_region_strain": np.reshape([0.1, 0.2], (2, 1, 1, 1, 1)),
+        "tracked_segment_strain": np.reshape([0.11, 0.21], (2, 1, 1, 1, 1)),
+        "tracked_line_strain": np.reshape([-0.12, -0.22], (2, 1, 1)),
+        "tracked_rotation": np.reshape([0.13, 0.23], (2, 1)),
+        "true_region_strain": np.reshape([0.3, 0.4, 0.5], (3, 1, 1, 1, 1)),
+        "true_segment_strain": np.reshape([0.31, 0.41, 0.51], (3, 1, 1, 1, 1)),
+        "true_line_strain": -0.14,
+        "true_rotation": 0.15,
     },
 }
 """What the two trackers found, and the three references: told apart by their values."""

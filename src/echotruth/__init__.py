@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from echotruth.notebook.points import load_points
     from echotruth.notebook.repositories import load_clip, load_heart, open
     from echotruth.notebook.simulation import beat, evaluate, image, track
+    from echotruth.notebook.strain import strain_curves, strain_peaks, strain_summary, twist_curves
     from echotruth.repository.unpacking import unpack
     from echotruth.tracking.failure import TrackerFailed
 
@@ -53,7 +54,11 @@ __all__ = [
     "load_points",
     "open",
     "point_tracks",
+    "strain_curves",
+    "strain_peaks",
+    "strain_summary",
     "track",
+    "twist_curves",
     "unpack",
 ]
 
@@ -71,6 +76,7 @@ _ORIGIN = {
     "notebook.points": ("load_points",),
     "notebook.repositories": ("load_clip", "load_heart", "open"),
     "notebook.simulation": ("beat", "evaluate", "image", "track"),
+    "notebook.strain": ("strain_curves", "strain_peaks", "strain_summary", "twist_curves"),
     "repository.unpacking": ("unpack",),
     "tracking.failure": ("TrackerFailed",),
 }

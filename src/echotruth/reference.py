@@ -22,8 +22,9 @@ from echotruth.section import Section, discriminator, unit_of, variants
 
 _CONFIG_HEAD = """# Configuration
 
-A configuration is a YAML file; keys that it does not give take their defaults. Unknown keys
-and invalid values are refused before anything runs. With `schema.json` in this folder,
+A configuration is a YAML file. A key that it leaves out has the default that is listed here; a
+key without a default must be given where its section is used. Unknown keys and invalid values
+are refused before anything runs. With `schema.json` in this folder,
 editors complete and check the YAML. The keys carry their units.
 
 This page is generated from `src/echotruth/config` by `make reference`.
@@ -58,7 +59,9 @@ that leave it stay, a case as `retired`. Find them by their labels.
 
 The folder of the repository also contains `cases.csv` (the present cases with labels and all keys), `registry.txt`
 (row of every case) and `views.txt` (index of every view), `ledger/` (a record of every finished job: checksums, seed,
-time taken; `structure.json`: checksums of all other files of the tree), `figures/` and `logs/`.
+time taken; `structure.json`: checksums of all other files of the tree), `figures/` and `logs/`; and `external/` what
+`echotruth evaluate` found of other trackers: their scores (NAME.csv) and, with `--keep`, NAME.zarr, which has those
+arrays of the groups tracking and evaluation that depend on the tracker, in the same rows.
 
 This page is generated from `src/echotruth/repository/schema.py` by `make reference`.
 
@@ -133,7 +136,7 @@ def _section(model: type[BaseModel], prefix: str, title: str, meaning: str = "")
     lines = [f"## {title}\n"]
     if prefix:
         lines += [f"{meaning or ' '.join((model.__doc__ or '').split())}\n"]
-    lines += ["| key | unit | default | meaning |", "|---|---|---|---|"]
+    rows: list[str] = []
     subsections: list[str] = []
     for key, field in model.model_fields.items():
         mapping = get_origin(field.annotation) is dict
@@ -145,10 +148,12 @@ def _section(model: type[BaseModel], prefix: str, title: str, meaning: str = "")
             continue
         subsection = None if sections else _subsection(field)
         if subsection is None or mapping:
-            lines.append(f"| `{prefix}{key}` | {_unit(key)} | {_default(field)} | {_meaning(field)} |")
+            rows.append(f"| `{prefix}{key}` | {_unit(key)} | {_default(field)} | {_meaning(field)} |")
         if subsection is not None:
             subsections += _section(subsection, path, path.removesuffix("."), "" if mapping else _meaning(field))
-    return [*lines, "", *subsections]
+    if rows:
+        lines += ["| key | unit | default | meaning |", "|---|---|---|---|", *rows, ""]
+    return [*lines, *subsections]
 
 
 def _subsection(field: FieldInfo) -> type[Section] | None:

@@ -62,14 +62,3 @@ def test_parts_of_the_error_add_up(strains):
     whole = compare(tracked, true, WALL, 1)["strain_bias"]
     shown, smoothed = (compare(true[k], true, WALL, 1)["strain_bias"] for k in (1, 2))
     np.testing.assert_allclose(whole[0], shown[0] + smoothed[1] + whole[2], atol=1e-12)
-
-
-def test_segments_and_wall_are_means_over_the_same_points(strains):
-    tracked, true = strains
-    tracked[:, ::2] = np.nan
-    found = compare(tracked, true, WALL, 0)
-    odd = np.arange(COUNT) % 2 == 1
-    np.testing.assert_allclose(found["true_global_strain"][1], true[1][:, odd].mean(1))
-    np.testing.assert_allclose(found["tracked_global_strain"], tracked[:, odd].mean(1))
-    np.testing.assert_allclose(found["true_segment_strain"][2, :, 8], true[2][:, odd & (SEGMENT == 9)].mean(1))
-    assert np.isnan(found["tracked_segment_strain"][:, [0, 16]]).all()

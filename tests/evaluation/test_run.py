@@ -209,8 +209,8 @@ def test_failure_on_one_clip_is_a_row_and_the_others_go_on(made, evaluate):
 
 
 def test_tracker_that_fails_everywhere_ends_with_status_1(made, evaluate):
-    status, output, errors = evaluate("--tracker", "custom:nothing", "--name", "nothing")
-    assert (status, errors) == (1, "") and output.count("cannot be imported: AttributeError") == 6
+    status, output, errors = evaluate("--tracker", "custom:small_only", "--size", "128", "--name", "nothing")
+    assert (status, errors) == (1, "") and output.count("raised MemoryError: no room") == 3
     assert scores(made, "nothing")["failure"].notna().all()
 
 
@@ -345,7 +345,19 @@ REFUSED = {
     "ours": (["--tracker", "a:b", "--name", "ours"], "ours is already a tracker of {made}"),
     "name": (["--tracker", "a:b", "--name", "my tracker"], "'my tracker' cannot be the name of a tracker: use letters"),
     "its own name": (["--command", "./2d {input} {output}"], "'2d' cannot be the name of a tracker: use letters"),
-    "path": (["--tracker", "code/own.py:track"], "write package.module:function (dots, no path, no .py)"),
+    "path": (["--tracker", "code/own.py:track"], "is a path: did you mean code.own:track?"),
+    "method": (["--tracker", "bspline"], "--tracker bspline: is not a tracker: did you mean bspline_dic?"),
+    "dot": (["--tracker", "custom.exact"], "has no colon between module and function: did you mean custom:exact?"),
+    "no function": (["--tracker", "custom"], "is a module: name its function, as custom:track"),
+    "nothing": (["--tracker", "zzzzzz"], "write package.module:function, or use one of phase_correlation, "),
+    "module": (["--tracker", "custon:exact"], "No module named 'custon': did you mean custom:exact?"),
+    "function": (["--tracker", "custom:exat"], "has no attribute 'exat': did you mean custom:exact?"),
+    "not a function": (["--tracker", "custom:np.pi"], "is no function but a float: name a function"),
+    "needs an option": (["--tracker", "custom:exact"], "missing a required argument: 'course': give --option course="),
+    "an option": (["--tracker", "custom:exact", "--option", "shif=0"], "has no option shif: did you mean shift?"),
+    "no options": (["--tracker", "custom:still", "--option", "a=1"], "its options are none"),
+    "program": (["--command", "trakk {input} {output}"], "trakk: is not there or cannot be run"),
+    "script": (["--command", f"{sys.executable} progam.py {{input}} {{output}}"], "progam.py is not there"),
     "date": (["--tracker", "a:b", "--option", "a=2026-01-01"], "must be finite numbers, text"),
     "case": (["--tracker", "a:b", "--case", "seed9"], "seed9 is not a case of {made}: use heart, seed2_"),
     "view": (["--tracker", "a:b", "--view", "base"], "base is not a view of {made}: use mid, apex"),
@@ -361,7 +373,7 @@ REFUSED = {
     "places": (["--command", "a {input}"], "must contain {{output}} where the path of that file belongs"),
     "timeout": (["--command", "a {input} {output}", "--timeout", "0"], "timeout_s = 0.0: should be greater than 0"),
     "untimed": (["--tracker", "a:b", "--timeout", "5"], "--timeout 5: a:b is not timed"),
-    "jobs": (["--tracker", "a:b", "--jobs", "0"], "--jobs 0: must be 1 or more"),
+    "jobs": (["--tracker", "custom:still", "--jobs", "0"], "--jobs 0: must be 1 or more"),
 }
 
 

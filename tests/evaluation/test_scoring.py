@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from echotruth.evaluation.contours import Contours
 from echotruth.evaluation.displacement_error import WallPoints
 from echotruth.evaluation.polar import directions
 from echotruth.evaluation.scoring import Truth, metrics, score
@@ -29,7 +30,17 @@ def ventricle(plane="short_axis"):
     wall = WallPoints(position, layer, segment, np.zeros(2), plane)
     out = 1e-4 * np.sin(np.arange(5))[:, None] * np.ones(len(position))
     everywhere = np.broadcast_to(strain, (3, 5, len(position), 3))
-    return Truth(inside, wall, operator, fraction * position, out, everywhere, 2)
+    lines, time = rings(fraction), 3e-3 * np.arange(5)
+    return Truth(inside, wall, operator, fraction * position, out, everywhere, 2, lines, time)
+
+
+def rings(fraction):
+    """Endocardial, middle and epicardial contour, all of which change by a fraction (frame, 1, 1)."""
+    angle = np.linspace(0, 2 * np.pi, 121)
+    circle = np.stack([np.cos(angle), np.sin(angle)], -1)
+    ends = np.stack([circle[:-1], circle[1:]], 1)
+    position = np.concatenate([radius * ends for radius in (1.41e-3, 1.9e-3, 2.39e-3)])
+    return Contours(position, fraction[..., None] * position, np.repeat(np.arange(3), len(ends)))
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +57,7 @@ def test_the_truth_itself_has_no_error(truth):
     for name, value in found.items():
         # What is the same at every point correlates with nothing: the error, and the strain of this slice.
         perfect = np.nan if name.endswith("correlation") else {"coverage_percent": 100}.get(name, 0)
-        if "e_ll_" in name or "transmural_gradient" in name:
+        if "e_ll_" in name or "gls_" in name or "transmural_gradient" in name:
             continue
         assert value == pytest.approx(perfect, abs=1e-6, nan_ok=True), name
 
@@ -84,10 +95,16 @@ def test_a_tracker_that_sees_nine_tenths_is_off_by_a_tenth(truth):
     for name in ("global_e_cc_bias_pp", "e_cc_rms_pp", "segment_e_rr_error_pp", "tracker_e_rr_rms_pp"):
         assert found[name] == pytest.approx(bias), name
     assert found["segment_e_cc_limits_pp"] == pytest.approx(0, abs=1e-9)
+    # The ring is a tenth shorter, and the tracker sees nine hundredths.
+    for name in ("gcs_bias_pp", "gcs_error_pp", "peak_strain_error_pp"):
+        assert found[name] == pytest.approx(1, abs=2e-3), name
+    assert found["time_to_peak_error_ms"] == 0 and found["rotation_error_deg"] == pytest.approx(0, abs=1e-9)
 
 
 def test_long_axis_tells_the_longitudinal_strain_alone(truth):
     found = metrics(score(tracked(truth, 0.9 * truth.displacement), ventricle("long_axis")), "long_axis")
+    assert np.isnan(found["gcs_error_pp"]) and found["gls_error_pp"] == pytest.approx(1, abs=2e-3)
+    assert np.isnan(found["rotation_error_deg"])
     assert np.isnan(found["e_cc_rms_pp"]) and found["e_ll_rms_pp"] == pytest.approx(100 * (0.91**2 - 0.9**2) / 2)
 
 
@@ -95,6 +112,7 @@ def test_no_answer_is_an_error_of_all_there_is(truth):
     found = metrics(score(tracked(truth, np.nan * truth.displacement), truth), "short_axis")
     assert found["coverage_percent"] == 0 and found["nrmse_all_percent"] == pytest.approx(100)
     assert np.isnan(found["nrmse_percent"]) and np.isnan(found["e_cc_rms_pp"]) and np.isnan(found["epe_um"])
+    assert np.isnan([found[name] for name in ("gcs_bias_pp", "time_to_peak_error_ms", "rotation_error_deg")]).all()
 
 
 def test_leaving_points_out_does_not_pay(truth):
@@ -152,6 +170,8 @@ def test_a_grid_too_coarse_for_strain_still_has_an_error_of_displacement(truth, 
         through_plane=truth.through_plane[:, kept],
         strain=truth.strain[:, :, kept],
         es=truth.es,
+        contours=truth.contours,
+        time=truth.time,
     )
     found = metrics(score(tracked(few, 0.9 * few.displacement), few), "short_axis")
     np.testing.assert_allclose(found["nrmse_percent"], 10 if count else np.nan)

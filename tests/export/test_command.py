@@ -24,7 +24,7 @@ def call(monkeypatch, *arguments):
 
 
 def test_command_and_page_have_all_formats():
-    assert tuple(FORMATS) == cli.EXPORTED
+    assert tuple(FORMATS) == cli.export.EXPORTED
     page = (Path(__file__).parents[2] / "docs/export.md").read_text()
     rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
     assert re.findall(r"`(\w+)`", "".join(rows)) == list(FORMATS)
@@ -91,7 +91,7 @@ def test_folder_without_a_repository_is_refused(tmp_path, monkeypatch, capsys):
 def test_missing_package_is_said_with_what_to_install(known, monkeypatch, tmp_path, capsys, name, package):
     monkeypatch.setitem(sys.modules, package, None)
     assert call(monkeypatch, known.folder, "--format", name, "-o", tmp_path) == 2
-    assert capsys.readouterr().err == f"echotruth: needs the package {package}: install echotruth[export]\n"
+    assert capsys.readouterr().err == f"echotruth: needs the package {package}: pip install 'echotruth[clinical]'\n"
     assert not list(tmp_path.iterdir())
 
 

@@ -207,7 +207,7 @@ def test_missing_h5py_is_said_in_one_line(folder):
     command = ["export", str(folder), "--format", "uff", "--case", "heart", "--view", "mid"]
     done = subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr == "echotruth: needs the package h5py: install echotruth[export]\n"
+    assert done.stderr == "echotruth: needs the package h5py: pip install 'echotruth[export]'\n"
 
 
 def test_command_writes_the_file_and_says_where(folder, tmp_path):

@@ -69,7 +69,7 @@ def test_store_reads_single_arrays_of_a_pack_by_their_names(written):
     store, values = written
     found = store.read("evaluation", 0, 1, names=("nrmse", "coverage", "true_segment_strain"))
     assert list(found) == ["nrmse", "coverage", "true_segment_strain"]
-    assert found["nrmse"].shape == (2, 1, 7, 3) and found["true_segment_strain"].shape == (2, 1, 3, 4, 17, 3)
+    assert found["nrmse"].shape == (2, 1, 7, 3) and found["true_segment_strain"].shape == (3, 4, 2, 17, 3)
     for name, value in found.items():
         np.testing.assert_array_equal(value, values["evaluation"][name].astype(value.dtype))
 

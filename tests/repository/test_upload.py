@@ -135,6 +135,7 @@ def test_all_files_are_there_with_the_bytes_of_those_here(bucket, repository):
     here = files(repository)
     assert bucket.content() == here
     assert f"{len(here)} files; sent: {len(here)}," in output
+    assert f"read back all {len(here)} files; each is the same as here" in output
 
 
 def test_what_is_there_is_not_sent_again_and_what_changed_is(bucket, repository):

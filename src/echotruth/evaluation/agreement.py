@@ -43,10 +43,6 @@ def compare(tracked: np.ndarray, true: np.ndarray, wall: WallPoints, es: int) ->
             points of a region; region 0 is the whole wall, the others are its layers.
         frame_strain_rms (reference, frame, 3)
             RMS over the whole wall in every frame.
-        tracked_segment_strain (frame, 17, 3), true_segment_strain (reference, frame, 17, 3)
-            Mean over each AHA segment.
-        tracked_global_strain (frame, 3), true_global_strain (reference, frame, 3)
-            Mean over the whole wall.
         segment_strain_error (reference, 3)
             Mean absolute difference of the segment means at ES.
         segment_agreement (reference, 4, 3)
@@ -59,19 +55,15 @@ def compare(tracked: np.ndarray, true: np.ndarray, wall: WallPoints, es: int) ->
     error, regions = tracked - true, wall.regions
     all_segments = np.ones((1, len(wall.segments)), bool)
     at_es = np.broadcast_to(tracked, true.shape)[:, es], true[:, es]
-    tracked_segments, true_segments = (statistics.mean(strain, wall.segments) for strain in (tracked, true))
-    segment_error = np.abs(tracked_segments - true_segments)[:, es]
+    tracked_segments, true_segments = (statistics.mean(strain, wall.segments) for strain in at_es)
+    segment_error = np.abs(tracked_segments - true_segments)
     return {
         "strain_bias": statistics.mean(error[:, es], regions),
         "strain_rms": statistics.rms(error[:, es], regions),
         "strain_correlation": statistics.correlation(*at_es, regions, STRAIN_ROUNDING),
         "frame_strain_rms": statistics.rms(error, regions[:1])[..., 0, :],
-        "tracked_segment_strain": tracked_segments,
-        "true_segment_strain": true_segments,
-        "tracked_global_strain": statistics.mean(tracked, regions[:1])[..., 0, :],
-        "true_global_strain": statistics.mean(true, regions[:1])[..., 0, :],
         "segment_strain_error": statistics.mean(segment_error, all_segments)[:, 0],
-        "segment_agreement": limits_of_agreement(tracked_segments[es], true_segments[:, es]),
+        "segment_agreement": limits_of_agreement(tracked_segments, true_segments),
     }
 
 

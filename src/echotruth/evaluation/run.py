@@ -1,6 +1,7 @@
 """Evaluation of one tracker on the clips of a published repository, scored as the workflow scores its own trackers.
 
-The scores are written to `external/NAME.csv` in the folder of the repository, one row per clip; nothing else changes.
+The scores are written to `external/NAME.csv` in the folder of the repository, one row per clip, and, if asked for, the
+displacement and the curves to `external/NAME.zarr` (:mod:`echotruth.evaluation.kept`); nothing else changes.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from pydantic import TypeAdapter, ValidationError
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load, validate
+from echotruth.evaluation import kept
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
@@ -55,12 +57,15 @@ class EvaluationRun:
         Name of the tracker.
     settings : Section
         Settings of the tracker, as one of `tracking.trackers`.
+    keep : bool
+        Whether to store displacement, quality and curves beside the scores.
     """
 
     folder: Path
     config: Config
     name: str
     settings: Section
+    keep: bool = False
 
     @property
     def file(self) -> Path:
@@ -108,6 +113,13 @@ class EvaluationRun:
         """
         if jobs < 1:
             raise EvaluationError(f"--jobs {jobs}: must be 1 or more")
+        try:
+            yield from self._rows(case_views, sizes, jobs)
+        except BaseException:  # also when nobody asks for the rest of the rows
+            self.keeping.discard()
+            raise
+
+    def _rows(self, case_views: list[tuple[str, str]], sizes: list[int], jobs: int) -> Iterator[Row]:
         score_view = partial(_score_view, self, sizes)
         if jobs == 1:
             for case_view in case_views:
@@ -125,22 +137,37 @@ class EvaluationRun:
                 pool.shutdown(cancel_futures=True)
 
     def check_writable(self) -> None:
-        """Make the folder of the scores; EvaluationError if they cannot be written there."""
+        """Make the folder of the scores, and the arrays to be kept; EvaluationError if they cannot be written there."""
         with self._writing():
             self.file.parent.mkdir(exist_ok=True)
             with TemporaryFile(dir=self.file.parent):
                 pass
+            if self.keep:
+                self.keeping.begin()
 
     def write(self, rows: list[Row]) -> pd.DataFrame:
-        """Write the scores atomically; they replace earlier ones of the same name."""
+        """Write the scores atomically, and give what is kept its name; they replace earlier ones of the same name.
+
+        What an earlier evaluation of this name kept is removed also if nothing is kept now: it is not what was scored.
+        """
         import pandas as pd
 
         table = pd.DataFrame(rows)
         draft = self.file.with_name(f".{self.file.name}.{os.getpid()}")
         with self._writing():
             table.to_csv(draft, index=False)
+            if self.keep:
+                clips = {f"{row['case']}/{row['view']}": row["clip"] for row in rows}
+                self.keeping.publish(clips, self.settings.model_dump(mode="json"))
+            else:
+                kept.remove(self.folder, self.name)
             draft.replace(self.file)
         return table
+
+    @property
+    def keeping(self) -> kept.Keeping:
+        """Store of what the tracker finds, in the making."""
+        return kept.Keeping(self.folder, self.config, self.name)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -162,7 +189,7 @@ class EvaluationRun:
         return all(path.is_file() and ledger.read(path)["status"] == "complete" for path in records)
 
 
-def prepare(repository: Path, name: str, values: dict[str, Any]) -> EvaluationRun:
+def prepare(repository: Path, name: str, values: dict[str, Any], keep: bool = False) -> EvaluationRun:
     """Prepare the evaluation of a tracker that is not one of the repository's.
 
     Parameters
@@ -173,6 +200,8 @@ def prepare(repository: Path, name: str, values: dict[str, Any]) -> EvaluationRu
         Name of the tracker; letters, digits and underscores.
     values : dict
         Its settings, as in a configuration.
+    keep : bool
+        Whether to store displacement, quality and curves beside the scores.
 
     Raises
     ------
@@ -194,7 +223,7 @@ def prepare(repository: Path, name: str, values: dict[str, Any]) -> EvaluationRu
         raise EvaluationError(f"{name} is already a tracker of {folder}: give this one another name with --name")
     tracking = {"grid_px": config.tracking.grid_px, "trackers": {name: values}}
     checked = validate(config.model_dump() | {"tracking": tracking}, f"tracker {name}")
-    return EvaluationRun(folder, config, name, checked.tracking.trackers[name])
+    return EvaluationRun(folder, config, name, checked.tracking.trackers[name], keep)
 
 
 def _limit_threads(threads: int) -> None:
@@ -215,17 +244,27 @@ def _score_view(run: EvaluationRun, sizes: list[int], case_view: tuple[str, str]
         except (ValueError, KeyError, OSError) as error:
             remedy = f"run it again ({in_one_line(str(error))})"
             raise EvaluationError(f"{run.folder} cannot be read at {' '.join(case_view)}: {remedy}") from error
-        return [_score_clip(run, case_view, clip, truth) for size, clip in clip_of_size.items() if size in sizes]
+        found = {size: _score_clip(run, case_view, clip, truth) for size, clip in clip_of_size.items() if size in sizes}
+        if run.keep:
+            try:
+                run.keeping.write(job, {size: arrays for size, (_, arrays) in found.items()})
+            except OSError as error:
+                raise EvaluationError(f"{run.file.parent} cannot hold the displacement: {error.strerror}") from error
+        return [row for row, _ in found.values()]
 
 
-def _score_clip(run: EvaluationRun, case_view: tuple[str, str], clip: Clip, truth: Truth) -> Row:
+def _score_clip(run: EvaluationRun, case_view: tuple[str, str], clip: Clip, truth: Truth) -> tuple[Row, kept.Found]:
+    """Row of a clip, and the arrays of the tracker by group."""
     try:
         estimate, failure = track(*clip.tracker_arguments, run.settings), ""
     except TrackerFailed as error:
         estimate, failure = clip.no_estimate, str(error)
     keys = {"case": case_view[0], "view": case_view[1], "size_px": clip.size, "tracker": run.name}
     keys["clip"] = digest(run.folder, *case_view)
-    return keys | metrics(score(clip.on_grid(*estimate)[0], truth), truth.wall.plane) | {"failure": failure}
+    displacement, quality = clip.on_grid(*estimate)
+    scored = score(displacement, truth)
+    row = keys | metrics(scored, truth.wall.plane) | {"failure": failure}
+    return row, {"tracking": {"displacement": displacement, "quality": quality}, "evaluation": scored}
 
 
 def format_row(row: Row) -> str:

@@ -1,11 +1,13 @@
 """Score of a tracker on one clip, and the metrics of the leaderboard made from it.
 
-The formulas stand in :mod:`.displacement_error` (NRMSE and others), :mod:`.agreement` (strain) and :mod:`.statistics`.
+The formulas stand in :mod:`.displacement_error` (NRMSE and others), :mod:`.agreement` (strain), :mod:`.courses` and
+:mod:`.contours` (strain and rotation over the cycle) and :mod:`.statistics`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,12 +16,16 @@ from echotruth.config import Config
 from echotruth.evaluation import statistics
 from echotruth.evaluation.agreement import REFERENCES, compare
 from echotruth.evaluation.clip import grid_positions
+from echotruth.evaluation.contours import Contours, contours
+from echotruth.evaluation.courses import motion_courses, peak, strain_courses
 from echotruth.evaluation.displacement_error import WallPoints, evaluate
+from echotruth.evaluation.local_fit import LocalFit
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.heart import Heart
 from echotruth.imaging.truth import cavity_centroid, material_truth
 from echotruth.imaging.view import Plane
-from echotruth.repository import rounding
+from echotruth.loop.cycle import read_loop
+from echotruth.repository import rounding, schema
 from echotruth.repository.rounding import length_quantum
 
 if TYPE_CHECKING:
@@ -51,6 +57,9 @@ class Truth:
         Radial, tangential, shear; references as in :data:`echotruth.evaluation.agreement.REFERENCES`.
     es : int
         Frame of end-systole.
+    contours : Contours
+    time : ndarray of shape (frame,)
+        Since end-diastole, s.
     quantum : float
         Displacements are multiples of it, m; 0 if they are not rounded.
     """
@@ -62,6 +71,8 @@ class Truth:
     through_plane: np.ndarray
     strain: np.ndarray
     es: int
+    contours: Contours
+    time: np.ndarray
     quantum: float = 0.0
 
     def on_grid(self, values: np.ndarray, axis: int) -> np.ndarray:
@@ -86,7 +97,21 @@ class Truth:
             "through_plane_rms": statistics.rms(self.through_plane[self.es][:, None], self.wall.regions[:1])[0, 0],
             "operator_bias": operator["strain_bias"],
             "operator_rms": operator["strain_rms"],
+            **{f"true_{name}": values for name, values in self.courses.items()},
         }
+
+    @cached_property
+    def courses(self) -> dict[str, np.ndarray]:
+        """True strain and rotation over the cycle, by the names of :mod:`echotruth.evaluation.courses`."""
+        strain = strain_courses(self.strain, self.wall)
+        return _rounded(
+            strain | motion_courses(self.displacement, self.contours.displacement, self.wall, self.contours)
+        )
+
+    @cached_property
+    def contour_fit(self) -> LocalFit:
+        """The fit of a displacement at the ends of the pieces of the contours."""
+        return self.operator.at(self.contours.position.reshape(-1, 2))
 
 
 def ground_truth(job: Job) -> Truth:
@@ -133,12 +158,18 @@ def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, config
     strain = [motion[f"{name}_strain"][:, inside] for name in REFERENCES[:2]]
     strain.append(operator.strain(displacement))
     stored = _single(np.stack(strain), rounding.STRAIN)
-    return Truth(inside, wall, operator, displacement, through_plane, stored, heart.es, quantum)
+    lines, time = contours(heart, plane), read_loop(config.loop).time[: len(heart.displacement)]
+    return Truth(inside, wall, operator, displacement, through_plane, stored, heart.es, lines, time, quantum)
 
 
 def _single(values: np.ndarray, quantum: float | None = None) -> np.ndarray:
     """Values as the store has them: of single precision, and rounded to a quantum."""
     return rounding.rounded(np.asarray(values, np.float32), quantum).astype(float)
+
+
+def _rounded(courses: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Curves rounded to their quantum, the tracked ones too: what is equal must not differ by rounding."""
+    return {name: rounding.rounded(values, rounding.CURVE) for name, values in courses.items()}
 
 
 def score(tracked: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
@@ -155,8 +186,8 @@ def score(tracked: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
     -------
     dict of ndarray
         The results of :func:`.displacement_error.evaluate` and :func:`.agreement.compare` on the displacement rounded
-        as the store rounds it, and through_plane_correlation (): of the length of the error with the displacement out
-        of the plane, at ES; NaN where either is the same at all points.
+        as the store rounds it; through_plane_correlation (): of the length of the error with the displacement out
+        of the plane, at ES, NaN where either is the same at all points; and those of :func:`curves`.
     """
     displacement = np.asarray(tracked, float)[:, truth.inside]
     if truth.quantum:
@@ -171,6 +202,42 @@ def score(tracked: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
         **evaluate(displacement, truth.displacement, truth.wall, es),
         **compare(strain, truth.strain, truth.wall, es),
         "through_plane_correlation": correlation[0, 0],
+        **curves(displacement, strain, truth),
+    }
+
+
+def curves(displacement: np.ndarray, strain: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
+    """Tracked strain and rotation over the cycle, and the errors of what is read from them.
+
+    Parameters
+    ----------
+    displacement : ndarray of shape (frame, point, 2)
+        Since end-diastole: lateral, axial, m; NaN where unknown.
+    strain : ndarray of shape (frame, point, 3)
+        Of that displacement, by the operator.
+    truth : Truth
+
+    Returns
+    -------
+    dict of ndarray
+        tracked_region_strain (frame, measure, region, 3), tracked_segment_strain (frame, measure, 17, 3),
+        tracked_line_strain (frame, 3) and tracked_rotation (frame,), rad, as :mod:`.courses` defines them; and tracked
+        minus true: line_strain_error (3,) and rotation_error (), rad, at ES, peak_line_strain_error (3,) of the peaks
+        and time_to_peak_error (3,), s, of their times.
+    """
+    pieces = truth.contour_fit(displacement)[:, :, 0].reshape(len(displacement), -1, 2, 2)
+    motion = motion_courses(displacement, pieces, truth.wall, truth.contours)
+    found = _rounded(strain_courses(strain, truth.wall) | motion)
+    true, es = truth.courses, truth.es
+    (tracked_peak, tracked_time), (true_peak, true_time) = (
+        peak(course["line_strain"], truth.time) for course in (found, true)
+    )
+    return {
+        **{f"tracked_{name}": values for name, values in found.items()},
+        "line_strain_error": (found["line_strain"] - true["line_strain"])[es],
+        "peak_line_strain_error": tracked_peak - true_peak,
+        "time_to_peak_error": tracked_time - true_time,
+        "rotation_error": (found["rotation"] - true["rotation"])[es],
     }
 
 
@@ -188,7 +255,8 @@ def metrics(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
     -------
     dict
         Name of a metric, which ends in its unit, to its value; NaN for the strain that the plane does not show. All at
-        ES except `nrmse_cycle_percent` and `drift_um`.
+        ES except `nrmse_cycle_percent`, `drift_um`, and peak and time to peak. Strain is compared with that in the
+        plane, so that a tracker is not blamed for what the plane does not show; `tracker_e_..._pp` with the operator's.
     """
     tangential = {"short_axis": "e_cc", "long_axis": "e_ll"}[plane]
     tracked_gradient, true_gradient = (score[f"{name}_transmural_gradient"] for name in ("tracked", "true"))
@@ -210,21 +278,38 @@ def metrics(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
         "through_plane_correlation": score["through_plane_correlation"],
         "coverage_percent": 100 * score["coverage"],
     }
+    values |= _line_metrics(score, plane)
     for name, component in components.items():
         strain = _strain_metrics(score, name, component or 0)
         values |= dict.fromkeys(strain, np.nan) if component is None else strain
     return {name: float(value) for name, value in values.items()}
 
 
+def _line_metrics(score: dict[str, np.ndarray], plane: str) -> dict[str, float]:
+    """Metrics of the strain of the middle contour, GCS or GLS, and of rotation; errors are absolute values."""
+    middle = schema.LABELS["contour"].index("middle")
+    bias, rotation = 100 * score["line_strain_error"][middle], score["rotation_error"]
+    shown, other = ("gcs", "gls") if plane == "short_axis" else ("gls", "gcs")
+    return {
+        f"{name}_{what}_pp": value if name == shown else np.nan
+        for name in sorted((shown, other))
+        for what, value in (("bias", bias), ("error", np.abs(bias)))
+    } | {
+        "peak_strain_error_pp": 100 * np.abs(score["peak_line_strain_error"][middle]),
+        "time_to_peak_error_ms": 1e3 * np.abs(score["time_to_peak_error"][middle]),
+        "rotation_error_deg": np.degrees(np.abs(rotation)),
+    }
+
+
 def _strain_metrics(score: dict[str, np.ndarray], name: str, component: int) -> dict[str, float]:
     """Metrics of one strain component, in percentage points."""
-    heart, operator = REFERENCES.index("heart"), REFERENCES.index("operator")
-    _, lower, upper, _ = score["segment_agreement"][heart, :, component]
+    plane, operator = REFERENCES.index("plane"), REFERENCES.index("operator")
+    _, lower, upper, _ = score["segment_agreement"][plane, :, component]
     return {
-        f"global_{name}_bias_pp": 100 * score["strain_bias"][heart, 0, component],
-        f"{name}_rms_pp": 100 * score["strain_rms"][heart, 0, component],
-        f"{name}_correlation": score["strain_correlation"][heart, 0, component],
-        f"segment_{name}_error_pp": 100 * score["segment_strain_error"][heart, component],
+        f"global_{name}_bias_pp": 100 * score["strain_bias"][plane, 0, component],
+        f"{name}_rms_pp": 100 * score["strain_rms"][plane, 0, component],
+        f"{name}_correlation": score["strain_correlation"][plane, 0, component],
+        f"segment_{name}_error_pp": 100 * score["segment_strain_error"][plane, component],
         f"segment_{name}_limits_pp": 100 * (upper - lower) / 2,
         f"tracker_{name}_bias_pp": 100 * score["strain_bias"][operator, 0, component],
         f"tracker_{name}_rms_pp": 100 * score["strain_rms"][operator, 0, component],

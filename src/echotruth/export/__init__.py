@@ -35,6 +35,8 @@ class Format:
         What a file is of.
     options : tuple of {"overlay", "rate", "trackers"}
         What it can be told, beside which cases, views and sizes to write.
+    table : str
+        Name of one more file, of all clips, that its module writes with `write_summary`; "" for none.
     """
 
     module: str
@@ -42,6 +44,7 @@ class Format:
     stages: tuple[str, ...] = ("phantom", "truth", "bmode")
     holds: Literal["clip", "view", "heart"] = "clip"
     options: tuple[str, ...] = ()
+    table: str = ""
 
     def takes(self, option: str) -> bool:
         """Whether an option, or a choice of views or sizes, does something for it."""
@@ -74,7 +77,9 @@ FORMATS = {
     "dicom": Format("dicom", ".dcm"),
     "vtk": Format("vtk", "", (), "heart"),
     "matlab": Format("matlab", ".mat", ("phantom", "truth", "bmode", "tracking"), options=("trackers",)),
-    "csv": Format("curves", ".csv", ("physiology", "tracking", "evaluation"), options=("trackers",)),
+    "csv": Format(
+        "curves", ".csv", ("physiology", "tracking", "evaluation"), options=("trackers",), table="summary.csv"
+    ),
     "tap": Format("tap", ".npz"),
     "flo": Format("flo", ""),
     "uff": Format("uff", ".uff", (), "view"),
@@ -136,6 +141,8 @@ class Export:
     def write(self, clips: Sequence[Clip]) -> Iterator[Path]:
         """Write a file or folder for each clip, view or heart, and give its path when it is whole.
 
+        The table of a format is written last, unless `output` is the path of a single file.
+
         Raises
         ------
         ExportError
@@ -151,15 +158,27 @@ class Export:
             with draft(target) as path, _told(clip):
                 write(replace(clip), path, **chosen)  # a copy, with which goes what was read
             yield target
+        folder = self._folder
+        if form.table and folder is not None and clips:
+            with draft(folder / form.table) as path, _told(clips[0]):
+                import_module(f"echotruth.export.{form.module}").write_summary(clips, path, self.source.trackers)
 
-    def _targets(self, clips: Sequence[Clip]) -> list[Path]:
+    @property
+    def _folder(self) -> Path | None:
+        """Folder of the files; None if `output` is the path of a single file."""
         suffix = FORMATS[self.format].suffix
         if self.output is not None and suffix and self.output.name.endswith(suffix) and not self.output.is_dir():
+            return None
+        return self.output or self.source.folder / "export" / self.format
+
+    def _targets(self, clips: Sequence[Clip]) -> list[Path]:
+        suffix, folder = FORMATS[self.format].suffix, self._folder
+        if folder is None and self.output is not None:
             if len(clips) > 1:
                 remedy = "give a folder, or choose one with --case, --view and --size"
                 raise ExportError(f"{self.output} is one file, but there are {len(clips)} to write: {remedy}")
             return [self.output]
-        folder = self.output or self.source.folder / "export" / self.format
+        assert folder is not None
         return [folder / f"{clip.name}{suffix}" for clip in clips]
 
 

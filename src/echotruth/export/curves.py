@@ -1,42 +1,50 @@
-"""Curves as CSV: one row a frame, one column a quantity with its unit in its name."""
+"""Curves as tidy CSV: one row a frame, tracker and quantity, and a table of what is read off them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
+from echotruth.evaluation.curves import strain_curves
+from echotruth.evaluation.summary import strain_summary
 from echotruth.export.clip import Clip
-from echotruth.export.tracked import tracked
 from echotruth.fem.volume import cell_volumes
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 COMPONENTS = ("RR", "CC", "LL")
 """Of the heart's strain: radial, circumferential, longitudinal."""
 
-IMAGE_COMPONENTS = ("RR", "TT", "RT")
-"""Of strain in the image: radial, tangential, shear."""
-
 CURVES = {
-    "pressure_kPa": ("mechanics", "pressure", 1e-3),
-    "volume_uL": ("mechanics", "volume", 1e9),
-    "active_tension_kPa": ("mechanics", "active_tension", 1e-3),
-    "rotation_base_deg": ("physiology", "rotation_base", np.degrees(1)),
-    "rotation_apex_deg": ("physiology", "rotation_apex", np.degrees(1)),
-    "twist_deg": ("physiology", "twist", np.degrees(1)),
-    "apex_motion_um": ("physiology", "apex_motion", 1e6),
-    "base_motion_um": ("physiology", "base_motion", 1e6),
+    "pressure": ("mechanics", "pressure", 1e-3, "kPa"),
+    "volume": ("mechanics", "volume", 1e9, "uL"),
+    "active_tension": ("mechanics", "active_tension", 1e-3, "kPa"),
+    "rotation_base": ("physiology", "rotation_base", np.degrees(1), "degree"),
+    "rotation_apex": ("physiology", "rotation_apex", np.degrees(1), "degree"),
+    "twist": ("physiology", "twist", np.degrees(1), "degree"),
+    "apex_motion": ("physiology", "apex_motion", 1e6, "um"),
+    "base_motion": ("physiology", "base_motion", 1e6, "um"),
 }
-"""Column -> group and array of the heart, and factor from SI to the unit of the column."""
+"""Quantity -> group and array of the heart, factor from SI to the unit, and the unit."""
+
+COLUMNS = (
+    *("case", "view", "size_px", "tracker", "quantity", "measure", "place", "component", "frame", "time_ms"),
+    *("tracked", "true", "unit"),
+)
+"""Columns of the curves."""
 
 
 def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
     """Write the curves of the heart, and what each tracker found in the clip beside its truth.
 
-    Empty cells are unknown: the pressure of a prescribed motion, or a segment that a view does not show.
+    Empty cells are unknown: the pressure of a prescribed motion, or a segment that a view does not show. The tracker of
+    the heart's own curves is empty.
 
     Parameters
     ----------
@@ -44,38 +52,78 @@ def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
     path : Path
     trackers : sequence of str
     """
-    columns: dict[str, NDArray[np.generic]] = {"frame": np.arange(len(clip.time)), "time_ms": 1e3 * clip.time}
-    for name, (group, array, factor) in CURVES.items():
-        columns[name] = factor * clip.job.read(group, array)[array]
-    columns |= _heart_strain(clip)
+    parts = [*_heart(clip), *_heart_strain(clip)]
     for tracker in trackers:
-        columns |= _tracked_strain(clip, tracker)
-    pd.DataFrame(columns).to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
+        curves = strain_curves(clip.job, tracker, clip.size)
+        parts += [part.assign(tracker=tracker) for part in _tracked(curves)]
+    table = pd.concat(parts, ignore_index=True)
+    table = table.assign(case=clip.case.id, view=clip.view, size_px=clip.size)
+    table["time_ms"] = 1e3 * clip.time[table["frame"].to_numpy()]
+    table[list(COLUMNS)].to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
 
 
-def _heart_strain(clip: Clip) -> dict[str, Floats]:
-    """Strain of the wall and of its segments since end-diastole, %."""
+def write_summary(clips: Sequence[Clip], path: Path, trackers: Sequence[str]) -> None:
+    """Write the table of :func:`echotruth.strain_summary` of some clips.
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+        Of one repository.
+    path : Path
+    trackers : sequence of str
+    """
+    cases, views, sizes = (
+        list(dict.fromkeys(found))
+        for found in zip(*((clip.case.id, clip.view, clip.size) for clip in clips), strict=True)
+    )
+    table = strain_summary(clips[0].folder, cases, views, sizes, trackers)
+    table.to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
+
+
+def _rows(true: Floats, unit: str, **about: str) -> pd.DataFrame:
+    """Rows of one curve of the heart."""
+    return pd.DataFrame({"frame": np.arange(len(true)), "true": true, "unit": unit, "tracker": ""}).assign(
+        **{"measure": "", "place": "", "component": "", "tracked": np.nan} | about
+    )
+
+
+def _heart(clip: Clip) -> Iterator[pd.DataFrame]:
+    for quantity, (group, array, factor, unit) in CURVES.items():
+        yield _rows(factor * clip.job.read(group, array)[array], unit, quantity=quantity)
+
+
+def _heart_strain(clip: Clip) -> Iterator[pd.DataFrame]:
+    """Green-Lagrange strain of the wall and of its segments since end-diastole, %."""
     strain, wall = (clip.job.read("kinematics", name)[name] for name in ("strain", "strain_mean"))
-    columns = {f"strain_{name}_percent": 100 * wall[:, k] for k, name in enumerate(COMPONENTS)}
+    about = {"quantity": "heart_strain", "measure": "green_lagrange"}
+    for k, component in enumerate(COMPONENTS):
+        yield _rows(100 * wall[:, k], "percent", place="wall", component=component, **about)
     volume, segment = cell_volumes(clip.heart.nodes, clip.heart.cells), clip.heart.arrays["fibres"]["segment"]
     for number in range(1, 18):
         share = np.where(segment == number, volume, 0.0)
-        for k, name in enumerate(COMPONENTS):
+        for k, component in enumerate(COMPONENTS):
             mean = strain[..., k] @ (share / share.sum()) if share.any() else np.full(len(strain), np.nan)
-            columns[f"segment_{number:02d}_strain_{name}_percent"] = 100 * mean
-    return columns
+            yield _rows(100 * mean, "percent", place=f"segment_{number:02d}", component=component, **about)
 
 
-def _tracked_strain(clip: Clip, tracker: str) -> dict[str, Floats]:
-    """Strain in the image by a tracker, and that of the heart at the points where it has one, %."""
-    columns = {}
-    for what in ("tracked", "true"):
-        means = tracked(clip, "evaluation", f"{what}_global_strain", tracker)
-        segments = tracked(clip, "evaluation", f"{what}_segment_strain", tracker)
-        if what == "true":  # by each reference; the first is the heart
-            means, segments = means[0], segments[0]
-        for k, name in enumerate(IMAGE_COMPONENTS):
-            columns[f"{tracker}_{what}_strain_{name}_percent"] = 100 * means[:, k]
-            for number, values in enumerate(segments[..., k].T, start=1):
-                columns[f"{tracker}_segment_{number:02d}_{what}_strain_{name}_percent"] = 100 * values
-    return columns
+def _tracked(curves: xr.Dataset) -> Iterator[pd.DataFrame]:
+    """Rows of the strain and the rotation in the view; strain in %, angles in degrees."""
+    places = {"region": lambda number: f"layer_{number}" if number else "wall", "aha": "segment_{:02d}".format}
+    for quantity in ("region_strain", "segment_strain", "line_strain", "rotation"):
+        pair = curves[[f"tracked_{quantity}", f"true_{quantity}"]].rename(
+            {f"tracked_{quantity}": "tracked", f"true_{quantity}": "true"}
+        )
+        table = pair.drop_vars("time").to_dataframe().reset_index()
+        for dim, name in places.items():
+            if dim in table:
+                table["place"] = table[dim].map(name)
+        table = table.rename(columns={"contour": "place", "wall_component": "component"})
+        table = table.assign(**{name: "" for name in ("measure", "place", "component") if name not in table})
+        if quantity == "line_strain":
+            table["measure"] = "engineering"
+        angle = (quantity == "rotation") | ((table["component"] == "RT") & (table["measure"] == "engineering"))
+        factor = np.where(angle, np.degrees(1), 100.0)
+        table[["tracked", "true"]] *= factor[:, None]
+        table["unit"] = np.where(angle, "degree", "percent")
+        order = ["measure", "place", "component", "frame"]
+        yield table.assign(quantity=quantity).sort_values(order, kind="stable")

@@ -5,6 +5,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+CLINICAL = ("nibabel", "pydicom")
+"""Packages of the extra `clinical`; the extra `export` has these and h5py."""
+
 
 class ExportError(ValueError):
     """Raised if something cannot be exported; the message says why, and what to do."""
@@ -27,4 +30,5 @@ def optional(package: str, module: str = "") -> Any:
     try:
         return import_module(module or package)
     except ImportError:
-        raise ExportError(f"needs the package {package}: install echotruth[export]") from None
+        extra = "clinical" if package in CLINICAL else "export"
+        raise ExportError(f"needs the package {package}: pip install 'echotruth[{extra}]'") from None

@@ -10,6 +10,7 @@ from typing import TypeVar
 from echotruth.cases import expand
 from echotruth.config import Config
 from echotruth.config.loading import load
+from echotruth.evaluation import kept
 from echotruth.export.clip import Clip
 from echotruth.export.error import ExportError
 from echotruth.repository import ledger
@@ -55,8 +56,10 @@ class Source:
 
     @property
     def trackers(self) -> list[str]:
-        """Names of the chosen trackers."""
-        return self._chosen("tracker", self.selection.trackers, list(self.config.tracking.trackers))
+        """Names of the chosen trackers; all of the repository's own if none is named."""
+        own = list(self.config.tracking.trackers)
+        named = self.selection.trackers
+        return self._chosen("tracker", named, kept.trackers(self.folder, self.config) if named else own)
 
     def hearts(self) -> Iterator[Clip]:
         """The chosen hearts."""

@@ -6,6 +6,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from echotruth.evaluation import kept
 from echotruth.export.clip import Clip
 
 
@@ -25,7 +26,4 @@ def tracked(clip: Clip, group: str, name: str, tracker: str) -> NDArray[Any]:
     ndarray
         Its dimensions without case, view, size and tracker.
     """
-    config = clip.case.config
-    of_size = clip.job.read(group, name)[name][list(config.bmode.sizes).index(clip.size)]
-    values: NDArray[Any] = of_size[list(config.tracking.trackers).index(tracker)]
-    return values
+    return kept.read(clip.job, group, name, tracker=tracker, size=clip.size)[name]

@@ -104,15 +104,22 @@ def wall_thickness(endo: Integers, epi: Integers, positions: Floats, height: flo
 
 
 def mid_wall_surface(depth: Floats, cells: Integers) -> Cut:
-    """Triangles (n_triangles, 3) of the surface at the depth `MID_WALL`, as points on edges (marching tetrahedra).
+    """Triangles (n_triangles, 3) of the surface at the depth `MID_WALL`, as :func:`depth_surface` gives them."""
+    return depth_surface(depth, cells, MID_WALL)
+
+
+def depth_surface(depth: Floats, cells: Integers, level: float) -> Cut:
+    """Triangles (n_triangles, 3) of the surface at a wall depth, as points on edges (marching tetrahedra).
 
     Parameters
     ----------
     depth : ndarray of shape (n_nodes,)
     cells : ndarray of shape (n_cells, 10)
+    level : float
+        Above 0 and below 1: at the borders of the wall no value changes sign.
     """
     corners = cells[:, _TETRAHEDRA].reshape(-1, 4)
-    value = depth - MID_WALL
+    value = depth - level
     inside = value[corners] >= 0
     order = np.argsort(inside, axis=1, kind="stable")  # what lies outside comes first
     corners, count = np.take_along_axis(corners, order, axis=1), inside.sum(axis=1)

@@ -17,6 +17,7 @@ from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import wall_mask
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
+from echotruth.notebook.arguments import check_heart
 from echotruth.notebook.derived import derived
 from echotruth.repository import rounding, schema
 
@@ -37,7 +38,15 @@ def heart_dataset(heart: Heart, group: str) -> xr.Dataset:
     ------
     ValueError
         If the heart has no such group.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> geometry = et.heart_dataset(et.load_heart("out/demo"), "geometry")
+    >>> geometry["node_position"].dims, geometry["node_position"].units
+    (('node', 'xyz'), 'm')
     """
+    check_heart(heart)
     if heart.config is None or group not in heart.arrays:
         raise ValueError(f"group = {group!r}: the heart has {', '.join(heart.arrays) or 'no groups'}.")
     case = Case("heart", {}, heart.config)
@@ -135,5 +144,7 @@ def image_size(config: Config, size: int | None) -> int:
     """
     sizes = config.bmode.sizes
     if size is not None and size not in sizes:
-        raise ValueError(f"size = {size}: use one of {', '.join(map(str, sizes))}, or change bmode.")
+        raise ValueError(
+            f"size = {size}: use one of {', '.join(map(str, sizes))}, which bmode.size_px and bmode.downsampling set."
+        )
     return sizes[0] if size is None else size

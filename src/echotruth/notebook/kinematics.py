@@ -9,6 +9,7 @@ import numpy as np
 from echotruth.heart import Heart
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
+from echotruth.notebook.arguments import check_heart
 from echotruth.repository import schema
 
 if TYPE_CHECKING:
@@ -35,9 +36,19 @@ def kinematics(heart: Heart) -> xr.Dataset:
     ------
     ValueError
         If the heart was not made by echotruth.beat or echotruth.load_heart.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> strain = et.kinematics(et.load_heart("out/demo"))["strain"]
+    >>> strain.dims
+    ('frame', 'cell', 'strain_component')
+    >>> float(abs(strain.isel(frame=0)).max()) < 1e-6  # strain is from end-diastole, frame 0
+    True
     """
     import xarray as xr
 
+    check_heart(heart)
     if heart.config is None or not {"geometry", "fibres"} <= set(heart.arrays):
         raise ValueError("The heart has no fibres: make it by echotruth.beat or echotruth.load_heart.")
     values = centroid_kinematics(heart) | fibre_angles(heart)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from echotruth.heart import Heart
 from echotruth.imaging.tracks import follow, visible
 from echotruth.imaging.view import Plane
+from echotruth.notebook.arguments import check_clip, check_heart
 from echotruth.notebook.datasets import case_of, fingerprint
 
 if TYPE_CHECKING:
@@ -46,9 +47,20 @@ def point_tracks(
     ------
     ValueError
         If it is another heart, a point or a frame is not possible, or the clip has lost its attributes.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> heart, clip = et.load_heart("out/demo"), et.load_clip("out/demo", view="mid", size=128)
+    >>> rows, columns = clip["mask"].isel(frame=0).values.nonzero()
+    >>> tracks = et.point_tracks(heart, clip, [[columns[0], rows[0]], [columns[-1], rows[-1]]])
+    >>> tracks["pixel"].dims, dict(tracks["pixel"].sizes)["point"]
+    (('frame', 'point', 'plane'), 2)
     """
     import xarray as xr
 
+    check_heart(heart)
+    check_clip(clip)
     case = case_of(clip)
     if clip.attrs.get("heart", fingerprint(heart)) != fingerprint(heart):
         raise ValueError("The clip was made of another heart: give the one that was imaged.")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echotruth.config import Config
+from echotruth.evaluation import kept
 from echotruth.evaluation.clip import grid_positions
 from echotruth.evaluation.scoring import truth_at
 from echotruth.evaluation.strain import RADIUS, StrainOperator
@@ -36,7 +37,7 @@ def load_points(
         Case id, as in `cases.csv`.
     view : str
     tracker : str
-        Name of a tracker of the repository.
+        Name of a tracker of the repository, or of one that `echotruth evaluate --keep` stored.
     size : int, optional
         Pixels along a side of the clip. Default: the largest.
 
@@ -52,14 +53,19 @@ def load_points(
     ------
     FileNotFoundError, ValueError
         If there is no such repository, case, view, tracker or size.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> points = et.load_points("out/demo", "heart", "mid", tracker="dis", size=128)
+    >>> error = points["displacement"] - points["true_displacement"].sel(vector=["lateral", "axial"]).values
+    >>> error.dims
+    ('frame', 'axial', 'lateral', 'plane')
     """
     job = job_of(repository, case, view)
     config = job.case.config
-    size, trackers = image_size(config, size), list(config.tracking.trackers)
-    if tracker not in trackers:
-        raise ValueError(f"tracker = {tracker!r}: use one of {', '.join(trackers)}.")
-    place = config.bmode.sizes.index(size), trackers.index(tracker)
-    tracked = {name: values[place] for name, values in job.read("tracking").items()}
+    size = image_size(config, size)
+    tracked = kept.read(job, "tracking", "displacement", "quality", tracker=tracker, size=size)
     true = job.read("evaluation", "true_displacement", "true_strain")
     grid = grid_positions(config)
     points = {"lateral": grid[0, :, 0], "axial": grid[:, 0, 1]}

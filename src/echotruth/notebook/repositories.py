@@ -44,6 +44,15 @@ def open(repository: str | Path) -> xr.DataTree:
         If the folder holds no repository.
     RemoteError
         If the address cannot be reached.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> tree = et.open("out/demo")
+    >>> list(tree["cases"]["status"].values)
+    ['complete']
+    >>> tree["bmode/128"].sel(view="mid").isel(case=0)["image"].dims
+    ('frame', 'axial', 'lateral')
     """
     import xarray as xr
 
@@ -70,6 +79,13 @@ def load_heart(repository: str | Path, case: str = "heart") -> Heart:
     ------
     FileNotFoundError, ValueError
         If there is no such repository or case.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> heart = et.load_heart("out/demo", "heart")
+    >>> heart.displacement.shape == (heart.config.loop.frames, len(heart.nodes), 3)
+    True
     """
     return job_of(repository, case).heart
 
@@ -98,6 +114,13 @@ def load_clip(
     ------
     FileNotFoundError, ValueError
         If there is no such repository, case, view, size or variable.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> clip = et.load_clip("out/demo", "heart", "long_axis", size=128, variables=("image", "flow"))
+    >>> clip["flow"].dims, clip["flow"].units
+    (('frame', 'to', 'axial', 'lateral', 'vector'), 'm')
     """
     job = job_of(repository, case, view)
     config = job.case.config

@@ -25,6 +25,7 @@ from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.physiology import measures, violated_bound
+from echotruth.notebook.arguments import check_clip, check_heart
 from echotruth.notebook.datasets import as_stored, case_of, clip_dataset, dataset, fingerprint, image_size
 from echotruth.seeds import generator
 from echotruth.tracking.tracker import track as track_points
@@ -57,6 +58,14 @@ def beat(config: Source = None, progress: bool = True) -> Heart:
         If the configuration is invalid.
     GeometryError, FibreError, PathologyError, LoopError, MotionError, Diverged
         If geometry, fibres, pathology, loop or motion are invalid, or the solver does not converge.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> coarse = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
+    >>> heart = et.beat({"geometry": coarse, "loop": {"frames": 4}})  # a few seconds; without keys, a minute
+    >>> round(1e9 * float(heart.arrays["mechanics"]["volume"][0]))  # uL at end-diastole
+    50
     """
     settings = config if isinstance(config, Config) else configure(config)
     if settings.cases:
@@ -115,7 +124,18 @@ def image(
         If the probe does not suit the configuration.
     ValueError
         If there is no such view or size.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> heart = et.load_heart("out/demo")
+    >>> clip = et.image(heart, et.View(position=0.4), size=128)  # a plane that the repository does not have
+    >>> clip["image"].dims, str(clip["image"].dtype)
+    (('frame', 'axial', 'lateral'), 'uint8')
+    >>> clip["displacement"].dims, clip["displacement"].units
+    (('frame', 'axial', 'lateral', 'vector'), 'm')
     """
+    check_heart(heart)
     if heart.config is None:
         raise ValueError("The heart has no configuration: make it by echotruth.beat or echotruth.load_heart.")
     config, name = _imaged_by(heart.config, view, probe)
@@ -166,7 +186,24 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
         If the tracker finds no motion.
     ValueError
         If the clip is not a whole cycle, or has lost its attributes.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> clip = et.load_clip("out/demo", view="mid", size=128)
+    >>> tracked = et.track(clip, "dis")
+    >>> tracked["displacement"].dims, tracked["displacement"].units
+    (('frame', 'axial', 'lateral', 'plane'), 'm')
+
+    A tracker is any function of these six arguments:
+
+    >>> import numpy as np
+    >>> def at_rest(frames, points, mask, spacing, frame_time, seed):
+    ...     return np.zeros((len(frames), len(points), 2))
+    >>> float(np.abs(et.track(clip, at_rest)["displacement"]).max())
+    0.0
     """
+    check_clip(clip)
     case = case_of(clip)
     if clip.sizes["frame"] != case.config.loop.frames:
         number = f"{clip.sizes['frame']} of {case.config.loop.frames} frames"
@@ -204,9 +241,19 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
     ------
     ValueError
         If it is another heart, frames are missing, or the data set has lost its attributes.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> heart, clip = et.load_heart("out/demo"), et.load_clip("out/demo", view="mid", size=128)
+    >>> scores = et.evaluate(et.track(clip, "dis"), heart)
+    >>> bool(scores["nrmse_percent"] < 100)  # it finds more than nothing
+    True
     """
     import pandas as pd
 
+    check_clip(tracked, "tracked")
+    check_heart(heart)
     case, attributes = case_of(tracked), tracked.attrs
     if attributes.get("heart", fingerprint(heart)) != fingerprint(heart):
         raise ValueError("The clip was made of another heart: give the one that was imaged.")

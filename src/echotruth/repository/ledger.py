@@ -60,6 +60,9 @@ def repository_folder(repository: str | Path) -> Path:
     FileNotFoundError
         If the folder holds no repository.
     """
+    if "://" in str(repository):
+        remedy = "download it, and give the folder; echotruth.open reads an address too"
+        raise FileNotFoundError(f"{repository}: is an address and not a folder: {remedy}")
     folder = Path(repository)
     folder = folder.parent if folder.suffix == ".zarr" else folder
     if not (folder / "registry.txt").is_file():

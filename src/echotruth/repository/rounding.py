@@ -20,6 +20,8 @@ LENGTH = "pixel/256"
 """Quantum of lengths in the image: the largest power of two, in metres, not above 1/256 pixel of the largest image."""
 
 STRAIN = 2.0**-12
+CURVE = 2.0**-16
+"""Quantum of means of strain and of angles (rad) over time."""
 WALL_DEPTH = 2.0**-10
 QUALITY = 2.0**-8
 

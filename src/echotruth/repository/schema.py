@@ -142,6 +142,8 @@ COORDINATES = (
     _array("fibre_component", "fibre_component", "string", "1", "fibre, sheet, normal"),
     _array("wall_component", "wall_component", "string", "1", "radial, tangential (CC or LL), shear along the wall"),
     _array("reference", "reference", "string", "1", "reference strain"),
+    _array("measure", "measure", "string", "1", "measure of strain"),
+    _array("contour", "contour", "string", "1", "contour of the wall"),
     _array("statistic", "statistic", "string", "1", "mean, median, 95th percentile"),
     _array("agreement", "agreement", "string", "1", "mean difference, limits of agreement, correlation"),
     _array("layer", "layer", "int32", "1", "transmural layer, 1 at the endocardium"),
@@ -158,7 +160,7 @@ COORDINATES = (
     _array("component", "component", "string", "1", "polar component, or the whole vector"),
     *(
         coordinate
-        for dim in ("scalar", "course", "limit", "score")
+        for dim in ("scalar", "course", "true_course", "limit", "score")
         for coordinate in (
             _array(dim, dim, "string", "1", "name of the array that the number belongs to, and its place there"),
             _array(f"{dim}_units", dim, "string", "1", "unit of the number"),
@@ -176,6 +178,8 @@ LABELS: dict[str, tuple[str, ...]] = {
     "fibre_component": ("ff", "ss", "nn", "fs", "fn", "sn"),
     "wall_component": ("RR", "TT", "RT"),
     "reference": ("heart", "plane", "operator"),
+    "measure": ("engineering", "green_lagrange"),
+    "contour": ("endocardial", "middle", "epicardial"),
     "statistic": ("mean", "median", "p95"),
     "agreement": ("bias", "lower", "upper", "correlation"),
     "polar": ("radial", "tangential"),

@@ -11,6 +11,7 @@ from echotruth.repository.packing import Pack
 from echotruth.repository.rounding import LENGTH, QUALITY, STRAIN
 
 _TRACKED = "case view size tracker"
+_CCW = "about its centroid since ED, counter-clockwise seen from the apex; of short-axis views"
 TRACKING = (
     array(
         *("displacement", f"{_TRACKED} frame axial lateral plane", "float32", "m"),
@@ -65,22 +66,39 @@ _SCORES = (
         "agreement of the strain of segments at ES",
     ),
     array("coverage", _TRACKED, "float64", "1", "fraction of the wall's points with an estimate"),
+    array("line_strain_error", f"{_TRACKED} contour", "float64", "1", "error of the line strain at ES"),
+    array("peak_line_strain_error", f"{_TRACKED} contour", "float64", "1", "error of the peak of the line strain"),
+    array("time_to_peak_error", f"{_TRACKED} contour", "float64", "s", "error of the time of that peak"),
+    array("rotation_error", _TRACKED, "float64", "rad", "error of the rotation of the wall at ES"),
 )
 
 _COURSES = (
     array("frame_rms_error", f"{_TRACKED} frame component", "float32", "m", "RMS error of displacement"),
     array("frame_nrmse", f"{_TRACKED} frame component", "float32", "1", "NRMSE of the whole wall"),
     array("frame_strain_rms", f"{_TRACKED} reference frame wall_component", "float32", "1", "RMS error of strain"),
-    array("tracked_global_strain", f"{_TRACKED} frame wall_component", "float32", "1", "tracked mean of the wall"),
     array(
-        *("true_global_strain", f"{_TRACKED} reference frame wall_component", "float32", "1"),
-        "true mean strain of the wall, by each reference",
+        *("tracked_region_strain", f"{_TRACKED} frame measure region wall_component", "float32", "1"),
+        "tracked mean strain of a region (engineering RT: rad)",
     ),
-    array("tracked_segment_strain", f"{_TRACKED} frame aha wall_component", "float32", "1", "tracked mean strain"),
     array(
-        *("true_segment_strain", f"{_TRACKED} reference frame aha wall_component", "float32", "1"),
-        "true mean strain of a segment, by each reference",
+        *("tracked_segment_strain", f"{_TRACKED} frame measure aha wall_component", "float32", "1"),
+        "tracked mean strain of a segment (engineering RT: rad)",
     ),
+    array("tracked_line_strain", f"{_TRACKED} frame contour", "float32", "1", "tracked strain of a contour's length"),
+    array("tracked_rotation", f"{_TRACKED} frame", "float32", "rad", f"tracked rotation of the wall, {_CCW}"),
+)
+
+_TRUE_COURSES = (
+    array(
+        *("true_region_strain", "case view reference frame measure region wall_component", "float32", "1"),
+        "true mean strain of a region, by each reference (engineering RT: rad)",
+    ),
+    array(
+        *("true_segment_strain", "case view reference frame measure aha wall_component", "float32", "1"),
+        "true mean strain of a segment, by each reference (engineering RT: rad)",
+    ),
+    array("true_line_strain", "case view frame contour", "float32", "1", "true strain of a contour's length"),
+    array("true_rotation", "case view frame", "float32", "rad", f"true rotation of the wall, {_CCW}"),
 )
 
 EVALUATION_PACKS = (
@@ -88,6 +106,10 @@ EVALUATION_PACKS = (
     Pack(array("scores", f"{_TRACKED} score", "float64", "mixed", "scores of a tracker on a clip"), _SCORES),
     Pack(
         array("courses", f"{_TRACKED} frame course", "float32", "mixed", "its errors and strains over time"), _COURSES
+    ),
+    Pack(
+        array("true_courses", "case view frame true_course", "float32", "mixed", "true strains over time"),
+        _TRUE_COURSES,
     ),
 )
 EVALUATION = (

@@ -33,6 +33,13 @@ def unpack(data: xr.Dataset, *names: str) -> xr.Dataset:
     ------
     ValueError
         If there is no such array, or the selection has a part of its numbers only.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> measures = et.unpack(et.open("out/demo")["physiology"].to_dataset(), "ejection_fraction", "gls")
+    >>> measures["gls"].dims, measures["gls"].units
+    (('case',), '1')
     """
     import xarray as xr
 

@@ -1,0 +1,218 @@
+"""Curves of strain and rotation of one clip, tracked beside true, as they are read from a repository."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echotruth.config import Config
+from echotruth.evaluation import kept
+from echotruth.evaluation.agreement import REFERENCES
+from echotruth.evaluation.courses import peak, rate, systolic_rate
+from echotruth.loop.cycle import read_loop
+from echotruth.repository import schema
+from echotruth.workflow.job import Job
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NAMES = ("region_strain", "segment_strain", "line_strain", "rotation")
+"""What is tracked over the cycle; the arrays are `tracked_NAME` and `true_NAME`."""
+
+REFERENCE = "plane"
+"""Reference of true strain unless another is asked for: that of the motion in the plane, so that a tracker is not
+blamed for the thickening of a wall that is oblique to the plane, which no image of it shows."""
+
+
+def strain_curves(job: Job, tracker: str, size: int | None = None, reference: str = REFERENCE) -> xr.Dataset:
+    """Read the strain and the rotation of one clip over the cycle, tracked and true.
+
+    Parameters
+    ----------
+    job : Job
+        Job of the stage tracking of the view.
+    tracker : str
+        One of :func:`echotruth.evaluation.kept.trackers`.
+    size : int, optional
+        Pixels along a side. Default: the largest.
+    reference : {"plane", "heart", "operator"}
+        Reference of the true strain of points (docs/conventions.md); lines and rotation are those in the plane.
+
+    Returns
+    -------
+    Dataset
+        As :func:`echotruth.strain_curves` returns it.
+
+    Raises
+    ------
+    ValueError
+        If there is no such tracker, size or reference, or the tracker was not evaluated on this clip.
+    """
+    config, es = job.case.config, int(job.store.read("mechanics", job.row, names=("es_frame",))["es_frame"])
+    size = image_size(config, size)
+    if reference not in REFERENCES:
+        raise ValueError(f"reference = {reference!r}: use one of {', '.join(REFERENCES)}.")
+    names = [f"{what}_{name}" for name in NAMES for what in ("tracked", "true")]
+    values = kept.read(job, "evaluation", *names, tracker=tracker, size=size)
+    for name in ("true_region_strain", "true_segment_strain"):
+        values[name] = values[name][REFERENCES.index(reference)]
+    time = read_loop(config.loop).time
+    found = _dataset(values, time, config)
+    return found.assign_attrs(
+        case=job.case.id,
+        view=str(job.view_name),
+        plane=job.view.plane,
+        tracker=tracker,
+        size_px=size,
+        reference=reference,
+        es_frame=es,
+        end_systole=float(time[es]),
+    )
+
+
+def strain_peaks(curves: xr.Dataset) -> xr.Dataset:
+    """Read end-systolic value, peak and time to peak off curves.
+
+    Parameters
+    ----------
+    curves : Dataset
+        As :func:`strain_curves` or :func:`twist_curves` returns it.
+
+    Returns
+    -------
+    Dataset
+        For every curve NAME without `_rate`, without the dimension frame: `NAME_es`, its value at end-systole;
+        `NAME_peak`, its value of largest magnitude over the cycle; and `NAME_time_to_peak`, s since end-diastole. Of
+        every rate NAME_rate: `NAME_systolic_rate`, the largest rate from end-diastole to end-systole in the direction
+        of the end-systolic value (of shortening the most negative one).
+
+    Raises
+    ------
+    ValueError
+        If the data set has lost its attributes.
+    """
+    import xarray as xr
+
+    if "es_frame" not in curves.attrs:
+        raise ValueError("The data set has lost its attribute es_frame: keep those that echotruth gave it.")
+    es, time = curves.attrs["es_frame"], curves["time"].values
+    found = {}
+    for name, curve in curves.data_vars.items():
+        dims, units = [dim for dim in curve.dims if dim != "frame"], {"units": curve.attrs["units"]}
+        values = curve.transpose("frame", ...).values
+        if str(name).endswith("_rate"):
+            of = str(name).removesuffix("_rate")
+            at_es = curves[of].isel(frame=es).transpose(*dims).values
+            found[f"{of}_systolic_rate"] = (dims, systolic_rate(values[: es + 1], at_es), units)
+            continue
+        value, when = peak(values, time)
+        found |= {
+            f"{name}_es": (dims, values[es], units),
+            f"{name}_peak": (dims, value, units),
+            f"{name}_time_to_peak": (dims, when, {"units": "s"}),
+        }
+    coordinates = {name: array for name, array in curves.coords.items() if "frame" not in array.dims}
+    return xr.Dataset(found, coordinates, curves.attrs)
+
+
+def twist_curves(job: Job, tracker: str, size: int | None = None) -> xr.Dataset:
+    """Read the twist of a heart over the cycle, tracked and true: the rotation of the apex less that of the base.
+
+    Parameters
+    ----------
+    job : Job
+        Any job of the heart.
+    tracker : str
+    size : int, optional
+        Pixels along a side. Default: the largest.
+
+    Returns
+    -------
+    Dataset
+        As :func:`echotruth.twist_curves` returns it.
+
+    Raises
+    ------
+    ValueError
+        If the repository has fewer than two short-axis views, or the tracker was not evaluated on these.
+    """
+    views = twist_views(job.case.config)
+    if views is None:
+        raise ValueError("Twist needs two short-axis views at different positions, and the repository has not.")
+    jobs = (Job(job.folder, "tracking", job.case, view, code="read") for view in views)
+    base, apex = (strain_curves(of_view, tracker, size) for of_view in jobs)
+    return twist_of(base, apex, job.store.read("physiology", job.row, names=("twist",))["twist"])
+
+
+def twist_views(config: Config) -> tuple[str, str] | None:
+    """Names of the most basal and the most apical short-axis view; None if there are not two."""
+    position = {name: view.position for name, view in config.views.items() if view.plane == "short_axis"}
+    views = sorted(position, key=lambda name: position[name])
+    return (views[0], views[-1]) if views and position[views[0]] < position[views[-1]] else None
+
+
+def twist_of(base: xr.Dataset, apex: xr.Dataset, heart_twist: np.ndarray | None = None) -> xr.Dataset:
+    """Twist from the curves of two short-axis views.
+
+    Parameters
+    ----------
+    base, apex : Dataset
+        As :func:`strain_curves` returns them.
+    heart_twist : ndarray of shape (frame,), rad, optional
+        That of the group physiology.
+    """
+    import xarray as xr
+
+    time = base["time"].values
+    about = "rotation of the apical less that of the basal view, counter-clockwise seen from the apex"
+    found = {}
+    for what in ("tracked", "true"):
+        name, curve = f"{what}_twist", apex[f"{what}_rotation"].values - base[f"{what}_rotation"].values
+        found[name] = ("frame", curve, {"units": "rad", "long_name": f"{what} {about}"})
+        found[f"{name}_rate"] = ("frame", rate(curve, time), {"units": "rad s-1", "long_name": f"rate of {name}"})
+    if heart_twist is not None:
+        found["heart_twist"] = ("frame", heart_twist, {"units": "rad", "long_name": "twist of the group physiology"})
+    attributes = {key: value for key, value in base.attrs.items() if key not in ("view", "reference", "plane")}
+    attributes |= {"basal_view": base.attrs["view"], "apical_view": apex.attrs["view"]}
+    return xr.Dataset(found, base[["frame", "time"]].coords, attributes)
+
+
+def image_size(config: Config, size: int | None) -> int:
+    """Pixels along a side: the size asked for, or the largest.
+
+    Raises
+    ------
+    ValueError
+        If the repository has no clips of that size.
+    """
+    sizes = config.bmode.sizes
+    if size is not None and size not in sizes:
+        raise ValueError(f"size = {size}: use one of {', '.join(map(str, sizes))}.")
+    return sizes[0] if size is None else size
+
+
+def _dataset(values: dict[str, np.ndarray], time: np.ndarray, config: Config) -> xr.Dataset:
+    """Arrays of one clip and their rates, with dimensions, coordinates and units."""
+    import xarray as xr
+
+    arrays = {array.name: array for array in schema.named("evaluation")}
+    found: dict[str, tuple[list[str], np.ndarray, dict[str, str]]] = {}
+    for name, value in values.items():
+        array = arrays[name]
+        dims = [dim for dim in array.dims if dim not in ("case", "view", "size", "tracker", "reference")]
+        order = ["frame", *(dim for dim in dims if dim != "frame")]
+        curve = np.asarray(value, float).transpose([dims.index(dim) for dim in order])
+        found[name] = (order, curve, {"units": array.units, "long_name": array.long_name})
+        rates = {"units": "s-1" if array.units == "1" else f"{array.units} s-1", "long_name": f"rate of {name}"}
+        found[f"{name}_rate"] = (order, rate(curve, time), rates)
+    data = xr.Dataset(found).transpose("measure", "frame", ...)
+    labels = {
+        "measure": list(schema.LABELS["measure"]),
+        "wall_component": list(schema.LABELS["wall_component"]),
+        "contour": list(schema.LABELS["contour"]),
+        "region": np.arange(1 + config.fibres.layers),
+        "aha": np.arange(1, 18),
+        "frame": np.arange(len(time)),
+    }
+    return data.assign_coords(labels | {"time": ("frame", time, {"units": "s"})})

@@ -1,0 +1,120 @@
+"""Values and gradients of a displacement between the points at which it is known, by local polynomials.
+
+About every target x_0 the displacement is fitted by a polynomial of second degree in the position x at end-diastole,
+u(x) = sum_j c_j p_j with p = (1, X, Y, X^2, XY, Y^2) and (X, Y) = (x - x_0) / r, by weighted least squares over the
+points of the wall within the radius r: c = (P^T W P)^-1 P^T W u, u(x_0) = c_0 and grad u = (c_1, c_2) / r. The weights
+w = 1 - (|x - x_0| / r)^2 (Epanechnikov) fall to 0 at the radius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+MIN_POINTS = 10
+"""Smallest number of points of a fit, which has six coefficients."""
+
+MIN_EIGENVALUE_RATIO = 1e-4
+"""Smallest over largest eigenvalue of P^T W P, below which the points lie almost on a line."""
+
+
+@dataclass(frozen=True)
+class LocalFit:
+    """Linear operator from the displacement of points to its value and gradient at targets.
+
+    Attributes
+    ----------
+    position : ndarray of shape (point, 2)
+        Points at end-diastole: lateral, axial, m.
+    normal : ndarray of shape (point, 2)
+        Radial direction of the wall there.
+    target : ndarray of shape (target, 2)
+        Where values are wanted: lateral, axial, m.
+    target_normal : ndarray of shape (target, 2)
+        Radial direction of the wall there.
+    radius : float
+        Radius of the neighbourhood of a target, m.
+    """
+
+    position: np.ndarray
+    normal: np.ndarray
+    target: np.ndarray
+    target_normal: np.ndarray
+    radius: float
+
+    def __call__(self, displacement: np.ndarray) -> np.ndarray:
+        """Fit a displacement.
+
+        Parameters
+        ----------
+        displacement : ndarray of shape (frame, point, 2)
+            Lateral, axial, m; NaN where unknown.
+
+        Returns
+        -------
+        ndarray of shape (frame, target, 3, 2)
+            Value, m, and derivatives along lateral and axial, of each component; NaN where too few points are known.
+        """
+        known = np.isfinite(displacement).all(-1)
+        filled = np.where(known[..., None], displacement, 0)
+        targets = len(self.target)
+        result = np.full((len(displacement), targets, 3, 2), np.nan)
+        if not len(self.position):
+            return result
+        patterns, pattern_of_frame = np.unique(known, axis=0, return_inverse=True)
+        for number, pattern in enumerate(patterns):
+            frames = np.flatnonzero(pattern_of_frame.ravel() == number)
+            columns = np.moveaxis(filled[frames], 1, 0).reshape(len(pattern), 2 * len(frames))
+            fitted = (self._matrix(pattern) @ columns).reshape(targets, 3, len(frames), 2)
+            result[frames] = fitted.transpose(2, 0, 1, 3)
+        return result
+
+    @cached_property
+    def _neighbours(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Indices of the neighbours of every target, their weights w and their polynomial terms p."""
+        tree = cKDTree(self.position)
+        most = int(np.max(tree.query_ball_point(self.target, self.radius, return_length=True), initial=1))
+        distance, neighbour = tree.query(self.target, most, distance_upper_bound=self.radius)
+        distance, neighbour = (array.reshape(len(self.target), most) for array in (distance, neighbour))
+        # Where a target has fewer neighbours, the tree pads with an infinite distance and an index out of range.
+        neighbour = np.where(np.isfinite(distance), neighbour, 0)
+        # Points across a narrow cavity, whose radial direction is opposite, do not count.
+        same_side = np.einsum("nkj,nj->nk", self.normal[neighbour], self.target_normal) > 0
+        weight = np.where(np.isfinite(distance) & same_side, 1 - (distance / self.radius) ** 2, 0)
+        x, y = np.moveaxis((self.position[neighbour] - self.target[:, None]) / self.radius, -1, 0)
+        return neighbour, weight, np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
+
+    def _matrix(self, known: np.ndarray) -> csr_array:
+        """Matrix from the values at the points to value (1), d/dx and d/dy (1/m) at the targets, (3 target, point)."""
+        neighbour, weight, _ = self._neighbours
+        incomplete = ((weight > 0) & ~known[neighbour]).any(1)
+        coefficients = self._coefficients_of_all
+        if incomplete.any():
+            coefficients = coefficients.copy()
+            coefficients[incomplete] = self._coefficients(incomplete, known)
+        targets, most = neighbour.shape
+        values = np.swapaxes(coefficients, 1, 2).ravel()
+        columns, rows = np.repeat(neighbour, 3, axis=0).ravel(), np.arange(3 * targets + 1) * most
+        return csr_array((values, columns, rows), (3 * targets, len(self.position)))
+
+    @cached_property
+    def _coefficients_of_all(self) -> np.ndarray:
+        """Coefficients of all targets where all points are known."""
+        return self._coefficients(np.ones(len(self.target), bool), np.ones(len(self.position), bool))
+
+    def _coefficients(self, chosen: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """Rows 0, 1 and 2 of (P^T W P)^-1 P^T W at the chosen targets, 1 and 2 over r, (target, neighbour, 3)."""
+        neighbour, weight, terms = (array[chosen] for array in self._neighbours)
+        weight = weight * known[neighbour]
+        weighted = np.swapaxes(weight[..., None] * terms, 1, 2)  # P^T W
+        normal = weighted @ terms  # P^T W P
+        eigenvalue = np.linalg.eigvalsh(normal)
+        enough = (weight > 0).sum(1) >= MIN_POINTS
+        fit = enough & (eigenvalue[:, 0] > MIN_EIGENVALUE_RATIO * eigenvalue[:, -1])
+        coefficients = np.full((*weight.shape, 3), np.nan)
+        coefficients[fit] = np.swapaxes(np.linalg.inv(normal[fit])[:, :3] @ weighted[fit], 1, 2)
+        return coefficients / [1, self.radius, self.radius]

@@ -1,0 +1,36 @@
+"""Refusal of what is no heart and no clip, with the function that makes one."""
+
+from __future__ import annotations
+
+from echotruth.heart import Heart
+
+
+def check_heart(heart: object) -> None:
+    """Check that a heart is one.
+
+    Raises
+    ------
+    TypeError
+        If it is something else, such as the path of a repository.
+    """
+    if not isinstance(heart, Heart):
+        made = "echotruth.load_heart reads one from a repository, echotruth.beat makes one"
+        raise TypeError(f"heart = {heart!r:.80}: must be a Heart: {made}.")
+
+
+def check_clip(clip: object, name: str = "clip") -> None:
+    """Check that a clip, or what a tracker made of one, is a dataset.
+
+    Raises
+    ------
+    TypeError
+        If it is something else, such as the path of a repository.
+    """
+    import xarray as xr
+
+    if not isinstance(clip, xr.Dataset):
+        made = {
+            "clip": "echotruth.load_clip reads one from a repository, echotruth.image makes one",
+            "tracked": "echotruth.track makes one from a clip",
+        }
+        raise TypeError(f"{name} = {clip!r:.80}: must be a Dataset: {made[name]}.")

@@ -1,0 +1,161 @@
+"""Curves, peaks, twist and their table as they are read from a repository whose numbers are known."""
+
+import numpy as np
+import pytest
+from known_repository import FRAMES, SETTINGS, make
+
+import echotruth as et
+from echotruth.repository.rounding import rounded
+from echotruth.workflow.job import Job
+
+VIEWS = {
+    "apical": {"position": 0.8},
+    "mid": {"position": 0.5},
+    "basal": {"position": 0.2},
+    "long": {"plane": "long_axis"},
+}
+ES = 1
+COURSE = np.array([0, 1.0, 1.1])
+"""Of all curves: the peak comes after end-systole."""
+TURN = {"apical": 0.16, "mid": 0.08, "basal": -0.04}
+FACTOR = {("tracked", 0): 0.9, ("tracked", 1): 0.5, ("true", 0): 1.0}
+
+
+@pytest.fixture(scope="module")
+def repository(tmp_path_factory):
+    """Two trackers that find nine and five tenths of everything, at two image sizes."""
+    folder = make(tmp_path_factory.mktemp("curves") / "known", SETTINGS | {"views": VIEWS}).folder
+    for view in VIEWS:
+        job = Job(folder, "evaluation", "heart", view, code="1")
+        job.store.write("evaluation", job.read("evaluation") | arrays(view), *job.index)
+    heart = Job(folder, "mechanics", "heart", code="1")
+    heart.store.write("mechanics", heart.read("mechanics") | {"es_frame": ES}, *heart.index)
+    return folder
+
+
+def arrays(view):
+    """Curves of one view: the magnitude tells contour, region, component and reference apart."""
+    contours, component = np.array([-0.3, -0.2, -0.1]), np.array([0.4, -0.2, 0.05])
+    regions, segments, measure = 1 + np.arange(7) / 10, 1 + np.arange(17) / 20, np.array([1.0, 1.1])
+    reference = np.array([3.0, 1.0, 2.0])  # heart, plane, operator
+
+    def outer(*factors):
+        product = COURSE
+        for factor in factors:
+            product = np.multiply.outer(product, factor)
+        return product
+
+    true = {
+        "region_strain": outer(measure, regions, component),
+        "segment_strain": outer(measure, segments, component),
+        "line_strain": outer(contours),
+        "rotation": TURN.get(view, np.nan) * COURSE,
+    }
+    found = {f"true_{name}": values for name, values in true.items()}
+    for name in ("true_region_strain", "true_segment_strain"):
+        found[name] = np.multiply.outer(reference, found[name])
+    for name, values in true.items():
+        by_tracker = np.stack([FACTOR["tracked", k] * values for k in (0, 1)])
+        found[f"tracked_{name}"] = np.stack([by_tracker, 0.5 * by_tracker])
+    return {name: rounded(np.asarray(values, np.float32), None) for name, values in found.items()}
+
+
+def test_curves_of_a_clip_stand_at_their_labels(repository):
+    curves = et.strain_curves(repository, view="mid", tracker="one")
+    frame = curves.isel(frame=ES)
+    line = frame[["true_line_strain", "tracked_line_strain"]].sel(contour="middle")
+    np.testing.assert_allclose([line["true_line_strain"], line["tracked_line_strain"]], [-0.2, -0.18], atol=1e-6)
+    place = {"measure": "green_lagrange", "region": 3, "wall_component": "TT"}
+    assert float(frame["true_region_strain"].sel(place)) == pytest.approx(-0.2 * 1.1 * 1.3, abs=1e-6)
+    place = {"measure": "engineering", "aha": 9, "wall_component": "RR"}
+    assert float(frame["tracked_segment_strain"].sel(place)) == pytest.approx(0.9 * 0.4 * 1.4, abs=1e-6)
+    assert float(frame["tracked_rotation"]) == pytest.approx(0.9 * 0.08, abs=1e-6)
+    assert curves.attrs["es_frame"] == ES and curves.attrs["plane"] == "short_axis"
+    np.testing.assert_allclose(curves["time"], 0.12 / FRAMES * np.arange(FRAMES))
+    assert curves["true_rotation"].attrs["units"] == "rad" and curves["true_rotation_rate"].attrs["units"] == "rad s-1"
+
+
+def test_tracked_curves_are_those_of_the_size_and_the_truth_is_the_same(repository):
+    large, small = (et.strain_curves(repository, view="mid", tracker="two", size=size) for size in (128, 64))
+    np.testing.assert_allclose(small["tracked_line_strain"], 0.5 * large["tracked_line_strain"], atol=1e-6)
+    np.testing.assert_array_equal(small["true_line_strain"], large["true_line_strain"])
+
+
+def test_truth_is_that_of_the_reference_asked_for_and_of_the_plane_if_none_is(repository):
+    place = {"measure": "engineering", "region": 0, "wall_component": "RR", "frame": ES}
+    found = {
+        name: float(et.strain_curves(repository, view="mid", tracker="one", **given)["true_region_strain"].sel(place))
+        for name, given in {"": {}, **{name: {"reference": name} for name in ("heart", "plane", "operator")}}.items()
+    }
+    assert found == pytest.approx({"": 0.4, "heart": 1.2, "plane": 0.4, "operator": 0.8}, abs=1e-6)
+
+
+def test_peaks_come_after_end_systole_where_the_curve_says_so(repository):
+    curves = et.strain_curves(repository, view="mid", tracker="one")
+    middle = et.strain_peaks(curves).sel(contour="middle")
+    step = 0.12 / FRAMES
+    values = [float(middle[f"true_line_strain_{name}"]) for name in ("es", "peak", "time_to_peak", "systolic_rate")]
+    # Shortening is fastest at the start, where the parabola through the three frames has this slope.
+    np.testing.assert_allclose(values, [-0.2, -0.22, 2 * step, -0.2 * (4 - 1.1) / (2 * step)], rtol=1e-5)
+    assert "frame" not in et.strain_peaks(curves).dims
+
+
+def test_twist_is_the_rotation_of_the_apex_less_that_of_the_base(repository):
+    twist = et.twist_curves(repository, tracker="one")
+    assert (twist.attrs["basal_view"], twist.attrs["apical_view"]) == ("basal", "apical")
+    np.testing.assert_allclose(twist["true_twist"], 0.2 * COURSE, atol=1e-6)
+    np.testing.assert_allclose(twist["tracked_twist"], 0.18 * COURSE, atol=1e-6)
+    peaks = et.strain_peaks(twist)
+    assert float(peaks["true_twist_peak"]) == pytest.approx(0.22, abs=1e-6)
+
+
+def test_table_has_the_numbers_of_the_curves_of_every_view_and_of_the_heart(repository):
+    table = et.strain_summary(repository, trackers=["one"]).set_index(["view", "quantity"])
+    np.testing.assert_allclose(table.loc[("long", "gls"), "tracked_es"], -18, atol=1e-4)
+    np.testing.assert_allclose(table.loc[("mid", "gcs_endocardial"), "true_peak"], -33, atol=1e-4)
+    np.testing.assert_allclose(
+        table.loc[("all", "radial"), ["tracked_es", "true_es"]].astype(float), [36, 40], atol=1e-4
+    )
+    np.testing.assert_allclose(table.loc[("all", "twist"), "true_es"], np.degrees(0.2), atol=1e-4)
+    np.testing.assert_allclose(table.loc[("basal", "rotation"), "true_es"], np.degrees(-0.04), atol=1e-4)
+    for (view, quantity), curve, place in (
+        (("mid", "gcs"), "line_strain", {"contour": "middle"}),
+        (("long", "radial"), "region_strain", {"measure": "engineering", "region": 0, "wall_component": "RR"}),
+    ):
+        peaks = et.strain_peaks(et.strain_curves(repository, view=view, tracker="one")).sel(place)
+        for what in ("tracked", "true"):
+            of = f"{what}_{curve}"
+            row = table.loc[(view, quantity)]
+            assert row[f"{what}_time_to_peak_ms"] == pytest.approx(1e3 * float(peaks[f"{of}_time_to_peak"]))
+            assert row[f"{what}_systolic_rate"] == pytest.approx(float(peaks[f"{of}_systolic_rate"]))
+    assert ("long", "gcs") not in table.index and ("mid", "gls") not in table.index
+    assert set(table.loc[("all", "twist"), ["unit", "rate_unit"]]) == {"degree", "degree s-1"}
+
+
+def test_mean_of_a_heart_is_over_all_its_views_or_there_is_none(repository):
+    table = et.strain_summary(repository, trackers=["one"], views=["basal", "apical", "long"])
+    of_heart = set(table.loc[table["view"] == "all", "quantity"])
+    assert of_heart == {"gls", "gls_endocardial", "twist"}
+
+
+@pytest.mark.parametrize(
+    "given, expected",
+    [
+        ({"tracker": "three"}, r"^tracker = 'three': use one of one, two\.$"),
+        ({"size": 512}, r"^size = 512: use one of 128, 64\.$"),
+        ({"view": "top"}, r"^view = 'top': use one of apical, mid, basal, long\.$"),
+        ({"case": "other"}, r"^case = 'other': use one of heart\.$"),
+        ({"reference": "truth"}, r"^reference = 'truth': use one of heart, plane, operator\.$"),
+    ],
+)
+def test_what_there_is_not_is_refused_in_one_sentence(repository, given, expected):
+    with pytest.raises(ValueError, match=expected):
+        et.strain_curves(repository, **{"tracker": "one"} | given)
+
+
+def test_curves_without_their_attributes_have_no_peaks(repository):
+    curves = et.strain_curves(repository, view="mid", tracker="one").drop_attrs()
+    with pytest.raises(ValueError, match="lost its attribute es_frame"):
+        et.strain_peaks(curves)
+    with pytest.raises(ValueError, match=r"^view = 'top': use one of"):
+        et.strain_summary(repository, views=["top"])

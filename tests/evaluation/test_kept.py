@@ -1,0 +1,153 @@
+"""Displacement and curves of a tracker from outside, stored beside those of the repository."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from known_repository import SETTINGS, make
+
+import echotruth as et
+from echotruth.evaluation import kept
+from echotruth.evaluation.run import prepare
+from echotruth.evaluation.tracker_options import EvaluationError
+from echotruth.repository import ledger
+from echotruth.repository.ledger import record_path
+
+TRACKER = """
+import numpy as np
+
+def steps(frames, points, mask, spacing, frame_time, seed):
+    course = np.arange(len(frames))[:, None, None]
+    return course * np.array([1.0, -2.0]) * np.ones((1, len(points), 2)), np.full((len(frames), len(points)), 0.5)
+
+def large_only(frames, points, mask, spacing, frame_time, seed):
+    if frames.shape[-1] < 128:
+        raise MemoryError("no room")
+    return steps(frames, points, mask, spacing, frame_time, seed)
+"""
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A repository of one heart that moves as a rigid body, at two image sizes."""
+    folder = tmp_path_factory.mktemp("kept") / "known"
+    return make(folder, SETTINGS | {"tracking": SETTINGS["tracking"] | {"grid_px": 2}}).folder
+
+
+@pytest.fixture
+def repository(finished, tmp_path, monkeypatch):
+    """A copy of it, where the trackers are."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
+    Path("mine.py").write_text(TRACKER)
+    return Path(shutil.copytree(finished, tmp_path / "known"))
+
+
+def evaluate(folder, function="steps", sizes=(), views=(), keep=True):
+    run = prepare(folder, "mine", {"method": "external", "track": f"mine:{function}"}, keep)
+    case_views, sizes = run.case_views([], list(views)), run.sizes(list(sizes))
+    run.check_writable()
+    return run.write(list(run.rows(case_views, sizes)))
+
+
+def test_kept_displacement_is_what_the_tracker_returned_in_metres_on_the_grid(repository):
+    evaluate(repository)
+    for size in (128, 64):
+        found = et.load_points(repository, view="mid", tracker="mine", size=size)
+        spacing = 12e-3 / size
+        inside = found["layer"].values > 0
+        assert inside.any() and np.isnan(found["displacement"].values[:, ~inside]).all()
+        moved = found["displacement"].values[:, inside]
+        expected = np.arange(3)[:, None, None] * np.array([1, -2]) * spacing * np.ones((1, inside.sum(), 1))
+        np.testing.assert_allclose(moved, expected, atol=1e-6)
+        np.testing.assert_array_equal(found["quality"].values[:, inside], 0.5)
+        assert found.attrs["tracker"] == "mine"
+
+
+def test_kept_curves_are_read_like_those_of_the_repository(repository):
+    evaluate(repository)
+    mine, own = (et.strain_curves(repository, view="mid", tracker=name, size=64) for name in ("mine", "two"))
+    assert set(mine) == set(own) and mine.sizes == own.sizes
+    np.testing.assert_array_equal(mine["true_line_strain"], own["true_line_strain"])
+    # A tracker that shifts all points alike finds neither strain nor rotation, where there are points enough to say so.
+    for name in ("tracked_region_strain", "tracked_rotation", "tracked_line_strain"):
+        seen = mine[name].values[np.isfinite(mine[name].values)]
+        np.testing.assert_allclose(seen, 0, atol=1e-4)
+    table = et.strain_summary(repository, trackers=["mine"])
+    assert set(table["tracker"]) == {"mine"} and set(table["view"]) == {"mid", "long", "all"}
+
+
+def test_kept_trackers_stand_after_those_of_the_repository(repository):
+    config = et.configure(repository / "config.yaml")
+    assert kept.trackers(repository, config) == ["one", "two"]
+    evaluate(repository)
+    assert kept.trackers(repository, config) == ["one", "two", "mine"]
+    with pytest.raises(ValueError, match=r"^tracker = 'other': use one of one, two, mine\.$"):
+        et.strain_curves(repository, tracker="other")
+
+
+def test_what_was_not_evaluated_is_unknown_or_refused(repository):
+    evaluate(repository, sizes=[128], views=["mid"])
+    assert np.isnan(et.load_points(repository, view="mid", tracker="mine", size=64)["displacement"]).all()
+    with pytest.raises(ValueError, match=r"^tracker = 'mine': it was not evaluated on heart long\.$"):
+        et.strain_curves(repository, view="long", tracker="mine")
+    table = et.strain_summary(repository)
+    assert set(table.loc[table["tracker"] == "mine", "view"]) == {"mid", "all"}
+
+
+def test_size_at_which_the_tracker_failed_is_unknown_and_the_other_is_there(repository):
+    table = evaluate(repository, "large_only", views=["mid"])
+    assert list(table["failure"] != "") == [False, True]
+    large, small = (et.load_points(repository, view="mid", tracker="mine", size=size) for size in (128, 64))
+    assert np.isfinite(large["displacement"]).any() and np.isnan(small["displacement"]).all()
+
+
+def test_images_made_anew_are_not_those_that_were_tracked(repository):
+    evaluate(repository)
+    path = record_path(repository, "bmode", "heart", "mid")
+    record = ledger.read(path)
+    ledger.commit(path, record | {"sha256": record["sha256"] | {sorted(record["sha256"])[0]: 64 * "0"}})
+    with pytest.raises(ValueError, match=r"^tracker = 'mine': it was evaluated on older images of heart mid"):
+        et.load_points(repository, view="mid", tracker="mine")
+    assert et.load_points(repository, view="long", tracker="mine") is not None
+
+
+def test_points_of_another_grid_are_not_those_that_were_tracked(repository):
+    evaluate(repository, views=["mid"])
+    path = repository / "config.yaml"
+    path.write_text(path.read_text().replace("grid_px: 2", "grid_px: 4"))
+    with pytest.raises(ValueError, match=r"^tracker = 'mine': it was evaluated with another tracking\.grid_px"):
+        et.load_points(repository, view="mid", tracker="mine")
+
+
+def test_later_evaluation_replaces_what_was_kept_and_one_that_keeps_nothing_removes_it(repository):
+    evaluate(repository)
+    evaluate(repository, views=["mid"])
+    with pytest.raises(ValueError, match="not evaluated on heart long"):
+        et.load_points(repository, view="long", tracker="mine")
+    assert sorted(path.name for path in (repository / "external").iterdir()) == ["mine.csv", "mine.zarr"]
+    evaluate(repository, keep=False)
+    assert [path.name for path in (repository / "external").iterdir()] == ["mine.csv"]
+    assert len(pd.read_csv(repository / "external/mine.csv")) == 4
+
+
+def test_evaluation_that_is_broken_off_leaves_nothing_and_what_was_kept_before(repository):
+    evaluate(repository, views=["mid"])
+    run = prepare(repository, "mine", {"method": "external", "track": "mine:steps"}, keep=True)
+    run.check_writable()
+    rows = run.rows(run.case_views([], []), run.sizes([]))
+    next(rows)
+    rows.close()
+    assert sorted(path.name for path in (repository / "external").iterdir()) == ["mine.csv", "mine.zarr"]
+    assert np.isfinite(et.load_points(repository, view="mid", tracker="mine")["displacement"]).any()
+
+
+def test_folder_that_cannot_hold_the_displacement_is_refused_in_one_sentence(repository):
+    (repository / "external").write_text("")
+    run = prepare(repository, "mine", {"method": "external", "track": "mine:steps"}, keep=True)
+    with pytest.raises(EvaluationError, match="external cannot hold the scores"):
+        run.check_writable()
