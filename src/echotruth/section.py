@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from math import log, pi
 from types import SimpleNamespace
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints, Tag
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    StringConstraints,
+    Tag,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 UNITS: dict[str, float] = {
     "um": 1e-6,
@@ -43,6 +54,22 @@ Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_
 def invalid(key: str, value: object, remedy: str) -> PydanticCustomError:
     """Validation error of a key whose value conflicts with other keys of its section."""
     return PydanticCustomError("invalid", "{remedy}", {"key": key, "value": value, "remedy": remedy})
+
+
+Check = TypeVar("Check", bound=Callable[[Any], object])
+_CHECK = "is_check"
+
+
+def check(method: Check) -> Check:
+    """Mark a method of a section that raises :func:`invalid` if its keys conflict; all that fail are told at once."""
+    setattr(method, _CHECK, True)
+    return method
+
+
+@cache
+def _checks(section: type[Section]) -> list[Callable[[Section], object]]:
+    """The checks of a section, in the order in which they are written."""
+    return [method for kind in reversed(section.mro()) for method in vars(kind).values() if hasattr(method, _CHECK)]
 
 
 def unit_of(key: str) -> str:
@@ -85,6 +112,19 @@ class Section(BaseModel):
 
     def resolved(self) -> Section:
         """The section with every value filled in that follows from a preset."""
+        return self
+
+    @model_validator(mode="after")
+    def _run_checks(self) -> Section:
+        errors: list[PydanticCustomError] = []
+        for run in _checks(type(self)):
+            try:
+                run(self)
+            except PydanticCustomError as error:
+                errors.append(error)
+        if errors:
+            details = [InitErrorDetails(type=error, input=None) for error in errors]
+            raise ValidationError.from_exception_data(type(self).__name__, details)
         return self
 
 

@@ -97,7 +97,7 @@ MALFORMED = {
     "a reserved character": ("name: @a", "put text that begins with a special character in quotes"),
     "a line break in a key": ('"a\\nb": 1', "a\\nb is not a key"),
     "a line break in a name": ('views: {"mid\\n": {}}', "use letters, digits and underscores only"),
-    "a section that is null": ("bmode:", "bmode = null: must be a mapping of keys to values"),
+    "a section that is a number": ("bmode: 3", "bmode = 3: must be a mapping of keys to values"),
     "a short list": ("motion: {affine: {gradient: [[1]]}}", "gradient.0 = [1]: must have 3 entries or more"),
 }
 
@@ -233,7 +233,7 @@ def test_every_hostile_file_is_refused_within_two_seconds_and_300_MiB(tmp_path):
         "        load(path)\n"
         "        print(path, 'accepted')\n"
         "    except ConfigError as error:\n"
-        "        '\\n' in str(error) and print(path, 'several lines')\n"
+        "        len(str(error).splitlines()) > 21 and print(path, 'many lines')\n"
         "    if time.process_time() - start > 2:\n"
         "        print(path, 'slow')\n"
         # Not `ru_maxrss`, which a process inherits from the one that started it.

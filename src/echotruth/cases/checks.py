@@ -13,6 +13,7 @@ from echotruth.cases.ids import exact
 from echotruth.cases.rows import source_of
 from echotruth.config import Config, Section
 from echotruth.config.loading import ConfigError
+from echotruth.config.reading import Errors
 from echotruth.config.table import LABEL
 
 NOT_SWEPT = (
@@ -31,16 +32,20 @@ def check_keys(config: Config, source: str) -> None:
     Raises
     ------
     ConfigError
-        With the key that cannot.
+        With the keys that cannot.
     """
     places: dict[str, str] = {}
+    errors = Errors()
     for key, place in _keys(config):
-        if key in places:
-            raise ConfigError(f"{source}: {place}: {key} is swept by {places[key]} too: give it in one of them")
-        places[key] = place
-        _check_swept_key(config, key, f"{source}: {place}")
+        with errors.collecting():
+            if key in places:
+                raise ConfigError(f"{source}: {place}: {key} is swept by {places[key]} too: give it in one of them")
+            places[key] = place
+            _check_swept_key(config, key, f"{source}: {place}")
     for key, values in config.cases.grid.items():
-        _check_distinct(key, values, source)
+        with errors.collecting():
+            _check_distinct(key, values, source)
+    errors.raise_all(source)
 
 
 def check_ids(hearts: list[tuple[Combination, Case]], source: str) -> None:

@@ -16,6 +16,7 @@ from echotruth.cases.conditions import Condition, ConditionError
 from echotruth.cases.sections import Sweep
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError
+from echotruth.config.reading import Errors
 from echotruth.config.table import LABEL
 
 
@@ -26,8 +27,17 @@ def expand(config: Config, source: str = "configuration") -> list[Case]:
     ------
     ConfigError
         If a key cannot be swept, a combination is not valid, a file is missing, or conditions leave no case.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> config = et.configure(cases={"geometry.wall_mm": [0.9, 1.1], "seed": [1, 2]})
+    >>> [case.id for case in et.expand(config)]
+    ['wall0.9_b94424', 'wall0.9_seed2_74e3c3', 'wall1.1_e79e50', 'wall1.1_seed2_7c0d55']
     """
-    hearts = list(_hearts(config, source))
+    errors = Errors()
+    hearts = list(_hearts(config, source, errors))
+    errors.raise_all(source)
     if not hearts:
         raise ConfigError(f"{source}: cases.where leaves out all {config.cases.number} cases: widen a condition")
     check_ids(hearts, source)
@@ -37,7 +47,10 @@ def expand(config: Config, source: str = "configuration") -> list[Case]:
 
 def all_cases(config: Config) -> dict[str, Case]:
     """Cases by id; the files that they name need not be there any more."""
-    return {case.id: case for _, case in _hearts(config, config.name)}
+    errors = Errors()
+    cases = {case.id: case for _, case in _hearts(config, config.name, errors)}
+    errors.raise_all(config.name)
+    return cases
 
 
 def find_case(config: Config, id: str) -> Case:
@@ -66,13 +79,18 @@ def combinations(config: Config, source: str) -> Iterator[Combination]:
                 yield replace(row, parameters=parameters, origin=origin)
 
 
-def _hearts(config: Config, source: str) -> Iterator[tuple[Combination, Case]]:
-    """Combinations that meet the conditions, and their cases."""
+def _hearts(config: Config, source: str, errors: Errors) -> Iterator[tuple[Combination, Case]]:
+    """Combinations that meet the conditions, and their cases; what is wrong with them is collected."""
     check_keys(config, source)
     sweep, conditions = Sweep(config, source), _conditions(config, source)
     for heart in combinations(config, source):
-        if _meets(conditions, sweep, heart):
+        # A condition that cannot be asked of one case can be asked of no other: that error stands alone.
+        if not _meets(conditions, sweep, heart):
+            continue
+        with errors.collecting():
             yield heart, sweep.case(heart)
+        if errors.are_enough:
+            return
 
 
 def _draws(config: Config) -> list[tuple[str, dict]]:

@@ -12,6 +12,7 @@ from echotruth.cases.case import Case, Combination, Label
 from echotruth.cases.ids import GIVEN, GIVEN_LENGTH, LONGEST, integer_if_whole
 from echotruth.config import Config, Section
 from echotruth.config.loading import ConfigError
+from echotruth.config.reading import Errors
 from echotruth.config.table import CASE, LABEL, NOTE, Table
 
 _LABEL = re.compile(r"label\.[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -80,15 +81,22 @@ def _written_label(label: Label) -> str:
 def _parameters(config: Config, table: Table, source: str) -> list[dict[str, Any]]:
     """Dotted key -> value of the cells that are not empty, in each row."""
     parameters: list[dict[str, Any]] = [{} for _ in table.cells]
+    errors = Errors()
     for key in table.keys:
         allowed = _types(config, key)
         for number, values, cell in zip(table.numbers, parameters, _column(table, key), strict=True):
             if cell:
-                try:
-                    values[key] = cells.value(cell, allowed)
-                except cells.CellError as error:
-                    raise ConfigError(f"{source}, row {number}: {key} = {cell[:80]!r}: {error}") from None
+                with errors.collecting():
+                    values[key] = _cell(cell, allowed, f"{source}, row {number}: {key}")
+    errors.raise_all(source)
     return parameters
+
+
+def _cell(text: str, allowed: frozenset[type], place: str) -> Any:
+    try:
+        return cells.value(text, allowed)
+    except cells.CellError as error:
+        raise ConfigError(f"{place} = {text[:80]!r}: {error}") from None
 
 
 def _types(config: Config, dotted_key: str) -> frozenset[type]:

@@ -38,7 +38,8 @@ def configure(source: Source = None, **keys: Any) -> Config:
 
     Examples
     --------
-    >>> configure(geometry={"preset": "rat"}).probe.preset
+    >>> import echotruth as et
+    >>> et.configure(geometry={"preset": "rat"}).probe.preset
     'rat_15MHz'
     """
     if isinstance(source, Config):

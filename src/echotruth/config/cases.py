@@ -118,8 +118,8 @@ class Cases(Section):
     """CSV file with a row for each heart: columns of dotted keys, `case` (id), `label.NAME` and `note`. An empty cell
     has the value of the configuration."""
     table: str | None = None
-    """The text of such a file, in its place: so the configuration of a repository has it, and needs the file no
-    more."""
+    """Text of such a file, instead of `file`. The configuration that a run stores with a repository has it, so that the
+    file is not needed again."""
     draw: Draw | None = None
     """Hearts drawn at random: each has one value of every key in `keys`."""
     where: Annotated[

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat
 
 from echotruth.config.anatomy import HEART_PRESETS, Lengths
-from echotruth.section import Positive, Section, invalid
+from echotruth.section import Positive, Section, check, invalid
 
 Factor = Annotated[FiniteFloat, Field(ge=0.2, le=5)]
 
@@ -119,7 +119,7 @@ class Geometry(Section):
         """The section with the lengths of the preset filled in, if the shape is not read from a file."""
         return self if self.file else self.model_copy(update=self.lengths())
 
-    @model_validator(mode="after")
+    @check
     def _check_base_plane(self) -> Geometry:
         lengths = self.lengths()
         if abs(lengths["base_mm"]) >= lengths["endo_length_mm"]:
@@ -127,7 +127,7 @@ class Geometry(Section):
             raise invalid("base_mm", lengths["base_mm"], remedy)
         return self
 
-    @model_validator(mode="after")
+    @check
     def _check_keys_of_source(self) -> Geometry:
         if self.file is None:
             self._refuse(_FILE_KEYS, "applies to a wall read from a file: give geometry.file, or leave it out")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat
 
-from echotruth.section import Fraction, Positive, Section, invalid
+from echotruth.section import Fraction, Positive, Section, check, invalid
 
 
 class View(Section):
@@ -99,7 +99,7 @@ class Rf(Section):
         """Distance of the nearest and of the farthest transmit focus from `focus_mm`, mm."""
         return (self.focal_zones - 1) / 2 * self.focal_spacing_mm if self.transmit == "focused" else 0.0
 
-    @model_validator(mode="after")
+    @check
     def _check_foci(self) -> Rf:
         if self.focus_mm <= self.focal_half_span_mm:
             foci = f"its focal_zones = {self.focal_zones} foci, focal_spacing_mm = {self.focal_spacing_mm:g} apart"
@@ -107,7 +107,7 @@ class Rf(Section):
             raise invalid("focus_mm", self.focus_mm, remedy)
         return self
 
-    @model_validator(mode="after")
+    @check
     def _check_keep(self) -> Rf:
         if len(set(self.keep)) < len(self.keep):
             raise invalid("keep", self.keep, "list each entry once")
@@ -134,7 +134,7 @@ class Bmode(Section):
         """Pixels along a side of every image size, largest first."""
         return tuple(self.size_px // divisor for divisor in sorted(self.downsampling))
 
-    @model_validator(mode="after")
+    @check
     def _check_sizes(self) -> Bmode:
         for divisor in self.downsampling:
             if self.size_px % divisor or self.size_px // divisor < 16:

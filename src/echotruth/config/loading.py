@@ -11,10 +11,12 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from echotruth.config.reading import ConfigError, check_size, read_yaml, shown_key
+from echotruth.config.reading import ConfigError, Errors, check_size, read_yaml, shown_key
 from echotruth.config.sections import Config
 from echotruth.materials import Material
 from echotruth.section import Section, discriminator, variants
+
+__all__ = ["ConfigError", "load", "override", "read_yaml", "replace_values", "validate"]
 
 
 def load(path: str | Path) -> Config:
@@ -39,9 +41,12 @@ def validate(values: dict[str, Any], source: str) -> Config:
     if isinstance(values, dict):
         check_size(values, source)
     try:
-        return Config.model_validate(_with_tuples(values))
+        return Config.model_validate(_with_tuples(_without_empty(values, Config)))
     except ValidationError as error:
-        raise ConfigError(f"{source}: {_message(error.errors()[0])}") from None
+        errors = Errors()
+        for each in _distinct(error.errors()):
+            errors.add(f"{source}: {_message(each)}")
+        raise errors.joined(source) from None
 
 
 def override(config: Config, changes: dict[str, Any], source: str = "cases") -> Config:
@@ -67,6 +72,19 @@ def replace_values(values: dict[str, Any], changes: dict[str, Any]) -> dict[str,
     return values
 
 
+def _without_empty(values: Any, model: type[BaseModel]) -> Any:
+    """Leave out sections of which nothing is given, as YAML has them if all their keys are commented out."""
+    if not isinstance(values, dict):
+        return values
+    found = {}
+    for key, value in values.items():
+        annotation = model.model_fields[key].annotation if key in model.model_fields else None
+        section = annotation if isinstance(annotation, type) and issubclass(annotation, Section) else None
+        if value is not None or not (section or (variants(annotation) and get_origin(annotation) is not dict)):
+            found[key] = _without_empty(value, section) if section else value
+    return found
+
+
 def _with_tuples(values: Any) -> Any:
     """Convert `bmode.downsampling` to the tuple that the strict model requires; YAML has only lists."""
     if isinstance(values, dict) and isinstance(values.get("bmode"), dict):
@@ -76,9 +94,25 @@ def _with_tuples(values: Any) -> Any:
     return values
 
 
+def _distinct(errors: list[ErrorDetails]) -> list[ErrorDetails]:
+    """One error of each value: pydantic tells one for each type that it may have."""
+    found: dict[tuple[Any, ...], ErrorDetails] = {}
+    for number, error in enumerate(errors):
+        location = _without_type(list(error["loc"]))
+        found.setdefault((number,) if error["type"] == "invalid" else tuple(location), error)
+    # A key that is not one explains what else is wrong.
+    return sorted(found.values(), key=lambda error: error["type"] != "extra_forbidden")
+
+
+def _without_type(location: list[Any]) -> list[Any]:
+    """Location without the type that follows the number of an entry of a list, if it may have several."""
+    *place, last = location or [None]
+    return place if last in ("int", "str") and place and isinstance(place[-1], int) else location
+
+
 def _message(error: ErrorDetails) -> str:
     context = error.get("ctx", {})
-    keys, model, sections = _locate([part for part in error["loc"] if part != "[key]"])
+    keys, model, sections = _locate([part for part in _without_type(list(error["loc"])) if part != "[key]"])
     if error["type"] == "invalid":
         keys.append(context["key"])
     if error["type"] in _UNKNOWN_VARIANT:
@@ -91,7 +125,8 @@ def _message(error: ErrorDetails) -> str:
     if error["type"] == "missing":
         return f"{dotted_key} is missing: it must be given"
     value = context["value"] if error["type"] == "invalid" else error["input"]
-    return f"{dotted_key} = {_shown_value(value)}: {_remedy(error, context)}"
+    given = f"{dotted_key} = {_shown_value(value)}" if keys else _shown_value(value)
+    return f"{given}: {_remedy(error, context)}"
 
 
 def _shown_value(value: Any) -> str:

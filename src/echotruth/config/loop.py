@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat
 
-from echotruth.section import Section, invalid
+from echotruth.section import Section, check, invalid
 
 Volume = Annotated[FiniteFloat, Field(gt=0, le=1e8)]
 Pressure = Annotated[FiniteFloat, Field(gt=0, le=1e4)]
@@ -37,7 +37,7 @@ class Loop(Section):
     frames: Annotated[int, Field(ge=2, le=1000)] = 40
     """Frames of one cycle; frame 0 is end-diastole."""
 
-    @model_validator(mode="after")
+    @check
     def _ejects(self) -> Loop:
         if self.edv_uL is not None and self.esv_uL is not None and self.esv_uL >= self.edv_uL:
             raise invalid("esv_uL", self.esv_uL, f"must be smaller than edv_uL = {self.edv_uL}")
@@ -45,7 +45,7 @@ class Loop(Section):
             raise invalid("esp_mmHg", self.esp_mmHg, f"must be greater than edp_mmHg = {self.edp_mmHg}")
         return self
 
-    @model_validator(mode="after")
+    @check
     def _maps_what_it_prescribes(self) -> Loop:
         for key in ("edv_uL", "esv_uL", "edp_mmHg", "esp_mmHg"):
             missing = "volume" if key.endswith("uL") else "pressure"

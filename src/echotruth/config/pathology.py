@@ -26,9 +26,9 @@ class Infarct(Section):
     radius_mm: Positive | None = None
     """Radius of a sphere centred in the middle of the wall at `position` and `azimuth_deg`."""
     position: Fraction = 0.5
-    """Ball only: position of its centre along the long axis, 0 at the base, 1 at the endocardial apex."""
+    """Sphere only: position of its centre along the long axis, 0 at the base, 1 at the endocardial apex."""
     azimuth_deg: Annotated[FiniteFloat, Field(ge=-180, le=180)] = 90.0
-    """Ball only: azimuth of its centre; septal 0, anterior 90, lateral 180, inferior -90."""
+    """Sphere only: azimuth of its centre; septal 0, anterior 90, lateral 180, inferior -90."""
     transmurality: Annotated[FiniteFloat, Field(gt=0, le=1)] = 1.0
     """Wall depth to which the tissue is infarcted, from the endocardium."""
     tension_scale: Fraction = 0.0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,75 @@ MAX_VALUES = 100_000
 """Largest number of values of a file, keys included, each counted as often as aliases repeat it."""
 
 
+MAX_ERRORS = 20
+"""Largest number of errors that are told at once."""
+
+
 class ConfigError(ValueError):
-    """Raised if a configuration cannot be run; the message names file, key, value and remedy."""
+    """Raised if a configuration cannot be run; each line of the message names file, key, value and remedy."""
+
+
+class Errors:
+    """Collects the errors of a configuration, so that all are told at once.
+
+    Examples
+    --------
+    >>> errors = Errors()
+    >>> for number in (1, 2):
+    ...     with errors.collecting():
+    ...         raise ConfigError(f"a.yaml: error {number}")
+    >>> errors.raise_all("a.yaml")
+    Traceback (most recent call last):
+    ...
+    echotruth.config.reading.ConfigError: a.yaml: error 1
+    a.yaml: error 2
+    """
+
+    def __init__(self) -> None:
+        self.lines: dict[str, None] = {}
+        self.number = 0
+
+    def add(self, message: str) -> None:
+        """Keep an error; one that is known already is not told twice."""
+        self.number += 1
+        self.lines |= dict.fromkeys(message.splitlines())
+
+    @contextmanager
+    def collecting(self) -> Iterator[None]:
+        """Keep the error that is raised within."""
+        try:
+            yield
+        except ConfigError as error:
+            self.add(str(error))
+
+    @property
+    def are_enough(self) -> bool:
+        """Whether there are more than are told, or so many alike that a search for others takes long."""
+        return len(self.lines) > MAX_ERRORS or self.number >= 10 * MAX_ERRORS
+
+    def joined(self, source: str) -> ConfigError:
+        """The errors as one, a line each.
+
+        Parameters
+        ----------
+        source : str
+            What the line names that says how many more there are.
+        """
+        lines = list(self.lines)
+        if len(lines) > MAX_ERRORS:
+            more = f"{source}: at least {len(lines) - MAX_ERRORS} more errors: correct these first"
+            lines = [*lines[:MAX_ERRORS], more]
+        return ConfigError("\n".join(lines))
+
+    def raise_all(self, source: str) -> None:
+        """Raise the errors as one, if there are any; `source` as in :meth:`joined`.
+
+        Raises
+        ------
+        ConfigError
+        """
+        if self.lines:
+            raise self.joined(source)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
 from echotruth.config.realism import Realism
 from echotruth.config.tracking import PhaseCorrelation, Tracking
-from echotruth.section import Name, Section, invalid
+from echotruth.section import Name, Section, check, invalid
 
 _TRACKER_LENGTHS = ("window_mm", "windows_mm", "subset_mm", "knots_mm")
 """Keys of trackers that must not exceed the image."""
@@ -59,7 +59,7 @@ class Config(Section):
     def _apply_presets(cls, values: Any) -> Any:
         return apply_presets(values) if isinstance(values, dict) else values
 
-    @model_validator(mode="after")
+    @check
     def _check_lengths(self) -> Config:
         side, rf = self.bmode.field_of_view_mm, self.rf
         for name, tracker in self.tracking.trackers.items():
@@ -85,14 +85,14 @@ class Config(Section):
             if max(length if isinstance(length, list) else [length or 0]) > side:
                 raise invalid(f"{path}.{key}", length, f"must not exceed bmode.field_of_view_mm = {side:g}")
 
-    @model_validator(mode="after")
+    @check
     def _check_view_names(self) -> Config:
         if ALL_VIEWS in self.views:
             remedy = "is the name of the mean over all views in the leaderboard: give the view another name"
             raise invalid("views", ALL_VIEWS, remedy)
         return self
 
-    @model_validator(mode="after")
+    @check
     def _check_focus(self) -> Config:
         radius = 0.0 if self.geometry.file else self.geometry.outer_radius_mm()
         if self.rf.focus_mm <= radius:
@@ -100,7 +100,7 @@ class Config(Section):
             raise invalid("rf.focus_mm", self.rf.focus_mm, remedy)
         return self
 
-    @model_validator(mode="after")
+    @check
     def _check_shape(self) -> Config:
         kind, shape = self.motion.kind, self.geometry.shape
         if kind == "tube" and shape != "tube":
@@ -110,7 +110,7 @@ class Config(Section):
             raise invalid("geometry.shape", shape, remedy)
         return self
 
-    @model_validator(mode="after")
+    @check
     def _check_motion_file(self) -> Config:
         if self.motion.kind != "file":
             return self
@@ -128,7 +128,7 @@ class Config(Section):
             raise invalid("loop.heart_rate_per_min", None, remedy)
         return self
 
-    @model_validator(mode="after")
+    @check
     def _check_tissues(self) -> Config:
         for name, tissue in {"blood": self.realism.blood, "surroundings": self.realism.surroundings}.items():
             key, level = f"realism.{name}.level_dB", tissue.level_dB
@@ -140,21 +140,21 @@ class Config(Section):
                 raise invalid(key, level, remedy)
         return self
 
-    @model_validator(mode="after")
+    @check
     def _check_width(self) -> Config:
         length, width = self.probe.elements * self.probe.pitch_um / 1e3, self.rf.width_mm
         if self.rf.scan == "linear" and width is not None and width > length:
             raise invalid("rf.width_mm", width, f"must not exceed {length:g}, the length of the array")
         return self
 
-    @model_validator(mode="after")
+    @check
     def _check_fibres(self) -> Config:
         if self.fibres.source == "file" and self.geometry.fibre is None:
             remedy = "give the name of the array in the mesh file as geometry.fibre, or set this key to rule"
             raise invalid("fibres.source", self.fibres.source, remedy)
         return self
 
-    @model_validator(mode="after")
+    @check
     def _check_stiffness(self) -> Config:
         key, stiffness = "mechanics.material.stiffness_kPa", self.mechanics.material.stiffness_kPa
         prescribed, end_diastolic = self.loop.prescribed, self.geometry.given_state == "end_diastole"
@@ -172,7 +172,7 @@ class Config(Section):
             raise invalid("loop.prescribed", prescribed, remedy)
         return self
 
-    @model_validator(mode="after")
+    @check
     def _check_amounts(self) -> Config:
         check_amounts(self)
         return self

@@ -30,9 +30,10 @@ class Clips(Items):
 
     Examples
     --------
-    >>> clips = Clips("out/demo", views=["mid"], size=256, truth=["displacement"])  # doctest: +SKIP
-    >>> clips[0]["displacement"].shape  # doctest: +SKIP
-    (40, 3, 256, 256)
+    >>> from echotruth.learning import Clips
+    >>> clip = Clips("out/demo", views=["mid"], size=128, truth=["displacement"])[0]
+    >>> clip["displacement"].shape[1:]  # of every frame
+    (3, 128, 128)
     """
 
     def __init__(

@@ -32,6 +32,13 @@ class Diagnosis(Items):
     ------
     ValueError
         If a heart has a diagnosis that is not one of the classes.
+
+    Examples
+    --------
+    >>> from echotruth.learning import Diagnosis
+    >>> clips = Diagnosis("out/demo", views=["mid"], size=128)
+    >>> clips.classes, clips[0]["label"]
+    (['healthy'], 0)
     """
 
     def __init__(

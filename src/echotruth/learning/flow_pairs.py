@@ -36,9 +36,10 @@ class FlowPairs(Items):
 
     Examples
     --------
-    >>> pairs = FlowPairs("out/demo", size=128)  # doctest: +SKIP
-    >>> pairs[0]["flow"].shape  # doctest: +SKIP
-    (2, 128, 128)
+    >>> from echotruth.learning import FlowPairs
+    >>> pairs = FlowPairs("out/demo", size=128)
+    >>> pairs[0]["image"].shape, pairs[0]["flow"].shape
+    ((2, 128, 128), (2, 128, 128))
     """
 
     @property

@@ -58,6 +58,13 @@ class Items(Sequence[Item]):
         If the folder holds no repository.
     ValueError
         If there is no such case, view or size, or one of the clips was not made.
+
+    Examples
+    --------
+    >>> from echotruth.learning import Clips
+    >>> clips = Clips("out/demo", size=128)
+    >>> [item["view"] for item in clips]
+    ['base', 'mid', 'apex', 'long_axis']
     """
 
     def __init__(

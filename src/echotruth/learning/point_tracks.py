@@ -43,6 +43,13 @@ class PointTracks(Items):
     ------
     ValueError
         If the number of points or the frame is not possible.
+
+    Examples
+    --------
+    >>> from echotruth.learning import PointTracks
+    >>> item = PointTracks("out/demo", views=["mid"], size=128, points=5)[0]
+    >>> item["position"].shape[1:], item["start"]
+    ((5, 2), 0)
     """
 
     def __init__(

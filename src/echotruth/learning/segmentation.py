@@ -26,6 +26,13 @@ class Segmentation(Items):
     target : {"wall", "layer", "segment", "region"}
         What the label is: wall 1 and the rest 0; transmural layer, 1 at the endocardium, or AHA segment, 0 outside; or
         region of disease, 0 healthy or outside (docs/schema.md).
+
+    Examples
+    --------
+    >>> from echotruth.learning import Segmentation
+    >>> item = Segmentation("out/demo", views=["mid"], size=128, target="wall")[0]
+    >>> item["image"].shape, item["label"].shape, sorted(set(item["label"].ravel().tolist()))
+    ((1, 128, 128), (128, 128), [0, 1])
     """
 
     def __init__(

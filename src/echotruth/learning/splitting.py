@@ -46,9 +46,10 @@ def split(
     Examples
     --------
     >>> import pandas as pd
+    >>> from echotruth.learning import split
     >>> hearts = pd.DataFrame({"heart": [f"heart{number}" for number in range(100)]})
     >>> {name: len(part) for name, part in split(hearts, {"train": 0.8, "test": 0.2}, seed=1).items()}
-    {'train': 79, 'test': 21}
+    {'train': 82, 'test': 18}
     """
     values = np.array(list(fractions.values()), float)
     if not (len(values) and (values > 0).all() and abs(values.sum() - 1) < 1e-9):

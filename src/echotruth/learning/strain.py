@@ -23,6 +23,13 @@ class Strain(Items):
     ----------
     repository, cases, views, size
         See :class:`Items`.
+
+    Examples
+    --------
+    >>> from echotruth.learning import Strain
+    >>> item = Strain("out/demo", views=["mid"], size=128)[0]
+    >>> len(item["strain"]) == len(item["time"]), item["strain"].shape[1]
+    (True, 6)
     """
 
     def item(self, place: Place, within: int) -> Item:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +50,13 @@ def cases(repository: str | Path, query: str | None = None, measurements: bool =
         If the folder holds no repository.
     ValueError
         If the query cannot be evaluated.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> table = et.learning.cases("out/demo", "status == 'complete'")
+    >>> list(table.index), list(table["diagnosis"])
+    (['heart'], ['healthy'])
     """
     reader = Reader(repository)
     found = _columns(reader)
@@ -128,6 +137,23 @@ def _selected(found: pd.DataFrame, constants: dict[str, Any], query: str) -> pd.
     try:
         return found.join(same).query(query).index
     except Exception as error:  # pandas, its parser and its engine have many kinds
-        raise ValueError(
-            f"query = {query!r}: {str(error).splitlines()[0]}: write it over columns of the table."
-        ) from None
+        columns = [str(name) for name in (*found, *same)]
+        raise ValueError(f"query = {query!r}: {_reason(error, query, columns)}") from None
+
+
+def _reason(error: Exception, query: str, columns: list[str]) -> str:
+    """Why a query cannot be evaluated, and what would be right."""
+    match = re.search(r"name '(.+?)' is not defined", str(error))
+    if match is None:
+        if re.search(r"(?<![=!<>])=(?!=)", query):
+            return "has a single =: compare by ==."
+        said = re.sub(r" \(<unknown>.*", "", " ".join(str(error).split()))[:200].rstrip(".") or type(error).__name__
+        return f"cannot be evaluated ({said}): write it as status == 'complete' and `fibres.endo_deg` > 60."
+    name = match[1].replace("BACKTICK_QUOTED_STRING_", "").replace("_DOT_", ".")
+    # Without backticks, a name ends for pandas before its first dot.
+    whole = next((word for word in re.findall(r"[\w.]+", query) if word == name or word.startswith(f"{name}.")), name)
+    if whole in columns:
+        return f"{whole} has a dot: write it in backticks, as `{whole}`."
+    close = get_close_matches(whole, columns, n=1)
+    remedy = f"did you mean {close[0]}?" if close else "echotruth.learning.cases lists them."
+    return f"{whole} is not a column: {remedy}"

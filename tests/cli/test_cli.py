@@ -15,7 +15,7 @@ from echotruth.cases import expand
 from echotruth.cli import main
 from echotruth.config.loading import load
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def run_cli(*arguments, cwd=ROOT):

@@ -1,0 +1,81 @@
+"""Command line: one module a command, each with `add`, which adds its parser, and the function that does it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from difflib import get_close_matches
+
+import echotruth
+from echotruth.cli import (
+    cases,
+    check,
+    completion,
+    describe,
+    evaluate,
+    export,
+    info,
+    merge,
+    new,
+    run,
+    show,
+    status,
+    upload,
+    validate,
+)
+from echotruth.cli.command import Parser, fail
+
+COMMANDS = (new, check, cases, run, status, info, show, evaluate, export, describe, merge, upload, validate, completion)
+"""Modules of the commands, in the order of `echotruth --help`."""
+
+PASSES_ON = "run"
+"""Command of which the options that it does not know are passed on."""
+
+
+def main() -> None:
+    """Entry point of the command `echotruth`."""
+    whole = parser()
+    if len(sys.argv) == 1:
+        whole.print_help()
+        sys.exit(2)
+    arguments, options = whole.parse_known_args()
+    if options and arguments.command != PASSES_ON:
+        sys.exit(fail(_unknown(options[0], arguments.command, whole)))
+    arguments.options = options
+    try:
+        ended = arguments.act(arguments)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.exit(fail("interrupted") and 130)
+    except BrokenPipeError:
+        # Whoever read the output has seen enough; the interpreter would tell so at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except OSError as error:
+        place = f"{error.filename!s:.200}: " if error.filename else ""
+        sys.exit(fail(f"{place}{error.strerror or error}: see that the path is right and you may read and write there"))
+    sys.exit(ended)
+
+
+def parser() -> Parser:
+    """Parser of the whole command line."""
+    whole = Parser(
+        prog="echotruth",
+        description=(echotruth.__doc__ or "").split("\n")[0],
+        epilog="Begin with: echotruth new; echotruth run mouse.yaml. More: echotruth COMMAND --help",
+    )
+    whole.add_argument("--version", action="version", version=echotruth.__version__)
+    commands = whole.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for module in COMMANDS:
+        module.add(commands)
+    return whole
+
+
+def _unknown(option: str, command: str, whole: Parser) -> str:
+    """What to say of an option, or of an argument too many, that a command does not take."""
+    if not option.startswith("-"):
+        return f"{option}: is one argument too many: see echotruth {command} --help"
+    name = option.partition("=")[0]
+    close = get_close_matches(name, whole.options_of(command), n=1)
+    remedy = f"did you mean {close[0]}?" if close else f"see echotruth {command} --help"
+    return f"{name}: is not an option of echotruth {command}: {remedy}"

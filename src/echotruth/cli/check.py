@@ -1,0 +1,55 @@
+"""`echotruth check`: a configuration, or all files and values of a repository."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from echotruth.cli.command import Commands, add_command, add_configuration
+
+STATUSES = {
+    0: "nothing is wrong (jobs not run yet are no damage)",
+    1: "the configuration is not valid, or something is damaged",
+    2: "it cannot be checked",
+}
+
+
+def add(commands: Commands) -> None:
+    """Add the parser of `echotruth check`."""
+    parser = add_command(
+        commands,
+        check,
+        "check a configuration, or all files and values of a repository",
+        "A repository is checked to the end, with one line for each fault.",
+        ["check config/demo.yaml", "check out/demo", "check out/demo --heal"],
+        STATUSES,
+    )
+    text = "YAML file, a name of `echotruth new --list`, or folder of a repository, such as out/demo"
+    add_configuration(parser, text, metavar="path")
+    parser.add_argument(
+        "--heal",
+        action="store_true",
+        help="delete damaged files and their records, so that the next run makes just these",
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="compare the checksums of the files only, and leave out their values"
+    )
+
+
+def check(arguments: argparse.Namespace) -> int:
+    """Check a configuration or a repository; return the exit status."""
+    if arguments.heal or Path(arguments.config).is_dir():
+        from echotruth.workflow.integrity import check_repository
+
+        return check_repository(Path(arguments.config), arguments.heal, arguments.quick)
+    from echotruth.cli.configuration import load_cases
+
+    config, cases = load_cases(arguments.config)
+    print(f"{arguments.config}: valid; cases: {len(cases)}, views per case: {len(config.views)}")
+    from echotruth.cli.estimation import estimated, print_concerns
+    from echotruth.workflow.estimate_text import short
+
+    found, concerns = estimated(config, cases, [])
+    print(f"A run takes {short(found)}.")
+    print_concerns(concerns)
+    return 0

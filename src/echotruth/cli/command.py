@@ -1,0 +1,128 @@
+"""Parser of one command: what it does, its examples and what its exit statuses mean."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import NoReturn
+
+Commands = argparse._SubParsersAction  # type: ignore[type-arg]
+"""What the parsers of commands are added to; argparse has no public name for it."""
+
+Act = Callable[[argparse.Namespace], int]
+"""Function that does a command and returns its exit status."""
+
+WIDTH = 100
+"""Longest line of a description."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser that tells an error in one line, with what was probably meant."""
+
+    def error(self, message: str) -> NoReturn:
+        """Tell an error and end the process with status 2."""
+        if match := re.search(r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message):
+            argument, given, listed = match.groups()
+            close = get_close_matches(given, re.findall(r"[\w.-]+", listed), n=1)
+            remedy = f"did you mean {close[0]}?" if close else f"use one of {listed.replace(chr(39), '')}"
+            message = f"{argument} = {given}: {remedy}"
+        elif meant := self._meant():
+            message = meant  # what is missing is there, under another name
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+    def _meant(self) -> str:
+        """What an option that a command does not take may mean; "" if there is none, or nothing is like it."""
+        known = list(self._option_string_actions)
+        for name in (word.partition("=")[0] for word in sys.argv[1:] if word.startswith("--") and " " in self.prog):
+            if name not in known and (close := get_close_matches(name, known, n=1)):
+                return f"{name} is not an option: did you mean {close[0]}?"
+        return ""
+
+    def options_of(self, command: str) -> list[str]:
+        """Options that a command takes."""
+        (commands,) = (action for action in self._actions if isinstance(action, argparse._SubParsersAction))
+        parser: argparse.ArgumentParser = commands.choices[command]
+        return [text for action in parser._actions for text in action.option_strings if text.startswith("--")]
+
+
+def add_command(
+    commands: Commands,
+    act: Act,
+    summary: str,
+    detail: str = "",
+    examples: Sequence[str] = (),
+    statuses: Mapping[int, str] | None = None,
+    notes: str = "",
+) -> argparse.ArgumentParser:
+    """Add the parser of a command, which has the name of the function that does it.
+
+    Parameters
+    ----------
+    commands : argparse._SubParsersAction
+        What the parser is added to.
+    act : callable
+        Function of the parsed arguments that does the command and returns its exit status.
+    summary : str
+        What it does, in half a sentence.
+    detail : str, optional
+        More about it, in sentences.
+    examples : sequence of str, optional
+        Command lines, without the word echotruth.
+    statuses : mapping, optional
+        What the exit statuses mean.
+    notes : str, optional
+        Lines between the options and the examples, printed as they are.
+
+    Returns
+    -------
+    argparse.ArgumentParser
+        Parser to which the arguments are added.
+    """
+    parts = [notes.rstrip()] if notes else []
+    if examples:
+        parts.append("\n".join(["examples:", *(f"  echotruth {example}" for example in examples)]))
+    if statuses:
+        parts.append("\n".join(["exit status:", *(f"  {status}  {text}" for status, text in statuses.items())]))
+    text = summary[0].upper() + summary[1:] + "." + (f" {detail}" if detail else "")
+    parser: argparse.ArgumentParser = commands.add_parser(
+        act.__name__,
+        help=summary,
+        description=textwrap.fill(text, WIDTH, break_on_hyphens=False),
+        epilog="\n\n".join(parts) or None,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(act=act)
+    return parser
+
+
+def add_configuration(parser: argparse.ArgumentParser, text: str = "", metavar: str | None = None) -> None:
+    """Add the argument that is the file of a configuration, or the name of a shipped one."""
+    text = text or "YAML file, or a name of `echotruth new --list`, such as demo"
+    parser.add_argument("config", metavar=metavar, type=_configuration, help=text)
+
+
+def _configuration(path: str) -> str:
+    from echotruth.config import shipped
+
+    return shipped.found(path)
+
+
+def add_repeated(parser: argparse.ArgumentParser, *options: tuple[str, type, str]) -> None:
+    """Add options that can be repeated, each with its type and its help."""
+    for name, kind, text in options:
+        parser.add_argument(f"--{name}", type=kind, action="append", default=[], help=text)
+
+
+def fail(message: str) -> int:
+    """Print why a command cannot be done, a line for each reason; return its exit status."""
+    print(named(message), file=sys.stderr)
+    return 2
+
+
+def named(message: str) -> str:
+    """What went wrong, each line with the name of the program."""
+    return "\n".join(f"echotruth: {line}" for line in message.splitlines())

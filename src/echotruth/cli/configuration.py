@@ -1,0 +1,23 @@
+"""Configuration and cases that a command is given."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from echotruth.cases import Case, expand
+from echotruth.cli.command import named
+from echotruth.config import Config, shipped
+from echotruth.config.loading import ConfigError, load
+
+
+def load_cases(path: str) -> tuple[Config, list[Case]]:
+    """Configuration in a file and its cases; if they are not valid, end the command with a line for each error."""
+    try:
+        config = load(path)
+        return config, expand(config, path)
+    except ConfigError as error:
+        message = str(error)
+        if Path(path).parent == shipped.folder() and "cases.file" in message:
+            message += f"\n{path}: echotruth new {Path(path).stem} writes it here, with the table that it reads"
+        sys.exit(named(message))

@@ -1,0 +1,45 @@
+"""`echotruth describe`: documents that describe a repository."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from echotruth.cli.command import Commands, add_command, fail
+
+
+def add(commands: Commands) -> None:
+    """Add the parser of `echotruth describe`."""
+    parser = add_command(
+        commands,
+        describe,
+        "write a data card, a citation, Croissant and RO-Crate metadata of a repository",
+        "They are written into its folder (docs/description.md).",
+        ["describe out/demo --license CC-BY-4.0 --author 'Doe, Jane; 0000-0002-1825-0097'"],
+        {0: "all documents are written", 2: "it cannot be described"},
+    )
+    parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
+    parser.add_argument("-o", "--output", type=Path, help="another folder for the documents")
+    parser.add_argument("--license", help="identifier of SPDX, such as CC-BY-4.0, or an address (default: none)")
+    text = "'Family, Given; ORCID; affiliation; its web address', or a group as 'Name; web address'; can be repeated"
+    parser.add_argument("--author", action="append", default=[], help=text)
+    parser.add_argument("--url", help="address at which the repository is published")
+    parser.add_argument("--release", default="1.0.0", help="version of the data (default: 1.0.0)")
+    parser.add_argument("--date", help="day of publication, as 2026-01-31 (default: that of the last job)")
+
+
+def describe(arguments: argparse.Namespace) -> int:
+    """Write the documents that describe a repository; return 0, or 2 if it cannot be described."""
+    from echotruth.repository.description import DescriptionError, attribution
+    from echotruth.repository.description import describe as write
+    from echotruth.workflow import lease
+
+    try:
+        given = attribution(arguments.author, arguments.license, arguments.url, arguments.release, arguments.date)
+        lease.follow(arguments.repository)
+        documents = write(arguments.repository, arguments.output, given)
+    except (DescriptionError, lease.LeaseError) as error:
+        return fail(str(error))
+    for path in documents:
+        print(path)
+    return 0

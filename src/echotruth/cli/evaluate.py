@@ -1,0 +1,68 @@
+"""`echotruth evaluate`: a tracker on every clip of a repository."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from echotruth.cli.command import Commands, add_command, add_repeated, fail
+
+
+def add(commands: Commands) -> None:
+    """Add the parser of `echotruth evaluate`."""
+    parser = add_command(
+        commands,
+        evaluate,
+        "run a tracker on every clip of a repository, score it like the repository's own trackers, write the scores",
+        "See docs/trackers.md.",
+        [
+            "evaluate out/demo --tracker mypackage.module:track",
+            "evaluate out/demo --tracker dis --option preset=fast",
+            'evaluate out/demo --command "track {input} {output}" --name mine',
+        ],
+        {0: "it tracked a clip", 1: "it failed on every clip", 2: "it cannot be evaluated"},
+    )
+    parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
+    tracker = parser.add_mutually_exclusive_group(required=True)
+    tracker.add_argument("--tracker", help="package.module:function, an entry point, or a method of config/README.md")
+    # `arguments.command` is the name of the subcommand.
+    tracker.add_argument("--command", dest="program", help='a program, such as "track {input} {output}"')
+    parser.add_argument("--timeout", type=float, help="longest time of the program per clip, s (default: 3600)")
+    parser.add_argument("--name", help="name of the tracker in the scores (default: derived from the tracker)")
+    parser.add_argument(
+        "--keep", action="store_true", help="store displacement and curves of strain too, as external/NAME.zarr"
+    )
+    add_repeated(
+        parser,
+        ("option", str, "key=value for the tracker; can be repeated"),
+        ("case", str, "case id from cases.csv; can be repeated (default: all)"),
+        ("view", str, "name of the view; can be repeated (default: all)"),
+        ("size", int, "image size, px; can be repeated (default: all)"),
+    )
+    parser.add_argument("--jobs", type=int, default=1, help="processes (default: 1); scores do not depend on it")
+
+
+def evaluate(arguments: argparse.Namespace) -> int:
+    """Evaluate a tracker on a repository; return 0, 1 if it failed on every clip, or 2 if it cannot be evaluated."""
+    from echotruth.config.loading import ConfigError
+    from echotruth.evaluation.availability import check_name, check_runs
+    from echotruth.evaluation.run import format_row, prepare, summary
+    from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
+
+    rows = []
+    try:
+        name, settings = parse_tracker(arguments.tracker, arguments.program, arguments.option, arguments.timeout)
+        if arguments.tracker is not None:
+            check_name(arguments.tracker)
+        evaluation = prepare(arguments.repository, arguments.name or name, settings, arguments.keep)
+        case_views, sizes = evaluation.case_views(arguments.case, arguments.view), evaluation.sizes(arguments.size)
+        check_runs(evaluation.settings)
+        evaluation.check_writable()
+        for row in evaluation.rows(case_views, sizes, arguments.jobs):
+            print(format_row(row), flush=True)
+            rows.append(row)
+        table = evaluation.write(rows)
+    except (EvaluationError, ConfigError) as error:
+        return fail(str(error))
+    print(f"\n{summary(table)}\n\nScores: {evaluation.file}")
+    return 0 if any(not row["failure"] for row in rows) else 1

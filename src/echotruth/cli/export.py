@@ -1,0 +1,83 @@
+"""`echotruth export`: clips, hearts or RF as files of other programs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from echotruth.cli.command import Commands, add_command, add_repeated, fail
+
+EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap", "flo", "uff", "zea")
+"""Formats of `echotruth export`."""
+
+
+def add(commands: Commands) -> None:
+    """Add the parser of `echotruth export`."""
+    parser = add_command(
+        commands,
+        export,
+        "write clips, hearts or RF of a repository as files of other programs",
+        "There is one file for each clip, CASE_VIEW_SIZE (docs/export.md).",
+        [
+            "export out/demo --format mp4 --view mid --overlay wall",
+            "export out/demo --format csv --tracker dis",
+        ],
+        {0: "all files are written", 2: "they cannot be exported"},
+    )
+    parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
+    parser.add_argument("--format", choices=EXPORTED, required=True, help="format of the files")
+    add_repeated(
+        parser,
+        ("case", str, "case id from cases.csv; can be repeated (default: all)"),
+        ("view", str, "name of the view; can be repeated (default: all)"),
+        ("size", int, "image size, px; can be repeated (default: the largest)"),
+        ("tracker", str, "tracker for matlab and csv; can be repeated (default: all)"),
+        ("overlay", str, "wall, segments or displacement over mp4, gif and png; can be repeated (default: none)"),
+    )
+    parser.add_argument("--rate", type=float, help="frames per second of mp4 and gif (default: 20)")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="folder, or the file if it is one (default: export/FORMAT in the repository)"
+    )
+
+
+def export(arguments: argparse.Namespace) -> int:
+    """Write clips, hearts or RF as files of another format; return 0, or 2 if they cannot be exported."""
+    from echotruth.config.loading import ConfigError
+    from echotruth.export import Export, ExportError, Selection, source
+
+    chosen = Selection(arguments.case, arguments.view, arguments.size, arguments.tracker)
+    try:
+        opened = source(arguments.repository, chosen)
+        work = Export(opened, arguments.format, arguments.overlay, arguments.rate, arguments.output)
+        clips, left_out = work.clips()
+        _print_counted(work.write(clips), len(clips))
+    except (ExportError, ConfigError) as error:
+        return fail(str(error))
+    except OSError as error:
+        place, said = error.filename or arguments.output or arguments.repository, error.strerror or str(error)
+        return fail(f"{place}: {' '.join(said.split())}: the folder for the files must be writable and have space")
+    except KeyboardInterrupt:
+        return fail("interrupted; the files that were named are whole")
+    if left_out:
+        print(f"echotruth: left out {len(left_out)} that are not finished, first: {left_out[0]}", file=sys.stderr)
+    return 0
+
+
+def _print_counted(paths: Iterator[Path], total: int) -> None:
+    """Print each path when its file is written; below them, where a person watches, how many of many there are."""
+    watched = sys.stderr.isatty() and total > 1
+
+    def show(line: str) -> None:
+        if watched:
+            print(f"\r\033[K{line}", end="", file=sys.stderr, flush=True)
+
+    try:
+        show(f"0 of {total}")
+        for done, path in enumerate(paths, start=1):
+            show("")
+            print(path, flush=True)
+            show(f"{done} of {total}")
+    finally:
+        show("")

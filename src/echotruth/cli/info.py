@@ -1,0 +1,151 @@
+"""`echotruth info`: this installation and machine, or a repository at a glance."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import shutil
+from importlib.metadata import PackageNotFoundError, metadata, version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import echotruth
+from echotruth.cli.command import Commands, add_command, fail
+
+if TYPE_CHECKING:
+    from packaging.requirements import Requirement
+
+    from echotruth.repository.overview import Overview
+
+GIB = 2**30
+
+DEVELOPMENT = ("build", "docs", "integration", "test")
+"""Extras for those who change echotruth."""
+
+
+def add(commands: Commands) -> None:
+    """Add the parser of `echotruth info`."""
+    parser = add_command(
+        commands,
+        info,
+        "show what is installed, or what a repository holds and how to open it",
+        "",
+        ["info", "info out/demo"],
+        {0: "it is printed", 2: "there is no such repository"},
+    )
+    text = "folder of a repository, such as out/demo (default: none, but the installation and the machine)"
+    parser.add_argument("repository", nargs="?", help=text)
+
+
+def info(arguments: argparse.Namespace) -> int:
+    """Print what is installed, or what a repository holds; return the exit status."""
+    if arguments.repository is None:
+        _print(_installation())
+        return 0
+    from echotruth.config.loading import ConfigError
+    from echotruth.repository.overview import overview
+
+    try:
+        found = overview(arguments.repository)
+    except (ConfigError, FileNotFoundError) as error:
+        return fail(str(error))
+    except OSError as error:
+        return fail(f"{error.filename or arguments.repository}: cannot be read ({error.strerror or error})")
+    except (ValueError, KeyError) as error:
+        remedy = f"run echotruth check {arguments.repository}"
+        return fail(f"{arguments.repository}: is damaged ({' '.join(str(error).split())}): {remedy}")
+    _print(_repository(found))
+    if found.packages:
+        print(f'\nOpen it:\n  import echotruth as et\n  tree = et.open("{found.folder}")')
+    if found.example:
+        view = next(iter(found.config.views))
+        print(f'  clip = et.load_clip("{found.folder}", case="{found.example}", view="{view}")')
+    return 0
+
+
+def _print(lines: dict[str, str]) -> None:
+    width = max(map(len, lines))
+    print("\n".join(f"{name:{width}}  {text}" for name, text in lines.items() if text))
+
+
+def _bytes(number: int) -> str:
+    """Size in words."""
+    return f"{number / GIB:.1f} GiB" if number >= GIB else f"{1024 * number / GIB:.1f} MiB"
+
+
+def _installation() -> dict[str, str]:
+    """What is installed, and the machine."""
+    import psutil
+
+    memory = psutil.virtual_memory()
+    disk = shutil.disk_usage(Path.cwd())
+    core, extras = _requirements()
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return {
+        "echotruth": f"{echotruth.__version__}, {Path(echotruth.__file__).parent}",
+        "Python": f"{platform.python_version()} on {platform.system()} {platform.release()} ({platform.machine()})",
+        "packages": ", ".join(f"{name} {_version(name)}" for name in core),
+        "extras": "; ".join(_extra(name, packages) for name, packages in extras.items()),
+        "cores": f"{usable} of {os.cpu_count()}",
+        "memory": f"{memory.available / GIB:.1f} GiB free of {memory.total / GIB:.1f} GiB",
+        "disk": f"{disk.free / GIB:.1f} GiB free of {disk.total / GIB:.1f} GiB in {Path.cwd()}",
+    }
+
+
+def _requirements() -> tuple[list[str], dict[str, list[str]]]:
+    """Packages that echotruth needs here, and those of each extra, as its installation lists them."""
+    from packaging.requirements import Requirement
+
+    try:
+        about = metadata("echotruth")
+    except PackageNotFoundError:
+        return [], {}
+    listed = [Requirement(text) for text in about.get_all("Requires-Dist") or ()]
+    extras = {name: _needed(listed, name) for name in about.get_all("Provides-Extra") or ()}
+    return _needed(listed, ""), {name: packages for name, packages in extras.items() if name not in DEVELOPMENT}
+
+
+def _needed(listed: list[Requirement], extra: str) -> list[str]:
+    """Packages of an extra, or of the core if it is ""."""
+    found = [one for one in listed if one.marker is None or one.marker.evaluate({"extra": extra})]
+    core = {one.name for one in listed if one.marker is None or one.marker.evaluate({"extra": ""})}
+    return sorted({one.name for one in found} - (core if extra else set()))
+
+
+def _version(package: str) -> str:
+    """Installed version of a package; "" if it is missing."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def _extra(name: str, packages: list[str]) -> str:
+    """Whether the packages of an extra are installed."""
+    missing = [package for package in packages if not _version(package)]
+    return f"{name} is missing ({', '.join(missing)})" if missing else f"{name} is installed"
+
+
+def _repository(found: Overview) -> dict[str, str]:
+    """What a repository holds."""
+    config = found.config
+    statuses = ", ".join(f"{number} {status}" for status, number in found.statuses.items())
+    sizes = ", ".join(map(str, config.bmode.sizes))
+    views = [f"{name} ({view.plane.replace('_', ' ')})" for name, view in config.views.items()]
+    made = ", ".join(
+        f"{name} {found.packages[name]}" for name in ("echotruth", "numpy", "zarr") if name in found.packages
+    )
+    return {
+        "repository": f"{found.folder}",
+        "name": f"{config.name}, seed {config.seed}",
+        "heart": f"{config.geometry.file or config.geometry.preset}, {config.loop.frames} frames of one cycle",
+        "cases": f"{sum(found.statuses.values())}: {statuses}",
+        "views": f"{len(views)}: {', '.join(views)}",
+        "sizes": f"{sizes} px, {config.bmode.field_of_view_mm:g} mm wide; array {config.probe.preset}",
+        "RF": ", ".join(config.rf.keep) or "not kept",
+        "trackers": ", ".join(config.tracking.trackers),
+        "from outside": ", ".join(found.external),
+        "on disk": f"{_bytes(found.bytes)} in {found.files} files",
+        "made by": made or "not published yet: run it to its end",
+    }

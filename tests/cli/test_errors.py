@@ -1,0 +1,82 @@
+"""All errors of a configuration are told at once, each once, in one line."""
+
+import pytest
+
+from echotruth.cases import expand
+from echotruth.config.loading import ConfigError, validate
+from echotruth.config.reading import MAX_ERRORS
+
+
+def refused(values):
+    with pytest.raises(ConfigError) as error:
+        expand(validate(values, "my.yaml"), "my.yaml")
+    lines = str(error.value).splitlines()
+    assert all(line.startswith("my.yaml: ") for line in lines) and len(set(lines)) == len(lines)
+    return [line.removeprefix("my.yaml: ") for line in lines]
+
+
+def test_errors_of_all_sections_are_told_and_mistyped_keys_first():
+    values = {"geometri": {}, "seed": -1, "fibres": {"endo_deg": 95.0, "epi": 3}, "rf": {"keep": ["a", "b"]}}
+    assert [line.split(" ")[0] for line in refused(values)] == [
+        *("fibres.epi", "geometri", "seed", "fibres.endo_deg", "rf.keep.0", "rf.keep.1"),
+    ]
+
+
+def test_keys_that_conflict_are_told_together():
+    values = {"rf": {"focus_mm": 30.0}, "views": {"all": {}}, "fibres": {"source": "file"}}
+    assert [line.split(" ")[0] for line in refused(values)] == ["rf.focus_mm", "views", "fibres.source"]
+
+
+def test_value_of_several_types_has_one_error():
+    values = {"geometry": {"file": "a.vtu", "wall_cells": {"array": "part", "values": [1.5, None, "a"]}}}
+    assert [line.partition(":")[0] for line in refused(values)] == [
+        "geometry.wall_cells.values.0 = 1.5",
+        "geometry.wall_cells.values.1 = null",
+    ]
+
+
+def test_names_that_are_those_of_types_stay_in_the_key():
+    assert refused({"views": {"int": {"plane": 3}, "str": {"position": 2.0}}})[0].startswith("views.int.plane = 3")
+
+
+def test_many_errors_are_cut_and_counted():
+    lines = refused({"views": {f"v{number}": {"position": 2.0} for number in range(30)}})
+    assert len(lines) == MAX_ERRORS + 1 and lines[-1] == "at least 10 more errors: correct these first"
+
+
+def test_all_rows_of_a_table_are_told():
+    table = "fibres.endo_deg,fibres.epi_deg\nx,-40\n60,95\n95,y\n"
+    assert [line.partition(" = ")[0] for line in refused({"cases": {"table": table}})] == [
+        "cases.table, row 1: fibres.endo_deg",
+        "cases.table, row 2: fibres.epi_deg",
+        "cases.table, row 3: fibres.endo_deg",
+        "cases.table, row 3: fibres.epi_deg",
+    ]
+
+
+def test_all_values_of_a_grid_are_told_once_however_many_cases_have_them():
+    grid = {"fibres.endo_deg": [60, 95, 96], "seed": list(range(30))}
+    assert refused({"cases": grid}) == [
+        f"cases: fibres.endo_deg = {value}: should be less than or equal to 90" for value in (95, 96)
+    ]
+
+
+def test_all_keys_that_cannot_be_swept_are_told():
+    lines = refused({"cases": {"loop.frames": [10], "foo.bar": [3], "seed": [1, 1]}})
+    assert [line.partition(": ")[0] for line in lines] == [
+        "cases.loop.frames",
+        "cases.foo.bar",
+        "cases.seed gives a value twice, 1",
+    ]
+
+
+def test_condition_that_is_cut_by_a_comment_is_told_so(call, tmp_path):
+    (tmp_path / "cut.yaml").write_text("cases:\n  seed: [1, 2]\n  where:\n    - seed == #3\n")
+    status, output, errors = call("check", "cut.yaml")
+    assert (status, output) == (1, "") and "ends too early" in errors and "put the condition in quotes" in errors
+
+
+def test_each_line_on_the_terminal_has_the_name_of_the_program(call, tmp_path):
+    (tmp_path / "bad.yaml").write_text("seed: -1\nfibres: {endo_deg: 95}\n")
+    status, output, errors = call("check", "bad.yaml")
+    assert (status, output) == (1, "") and [line[:20] for line in errors.splitlines()] == ["echotruth: bad.yaml:"] * 2

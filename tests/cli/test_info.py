@@ -1,0 +1,92 @@
+"""`echotruth info`: what it tells is what is there."""
+
+import os
+import platform
+import re
+import shutil
+from contextlib import chdir
+from importlib.metadata import version
+
+import finished_repository
+import known_repository
+import numpy as np
+import pytest
+
+import echotruth
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("info") / "small"
+    finished_repository.finish(folder, finished_repository.configured(seeds=(1, 2, 3), views=("mid",)))
+    return folder
+
+
+def told(output):
+    """Name -> text of each line."""
+    return dict(re.split(r"  +", line, maxsplit=1) for line in output.splitlines() if re.search(r"^\S.*?  +\S", line))
+
+
+def test_installation_is_told(call):
+    status, output, errors = call("info")
+    found = told(output)
+    assert (status, errors) == (0, "")
+    assert found["echotruth"].startswith(echotruth.__version__) and found["Python"].startswith(
+        platform.python_version()
+    )
+    assert f"numpy {version('numpy')}" in found["packages"] and f"of {os.cpu_count()}" in found["cores"]
+    assert float(found["disk"].split()[0]) == pytest.approx(shutil.disk_usage(".").free / 2**30, abs=5)
+
+
+def test_repository_is_told_and_opens_as_it_says(call, finished):
+    (finished / "external").mkdir(exist_ok=True)
+    (finished / "external/mine.csv").write_text("case\n")
+    status, output, errors = call("info", finished)
+    found = told(output)
+    assert (status, errors) == (0, "")
+    assert (found["cases"], found["views"], found["trackers"]) == ("3: 3 complete", "1: mid (short axis)", "one")
+    assert found["sizes"].startswith("64 px") and found["from outside"] == "mine" and found["name"] == "small, seed 1"
+    files = [path for path in finished.rglob("*") if path.is_file()]
+    assert f"{sum(path.stat().st_size for path in files) / 2**20:.1f} MiB in {len(files)} files" == found["on disk"]
+
+
+def test_repository_opens_as_it_is_told(call, tmp_path):
+    known = known_repository.make(tmp_path / "known", known_repository.SETTINGS)
+    code = "\n".join(line.strip() for line in call("info", "known")[1].partition("Open it:\n")[2].splitlines())
+    with chdir(tmp_path):
+        found: dict = {}
+        exec(code, found)
+    assert found["tree"]["cases"].sizes["case"] == 1
+    np.testing.assert_array_equal(found["clip"]["image"].values, known.images(known_repository.SIZES[0]))
+
+
+def test_repository_that_no_run_has_published_is_told_so(call, finished, tmp_path):
+    (tmp_path / "begun").mkdir()
+    for name in ("config.yaml", "registry.txt", "views.txt"):
+        shutil.copy(finished / name, tmp_path / "begun")
+    status, output, _ = call("info", "begun")
+    found = told(output)
+    assert status == 0 and found["cases"] == "3: 3 unfinished" and "not published" in found["made by"]
+    assert "et.open" not in output
+
+
+@pytest.mark.parametrize(
+    ("place", "sentence"),
+    [
+        ("nowhere", "nowhere: is not a repository: give the folder that a run made, as out/demo"),
+        ("s3://bucket/demo", "s3://bucket/demo: is an address and not a folder"),
+    ],
+)
+def test_what_is_no_repository_is_refused_in_one_line(call, place, sentence):
+    status, output, errors = call("info", place)
+    assert (status, output, errors.count("\n")) == (2, "", 1) and sentence in errors
+
+
+def test_damaged_repository_is_refused_in_one_line(call, finished, tmp_path):
+    for number, name in enumerate(("config.yaml", "zarr.json", "cases/status/zarr.json")):
+        copy = tmp_path / f"copy{number}" / "small"
+        shutil.copytree(finished, copy)
+        path = copy / name if name == "config.yaml" else copy / "small.zarr" / name
+        path.write_text("{")
+        status, output, errors = call("info", copy)
+        assert (status, output, errors.count("\n")) == (2, "", 1) and str(copy) in errors, errors
