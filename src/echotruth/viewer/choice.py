@@ -1,0 +1,95 @@
+"""What a viewer has chosen to see, and the address that says so."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from urllib.parse import urlencode
+
+from echotruth.viewer.catalogue import FINISHED, Catalogue
+from echotruth.viewer.curves import CONTOURS, LINE, MEASURES, MIDDLE, WALL
+from echotruth.viewer.tint import COLOURS, WALL_COMPONENTS
+
+NOTHING, TRUTH = "", "truth"
+"""In place of a second tracker: none, and the truth at the points of the first."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A clip, and what is drawn over it.
+
+    Attributes
+    ----------
+    case, view : str
+    size : int
+        Pixels along a side.
+    tracker : str
+    other : str
+        Second tracker, `TRUTH` or `NOTHING`.
+    colour : str
+        A key of :data:`echotruth.viewer.tint.COLOURS`.
+    component : str
+        Of strain, as "RR"; empty for colours without one.
+    curve : str
+        Strain of the curves: `line` (of a contour), RR, TT or RT.
+    measure : {"engineering", "green_lagrange"}
+    part : str
+        Part of the wall of the curves, as "middle" (a contour), "wall", "layer 1" or "segment 7".
+    frame : int
+    """
+
+    case: str
+    view: str
+    size: int
+    tracker: str
+    other: str = NOTHING
+    colour: str = "none"
+    component: str = ""
+    curve: str = LINE
+    measure: str = "engineering"
+    part: str = MIDDLE
+    frame: int = 0
+
+    @property
+    def address(self) -> str:
+        """The choice as the query of an address; what is as it would be without it is left out."""
+        given = asdict(self)
+        plain = {field.name: field.default for field in fields(self)}
+        return urlencode({name: value for name, value in given.items() if value != plain[name] and name != "frame"})
+
+
+def first(catalogue: Catalogue) -> Choice:
+    """What is shown at first: the first case that is complete, or the first of all."""
+    complete = (case for case in catalogue.cases if catalogue.status(case) == FINISHED)
+    case = next(complete, catalogue.cases[0])
+    trackers = catalogue.trackers
+    return Choice(case, catalogue.views[0], catalogue.sizes[0], trackers[-1] if trackers else NOTHING)
+
+
+def asked(catalogue: Catalogue, query: Mapping[str, Sequence[str]]) -> Choice:
+    """What an address asks for; what it does not say, or what the repository does not have, is as at first.
+
+    Parameters
+    ----------
+    catalogue : Catalogue
+    query : dict
+        Name -> values, as `urllib.parse.parse_qs` gives them.
+    """
+    given = {name: values[-1] for name, values in query.items() if values}
+    known = {
+        "case": [case for case in (given.get("case"),) if case in catalogue.rows],
+        "view": catalogue.views,
+        "size": list(map(str, catalogue.sizes)),
+        "tracker": catalogue.trackers,
+        "other": [TRUTH, *catalogue.trackers],
+        "colour": list(COLOURS),
+        "component": ["RR", "CC", "LL", "RC", "RL", "CL", "TT", "RT"],
+        "curve": [LINE, *WALL_COMPONENTS],
+        "measure": list(MEASURES),
+        "part": [*CONTOURS, WALL, *(f"layer {n}" for n in range(1, 99)), *(f"segment {n}" for n in range(1, 18))],
+        "frame": list(map(str, range(catalogue.config.loop.frames))),
+    }
+    chosen = {name: value for name, value in given.items() if value in known.get(name, ())}
+    numbers = {name: int(value) for name, value in chosen.items() if name in ("size", "frame")}
+    texts = {name: value for name, value in chosen.items() if name not in numbers}
+    return replace(first(catalogue), **numbers, **texts)  # type: ignore[arg-type]  # each has its type

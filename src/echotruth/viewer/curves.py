@@ -1,0 +1,130 @@
+"""Curves of a clip and of its heart over the cycle: strain and rotation, tracked and true, and the volume."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echotruth.arrays import Floats
+from echotruth.evaluation.curves import strain_curves
+from echotruth.viewer.clip import Clip
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LINE = "line"
+"""In place of a component: the strain of a contour, which is GCS in a short axis and GLS in a long one."""
+MEASURES = {"engineering": "engineering strain, L / L0 - 1", "green_lagrange": "Green-Lagrange strain"}
+WALL, MIDDLE = "wall", "middle"
+CONTOURS = ("endocardial", MIDDLE, "epicardial")
+TRUE = "true"
+"""Name of the true curve."""
+MAX_VOLUME_IN_UL = 2e-6
+"""Largest volume that is shown in µL, m³; larger ones are in mL."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Curves over one axis.
+
+    Attributes
+    ----------
+    title : str
+        Of the values, with their unit.
+    curves : dict
+        Name -> values, (frame,); NaN where unknown.
+    """
+
+    title: str
+    curves: dict[str, Floats]
+
+
+def strain_of(clip: Clip, tracker: str) -> xr.Dataset:
+    """Curves of strain and rotation of a tracker and of the truth, as :func:`echotruth.strain_curves` gives them."""
+    return strain_curves(clip.job, tracker, clip.size)
+
+
+def strain(clip: Clip, found: dict[str, xr.Dataset], component: str, measure: str, part: str) -> Plot:
+    """Strain over the cycle, tracked and true, %.
+
+    Parameters
+    ----------
+    clip : Clip
+    found : dict
+        Tracker -> its curves, as :func:`strain_of` gives them.
+    component : {"line", "RR", "TT", "RT"}
+    measure : {"engineering", "green_lagrange"}
+        Ignored for the strain of a contour, which is an engineering strain.
+    part : str
+        One of :func:`parts`.
+    """
+    kind, _, number = part.partition(" ")
+    chosen: dict[str, str | int] = {}
+    if component == LINE:
+        name, chosen = "line_strain", {"contour": part}
+    else:
+        key = "aha" if kind == "segment" else "region"
+        name, chosen = f"{'segment' if key == 'aha' else 'region'}_strain", {key: int(number or 0)}
+        chosen |= {"measure": measure, "wall_component": component}
+    shear = component == "RT" and measure == "engineering"
+    factor, unit = (np.degrees(1), "°") if shear else (100, "%")
+    return Plot(f"{strain_name(clip, component)} ({unit})", _tracked_and_true(found, name, factor, chosen))
+
+
+def rotation(clip: Clip, found: dict[str, xr.Dataset]) -> Plot:
+    """Rotation of a short axis, tracked and true; the twist of the heart in a long axis; degrees."""
+    if clip.is_short_axis and found:
+        return Plot("rotation in this view (°)", _tracked_and_true(found, "rotation", np.degrees(1), {}))
+    reader, row = clip.catalogue.reader, clip.place[0]
+    if not clip.catalogue.is_written("physiology/courses", clip.case):
+        return Plot("twist of the heart (°)", {})
+    labels, courses = reader.labels("physiology/course"), reader.read("physiology/courses", row)
+    shown = {"base": "rotation_base", "apex": "rotation_apex", "twist": "twist"}
+    curves = {name: np.degrees(courses[:, labels.index(label)]) for name, label in shown.items()}
+    return Plot("rotation of the heart (°)", curves)
+
+
+def volume(clip: Clip) -> Plot:
+    """Volume of the cavity, µL or mL."""
+    if not clip.catalogue.is_written("mechanics/volume", clip.case):
+        return Plot("volume of the cavity (µL)", {})
+    values = clip.catalogue.reader.read("mechanics/volume", clip.place[0])
+    factor, unit = (1e9, "µL") if np.nanmax(values, initial=0.0) < MAX_VOLUME_IN_UL else (1e6, "mL")
+    return Plot(f"volume of the cavity ({unit})", {TRUE: factor * values})
+
+
+def parts(clip: Clip, component: str, segments: list[int]) -> list[str]:
+    """Parts of the wall of which there are curves: contours, or the wall, its layers and the segments of the view."""
+    if component == LINE:
+        return list(CONTOURS)
+    layers = range(1, clip.catalogue.config.fibres.layers + 1)
+    return [WALL, *(f"layer {number}" for number in layers), *(f"segment {number}" for number in segments)]
+
+
+def strain_name(clip: Clip, component: str) -> str:
+    """A strain in words, as echocardiography has it."""
+    direction = "circumferential" if clip.is_short_axis else "longitudinal"
+    short = "GCS" if clip.is_short_axis else "GLS"
+    names = {LINE: f"{short}, strain of a contour", "RR": "radial strain", "TT": f"{direction} strain"}
+    return (names | {"RT": "shear"})[component]
+
+
+def segments(found: xr.Dataset) -> list[int]:
+    """AHA segments that the view shows."""
+    strain = found["true_segment_strain"].isel(measure=0, wall_component=0).transpose("frame", "aha").values
+    return [int(number) for number in found["aha"].values[np.isfinite(strain).any(axis=0)]]
+
+
+def _tracked_and_true(
+    found: dict[str, xr.Dataset], name: str, factor: float, chosen: Mapping[str, str | int]
+) -> dict[str, Floats]:
+    """The true curve, and that of every tracker; the truth is the same for all."""
+    curves: dict[str, Floats] = {}
+    for tracker, data in found.items():
+        pick = {dim: value for dim, value in chosen.items() if dim in data.dims}
+        curves[TRUE] = factor * data[f"true_{name}"].sel(pick).values
+        curves[tracker] = factor * data[f"tracked_{name}"].sel(pick).values
+    return curves

@@ -1,0 +1,81 @@
+// Draws the frame that the slider says: the pictures with their colours, the arrows, and the lines in the curves.
+// Arguments: slider, opacity (sliders); clip {grey}, times {time, text}; and for each panel, in lists, colours {index},
+// palettes {red, green, blue}, pictures {image}, labels, figures; movements and arrows, in pairs; cursors; and side, mm.
+const state = (window.echotruth ??= { drawn: 0, pending: false, tables: [] });
+if (!state.pending) {
+  state.pending = true; // several changes within a frame of the screen are drawn once
+  requestAnimationFrame(() => {
+    state.pending = false;
+    const frame = Math.min(slider.value, times.data.time.length - 1);
+    const kinds = movements.length / figures.length;
+    figures.forEach((figure, panel) => {
+      if (!figure.visible) return; // drawn while hidden, a figure is laid out anew every time
+      draw_picture(pictures[panel], panel, frame);
+      for (let n = panel * kinds; n < (panel + 1) * kinds; n++) draw_arrows(movements[n], arrows[n], frame);
+    });
+    cursors.forEach((cursor) => { set(cursor, { location: times.data.time[frame] }); });
+    labels.forEach((label, panel) => { if (figures[panel].visible) set(label, { text: times.data.text[frame] }); });
+    state.drawn += 1;
+    state.frame = frame;
+  });
+}
+
+// Changes a model here alone: the server need not know.
+function set(model, values) {
+  model.setv(values, { sync: false });
+}
+
+function draw_picture(picture, panel, frame) {
+  const target = picture.data.image[0], stack = clip.data.grey[0];
+  if (stack.length < target.length * (frame + 1)) return; // the parts of another size are still on their way
+  const grey = part(Uint8Array, stack, frame * target.length, target.length);
+  const index = colours[panel].data.index[0];
+  const table = blended(panel);
+  if (index.length === stack.length) {
+    const over = part(Uint8Array, index, frame * target.length, target.length);
+    for (let i = 0; i < target.length; i++) target[i] = table[(over[i] << 8) | grey[i]];
+  } else {
+    for (let i = 0; i < target.length; i++) target[i] = table[grey[i]];
+  }
+  picture.change.emit();
+}
+
+// A part of an array of Bokeh's, whose own subarray() is the whole of it.
+function part(type, array, from, count) {
+  return new type(array.buffer, array.byteOffset + from * array.BYTES_PER_ELEMENT, count);
+}
+
+// Colour of every grey level under every entry of the palette; entry 0 is the grey level alone.
+function blended(panel) {
+  const { red, green, blue } = palettes[panel].data;
+  const known = state.tables[panel];
+  if (known && known.red === red && known.opacity === opacity.value) return known.table;
+  const table = known ? known.table : new Uint32Array(256 * 256);
+  for (let entry = 0; entry <= red.length; entry++) {
+    const share = entry === 0 ? 0 : opacity.value;
+    const [r, g, b] = entry === 0 ? [0, 0, 0] : [red[entry - 1], green[entry - 1], blue[entry - 1]];
+    for (let grey = 0; grey < 256; grey++) {
+      const mixed = (colour) => Math.round((1 - share) * grey + share * colour);
+      table[(entry << 8) | grey] = ((255 << 24) | (mixed(b) << 16) | (mixed(g) << 8) | mixed(r)) >>> 0;
+    }
+  }
+  state.tables[panel] = { red, opacity: opacity.value, table };
+  return table;
+}
+
+function draw_arrows(movement, shown, frame) {
+  const { x0, y0, x1, y1 } = movement.data;
+  if (x0.length === 0 && shown.data.x0.length === 0) return;
+  const count = Math.round(x0.length / times.data.time.length);
+  const from = frame * count;
+  const [start_x, start_y, end_x, end_y] = [x0, y0, x1, y1].map((all) => part(Float32Array, all, from, count));
+  const angle = new Float32Array(count), head_x = new Float32Array(count), tail_x = new Float32Array(count);
+  for (let i = 0; i < count; i++) {
+    const dx = end_x[i] - start_x[i], dy = end_y[i] - start_y[i], length = Math.hypot(dx, dy) / side.value;
+    angle[i] = Math.atan2(-dy, dx) - Math.PI / 2; // depth is downwards, and a triangle points up
+    head_x[i] = length < 0.008 ? NaN : end_x[i];
+    tail_x[i] = length < 0.002 ? NaN : start_x[i];
+  }
+  Object.assign(shown.data, { x0: tail_x, y0: start_y, x1: end_x, y1: end_y, head_x, angle });
+  shown.change.emit();
+}

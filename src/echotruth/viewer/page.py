@@ -1,0 +1,348 @@
+"""The page of the viewer: what can be chosen, the pictures, the curves, and what is known of the case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from functools import lru_cache, partial
+from html import escape
+from typing import Any
+
+import numpy as np
+from bokeh.document import Document
+from bokeh.layouts import column, row
+from bokeh.models import (
+    AutocompleteInput,
+    CheckboxButtonGroup,
+    ColumnDataSource,
+    Div,
+    InputWidget,
+    Range1d,
+    Select,
+    Slider,
+    Toggle,
+)
+
+from echotruth.viewer import arrows, curves, facts, script
+from echotruth.viewer.arrows import Arrows
+from echotruth.viewer.catalogue import Catalogue
+from echotruth.viewer.choice import NOTHING, TRUTH, Choice
+from echotruth.viewer.clip import Clip
+from echotruth.viewer.graph import Graph
+from echotruth.viewer.panel import ARROWS, Panel
+from echotruth.viewer.points import Points
+from echotruth.viewer.tint import COLOURS, component_name, components, tint
+
+MANY = 30
+"""Cases of which a list is offered; of more, those whose names contain what is typed."""
+KEPT_CLIPS = 3
+"""Clips that stay in memory."""
+RATES = ("5", "10", "20", "40")
+"""Frames per second."""
+KINDS = list(ARROWS)
+MARGIN = 1.3
+"""Half of the side of what is shown of a picture, over half of that of the wall in it."""
+MISSING = {
+    "images": "images",
+    "truth": "truth at the pixels",
+    "tracking": "tracked motion",
+    "evaluation": "scores and strain",
+}
+
+
+class Page:
+    """What one person sees.
+
+    Parameters
+    ----------
+    catalogue : Catalogue
+    choice : Choice
+        What is shown at first.
+    document : Document
+    """
+
+    def __init__(self, catalogue: Catalogue, choice: Choice, document: Document) -> None:
+        self.catalogue, self.choice, self.document = catalogue, choice, document
+        self.points = lru_cache(KEPT_CLIPS)(lambda case, view, size: Points(Clip(catalogue, case, view, size)))
+        self._shown: dict[str, Any] = {}
+        self._problems: dict[str, None] = {}
+        self.clip = ColumnDataSource({"grey": [np.zeros((0, 0, 0), np.uint8)]}, name="clip")
+        self.times = ColumnDataSource({"time": [0.0], "text": [""]}, name="times")
+        self.address = ColumnDataSource({"query": [""]})
+        frames = catalogue.config.loop.frames
+        self.frame = Slider(start=0, end=frames - 1, value=choice.frame, title="Frame", name="frame", width=380)
+        self.side = Slider(start=0, end=1e6, value=1, visible=False)
+        self.opacity = Slider(start=0, end=1, step=0.05, value=0.6, title="Opacity", width=110)
+        ranges = Range1d(-1, 1), Range1d(2, 0)
+        self.pointer, sliders = Div(name="pointer", height=20), (self.frame, self.side)
+        self.panels = [Panel(self.clip, sliders, ranges, self.pointer, name) for name in ("first", "second")]
+        self.graphs = {name: Graph(name) for name in ("strain", "rotation", "volume")}
+        self._widgets()
+        self._scripts()
+        document.add_root(self._layout())
+        document.title = f"{catalogue.config.name} - echotruth"
+        # Sent as a change, arrays travel as they are; within the page at first they would be text.
+        document.on_event("document_ready", lambda _event: self.show())
+
+    def _widgets(self) -> None:
+        """What can be chosen."""
+        catalogue, choice = self.catalogue, self.choice
+        self.inputs: dict[str, InputWidget] = {
+            "case": self._case_input(),
+            "view": Select(title="View", value=choice.view, options=catalogue.views, width=110),
+            "size": Select(
+                title="Size (px)", value=str(choice.size), options=list(map(str, catalogue.sizes)), width=80
+            ),
+            "tracker": Select(title="Tracker", value=choice.tracker, options=catalogue.trackers, width=150),
+            "other": Select(title="Beside it", value=choice.other, options=self._others(), width=150),
+            "colour": Select(title="Colour", value=choice.colour, options=list(COLOURS.items()), width=190),
+            "component": Select(title="Component", value=choice.component, options=[], width=220, visible=False),
+            "curve": Select(title="Curve", value=choice.curve, options=[], width=230),
+            "measure": Select(title="Measure", value=choice.measure, options=list(curves.MEASURES.items()), width=220),
+            "part": Select(title="Part of the wall", value=choice.part, options=[], width=120),
+        }
+        for name, widget in self.inputs.items():
+            widget.name = name
+            widget.on_change("value", lambda _attribute, _old, value, name=name: self._choose(name, value))
+        labels = [f"{kind} motion" if kind != "flow" else "flow" for kind in KINDS]
+        self.arrows = CheckboxButtonGroup(labels=labels, active=[], name="arrows")
+        self.arrows.on_change("active", lambda _attribute, _old, _active: self.show())
+        self.play = Toggle(label="▶ Play", width=90, name="play", button_type="primary")
+        self.rate = Select(title="", value="20", options=[(rate, f"{rate} frames/s") for rate in RATES], width=105)
+        self.message = Div(name="message", visible=False, styles={"color": "#a33", "font-weight": "bold"})
+        self.facts = Div(name="facts", width=520)
+
+    def _case_input(self) -> InputWidget:
+        cases, case = self.catalogue.cases, self.choice.case
+        if len(cases) <= MANY:
+            return Select(title="Case", value=case, options=cases, width=230)
+        return AutocompleteInput(
+            title=f"Case (of {len(cases)}: type a part of its name)",
+            value=case,
+            completions=cases,
+            search_strategy="includes",
+            case_sensitive=False,
+            min_characters=1,
+            max_completions=20,
+            width=330,
+        )
+
+    def _others(self) -> list[tuple[str, str]]:
+        return [(NOTHING, "–"), (TRUTH, "the truth"), *((name, name) for name in self.catalogue.trackers)]
+
+    def _scripts(self) -> None:
+        """What happens in the browser alone."""
+        movements = [panel.movements[kind] for panel in self.panels for kind in ARROWS]
+        draw = script.callback(
+            "draw",
+            slider=self.frame,
+            opacity=self.opacity,
+            side=self.side,
+            clip=self.clip,
+            times=self.times,
+            colours=[panel.colour for panel in self.panels],
+            palettes=[panel.palette for panel in self.panels],
+            pictures=[panel.picture for panel in self.panels],
+            labels=[panel.label for panel in self.panels],
+            figures=[panel.figure for panel in self.panels],
+            movements=movements,
+            arrows=[panel.arrows[kind] for panel in self.panels for kind in ARROWS],
+            cursors=[graph.cursor for graph in self.graphs.values()],
+        )
+        for slider in (self.frame, self.opacity):
+            slider.js_on_change("value", draw)
+        sources = [self.clip, self.times, *(panel.colour for panel in self.panels), *movements]
+        for source in sources:
+            source.js_on_change("data", draw)
+        for panel in self.panels:
+            panel.figure.js_on_change("visible", draw)
+        play = script.callback("play", button=self.play, slider=self.frame, rate=self.rate)
+        self.play.js_on_change("active", play)
+        self.rate.js_on_change("value", play)
+        address = script.callback("address", address=self.address, slider=self.frame)
+        self.address.js_on_change("data", address)
+        self.frame.js_on_change("value_throttled", address)
+
+    def _layout(self) -> Any:
+        chosen = self.inputs
+        apart = {"flex-wrap": "wrap", "gap": "4px"}
+        clip = row(*(chosen[name] for name in ("case", "view", "size", "tracker", "other")), styles=apart)
+        switches = column(Div(text="Arrows", margin=(5, 5, 0, 5)), self.arrows)
+        drawn = row(chosen["colour"], chosen["component"], self.opacity, switches, styles=apart)
+        pictures = row(*(panel.figure for panel in self.panels), styles=apart)
+        player = row(self.play, self.frame, self.rate, styles={"align-items": "center"})
+        plots = row(*(chosen[name] for name in ("curve", "measure", "part")), styles=apart)
+        graphs = row(*(graph.figure for graph in self.graphs.values()), sizing_mode="stretch_width", styles=apart)
+        left = column(pictures, self.pointer, player, self.side, self.facts)
+        right = column(plots, graphs, styles={"flex": "1 1 450px", "min-width": "450px"})
+        body = row(left, right, sizing_mode="stretch_width", styles=apart)
+        return column(clip, drawn, self.message, body, sizing_mode="stretch_width", styles={"padding": "8px"})
+
+    def _choose(self, name: str, value: str) -> None:
+        """Take over what was chosen, and show it."""
+        chosen = int(value) if name == "size" else value
+        if chosen == getattr(self.choice, name):  # the page set it itself
+            return
+        if name == "case" and value not in self.catalogue.rows:
+            self._say(f"There is no case {value}: choose one of the list.")
+            return
+        self.choice = replace(self.choice, **{name: chosen})  # type: ignore[arg-type]  # each has its type
+        self._say("Reading ...")
+        self.document.add_next_tick_callback(self.show)
+
+    def show(self) -> None:
+        """Show what is chosen; what is shown already stays."""
+        self.document.hold("combine")  # so that the browser draws once
+        try:
+            self._show()
+        except Exception as error:  # a damaged file fails in many ways, and the page must go on
+            self._blank()
+            place = f"{self.choice.case}, {self.choice.view}"
+            said = str(error).partition("\n")[0] or type(error).__name__
+            self._say(f"{place} cannot be shown: {said}. Run: echotruth check {self.catalogue.reader.folder}")
+        finally:
+            self.document.unhold()
+
+    def _show(self) -> None:
+        choice = self.choice
+        points = self.points(choice.case, choice.view, choice.size)
+        clip = points.clip
+        self._fit(clip)
+        self._problems = {}
+        place = (choice.case, choice.view, choice.size)
+        self._once("clip", place, lambda: self._show_clip(points))
+        for number, tracker in enumerate((choice.tracker, choice.other)):
+            self._show_panel(number, points, tracker)
+        found = self._once("found", (*place, choice.tracker, choice.other), lambda: self._curves(clip))
+        self._show_graphs(clip, found)
+        self.facts.text = facts.text(clip, [choice.tracker, choice.other])
+        self._say(" ".join([*self._lacking(clip), *self._problems]))
+        self.address.data = {"query": [self.choice.address]}
+
+    def _blank(self) -> None:
+        """Show nothing, rather than what was chosen before."""
+        self._shown.clear()
+        self.clip.data = {"grey": [np.zeros_like(self.clip.data["grey"][0])]}
+        for panel in self.panels:
+            panel.clear()
+        for graph in self.graphs.values():
+            graph.show(curves.Plot("no curves", {}), np.array([0.0, 1.0]), None)
+        self.facts.text = ""
+
+    def _once(self, part: str, key: Any, make: Callable[[], Any]) -> Any:
+        """What is made for a key, made again only if the key is another."""
+        if self._shown.get(part, (None,))[0] != key:
+            self._shown[part] = key, make()
+        return self._shown[part][1]
+
+    def _show_clip(self, points: Points) -> None:
+        """Grey levels and times, and the pictures about the wall; the tool of the picture resets them to the whole."""
+        clip = points.clip
+        side = 1e3 * clip.side
+        self.side.value = side
+        for panel in self.panels:
+            panel.size(clip.size, side)
+        shown = self.panels[0].figure
+        for axis, start, end in ((shown.x_range, -side / 2, side / 2), (shown.y_range, side, 0)):
+            axis.update(start=start, end=end, reset_start=start, reset_end=end)
+        if clip.has("evaluation"):
+            lateral, axial, half = (1e3 * value for value in points.extent)
+            half = min(MARGIN * half, side / 2)
+            lateral = min(max(lateral, half - side / 2), side / 2 - half)
+            axial = min(max(axial, half), side - half)
+            shown.x_range.update(start=lateral - half, end=lateral + half)
+            shown.y_range.update(start=axial + half, end=axial - half)
+        black = np.zeros((clip.frames, clip.size, clip.size), np.uint8)
+        self.clip.data = {"grey": [clip.image if clip.has("images") else black]}
+        time = 1e3 * clip.time
+        self.times.data = {"time": time, "text": [f"{value:.1f} ms" for value in time]}
+
+    def _show_panel(self, number: int, points: Points, tracker: str) -> None:
+        """Colours and arrows of one picture."""
+        choice, panel = self.choice, self.panels[number]
+        panel.show_beside(tracker != NOTHING or number == 0, alone=choice.other == NOTHING)
+        if not panel.figure.visible:
+            return
+        followed = None if tracker in (TRUTH, NOTHING) else tracker
+        panel.figure.title.text = "Truth" if tracker == TRUTH else tracker or "no tracker"
+        place = (choice.case, choice.view, choice.size, tracker)
+        try:
+            colour = (choice.colour, choice.component)
+            self._once(
+                f"colour {number}", (*place, *colour), lambda: panel.tint(tint(points.clip, points, *colour, followed))
+            )
+            for kind, make in _moved(points, followed).items():
+                wanted = KINDS.index(kind) in self.arrows.active
+                self._once(f"{kind} {number}", (*place, wanted), partial(_move, panel, kind, make if wanted else None))
+        except ValueError as error:  # a tracker from outside that was not evaluated on this clip
+            self._problems[str(error)] = None
+            panel.clear()
+            for part in ("colour", *KINDS):
+                self._shown.pop(f"{part} {number}", None)
+
+    def _curves(self, clip: Clip) -> dict[str, Any]:
+        """Tracker -> curves, of those that have any."""
+        found = {}
+        for tracker in (self.choice.tracker, self.choice.other) if clip.has_curves else ():
+            with suppress(ValueError):  # not evaluated on this clip, which the picture says
+                if tracker not in (TRUTH, NOTHING):
+                    found[tracker] = curves.strain_of(clip, tracker)
+        return found
+
+    def _show_graphs(self, clip: Clip, found: dict[str, Any]) -> None:
+        choice = self.choice
+        shown = [curves.segments(data) for data in found.values()][:1]
+        parts = curves.parts(clip, choice.curve, shown[0] if shown else [])
+        if choice.part not in parts:
+            self.choice = choice = replace(choice, part=parts[0])
+        names = [(kind, curves.strain_name(clip, kind)) for kind in (curves.LINE, "TT", "RR", "RT")]
+        self._set("curve", choice.curve, names)
+        self._set("part", choice.part, parts)
+        self.inputs["measure"].visible = choice.curve != curves.LINE
+        plots = {
+            "strain": curves.strain(clip, found, choice.curve, choice.measure, choice.part),
+            "rotation": curves.rotation(clip, found),
+            "volume": curves.volume(clip),
+        }
+        for name, plot in plots.items():
+            self.graphs[name].show(plot, 1e3 * clip.time, clip.es_frame)
+
+    def _fit(self, clip: Clip) -> None:
+        """Offer the components that the colour has, in the words of the view."""
+        known = components(self.choice.colour)
+        if self.choice.component not in known:
+            self.choice = replace(self.choice, component=known[min(1, len(known) - 1)] if known else "")
+        self._set("component", self.choice.component, [(name, component_name(name, clip)) for name in known])
+        self.inputs["component"].visible = bool(known)
+
+    def _set(self, name: str, value: str, options: list[Any]) -> None:
+        """Offer other options in an input, and one of them as chosen."""
+        self.inputs[name].update(options=options, value=value)
+
+    def _lacking(self, clip: Clip) -> list[str]:
+        """What is not there."""
+        if clip.missing:
+            lacking = ", ".join(MISSING[part] for part in clip.missing)
+            return [f"Not made yet, or not to be made, for this case and view: {lacking}."]
+        if not clip.has_curves:
+            return ["There are no curves: an earlier version made this repository. Run its configuration again."]
+        return []
+
+    def _say(self, text: str) -> None:
+        self.message.text = escape(text)
+        self.message.visible = bool(text)
+
+
+def _moved(points: Points, tracker: str | None) -> dict[str, Callable[[], Arrows | None]]:
+    """Kind of arrows to what makes those of a picture; without a tracker there are none of its own."""
+    clip = points.clip
+    return {
+        "true": lambda: arrows.true_motion(points) if clip.has("evaluation") else None,
+        "tracked": lambda: arrows.tracked_motion(points, tracker) if tracker and clip.has("tracking") else None,
+        "flow": lambda: arrows.flow(clip) if clip.has("truth") else None,
+    }
+
+
+def _move(panel: Panel, kind: str, make: Callable[[], Arrows | None] | None) -> None:
+    panel.move(kind, make() if make else None)

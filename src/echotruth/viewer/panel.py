@@ -1,0 +1,166 @@
+"""A picture on the page: a frame of the clip with its colours and arrows, axes in mm, and the scale of its colour."""
+
+from __future__ import annotations
+
+import numpy as np
+from bokeh.events import MouseMove
+from bokeh.models import (
+    AllLabels,
+    BasicTicker,
+    ColorBar,
+    ColumnDataSource,
+    Div,
+    FixedTicker,
+    GlyphRenderer,
+    Label,
+    LinearColorMapper,
+    Range1d,
+    Slider,
+)
+from bokeh.plotting import figure
+
+from echotruth.report.clip import MOTION
+from echotruth.viewer import script
+from echotruth.viewer.arrows import Arrows
+from echotruth.viewer.tint import Tint
+
+SIDE_ALONE, SIDE_BESIDE = 520, 400
+"""Of a picture on the screen, px: of one alone, and of two beside each other."""
+ARROWS = {"true": MOTION, "tracked": "#35d0ff", "flow": "#7dff6a"}
+"""Kind of arrows to their colour."""
+EMPTY = np.zeros(0, np.float32)
+NO_COLOUR = np.zeros((0, 0, 0), np.uint8)
+
+
+class Panel:
+    """One picture, of the truth or of a tracker.
+
+    Parameters
+    ----------
+    clip : ColumnDataSource
+        Grey levels of the clip.
+    sliders : tuple of Slider
+        The frame, and (never shown) the length of a side, mm.
+    ranges : tuple of Range1d
+        Lateral and axial: both panels share them.
+    said : Div
+        Where it is written what is under the pointer.
+    name : str
+        Under which the picture is found in the document.
+    """
+
+    def __init__(
+        self,
+        clip: ColumnDataSource,
+        sliders: tuple[Slider, Slider],
+        ranges: tuple[Range1d, Range1d],
+        said: Div,
+        name: str,
+    ) -> None:
+        frame, side = sliders
+        self.picture = ColumnDataSource({"image": [np.zeros((1, 1), np.uint32)]}, name=f"picture_{name}")
+        self.colour = ColumnDataSource({"index": [NO_COLOUR]}, name=f"colour_{name}")
+        self.palette = ColumnDataSource({"red": EMPTY, "green": EMPTY, "blue": EMPTY})
+        self.names = ColumnDataSource({"name": [""]})
+        self.movements = {kind: ColumnDataSource(dict.fromkeys(("x0", "y0", "x1", "y1"), EMPTY)) for kind in ARROWS}
+        ends = ("x0", "y0", "x1", "y1", "head_x", "angle")
+        self.arrows = {kind: ColumnDataSource(dict.fromkeys(ends, EMPTY), name=f"{kind}_{name}") for kind in ARROWS}
+        self.label = Label(x=8, y=8, x_units="screen", y_units="screen", text_color="white", text_font_size="13px")
+        scale = LinearColorMapper(palette=["#ffffff"], low=0, high=1)
+        self.bar = ColorBar(
+            color_mapper=scale, width=12, visible=False, title_standoff=8, major_label_policy=AllLabels()
+        )
+        self._ticks: list[int] = []
+        self.figure = _figure(ranges, name)
+        # Rows run downwards as depth does: the first is at depth 0, where the axis begins.
+        self._image = self.figure.image_rgba("image", x=-1, y=0, dw=2, dh=2, source=self.picture, origin="bottom_left")
+        self._renderers = {kind: self._draw(kind) for kind in ARROWS}
+        self.figure.add_layout(self.label)
+        self.figure.add_layout(self.bar, "right")
+        models = {"picture": self.picture, "colour": self.colour, "bar": self.bar, "names": self.names}
+        pointer = script.callback("pointer", clip=clip, slider=frame, side=side, said=said, **models)
+        self.figure.js_on_event(MouseMove, pointer)
+
+    def _draw(self, kind: str) -> list[GlyphRenderer]:
+        source, colour = self.arrows[kind], ARROWS[kind]
+        line = self.figure.segment("x0", "y0", "x1", "y1", source=source, line_color=colour, line_width=1.6)
+        head = self.figure.scatter(
+            "head_x", "y1", angle="angle", marker="triangle", size=6, source=source, color=colour, line_color=None
+        )
+        for renderer in (line, head):
+            renderer.visible = False
+        return [line, head]
+
+    def size(self, pixels: int, side: float) -> None:
+        """Make room for images of another size.
+
+        Parameters
+        ----------
+        pixels : int
+            Along a side.
+        side : float
+            mm.
+        """
+        self.picture.data = {"image": [np.zeros((pixels, pixels), np.uint32)]}
+        self._image.glyph.update(x=-side / 2, y=0, dw=side, dh=side)
+
+    def show_beside(self, visible: bool, alone: bool) -> None:
+        """Show the picture or hide it, smaller if there are two."""
+        side = SIDE_ALONE if alone else SIDE_BESIDE
+        self.figure.update(visible=visible, frame_width=side, frame_height=side)
+
+    def clear(self) -> None:
+        """Show neither colours nor arrows."""
+        self.tint(None)
+        for kind in ARROWS:
+            self.move(kind, None)
+
+    def tint(self, tint: Tint | None) -> None:
+        """Show other colours, or none."""
+        if tint is None:
+            self.colour.data = {"index": [NO_COLOUR]}
+            self.bar.visible = False
+            return
+        rgb = np.array([[int(colour[place : place + 2], 16) for place in (1, 3, 5)] for colour in tint.palette])
+        self.palette.data = dict(zip(("red", "green", "blue"), rgb.astype(np.float32).T.copy(), strict=True))
+        self.names.data = {"name": ["", *tint.names.values()]}
+        self.bar.color_mapper.update(palette=tint.palette, low=tint.low, high=tint.high)
+        if list(tint.names) != self._ticks:  # other models make Bokeh look through the whole page
+            self._ticks = list(tint.names)
+            self.bar.ticker = FixedTicker(ticks=self._ticks) if tint.names else BasicTicker()
+        # Of a name, the bar has the number if it begins with one; the pointer has all of it.
+        short = {number: name.split(" ")[0] if name[0].isdigit() else name for number, name in tint.names.items()}
+        self.bar.update(title=tint.title, visible=True, major_label_overrides=short)
+        self.colour.data = {"index": [tint.index]}
+
+    def move(self, kind: str, arrows: Arrows | None) -> None:
+        """Show other arrows of a kind, or none."""
+        columns = dict.fromkeys(("x0", "y0", "x1", "y1"), EMPTY)
+        if arrows is not None:
+            values = (arrows.start[..., 0], arrows.start[..., 1], arrows.end[..., 0], arrows.end[..., 1])
+            columns = {name: value.ravel() for name, value in zip(columns, values, strict=True)}
+        self.movements[kind].data = columns
+        for renderer in self._renderers[kind]:
+            renderer.visible = arrows is not None
+
+
+def _figure(ranges: tuple[Range1d, Range1d], name: str) -> figure:
+    """Empty axes in mm, depth downwards."""
+    lateral, axial = ranges
+    drawn = figure(
+        x_range=lateral,
+        y_range=axial,
+        frame_width=SIDE_ALONE,
+        frame_height=SIDE_ALONE,
+        tools="pan,wheel_zoom,box_zoom,reset,save",
+        active_drag=None,
+        toolbar_location="above",
+        min_border_left=60,
+        background_fill_color="black",
+        name=f"figure_{name}",
+        x_axis_label="lateral (mm)",
+        y_axis_label="depth (mm)",
+    )
+    drawn.grid.visible = False
+    drawn.toolbar.logo = None
+    return drawn

@@ -1,0 +1,99 @@
+"""The server of the viewer, on this machine alone."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+from bokeh.application import Application
+from bokeh.application.handlers import FunctionHandler
+from bokeh.document import Document
+from bokeh.server.server import Server
+
+from echotruth.viewer.catalogue import Catalogue
+from echotruth.viewer.choice import asked
+from echotruth.viewer.page import Page
+
+LOCAL = "localhost"
+
+
+class ShowError(ValueError):
+    """Raised if a repository cannot be shown."""
+
+
+def serve(repository: str | Path, port: int = 0) -> Server:
+    """Start a server that answers to this machine alone.
+
+    Parameters
+    ----------
+    repository : str or Path
+        `out/NAME` or `out/NAME/NAME.zarr`.
+    port : int
+        Default: any that is free.
+
+    Returns
+    -------
+    Server
+        Listening; its `io_loop` is to be started.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the folder holds no repository.
+    ShowError
+        If there is nothing to show, or the port is in use.
+    """
+    opened(repository)  # so that what cannot be shown is said at once
+
+    def page(document: Document) -> None:
+        context = document.session_context
+        query = context.request.arguments if context is not None and context.request is not None else {}
+        texts = {name: [value.decode() for value in values] for name, values in query.items()}
+        catalogue = opened(repository)  # as it is now: a run may be going on
+        Page(catalogue, asked(catalogue, texts), document)
+
+    try:
+        server = Server({"/": Application(FunctionHandler(page))}, port=port, address=LOCAL)
+    except OSError as error:
+        raise ShowError(f"port {port}: {error.strerror or error}: give another by --port, or none for any") from None
+    server.start()
+    return server
+
+
+def opened(repository: str | Path) -> Catalogue:
+    """Contents of a repository that has something to show.
+
+    Raises
+    ------
+    FileNotFoundError, ShowError
+        If the folder holds no repository, or one without cases.
+    """
+    catalogue = Catalogue(repository)
+    if not catalogue.reader.path.is_dir():
+        said = "it is named after its folder, which must not be renamed"
+        raise ShowError(f"{repository}: has no folder {catalogue.reader.path.name}: {said}")
+    if not catalogue.cases or not catalogue.views:
+        raise ShowError(f"{repository}: has no cases or no views yet: run its configuration first")
+    return catalogue
+
+
+def address(server: Server) -> str:
+    """Address of the page."""
+    return f"http://{LOCAL}:{server.port}/"
+
+
+def run(server: Server, ready: Callable[[], None]) -> None:
+    """Answer until the process is interrupted or told to end.
+
+    Parameters
+    ----------
+    server : Server
+    ready : callable
+        Called once the server answers.
+    """
+    server.io_loop.add_callback(ready)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: server.io_loop.add_callback_from_signal(server.io_loop.stop))
+    server.io_loop.start()
+    server.stop()

@@ -1,0 +1,42 @@
+"""A repository whose images are known at every pixel, and whose wall is a ring that moves by whole pixels."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from known_repository import FRAMES, SETTINGS, SIZES, make
+
+from echotruth.evaluation.clip import grid_positions
+from echotruth.repository.store import Store
+
+SIDE = 12e-3
+"""Of the images, m."""
+PIXEL = SIDE / SIZES[0]
+SHIFT = np.array([3 * PIXEL, -2 * PIXEL, 1e-4])
+"""True displacement of the ring in the last frame: lateral, axial, elevation, m; 3 and -2 pixels."""
+RADII = 2.5e-3, 5e-3
+"""Of the ring about the middle of the image, m."""
+
+
+@dataclass
+class Shown:
+    """The repository, and the points of its ring."""
+
+    folder: Path
+    position: np.ndarray
+    inside: np.ndarray
+
+
+def shown_repository(folder: Path) -> Shown:
+    """Write the repository, in its folder."""
+    known = make(folder, SETTINGS | {"tracking": SETTINGS["tracking"] | {"grid_px": 2}})
+    grid = grid_positions(known.config)
+    radius = np.hypot(grid[..., 0], grid[..., 1] - SIDE / 2)
+    inside = (radius > RADII[0]) & (radius < RADII[1])
+    share = np.arange(FRAMES)[:, None, None, None] / (FRAMES - 1)
+    moved = np.where(inside[..., None], share * SHIFT, np.nan)
+    axes = np.where(inside[..., None, None], np.eye(2), np.nan)
+    store = Store(known.folder / "known.zarr")
+    for index in range(len(known.config.views)):
+        store.write("evaluation", {"true_displacement": moved, "wall_axes": axes}, 0, index)
+    return Shown(known.folder, grid[inside], inside)

@@ -1,0 +1,87 @@
+"""The repository that the viewer shows, its page, and a browser."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from shown_repository import Shown, shown_repository
+
+from echotruth.viewer.catalogue import Catalogue
+
+CHROMIUM = Path("/usr/bin/chromium")
+QUIET = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
+
+
+@pytest.fixture(scope="session")
+def shown(tmp_path_factory) -> Shown:
+    return shown_repository(tmp_path_factory.mktemp("shown") / "known")
+
+
+@pytest.fixture
+def catalogue(shown) -> Catalogue:
+    return Catalogue(shown.folder)
+
+
+@pytest.fixture(scope="module")
+def address(shown):
+    """Address of the page, as `echotruth show` prints it."""
+    command = [sys.executable, "-m", "echotruth", "show", str(shown.folder), "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield process.stdout.readline().split()[1]
+        finally:
+            process.terminate()
+    assert process.returncode == 0
+
+
+@pytest.fixture(scope="module")
+def browser():
+    api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+    if not CHROMIUM.is_file():
+        pytest.skip(f"needs {CHROMIUM}")
+    with api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def opened(browser, address):
+    """A function that opens the page with a query; a script that fails in it, fails the tests."""
+    errors = []
+
+    def open_page(query=""):
+        page = browser.new_page(viewport={"width": 1500, "height": 900})
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(address + query)
+        page.wait_for_function("window.echotruth && echotruth.drawn > 0", timeout=120_000)
+        return page
+
+    yield open_page
+    assert errors == []
+
+
+@pytest.fixture(scope="module")
+def one_page(opened):
+    return opened("?tracker=one")
+
+
+AS_AT_FIRST = """() => {
+    const model = name => Bokeh.documents[0].get_model_by_name(name);
+    const first = {view: "mid", size: "128", other: "", colour: "none"};
+    for (const [name, value] of Object.entries(first)) model(name).value = value;
+    model("arrows").active = [];
+    model("frame").value = 0;
+    model("frame").value_throttled = 0;
+}"""
+
+
+@pytest.fixture
+def page(one_page):
+    """A page that is opened once; what a test chose is taken back after it."""
+    address = one_page.evaluate("location.search")
+    yield one_page
+    one_page.evaluate(AS_AT_FIRST)
+    as_before = "address => location.search === address && echotruth.frame === 0"
+    one_page.wait_for_function(as_before, arg=address, timeout=60_000)

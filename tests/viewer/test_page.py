@@ -1,0 +1,172 @@
+"""What can be chosen, what the address says, and what the page says where something is not there."""
+
+import shutil
+import sys
+import time
+from pathlib import Path
+from urllib.parse import parse_qs
+
+import numpy as np
+import pytest
+from bokeh.document import Document
+from finished_repository import configured
+from known_repository import SIZES
+
+from echotruth.cases import expand
+from echotruth.evaluation.run import prepare
+from echotruth.viewer.catalogue import Catalogue
+from echotruth.viewer.choice import TRUTH, Choice, asked, first
+from echotruth.viewer.page import Page
+from echotruth.viewer.server import ShowError, opened, serve
+from echotruth.workflow.scripts.cases import lay_out
+
+
+@pytest.fixture
+def page(catalogue):
+    made = Page(catalogue, first(catalogue), Document())
+    made.show()
+    return made
+
+
+def choose(page, **chosen):
+    for name, value in chosen.items():
+        page.inputs[name].value = value
+    page.show()
+
+
+@pytest.fixture(scope="session")
+def unfinished(tmp_path_factory):
+    """A repository of which no job is done."""
+    folder = tmp_path_factory.mktemp("unfinished") / "small"
+    config = configured()
+    lay_out(folder, config, expand(config))
+    return folder
+
+
+def test_address_leads_back_to_the_choice(catalogue):
+    choice = Choice("heart", "long", SIZES[1], "two", TRUTH, "strain", "LL", "TT", "green_lagrange", "layer 2", 0)
+    assert asked(catalogue, parse_qs(choice.address)) == choice
+
+
+def test_address_of_what_is_not_there_is_left_out(catalogue):
+    query = {"case": ["none"], "view": ["../.."], "size": ["7"], "colour": ["<b>"], "frame": ["-1"], "else": ["x"]}
+    assert asked(catalogue, query) == first(catalogue)
+
+
+def test_page_shows_the_images_of_what_is_chosen(page):
+    assert page.clip.data["grey"][0].shape[-1] == SIZES[0] and not page.message.visible
+    choose(page, size=str(SIZES[1]), view="long", colour="strain")
+    assert page.clip.data["grey"][0].shape[-1] == SIZES[1]
+    assert page.panels[0].colour.data["index"][0].shape[-1] == SIZES[1]
+    assert [name for name, _ in page.inputs["component"].options] == ["RR", "CC", "LL", "RC", "RL", "CL"]
+
+
+def test_what_is_shown_already_is_not_sent_again(page):
+    choose(page, colour="layer")
+    grey, layers = page.clip.data["grey"][0], page.panels[0].colour.data["index"][0]
+    choose(page, other="two", curve="RR")
+    assert page.clip.data["grey"][0] is grey and page.panels[0].colour.data["index"][0] is layers
+
+
+def test_truth_beside_a_tracker_has_its_strain_and_no_error(page):
+    choose(page, other=TRUTH, colour="tracked_strain", component="RR")
+    assert [panel.bar.title for panel in page.panels] == ["Tracked radial strain (%)", "True radial strain (%)"]
+    choose(page, colour="strain_error")
+    assert page.panels[0].bar.visible and not page.panels[1].bar.visible
+
+
+def test_part_of_the_wall_follows_the_curve(page):
+    assert page.inputs["part"].value == "middle"
+    choose(page, curve="TT")
+    assert page.inputs["part"].value == "wall" and "layer 6" in page.inputs["part"].options
+
+
+def test_unfinished_case_is_said_so(unfinished):
+    catalogue = Catalogue(unfinished)
+    page = Page(catalogue, first(catalogue), Document())
+    for colour in ("none", "strain", "tracked_strain", "segment"):
+        choose(page, colour=colour, other=TRUTH)
+        assert "Not made yet" in page.message.text and "images" in page.message.text
+        assert "<b>unfinished</b>" in page.facts.text
+        assert not page.clip.data["grey"][0].any()
+
+
+def test_damaged_file_is_said_and_nothing_else_is_shown(shown, tmp_path):
+    folder = tmp_path / "known"
+    shutil.copytree(shown.folder, folder)
+    shards = [path for path in (folder / f"known.zarr/bmode/{SIZES[0]}/image/c").rglob("*") if path.is_file()]
+    for shard in shards:
+        content = bytearray(shard.read_bytes())
+        content[len(content) // 3] ^= 0xFF
+        shard.write_bytes(content)
+    catalogue = Catalogue(folder)
+    page = Page(catalogue, first(catalogue), Document())
+    page.show()
+    assert "cannot be shown" in page.message.text and f"echotruth check {folder}" in page.message.text
+    assert not page.clip.data["grey"][0].any()
+    choose(page, size=str(SIZES[1]))
+    assert not page.message.visible and page.clip.data["grey"][0].any()
+
+
+def test_kept_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_missing(shown, tmp_path, monkeypatch):
+    folder = Path(shutil.copytree(shown.folder, tmp_path / "known"))
+    (tmp_path / "mine.py").write_text(
+        "import numpy as np\n"
+        "def track(frames, points, mask, spacing, frame_time, seed):\n"
+        "    course = np.arange(len(frames))[:, None, None]\n"
+        "    return course * np.ones((1, len(points), 2)), np.ones((len(frames), len(points)))\n"
+    )
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    run = prepare(folder, "outside", {"method": "external", "track": "mine:track"}, True)
+    case_views, sizes = run.case_views([], ["mid"]), run.sizes([SIZES[0]])
+    run.check_writable()
+    run.write(list(run.rows(case_views, sizes)))
+    catalogue = Catalogue(folder)
+    page = Page(catalogue, first(catalogue), Document())
+    page.arrows.active = [1]
+    choose(page, tracker="outside", colour="displacement_error")
+    assert not page.message.visible and page.graphs["strain"].source.data["y1"].shape == (3,)
+    assert page.panels[0].colour.data["index"][0].any()
+    moved = page.panels[0].movements["tracked"].data
+    np.testing.assert_allclose(np.nanmax(moved["x1"] - moved["x0"]), 1e3 * 2 * 12e-3 / SIZES[0], rtol=1e-3)
+    choose(page, view="long")
+    assert "was not evaluated" in page.message.text and "not evaluated on this clip" in page.facts.text
+    assert not page.panels[0].colour.data["index"][0].any() and not page.panels[0].movements["tracked"].data["x0"].size
+
+
+@pytest.mark.slow
+def test_ten_thousand_cases_open_in_seconds(tmp_path):
+    config = configured(seeds=range(1, 10_001))
+    lay_out(tmp_path / "small", config, expand(config))
+    start = time.process_time()
+    catalogue = Catalogue(tmp_path / "small")
+    page = Page(catalogue, first(catalogue), Document())
+    page.show()
+    page.inputs["case"].value = catalogue.cases[7777]
+    page.show()
+    assert time.process_time() - start < 5
+    assert page.facts.text.startswith(catalogue.cases[7777]) and len(page.inputs["case"].completions) == 10_000
+
+
+def test_folder_without_a_repository_or_with_another_name_is_refused(shown, tmp_path):
+    with pytest.raises(FileNotFoundError, match="is not a repository"):
+        opened(tmp_path)
+    shutil.copytree(shown.folder, tmp_path / "renamed")
+    with pytest.raises(ShowError, match=r"has no folder renamed\.zarr"):
+        opened(tmp_path / "renamed")
+
+
+def test_port_in_use_is_said_in_a_sentence(shown):
+    server = serve(shown.folder)
+    try:
+        with pytest.raises(ShowError, match=f"port {server.port}"):
+            serve(shown.folder, server.port)
+    finally:
+        server.stop()
+
+
+def test_times_of_the_frames_are_in_milliseconds(page):
+    time = page.times.data["time"]
+    assert time[0] == 0 and 10 < time[-1] < 1000
+    assert page.times.data["text"][1] == f"{time[1]:.1f} ms"
+    assert np.all(np.diff(time) > 0)
