@@ -22,8 +22,8 @@ def test_thin_keeps_its_distance():
 
 
 def test_frames_show_the_motion(made):
-    frames = clip.render(made, 120)
-    assert frames.shape == (4, 120, 120, 3) and frames.dtype == np.uint8
+    frames = clip.render(made, 240)
+    assert frames.shape == (4, 240, 240, 3) and frames.dtype == np.uint8
     amber = [((frame[..., 0] > 200) & (frame[..., 2] < 90)).sum() for frame in frames.astype(int)]
     assert amber[0] < amber[1] < amber[3]
 

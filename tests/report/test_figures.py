@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from echotruth.config import Config, Physiology
-from echotruth.report.figures import Figures
+from echotruth.report.figures import PARTS, Figures
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # of the little store that stands for a repository
 
@@ -26,6 +26,10 @@ def test_implausible_hearts_are_shown_where_there_are_no_others_and_they_were_im
     assert list(figures(tmp_path, ["failed", "implausible"], exclude=False).complete) == [1]
 
 
-def test_no_heart_to_show_is_said(tmp_path):
-    with pytest.raises(ValueError, match="no case is complete: see the reasons in cases/reason"):
-        figures(tmp_path, ["failed", "implausible"], exclude=True)
+def test_without_a_heart_a_sentence_stands_in_place_of_every_figure(tmp_path):
+    drawn = figures(tmp_path, ["failed", "implausible"], exclude=True)
+    for part in PARTS:
+        drawn.draw(part)
+    names = {name for part in PARTS.values() for name in part}
+    assert {path.stem for path in tmp_path.glob("*.png")} == {path.stem for path in tmp_path.glob("*.svg")} == names
+    assert {path.name for path in tmp_path.glob("*.[gmc]*")} == {"clip.gif", "clip.mp4", "leaderboard.csv"}

@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -5,7 +7,20 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from echotruth.evaluation.leaderboard import best, standings
-from echotruth.report import bullseye, error, leaderboard, loop, physiology, resolutions, strain, style, views
+from echotruth.report import (
+    bullseye,
+    curves,
+    error,
+    leaderboard,
+    loop,
+    physiology,
+    population,
+    resolutions,
+    strain,
+    style,
+    vector,
+    views,
+)
 
 TIME = np.arange(10) * 3e-3
 WAVE = np.sin(np.pi * np.arange(10) / 10) ** 2
@@ -63,9 +78,9 @@ def test_physiology(tmp_path, species):
     published = physiology.PUBLISHED.get(species, {})
     assert set(published) <= {"twist", *physiology.COMPONENTS}
     drawn = seen(physiology.draw(tmp_path / "a.png", cycle(500 + 13000 * WAVE, (6e-3, 9e-3, 4e-3)), published))
-    shades = coloured(drawn, physiology.SHADE)
+    shades = coloured(drawn, style.SHADE)
     bare = seen(physiology.draw(tmp_path / "b.png", cycle(500 + 13000 * WAVE, (np.nan,) * 3), published))
-    assert shades > 10000 + coloured(bare, physiology.SHADE), "isovolumic phases are shaded where there are any"
+    assert shades > 10000 + coloured(bare, style.SHADE), "isovolumic phases are shaded where there are any"
 
 
 def test_physiology_of_a_prescribed_motion_has_words_in_place_of_pressure_and_volume(tmp_path):
@@ -83,15 +98,26 @@ def test_resolutions(tmp_path):
 
 def test_views(tmp_path):
     image = np.random.default_rng(0).integers(0, 256, (64, 64)).astype(np.uint8)
-    wall = np.zeros((64, 64), bool)
-    wall[20:40, 20:40] = True
-    pictures = {"mid": [views.Picture(image, wall)] * 2, "long_axis": [views.Picture(image, wall & False)] * 2}
-    seen(views.draw(tmp_path / "views.png", pictures, 12e-3))
+    layer = np.zeros((64, 64), int)
+    layer[20:40, 20:40] = 1
+    one = {"mid": [views.Picture(image, layer)] * 2, "long_axis": [views.Picture(image, 0 * layer)] * 2}
+    border = coloured(seen(views.draw(tmp_path / "one.png", one, 12e-3)), views.BORDER)
+    layer[30:40, 20:40] = 2
+    two = coloured(seen(views.draw(tmp_path / "two.png", one, 12e-3)), views.BORDER)
+    assert two > border > 100, "there is a line between two layers"
+
+
+def test_views_show_the_part_that_holds_the_wall(tmp_path):
+    layer = np.zeros((64, 64), int)
+    layer[40:50, 40:50] = 1
+    left, right, bottom, top = views._shown([layer], 12.0)
+    assert left < 40 / 64 * 12 - 6 < 50 / 64 * 12 - 6 < right and top < 40 / 64 * 12 < 50 / 64 * 12 < bottom
+    assert right - left < 6 and bottom - top < 6
 
 
 def test_error(tmp_path):
-    curves = {"as_published": {64: np.full(6, 3e-5), 32: np.full(6, np.nan)}, "corrected": {64: np.full(6, 1e-5)}}
-    seen(error.draw(tmp_path / "error.png", {"mid": curves, "long_axis": curves}, ["long_axis"]))
+    errors = {"as_published": {64: np.full(6, 3e-5), 32: np.full(6, np.nan)}, "corrected": {64: np.full(6, 1e-5)}}
+    seen(error.draw(tmp_path / "error.png", {"mid": errors, "long_axis": errors}, ["long_axis"]))
 
 
 @pytest.mark.parametrize("hearts", [1, 5])
@@ -114,7 +140,23 @@ def test_leaderboard(tmp_path, hearts):
 
 def test_bullseye_without_data_is_hatched_throughout(tmp_path):
     nothing = np.full(17, np.nan)
-    seen(bullseye.draw(tmp_path / "bullseye.png", nothing, nothing, "none"))
+    seen(bullseye.draw(tmp_path / "bullseye.png", [bullseye.Segments("Strain", nothing, nothing)], "none"))
+    figure = Figure()
+    axes = figure.subplots()
+    bullseye.disc(axes, nothing, bullseye.TwoSlopeNorm(0, -1, 1))
+    assert all(wedge.get_hatch() for wedge in axes.patches) and len(axes.texts) == 4, "the names of four walls alone"
+
+
+def test_numbers_of_a_bullseye_stay_within_their_segments():
+    figure = style.figure(9.6, 3.45)
+    axes = figure.subplots(1, 3)[0]
+    bullseye.disc(axes, np.full(17, -18.0), bullseye.TwoSlopeNorm(0, -20, 20))
+    figure.canvas.draw()
+    to_data = axes.transData.inverted()
+    for number, (wedge, text) in enumerate(zip(axes.patches, axes.texts, strict=False), 1):
+        box = text.get_window_extent().transformed(to_data)
+        corners = [(x, y) for x in (box.x0, box.x1) for y in (box.y0 + box.height / 4, box.y1 - box.height / 4)]
+        assert all(wedge.get_path().contains_point(corner) for corner in corners), f"segment {number}"
 
 
 @pytest.mark.parametrize("number, position", [(1, (0, 0.85)), (2, (-0.74, 0.43)), (10, (0, -0.6)), (16, (0.38, 0.1))])
@@ -131,7 +173,50 @@ def test_segments_lie_where_they_should(number, position):
     assert red > blue
 
 
+def test_a_bad_tracker_does_not_flatten_a_good_one(tmp_path, monkeypatch):
+    """Errors of 5 and 10 um are told apart beside one of 900 um."""
+    kept = []
+    monkeypatch.setattr(style, "save", lambda figure, path: kept.append(figure) or path)
+    errors = {"bad": {64: np.full(6, 9e-4)}, "good": {64: np.linspace(5e-6, 1e-5, 6)}}
+    error.draw(tmp_path / "error.png", {"mid": errors})
+    axes = kept[0].axes[0]
+    kept[0].canvas.draw()
+    heights = axes.transAxes.inverted().transform(axes.transData.transform([(1, 5), (1, 10), (1, 900)]))[:, 1]
+    assert heights[1] - heights[0] > 0.08 and heights[0] > 0 and heights[2] < 1
+
+
+def panel(tracked):
+    return curves.Panel("GCS", "%", 1e3 * TIME, 15.0, -18 * WAVE, tracked)
+
+
+def test_curves(tmp_path):
+    rows = [[panel({"one": -17 * WAVE, "two": np.full(10, np.nan)}), None], [panel({}), panel({"one": -17 * WAVE})]]
+    seen(curves.draw(tmp_path / "curves.png", rows))
+
+
+def test_axis_of_curves_shows_truth_and_best_tracker_and_is_not_ruled_by_the_worst():
+    low, high = curves._limits(panel({"best": -20 * WAVE, "worst": -400 * WAVE}))
+    assert -60 < low < -20 and 0 < high < 10
+
+
+def test_population(tmp_path):
+    values = np.random.default_rng(0).normal(50, 5, 900)
+    kinds = np.where(np.arange(900) < 890, "healthy", "infarct+dilation")
+    seen(population.draw(tmp_path / "population.png", {"EF (%)": values, "GLS (%)": values * np.nan}, kinds))
+
+
+def test_figure_without_a_suffix_is_also_an_svg_without_paper(tmp_path):
+    path = loop.draw(tmp_path / "loop", TIME, 5, 4e4 * WAVE, np.stack([WAVE, 1 + WAVE]), np.stack([WAVE, 1 + WAVE]))
+    assert path == tmp_path / "loop.png" and seen(path)[0, 0].tolist() == [255, 255, 255]
+    drawing = vector.inline(tmp_path / "loop.svg", 'A "loop" & more')
+    assert 'aria-label="A &quot;loop&quot; &amp; more"' in drawing and style.INK not in drawing
+    names = re.findall(r'\bid="([^"]+)"', drawing)
+    assert names and all(name.startswith("loop-") for name in names)
+    used = re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', drawing)
+    assert {one or other for one, other in used} <= set(names)
+
+
 def test_same_figure_same_bytes(tmp_path):
-    curves = {"mid": {"as_published": {64: np.full(6, 3e-5)}}}
-    first, second = (error.draw(tmp_path / name, curves).read_bytes() for name in ("a.png", "b.png"))
+    errors = {"mid": {"as_published": {64: np.full(6, 3e-5)}}}
+    first, second = (error.draw(tmp_path / name, errors).read_bytes() for name in ("a.png", "b.png"))
     assert first == second

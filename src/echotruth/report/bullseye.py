@@ -1,7 +1,9 @@
-"""AHA bullseyes of true and tracked displacement (the paper's figure 3)."""
+"""AHA bullseyes of what is true and what was tracked in the segments, and of the difference."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,28 +12,54 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import TwoSlopeNorm
-from matplotlib.patches import Wedge
+from matplotlib.figure import SubFigure
+from matplotlib.patches import Patch, Wedge
 
 from echotruth.aha import BULLSEYE
 from echotruth.report import style
 
-UM = 1e-6
-"""m."""
-
 COLOURMAP = colormaps["RdBu_r"]
 """Blue below zero, red above."""
 
+UNSEEN: dict[str, Any] = {"facecolor": "none", "edgecolor": style.TARGET, "hatch": "////"}
+"""Look of a segment that no view shows."""
+
+ON_LIGHT = "#222222"
+"""Colour of numbers on light segments."""
+
+
+@dataclass(frozen=True)
+class Segments:
+    """One quantity in the segments.
+
+    Attributes
+    ----------
+    title : str
+        As "Circumferential strain, short-axis views".
+    true, tracked : ndarray of shape (17,)
+        Its values in segments 1..17; NaN where no view shows the segment.
+    label : str
+        What the colour bar says, with the unit.
+    difference_label : str
+        The same of the difference.
+    """
+
+    title: str
+    true: np.ndarray
+    tracked: np.ndarray
+    label: str = "Strain at ES (%)"
+    difference_label: str = "Difference (percentage points)"
+
 
 @style.styled
-def draw(path: str | Path, true: np.ndarray, tracked: np.ndarray, tracker: str) -> Path:
-    """Draw true and tracked displacement on one scale, and their difference.
+def draw(path: str | Path, quantities: Sequence[Segments], tracker: str) -> Path:
+    """Draw a row of three bullseyes for each quantity: true, tracked, and their difference.
 
     Parameters
     ----------
     path : str or Path
         File to write.
-    true, tracked : ndarray of shape (17,)
-        Displacement of segments 1..17 from end-diastole to end-systole, m; NaN where unknown.
+    quantities : sequence of Segments
     tracker : str
         Name of the tracker.
 
@@ -40,29 +68,35 @@ def draw(path: str | Path, true: np.ndarray, tracked: np.ndarray, tracker: str) 
     Path
         The file.
     """
-    figure = style.figure(9.0, 3.9)
-    panels = figure.subplots(1, 3)
-    difference = tracked - true
-    common = _scale(np.concatenate([true, tracked]))
-    for panel, values, name, scale in zip(
-        panels,
-        (true, tracked, difference),
-        ("Finite elements", f"Tracked: {tracker}", "Tracking minus FE"),
-        (common, common, _scale(difference)),
-        strict=True,
-    ):
-        disc(panel, values / UM, scale)
-        panel.set_title(name)
-    for scale, axes, shrink, aspect, label in (
-        (common, panels[:2], 0.7, 50, "Circumferential displacement at ES (µm)"),
-        (_scale(difference), panels[2], 0.9, 25, "Difference (µm)"),
-    ):
-        bar: dict[str, Any] = {"shrink": shrink, "aspect": aspect, "orientation": "horizontal", "pad": 0.06}
-        figure.colorbar(ScalarMappable(scale, COLOURMAP), ax=axes, **bar).set_label(label)
+    figure = style.figure(9.6, 0.35 + 3.45 * len(quantities))
+    rows = figure.subfigures(len(quantities) + 1, 1, squeeze=False, height_ratios=[*[3.45] * len(quantities), 0.35])
+    for row, segments in zip(rows[:, 0], quantities, strict=False):
+        _row(row, segments, tracker)
+    hatched = Patch(linewidth=0.6, label="no view of this kind shows the segment", **UNSEEN)
+    rows[-1, 0].legend(handles=[hatched], loc="center", fontsize=8.5, labelcolor=style.MUTED)
     return style.save(figure, path)
 
 
-def disc(axes: Axes, values: np.ndarray, scale: TwoSlopeNorm) -> None:
+def _row(figure: SubFigure, segments: Segments, tracker: str) -> None:
+    panels = figure.subplots(1, 3)
+    figure.suptitle(segments.title, fontweight="bold", fontsize=10)
+    difference = segments.tracked - segments.true
+    common, own = _scale(np.concatenate([segments.true, segments.tracked])), _scale(difference)
+    shown = (segments.true, "True", common), (segments.tracked, f"Tracked ({tracker})", common)
+    for panel, (values, name, scale) in zip(panels, (*shown, (difference, "Tracked minus true", own)), strict=True):
+        disc(
+            panel,
+            values,
+            scale,
+            decimals=int(scale is own and np.abs(difference).max(initial=0, where=np.isfinite(difference)) < 10),
+        )
+        panel.set_title(name, fontweight="normal", fontsize=9)
+    bar: dict[str, Any] = {"shrink": 0.8, "aspect": 22, "pad": 0.02}
+    figure.colorbar(ScalarMappable(common, COLOURMAP), ax=panels[:2], **bar).set_label(segments.label)
+    figure.colorbar(ScalarMappable(own, COLOURMAP), ax=panels[2], **bar).set_label(segments.difference_label)
+
+
+def disc(axes: Axes, values: np.ndarray, scale: TwoSlopeNorm, decimals: int = 0) -> None:
     """Draw one bullseye: the base outermost, anterior at the top and the septum on the left.
 
     Parameters
@@ -72,48 +106,46 @@ def disc(axes: Axes, values: np.ndarray, scale: TwoSlopeNorm) -> None:
         One number per segment, written into it; segments that are NaN are hatched.
     scale : TwoSlopeNorm
         Normalisation of the colour map.
+    decimals : int
+        Of the numbers.
     """
-    for number, (value, (inner, outer, start, stop)) in enumerate(zip(values, BULLSEYE, strict=True), 1):
-        known = np.isfinite(value)
-        colour = COLOURMAP(scale(value)) if known else "#eeeeee"
-        axes.add_patch(
-            Wedge(
-                (0, 0),
-                outer,
-                np.degrees(start),
-                np.degrees(stop),
-                width=outer - inner,
-                facecolor=colour,
-                edgecolor="white" if known else "#bbbbbb",
-                linewidth=1.2,
-                hatch=None if known else "////",
+    for value, (inner, outer, start, stop) in zip(values, BULLSEYE, strict=True):
+        known = bool(np.isfinite(value))
+        colour = COLOURMAP(scale(value))
+        look = {"facecolor": colour, "edgecolor": style.PAPER} if known else UNSEEN
+        angles = np.degrees(start), np.degrees(stop)
+        axes.add_patch(Wedge((0, 0), outer, *angles, width=outer - inner, linewidth=1.2 if known else 0.6, **look))
+        if known:
+            angle, radius = (start + stop) / 2, (inner + outer) / 2 if inner else 0
+            is_dark = np.dot(colour[:3], (0.299, 0.587, 0.114)) < 0.55
+            axes.text(
+                radius * np.cos(angle),
+                radius * np.sin(angle),
+                _number(float(value), decimals),
+                ha="center",
+                va="center",
+                fontsize=7,
+                color=style.ON_IMAGE if is_dark else ON_LIGHT,
             )
-        )
-        angle, radius = (start + stop) / 2, (inner + outer) / 2 if inner else 0
-        position = radius * np.cos(angle), radius * np.sin(angle)
-        dark = known and np.dot(colour[:3], (0.299, 0.587, 0.114)) < 0.55
-        axes.text(
-            *position,
-            str(round(value)).replace("-", "−") if known else str(number),
-            ha="center",
-            va="center",
-            fontsize=8.5,
-            color="white" if dark else "#222222" if known else "#999999",
-        )
     _names(axes)
+
+
+def _number(value: float, decimals: int) -> str:
+    rounded = round(value, decimals) + 0.0  # not -0
+    return f"{rounded:.{decimals}f}".replace("-", "−")
 
 
 def _names(axes: Axes) -> None:
     """Write the names of the walls around the disc."""
     for angle, name, rotation in ((90, "anterior", 0), (180, "septal", 90), (270, "inferior", 0), (0, "lateral", 270)):
         x, y = 1.09 * np.cos(np.radians(angle)), 1.09 * np.sin(np.radians(angle))
-        axes.text(x, y, name, ha="center", va="center", rotation=rotation, fontsize=8, color="#555555")
+        axes.text(x, y, name, ha="center", va="center", rotation=rotation, fontsize=7.5, color=style.MUTED)
     axes.set(xlim=(-1.18, 1.18), ylim=(-1.18, 1.18), aspect="equal")
     axes.axis("off")
 
 
 def _scale(values: np.ndarray) -> TwoSlopeNorm:
-    """Scale symmetric about zero: white is no motion, the colour shows the sign."""
-    magnitude = np.abs(values[np.isfinite(values)]) / UM
-    limit = max(float(magnitude.max()), 1.0) if magnitude.size else 1.0
+    """Scale symmetric about zero: white is zero, the colour shows the sign; the darkest colours are left out."""
+    magnitude = np.abs(values[np.isfinite(values)])
+    limit = max(1.2 * float(magnitude.max()), 1.0) if magnitude.size else 1.0
     return TwoSlopeNorm(0, -limit, limit)

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
 from matplotlib.text import Text
 from PIL import Image
 
@@ -78,7 +79,10 @@ def thin(position: np.ndarray, distance: float) -> np.ndarray:
 
 @style.styled
 def render(clip: ClipWithMotion, side: int) -> np.ndarray:
-    """Draw every frame, cropped to the moving wall: grey image, paths so far and arrows from end-diastole.
+    """Draw every frame, cropped to the moving wall: the grey image, and points that stay on their tissue.
+
+    Behind each point is its path since end-diastole, fainter the longer ago, so that nothing seems to float where the
+    tissue was.
 
     Parameters
     ----------
@@ -91,35 +95,24 @@ def render(clip: ClipWithMotion, side: int) -> np.ndarray:
     ndarray of shape (frame, side, side, 3), uint8
         RGB.
     """
-    left, right, bottom, top = _crop(clip)
+    left, right, bottom, top = crop(clip)
     figure = style.figure(4, 4)
     figure.set_layout_engine("none")
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.axis("off")
     picture = axes.imshow(clip.image[0], cmap="gray", vmin=0, vmax=255, interpolation="bilinear")
-    trails = LineCollection([], colors=MOTION, linewidths=0.8, alpha=0.45)
+    trails = LineCollection([], linewidths=1.1)
     axes.add_collection(trails)
-    arrows = axes.quiver(
-        *clip.position.T,
-        *np.zeros_like(clip.position.T),
-        angles="xy",
-        scale_units="xy",
-        scale=1,
-        color=MOTION,
-        width=0.006,
-        headwidth=3.6,
-        headlength=3.8,
-        headaxislength=3.4,
-        minlength=0.5,
-    )
+    (points,) = axes.plot(*clip.position.T, "o", color=MOTION, markersize=2.6, markeredgewidth=0)
     axes.set(xlim=(left, right), ylim=(bottom, top))
     label = _scale_bar(axes, clip, (left, bottom))
     frames = []
     for t, image in enumerate(clip.image):
         picture.set_data(image)
-        trails.set_segments(list(clip.path[: t + 1].swapaxes(0, 1)))
-        arrows.set_UVC(*np.nan_to_num(clip.path[t] - clip.position).T)
+        trails.set_segments(list(_steps(clip.path[: t + 1])))
+        trails.set_color(_fading(t, len(clip.position)))
+        points.set_data(*clip.path[t].T)
         label.set_text(f"{clip.time[t] * 1e3:.0f} ms")
         figure.set_dpi(side / 4)
         canvas.draw()
@@ -127,10 +120,32 @@ def render(clip: ClipWithMotion, side: int) -> np.ndarray:
     return np.stack(frames)
 
 
-def _crop(clip: ClipWithMotion) -> tuple[float, float, float, float]:
-    """Square around the wall over the whole cycle, within the image: left, right, bottom, top, px."""
+def _steps(path: np.ndarray) -> np.ndarray:
+    """Steps of paths (frame, point, 2) from frame to frame: (step, 2, 2), those of one frame after those of another."""
+    return np.stack([path[:-1], path[1:]], axis=2).reshape(-1, 2, 2)
+
+
+def _fading(steps: int, points: int) -> list[tuple[float, float, float, float]]:
+    """Colours of the steps of all points, the last ones the strongest: (steps * points, 4), RGBA."""
+    opacity = np.repeat(np.linspace(0.12, 0.85, steps) if steps > 1 else np.full(steps, 0.85), points)
+    red, green, blue = to_rgb(MOTION)
+    return [(red, green, blue, float(alpha)) for alpha in opacity]
+
+
+def crop(clip: ClipWithMotion) -> tuple[float, float, float, float]:
+    """Square around the wall over the whole cycle, within the image: left, right, bottom, top, px.
+
+    Parameters
+    ----------
+    clip : ClipWithMotion
+
+    Returns
+    -------
+    tuple of float
+        The margin around the wall is a tenth of its extent.
+    """
     low, high = np.nanmin(clip.path, (0, 1)), np.nanmax(clip.path, (0, 1))
-    half = min(0.5 * (high - low).max() + 0.7e-3 / clip.spacing, (min(clip.image.shape[1:]) - 1) / 2)
+    half = min(0.6 * (high - low).max(), (min(clip.image.shape[1:]) - 1) / 2)
     size = np.array(clip.image.shape[:0:-1])
     centre = np.clip((low + high) / 2, half, size - 1 - half)
     (left, upper), (right, lower) = centre - half, centre + half
@@ -138,13 +153,32 @@ def _crop(clip: ClipWithMotion) -> tuple[float, float, float, float]:
 
 
 def _scale_bar(axes: Axes, clip: ClipWithMotion, corner: tuple[float, float]) -> Text:
-    """Draw a bar of 1 mm in the lower left corner; returns the label of the time in the lower right one."""
+    """Draw a bar of a round length in the lower left corner; returns the label of the time in the lower right one."""
     width = axes.get_xlim()[1] - axes.get_xlim()[0]
-    length = 1e-3 / clip.spacing
+    bar = round_length(width * clip.spacing)
+    length = bar / clip.spacing
     x, y = corner[0] + 0.05 * width, corner[1] - 0.05 * width
     axes.plot([x, x + length], [y, y], color="white", linewidth=2.5, solid_capstyle="butt")
-    axes.text(x + length / 2, y - 0.02 * width, "1 mm", color="white", ha="center", va="bottom", fontsize=9)
+    text = f"{1e3 * bar:g} mm"
+    axes.text(x + length / 2, y - 0.02 * width, text, color="white", ha="center", va="bottom", fontsize=9)
     return axes.text(corner[0] + 0.95 * width, y, "", color="white", ha="right", va="baseline", fontsize=10)
+
+
+def round_length(side: float) -> float:
+    """Length of the bar that shows the scale of a picture: 1, 2 or 5 times a power of ten, about a sixth of its side.
+
+    Parameters
+    ----------
+    side : float
+        m.
+
+    Returns
+    -------
+    float
+        m.
+    """
+    power = 10.0 ** np.floor(np.log10(side / 5))
+    return float(max(step * power for step in (1, 2, 5) if step * power <= side / 5))
 
 
 def gif(path: str | Path, frames: np.ndarray, rate: float = FRAME_RATE) -> Path:

@@ -13,9 +13,6 @@ from matplotlib.lines import Line2D
 
 from echotruth.report import style
 
-SIZES = (("blue", "o"), ("red", "s"), ("#556b2f", "v"))
-"""Colour and marker of the image sizes, the largest first, as in the paper."""
-
 TRACKERS: tuple[tuple[str, Literal["none", "full"]], ...] = (("--", "none"), ("-", "full"))
 """Line style and marker fill of the trackers, in their order."""
 
@@ -24,7 +21,7 @@ Errors = Mapping[str, Mapping[str, Mapping[int, np.ndarray]]]
 
 @style.styled
 def draw(path: str | Path, errors: Errors, longitudinal: Collection[str] = ()) -> Path:
-    """Draw the error by layer, one panel per view.
+    """Draw the error by layer, one panel per view, on a logarithmic axis, on which good and bad trackers can be told.
 
     Parameters
     ----------
@@ -45,14 +42,15 @@ def draw(path: str | Path, errors: Errors, longitudinal: Collection[str] = ()) -
     panels = figure.subplots(1, len(errors), sharey=True, squeeze=False)[0]
     for panel, (view, trackers) in zip(panels, errors.items(), strict=True):
         for (line, fill), sizes in zip(TRACKERS, trackers.values(), strict=False):
-            for (colour, marker), values in zip(SIZES, sizes.values(), strict=False):
+            for (colour, marker), values in zip(style.SIZES, sizes.values(), strict=False):
                 _curve(panel, np.asarray(values), {"color": colour, "marker": marker, "ls": line, "fillstyle": fill})
         component = "longitudinal" if view in longitudinal else "circumferential"
         panel.set_title(style.title(view), pad=16)
-        panel.text(0.5, 1.02, component, ha="center", color="#555555", transform=panel.transAxes)
+        panel.text(0.5, 1.02, component, ha="center", color=style.MUTED, transform=panel.transAxes)
         panel.set(xlabel="Layer, endo → epi")
-    # The panels share this axis: set earlier, it would keep the upper limit of the first panel.
-    panels[0].set(ylabel="RMS error of displacement at ES (µm)", ylim=(0, None))
+    panels[0].set_ylabel("RMS error of displacement at ES (µm)")
+    drawn = [np.asarray(values) for trackers in errors.values() for of in trackers.values() for values in of.values()]
+    style.plain_logarithmic(panels[0], "y", 1e6 * np.concatenate(drawn))
     _legend(figure, next(iter(errors.values())))
     return style.save(figure, path)
 
@@ -68,10 +66,10 @@ def _legend(figure: Figure, trackers: Mapping[str, Mapping[int, np.ndarray]]) ->
     sizes = next(iter(trackers.values()))
     marks = [
         Line2D([], [], color=colour, marker=marker, ls="none", label=f"{size} × {size} px")
-        for (colour, marker), size in zip(SIZES, sizes, strict=False)
+        for (colour, marker), size in zip(style.SIZES, sizes, strict=False)
     ]
     lines = [
-        Line2D([], [], color="#444444", ls=line, marker="D", markersize=5, fillstyle=fill, linewidth=1.2, label=name)
+        Line2D([], [], color=style.MUTED, ls=line, marker="D", markersize=5, fillstyle=fill, linewidth=1.2, label=name)
         for (line, fill), name in zip(TRACKERS, trackers, strict=False)
     ]
-    figure.legend(handles=marks + lines, loc="outside lower center", ncols=len(marks) + len(lines))
+    figure.legend(handles=[*marks, *lines], loc="outside lower center", ncols=len(marks) + len(lines))

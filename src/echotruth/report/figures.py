@@ -8,13 +8,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
+from PIL import Image
 
+from echotruth.cases import find_case
 from echotruth.config import Config
+from echotruth.evaluation import kept
 from echotruth.evaluation.leaderboard import best, rows, standings
 from echotruth.heart import Heart
 from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
 from echotruth.mechanics.physiology import CC
-from echotruth.report import bullseye, clip, error, heart, leaderboard, loop, physiology, resolutions, strain, views
+from echotruth.report import (
+    bullseye,
+    clip,
+    curves,
+    error,
+    heart,
+    leaderboard,
+    loop,
+    physiology,
+    population,
+    resolutions,
+    strain,
+    style,
+    views,
+)
+from echotruth.report.comparison import Comparison
+from echotruth.report.hearts import diagnoses, measures
 from echotruth.repository.unpacking import unpack
 
 if TYPE_CHECKING:
@@ -24,10 +44,46 @@ ARROW_SPACING = 0.45e-3
 """Smallest distance between the points whose motion is drawn on a clip, m."""
 
 PARTS = {
-    "motion": ("heart", "loop", "strain", "physiology", "bullseye", "error", "leaderboard"),
+    "motion": (
+        "heart",
+        "loop",
+        "strain",
+        "physiology",
+        "population",
+        "curves",
+        "segments",
+        "bullseye",
+        "error",
+        "leaderboard",
+    ),
     "images": ("clip", "resolutions", "views"),
 }
 """Figures that one job draws together, by the name of the part."""
+
+
+NONE_COMPLETE = "No heart is complete, so that there is nothing to show. The reasons are in the report."
+"""In place of figures."""
+
+
+def shown_hearts(tree: xr.DataTree, config: Config) -> NDArray[np.int_]:
+    """Rows of the hearts that figures and scores take in.
+
+    Parameters
+    ----------
+    tree : DataTree
+        The repository.
+    config : Config
+
+    Returns
+    -------
+    ndarray of int
+        Those that are complete; if there are none and implausible ones have been imaged too, those; else none.
+    """
+    status = tree["cases/status"].values
+    complete = np.flatnonzero(status == "complete")
+    if not len(complete) and not config.physiology.exclude_implausible:
+        return np.flatnonzero(status == "implausible")
+    return complete
 
 
 class Figures:
@@ -46,20 +102,33 @@ class Figures:
     def __init__(self, store: Path, config: Config, folder: Path) -> None:
         self.tree = xr.open_datatree(store, engine="zarr")
         self.config, self.folder = config, folder
-        status = self.tree["cases/status"].values
-        self.complete = np.flatnonzero(status == "complete")
-        if not len(self.complete) and not config.physiology.exclude_implausible:
-            self.complete = np.flatnonzero(status == "implausible")
-        if not len(self.complete):
-            raise ValueError(f"{store}: no case is complete: see the reasons in cases/reason")
+        self.complete = shown_hearts(self.tree, config)
         self.sizes = config.bmode.sizes
         self.view = next((name for name, view in config.views.items() if name == "mid"), next(iter(config.views)))
 
     def draw(self, part: str) -> None:
-        """Draw the figures of a part of `PARTS`; `motion` also writes the leaderboard as a table."""
+        """Draw the figures of a part of `PARTS`; `motion` also writes the leaderboard as a table.
+
+        If no heart is complete, a sentence stands in place of every figure.
+        """
         self.folder.mkdir(parents=True, exist_ok=True)
         for name in PARTS[part]:
-            getattr(self, name)()
+            if len(self.complete):
+                getattr(self, name)()
+            else:
+                style.sentence(self.folder / name, NONE_COMPLETE)
+        if not len(self.complete):
+            self._without_hearts(part)
+
+    def _without_hearts(self, part: str) -> None:
+        """What else a part writes, without a heart: an empty table, or clips of the sentence."""
+        if part == "motion":
+            table = "size_px,view,tracker,hearts,failures,rank\n"
+            (self.folder / "leaderboard.csv").write_text(table, encoding="utf-8")
+            return
+        picture = np.asarray(Image.open(self.folder / "clip.png").convert("RGB").resize((720, 102)))
+        clip.gif(self.folder / "clip.gif", picture[None])
+        clip.mp4(self.folder / "clip.mp4", picture[None])
 
     def group(self, path: str) -> xr.Dataset:
         """A group of the store for the heart that is shown."""
@@ -81,20 +150,20 @@ class Figures:
             carried = np.einsum("cij,cj->ci", kinematics["deformation_gradient"][number], fibre)  # F f
             circumferential = kinematics["strain_unloaded"][number, :, CC]
             states.append(heart.State(name, solved.positions(frames[number]), carried, circumferential))
-        heart.draw(self.folder / "heart.png", solved.cells, fibre_angles(solved)["helix_angle"], states)
+        heart.draw(self.folder / "heart", solved.cells, fibre_angles(solved)["helix_angle"], states)
 
     def loop(self) -> None:
         """The target and the solved loop, and the active tension."""
         data = self.group("mechanics")
         solved = np.stack([data.pressure, data.volume])
         target = np.stack([data.pressure_target, data.volume_target])
-        loop.draw(self.folder / "loop.png", data.time.values, self.es, data.active_tension.values, solved, target)
+        loop.draw(self.folder / "loop", data.time.values, self.es, data.active_tension.values, solved, target)
 
     def strain(self) -> None:
         """Strain over the cycle."""
         data = self.group("kinematics")
         arrays = (data[name].values for name in ("strain_mean", "strain_sd", "layer_strain"))
-        strain.draw(self.folder / "strain.png", data.time.values, self.es, *arrays)
+        strain.draw(self.folder / "strain", data.time.values, self.es, *arrays)
 
     def physiology(self) -> None:
         """Rotation, strain, axial motion, pressure and volume over the cycle."""
@@ -113,7 +182,12 @@ class Figures:
         )
         geometry, loop = self.config.geometry, self.config.loop
         species = loop.file if geometry.file else geometry.preset
-        physiology.draw(self.folder / "physiology.png", cycle, physiology.PUBLISHED.get(species, {}))
+        physiology.draw(self.folder / "physiology", cycle, physiology.PUBLISHED.get(species, {}))
+
+    def population(self) -> None:
+        """Measures of all hearts by their diagnosis."""
+        found = measures(self.tree, self.complete)
+        population.draw(self.folder / "population", found, diagnoses(self.tree)[self.complete])
 
     def clip(self) -> None:
         """The clip with its true motion, as a GIF and as a video."""
@@ -134,7 +208,7 @@ class Figures:
     def resolutions(self) -> None:
         """One frame at every image size."""
         frames = [self.group(f"bmode/{size}").image.sel(view=self.view).isel(frame=0).values for size in self.sizes]
-        resolutions.draw(self.folder / "resolutions.png", frames, self.config.bmode.si().field_of_view)
+        resolutions.draw(self.folder / "resolutions", frames, self.config.bmode.si().field_of_view)
 
     def views(self) -> None:
         """Every view at end-diastole and end-systole."""
@@ -142,14 +216,12 @@ class Figures:
         layer = truth["labels"].sel(label="layer")
         pictures = {
             view: [
-                views.Picture(
-                    images.image.sel(view=view, frame=frame).values, layer.sel(view=view, frame=frame).values > 0
-                )
+                views.Picture(images.image.sel(view=view, frame=frame).values, layer.sel(view=view, frame=frame).values)
                 for frame in (0, self.es)
             ]
             for view in self.config.views
         }
-        views.draw(self.folder / "views.png", pictures, self.config.bmode.si().field_of_view)
+        views.draw(self.folder / "views", pictures, self.config.bmode.si().field_of_view)
 
     @cached_property
     def standings(self) -> pd.DataFrame:
@@ -158,23 +230,33 @@ class Figures:
 
     @property
     def order(self) -> list[str]:
-        """The repository's own trackers, the best first."""
-        return [name for name in best(self.standings) if name in self.config.tracking.trackers]
+        """The trackers whose displacement is stored, of the repository and kept beside it, the best first."""
+        stored = kept.trackers(self.folder.parent, self.config)
+        return [name for name in best(self.standings) if name in stored]
+
+    @cached_property
+    def comparison(self) -> Comparison:
+        """Curves of the heart that is shown, true and by all trackers."""
+        case = find_case(self.config, str(self.tree["cases"].case.values[self.complete[0]]))
+        return Comparison(self.folder.parent, case, tuple(self.order))
+
+    def curves(self) -> None:
+        """Tracked against true curves of strain, rotation and twist."""
+        curves.draw(self.folder / "curves", self.comparison.rows)
+
+    def segments(self) -> None:
+        """Tracked against true strain of the segments of a view, by the best tracker."""
+        curves.draw(self.folder / "segments", self.comparison.segments(self.view, self.comparison.trackers[0]))
 
     def leaderboard(self) -> None:
         """The leaderboard as a table and as a figure."""
         self.standings.round(4).to_csv(self.folder / "leaderboard.csv", index=False)
-        leaderboard.draw(self.folder / "leaderboard.png", self.standings, best(self.standings))
+        leaderboard.draw(self.folder / "leaderboard", self.standings, best(self.standings))
 
     def bullseye(self) -> None:
-        """Circumferential displacement of the segments in the short-axis views, true and of the best tracker."""
-        short = [name for name, view in self.config.views.items() if view.plane == "short_axis"]
-        names = ("true_segment_displacement", "tracked_segment_displacement")
-        scores = self.group("evaluation").sel(tracker=self.order[0], size=self.sizes[0], view=short)
-        data = unpack(scores, *names).sel(polar="tangential")
-        # A segment at a boundary may be visible in two planes; their mean is shown.
-        true, tracked = (data[name].mean("view").values for name in names)
-        bullseye.draw(self.folder / "bullseye.png", true, tracked, self.order[0])
+        """Strain of the segments at end-systole, true and of the best tracker."""
+        tracker = self.comparison.trackers[0]
+        bullseye.draw(self.folder / "bullseye", self.comparison.bullseyes(tracker), tracker)
 
     def error(self) -> None:
         """Error of the tangential displacement by layer, view and image size, mean over the hearts.
@@ -182,7 +264,8 @@ class Figures:
         It shows the first tracker of the configuration and the best one.
         """
         first = next(iter(self.config.tracking.trackers))
-        trackers = dict.fromkeys((first, self.order[0]))
+        own = [name for name in self.order if name in self.config.tracking.trackers]
+        trackers = dict.fromkeys((first, own[0]))
         data = unpack(self.tree["evaluation"].to_dataset().isel(case=self.complete), "rms_error").rms_error
         tangential = data.sel(component="tangential").isel(region=slice(1, None))
         layers = {size: tangential.sel(size=size) for size in self.sizes}
@@ -194,4 +277,4 @@ class Figures:
             for view in self.config.views
         }
         long_axis = [name for name, view in self.config.views.items() if view.plane == "long_axis"]
-        error.draw(self.folder / "error.png", errors, long_axis)
+        error.draw(self.folder / "error", errors, long_axis)

@@ -20,8 +20,11 @@ VIEWPOINT = (-0.75, 1.6, 0.75)
 PIXELS = (490, 760)
 """Width and height of the picture of one heart, px."""
 
-WALL_OPACITY = 0.16
+WALL_OPACITY = 0.12
 """Opacity of the wall in front of its fibres."""
+
+GROUND = 0.62
+"""Brightness of the wall between its fibres, over theirs."""
 
 MARGIN = 1.03
 """Half the width of a picture over that of the heart, at least."""
@@ -78,17 +81,18 @@ def draw(path: str | Path, cells: np.ndarray, helix: np.ndarray, states: Sequenc
     limit = max(100 * float(np.nanmax(np.abs([state.strain for state in states]))), 0.1)
     scales = ScalarMappable(Normalize(-90, 90), "turbo"), ScalarMappable(Normalize(-limit, limit), "RdBu_r")
     camera = _camera(states)
-    figure = style.figure(7.6, 7.4)
+    figure = style.figure(8.6, 7.6)
     panels = figure.subplots(2, len(states), squeeze=False)
     for column, state in zip(panels.T, states, strict=True):
-        wall = _coloured(_cut(_grid(state.nodes, cells, 100 * state.strain)), scales[1], "strain")
+        wall = _cut(_grid(state.nodes, cells, {"strain": 100 * state.strain, "helix": np.degrees(helix)}))
         rods = _coloured(_rods(state, cells, helix), scales[0], "helix")
-        column[0].imshow(_behind_wall(rods, wall, camera).clip(0, 1))
-        column[1].imshow(_opaque(wall, camera).clip(0, 1))
+        column[0].imshow(_on_wall(rods, _coloured(wall, scales[0], "helix"), camera))
+        column[1].imshow(_picture(_coloured(wall, scales[1], "strain"), camera))
         column[0].set_title(state.name)
     for panel in panels.flat:
         panel.axis("off")
-    for row, scale, label in zip(panels, scales, ("Helix angle (°)", "$E_{CC}$ from unloaded (%)"), strict=True):
+    labels = "Helix angle (°)", "Circumferential strain $E_{CC}$\nfrom unloaded (%)"
+    for row, scale, label in zip(panels, scales, labels, strict=True):
         figure.colorbar(scale, ax=row, shrink=0.75, aspect=25).set_label(label)
     return style.save(figure, path)
 
@@ -111,9 +115,10 @@ def centroids(nodes: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return np.einsum("k,ckx->cx", np.repeat([-1 / 8, 1 / 4], [4, 6]), nodes[cells])
 
 
-def _grid(nodes: np.ndarray, cells: np.ndarray, strain: np.ndarray) -> pyvista.UnstructuredGrid:
+def _grid(nodes: np.ndarray, cells: np.ndarray, values: dict[str, np.ndarray]) -> pyvista.UnstructuredGrid:
     grid = pyvista.UnstructuredGrid({pyvista.CellType.QUADRATIC_TETRA: cells.astype(np.int64)}, nodes)
-    grid.cell_data["strain"] = strain
+    for name, of_cells in values.items():
+        grid.cell_data[name] = of_cells
     return grid.cell_data_to_point_data(pass_cell_data=True)
 
 
@@ -155,13 +160,26 @@ def _camera(states: Sequence[State]) -> Camera:
     return replace(camera, half_height=max(half_height, half_width * PIXELS[1] / PIXELS[0]))
 
 
-def _opaque(surface: Surface, camera: Camera) -> np.ndarray:
-    """Surface on a white background."""
-    colour, alpha = render(surface, camera)
-    return colour + (1 - alpha)[..., None]
+def _picture(surface: Surface, camera: Camera) -> np.ndarray:
+    """Surface without a background: RGBA."""
+    return _rgba(*render(surface, camera))
 
 
-def _behind_wall(rods: Surface, wall: Surface, camera: Camera) -> np.ndarray:
-    """Rods behind a grey translucent wall."""
-    colour, alpha = render(replace(wall, colours=np.full_like(wall.colours, 0.75)), camera)
-    return (1 - WALL_OPACITY * alpha)[..., None] * _opaque(rods, camera) + WALL_OPACITY * colour
+def _on_wall(rods: Surface, wall: Surface, camera: Camera) -> np.ndarray:
+    """Rods before the wall, which fills the gaps between them: RGBA.
+
+    The wall is darker than its rods, so that these are told from it. A thin grey haze, where the wall lies before its
+    rods, shows its edges.
+    """
+    colour, alpha = render(replace(wall, colours=GROUND * wall.colours), camera)
+    rod_colour, rod_alpha = render(rods, camera)
+    rod_alpha = rod_alpha * (alpha > 0)  # rods of quadratic cells end a little outside
+    joined = rod_colour * (rod_alpha > 0)[..., None] + (1 - rod_alpha)[..., None] * colour
+    haze = render(replace(wall, colours=np.full_like(wall.colours, 0.75)), camera)[0]
+    return _rgba((1 - WALL_OPACITY) * joined + WALL_OPACITY * haze, alpha)
+
+
+def _rgba(colour: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    """Picture of colours that are multiplied by their opacity."""
+    plain = colour / np.maximum(alpha, 1e-6)[..., None]
+    return np.dstack([plain, alpha]).clip(0, 1)

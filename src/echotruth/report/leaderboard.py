@@ -12,12 +12,13 @@ from matplotlib.lines import Line2D
 
 from echotruth.config.imaging import ALL_VIEWS
 from echotruth.report import style
-from echotruth.report.error import SIZES
+from echotruth.report.style import SIZES
 
 PANELS = (
-    ("nrmse_all_percent", "NRMSE of displacement at ES (%)"),
-    ("e_cc_rms_pp", "RMS error of $E_{CC}$ at ES (pp)"),
-    ("e_rr_rms_pp", "RMS error of $E_{RR}$ at ES (pp)"),
+    ("nrmse_all_percent", "NRMSE of displacement\nat ES (%)"),
+    ("e_cc_rms_pp", "RMS error of circumferential\nstrain at ES (percentage points)"),
+    ("e_ll_rms_pp", "RMS error of longitudinal\nstrain at ES (percentage points)"),
+    ("e_rr_rms_pp", "RMS error of radial strain\nat ES (percentage points)"),
 )
 """Metrics that are drawn, and their labels."""
 
@@ -42,7 +43,7 @@ def draw(path: str | Path, standings: pd.DataFrame, order: list[str]) -> Path:
     """
     # With a grid too coarse for strain, or no short-axis view, a metric has no values.
     shown = [panel for panel in PANELS if standings[panel[0]].notna().any()] or PANELS[:1]
-    figure = style.figure(2 + 2.8 * len(shown), 1.7 + 0.52 * len(order))
+    figure = style.figure(1.9 + 2.1 * len(shown), 1.5 + 0.52 * len(order))
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     sizes = sorted(standings["size_px"].unique(), reverse=True)[: len(SIZES)]
     for panel, (metric, title) in zip(panels, shown, strict=True):
@@ -50,11 +51,14 @@ def draw(path: str | Path, standings: pd.DataFrame, order: list[str]) -> Path:
             table = standings[standings["size_px"] == size].set_index("tracker")
             rows = dict(zip(order, np.arange(len(order)) + 0.26 * (k - (len(sizes) - 1) / 2), strict=True))
             _draw_size(panel, table, metric, rows, SIZES[k])
-        panel.set(xlabel=title, xlim=(0, None))
+        panel.set_xlabel(title)
+        style.plain_logarithmic(panel, "x", standings[metric].to_numpy(float))
         panel.grid(axis="y", visible=False)
+        for border in np.arange(len(order) - 1) + 0.5:
+            panel.axhline(border, color=style.GRID, linewidth=0.6)
     panels[0].set_yticks(range(len(order)), [_label(standings, tracker) for tracker in order])
     panels[0].set_ylim(len(order) - 0.5, -0.5)
-    _legend(figure, standings, columns=2 * len(shown))
+    _legend(figure, standings, columns=max(2, 2 * len(shown) - 2))
     return style.save(figure, path)
 
 
@@ -87,8 +91,9 @@ def _legend(figure: Figure, standings: pd.DataFrame, columns: int) -> None:
         Line2D([], [], color=colour, marker=marker, ls="none", label=f"{size} × {size} px")
         for (colour, marker), size in zip(SIZES, sizes, strict=False)
     ]
-    ring = Line2D([], [], color="#666666", marker="o", ls="none", markersize=3, fillstyle="none", label="a view")
+    ring = Line2D([], [], color=style.MUTED, marker="o", ls="none", markersize=3, fillstyle="none", label="one view")
     hearts = int(np.nanmax(standings["hearts"]))
-    text = "one heart: no interval" if hearts < 2 else f"mean of {hearts} hearts and its 95 % interval"
-    line = Line2D([], [], color="#444444", ls="none" if hearts < 2 else "-", linewidth=1.2, label=text)
-    figure.legend(handles=[*marks, ring, line], loc="outside lower center", ncols=columns)
+    text = "mean over the views" if hearts < 2 else f"mean of {hearts} hearts and its 95 % interval"
+    look = {"ls": "none", "marker": "o"} if hearts < 2 else {"ls": "-", "linewidth": 1.2}
+    mean = Line2D([], [], color=style.MUTED, label=text, **look)
+    figure.legend(handles=[*marks, ring, mean], loc="outside lower center", ncols=columns)

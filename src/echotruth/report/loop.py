@@ -40,7 +40,7 @@ def draw(
     figure = style.figure(8.4, 4.2)
     if not np.isfinite(solved).any():
         text = "No pressure-volume loop: the motion of this heart is prescribed (motion.kind), and nothing drives it."
-        figure.text(0.5, 0.5, text, ha="center", va="center", color="#555555")
+        figure.text(0.5, 0.5, text, ha="center", va="center", color=style.MUTED)
         return style.save(figure, path)
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.1, 1))[0]
     _loop(left.subplots(), es, solved, target)

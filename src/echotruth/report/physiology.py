@@ -41,10 +41,7 @@ NORMAL = {"RR": style.RADIAL, "CC": style.CIRCUMFERENTIAL, "LL": style.LONGITUDI
 SHEAR = {"RC": "#8a4f9e", "RL": "#c98a1b", "CL": "#2f9aa0"}
 """Component -> colour."""
 
-SHADE = "#f1ede4"
-"""Colour of the isovolumic phases."""
-
-_GREY = "#555555"
+_GREY = style.MUTED
 _UL, _MM = 1e-9, 1e-3
 
 
@@ -179,7 +176,7 @@ def _phases(axes: Axes, cycle: Cycle) -> None:
         return
     opening, closing, mitral = 1e3 * np.cumsum(cycle.intervals)
     for name, start, stop in (("IVC", 0, opening), ("IVR", closing, mitral)):
-        axes.axvspan(start, stop, color=SHADE, zorder=0, linewidth=0)
+        axes.axvspan(start, stop, color=style.SHADE, zorder=0, linewidth=0)
         axes.text((start + stop) / 2, 0.015, name, color=_GREY, fontsize=6.5, ha="center", va="bottom", transform=top)
 
 

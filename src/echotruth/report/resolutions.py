@@ -1,4 +1,4 @@
-"""The image sizes of one view side by side."""
+"""The image sizes of one view side by side, where the wall is."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ def draw(path: str | Path, images: Sequence[np.ndarray], field_of_view: float) -
     figure = style.figure(3.1 * len(images) + 0.4, 3.75)
     panels = figure.subplots(1, len(images), sharey=True, squeeze=False)[0]
     side = 1e3 * field_of_view
+    left, right, bottom, top = _bright(images[0], side)
     for panel, image in zip(panels, images, strict=True):
         panel.imshow(
             image, cmap="gray", vmin=0, vmax=255, extent=(-side / 2, side / 2, side, 0), interpolation="nearest"
@@ -38,7 +39,18 @@ def draw(path: str | Path, images: Sequence[np.ndarray], field_of_view: float) -
         rows, columns = image.shape
         panel.set(title=f"{rows} × {columns} px, {1e6 * field_of_view / columns:.0f} µm/px", xlabel="Lateral (mm)")
         panel.grid(False)
-        panel.set_xticks(np.arange(-np.floor(side / 6) * 3, side / 2 + 0.1, 3))
-        panel.set_yticks(np.arange(0, side + 0.1, 3))
+        panel.set(xlim=(left, right), ylim=(bottom, top))
     panels[0].set_ylabel("Axial (mm)")
     return style.save(figure, path)
+
+
+def _bright(image: np.ndarray, side: float) -> tuple[float, float, float, float]:
+    """Square around what is bright, within the image: left, right, bottom, top, mm."""
+    rows, columns = np.nonzero(image >= 0.35 * max(int(image.max()), 1))
+    middle = np.array([rows.min() + rows.max(), columns.min() + columns.max()]) / 2
+    count = len(image) - 1
+    half = min(0.58 * max(int(np.ptp(rows)), int(np.ptp(columns)), 8), count / 2)
+    row, column = np.clip(middle, half, count - half)
+    low, high = (np.array([-half, half]) + row) / count * side
+    left, right = (np.array([-half, half]) + column) / count * side - side / 2
+    return float(left), float(right), float(high), float(low)

@@ -60,9 +60,9 @@ def draw(path: str | Path, time: np.ndarray, es: int, mean: np.ndarray, sd: np.n
             handlelength=1.2,
         )
     for panel in (left, right):
-        panel.axvline(time[es] * 1e3, color="#555555", linewidth=0.9, linestyle=":")
-        panel.axhline(0, color="#555555", linewidth=0.6)
-        panel.text(time[es] * 1e3, 0.99, " ES", color="#555555", va="top", transform=panel.get_xaxis_transform())
+        panel.axvline(time[es] * 1e3, color=style.MUTED, linewidth=0.9, linestyle=":")
+        panel.axhline(0, color=style.MUTED, linewidth=0.6)
+        panel.text(time[es] * 1e3, 0.99, " ES", color=style.MUTED, va="top", transform=panel.get_xaxis_transform())
         panel.set_xlabel("Time since end-diastole (ms)")
         panel.margins(x=0.01)
         low, high = panel.get_ylim()  # without strain the axis would show rounding errors

@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 RADIAL, CIRCUMFERENTIAL, LONGITUDINAL = "#b5382a", "#1f5fa8", "#2f8550"
 """Colours of the wall directions."""
 
-TARGET, SOLVED = "#9a9a9a", "#1a1a1a"
+INK, MUTED, GRID, SHADE, PAPER = "#1b2026", "#5b646e", "#e3e6e9", "#f2efe8", "#ffffff"
+"""Colours of text and axes, of remarks, of grid lines, of shaded spans, and of the paper."""
+
+ON_IMAGE = "#fefefe"
+"""Colour of what stands on dark images and segments, on white and on dark paper."""
+
+TARGET, SOLVED = "#9a9fa5", INK
 """Colours of prescribed and of solved values."""
+
+TRUTH = INK
+"""Colour of what is true."""
+
+SERIES = ("#1f5fa8", "#c8641b", "#2f8550", "#8a4f9e", "#2f9aa0", "#a87f13")
+"""Colours of trackers, in the order of their ranks; further trackers are grey."""
+
+SIZES = (("#173f73", "o"), ("#3f83cc", "s"), ("#8fb7e3", "v"))
+"""Colour and marker of the image sizes, the largest first."""
 
 MMHG = 133.322387415
 """Pa."""
@@ -23,6 +40,11 @@ styled = matplotlib.rc_context(
     {
         "font.family": "DejaVu Sans",
         "font.size": 9,
+        "text.color": INK,
+        "axes.edgecolor": INK,
+        "axes.labelcolor": INK,
+        "xtick.color": INK,
+        "ytick.color": INK,
         "axes.titlesize": 10,
         "axes.titleweight": "bold",
         "axes.spines.top": False,
@@ -30,13 +52,14 @@ styled = matplotlib.rc_context(
         "axes.linewidth": 0.8,
         "axes.grid": True,
         "axes.axisbelow": True,
-        "grid.color": "#e4e4e4",
+        "grid.color": GRID,
         "grid.linewidth": 0.6,
         "legend.frameon": False,
         "lines.linewidth": 1.6,
         "lines.solid_capstyle": "round",
         "hatch.linewidth": 0.6,
-        "savefig.facecolor": "white",
+        "savefig.facecolor": PAPER,
+        "svg.hashsalt": "echotruth",
     }
 )
 """Decorator of functions that draw a figure."""
@@ -66,18 +89,76 @@ def save(figure: Figure, path: str | Path, dpi: int = 160) -> Path:
     ----------
     figure : Figure
     path : str or Path
-        The suffix determines the format.
+        The suffix determines the format. Without one, the figure is written as PNG on white paper, and as SVG without
+        paper, which the page of the report shows in its own colours.
     dpi : int
+        Of the PNG, and of pictures within an SVG.
 
     Returns
     -------
     Path
+        The file; without a suffix, the PNG.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.suffix:
+        figure.savefig(path.with_suffix(".svg"), dpi=dpi, facecolor="none", edgecolor="none", metadata=_NOTHING)
+        figure.set_layout_engine("none")  # what is laid out stays where it is
+        path = path.with_suffix(".png")
     undated = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     figure.savefig(path, dpi=dpi, metadata=undated.get(path.suffix))
     return path
+
+
+_NOTHING = {"Date": None, "Creator": None, "Format": None, "Type": None}
+"""Metadata of an SVG: none, so that nothing but the figure is in it."""
+
+
+@styled
+def sentence(path: str | Path, text: str) -> Path:
+    """Write a sentence in place of a figure that there is not.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write, as :func:`save` takes it.
+    text : str
+
+    Returns
+    -------
+    Path
+        The file.
+    """
+    empty = figure(8.4, 1.2)
+    empty.text(0.5, 0.5, text, ha="center", va="center", color=MUTED)
+    return save(empty, path)
+
+
+def plain_logarithmic(axes: Axes, which: Literal["x", "y"], values: np.ndarray) -> None:
+    """Make an axis logarithmic, with plain numbers and at least a decade long.
+
+    Parameters
+    ----------
+    axes : Axes
+        After all is drawn.
+    which : {"x", "y"}
+    values : ndarray
+        What the axis has to show; what is not a positive number has no place on it.
+    """
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    shown = values[np.isfinite(values) & (values > 0)]
+    low, high = (float(shown.min()), float(shown.max())) if shown.size else (1.0, 10.0)
+    middle = np.sqrt(low * high)
+    limits = min(low / 1.3, middle / np.sqrt(10)), max(high * 1.3, middle * np.sqrt(10))
+    axes.set(**{f"{which}scale": "log", f"{which}lim": limits})
+    axis.set_major_locator(LogLocator(10, (1.0, 2.0, 5.0) if limits[1] / limits[0] < 60 else (1.0, 3.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def series_colour(number: int) -> str:
+    """Colour of the tracker with a place in the ranking, counted from 0."""
+    return SERIES[number] if number < len(SERIES) else TARGET
 
 
 def layer_colours(layers: int) -> np.ndarray:
@@ -92,7 +173,7 @@ def layer_colours(layers: int) -> np.ndarray:
     ndarray of shape (layers, 4)
         RGBA.
     """
-    return matplotlib.colormaps["plasma"](np.linspace(0.05, 0.85, layers))
+    return matplotlib.colormaps["plasma"](np.linspace(0.28, 0.86, layers))
 
 
 def mark(axes: Axes, position: tuple[float, float], text: str, offset: tuple[float, float]) -> None:

@@ -1,0 +1,197 @@
+"""What a page says of a repository in words and numbers: what was made, what failed, and from what it was made."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from echotruth.cases.labels import diagnosis
+from echotruth.config import Config
+from echotruth.report import style
+from echotruth.report.hearts import statuses
+from echotruth.repository.ledger import GATES, VIEW_STAGES, read
+
+LISTED = 20
+"""Largest number of failures of a kind that are listed."""
+
+SAMPLE = 500
+"""Records of a stage that are read; the CPU time of the others is taken to be the same on average."""
+
+MAX_FILES = 200_000
+"""Files up to which the size of a repository is measured."""
+
+MOTIONS = {
+    "beat": "a beating heart, solved by finite elements",
+    "rigid": "rigid motion by a formula",
+    "affine": "homogeneous deformation by a formula",
+    "tube": "deformation of a tube by a formula",
+    "file": "motion read from a file",
+}
+"""Kind of motion -> what it is."""
+
+
+def lead(config: Config) -> str:
+    """What kind of repository it is, in two sentences."""
+    motion = MOTIONS.get(config.motion.kind, config.motion.kind)
+    species = config.geometry.file or config.geometry.preset
+    return (
+        f"B-mode clips with the true motion of every pixel of the wall ({species}; {motion}), "
+        f"and {_counted(len(config.tracking.trackers), 'tracker', 'trackers')} scored against it."
+    )
+
+
+def numbers(tree: xr.DataTree, folder: Path, config: Config) -> list[tuple[str, str]]:
+    """The largest facts: label and number."""
+    status = statuses(tree)
+    present = int(np.count_nonzero(status != "retired"))
+    imaged = np.isin(status, ("complete",) if config.physiology.exclude_implausible else ("complete", "implausible"))
+    count, frames, sizes = int(imaged.sum()), config.loop.frames, config.bmode.sizes
+    clips = count * len(config.views) * len(sizes)
+    found = [
+        (_imaged(count, present), _spaced(count)),
+        ("view a heart" if len(config.views) == 1 else "views a heart", _spaced(len(config.views))),
+        ("clips", _spaced(clips)),
+        ("frames", _spaced(clips * frames)),
+        ("trackers", _spaced(len(config.tracking.trackers))),
+    ]
+    size = _size_on_disk(folder / f"{config.name}.zarr")
+    return [*found, *([("in the store", _bytes(size))] if size else [])]
+
+
+def _imaged(count: int, present: int) -> str:
+    """What the number of hearts that were imaged is called."""
+    if count < present:
+        return f"of {_spaced(present)} hearts imaged"
+    return "heart" if count == 1 else "hearts"
+
+
+def facts(config: Config) -> list[tuple[str, str]]:
+    """Settings that matter most: label and value."""
+    views = ", ".join(
+        f"{style.title(name).lower()} ({view.plane.replace('_', ' ')})" for name, view in config.views.items()
+    )
+    sizes = ", ".join(f"{size} × {size}" for size in config.bmode.sizes)
+    probe = config.probe
+    return [
+        ("Views", views),
+        ("Images", f"{sizes} px, {config.bmode.field_of_view_mm:g} mm, {config.loop.frames} frames a cycle"),
+        ("Array", f"{probe.elements} elements, {probe.frequency_MHz:g} MHz, pitch {probe.pitch_um:g} µm"),
+        ("Wall", f"{_counted(config.fibres.layers, 'layer', 'layers')}, 17 AHA segments"),
+        ("Trackers", ", ".join(config.tracking.trackers)),
+        ("Diagnosis", diagnosis(config).replace("_", " ").replace("+", " + ") + " (of the configuration itself)"),
+    ]
+
+
+def failures(tree: xr.DataTree, folder: Path, config: Config) -> dict[str, Any]:
+    """Hearts that are not complete and trackers that found nothing, with their reasons."""
+    status, cases = statuses(tree), tree["cases"].to_dataset()
+    rows = np.flatnonzero(~np.isin(status, ("complete", "retired")))
+    reasons = cases["reason"].values
+    found = [
+        {"case": str(cases["case"].values[row]), "status": str(status[row]), "reason": str(reasons[row])}
+        for row in rows[:LISTED]
+    ]
+    lost = list(islice(_lost(folder, config), LISTED + 1))
+    return {
+        "cases": found,
+        "more_cases": len(rows) - len(found),
+        "trackers": lost[:LISTED],
+        "more_trackers": len(lost) > LISTED,
+    }
+
+
+def _lost(folder: Path, config: Config) -> Any:
+    """Trackers without a result on a clip."""
+    for path in sorted((folder / "ledger/tracking").glob("*/[!.]*.json")):
+        if path.stem in config.views:
+            for name, reason in sorted(read(path).get("failures", {}).items()):
+                tracker, _, size = name.rpartition("/")
+                yield {"tracker": tracker, "clip": f"{path.parent.name}, {path.stem}, {size} px", "reason": str(reason)}
+
+
+def provenance(tree: xr.DataTree, config: Config) -> list[tuple[str, str]]:
+    """From what the repository was made: label and value."""
+    packages = tree.attrs.get("packages", {})
+    return [
+        ("Seed", str(config.seed)),
+        ("Software", ", ".join(f"{name} {version}" for name, version in packages.items()) or "not recorded"),
+    ]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Jobs of a stage: their number, CPU time in words, and version of the code."""
+
+    name: str
+    jobs: str
+    cpu: str
+    code: str
+
+
+def stages(folder: Path) -> list[Stage]:
+    """What every stage took, from the ledger."""
+    found = []
+    for name in (*GATES, *VIEW_STAGES):
+        paths = sorted((folder / "ledger" / name).glob("**/[!.]*.json"))
+        if paths:
+            sample = [_record(path) for path in paths[:: -(-len(paths) // SAMPLE)]]
+            seconds = sum(float(record.get("cpu_seconds", 0)) for record in sample) / len(sample) * len(paths)
+            codes = sorted({str(record.get("code", "")) for record in sample})
+            found.append(Stage(name, _spaced(len(paths)), _duration(seconds), ", ".join(codes)))
+    return found
+
+
+def opening(config: Config, case: str, view: str) -> str:
+    """Lines of Python that open the repository."""
+    tracker = next(iter(config.tracking.trackers))
+    return f"""import echotruth as et
+
+clip = et.load_clip("out/{config.name}", case="{case}", view="{view}")  # image, displacement, strain, labels
+clip["image"].isel(frame=0).plot(yincrease=False, cmap="gray")
+curves = et.strain_curves("out/{config.name}", case="{case}", view="{view}", tracker="{tracker}")
+curves["tracked_line_strain"].sel(contour="middle").plot(x="time")"""
+
+
+def _record(path: Path) -> dict[str, Any]:
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except (ValueError, TypeError):
+        return {}
+
+
+def _size_on_disk(store: Path) -> int:
+    """Bytes of the files of a store; 0 if there are too many to look at each."""
+    total = 0
+    for number, path in enumerate(store.rglob("*")):
+        if number > MAX_FILES:
+            return 0
+        total += path.stat().st_size if path.is_file() else 0
+    return total
+
+
+def _bytes(size: float) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} TB"
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+
+
+def _spaced(number: int) -> str:
+    return f"{number:,}".replace(",", " ")
+
+
+def _counted(number: int, one: str, many: str) -> str:
+    return f"{_spaced(number)} {one if number == 1 else many}"

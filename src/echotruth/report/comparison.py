@@ -1,0 +1,181 @@
+"""What trackers found in one heart beside the truth: strain, rotation and twist over the cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.cases import Case
+from echotruth.config import View
+from echotruth.evaluation.curves import strain_curves, twist_of, twist_views
+from echotruth.report import style
+from echotruth.report.bullseye import Segments
+from echotruth.report.curves import Panel, segment_title
+from echotruth.workflow.job import Job
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+PERCENT = 100.0
+
+LINE = {"short_axis": "Circumferential strain, GCS", "long_axis": "Longitudinal strain, GLS"}
+"""Plane -> the strain of the mid-wall contour in it."""
+
+COMPONENTS = (
+    ("short_axis", "TT", "Circumferential strain, from the short-axis views"),
+    ("short_axis", "RR", "Radial strain, from the short-axis views"),
+    ("long_axis", "TT", "Longitudinal strain, from the long-axis views"),
+)
+"""Plane, component and title of the bullseyes."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Curves of one heart.
+
+    Attributes
+    ----------
+    folder : Path
+        Of the repository.
+    case : Case
+    candidates : tuple of str
+        Trackers of which displacement is stored, the best first.
+    """
+
+    folder: Path
+    case: Case
+    candidates: tuple[str, ...]
+
+    @property
+    def views(self) -> dict[str, View]:
+        """Views by their names."""
+        return self.case.config.views
+
+    @property
+    def size(self) -> int:
+        """Size of the images, px: the largest."""
+        return self.case.config.bmode.sizes[0]
+
+    @cached_property
+    def curves(self) -> dict[str, dict[str, xr.Dataset]]:
+        """View -> tracker -> its curves and the true ones."""
+        found = {}
+        for name in self.candidates:
+            # One from outside may have been evaluated on other clips, or before these were made.
+            with suppress(ValueError):
+                found[name] = {view: strain_curves(self.job(view), name, self.size) for view in self.views}
+        return {view: {name: of_views[view] for name, of_views in found.items()} for view in self.views}
+
+    @property
+    def trackers(self) -> list[str]:
+        """Trackers that have curves of all views, the best first."""
+        return list(next(iter(self.curves.values())))
+
+    def job(self, view: str) -> Job:
+        """Job of a view, through which its arrays are read."""
+        return Job(self.folder, "tracking", self.case, view, code="-")
+
+    def of_plane(self, plane: str) -> list[str]:
+        """Views that lie in a plane, short_axis or long_axis."""
+        return [name for name, view in self.views.items() if view.plane == plane]
+
+    @property
+    def rows(self) -> list[list[Panel | None]]:
+        """Panels of the global strains and of the rotation, a column for each view; twist where there is room."""
+        strains: list[list[Panel | None]] = [[], []]
+        turns: list[Panel | None] = []
+        for view, settings in self.views.items():
+            name = style.title(view)
+            middle = {"contour": "middle"}
+            whole = {"measure": "engineering", "region": 0, "wall_component": "RR"}
+            strains[0].append(self._panel(view, f"{name}\n{LINE[settings.plane]}", "line_strain", PERCENT, "%", middle))
+            strains[1].append(self._panel(view, "Radial strain in the plane", "region_strain", PERCENT, "%", whole))
+            is_short = settings.plane == "short_axis"
+            turns.append(self._panel(view, "Rotation", "rotation", np.degrees(1), "deg", {}) if is_short else None)
+        if twist := self.twist:
+            place = turns.index(None) if None in turns else len(turns)
+            for row in (*strains, turns) if place == len(turns) else ():
+                row.append(None)
+            turns[place] = twist
+        return [*strains, *([turns] if any(turns) else [])]
+
+    @property
+    def twist(self) -> Panel | None:
+        """Twist; none with fewer than two short-axis views."""
+        views = twist_views(self.case.config)
+        if views is None:
+            return None
+        base, apex = (self.curves[view] for view in views)
+        of_trackers = {name: twist_of(base[name], apex[name]) for name in self.trackers}
+        first = next(iter(of_trackers.values()))
+        tracked = {name: np.degrees(one["tracked_twist"].values) for name, one in of_trackers.items()}
+        time, end_systole = self._time(views[0])
+        return Panel("Twist, apex less base", "deg", time, end_systole, np.degrees(first["true_twist"].values), tracked)
+
+    def segments(self, view: str, tracker: str) -> list[list[Panel | None]]:
+        """Panels of the strain along the wall of the segments of a view, three in a row.
+
+        The strain is circumferential in a short axis and longitudinal in a long axis.
+        """
+        time, end_systole = self._time(view)
+        data = self.curves[view][tracker].sel(measure="engineering", wall_component="TT")
+        true, tracked = (PERCENT * data[f"{name}_segment_strain"] for name in ("true", "tracked"))
+        panels: list[Panel | None] = [
+            Panel(
+                segment_title(int(number)),
+                "%",
+                time,
+                end_systole,
+                true.sel(aha=number).values,
+                {tracker: tracked.sel(aha=number).values},
+            )
+            for number in data.aha.values
+            if bool(np.isfinite(true.sel(aha=number)).any())
+        ]
+        panels += [None] * (-len(panels) % 3)
+        return [panels[k : k + 3] for k in range(0, len(panels), 3)]
+
+    def bullseyes(self, tracker: str) -> list[Segments]:
+        """Strain of the segments at end-systole, true and of a tracker, for each component that a view shows."""
+        found = []
+        for plane, component, title in COMPONENTS:
+            views = self.of_plane(plane)
+            if views:
+                true, tracked = (self._segments_at_es(views, tracker, name, component) for name in ("true", "tracked"))
+                found.append(Segments(title, true, tracked))
+        return found
+
+    def _segments_at_es(self, views: list[str], tracker: str, name: str, component: str) -> NDArray[np.float64]:
+        """Strain of segments 1..17 at end-systole, %; where two views show a segment, their mean."""
+        columns = []
+        for view in views:
+            data = self.curves[view][tracker]
+            strain = data[f"{name}_segment_strain"].sel(measure="engineering", wall_component=component)
+            columns.append(PERCENT * strain.isel(frame=int(data.attrs["es_frame"])).values)
+        values = np.array(columns, float)
+        known = np.isfinite(values)
+        total = np.where(known, values, 0.0).sum(0)
+        return np.where(known.any(0), total / np.maximum(known.sum(0), 1), np.nan)
+
+    def _time(self, view: str) -> tuple[NDArray[np.float64], float]:
+        """Time since end-diastole and that of end-systole, ms."""
+        data = next(iter(self.curves[view].values()))
+        time = 1e3 * np.asarray(data["time"].values, float)
+        return time, float(time[int(data.attrs["es_frame"])])
+
+    def _panel(
+        self, view: str, title: str, name: str, factor: float, unit: str, selection: Mapping[str, object]
+    ) -> Panel:
+        curves = self.curves[view]
+        time, end_systole = self._time(view)
+        true = factor * next(iter(curves.values()))[f"true_{name}"].sel(selection).values
+        tracked = {tracker: factor * data[f"tracked_{name}"].sel(selection).values for tracker, data in curves.items()}
+        return Panel(title, unit, time, end_systole, true, tracked)

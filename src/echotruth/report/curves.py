@@ -1,0 +1,125 @@
+"""Tracked against true curves over the cycle: strain of the wall and rotation of every view, and strain of segments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from echotruth.aha import SEGMENT_NAMES
+from echotruth.report import style
+
+ROOM = 0.6
+"""Range of an axis beyond that of the truth and of the best tracker, to either side, over it; the curves of other
+trackers may leave it."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves of one quantity in one view.
+
+    Attributes
+    ----------
+    title : str
+    unit : str
+        As "%".
+    time : ndarray of shape (frame,)
+        Since end-diastole, ms.
+    end_systole : float
+        ms.
+    true : ndarray of shape (frame,)
+    tracked : dict of ndarray of shape (frame,)
+        Tracker -> its curve, the best tracker first; NaN where it has none.
+    """
+
+    title: str
+    unit: str
+    time: np.ndarray
+    end_systole: float
+    true: np.ndarray
+    tracked: Mapping[str, np.ndarray]
+
+
+@style.styled
+def draw(path: str | Path, rows: Sequence[Sequence[Panel | None]]) -> Path:
+    """Draw panels in rows.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write.
+    rows : sequence of sequence of Panel or None
+        All of one length; None leaves a place empty.
+
+    Returns
+    -------
+    Path
+        The file.
+    """
+    columns = max(map(len, rows))
+    figure = style.figure(max(2.45 * columns + 0.3, 5.2), 2.15 * len(rows) + 0.5)
+    grid = figure.subplots(len(rows), columns, squeeze=False, sharex=False)
+    for axes, panel in zip(grid.flat, (panel for row in rows for panel in row), strict=True):
+        if panel is None:
+            axes.axis("off")
+        else:
+            _panel(axes, panel)
+    for axes in grid[-1]:
+        axes.set_xlabel("Time since ED (ms)")
+    trackers = list(dict.fromkeys(name for row in rows for panel in row if panel for name in panel.tracked))
+    _legend(figure, trackers)
+    return style.save(figure, path)
+
+
+def _panel(axes: Axes, panel: Panel) -> None:
+    axes.axhline(0, color=style.MUTED, linewidth=0.6)
+    axes.axvline(panel.end_systole, color=style.MUTED, linewidth=0.9, linestyle=":")
+    axes.plot(panel.time, panel.true, color=style.TRUTH, linewidth=2.6, zorder=2)
+    for number, (_, values) in reversed(list(enumerate(panel.tracked.items()))):
+        axes.plot(panel.time, values, color=style.series_colour(number), linewidth=1.3, zorder=3)
+    axes.set_ylim(*_limits(panel))
+    axes.margins(x=0.01)
+    axes.set_title(f"{panel.title} ({panel.unit})", fontsize=8, loc="left")
+    axes.tick_params(labelsize=8)
+
+
+def _limits(panel: Panel) -> tuple[float, float]:
+    """Limits that show the truth and the best tracker in full, and of the others what lies near."""
+    first = [values for values in panel.tracked.values() if np.isfinite(values).any()][:1]
+    core = np.concatenate([panel.true, *first, [0.0]])
+    core = core[np.isfinite(core)]
+    low, high = float(core.min()), float(core.max())
+    room = ROOM * max(high - low, 1e-3)
+    every = np.concatenate([core, *panel.tracked.values()])
+    every = every[np.isfinite(every)]
+    low, high = max(float(every.min()), low - room), min(float(every.max()), high + room)
+    margin = 0.06 * max(high - low, 1.0)
+    return low - margin, high + margin
+
+
+def _legend(figure: Figure, trackers: Sequence[str]) -> None:
+    lines = [Line2D([], [], color=style.TRUTH, linewidth=2.6, label="true")]
+    for number, name in enumerate(trackers):
+        lines.append(Line2D([], [], color=style.series_colour(number), linewidth=1.3, label=name))
+    lines += [Line2D([], [], color=style.MUTED, linewidth=0.9, linestyle=":", label="ES")]
+    figure.legend(handles=lines, loc="outside lower center", ncols=min(len(lines), 7))
+
+
+def segment_title(number: int) -> str:
+    """Title of a segment: its number and its name.
+
+    Parameters
+    ----------
+    number : int
+        1..17.
+
+    Returns
+    -------
+    str
+    """
+    return f"{number} {SEGMENT_NAMES[number - 1]}"

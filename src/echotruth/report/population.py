@@ -1,0 +1,63 @@
+"""Measures of all hearts by their diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from echotruth.report import style
+
+MAX_DOTS = 400
+"""Hearts of a diagnosis beyond which every k-th is drawn; the bar is that of all."""
+
+SPREAD = 0.28
+"""Half the width over which the dots of a diagnosis are spread."""
+
+
+@style.styled
+def draw(path: str | Path, measures: Mapping[str, np.ndarray], diagnoses: np.ndarray) -> Path:
+    """Draw a panel for each measure: a dot for every heart, and median and quartiles of each diagnosis.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write.
+    measures : mapping of str to ndarray of shape (heart,)
+        Label with the unit -> values; NaN where a heart has none.
+    diagnoses : ndarray of shape (heart,), str
+
+    Returns
+    -------
+    Path
+        The file.
+    """
+    names = sorted(dict.fromkeys(map(str, diagnoses)), key=lambda name: (name != "healthy", name))
+    figure = style.figure(9.6, 1.3 + 0.42 * len(names))
+    panels = figure.subplots(1, len(measures), sharey=True, squeeze=False)[0]
+    for panel, (label, values) in zip(panels, measures.items(), strict=True):
+        for place, name in enumerate(names):
+            _diagnosis(panel, values[(diagnoses == name) & np.isfinite(values)], place)
+        panel.set_xlabel(label)
+        panel.grid(axis="y", visible=False)
+        panel.margins(x=0.08)
+    counts = [int(np.count_nonzero(diagnoses == name)) for name in names]
+    labels = [f"{name.replace('_', ' ').replace('+', ' + ')} ({n})" for name, n in zip(names, counts, strict=True)]
+    panels[0].set_yticks(range(len(names)), labels)
+    panels[0].set_ylim(len(names) - 0.5, -0.5)
+    return style.save(figure, path)
+
+
+def _diagnosis(axes: Axes, values: np.ndarray, place: int) -> None:
+    if not len(values):
+        return
+    dots = values[:: -(-len(values) // MAX_DOTS)]
+    # Fractions of the golden ratio spread dots evenly in any number of them, without chance.
+    height = place + SPREAD * (2 * (np.arange(len(dots)) * 0.6180339887 % 1) - 1) * (len(dots) > 1)
+    axes.plot(dots, height, "o", color=style.CIRCUMFERENTIAL, markersize=3.2, alpha=0.55, markeredgewidth=0)
+    if len(values) > 3:
+        low, middle, high = np.quantile(values, (0.25, 0.5, 0.75))
+        axes.plot([low, high], [place, place], color=style.INK, linewidth=1.6)
+        axes.plot(middle, place, "|", color=style.INK, markersize=11, markeredgewidth=2)

@@ -1,0 +1,102 @@
+"""The player of the page, clicked through in a browser."""
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def player(browser, reported):
+    """The page, opened from its file without a network; scripts must not fail."""
+    errors = []
+    page = browser.new_page(viewport={"width": 1300, "height": 900}, offline=True, reduced_motion="reduce")
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto((reported.folder / "report.html").as_uri())
+    page.wait_for_function("document.getElementById('clock').textContent.length > 0")
+    yield page
+    page.close()
+    assert errors == []
+
+
+def amber(page) -> np.ndarray:
+    """Which pixels of the screen have the colour of true motion, (row, column)."""
+    script = """() => { const screen = document.getElementById('screen');
+        const data = screen.getContext('2d').getImageData(0, 0, screen.width, screen.height).data;
+        return [screen.width, screen.height, Array.from(data)]; }"""
+    width, height, data = page.evaluate(script)
+    red, green, blue = np.moveaxis(np.reshape(data, (height, width, 4))[..., :3], -1, 0).astype(int)
+    return (red > 220) & (abs(green - 176) < 25) & (blue < 60)
+
+
+def centre(hit: np.ndarray) -> np.ndarray:
+    return np.argwhere(hit).mean(axis=0)
+
+
+def test_points_move_with_the_slider_as_the_tissue_does(player):
+    player.locator("#frame").fill("0")
+    first = centre(amber(player))
+    player.locator("#frame").fill("2")
+    last = centre(amber(player))
+    # 3 px to the right and 2 px up: rows run downwards.
+    assert last[1] - first[1] > 0 > last[0] - first[0]
+    assert player.locator("#clock").inner_text().split()[1] == "ms"
+
+
+def test_motion_can_be_left_out(player):
+    player.locator("#frame").fill("2")
+    assert amber(player).any()
+    player.uncheck("#show-true")
+    assert not amber(player).any()
+
+
+def test_strain_and_tracked_motion_are_drawn_where_they_are_asked_for(player):
+    player.locator("#frame").fill("2")
+    shown = [player.evaluate("document.getElementById('screen').toDataURL()")]
+    for box in ("#show-strain", "#show-tracked"):
+        player.check(box)
+        shown.append(player.evaluate("document.getElementById('screen').toDataURL()"))
+    assert len(set(shown)) == 3
+
+
+def test_view_is_chosen_and_curve_and_cursor_follow(player):
+    before = player.locator("#course-title").inner_text()
+    player.click("[data-view=long]")
+    assert player.locator("[data-view=long]").get_attribute("aria-pressed") == "true"
+    assert "Longitudinal" in player.locator("#course-title").inner_text() != before
+    player.locator("#frame").fill("0")
+    start = float(player.locator("#cursor").get_attribute("x1"))
+    player.click("#on")
+    assert float(player.locator("#cursor").get_attribute("x1")) > start
+
+
+def test_clip_plays_and_stops(player):
+    player.locator("#frame").fill("0")
+    player.click("#play")
+    player.wait_for_function("document.getElementById('frame').value !== '0'")
+    player.click("#play")
+    assert player.locator("#play").inner_text() == "Play"
+
+
+@pytest.mark.parametrize("width", [390, 1300])
+def test_nothing_is_wider_than_the_window(player, width):
+    player.set_viewport_size({"width": width, "height": 900})
+    assert player.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_and_axes_stand_out_from_the_paper_in_light_and_dark(player, scheme):
+    player.emulate_media(color_scheme=scheme)
+    script = """() => { const computed = getComputedStyle(document.documentElement);
+        const value = (name) => computed.getPropertyValue(name).trim();
+        return ['--paper', '--ink', '--muted', '--target', '--radial', '--circumferential', '--longitudinal',
+                '--size-0', '--size-1'].map(value); }"""
+    paper, *others = (luminance(colour) for colour in player.evaluate(script))
+    ratios = [(max(paper, other) + 0.05) / (min(paper, other) + 0.05) for other in others]
+    assert ratios[0] > 10 and ratios[1] > 4.5  # WCAG 2.2, contrast of text
+    assert min(ratios) > 2.5
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of WCAG 2.2."""
+    channels = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255
+    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
