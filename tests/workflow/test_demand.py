@@ -8,7 +8,7 @@ import pytest
 from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.workflow import demand
+from echotruth.workflow import demand, expected_cost
 
 CONFIG = Path(__file__).parents[2] / "config"
 # Largest wall-clock time, s, and memory, MB, of the records of finished repositories, on one core of a busy machine.
@@ -33,7 +33,7 @@ def test_volume_of_the_wall_is_that_of_its_mesh(name):
     mesh = left_ventricle(geometry)
     corners = mesh.nodes[mesh.cells[:, :4]]
     volume = abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6 * 1e9
-    assert demand.wall_volume(geometry) == pytest.approx(volume, rel=0.05)
+    assert expected_cost.wall_volume(geometry) == pytest.approx(volume, rel=0.05)
 
 
 @pytest.mark.parametrize("change", [

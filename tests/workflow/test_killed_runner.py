@@ -15,13 +15,15 @@ from echotruth.workflow.lease import VARIABLE
 
 pytestmark = pytest.mark.slow
 
+RUN = ("run", "tiny.yaml", "--cores", "2", "repository")
 SECONDS = 900
 """Longest time of a run."""
 
 
 def start(folder):
+    """Start a run that leaves out the report."""
     (folder / "tiny.yaml").write_text(CONFIG)
-    command = [sys.executable, "-c", "from echotruth.cli import main; main()", "run", "tiny.yaml", "--cores", "2"]
+    command = [sys.executable, "-c", "from echotruth.cli import main; main()", *RUN]
     environment = {name: value for name, value in os.environ.items() if name != VARIABLE}
     return subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
 

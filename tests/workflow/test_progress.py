@@ -1,12 +1,11 @@
 """Progress of a run, from Snakemake's log and the durations of jobs."""
 
 import io
-import json
 
 import pytest
 
 from echotruth.workflow.execution import ProgressLine
-from echotruth.workflow.progress import Progress, format_duration, measured_seconds
+from echotruth.workflow.progress import EXPECTED, Progress, expected_durations, format_duration, replay
 
 PLAN = """\
 Provided cores: 2
@@ -69,6 +68,15 @@ def test_a_slow_machine_is_known_by_the_first_job_and_a_stage_by_its_own():
     assert run.progress.fraction_done == pytest.approx((80 + 100) / (80 + 200))
 
 
+def test_compilation_in_the_first_heart_does_not_count_for_the_others():
+    run = Run(mechanics=40, imaging=0, compile_mechanics=20)
+    run.read("Provided cores: 1\nmechanics               3\n" + began("mechanics", 1))
+    assert run.progress.seconds_left == pytest.approx(20 + 3 * 40)
+    run.now = 120  # half as fast as expected, compilation included
+    run.read(ended("mechanics", 1))
+    assert run.progress.seconds_left == pytest.approx(2 * 80)
+
+
 def test_work_that_is_done_ahead_counts_once():
     run = Run(mechanics=40, imaging=100, tracking=60)
     run.read(PLAN + "tracking                5\n")
@@ -100,17 +108,33 @@ def test_failed_job_is_done_with_and_its_log_is_known():
     assert run.progress.seconds_left == pytest.approx(40 + 3 * 100 / 2)
 
 
-def test_records_tell_what_the_jobs_of_a_rule_take(tmp_path):
-    def record(path, **entries):
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).write_text(json.dumps(entries))
+def test_job_that_is_tried_again_is_planned_again():
+    run = Run(mechanics=40, imaging=100)
+    failed = "Error in rule imaging:\n    message: None\n    jobid: 1\n    log: out/mid.log (check log file(s))\n"
+    run.read(PLAN + began("imaging", 1) + failed + "Trying to restart job 1.\n")
+    assert not run.progress.logs and not run.progress.failed_jobs
+    assert run.progress.seconds_left == pytest.approx(40 + 4 * 100 / 2)
+    run.read(began("imaging", 1) + failed)
+    assert run.progress.failed_jobs == {"imaging": 1} and len(run.progress.logs) == 1
 
-    record("tracking/heart/mid.json", seconds=10, start_seconds=1)
-    record("tracking/heart/base.json", seconds=20, start_seconds=1)
-    assert measured_seconds(tmp_path) == {}, "of evaluation there is nothing yet"
-    record("evaluation/heart/mid.json", seconds=2, start_seconds=1)
-    record("evaluation/heart/base.json", status="skipped")
-    assert measured_seconds(tmp_path) == {"tracking": 16 + 3}
+
+def test_log_read_later_gives_the_progress_of_then(tmp_path):
+    log = tmp_path / "snakemake.log"
+    log.write_text(PLAN + began("mechanics", 5) + "[Sun Nov 22 02:40:18 2026]\n" + ended("mechanics", 5)[27:])
+    progress = replay(log, {"mechanics": 40, "imaging": 100}, runs=False)
+    assert progress.seconds_left == pytest.approx(200) and not progress.running_jobs
+    log.write_text(PLAN + began("mechanics", 5) + "[Sun Nov 22 02:39:48 2026]\n")
+    progress = replay(log, {"mechanics": 40, "imaging": 100}, runs=False)
+    assert progress.fraction_done == pytest.approx(10 / 440)
+    assert [(job.rule, str(job.log)) for job in progress.running_jobs] == [("mechanics", "mechanics.log")]
+
+
+def test_durations_that_a_run_expected_are_found_again(tmp_path):
+    assert expected_durations(tmp_path) == {}
+    (tmp_path / EXPECTED).write_text('{"imaging": 3}')
+    assert expected_durations(tmp_path) == {"imaging": 3.0}
+    (tmp_path / EXPECTED).write_text('{"imaging"')
+    assert expected_durations(tmp_path) == {}
 
 
 class Terminal(io.StringIO):
@@ -129,6 +153,16 @@ def test_line_is_rewritten_on_a_terminal_and_comes_once_in_a_while_elsewhere():
         output = stream.getvalue()
         assert output.count("demo: ") == expected
         assert ("\n" in output) != stream.isatty()
+
+
+def test_planning_that_takes_long_is_told():
+    run, stream = Run(), Terminal()
+    line = ProgressLine("demo", stream, lambda: run.now)
+    line.show(run.progress)
+    assert not stream.getvalue()
+    run.now = 60
+    line.show(run.progress)
+    assert stream.getvalue().endswith("demo: planning")
 
 
 @pytest.mark.parametrize("seconds, text", [(3, "10 s"), (42, "40 s"), (70, "1 min"), (1000, "17 min"), (9000, "2.5 h")])

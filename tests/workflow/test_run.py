@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from echotruth.cli import PROFILES, WORKFLOW, with_profiles
+from echotruth.cli.snakemake import PROFILES, WORKFLOW, with_profiles
 
 PACKAGED = ["--workflow-profile", str(WORKFLOW / "profiles/slurm")]
 
@@ -68,7 +68,7 @@ def read_only(tmp_path):
 
 
 def test_folder_that_cannot_be_written_is_told_in_one_line(read_only):
-    done = run(read_only)
+    done = run(read_only, "--yes")  # there is no space for a repository either
     assert is_refused(done) and "Read-only file system" in done.stderr, done.stderr
 
 
@@ -89,6 +89,8 @@ def full(tmp_path):
 
 def test_full_disk_is_told_in_one_line(full):
     done = run(full)
+    assert is_refused(done) and "has 0 GB free" in done.stderr, done.stderr
+    done = run(full, "--yes")
     assert is_refused(done) and "No space left on device" in done.stderr, done.stderr
 
 

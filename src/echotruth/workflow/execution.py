@@ -22,6 +22,8 @@ LINE_SECONDS = 30.0
 """Interval between progress lines on a stream that is not a terminal."""
 TERMINATION_SECONDS = 10.0
 """Time that jobs have to end after SIGTERM, before they are killed."""
+PLANNING_SECONDS = 10.0
+"""Time of planning after which the progress line says so."""
 LOG_LINES = 15
 """Number of lines shown of the log of a failed job."""
 MAX_LOGS = 3
@@ -70,13 +72,12 @@ class ProgressLine:
 
     def __init__(self, name: str, stream: TextIO, clock=time.monotonic) -> None:
         self._name, self._stream, self._clock = name, stream, clock
-        self._last_text, self._next_time = "", clock()
+        self._last_text, self._next_time, self._start = "", clock(), clock()
 
     def show(self, progress: Progress) -> None:
         """Print the line if it has changed and the interval has passed."""
-        percent, left = 100 * progress.fraction_done, progress.seconds_left
-        text = f"{self._name}: {percent:.0f} % done, {progress.running}, about {format_duration(left)} left"
-        if text == self._last_text or self._clock() < self._next_time or not left:
+        text = self._text(progress)
+        if not text or text == self._last_text or self._clock() < self._next_time:
             return
         self._last_text = text
         if self._stream.isatty():
@@ -85,6 +86,14 @@ class ProgressLine:
             self._next_time = self._clock() + LINE_SECONDS
             self._stream.write(f"{text}\n")
         self._stream.flush()
+
+    def _text(self, progress: Progress) -> str:
+        """The line; empty if there is nothing to say."""
+        if not progress.is_planned:
+            return f"{self._name}: planning" if self._clock() - self._start > PLANNING_SECONDS else ""
+        left = progress.seconds_left
+        share = f"{100 * progress.fraction_done:.0f} % done"
+        return f"{self._name}: {share}, {progress.running}, about {format_duration(left)} left" if left else ""
 
     def close(self) -> None:
         """Clear the line on a terminal."""

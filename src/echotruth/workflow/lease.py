@@ -238,6 +238,30 @@ def hold(folder: Path) -> None:
         atexit.register(acquire(folder, run, wait=False).release)
 
 
+def current(folder: Path) -> tuple[Holder | None, bool]:
+    """Process that holds the lease of a folder, or held it last, and whether it lives; nothing is written.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository; it need not exist.
+
+    Returns
+    -------
+    holder : Holder or None
+        None if the folder never had a lease.
+    lives : bool
+        Of a process on another machine, whether its last heartbeat is younger than `STALE_SECONDS` by the clock of this
+        one.
+    """
+    number, holder = _newest(folder)
+    if holder is None or holder.released:
+        return holder, False
+    if holder.is_here:
+        return holder, holder.lives
+    return holder, time.time() - _heartbeat(_path(folder, number)) < STALE_SECONDS
+
+
 _followed: list[Path] = []
 """Lease that this process follows."""
 

@@ -1,4 +1,4 @@
-"""Progress of a run, from Snakemake's log and the durations of earlier jobs."""
+"""Progress of a run, from Snakemake's log and the time that its jobs are expected to take."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import json
 import re
 import time
 from collections import Counter, defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 DEFAULT_SECONDS = {
     "mechanics": 50.0,
@@ -18,51 +21,45 @@ DEFAULT_SECONDS = {
     "repository": 3.0,
     "report": 12.0,
     "report_images": 12.0,
+    "report_page": 6.0,
 }
-"""Rule -> duration of its job for a heart of 40 frames, s; used until one has been measured."""
+"""Rule -> duration of its job for a heart of 40 frames, s; used where nothing else is expected."""
 STAGES = {"imaging": ("phantom", "truth", "rf", "bmode"), "tracking": ("tracking", "evaluation")}
 """Rule -> stages of its job, if there are several."""
 AHEAD = {"mechanics": "physiology", "imaging": "tracking"}
 """Rule -> rule whose work its jobs do as well; the jobs of that rule then only move their records."""
-MAX_RECORDS = 20
-"""Largest number of records from which the mean duration of a stage is taken."""
-
 _COUNT = re.compile(r"^(\w+) +(\d+)$")
 _RULE = re.compile(r"^ *(?:local)?rule (\w+):$")  # indented in a group of jobs on a cluster
 _FAILED = re.compile(r"^ *Error in rule (\w+):$")
 _JOB = re.compile(r"^ +jobid: (\d+)$")
 _LOG = re.compile(r"^ +log: (\S+)")
+_RESTARTED = re.compile(r"^Trying to restart job (\d+)\.")
+_TIME = re.compile(r"^\[(\w{3} \w{3} +\d+ \d+:\d+:\d+ \d{4})\]$")
 _FINISHED = re.compile(r"^Finished jobid: (\d+) \(Rule: (\w+)\)$")
 _CORES = re.compile(r"^Provided (?:cores|jobs|remote nodes): (\d+)")
 
+COMPILATION = "compile_mechanics"
+"""Entry among the expected durations for which there is no rule: the first job of the mechanics compiles."""
+EXPECTED = "expected.json"
+"""File beside Snakemake's log with the duration that is expected of a job of each rule, s."""
 
-def measured_seconds(ledger: Path) -> dict[str, float]:
-    """Mean duration of the jobs of each rule, from the records of a repository.
 
-    Parameters
+@dataclass(frozen=True)
+class RunningJob:
+    """A job that was started and has not ended.
+
+    Attributes
     ----------
-    ledger : Path
-        Folder of the records; it need not exist.
-
-    Returns
-    -------
-    dict
-        Rule -> duration, s, for rules with records of all their stages.
+    rule : str
+    start : float
+        Time at which it was started, s.
+    log : Path or None
+        Its log.
     """
-    durations = {}
-    for rule in DEFAULT_SECONDS:
-        means = [_mean_seconds(ledger / stage) for stage in STAGES.get(rule, (rule,))]
-        if all(means):
-            durations[rule] = sum(means)
-    return durations
 
-
-def _mean_seconds(stage: Path) -> float:
-    """Mean duration of a stage including its start, s; 0 without records."""
-    paths = list(stage.glob("**/[!.]*.json"))[:MAX_RECORDS]
-    records = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
-    times = [record["seconds"] + record["start_seconds"] for record in records if "start_seconds" in record]
-    return sum(times) / len(times) if times else 0.0
+    rule: str
+    start: float
+    log: Path | None = None
 
 
 class Progress:
@@ -74,21 +71,18 @@ class Progress:
         Rule -> expected duration of its job, s; replaces :data:`DEFAULT_SECONDS`.
     clock : callable
         Returns the time, s.
-
-    Attributes
-    ----------
-    logs : list of Path
-        Logs of the jobs that failed.
     """
 
-    def __init__(self, expected: dict[str, float], clock=time.monotonic) -> None:
+    def __init__(self, expected: dict[str, float], clock: Callable[[], float] = time.monotonic) -> None:
         self._expected, self._clock = DEFAULT_SECONDS | expected, clock
         self._planned: Counter[str] = Counter()
-        self._running: dict[str, tuple[str, float]] = {}  # job -> its rule and start time, s
+        self._running: dict[str, RunningJob] = {}
         self._durations: dict[str, list[float]] = defaultdict(list)
         self._cores, self._fraction_done = 1, 0.0
         self._rule, self._failed = "", False
-        self.logs: list[Path] = []
+        self._job, self._log = "", cast("Path | None", None)
+        self._failures: dict[str, str] = {}  # job -> its rule
+        self._failure_logs: dict[str, Path] = {}  # job -> its log
 
     def read_line(self, line: str) -> None:
         """Update the progress from a line of Snakemake's log."""
@@ -97,21 +91,64 @@ class Progress:
         elif match := _CORES.match(line):
             self._cores = int(match[1])
         elif match := _RULE.match(line) or _FAILED.match(line):
-            self._rule, self._failed = match[1], line.startswith("Error")
+            self._rule, self._failed, self._log = match[1], line.lstrip().startswith("Error"), None
         elif match := _JOB.match(line):
             self._start_or_fail(match[1])
-        elif (match := _LOG.match(line)) and self._failed:
-            self.logs.append(Path(match[1]))
+        elif match := _LOG.match(line):
+            self._set_log(Path(match[1]))
+        elif match := _RESTARTED.match(line):
+            self._restart(match[1])
         elif match := _FINISHED.match(line):
-            rule, start = self._running.pop(match[1], (match[2], self._clock()))
-            self._durations[rule].append(self._clock() - start)
+            job = self._running.pop(match[1], RunningJob(match[2], self._clock()))
+            # Compilation is not part of what the next job of the rule will take.
+            usual = self._usual_seconds(job.rule)
+            share = usual / (usual + self._compilation(job.rule)) if usual else 1.0
+            self._durations[job.rule].append(share * (self._clock() - job.start))
 
     def _start_or_fail(self, job: str) -> None:
+        """A job was started, or failed: its number follows the name of its rule."""
+        self._job = job
         if self._failed:
-            rule, _ = self._running.pop(job, (self._rule, 0.0))
-            self._planned[rule] -= 1
+            running = self._running.pop(job, None)
+            rule = running.rule if running else self._rule
+            if job not in self._failures:
+                self._failures[job] = rule
+                self._planned[rule] -= 1
         elif self._rule in self._planned:
-            self._running[job] = (self._rule, self._clock())
+            self._running[job] = RunningJob(self._rule, self._clock(), self._log)
+
+    def _set_log(self, log: Path) -> None:
+        """The log of a job stands before the number of one that was started, and after that of one that failed."""
+        if self._failed:
+            self._failure_logs[self._job] = log
+        else:
+            self._log = log
+
+    def _restart(self, job: str) -> None:
+        """A job that failed is tried again."""
+        if rule := self._failures.pop(job, None):
+            self._failure_logs.pop(job, None)
+            self._planned[rule] += 1
+
+    @property
+    def logs(self) -> list[Path]:
+        """Logs of the jobs that failed."""
+        return list(self._failure_logs.values())
+
+    @property
+    def failed_jobs(self) -> Counter[str]:
+        """Rule -> number of its jobs that failed and were not started again."""
+        return Counter(self._failures.values())
+
+    @property
+    def running_jobs(self) -> list[RunningJob]:
+        """Jobs that were started and have not ended; on a cluster some of them may still be in its queue."""
+        return list(self._running.values())
+
+    @property
+    def is_planned(self) -> bool:
+        """Whether Snakemake has said which jobs it will run."""
+        return bool(self._planned)
 
     @property
     def fraction_done(self) -> float:
@@ -132,7 +169,7 @@ class Progress:
     @property
     def running(self) -> str:
         """Running rules, such as `imaging (2 of 4)`."""
-        running = {rule for rule, _ in self._running.values()}
+        running = {job.rule for job in self._running.values()}
         rules = [rule for rule in self._planned if rule in running]
         shown = [rule for rule in rules if not rule.startswith("compile")] or rules
         texts = (f"{rule} ({self._job_number(rule)} of {self._planned[rule]})" for rule in shown)
@@ -145,7 +182,7 @@ class Progress:
         return self._planned[rule] - len(self._durations[rule])
 
     def _elapsed(self, rule: str) -> float:
-        return sum(self._clock() - start for name, start in self._running.values() if name == rule)
+        return sum(self._clock() - job.start for job in self._running.values() if job.rule == rule)
 
     def _expected_seconds(self, rule: str) -> float:
         """Mean duration of a job in this run, s; without one, the expected one scaled to the speed of this run."""
@@ -172,13 +209,85 @@ class Progress:
     def _remaining_work(self, rule: str) -> float:
         """Remaining work of the unfinished jobs of a rule, s; each running job has at least 1/20 of its work left."""
         expected = self._expected_seconds(rule)
-        starts = [start for name, start in self._running.values() if name == rule]
+        starts = [job.start for job in self._running.values() if job.rule == rule]
         running = sum(max(expected - (self._clock() - start), expected / 20) for start in starts)
-        return running + max(0, self._unfinished(rule) - len(starts)) * expected
+        compilation = self._compilation(rule) if self._unfinished(rule) > 0 else 0.0
+        return running + compilation + max(0, self._unfinished(rule) - len(starts)) * expected
+
+    def _compilation(self, rule: str) -> float:
+        """Time for which the first job of the mechanics compiles, s; the others load what it made."""
+        return self._expected.get(COMPILATION, 0.0) if rule == "mechanics" and not self._durations[rule] else 0.0
 
 
 def format_duration(seconds: float) -> str:
     """Rounded duration, such as `2 min`."""
     if seconds < 50:
         return f"{max(10, 10 * round(seconds / 10))} s"
-    return f"{round(seconds / 60)} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+    if seconds < 5400:
+        return f"{round(seconds / 60)} min"
+    return f"{seconds / 3600:.1f} h" if seconds < 100 * 3600 else f"{seconds / 86_400:.1f} days"
+
+
+class _LogTime:
+    """Clock that stands at the time of what was read last, and runs from the present once all of it was read."""
+
+    def __init__(self) -> None:
+        self.read: float | None = 0.0
+
+    def __call__(self) -> float:
+        return time.time() if self.read is None else self.read
+
+
+def replay(log: Path, expected: dict[str, float], runs: bool) -> Progress:
+    """Progress of a run from the log that Snakemake has written so far.
+
+    Parameters
+    ----------
+    log : Path
+        Output of Snakemake; it need not exist.
+    expected : dict
+        Rule -> expected duration of its job, s.
+    runs : bool
+        Whether it goes on. Else no time passes after the last line.
+    """
+    clock = _LogTime()
+    progress = Progress(expected, clock)
+    if log.is_file():
+        with log.open(encoding="utf-8", errors="replace") as lines:
+            for line in lines:
+                if match := _TIME.match(line):
+                    clock.read = time.mktime(time.strptime(match[1], "%a %b %d %H:%M:%S %Y"))
+                else:
+                    progress.read_line(line.rstrip("\n"))
+    if runs:
+        clock.read = None
+    return progress
+
+
+def expected_durations(folder: Path) -> dict[str, float]:
+    """Rule -> duration that the last run expected of its job, s, as it wrote it beside its log; empty without one.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the logs.
+    """
+    try:
+        found = json.loads((folder / EXPECTED).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return {rule: float(seconds) for rule, seconds in found.items()} if isinstance(found, dict) else {}
+
+
+def write_expected(folder: Path, expected: dict[str, float]) -> None:
+    """Write the durations that a run expects beside its log, for whoever asks how it is going.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the logs.
+    expected : dict
+        Rule -> duration of its job, s.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / EXPECTED).write_text(json.dumps({rule: round(seconds, 1) for rule, seconds in expected.items()}))

@@ -27,7 +27,7 @@ def requested_records(folder: Path, cases: Iterable[str], views: Iterable[str]) 
         Names of the views.
     """
     views = list(views)
-    existing = {stage: _existing(folder / "ledger" / stage) for stage in ORDER}
+    existing = {stage: existing_records(folder / "ledger" / stage) for stage in ORDER}
     return [path for case in cases for path in _requested(folder, case, views, existing)]
 
 
@@ -48,8 +48,8 @@ def _lost(stages: tuple[str, ...], name: str, existing: dict[str, set[str]]) -> 
     return [stage for place, stage in enumerate(stages) if not there[place] and any(there[place:])]
 
 
-def _existing(folder: Path) -> set[str]:
-    """Records of a stage: CASE or CASE/VIEW."""
+def existing_records(folder: Path) -> set[str]:
+    """Records of a stage, given its folder in the ledger: CASE or CASE/VIEW."""
     found: set[str] = set()
     for entry in _entries(folder):
         if entry.name.endswith(".json"):

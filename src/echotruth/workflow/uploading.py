@@ -117,6 +117,8 @@ def upload_repository(folder: Path, url: str, reading_back: bool) -> int:
     if others and not faults:
         print(f"{url}: holds {len(others)} other objects, first: {others[0]}")
     print(f"{url}: {_summary(upload)}")
+    if reading_back and not faults:
+        print(f"{url}: read back all {len(upload.total.names)} files; each is the same as here")
     return 1 if faults else 0
 
 

@@ -1,0 +1,99 @@
+"""What a run has made, and what it took."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from echotruth.workflow.progress import format_duration
+from echotruth.workflow.status import Status, StatusError, status_of
+from echotruth.workflow.status_text import verdicts
+
+
+class Spent:
+    """Time and CPU time since this was made."""
+
+    def __init__(self) -> None:
+        self._clock, self._time, self._cpu = time.monotonic(), time.time(), _cpu_of_children()
+
+    def __str__(self) -> str:
+        return f"{format_duration(self.seconds)}"
+
+    @property
+    def seconds(self) -> float:
+        """Time, s."""
+        return time.monotonic() - self._clock
+
+    def cpu_seconds(self, folder: Path) -> float:
+        """CPU time, s: of the processes that were started here, or by the records of jobs that ran elsewhere.
+
+        Parameters
+        ----------
+        folder : Path
+            Folder of the repository.
+        """
+        return max(_cpu_of_children() - self._cpu, sum(_recorded(folder / "ledger", self._time)))
+
+
+def _cpu_of_children() -> float:
+    """CPU time of the processes that this one has started and that have ended, s."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def _recorded(ledger: Path, since: float) -> Iterator[float]:
+    """CPU time of the jobs whose records were made since a time, s."""
+    for folder, _, names in os.walk(ledger):
+        for path in (Path(folder) / name for name in names if name.endswith(".json")):
+            try:
+                if path.stat().st_mtime >= since:
+                    record = json.loads(path.read_text(encoding="utf-8"))
+                    yield float(record.get("cpu_seconds", 0)) + float(record.get("start_seconds", 0))
+            except (OSError, ValueError):
+                continue
+
+
+def finished(folder: Path, spent: Spent) -> str:
+    """Lines that end a run which went well.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository, `out/NAME`.
+    spent : Spent
+        Since the run began.
+    """
+    try:
+        hearts = verdicts(status_of(folder))
+    except StatusError:
+        hearts = []
+    lines = [
+        f"Time:       {spent} ({format_duration(spent.cpu_seconds(folder))} of CPU time)",
+        f"Repository: {folder / f'{folder.name}.zarr'}",
+    ]
+    report = folder / "report.html"
+    return "\n".join([*hearts, *lines, *([f"Report:     {report}"] if report.is_file() else [])])
+
+
+def unfinished(folder: Path) -> str:
+    """Sentence that ends a run in which jobs failed.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository, `out/NAME`.
+    """
+    try:
+        made = _made(status_of(folder))
+    except StatusError:
+        made = "nothing"
+    return f"not finished; made so far: {made}: run the same command again to continue (echotruth status {folder})"
+
+
+def _made(status: Status) -> str:
+    parts = [f"{name} {part.done}/{part.jobs}" for name, part in status.parts.items()]
+    return ", ".join(parts) or "nothing"
