@@ -1,6 +1,6 @@
 """Learn the motion between two frames, against no motion and against two trackers.
 
-    pip install echotruth[torch]
+    pip install 'echotruth[torch]'
     echotruth run config/learning.yaml
     python examples/motion.py out/learning
 

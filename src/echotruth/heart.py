@@ -38,6 +38,13 @@ class Heart:
         The configuration it was made by.
     arrays : dict of dict of ndarray
         All that was computed of it, by the groups of docs/schema.md.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> heart = et.load_heart("out/demo")
+    >>> heart.positions(heart.es).shape == heart.nodes.shape  # nodes at end-systole, m
+    True
     """
 
     nodes: Floats

@@ -41,6 +41,16 @@ class Scanner:
         Frequency at which the lines are demodulated, Hz.
     matrix : FullMatrix
         The echoes between all pairs.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> import numpy as np
+    >>> scanner = et.Scanner(et.Probe(elements=32), et.Rf(lines=17, focal_zones=1), depth=8e-3)
+    >>> lines = scanner.lines(np.array([[0.0, 6.5e-3, 0.0]]), np.ones(1))  # lateral, axial, elevation, m
+    >>> brightest = np.abs(lines[8]).argmax()  # the middle line looks straight ahead
+    >>> bool(abs(scanner.range[brightest] - 6.5e-3) < 20e-6)
+    True
     """
 
     def __init__(self, probe: Probe, rf: Rf, depth: float):

@@ -86,6 +86,17 @@ class FullMatrix:
     sound_speed : float, m/s
     max_range : float, m
         Greatest range of a scatterer.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> import numpy as np
+    >>> matrix = et.FullMatrix(et.Probe(elements=8), depth=8e-3)
+    >>> spectra = matrix(np.array([[0.2e-3, 6.5e-3, 0.0]]), np.ones(1))
+    >>> spectra.shape == (len(matrix.frequency), 8, 8)
+    True
+    >>> bool(np.allclose(spectra, spectra.swapaxes(1, 2)))  # who sends and who listens may change places
+    True
     """
 
     def __init__(self, probe: Probe, depth: float, max_delay: float = 0.0, elevation: bool = True) -> None:

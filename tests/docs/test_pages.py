@@ -1,0 +1,85 @@
+"""The pages: their commands are known, their configurations valid, their notebooks without outputs."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import yaml
+
+import echotruth as et
+from echotruth.cli import parser
+from echotruth.loop.cycle import read_loop
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/*.md"), *ROOT.glob("docs/start/*.md")])
+NOTEBOOKS = sorted(ROOT.glob("docs/notebooks/*.ipynb"))
+COMMAND = re.compile(r"^(?:    )*(?:\.venv/bin/)?echotruth (?P<rest>(?:[^\n\\]|\\\n|\\.)*)", re.MULTILINE)
+COMMAND_HELP = re.compile(r"^(?:--version|COMMAND|of |is |will |runs )")
+"""How lines go on that begin with the word echotruth and are no command."""
+
+
+def commands(text):
+    """Arguments of the command lines in a page."""
+    for found in COMMAND.finditer(text):
+        rest = found["rest"].replace("\\\n", " ")
+        inside = text[: found.start()].count("```") % 2 or found.group().startswith(("    ", ".venv"))
+        if inside and not COMMAND_HELP.match(rest):
+            yield shlex.split(rest, comments=True)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_on_a_page_are_those_of_the_command_line(page):
+    for arguments in commands(page.read_text()):
+        try:
+            known, others = parser().parse_known_args(arguments)
+        except SystemExit:
+            pytest.fail(f"echotruth {shlex.join(arguments)}")
+        assert known.command == "run" or not others, arguments  # run hands other options to Snakemake
+
+
+def test_commands_are_found_on_the_pages():
+    found = [arguments for page in PAGES for arguments in commands(page.read_text())]
+    assert len(found) > 30
+    assert {"run", "check", "evaluate", "export"} <= {arguments[0] for arguments in found}
+
+
+@pytest.mark.parametrize("name", ["own_heart", "own_array"])
+def test_configurations_on_a_page_are_valid(name):
+    blocks = re.findall(r"```yaml\n(.*?)```", (ROOT / f"docs/{name}.md").read_text(), re.DOTALL)
+    assert len(blocks) >= 3
+    for block in blocks:
+        keys = yaml.safe_load(block)
+        if "file" in keys.get("loop", {}):
+            keys["loop"]["file"] = "mouse"
+        if "file" not in keys.get("geometry", {}):
+            et.configure(keys)
+
+
+def test_table_of_a_loop_on_the_page_is_one_that_is_read(tmp_path):
+    (block,) = re.findall(r"```text\n(time_ms.*?)```", (ROOT / "docs/own_heart.md").read_text(), re.DOTALL)
+    rest = "".join(
+        f"{time}.0,{pressure}.0,{volume}.0\n" for time, pressure, volume in ((30, 90, 40), (60, 80, 20), (90, 5, 35))
+    )
+    (tmp_path / "my_loop.csv").write_text(block + rest + "120.0,6.0,50.0\n")
+    config = et.configure(loop={"file": str(tmp_path / "my_loop.csv"), "frames": 8})
+    assert read_loop(config.loop).volume.max() == pytest.approx(50e-9, rel=1e-6)
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebook_is_kept_without_outputs(notebook):
+    cells = [cell for cell in json.loads(notebook.read_text())["cells"] if cell["cell_type"] == "code"]
+    assert cells
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in cells)
+
+
+def test_hearts_of_the_notebooks_are_four_in_groups_that_a_split_can_part(monkeypatch):
+    monkeypatch.chdir(ROOT / "docs/notebooks")
+    cases = et.expand(et.configure("first.yaml"))
+    assert [case.id for case in cases] == ["healthy_1", "healthy_2", "infarct_1", "infarct_2"]
+
+
+def test_page_of_scripts_shows_every_example():
+    shown = set(re.findall(r"literalinclude\} /examples/(\S+)", (ROOT / "docs/examples.md").read_text()))
+    assert shown == {path.name for path in (ROOT / "examples").glob("*.py")}
