@@ -12,8 +12,9 @@ from echotruth.mechanics.geometry import left_ventricle
 
 
 def pytest_collection_modifyitems(items):
-    """What takes longest goes first, so that no worker waits for it at the end."""
-    items.sort(key=lambda item: item.path.stem != "test_workflow")
+    """Modules that take longest go first, so that no worker waits for one at the end."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: (item.path.stem != "test_workflow", item.path not in slow))
 
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)

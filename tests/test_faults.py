@@ -115,10 +115,10 @@ def test_damaged_structure_is_laid_out_again_and_no_job_is_run(workspace):
 
 
 def test_merged_repository_is_run_again_only_where_settings_change(workspace):
-    workspace.run("run", workspace.configure("second", [3]), "--cores", "2")
+    workspace.run("run", workspace.configure("second", [3]), "--cores", "2", "repository")  # without its report
     workspace.run("merge", "out/both", "out/first", "out/second")
     jobs = workspace.planned(workspace.configure("both", [1, 2, 3]))
-    assert set(jobs) <= {"report", "report_images", "all", "total"}
+    assert set(jobs) <= {"report", "report_images", "report_page", "all", "total"}
     jobs = workspace.planned(workspace.configure("both", [1, 2, 3], window=20))
     assert jobs["tracking"] == 6 and not {"mechanics", "imaging"} & set(jobs)
     assert "no faults" in workspace.run("check", "out/both")

@@ -16,7 +16,7 @@ def test_missing_pytorch_is_told_in_one_sentence_with_the_extra():
     found = subprocess.run([sys.executable, "-c", BLOCKED], capture_output=True, text=True, check=False)
     assert found.returncode == 1
     last = found.stderr.strip().splitlines()[-1]
-    assert last == "ModuleNotFoundError: echotruth.torch needs PyTorch: pip install echotruth[torch]"
+    assert last == "ModuleNotFoundError: echotruth.torch needs PyTorch: pip install 'echotruth[torch]'"
 
 
 @pytest.fixture(scope="module")

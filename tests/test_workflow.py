@@ -203,7 +203,7 @@ def test_a_tracker_that_fails_is_a_row_of_the_leaderboard_and_not_the_end_of_the
 
 
 def test_figures_stand_beside_the_repository_and_of_scratch_only_checkpoints_stay(made):
-    assert {path.suffix for path in (made.out / "figures").iterdir()} == {".png", ".gif", ".csv", ".mp4"}
+    assert {path.suffix for path in (made.out / "figures").iterdir()} == {".png", ".svg", ".gif", ".csv", ".mp4"}
     left = {path.name for path in made.out.glob("scratch/**/*") if path.is_file()}
     assert left == {"checkpoint.json"}
 
@@ -212,6 +212,7 @@ def test_figures_stand_beside_the_repository_and_of_scratch_only_checkpoints_sta
 def test_jobs_of_a_view_find_all_that_they_call_compiled(tmp_path):
     """The miniature compiles all functions that the jobs call, with the same types."""
     made = Workspace(tmp_path / "echotruth", share_cache=False)
+    (made.folder / "tiny.yaml").write_text(CONFIG.replace("[1, 2]\n", "[1]\n").replace("frames: 10", "frames: 4"))
     made.snakemake("--cores", "2", "--until", "tracking")
     records = [json.loads(path.read_text()) for path in made.out.glob("ledger/*/*/*.json")]
     assert {record["stage"] for record in records} == {"phantom", "truth", "rf", "bmode", "tracking", "evaluation"}

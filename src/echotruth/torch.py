@@ -23,7 +23,7 @@ try:
 except ModuleNotFoundError as error:
     if error.name != "torch":
         raise
-    raise ModuleNotFoundError("echotruth.torch needs PyTorch: pip install echotruth[torch]", name="torch") from None
+    raise ModuleNotFoundError("echotruth.torch needs PyTorch: pip install 'echotruth[torch]'", name="torch") from None
 
 __all__ = ["Clips", "Diagnosis", "FlowPairs", "PointTracks", "Segmentation", "Strain", "Tensors", "loader", "tensors"]
 

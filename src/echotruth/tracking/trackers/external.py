@@ -63,7 +63,7 @@ def track(
 def _call(name: str | Callable[..., Any], arguments: tuple[Any, ...], options: dict[str, Any]) -> Any:
     try:
         with redirect_stdout(sys.stderr):
-            return (name if callable(name) else _load(name))(*arguments, **options)
+            return (name if callable(name) else load_callable(name))(*arguments, **options)
     except TrackerFailed:
         raise
     except (Exception, SystemExit) as error:
@@ -76,8 +76,14 @@ def _describe(error: BaseException) -> str:
     return in_one_line(f"{type(error).__name__}: {error}")
 
 
-def _load(name: str) -> Callable[..., Any]:
-    """Import the callable `package.module:function` or the entry point; the current directory is searched too."""
+def load_callable(name: str) -> Callable[..., Any]:
+    """Import the callable `package.module:function` or the entry point; the current directory is searched too.
+
+    Raises
+    ------
+    TrackerFailed
+        If it cannot be found or imported.
+    """
     if not {"", str(Path.cwd())} & set(sys.path):
         sys.path.insert(0, str(Path.cwd()))
     installed = entry_points(group=ENTRY_POINT_GROUP)

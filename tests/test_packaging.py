@@ -1,0 +1,76 @@
+"""Wheel and sdist hold what they must, and the package works from the wheel in an empty folder."""
+
+import os
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def build(target: str, source: Path, folder: Path) -> Path:
+    """Build an archive with the installed hatchling, without a network."""
+    command = [sys.executable, "-m", "hatchling", "build", "--target", target, "--directory", str(folder)]
+    subprocess.run(command, cwd=source, check=True, capture_output=True)
+    return next(folder.glob("*.whl" if target == "wheel" else "*.tar.gz"))
+
+
+@pytest.fixture(scope="module")
+def sdist(tmp_path_factory) -> Path:
+    """The unpacked sdist."""
+    folder = tmp_path_factory.mktemp("sdist")
+    with tarfile.open(build("sdist", ROOT, folder)) as archive:
+        archive.extractall(folder, filter="data")
+    return next(path for path in folder.iterdir() if path.is_dir())
+
+
+@pytest.fixture(scope="module")
+def wheel(sdist, tmp_path_factory) -> Path:
+    """The unpacked wheel that is built from the sdist, as an installer does."""
+    folder = tmp_path_factory.mktemp("wheel")
+    with zipfile.ZipFile(build("wheel", sdist, folder)) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+def files(folder: Path) -> set[str]:
+    paths = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+    return {path.as_posix() for path in paths if "__pycache__" not in path.parts}
+
+
+def test_wheel_made_from_the_sdist_has_every_file_of_the_package(wheel):
+    assert files(ROOT / "src/echotruth") - files(wheel / "echotruth") == set()
+
+
+def test_sdist_has_tests_and_docs_and_no_data(sdist):
+    found = files(sdist)
+    assert {"LICENSE", "README.md", "CITATION.cff", "requirements.lock", "docs/schema.md", "config/demo.yaml"} <= found
+    assert files(ROOT / "tests") <= {name.removeprefix("tests/") for name in found if name.startswith("tests/")}
+    assert {name.split("/")[0] for name in found if name.startswith(".")} <= {".ci", ".gitignore"}
+    assert not [name for name in found if name.startswith("out/") or ".zarr/" in name]
+    assert sum((sdist / name).stat().st_size for name in found) < 20e6
+
+
+def test_command_works_from_the_wheel_in_an_empty_folder(wheel, tmp_path):
+    (tmp_path / "mine.yaml").write_text("name: mine\n")
+    code = f"import sys; sys.path.insert(0, {str(wheel)!r}); import echotruth; print(echotruth.__file__)"
+    command = [sys.executable, "-c", f"{code}; from echotruth.cli import main; main()", "check", "mine.yaml"]
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(str(wheel))
+    assert "mine.yaml: valid" in done.stdout
+
+
+def test_shipped_configurations_travel_in_the_wheel_and_are_found_there(wheel, tmp_path):
+    assert files(ROOT / "config") == files(wheel / "echotruth/examples")
+    code = f"import sys; sys.path.insert(0, {str(wheel)!r}); from echotruth.cli import main; main()"
+    for arguments in (["new", "hearts"], ["check", "hearts.yaml"], ["check", "sweep"]):
+        done = subprocess.run(
+            [sys.executable, "-c", code, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, ""), done.stderr
