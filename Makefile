@@ -1,11 +1,12 @@
-# make demo and make test set up .venv from requirements.lock first; make test-all runs the slow tests too, and make
-# test-integration those that need PyTorch, an S3 server or the validators of other formats, in an environment of their own.
+# make demo and make test set up .venv from requirements.lock first; make test-all runs the slow tests too. Make
+# test-integration runs the tests that need PyTorch, an S3 server, validators of other formats, other simulators or Sphinx,
+# in an environment of their own; make docs builds the site there.
 
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test test-all test-integration reference validation lock clean
+.PHONY: demo test test-all test-integration docs reference validation lock clean
 
 demo: .venv/ready
 	$(BIN)/echotruth run config/demo.yaml
@@ -19,7 +20,9 @@ test test-all: .venv/ready
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(CHOICE)
 
-INTEGRATION := tests/test_torch.py tests/learning/test_baselines.py tests/description tests/repository/test_upload.py
+# tests/docs builds the site.
+INTEGRATION := tests/test_torch.py tests/learning/test_baselines.py tests/description tests/repository/test_upload.py \
+	tests/repository/test_export.py tests/imaging/test_peers.py tests/docs
 
 test-integration: .venv-integration/ready
 	.venv-integration/bin/python -m pytest -n 2 --dist loadscope $(INTEGRATION)
@@ -39,18 +42,21 @@ test-integration: .venv-integration/ready
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .
 	touch $@
 
+docs: .venv-integration/ready  ## the site, in out/site
+	.venv-integration/bin/python -m sphinx -W --keep-going -b html -c docs . out/site
+
 reference: .venv/ready  ## generated pages: schema and tables
 	$(BIN)/python -m echotruth.reference
 
 validation: .venv/ready  ## docs/validation.md; takes half an hour on one core
 	$(BIN)/echotruth validate
 
-COMPILE := uv pip compile pyproject.toml --extra test --extra build --universal --python-version 3.11 \
+COMPILE := uv pip compile pyproject.toml --extra test --extra browser --extra build --universal --python-version 3.11 \
 	--generate-hashes --no-header --no-annotate --quiet
 
 lock:  ## needs uv
 	$(COMPILE) --output-file requirements.lock
-	$(COMPILE) --extra integration --output-file integration.lock
+	$(COMPILE) --extra integration --extra peers --extra docs --output-file integration.lock
 
 clean:
-	rm -rf .venv .venv-integration .snakemake out
+	rm -rf .venv .venv-integration .snakemake out docs/notebooks/.snakemake docs/notebooks/out

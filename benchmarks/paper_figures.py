@@ -68,7 +68,10 @@ def draw_figures(folder: Path, hearts: Hearts, printed: str, mended: str) -> Non
         clips = [heart.group(f"bmode/{size}").image.sel(view="mid").isel(frame=0).values for size in heart.sizes[:2]]
         resolutions.draw(folder / f"paper_bmode_{name}.png", clips, heart.field_of_view)
         for tracker in (printed, mended):
-            bullseye.draw(folder / f"paper_bullseye_{name}_{tracker}.png", *heart.segments(tracker), tracker)
+            true, tracked = (1e6 * values for values in heart.segments(tracker))
+            labels = "Circumferential displacement at ES (µm)", "Difference (µm)"
+            segments = bullseye.Segments("Circumferential displacement", true, tracked, *labels)
+            bullseye.draw(folder / f"paper_bullseye_{name}_{tracker}.png", [segments], tracker)
         errors = {
             view: {
                 tracker: {size: heart.layer_errors(view, tracker, size) for size in heart.sizes}
