@@ -1,4 +1,6 @@
-"""Meshes and motions of which everything is known."""
+"""Meshes and motions of which everything is known, and a browser."""
+
+import shutil
 
 import cores  # noqa: F401 - before whatever multiplies or compiles
 import numpy as np
@@ -15,6 +17,23 @@ def pytest_collection_modifyitems(items):
     """Modules that take longest go first, so that no worker waits for one at the end."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: (item.path.stem != "test_workflow", item.path not in slow))
+
+
+QUIET = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
+"""Options of a browser that runs without a screen, as root, and asks nobody."""
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """One for all tests of a worker: Playwright refuses a second one beside it."""
+    api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("needs Chromium")
+    with api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=chromium, args=QUIET)
+        yield opened
+        opened.close()
 
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)

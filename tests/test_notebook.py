@@ -206,6 +206,7 @@ def test_function_that_raises_is_named(clip):
         (lambda heart, clip: et.track(clip.drop_attrs(), "dis"), ValueError, "lost its attribute case"),
         (lambda heart, clip: et.beat({"cases": {"seed": [1, 2]}}), ValueError, "cases sweeps seed"),
         (lambda heart, clip: et.heart_dataset(heart, "rf"), ValueError, "group = 'rf': the heart has geometry"),
+        (lambda heart, clip: et.evaluate(clip, heart), ValueError, "tracked: has no displacement .*et.track returns"),
         (lambda heart, clip: et.open("out/nowhere"), FileNotFoundError, "out/nowhere.*is not a repository"),
         (lambda heart, clip: et.load_heart("out/nowhere"), FileNotFoundError, "out/nowhere.*is not a repository"),
     ],

@@ -1,14 +1,9 @@
-"""A repository with its figures and its page, and a browser."""
-
-from pathlib import Path
+"""A repository with its figures and its page."""
 
 import pytest
 from known_repository import SIZES
 from reported_repository import report
 from shown_repository import Shown, shown_repository
-
-CHROMIUM = Path("/usr/bin/chromium")
-QUIET = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
 
 
 @pytest.fixture(scope="session")
@@ -28,14 +23,3 @@ def text(reported) -> str:
 def size() -> int:
     """Of the largest images, px."""
     return SIZES[0]
-
-
-@pytest.fixture(scope="session")
-def browser():
-    api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-    if not CHROMIUM.is_file():
-        pytest.skip(f"needs {CHROMIUM}")
-    with api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
-        yield opened
-        opened.close()

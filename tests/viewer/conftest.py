@@ -1,16 +1,12 @@
-"""The repository that the viewer shows, its page, and a browser."""
+"""The repository that the viewer shows, and its page."""
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from shown_repository import Shown, shown_repository
 
 from echotruth.viewer.catalogue import Catalogue
-
-CHROMIUM = Path("/usr/bin/chromium")
-QUIET = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
 
 
 @pytest.fixture(scope="session")
@@ -33,17 +29,6 @@ def address(shown):
         finally:
             process.terminate()
     assert process.returncode == 0
-
-
-@pytest.fixture(scope="module")
-def browser():
-    api = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-    if not CHROMIUM.is_file():
-        pytest.skip(f"needs {CHROMIUM}")
-    with api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
-        yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")

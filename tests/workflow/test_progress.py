@@ -46,6 +46,15 @@ def test_time_left_is_that_of_stage_after_stage_on_the_cores_there_are():
     assert progress.seconds_left == pytest.approx(40 + 4 * 100 / 2)
 
 
+def test_end_of_the_rule_that_only_collects_the_results_is_the_end_of_the_run():
+    run = Run(mechanics=40, imaging=100)
+    run.read("Provided cores: 1\nall                     1\nmechanics               1\n" + began("mechanics", 1))
+    run.now = 40
+    run.read(ended("mechanics", 1) + began("all", 0) + ended("all", 0))
+    assert (run.progress.fraction_done, run.progress.seconds_left) == (1, 0)
+    assert run.progress.running == "starting", "no job is left"
+
+
 def test_running_jobs_count_as_far_as_they_are():
     run = Run(mechanics=40, imaging=100)
     run.read(PLAN + began("mechanics", 5))

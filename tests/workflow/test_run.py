@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from echotruth.cli.snakemake import PROFILES, WORKFLOW, with_profiles
+from echotruth.cli.snakemake import PROFILES, WORKFLOW, executor_error, option_errors, with_profiles
 
 PACKAGED = ["--workflow-profile", str(WORKFLOW / "profiles/slurm")]
 
@@ -29,6 +29,37 @@ def test_folder_of_the_user_is_preferred_to_a_profile_of_its_name(tmp_path):
     (tmp_path / "slurm").mkdir()
     with chdir(tmp_path):
         assert with_profiles(["--profile", "slurm"]) == ["--profile", "slurm"]
+
+
+@pytest.mark.parametrize("options", [["--cores", "0"], ["--cores=0"], ["-j", "0"], ["-c", "-1"], ["--cores", "two"]])
+def test_number_of_cores_with_which_nothing_would_ever_run_is_refused(options):
+    (error,) = option_errors(options)
+    assert error.startswith(options[0].split("=")[0]) and "give a whole number above 0" in error
+
+
+@pytest.mark.parametrize("options", [["--cores", "2"], ["-c", "all"], ["--jobs=unlimited"], ["-j"], ["--cores", "-n"]])
+def test_numbers_of_cores_that_snakemake_takes_are_no_errors(options):
+    assert option_errors(options) == []
+
+
+def test_profile_that_is_none_is_refused_before_anything_is_written(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/config.yaml").write_text("jobs: 2\n")
+    with chdir(tmp_path):
+        assert option_errors(["--profile", "mine"]) == option_errors(["--profile=slurm"]) == []
+        (error,) = option_errors(["--profile", "none"])
+        Path("tiny.yaml").write_text("name: tiny\n")
+        (swapped,) = option_errors(["--profile", "tiny.yaml"])
+    assert error.startswith("--profile none: is not a profile: give") and "slurm" in error and "before" not in error
+    assert swapped.endswith("the file of the configuration comes before the options")
+    assert is_refused(run(tmp_path, "--profile", "none")) and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("executor", "remedy"), [("slurm", "'echotruth[slurm]'"), ("lsf", "executor-plugin-lsf")])
+def test_missing_package_of_an_executor_is_named_with_its_remedy(monkeypatch, executor, remedy):
+    monkeypatch.setattr("echotruth.cli.snakemake.find_spec", lambda name: None)
+    assert executor_error(executor).endswith(remedy) and "pip install" in executor_error(executor)
+    assert executor_error("local") is executor_error(None) is None
 
 
 def run(folder, *options):

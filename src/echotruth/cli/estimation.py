@@ -32,7 +32,7 @@ def estimated(config: Config, cases: Sequence[Case], options: list[str]) -> tupl
         Options for Snakemake.
     """
     folder = Path("out") / config.name
-    profile = _profile(options)
+    profile = profile_content(options)
     is_local = profile is None or profile.get("executor", "local") == "local"
     # What other machines take is not known from the repositories that were made on this one.
     speed = measured_speed(folder.parent) if is_local else Speed({})
@@ -68,7 +68,7 @@ def _cores(options: list[str], profile: dict[str, object] | None) -> int:
     return jobs if isinstance(jobs, int) and jobs > 0 else _available_cores()
 
 
-def _profile(options: list[str]) -> dict[str, object] | None:
+def profile_content(options: list[str]) -> dict[str, object] | None:
     """Content of the profile that the options name; None without one, or if it cannot be read."""
     for flag, name in pairwise([*with_profiles(options), ""]):
         if flag in PROFILE_OPTIONS:

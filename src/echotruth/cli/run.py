@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echotruth.cli.command import Commands, add_command, add_configuration, fail
-from echotruth.cli.snakemake import PROFILES, WORKFLOW, is_query, with_profiles
+from echotruth.cli.snakemake import PROFILES, WORKFLOW, executor_error, is_query, option_errors, with_profiles
 
 if TYPE_CHECKING:
     from echotruth.config import Config
@@ -26,7 +26,7 @@ NOTES = f"""options of Snakemake that are useful here:
 STATUSES = {
     0: "everything is made",
     1: "the configuration is not valid, or jobs failed",
-    2: "it is refused, because it does not fit this machine or makes no sense; --yes runs it nevertheless",
+    2: "an option is wrong, or it does not fit this machine or makes no sense; --yes runs the latter nevertheless",
     3: "everything is made, but not everything is uploaded",
 }
 
@@ -65,6 +65,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the workflow of a configuration; return the exit status."""
     from echotruth.cli.configuration import load_cases
 
+    if errors := option_errors(arguments.options):
+        return fail("\n".join(errors))
     config, cases = load_cases(arguments.config)
     expected: dict[str, float] = {}
     try:
@@ -82,11 +84,20 @@ def run(arguments: argparse.Namespace) -> int:
                 return 2
             if arguments.estimate:
                 return 0
-        return make_repository(arguments.config, config, arguments.options, arguments.upload, expected)
+        return _started(arguments, config, expected)
     except KeyboardInterrupt:
         sys.exit("echotruth: interrupted; run the same command again to continue")
     except OSError as error:
         sys.exit(f"echotruth: {error.filename or arguments.config}: {error.strerror or error}: {WRITABLE}")
+
+
+def _started(arguments: argparse.Namespace, config: Config, expected: dict[str, float]) -> int:
+    """Make a repository, unless the package that starts jobs elsewhere is missing; return the exit status."""
+    from echotruth.cli.estimation import profile_content
+
+    if error := executor_error((profile_content(arguments.options) or {}).get("executor")):
+        return fail(error)
+    return make_repository(arguments.config, config, arguments.options, arguments.upload, expected)
 
 
 def make_repository(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,6 +16,12 @@ PROFILES = sorted(path.name for path in (WORKFLOW / "profiles").iterdir())
 """Profiles of the package, which `--profile` takes by their name."""
 
 PROFILE_OPTIONS = ("--profile", "--workflow-profile")
+
+NUMBER_OPTIONS = {"--cores": "all", "-c": "all", "--jobs": "unlimited", "-j": "unlimited"}
+"""Options that take a number of jobs at the same time -> the word that they take as well."""
+
+OWN_EXECUTORS = ("local", "dryrun", "touch")
+"""Executors of Snakemake itself; others are packages."""
 
 QUERY_OPTIONS = {
     *("--dry-run", "--dryrun", "--dag", "--rulegraph", "--filegraph", "--d3dag", "--summary", "--detailed-summary"),
@@ -39,3 +46,63 @@ def with_profiles(options: list[str]) -> list[str]:
 def is_query(option: str) -> bool:
     """Whether an option makes Snakemake only print."""
     return option in QUERY_OPTIONS or re.fullmatch(r"-[a-z]*n[a-z]*", option) is not None
+
+
+def option_errors(options: list[str]) -> list[str]:
+    """What is wrong with the options that say where and on how many cores jobs run, in a sentence each.
+
+    Snakemake waits for ever with 0 cores, and tells of a profile that it does not find only when the run has begun.
+
+    Parameters
+    ----------
+    options : list of str
+        Options for Snakemake, as the user gave them.
+    """
+    found = []
+    parts = [part for option in options for part in (option.split("=", 1) if option.startswith("--") else [option])]
+    for flag, value in pairwise(parts):
+        if value.startswith("-") and not value[1:].isdigit():
+            continue
+        if flag in NUMBER_OPTIONS and value != NUMBER_OPTIONS[flag] and not (value.isdigit() and int(value) > 0):
+            remedy = f"give a whole number above 0, or {NUMBER_OPTIONS[flag]}"
+        elif flag in PROFILE_OPTIONS and not _is_profile(value):
+            remedy = f"is not a profile: give {' or '.join(PROFILES)}, or a folder that holds a config.yaml"
+        else:
+            continue
+        is_file = value.endswith((".yaml", ".yml"))
+        found.append(f"{flag} {value}: {remedy}{_ORDER if is_file else ''}")
+    return found
+
+
+_ORDER = "; the file of the configuration comes before the options"
+
+
+def _is_profile(name: str) -> bool:
+    """Whether a profile of the package, of Snakemake's own folders, or of this path exists."""
+    if name in PROFILES:
+        return True
+    if Path(name).is_file() and not Path(name).name.startswith(("config", "profile")):
+        return False  # Snakemake would read the configuration of a heart as a profile
+    from snakemake.cli import get_profile_dir
+
+    try:
+        return get_profile_dir(name) is not None
+    except OSError:
+        return False
+
+
+def executor_error(executor: object) -> str | None:
+    """Say which package to install if that of an executor is missing; None if it is there.
+
+    Parameters
+    ----------
+    executor : object
+        The `executor` of a profile.
+    """
+    if not isinstance(executor, str) or executor in OWN_EXECUTORS:
+        return None
+    package = f"snakemake-executor-plugin-{executor}"
+    if find_spec(package.replace("-", "_")) is not None:
+        return None
+    wanted = "'echotruth[slurm]'" if executor == "slurm" else package
+    return f"executor {executor}: needs the package {package}: pip install {wanted}"

@@ -147,7 +147,10 @@ def _variant(model: type[BaseModel], sections: dict[str, type[Section]]) -> str:
 def _remedy(error: ErrorDetails, context: dict[str, Any]) -> str:
     message = _MESSAGES.get(error["type"], error["msg"])
     if error["type"] == "string_pattern_mismatch":
-        return f"use letters, digits and underscores only (pattern {context['pattern']})"
+        signs = (
+            "letters, digits, `_`, `.` and `-`" if ".-]" in context["pattern"] else "letters, digits and underscores"
+        )
+        return f"use {signs} only (pattern {context['pattern']})"
     if error["type"] == "too_long":
         return f"must have at most {context['max_length']} entries"
     if error["type"] == "too_short" and context["min_length"] > 1:

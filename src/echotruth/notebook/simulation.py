@@ -254,6 +254,8 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
 
     check_clip(tracked, "tracked")
     check_heart(heart)
+    if "displacement" not in tracked or set(tracked["displacement"].dims) != {"frame", "axial", "lateral", "plane"}:
+        raise ValueError("tracked: has no displacement (frame, axial, lateral, plane): give what et.track returns.")
     case, attributes = case_of(tracked), tracked.attrs
     if attributes.get("heart", fingerprint(heart)) != fingerprint(heart):
         raise ValueError("The clip was made of another heart: give the one that was imaged.")

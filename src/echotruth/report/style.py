@@ -143,11 +143,13 @@ def plain_logarithmic(axes: Axes, which: Literal["x", "y"], values: np.ndarray) 
         After all is drawn.
     which : {"x", "y"}
     values : ndarray
-        What the axis has to show; what is not a positive number has no place on it.
+        What the axis has to show; what is not a positive number has no place on it. If there is none, it stays linear.
     """
     axis = axes.xaxis if which == "x" else axes.yaxis
     shown = values[np.isfinite(values) & (values > 0)]
-    low, high = (float(shown.min()), float(shown.max())) if shown.size else (1.0, 10.0)
+    if not shown.size:
+        return
+    low, high = float(shown.min()), float(shown.max())
     middle = np.sqrt(low * high)
     limits = min(low / 1.3, middle / np.sqrt(10)), max(high * 1.3, middle * np.sqrt(10))
     axes.set(**{f"{which}scale": "log", f"{which}lim": limits})

@@ -58,7 +58,8 @@ def width(path: Path) -> float:
 
 
 def _renamed(text: str, prefix: str) -> str:
-    """Names and references of one figure, told from those of others on the same page."""
-    text = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}-\1"', text)
+    """Names that are referred to, told from those of other figures on the same page; all other names are left out."""
+    used = {one or other for one, other in re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', text)}
+    text = re.sub(r' id="([^"]+)"', lambda name: f' id="{prefix}-{name[1]}"' if name[1] in used else "", text)
     text = re.sub(r'href="#([^"]+)"', rf'href="#{prefix}-\1"', text)
     return re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}-\1)", text)

@@ -98,7 +98,7 @@ class Progress:
             self._set_log(Path(match[1]))
         elif match := _RESTARTED.match(line):
             self._restart(match[1])
-        elif match := _FINISHED.match(line):
+        elif (match := _FINISHED.match(line)) and match[2] in self._expected:  # the rule `all` does no work
             job = self._running.pop(match[1], RunningJob(match[2], self._clock()))
             # Compilation is not part of what the next job of the rule will take.
             usual = self._usual_seconds(job.rule)
