@@ -120,3 +120,10 @@ def test_lost_or_damaged_registry_is_made_again_from_the_store(tmp_path, content
 
 def test_rows_of_a_repository_not_yet_made_are_none(tmp_path):
     assert ledger.rows(tmp_path / "registry.txt") == {}
+
+
+def test_repository_of_an_empty_configuration_is_not_read_as_one_of_defaults(tmp_path):
+    ledger.register(tmp_path / "registry.txt", ["a"])
+    (tmp_path / "config.yaml").touch()
+    with pytest.raises(FileNotFoundError, match=r"config.yaml: is empty: run the repository again"):
+        ledger.repository_folder(tmp_path)

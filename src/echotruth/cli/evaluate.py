@@ -65,4 +65,6 @@ def evaluate(arguments: argparse.Namespace) -> int:
     except (EvaluationError, ConfigError) as error:
         return fail(str(error))
     print(f"\n{summary(table)}\n\nScores: {evaluation.file}")
+    if arguments.keep:
+        print(f"Motion: {evaluation.file.with_suffix('.zarr')}")
     return 0 if any(not row["failure"] for row in rows) else 1

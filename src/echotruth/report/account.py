@@ -147,9 +147,9 @@ def stages(folder: Path) -> list[Stage]:
     return found
 
 
-def opening(config: Config, case: str, view: str) -> str:
-    """Lines of Python that open the repository."""
-    tracker = next(iter(config.tracking.trackers))
+def opening(config: Config, case: str, view: str, best: str) -> str:
+    """Lines of Python that open the repository; the curves are of the best tracker, if there is one."""
+    tracker = best or next(iter(config.tracking.trackers))
     return f"""import echotruth as et
 
 clip = et.load_clip("out/{config.name}", case="{case}", view="{view}")  # image, displacement, strain, labels

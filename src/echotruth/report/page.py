@@ -82,6 +82,7 @@ def _context(tree: xr.DataTree, folder: Path, config: Config, shown: np.ndarray)
     stored = kept.trackers(folder, config)
     order = [name for name in best(standings) if name in stored] if standings is not None else []
     comparison = Comparison(folder, find_case(config, case), tuple(order)) if case else None
+    leader = comparison.trackers[0] if comparison else ""
     return {
         "name": config.name,
         "version": version,
@@ -94,7 +95,7 @@ def _context(tree: xr.DataTree, folder: Path, config: Config, shown: np.ndarray)
         "facts": account.facts(config),
         "board": board.of(standings, config.bmode.sizes[0]) if standings is not None else None,
         "shown": case,
-        "best": comparison.trackers[0] if comparison else "",
+        "best": leader,
         "views": [(view, style.title(view)) for view in config.views],
         "main_view": main_view(config),
         "segment_view": style.title(main_view(config)).lower(),
@@ -105,7 +106,7 @@ def _context(tree: xr.DataTree, folder: Path, config: Config, shown: np.ndarray)
         "provenance": account.provenance(tree, config),
         "stages": account.stages(folder),
         "configuration": (folder / "config.yaml").read_text(encoding="utf-8"),
-        "opening": account.opening(config, case or "heart", main_view(config)),
+        "opening": account.opening(config, case or "heart", main_view(config), leader),
         "paper": _reference(),
         "bibtex": _bibtex(version),
     }
