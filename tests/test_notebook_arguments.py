@@ -1,6 +1,7 @@
 """Functions for notebooks say what they take if they are given something else."""
 
 import pytest
+import xarray as xr
 
 import echotruth as et
 
@@ -20,6 +21,11 @@ def test_path_in_place_of_a_heart_or_a_clip_is_refused(call, sentence):
     with pytest.raises(TypeError) as error:
         call()
     assert str(error.value).startswith(sentence)
+
+
+def test_clip_that_was_loaded_without_its_mask_is_refused_by_trackers():
+    with pytest.raises(ValueError, match="clip: has no mask: load it with image and mask among its variables"):
+        et.track(xr.Dataset({"image": ("frame", [0, 1])}))
 
 
 @pytest.mark.parametrize("read", [et.load_heart, et.load_clip, et.load_points])

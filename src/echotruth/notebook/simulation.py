@@ -204,6 +204,8 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     0.0
     """
     check_clip(clip)
+    if missing := [name for name in ("image", "mask", "grid_mask") if name not in clip]:
+        raise ValueError(f"clip: has no {missing[0]}: load it with image and mask among its variables.")
     case = case_of(clip)
     if clip.sizes["frame"] != case.config.loop.frames:
         number = f"{clip.sizes['frame']} of {case.config.loop.frames} frames"
