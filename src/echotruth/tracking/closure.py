@@ -41,7 +41,7 @@ def closing_correlation(frames: np.ndarray, mask: np.ndarray) -> tuple[float, fl
     if min(size) < MIN_IMAGE_SIDE or not mask.any():
         return np.nan, np.nan
     amplitudes = [_reduced(decompress(np.nan_to_num(frame), DYNAMIC_RANGE), size) for frame in grey_levels(frames)]
-    images = [amplitude / (np.max(amplitudes) or 1) for amplitude in amplitudes]
+    images = list(np.array(amplitudes) / (np.max(amplitudes) or 1))
     inside = _reduced(mask.astype(np.float32), size) >= 0.5
     consecutive = [_correlation(first, second, inside) for first, second in pairwise(images)]
     return _correlation(images[0], images[-1], inside), float(np.min(consecutive))
