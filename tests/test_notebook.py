@@ -171,6 +171,19 @@ def test_tracker_that_sees_no_motion_misses_all_of_it(clip, heart):
     assert et.evaluate(et.track(clip, at_rest), heart)["nrmse_percent"] == pytest.approx(100, rel=1e-6)
 
 
+def test_tracker_of_a_low_frame_rate_is_given_every_second_frame_and_found_to_move_evenly_in_between(clip):
+    given = []
+
+    def drifting(frames, points, mask, spacing, frame_time, seed):
+        given.append((len(frames), frame_time[1]))
+        return np.arange(len(frames))[:, None, None] * np.ones((len(points), 2))
+
+    slow = clip.assign_attrs(config=et.configure(TUBE, **{"tracking.frame_step": 2}).model_dump_json())
+    moved = et.track(slow, drifting)["displacement"].mean(["axial", "lateral", "plane"]).values
+    assert given == [(2, float(clip["time"][2]))]
+    assert moved / moved[2] == pytest.approx([0, 0.5, 1], abs=1 / 256)  # px, to which it is stored
+
+
 def test_true_displacement_in_place_of_a_tracked_one_has_no_error(clip, heart):
     tracked = et.track(clip, "dis")
     truth = np.broadcast_to([60e-6, 40e-6], tracked["displacement"].shape[1:])

@@ -38,3 +38,39 @@ def test_image_and_heart_coordinates_are_inverse():
     long_axis = imaging_plane(View(plane="long_axis", rotation_deg=35.0), Rf(), ENDO)
     positions = np.random.default_rng(0).normal(size=(10, 3)) * 1e-3
     assert np.allclose(long_axis.to_heart(long_axis.to_image(positions)), positions, atol=1e-17)
+
+
+@pytest.mark.parametrize("tilt", [-20.0, 15.0])
+@pytest.mark.parametrize("view", [View(position=0.3), View(plane="long_axis", rotation_deg=60.0)])
+def test_tilted_plane_turns_about_its_lateral_axis_with_its_upper_edge_along_the_elevation_axis(view, tilt):
+    straight = imaging_plane(view, Rf(), ENDO).axes
+    axes = imaging_plane(view.model_copy(update={"tilt_deg": tilt}), Rf(), ENDO).axes
+    assert np.allclose(axes @ axes.T, np.eye(3)) and np.allclose(np.cross(axes[0], axes[1]), axes[2])
+    assert np.allclose(axes[0], straight[0])
+    assert np.degrees(np.arcsin(-axes[1] @ straight[2])) == pytest.approx(tilt)
+
+
+def test_oblique_short_axis_cuts_a_cylinder_in_the_ellipse_that_geometry_gives_about_the_same_point():
+    radius, tilt, angle = 2e-3, np.radians(25), np.linspace(0, 2 * np.pi, 50)
+    oblique = imaging_plane(View(position=0.4, tilt_deg=25.0), Rf(), ENDO)
+    ellipse = np.stack([radius * np.cos(angle), 6.5e-3 + radius / np.cos(tilt) * np.sin(angle), 0 * angle], axis=-1)
+    cut = oblique.to_heart(ellipse)
+    assert np.allclose(np.hypot(cut[:, 0], cut[:, 1]), radius)
+    assert cut[:, 2].mean() == pytest.approx(0.4 * -6e-3, rel=0.02)
+    anterior = cut[np.argmax(cut[:, 1])]
+    assert anterior[2] == pytest.approx(0.4 * -6e-3 + radius * np.tan(tilt), rel=1e-2)  # nearer to the base
+
+
+@pytest.mark.parametrize(("rotation", "side"), [(0.0, [0, 1.0, 0]), (90.0, [-1.0, 0, 0])])
+def test_foreshortened_long_axis_holds_the_middle_of_the_base_and_passes_the_apex_at_the_sine_of_its_tilt(
+    rotation, side
+):
+    length, tilt = 6e-3, np.radians(12)
+    plane = imaging_plane(View(plane="long_axis", rotation_deg=rotation, tilt_deg=12.0), Rf(), ENDO)
+    base, apex = plane.to_image(np.array([[0, 0, 0.0], [0, 0, -length]]))
+    assert np.allclose(base, [0, 6.5e-3 + length / 2, 0])
+    assert np.allclose(apex, [0, base[1] - length * np.cos(tilt), -length * np.sin(tilt)])
+    # The point of the plane in front of the apex lies on the stated side of it.
+    in_front = plane.to_heart(np.array([0, apex[1], 0]))
+    assert np.allclose(in_front - [0, 0, -length], length * np.sin(tilt) * plane.axes[2], atol=1e-12)
+    assert (in_front - [0, 0, -length]) @ np.array(side) > 0

@@ -75,6 +75,47 @@ def test_column_that_is_added_empty_or_at_the_present_value_renames_no_heart(hea
     assert [case.id for case in hearts(added)] == [case.id for case in hearts(TABLE)]
 
 
+POSES = """\
+case,views.mid.position,views.mid.tilt_deg,views.long_axis.rotation_deg,tracking.frame_step
+plain,,,,
+basal,0.2,,,
+oblique,,12,30,
+slow,,,,2
+"""
+
+
+def test_poses_of_views_and_the_frame_rate_of_trackers_differ_between_rows(hearts):
+    plain, basal, oblique, slow = hearts(POSES)
+    for case in (plain, basal, oblique, slow):
+        assert case.config.model_dump() == override(Config(), case.parameters).model_dump()
+    assert [case.config.views["mid"].position for case in (plain, basal)] == [0.5, 0.2]
+    assert (oblique.config.views["mid"].tilt_deg, oblique.config.views["long_axis"].rotation_deg) == (12, 30)
+    assert [case.config.tracking.frame_step for case in (plain, slow)] == [1, 2]
+    columns = table([plain, basal, oblique, slow])
+    assert list(columns["views.mid.tilt_deg"]) == [0, 0, 12, 0]
+    assert list(columns["tracking.frame_step"]) == [1, 1, 1, 2]
+
+
+def test_row_at_the_pose_of_the_configuration_has_the_id_of_the_heart_without_one(hearts):
+    (there,) = hearts("views.mid.position,tracking.frame_step\n0.5,1\n")
+    (moved,) = hearts("views.mid.position,tracking.frame_step\n0.4,1\n")
+    assert there.id == "heart" and moved.id.startswith("position0.4_")
+
+
+def test_views_themselves_and_the_trackers_are_the_same_in_all_rows(refusal):
+    assert "views.mid.plane cannot be swept" in refusal("views.mid.plane\nlong_axis\n")
+    assert "tracking.grid_px cannot be swept" in refusal("tracking.grid_px\n3\n")
+    assert "tracking.trackers.dis.preset cannot be swept" in refusal("tracking.trackers.dis.preset\nfast\n")
+    assert "did you mean views.mid.position?" in refusal("views.middle.position\n0.3\n")
+    assert "row 1: views.mid.position = 3" in refusal("views.mid.position\n3\n")
+
+
+def test_delays_of_segments_stand_in_a_cell_as_json_and_are_written_back(hearts):
+    (late,) = hearts('case,pathology.late_activation.delay_ms\na,"{""11"": 6, ""12"": 4.5}"\n')
+    assert late.config.pathology.late_activation.delay_ms == {11: 6, 12: 4.5}
+    assert hearts(as_table([late]))[0].config == late.config
+
+
 def test_mesh_and_loop_of_a_row_stay_together(hearts, tmp_path):
     for name in "ab":
         (tmp_path / f"{name}.csv").write_text((SHIPPED / "mouse.csv").read_text())

@@ -22,8 +22,18 @@ NOT_SWEPT = (
 )
 """Keys that cannot be swept (nor can `geometry.*_elements`), because they set the sizes of arrays over all cases."""
 
+_SWEPT_WITHIN = re.compile(r"views\.\w+\.(position|rotation_deg|tilt_deg)|tracking\.frame_step")
+"""Keys that can be swept within those that cannot."""
+
 RF_INDEPENDENT = ("probe.width_um", "probe.height_mm", "probe.elevation_focus_mm", "probe.attenuation_dB_per_cm_MHz")
 """Keys of the probe that can be swept even if RF is kept: they change neither its length nor the scan lines."""
+
+
+def can_be_swept(key: str) -> bool:
+    """Whether a dotted key may differ between the cases of a repository."""
+    if _SWEPT_WITHIN.fullmatch(key):
+        return True
+    return not (key.startswith(NOT_SWEPT) or key.endswith("_elements"))
 
 
 def check_keys(config: Config, source: str) -> None:
@@ -128,9 +138,10 @@ def _check_distinct(key: str, values: list[Any], source: str) -> None:
 
 def _check_swept_key(config: Config, key: str, place: str) -> None:
     value = _section_of(config, key, place)
-    if isinstance(value, Section | dict):
+    holds_sections = isinstance(value, dict) and any(isinstance(inner, Section) for inner in value.values())
+    if isinstance(value, Section) or holds_sections:
         raise ConfigError(f"{place}: {key} is a section: sweep one of its keys")
-    if key.startswith(NOT_SWEPT) or key.endswith("_elements"):
+    if not can_be_swept(key):
         raise ConfigError(f"{place}: {key} cannot be swept, all cases share it: set it once")
     if config.rf.keep and key.startswith(("probe.", "rf.")) and key not in RF_INDEPENDENT:
         raise ConfigError(f"{place}: {key} cannot be swept if RF is kept: leave rf.keep empty")
@@ -140,9 +151,12 @@ def _section_of(config: Config, key: str, place: str) -> Any:
     """Value of a dotted key without the sweep."""
     value: Any = config
     for part in key.split("."):
-        if not isinstance(value, Section) or part not in type(value).model_fields:
+        if isinstance(value, dict) and isinstance(value.get(part), Section):
+            value = value[part]
+        elif isinstance(value, Section) and part in type(value).model_fields:
+            value = getattr(value, part)
+        else:
             raise ConfigError(f"{place}: {key[:80]} is not a key: {_suggestion(config, key)}")
-        value = getattr(value, part)
     return value
 
 
@@ -158,6 +172,9 @@ def _all_keys(section: Section, prefix: str) -> Iterator[str]:
         value = getattr(section, name)
         if isinstance(value, Section):
             yield from _all_keys(value, f"{prefix}{name}.")
+        elif f"{prefix}{name}" == "views":
+            for view, inner in value.items():
+                yield from _all_keys(inner, f"views.{view}.")
         else:
             yield f"{prefix}{name}"
 

@@ -10,7 +10,7 @@ from typing import Any
 from echotruth.cases import cells
 from echotruth.cases.case import Case, Combination, Label
 from echotruth.cases.ids import GIVEN, GIVEN_LENGTH, LONGEST, integer_if_whole
-from echotruth.config import Config, Section
+from echotruth.config import Config
 from echotruth.config.loading import ConfigError
 from echotruth.config.reading import Errors
 from echotruth.config.table import CASE, LABEL, NOTE, Table
@@ -101,9 +101,9 @@ def _cell(text: str, allowed: frozenset[type], place: str) -> Any:
 
 def _types(config: Config, dotted_key: str) -> frozenset[type]:
     *parents, key = dotted_key.split(".")
-    section: Section = config
+    section: Any = config
     for parent in parents:
-        section = getattr(section, parent)
+        section = section[parent] if isinstance(section, dict) else getattr(section, parent)
     return cells.types(section, key)
 
 

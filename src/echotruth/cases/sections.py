@@ -105,7 +105,8 @@ class Sweep:
         known = (name, repr(changes))
         if known not in self._sections:
             base = self._values[name]
-            self._sections[known] = _replaced(base, changes) if isinstance(base, Section) else changes[name]
+            is_section = isinstance(base, Section | dict)
+            self._sections[known] = _replaced(base, changes) if is_section else changes[name]
         return self._sections[known]
 
     def _differing_keys(self, name: str, changes: dict[str, Any]) -> frozenset[str]:
@@ -117,7 +118,7 @@ class Sweep:
         known = (name, repr(changes))
         if known not in self._differing:
             base, section = self._values[name], self._section(name, changes)
-            if isinstance(base, Section):
+            if isinstance(base, Section | dict):
                 self._differing[known] = frozenset(key for key in changes if _differs(base, section, changes, key))
             else:
                 self._differing[known] = frozenset(changes if exact(section) != exact(base) else ())
@@ -132,13 +133,15 @@ def _by_section(parameters: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return by_section
 
 
-def _replaced(base: Section, changes: dict[str, Any]) -> Section:
-    """Section with the values of some dotted keys, named from the top, replaced."""
+def _replaced(base: Any, changes: dict[str, Any]) -> Any:
+    """Section, or mapping of names to sections, with the values of some dotted keys, named from the top, replaced."""
     keys = {key.partition(".")[2]: value for key, value in changes.items()}
+    if isinstance(base, dict):
+        return base | {name: _replaced(base[name], own) for name, own in _by_section(keys).items()}
     return type(base).model_validate(replace_values(base.model_dump(), keys))
 
 
-def _differs(base: Section, section: Section, changes: dict[str, Any], key: str) -> bool:
+def _differs(base: Any, section: Any, changes: dict[str, Any], key: str) -> bool:
     others = {other: value for other, value in changes.items() if other != key}
     try:
         without, inner = _replaced(base, others) if others else base, key.partition(".")[2]
@@ -147,8 +150,8 @@ def _differs(base: Section, section: Section, changes: dict[str, Any], key: str)
         return True  # without the key there is no such section
 
 
-def _value(section: Section, dotted_key: str) -> Any:
-    value: Any = section
+def _value(section: Any, dotted_key: str) -> Any:
+    value = section
     for part in dotted_key.split("."):
-        value = getattr(value.resolved(), part)
+        value = value[part] if isinstance(value, dict) else getattr(value.resolved(), part)
     return value.model_dump(mode="json") if isinstance(value, Section) else value

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from echotruth.cases import labels
 from echotruth.cases.case import Case
-from echotruth.cases.checks import NOT_SWEPT
+from echotruth.cases.checks import can_be_swept
 from echotruth.config import Config, Section
 
 if TYPE_CHECKING:
@@ -21,7 +21,10 @@ def table(cases: list[Case]) -> pd.DataFrame:
     columns: dict[str, list[Any]] = {"case": [case.id for case in cases], "seed": [case.config.seed for case in cases]}
     columns |= labels.columns(cases)
     for name in Config.model_fields:
-        if isinstance(getattr(cases[0].config, name), Section) and name not in NOT_SWEPT:
+        if name == "views":
+            for view in cases[0].config.views:
+                columns |= _columns(f"views.{view}", [case.config.views[view] for case in cases])
+        elif isinstance(getattr(cases[0].config, name), Section) and name != "cases":
             columns |= _columns(name, [getattr(case.config, name) for case in cases])
     return pd.DataFrame(columns)
 
@@ -43,7 +46,7 @@ def _sweepable(section: Section, prefix: str = "") -> dict[str, Any]:
         dotted, value = f"{prefix}{key}", getattr(section, key)
         if isinstance(value, Section):
             values |= _sweepable(value, f"{dotted}.")
-        elif not (isinstance(value, dict) or dotted.startswith((*NOT_SWEPT, "seed")) or dotted.endswith("_elements")):
+        elif can_be_swept(dotted) and not isinstance(value, dict) and dotted != "seed":
             # A list is one entry of the table.
             values[dotted] = " ".join(map(str, value)) if isinstance(value, list) else value
     return values

@@ -18,6 +18,11 @@ class View(Section):
     """Short axis only: position of the plane at end-diastole, 0 at the base, 1 at the endocardial apex."""
     rotation_deg: Annotated[FiniteFloat, Field(ge=-180, le=180)] = 0.0
     """Long axis only: rotation of the plane about the long axis; 0 cuts septum and lateral wall."""
+    tilt_deg: Annotated[FiniteFloat, Field(ge=-45, le=45)] = 0.0
+    """Tilt of the plane about its lateral axis; a positive one moves the upper edge of the image, where the probe is,
+    to the side of the elevation axis. Short axis: about the point of the long axis at `position`; the cut is oblique,
+    with the anterior wall nearer to the base. Long axis: about the middle of the base; the plane misses the apex, which
+    looks foreshortened, and its apical end lies in front of it (`rotation_deg` 0: on the anterior side)."""
 
 
 ALL_VIEWS = "all"

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 class Clip:
     """One view of one heart at one image size.
 
+    Trackers are given every `frame_step`-th frame, as of a scanner with a lower frame rate.
+
     Attributes
     ----------
     frames : ndarray of shape (frame, axial, lateral), uint8
@@ -37,6 +39,8 @@ class Clip:
         Time since end-diastole, s.
     seed : int
         Seed of the tracker's random numbers.
+    frame_step : int
+        Step between the frames that a tracker is given.
     """
 
     frames: np.ndarray
@@ -46,6 +50,7 @@ class Clip:
     spacing: float
     frame_time: np.ndarray
     seed: int
+    frame_step: int = 1
 
     @property
     def size(self) -> int:
@@ -55,22 +60,23 @@ class Clip:
     @property
     def tracker_arguments(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray, int]:
         """Arguments of a tracker, in the order of :func:`echotruth.tracking.tracker.track`."""
-        return self.frames, self.points, self.mask, self.spacing, self.frame_time, self.seed
+        given = slice(None, None, self.frame_step)
+        return self.frames[given], self.points, self.mask, self.spacing, self.frame_time[given], self.seed
 
     @property
     def no_estimate(self) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement (frame, n, 2) and quality (frame, n) of a tracker that failed, all NaN."""
-        shape = len(self.frames), len(self.points)
+        """Displacement (given frame, n, 2) and quality (given frame, n) of a tracker that failed, all NaN."""
+        shape = len(self.frames[:: self.frame_step]), len(self.points)
         return np.full((*shape, 2), np.nan), np.full(shape, np.nan)
 
     def on_grid(self, displacement: np.ndarray, quality: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement and quality on the whole grid.
+        """Displacement and quality on the whole grid, in all frames.
 
         Parameters
         ----------
-        displacement : ndarray of shape (frame, n, 2)
+        displacement : ndarray of shape (given frame, n, 2)
             Lateral, axial, px.
-        quality : ndarray of shape (frame, n)
+        quality : ndarray of shape (given frame, n)
 
         Returns
         -------
@@ -79,9 +85,36 @@ class Clip:
         quality : ndarray of shape (frame, grid rows, grid columns)
         """
         gridded = np.full((len(self.frames), *self.inside.shape, 3), np.nan)
-        gridded[:, self.inside, :2] = displacement * self.spacing
-        gridded[:, self.inside, 2] = quality
+        gridded[:, self.inside, :2] = between_frames(displacement, self.frame_step, len(self.frames)) * self.spacing
+        gridded[:, self.inside, 2] = between_frames(quality, self.frame_step, len(self.frames))
         return gridded[..., :2], gridded[..., 2]
+
+
+def between_frames(values: np.ndarray, step: int, frames: int) -> np.ndarray:
+    """Values in all frames of a cycle from those in every n-th, linear in time in between.
+
+    Frames are equally far apart. The cycle closes: after the last given frame comes the first one, a period after it.
+
+    Parameters
+    ----------
+    values : ndarray of shape (given frame, ...)
+        In the frames 0, `step`, 2 `step` and so on; NaN where unknown.
+    step, frames : int
+        Step between the given frames, and number of all frames.
+
+    Returns
+    -------
+    ndarray of shape (frame, ...)
+        NaN also between a given frame in which a value is known and one in which it is not.
+    """
+    if step == 1:
+        return values
+    frame = np.arange(frames)
+    before = frame // step
+    interval = np.minimum(step, frames - before * step)  # the last one is shorter where the step does not divide them
+    weight = ((frame - before * step) / interval).reshape(-1, *(1,) * (values.ndim - 1))
+    given, following = values[before], values[(before + 1) % len(values)]
+    return np.where(weight > 0, (1 - weight) * given + weight * following, given)
 
 
 def grid_points(config: Config, size: int) -> np.ndarray:
@@ -128,6 +161,7 @@ def clips(job: Job) -> dict[int, Clip]:
             spacing=config.bmode.si().field_of_view / size,
             frame_time=time,
             seed=seed,
+            frame_step=config.tracking.frame_step,
         )
         for size, mask in masks.items()
     }

@@ -49,12 +49,33 @@ def imaging_plane(view: View, rf: Rf, endo_ed: Floats) -> Plane:
     -------
     Plane
     """
-    apex = endo_ed[:, 2].min()
+    apex, si = endo_ed[:, 2].min(), view.si()
     if view.plane == "short_axis":
-        axes = SHORT_AXIS
+        axes = tilted(SHORT_AXIS, si.tilt)
         centre = np.array([0, 0, view.position * apex])
     else:
-        angle = view.si().rotation
-        axes = np.array([[-np.cos(angle), -np.sin(angle), 0], [0, 0, 1.0], [-np.sin(angle), np.cos(angle), 0]])
-        centre = np.array([0, 0, apex / 2])
+        cos, sin = np.cos(si.rotation), np.sin(si.rotation)
+        axes = tilted(np.array([[-cos, -sin, 0], [0, 0, 1.0], [-sin, cos, 0]]), si.tilt)
+        # Half the length of the cavity from the middle of the base, which is the origin of the heart frame.
+        centre = apex / 2 * axes[1] + 0.0  # no -0.0
     return Plane(centre - rf.si().focus * axes[1], axes)
+
+
+def tilted(axes: Floats, angle: float) -> Floats:
+    """Axes of a plane that is tilted about its lateral axis, so that its upper edge moves along the elevation axis.
+
+    Parameters
+    ----------
+    axes : ndarray of shape (3, 3)
+        Rows: unit vectors lateral, axial and elevation.
+    angle : float, rad
+
+    Returns
+    -------
+    ndarray of shape (3, 3)
+    """
+    if angle == 0:
+        return axes
+    lateral, axial, elevation = axes
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack([lateral, cos * axial - sin * elevation, cos * elevation + sin * axial])

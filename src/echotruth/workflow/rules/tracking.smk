@@ -4,7 +4,7 @@ The job of the images has mostly done this already. Then its records are only mo
 """
 
 TRACKING_CACHE = quote(str(Path(CACHE["tracking"]).absolute()))
-TRACKING_VERSION = f"{code('tracking', 'evaluation')}-{settings_version(CONFIG.tracking)}"
+TRACKING_CODE = code("tracking", "evaluation")
 
 TRACKING = handed("tracking", "evaluation")
 
@@ -17,7 +17,7 @@ rule tracking:
         evaluation=record("evaluation", view="{view}"),
     params:
         code=code("tracking", "evaluation"),
-        settings=settings_version(CONFIG.tracking),
+        settings=lambda wildcards: tracking_settings(wildcards.case),
     group:
         "view"
     log:
@@ -42,5 +42,20 @@ rule tracking:
         """
 
 
-# Folder in which the job of the images leaves the records, if they are of this code and these settings.
-TRACKING_AHEAD = OfCase(lambda path: str(FOLDER / "scratch" / path / f"ahead-{TRACKING_VERSION}"))
+@cache
+def settings_of_step(step):
+    """Hash of the trackers' settings for a step between frames, which may differ between cases."""
+    return settings_version(CONFIG.tracking.model_copy(update={"frame_step": step}))
+
+
+def tracking_settings(case):
+    return settings_of_step(CASES[case].config.tracking.frame_step)
+
+
+def tracking_ahead(path):
+    """Folder in which the job of the images leaves the records, if they are of this code and these settings."""
+    case = path.partition("/")[0]
+    return str(FOLDER / "scratch" / path / f"ahead-{TRACKING_CODE}-{tracking_settings(case)}")
+
+
+TRACKING_AHEAD = OfCase(tracking_ahead)
