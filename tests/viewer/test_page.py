@@ -15,7 +15,7 @@ from known_repository import SIZES
 from echotruth.cases import expand
 from echotruth.evaluation.run import prepare
 from echotruth.viewer.catalogue import Catalogue
-from echotruth.viewer.choice import TRUTH, Choice, asked, first
+from echotruth.viewer.choice import TRUTH, Choice, asked, first, refused
 from echotruth.viewer.page import Page
 from echotruth.viewer.server import ShowError, opened, serve
 from echotruth.workflow.scripts.cases import lay_out
@@ -51,6 +51,15 @@ def test_address_leads_back_to_the_choice(catalogue):
 def test_address_of_what_is_not_there_is_left_out(catalogue):
     query = {"case": ["none"], "view": ["../.."], "size": ["7"], "colour": ["<b>"], "frame": ["-1"], "else": ["x"]}
     assert asked(catalogue, query) == first(catalogue)
+
+
+def test_what_an_address_asks_for_and_is_not_there_is_said_until_something_else_is_chosen(catalogue):
+    query = {"case": ["none"], "view": ["long"], "else": ["x"]}
+    page = Page(catalogue, asked(catalogue, query), Document(), refused(catalogue, query))
+    page.show()
+    assert page.message.text == "There is no case none, which the address asks for."
+    choose(page, size=str(SIZES[1]))
+    assert not page.message.visible
 
 
 def test_page_shows_the_images_of_what_is_chosen(page):

@@ -55,6 +55,12 @@ def test_finished_repository_is_finished(folder):
     assert status.verdicts == {"complete": 2, "implausible": 0, "failed": 0} and not status.reasons
 
 
+def test_repository_whose_last_record_is_damaged_is_not_finished(folder):
+    path = folder / "ledger/repository.json"
+    path.write_text(path.read_text().replace(": 2", ": 3", 1))
+    assert status_of(folder).state != "finished"
+
+
 def test_what_was_never_begun_waits(tmp_path):
     status = status_before(CONFIG, [FIRST, SECOND], tmp_path / "small")
     assert status.state == "never begun" and counts(status, "tracking") == (4, 0, 0, 0, 4)

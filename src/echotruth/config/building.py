@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from echotruth.config import shipped
 from echotruth.config.loading import read_yaml, validate
 from echotruth.config.sections import Config
 
@@ -22,7 +23,8 @@ def configure(source: Source = None, **keys: Any) -> Config:
     Parameters
     ----------
     source : Config, dict, str or Path, optional
-        A configuration, its keys and values, or a YAML file. Default: the default heart.
+        A configuration, its keys and values, a YAML file, or the name of a shipped one, as "human". Default: the
+        default heart.
     **keys
         Sections, as `geometry={"preset": "human"}`, or single keys, as `**{"loop.frames": 20}`; they are merged into
         the source (config/README.md lists them). What follows a preset follows the new one.
@@ -45,7 +47,7 @@ def configure(source: Source = None, **keys: Any) -> Config:
     if isinstance(source, Config):
         values, name = _given(source), source.name
     elif isinstance(source, str | Path):
-        values, name = read_yaml(Path(source)), str(source)
+        values, name = read_yaml(Path(shipped.found(str(source)))), str(source)
     else:
         values, name = source or {}, "configuration"
     for key, value in keys.items():

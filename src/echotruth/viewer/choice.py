@@ -75,9 +75,31 @@ def asked(catalogue: Catalogue, query: Mapping[str, Sequence[str]]) -> Choice:
     query : dict
         Name -> values, as `urllib.parse.parse_qs` gives them.
     """
-    given = {name: values[-1] for name, values in query.items() if values}
+    given = _given(query)
+    chosen = {name: value for name, value in given.items() if _is_known(catalogue, name, value)}
+    numbers = {name: int(value) for name, value in chosen.items() if name in ("size", "frame")}
+    texts = {name: value for name, value in chosen.items() if name not in numbers}
+    return replace(first(catalogue), **numbers, **texts)  # type: ignore[arg-type]  # each has its type
+
+
+def refused(catalogue: Catalogue, query: Mapping[str, Sequence[str]]) -> list[str]:
+    """What an address asks for and the repository does not have, a sentence each; other names are ignored."""
+    given, names = _given(query), {field.name for field in fields(Choice)}
+    return [
+        f"There is no {name} {value}, which the address asks for."
+        for name, value in given.items()
+        if name in names and not _is_known(catalogue, name, value)
+    ]
+
+
+def _given(query: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    return {name: values[-1] for name, values in query.items() if values}
+
+
+def _is_known(catalogue: Catalogue, name: str, value: str) -> bool:
+    if name == "case":
+        return value in catalogue.rows
     known = {
-        "case": [case for case in (given.get("case"),) if case in catalogue.rows],
         "view": catalogue.views,
         "size": list(map(str, catalogue.sizes)),
         "tracker": catalogue.trackers,
@@ -89,7 +111,4 @@ def asked(catalogue: Catalogue, query: Mapping[str, Sequence[str]]) -> Choice:
         "part": [*CONTOURS, WALL, *(f"layer {n}" for n in range(1, 99)), *(f"segment {n}" for n in range(1, 18))],
         "frame": list(map(str, range(catalogue.config.loop.frames))),
     }
-    chosen = {name: value for name, value in given.items() if value in known.get(name, ())}
-    numbers = {name: int(value) for name, value in chosen.items() if name in ("size", "frame")}
-    texts = {name: value for name, value in chosen.items() if name not in numbers}
-    return replace(first(catalogue), **numbers, **texts)  # type: ignore[arg-type]  # each has its type
+    return value in known.get(name, ())

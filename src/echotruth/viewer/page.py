@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -60,10 +60,12 @@ class Page:
     choice : Choice
         What is shown at first.
     document : Document
+    refused : sequence of str
+        Sentences on what was asked for and is not there; they are shown until something else is chosen.
     """
 
-    def __init__(self, catalogue: Catalogue, choice: Choice, document: Document) -> None:
-        self.catalogue, self.choice, self.document = catalogue, choice, document
+    def __init__(self, catalogue: Catalogue, choice: Choice, document: Document, refused: Sequence[str] = ()) -> None:
+        self.catalogue, self.choice, self.document, self.refused = catalogue, choice, document, refused
         self.points = lru_cache(KEPT_CLIPS)(lambda case, view, size: Points(Clip(catalogue, case, view, size)))
         self._shown: dict[str, Any] = {}
         self._problems: dict[str, None] = {}
@@ -217,7 +219,8 @@ class Page:
         found = self._once("found", (*place, choice.tracker, choice.other), lambda: self._curves(clip))
         self._show_graphs(clip, found)
         self.facts.text = facts.text(clip, [choice.tracker, choice.other])
-        self._say(" ".join([*self._lacking(clip), *self._problems]))
+        self._say(" ".join([*self.refused, *self._lacking(clip), *self._problems]))
+        self.refused = ()
         self.address.data = {"query": [self.choice.address]}
 
     def _blank(self) -> None:

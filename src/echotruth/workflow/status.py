@@ -205,7 +205,7 @@ def _parts(folder: Path, cases: list[str], views: list[str], progress: Progress,
         wanted = set(cases) if stage in GATES else clips
         done = len(wanted & existing_records(folder / "ledger" / stage))
         parts[part] = PartStatus(len(wanted), done, running[rule], failed[rule])
-    made = [(folder / "ledger/repository.json").is_file(), (folder / "report.html").is_file()]
+    made = [bool(_read(folder / "ledger/repository.json")), (folder / "report.html").is_file()]
     at_work, ended = (sum(jobs[rule] for rule in FINAL_RULES) for jobs in (running, failed))
     parts["report"] = PartStatus(
         len(made), sum(made), min(at_work, len(made) - sum(made)), min(ended, len(made) - sum(made))
