@@ -159,3 +159,33 @@ def test_curves_without_their_attributes_have_no_peaks(repository):
         et.strain_peaks(curves)
     with pytest.raises(ValueError, match=r"^view = 'top': use one of"):
         et.strain_summary(repository, views=["top"])
+
+
+def test_clips_have_the_strain_of_the_middle_line_and_its_rate(repository):
+    clips = et.clip_metrics(repository, sizes=[128], trackers=["one"]).clips.set_index("view")
+    mid, long = clips.loc["mid"], clips.loc["long"]
+    assert list(mid[["tracked_gcs_percent", "true_gcs_percent"]]) == pytest.approx([-18, -20], abs=1e-4)
+    assert list(long[["tracked_gls_percent", "true_gls_percent"]]) == pytest.approx([-18, -20], abs=1e-4)
+    assert np.isnan(mid["true_gls_percent"]) and np.isnan(long["tracked_gcs_percent"])
+    rate = -0.2 * (4 - 1.1) / (2 * 0.12 / FRAMES)
+    found = mid[["true_strain_rate_per_s", "tracked_strain_rate_per_s", "strain_rate_error_per_s"]]
+    assert list(found) == pytest.approx([rate, 0.9 * rate, 0.1 * -rate], rel=1e-4)
+
+
+def test_segments_that_a_view_shows_have_their_peaks(repository):
+    found = et.clip_metrics(repository, views=["mid", "long"], sizes=[64], trackers=["two"])
+    table = found.segments.set_index(["view", "aha", "component"])
+    assert {aha for view, aha, _ in table.index if view == "mid"} == set(range(7, 13))
+    assert set(table.loc["long"].index.get_level_values("component")) == {"radial", "longitudinal"}
+    row, radial = table.loc["mid", 9, "circumferential"], table.loc["mid", 9, "radial"]
+    # The curve is at its peak after end-systole; the truth is that of the plane, and at 64 px half of it is found.
+    values = row[["true_es_percent", "true_peak_percent", "tracked_peak_percent"]]
+    assert list(values) == pytest.approx([-28, -30.8, -7.7], abs=1e-4)
+    assert row["true_time_to_peak_ms"] == pytest.approx(2 * 120 / FRAMES)
+    assert radial["true_peak_percent"] == pytest.approx(61.6, abs=1e-4) and radial["true_systolic_rate_per_s"] > 0
+    clip = found.clips.set_index("view").loc["mid"]
+    of_mid = table.loc["mid"].query("component == 'circumferential'")
+    assert of_mid["points"].sum() == clip["points"] and (of_mid["infarct_share"] == 0).all()
+    error = 0.75 * -of_mid["true_peak_percent"].mean()
+    assert list(clip[["segment_peak_error_pp", "segment_peak_bias_pp"]]) == pytest.approx([error, error], rel=1e-5)
+    assert clip["segment_time_to_peak_error_ms"] == 0

@@ -15,6 +15,7 @@ from echotruth.evaluation.run import prepare
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import ledger
 from echotruth.repository.ledger import record_path
+from echotruth.workflow.job import Job
 
 TRACKER = """
 import numpy as np
@@ -151,3 +152,73 @@ def test_folder_that_cannot_hold_the_displacement_is_refused_in_one_sentence(rep
     run = prepare(repository, "mine", {"method": "external", "track": "mine:steps"}, keep=True)
     with pytest.raises(EvaluationError, match="external cannot hold the scores"):
         run.check_writable()
+
+
+def px256(clips, tracker, view="mid"):
+    """Metrics of one tracker by size."""
+    return clips[(clips["tracker"] == tracker) & (clips["view"] == view)].set_index("size_px")
+
+
+def test_metrics_of_tracks_are_those_of_displacements_that_are_known(repository):
+    evaluate(repository, views=["mid"])
+    found = et.clip_metrics(repository)
+    assert len(found.clips) == 2 * 2 * 2 + 2 and set(found.clips["heart"]) == {"heart"}
+    # The truth of this repository does not move; tracker one is off by 0.1 mm both ways, 3.02 px of 256 in 12 mm.
+    one, two, mine = (px256(found.clips, name) for name in ("one", "two", "mine"))
+    assert list(one["delta_2_percent"]) == [0, 0] and list(one["delta_avg_percent"]) == [60, 60]
+    assert list(two["delta_avg_percent"]) == [40, 40] and list(one["flow_epe_px256"]) == [0, 0]
+    # Stored displacements are rounded to 1/256 pixel of 2 px.
+    assert one["median_trajectory_error_px256"].tolist() == pytest.approx(
+        [2**0.5 * 0.1e-3 * 256 / 12e-3] * 2, abs=0.006
+    )
+    # Mine moves by (1, -2) px a frame, 2 px of 256 wide at 128 and 4 at 64.
+    step = 5**0.5 * np.array([2, 4])
+    np.testing.assert_allclose(mine["flow_epe_px256"], step, rtol=1e-3)
+    np.testing.assert_allclose(mine["median_trajectory_error_px256"], 1.5 * step, rtol=1e-3)
+    np.testing.assert_allclose(mine["flow_angular_error_deg"], np.degrees(np.arctan(step)), rtol=1e-3)
+    assert list(mine["delta_16_percent"]) == [100, 50] and list(mine["survival_8px_percent"]) == [50, 0]
+    assert list(mine["visible_percent"]) == [100, 100] and list(mine["occlusion_accuracy_percent"]) == [100, 100]
+    assert list(one["occlusion_accuracy_percent"]) == [0, 0]  # its quality is 0
+    sure = found.reliability[found.reliability["count"] > 0].set_index(["tracker", "size_px", "view"])
+    row = sure.loc[("mine", 128, "mid"), ["quality_low", "count", "within_count"]]
+    assert list(row) == [0.5, 2 * mine.loc[128, "points"], 0]
+
+
+def test_tissue_that_leaves_the_slice_is_hidden_and_a_tracker_that_is_sure_of_it_is_wrong(repository):
+    evaluate(repository, views=["mid"])
+    job = Job(repository, "evaluation", "heart", "mid", code="1")
+    true = job.read("evaluation")
+    # The slice is some 0.36 mm thick.
+    true["true_displacement"][..., 2] = np.array([0, 0.1e-3, 1e-3])[:, None, None]
+    job.store.write("evaluation", true, *job.index)
+    clips = px256(et.clip_metrics(repository, views=["mid"]).clips, "mine")
+    assert list(clips["visible_percent"]) == list(clips["occlusion_accuracy_percent"]) == [50, 50]
+    # In the frame in which it is seen it is off by 4.5 px, afterwards by 8.9; the latter claim is false anyhow.
+    assert clips.loc[128, "delta_avg_percent"] == 40 and clips.loc[128, "delta_all_avg_percent"] == 30
+    assert clips.loc[128, "average_jaccard_percent"] == pytest.approx(100 * 2 / 5 * 1 / 2)
+    assert clips.loc[128, "through_plane_rms_um"] == pytest.approx(1000, abs=0.5)  # end-systole is the last frame
+
+
+def test_metrics_of_a_tracker_that_was_not_kept_are_those_of_its_scores(repository):
+    scores = evaluate(repository, keep=False).set_index(["view", "size_px"])
+    clips = et.clip_metrics(repository, trackers=["mine"]).clips.set_index(["view", "size_px"])
+    np.testing.assert_allclose(clips["nrmse_all_percent"], scores.loc[clips.index, "nrmse_all_percent"])
+    assert len(clips) == 4 and (clips["failure"] == "").all() and (clips["points"] > 0).all()
+    everything = et.clip_metrics(repository).clips
+    assert everything.loc[everything["tracker"] == "mine", "delta_avg_percent"].isna().all()
+
+
+def test_metrics_of_a_failed_clip_are_the_worst_or_unknown_and_its_reason_is_told(repository):
+    evaluate(repository, "large_only", views=["mid"])
+    small = px256(et.clip_metrics(repository).clips, "mine").loc[64]
+    assert "no room" in small["failure"] and small["nrmse_all_percent"] == 100
+    assert small["delta_avg_percent"] == 0 and small["survival_percent"] == 0 and small["quality_percent"] == 0
+    assert np.isnan(small["tracked_gcs_percent"]) and np.isnan(small["segment_peak_error_pp"])
+
+
+def test_clips_that_are_not_evaluated_yet_have_no_metrics(repository):
+    record_path(repository, "evaluation", "heart", "long").unlink()
+    assert set(et.clip_metrics(repository).clips["view"]) == {"mid"}
+    assert et.clip_metrics(repository, views=["long"]).clips.empty
+    with pytest.raises(ValueError, match=r"^tracker = 'other': use one of one, two\.$"):
+        et.clip_metrics(repository, trackers=["other"])

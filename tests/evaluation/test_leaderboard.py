@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking, View
-from echotruth.evaluation.leaderboard import best, interval, ranks, rows, standings
+from echotruth.evaluation.leaderboard import best, rows, standings
 from echotruth.repository import layout
 from echotruth.repository.schema import PACKS
 
@@ -29,22 +29,7 @@ def overall(table):
     return table[table["view"] == "all"].set_index("tracker")
 
 
-def test_interval_of_two_hearts_is_the_whole_range():
-    # Each heart is drawn twice in a quarter of the draws: more than 2.5 %.
-    low, high = interval(np.array([[1.0], [3.0]]), np.random.default_rng(0).integers(2, size=(2000, 2)))
-    assert low == 1 and high == 3
-
-
-def test_interval_of_many_hearts_is_that_of_normal_theory():
-    random = np.random.default_rng(1)
-    values = random.normal(5, 2, (400, 1))
-    low, high = interval(values, random.integers(400, size=(4000, 400)))
-    expected = values.mean() + 1.96 * values.std() / 20 * np.array([-1, 1])
-    np.testing.assert_allclose([low[0], high[0]], expected, atol=0.02)
-
-
 def test_equal_trackers_share_a_rank():
-    np.testing.assert_array_equal(ranks(np.array([3.0, 1.0, 1.0, 2.0, np.nan])), [4, 1, 1, 3, np.nan])
     table = overall(standings(scores({"a": [5, 7, 9], "b": [5, 7, 9], "c": [6, 8, 10]}), 1))
     assert list(table["rank"]) == [1, 1, 3]
     assert (table.loc["a"].drop("hearts") == table.loc["b"].drop("hearts"))[["rank_low", "rank_high"]].all()

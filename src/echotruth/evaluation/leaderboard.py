@@ -10,6 +10,7 @@ Ann Stat 1979; 7:1), in which all trackers share the resampled hearts. A single 
 from __future__ import annotations
 
 import logging
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ import xarray as xr
 from echotruth.config import Config
 from echotruth.config.imaging import ALL_VIEWS
 from echotruth.evaluation.digest import digest
+from echotruth.evaluation.resampling import draws, interval, means_of_hearts, percentiles, ranks
 from echotruth.evaluation.scoring import metrics
 from echotruth.repository import ledger
 from echotruth.repository.ledger import record_path
@@ -32,9 +34,6 @@ KEYS = ("case", "view", "size_px", "tracker")
 
 RANKED_BY = "nrmse_all_percent"
 """Metric by which trackers are ranked."""
-
-RESAMPLES = 2000
-"""Number of bootstrap samples."""
 
 
 def rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path) -> pd.DataFrame:
@@ -95,7 +94,7 @@ def standings(rows: pd.DataFrame, seed: int) -> pd.DataFrame:
         there is no mean.
     """
     cases, views = (list(dict.fromkeys(rows[name])) for name in ("case", "view"))
-    resamples = np.random.default_rng(seed).integers(len(cases), size=(RESAMPLES, len(cases)))
+    resamples = draws(len(cases), seed)
     tables = []
     for size in dict.fromkeys(rows["size_px"]):
         of_size = rows[rows["size_px"] == size]
@@ -116,44 +115,12 @@ def best(standings: pd.DataFrame) -> list[str]:
     return list(table.sort_values("rank", kind="stable", na_position="last")["tracker"])
 
 
-def interval(values: np.ndarray, resamples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bootstrap interval of the mean over hearts.
-
-    Parameters
-    ----------
-    values : ndarray of shape (heart, k)
-        Any unit.
-    resamples : ndarray of shape (sample, heart), integer
-        Indices of the hearts drawn with replacement.
-
-    Returns
-    -------
-    low, high : ndarray of shape (k,)
-        2.5th and 97.5th percentile; NaN with a single heart.
-    """
-    return _percentiles(values[resamples].mean(1), len(values))
-
-
-def ranks(values: np.ndarray) -> np.ndarray:
-    """Rank along the last axis, 1 for the smallest; equal values share the better rank, NaN has none."""
-    better = (values[..., None, :] < values[..., :, None]).sum(-1)
-    return np.where(np.isfinite(values), 1.0 + better, np.nan)
-
-
-def _percentiles(samples: np.ndarray, hearts: int) -> tuple[np.ndarray, np.ndarray]:
-    """2.5th and 97.5th percentile of bootstrap samples (sample, k)."""
-    if hearts < 2:
-        return np.full(samples.shape[1], np.nan), np.full(samples.shape[1], np.nan)
-    low, high = np.quantile(samples, (0.025, 0.975), axis=0, method="inverted_cdf")
-    return low, high
-
-
 def _table(clips: pd.DataFrame, cases: list[str], clips_per_heart: int, resamples: np.ndarray) -> pd.DataFrame:
     """Rows of one image size and view."""
     columns = [str(name) for name in clips if name not in (*KEYS, "failure")]
     # Hearts with a missing view are left out: their mean would be over other clips than that of other trackers.
     every_view = clips.groupby(["tracker", "case"], sort=False).size() == clips_per_heart
-    means = _means_of_hearts(clips, columns)[every_view]
+    means = means_of_hearts(clips, columns)[every_view]
     trackers = list(dict.fromkeys(clips["tracker"]))
     table = pd.DataFrame({"tracker": trackers}).set_index("tracker")
     table["hearts"] = every_view.groupby("tracker").sum()
@@ -162,7 +129,7 @@ def _table(clips: pd.DataFrame, cases: list[str], clips_per_heart: int, resample
         values = means[name].unstack("case").reindex(index=trackers, columns=cases).to_numpy().T
         if name == RANKED_BY:
             table["rank"] = ranks(values.mean(0))
-            table["rank_low"], table["rank_high"] = _percentiles(ranks(values[resamples].mean(1)), len(cases))
+            table["rank_low"], table["rank_high"] = percentiles(ranks(values[resamples].mean(1)), len(cases))
         table[f"{name}_low"], table[f"{name}_high"] = interval(values, resamples)
     by_tracker = means.groupby("tracker", sort=False)
     known_for_all = by_tracker.count().eq(by_tracker.size(), axis=0)
@@ -170,16 +137,10 @@ def _table(clips: pd.DataFrame, cases: list[str], clips_per_heart: int, resample
     return table.sort_values("rank", kind="stable", na_position="last").reset_index()
 
 
-def _means_of_hearts(clips: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
-    """Means over the views of each heart, one row per tracker and case; NaN where a clip lacks a value.
-
-    Views in which no tracker has the metric, such as the short axis for E_LL, are left out.
-    """
-    missing, failed = clips[columns].isna(), (clips["failure"] != "").to_numpy()[:, None]
-    measurable = (~missing).groupby([clips["case"], clips["view"]]).transform("any")
-    heart = [clips["tracker"], clips["case"]]
-    incomplete = (missing & (measurable | failed)).groupby(heart, sort=False).any()
-    return clips[columns].groupby(heart, sort=False).mean().mask(incomplete)
+def failures_of(folder: Path, case: str, view: str) -> dict[str, str]:
+    """Why trackers of a repository failed on a view of a heart, by "TRACKER/SIZE"; others are not in it."""
+    record = record_path(folder, "tracking", case, view)
+    return dict(ledger.read(record).get("failures", {})) if record.is_file() else {}
 
 
 def _builtin_rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path, size: int) -> list[dict]:
@@ -191,14 +152,47 @@ def _builtin_rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folde
     rows = []
     for i, case in enumerate(map(str, scored.case.values)):
         for j, (view, settings) in enumerate(config.views.items()):
-            record = record_path(folder, "tracking", case, view)
-            failures = ledger.read(record).get("failures", {}) if record.is_file() else {}
+            failures = failures_of(folder, case, view)
             for k, tracker in enumerate(config.tracking.trackers):
                 score = {name: value[i, j, k] for name, value in values.items()}
                 keys = dict(zip(KEYS, (case, view, size, tracker), strict=True))
                 failure = failures.get(f"{tracker}/{size}", "")
                 rows.append(keys | metrics(score, settings.plane) | {"failure": failure})
     return rows
+
+
+def scores_of_guests(folder: Path, own: Collection[str]) -> pd.DataFrame:
+    """Scores that `echotruth evaluate` wrote of trackers from outside, on images that have not changed since.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository.
+    own : collection of str
+        Its own trackers; scores of others of the same name do not count.
+
+    Returns
+    -------
+    DataFrame
+        Columns of `KEYS`, the metrics that the tables have, and `failure`.
+
+    Raises
+    ------
+    ValueError
+        If a table cannot be read or lacks a column.
+    """
+    files = sorted((folder / "external").glob("*.csv"))
+    tables = [_external_rows(file, _columns(file)) for file in files if file.stem not in own]
+    return pd.concat([pd.DataFrame(columns=[*KEYS, "failure"]), *(table for table in tables if len(table))])
+
+
+def _columns(file: Path) -> pd.Index:
+    """Columns of a table of scores, and those that it must have."""
+    try:
+        given = [str(name) for name in pd.read_csv(file, nrows=0) if name != "clip"]
+    except (ValueError, OSError):  # told where the table is read
+        given = []
+    return pd.Index([*KEYS, *(name for name in given if name not in (*KEYS, "failure")), "failure"])
 
 
 def _external_rows(file: Path, columns: pd.Index) -> pd.DataFrame:

@@ -104,14 +104,14 @@ def strain_summary(
 
     config = load(folder / "config.yaml")
     known = kept.trackers(folder, config)
-    chosen_cases = _chosen("case", cases, list(all_cases(config)))
-    chosen_views = _chosen("view", views, list(config.views))
+    chosen_cases = chosen("case", cases, list(all_cases(config)))
+    chosen_views = chosen("view", views, list(config.views))
     chosen_sizes = [image_size(config, size) for size in sizes or config.bmode.sizes[:1]]
-    chosen_trackers = _chosen("tracker", trackers, known)
+    chosen_trackers = chosen("tracker", trackers, known)
     by_id = {case.id: case for case in expand(config, str(folder / "config.yaml"))}
     rows: list[Row] = []
     for case in chosen_cases:
-        evaluated = [view for view in chosen_views if _is_evaluated(folder, case, view)]
+        evaluated = [view for view in chosen_views if is_evaluated(folder, case, view)]
         jobs = [Job(folder, "tracking", by_id[case], view, code="read") for view in evaluated]
         rows += _rows(jobs, chosen_sizes, chosen_trackers)
     return pd.DataFrame(rows, columns=list(COLUMNS))
@@ -202,13 +202,28 @@ def _means(rows: list[Row], config: Config, keys: Row) -> Iterator[Row]:
             yield of_plane[0] | keys | {"view": ALL_VIEWS} | means
 
 
-def _is_evaluated(folder: Path, case: str, view: str) -> bool:
+def is_evaluated(folder: Path, case: str, view: str) -> bool:
+    """Whether the trackers of a repository were evaluated on a view of a heart."""
     path = record_path(folder, "evaluation", case, view)
     return path.is_file() and ledger.read(path).get("status") == "complete"
 
 
-def _chosen(what: str, chosen: Sequence[str] | None, known: list[str]) -> list[str]:
-    for item in chosen or ():
-        if item not in known:
-            raise ValueError(f"{what} = {item!r}: use one of {', '.join(known[:20])}.")
-    return [item for item in known if not chosen or item in chosen]
+def chosen(what: str, names: Sequence[str] | None, known: list[str]) -> list[str]:
+    """Those of the known names that are asked for, in their order; all if none are.
+
+    Parameters
+    ----------
+    what : str
+        What the names are, for the message.
+    names : sequence of str or None
+    known : list of str
+
+    Raises
+    ------
+    ValueError
+        If one is not known.
+    """
+    for name in names or ():
+        if name not in known:
+            raise ValueError(f"{what} = {name!r}: use one of {', '.join(known[:20])}.")
+    return [name for name in known if not names or name in names]

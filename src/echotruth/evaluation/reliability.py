@@ -1,0 +1,130 @@
+"""Whether the quality that trackers give is the probability of being right: that of an error below a distance.
+
+A tracker is calibrated if of the points of which it is sure to 0.8, 80 % are right (DeGroot & Fienberg, The
+Statistician 1983; 32:12, doi 10.2307/2987588).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.arrays import Floats
+from echotruth.evaluation.statistics import ratio
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+BINS = 10
+"""Number of equal steps of quality from 0 to 1."""
+
+WITHIN = 1.0
+"""Error below which a point is right, 1/256 of the side of the image."""
+
+COUNTS = ("count", "quality_sum", "within_count")
+"""Columns that are added over clips."""
+
+
+def counts(quality: Floats, within: NDArray[np.bool_]) -> list[dict[str, float]]:
+    """Number of points by their quality, and how many of them are right.
+
+    Parameters
+    ----------
+    quality : ndarray of any shape
+        0 to 1; NaN, of a point without an estimate, counts as 0.
+    within : ndarray of the same shape, bool
+        Whether the point is right.
+
+    Returns
+    -------
+    list of dict
+        One for each step of quality, with quality_low, quality_high, count, quality_sum and within_count.
+    """
+    stated = np.clip(np.nan_to_num(quality, nan=0.0), 0, 1).ravel()
+    step = np.minimum((stated * BINS).astype(int), BINS - 1)
+    columns = [
+        np.bincount(step, weight, BINS) for weight in (np.ones(stated.size), stated, within.ravel().astype(float))
+    ]
+    return [
+        {"quality_low": k / BINS, "quality_high": (k + 1) / BINS} | dict(zip(COUNTS, map(float, values), strict=True))
+        for k, values in enumerate(zip(*columns, strict=True))
+    ]
+
+
+def summary(quality: Floats, within: NDArray[np.bool_]) -> dict[str, float]:
+    """Calibration of one clip.
+
+    Parameters
+    ----------
+    quality, within
+        As for :func:`counts`.
+
+    Returns
+    -------
+    dict of float
+        quality_percent, the mean quality; within_percent, the share of right points; calibration_error_percent, as
+        :func:`calibration_error`; brier_score, the mean of (quality - right)^2 (Brier, Mon Weather Rev 1950; 78:1).
+    """
+    stated = np.clip(np.nan_to_num(quality, nan=0.0), 0, 1)
+    nothing, columns = not stated.size, _added(counts(quality, within))
+    return {
+        "quality_percent": np.nan if nothing else float(100 * np.mean(stated)),
+        "within_percent": np.nan if nothing else float(100 * np.mean(within)),
+        "calibration_error_percent": _expected_error(*columns),
+        "brier_score": np.nan if nothing else float(np.mean((stated - within) ** 2)),
+    }
+
+
+def curve(table: pd.DataFrame) -> pd.DataFrame:
+    """Stated and observed share of right points by step of quality.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As :attr:`echotruth.evaluation.clip_metrics.ClipMetrics.reliability`.
+
+    Returns
+    -------
+    DataFrame
+        For every size_px, tracker and step of quality, over the clips of the table: count, stated_percent (the mean
+        quality) and observed_percent (the share of right points); NaN where no point has such a quality.
+    """
+    keys = [name for name in ("size_px", "tracker", "quality_low", "quality_high") if name in table]
+    added = table.groupby(keys, sort=False)[list(COUNTS)].sum().reset_index()
+    count = added["count"].to_numpy(float)
+    shares = {
+        "stated_percent": 100 * ratio(added["quality_sum"].to_numpy(float), count),
+        "observed_percent": 100 * ratio(added["within_count"].to_numpy(float), count),
+    }
+    return added[[*keys, "count"]].assign(**shares)
+
+
+def calibration_error(table: pd.DataFrame) -> float:
+    """Expected calibration error (Naeini et al., Proc AAAI 2015; 29, doi 10.1609/aaai.v29i1.9602).
+
+    Parameters
+    ----------
+    table : DataFrame
+        As :func:`curve` takes it, of one tracker and image size.
+
+    Returns
+    -------
+    float
+        Mean over the points of the difference between stated and observed share of their step, in %; NaN without
+        points.
+    """
+    added = table.groupby("quality_low")[list(COUNTS)].sum()
+    return _expected_error(*(added[name].to_numpy(float) for name in COUNTS))
+
+
+def _added(steps: list[dict[str, float]]) -> list[Floats]:
+    """Columns of `COUNTS`, each (step,)."""
+    return [np.array([step[name] for step in steps]) for name in COUNTS]
+
+
+def _expected_error(count: Floats, quality_sum: Floats, within_count: Floats) -> float:
+    """Mean difference of stated and observed share over the points, in %, from counts by step (step,)."""
+    apart = np.abs(quality_sum - within_count).sum()
+    return float(100 * ratio(np.asarray(apart, float), np.asarray(count.sum(), float)))

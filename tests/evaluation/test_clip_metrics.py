@@ -1,0 +1,37 @@
+"""Labels by which clips are sorted, and hearts told apart."""
+
+import pytest
+from finished_repository import configured, finish
+
+import echotruth as et
+from echotruth.config import Cases
+from echotruth.evaluation.resampling import by_heart
+
+TABLE = """case,seed,motion.affine.position,label.heart,label.split,label.group
+a,1,,first,develop,healthy
+b,2,,first,develop,
+c,3,,,develop,7
+d,4,,second,test,7
+e,5,0.4,,test,7
+f,6,0.4,,test,7
+"""
+
+
+@pytest.fixture(scope="module")
+def clips(tmp_path_factory):
+    config = configured(name="sorted", views=("mid",), cases=Cases(table=TABLE))
+    return et.clip_metrics(finish(tmp_path_factory.mktemp("sorted") / "sorted", config)).clips
+
+
+def test_clips_have_the_labels_of_their_case_and_nothing_where_it_has_none(clips):
+    table = clips.set_index("case")
+    assert list(table["split"]) == ["develop"] * 3 + ["test"] * 3
+    assert list(table["group"]) == ["healthy", "", "7", "7", "7", "7"]
+    assert set(table["acoustics"]) == set(table["variation"]) == {""} and set(table["diagnosis"]) == {"healthy"}
+
+
+def test_without_a_label_cases_of_one_motion_are_one_heart(clips):
+    # Cases c and d move as a does, which has a label; f moves as e, which has none.
+    hearts = clips.set_index("case")["heart"].to_dict()
+    assert hearts == {"a": "first", "b": "first", "c": "first", "d": "second", "e": "e", "f": "e"}
+    assert by_heart(clips, "nrmse_all_percent").index.tolist() == ["first", "second", "e"]
