@@ -1,0 +1,86 @@
+"""Table of the difficulty of the clips of a repository."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from math import isnan
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echotruth.cases import all_cases, expand
+from echotruth.config.loading import load
+from echotruth.evaluation.difficulty.floors import COLUMNS, PARAMETERS, Row, difficulty
+from echotruth.evaluation.digest import digest
+from echotruth.repository import durable, ledger
+from echotruth.repository.ledger import record_path
+from echotruth.workflow.job import Job
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_VERSION = 1
+"""Of what is kept of a clip; to be raised when its definition changes."""
+
+
+def difficulties(folder: Path, cases: Sequence[str] | None = None, views: Sequence[str] | None = None) -> pd.DataFrame:
+    """Determine how difficult the clips of a repository are to track.
+
+    What was found of a clip is kept in the folder `scratch` of the repository, until its images or truth change.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository.
+    cases, views : sequence of str, optional
+        Those to include. Default: all whose images and truth are complete.
+
+    Returns
+    -------
+    DataFrame
+        Rows of :func:`difficulty` of all these clips.
+
+    Raises
+    ------
+    ValueError
+        If the repository does not have one of them.
+    """
+    import pandas as pd
+
+    config = load(folder / "config.yaml")
+    known = {"case": list(all_cases(config)), "view": list(config.views)}
+    for what, chosen in (("case", cases), ("view", views)):
+        if unknown := [name for name in chosen or () if name not in known[what]]:
+            raise ValueError(f"{what} = {unknown[0]!r}: use one of {', '.join(known[what][:20])}.")
+    rows: list[Row] = []
+    for case in expand(config, str(folder / "config.yaml")):
+        for view in config.views:
+            wanted = case.id in (cases or [case.id]) and view in (views or [view])
+            if wanted and all(_is_complete(folder, stage, case.id, view) for stage in ("truth", "bmode")):
+                rows += _kept(Job(folder, "tracking", case, view, code="read"))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _is_complete(folder: Path, stage: str, case: str, view: str) -> bool:
+    path = record_path(folder, stage, case, view)
+    return path.is_file() and ledger.read(path).get("status") == "complete"
+
+
+def _kept(job: Job) -> list[Row]:
+    """Rows of a clip, as they were kept of the same images and truth, or determined now and kept."""
+    path = job.scratch / "difficulty.json"
+    step = job.case.config.tracking.frame_step
+    key = [_VERSION, PARAMETERS, step, digest(job.folder, job.case.id, str(job.view_name))]
+    with suppress(OSError, ValueError, KeyError, TypeError):  # there is none, or it is damaged
+        kept = json.loads(path.read_text())
+        if kept["key"] == key:
+            return [{name: np.nan if row[name] is None else row[name] for name in COLUMNS} for row in kept["rows"]]
+    rows = difficulty(job)
+    # JSON has no NaN.
+    content = [{n: None if isinstance(v, float) and isnan(v) else v for n, v in row.items()} for row in rows]
+    with suppress(OSError):  # a repository that cannot be written can be read
+        durable.write(path, json.dumps({"key": key, "rows": content}).encode())
+    return rows
