@@ -37,7 +37,8 @@ INWARDS, UNEVEN = 0.3e-3, 0.4
 FRAMES, CYCLE = 20, 0.12
 """Of the cycle, and its duration, s."""
 HARMONICS = (2, 3, 4)
-SMOOTHNESS = tuple(share * BsplineDic().smoothness for share in (1 / 8, 1 / 4, 1 / 2, 1, 2))
+SMOOTHNESS = (None, 375.0, 750.0, 1500.0, 3000.0, 6000.0)
+"""None is the default: by the evidence of the images."""
 RADII = np.array([1.5e-3, 2.2e-3])
 """Where the harmonics are told, m."""
 ANGLES = np.linspace(0, 2 * np.pi, 144, endpoint=False)
@@ -96,7 +97,7 @@ def main() -> None:
     rings = {harmonic: ring(config, harmonic)[config.bmode.sizes[0]] for harmonic in HARMONICS}
     lines = []
     for smoothness in SMOOTHNESS:
-        tracker, cells = BsplineDic(smoothness=smoothness), [f"{smoothness:g}"]
+        tracker, cells = BsplineDic(smoothness=smoothness), [f"{smoothness:g}" if smoothness else "by the images"]
         for harmonic, frames in rings.items():
             error, (inside, outside) = recovered(frames, config, harmonic, tracker)
             cells += [f"{error:.1f}", f"{inside:.2f}, {outside:.2f}"]

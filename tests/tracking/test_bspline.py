@@ -10,6 +10,7 @@ from echotruth.tracking import alignment
 from echotruth.tracking import region as region_module
 from echotruth.tracking.bending_energy import bending_energy, wall_frame
 from echotruth.tracking.bspline import lattice_around
+from echotruth.tracking.evidence import Match
 from echotruth.tracking.ncc import NormalizedCrossCorrelation
 from echotruth.tracking.region import FLOW_SMOOTHNESS, wall_region
 from echotruth.tracking.trackers.bspline_dic import block_mean
@@ -133,7 +134,8 @@ def test_relative_noise_is_power_over_speckle_power_times_speckle_length_over_kn
     weight = random.uniform(size=len(residual))
     # Power 1, gradient of power wavenumber^2 / 2 along either axis.
     expected = 0.2**2 * np.sqrt(2) / wavenumber / STEP
-    np.testing.assert_allclose(region._relative_noise(template, residual, weight, gradient), expected, rtol=0.1)
+    match = Match(template, residual, gradient, weight)
+    np.testing.assert_allclose(match.relative_noise(STEP), expected, rtol=0.1)
 
 
 def test_fit_of_a_flow_becomes_that_by_least_squares_with_its_own_weights(random, monkeypatch):

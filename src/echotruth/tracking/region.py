@@ -11,6 +11,7 @@ from scipy import ndimage
 from echotruth.tracking import alignment
 from echotruth.tracking.bending_energy import bending_energy, wall_frame
 from echotruth.tracking.bspline import Cells, KnotLattice, lattice_around
+from echotruth.tracking.evidence import PROBES, Match, energy_weight, told_unknowns
 
 MAX_ITERATIONS = 24
 MATRIX_REUSE = 8
@@ -25,6 +26,12 @@ MAX_KNOT_SPACING_ALL_PIXELS = 16
 """Knot spacing above which every other pixel is used, px."""
 MIN_SMOOTHNESS = 3.0
 """Least weight of the bending energy, which fills areas without speckle even where there is no noise."""
+FIRST_SMOOTHNESS = 300.0
+"""Smoothness of the first iterations where it is chosen by the evidence, which needs a step to go by."""
+LEAST_SMOOTHNESS = 0.01
+"""Least weight of the bending energy by evidence, over the mean diagonal of the image's matrix."""
+EVIDENCE_ITERATIONS = (2, 4, 6)
+"""Iterations at which the evidence sets the weight anew; convergence is looked for from the last one on."""
 PIXELS_PER_CELL = 40
 """Pixels of a cell that are enough for the normal matrix, which affects the rate of convergence, not the solution."""
 MEDIAN_STRIDE = 4
@@ -33,6 +40,28 @@ MAD_TO_STD = 1.4826
 """Standard deviation of a Gaussian over its median absolute deviation."""
 REGULARISATION = 1e-5
 """Added to the diagonal of the normal matrix, over its mean, so that it is not singular."""
+
+
+@dataclass(frozen=True)
+class NormalMatrix:
+    """Factor of the normal matrix of image and bending energy.
+
+    Attributes
+    ----------
+    factor : ndarray of shape (unknowns, width)
+        Of :func:`echotruth.tracking.alignment.cholesky_banded`.
+    energy_weight : float
+        Weight of the bending energy in it.
+    """
+
+    factor: np.ndarray
+    energy_weight: float
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """Solution (unknowns,) for a right-hand side (unknowns,), which is kept."""
+        solution = rhs.copy()
+        alignment.solve_banded(self.factor, solution)
+        return solution
 
 
 @dataclass(frozen=True)
@@ -70,7 +99,7 @@ class WallRegion:
         template: np.ndarray,
         start: np.ndarray,
         previous: np.ndarray,
-        smoothness: float,
+        smoothness: float | None,
         tolerance: float,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Displacement U that minimises sum w (I(X + U) - T)^2 plus the weighted bending energy of U - U_previous.
@@ -83,9 +112,10 @@ class WallRegion:
             Grey values T.
         start, previous : ndarray of shape (knot, 2)
             Coefficients of the initial estimate and of U_previous, px.
-        smoothness : float
+        smoothness : float, optional
             Weight of the bending energy relative to the image, if noise were as strong as speckle and the speckle
-            length equal to the knot spacing.
+            length equal to the knot spacing; None for the weight that the evidence is greatest for, see
+            :mod:`echotruth.tracking.evidence`.
         tolerance : float
             Residual, in standard deviations, at which the weight w of a pixel is 1/4.
 
@@ -97,18 +127,23 @@ class WallRegion:
             I(X + U), and its lateral and axial derivative per px.
         """
         coefficients, position = start, self.positions + self.cells.evaluate(start)
+        normal: NormalMatrix | None = None
         for iteration in range(MAX_ITERATIONS):
             warped = alignment.interpolate_with_gradient(image, position)
             residual = warped[:, 0] - template
-            weight = geman_mcclure(residual, tolerance)
-            if iteration % MATRIX_REUSE == 0:
-                noise = self._relative_noise(template, residual, weight, warped[:, 1:])
-                stride = max(1, len(self.positions) // (PIXELS_PER_CELL * len(self.cells.knots)))
-                normal = self._normal_matrix(warped[:, 1:], weight, max(MIN_SMOOTHNESS, smoothness * noise), stride)
-            change = self._newton_step(normal, (weight * residual)[:, None] * warped[:, 1:], coefficients - previous)
+            match = Match(template, residual, warped[:, 1:], geman_mcclure(residual, tolerance))
+            if (
+                normal is None
+                or iteration % MATRIX_REUSE == 0
+                or (smoothness is None and iteration in EVIDENCE_ITERATIONS)
+            ):
+                normal = self._normal_matrix(match, smoothness, coefficients - previous, normal)
+            force = (match.weight * residual)[:, None] * match.gradient
+            change = self._newton_step(normal, force, coefficients - previous)
             step = self.cells.evaluate(change)
             coefficients, position = coefficients + change, position + step
-            if np.sqrt(np.mean(step**2)) < CONVERGENCE * self.lattice.knot_spacing:
+            settled = smoothness is not None or iteration >= EVIDENCE_ITERATIONS[-1]
+            if settled and np.sqrt(np.mean(step**2)) < CONVERGENCE * self.lattice.knot_spacing:
                 break
         return coefficients, alignment.interpolate_with_gradient(image, position)
 
@@ -126,22 +161,32 @@ class WallRegion:
             coefficients = coefficients + self._newton_step(self._flow_matrix, force, coefficients)
         return coefficients
 
+    @property
+    def pixel_density(self) -> float:
+        """Share of the pixels of the wall that are used."""
+        return 1.0 if self.lattice.knot_spacing <= MAX_KNOT_SPACING_ALL_PIXELS else 0.5
+
+    @cached_property
+    def _probes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Vectors z of random signs, always the same, and K z, both (probe, unknowns)."""
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(PROBES, 2 * self.lattice.size))
+        return signs, np.array([self._energy_gradient(sign) for sign in signs])
+
     @cached_property
     def _flow_component(self) -> np.ndarray:
         """Every other pixel (pixel, 2) gives the lateral and the axial flow, so that both share one matrix."""
         return np.eye(2)[np.arange(len(self.positions)) % 2]
 
     @cached_property
-    def _flow_matrix(self) -> tuple[np.ndarray, float]:
-        return self._normal_matrix(self._flow_component, np.ones(len(self.positions)), FLOW_SMOOTHNESS, 1)
+    def _flow_matrix(self) -> NormalMatrix:
+        band, scale = self._image_matrix(self._flow_component, np.ones(len(self.positions)), 1)
+        return self._factor(band, scale, scale * FLOW_SMOOTHNESS)
 
-    def _newton_step(self, normal: tuple[np.ndarray, float], force: np.ndarray, field: np.ndarray) -> np.ndarray:
+    def _newton_step(self, normal: NormalMatrix, force: np.ndarray, field: np.ndarray) -> np.ndarray:
         """Change of coefficients (knot, 2) from the image force (pixel, 2) and the energy of a field (knot, 2)."""
-        factor, energy_weight = normal
         force = self.cells.adjoint(force, self.lattice.size).ravel()
-        change = -force - energy_weight * self._energy_gradient(field.ravel())
-        alignment.solve_banded(factor, change)
-        return change.reshape(-1, 2)
+        change = -force - normal.energy_weight * self._energy_gradient(field.ravel())
+        return normal.solve(change).reshape(-1, 2)
 
     def _energy_gradient(self, field: np.ndarray) -> np.ndarray:
         """Half the gradient of the bending energy of a field, both of shape (unknowns,).
@@ -152,18 +197,30 @@ class WallRegion:
         affine = np.sum(self.energy_affine * field[:, None], 0)
         return alignment.multiply_banded(self.energy, field) - np.sum(self.energy_affine_inverse * affine, 1)
 
-    def _relative_noise(self, template: np.ndarray, residual: np.ndarray, weight: np.ndarray, gradient: np.ndarray):
-        """(noise power / speckle power) (speckle length / knot spacing), a number.
+    def _normal_matrix(
+        self, match: Match, smoothness: float | None, step: np.ndarray, before: NormalMatrix | None
+    ) -> NormalMatrix:
+        """Normal matrix of a match; its energy has the given smoothness, or the weight of :meth:`_evidence_weight`."""
+        stride = max(1, len(self.positions) // (PIXELS_PER_CELL * len(self.cells.knots)))
+        band, scale = self._image_matrix(match.gradient, match.weight, stride)
+        if smoothness is None and before is not None:
+            weight = self._evidence_weight(match, step.ravel(), before)
+            if not np.isfinite(weight):
+                weight = before.energy_weight
+            return self._factor(band, scale, max(weight, LEAST_SMOOTHNESS * scale))
+        relative = (smoothness or FIRST_SMOOTHNESS) * match.relative_noise(self.lattice.knot_spacing)
+        return self._factor(band, scale, scale * max(MIN_SMOOTHNESS, relative))
 
-        Noise power is the weighted mean square of the residuals (pixel,), speckle power the variance of the template
-        (pixel,), speckle length its standard deviation over the RMS of the gradient (pixel, 2).
-        """
-        power, slope = np.var(template), np.sqrt(np.mean(gradient**2))
-        noise = np.sum(weight * residual**2) / np.sum(weight)
-        return noise / (np.sqrt(power) * slope * self.lattice.knot_spacing or 1.0)
+    def _evidence_weight(self, match: Match, step: np.ndarray, before: NormalMatrix) -> float:
+        """Weight of the energy by the evidence of a step (unknowns,), from the normal matrix that it was found with."""
+        told = told_unknowns(before.energy_weight, before.solve, *self._probes)
+        vectors = step.reshape(-1, 2)
+        square = float(((vectors - vectors.mean(0)) ** 2).sum(1).mean())
+        energy = float(step @ self._energy_gradient(step))
+        return energy_weight(match.variance(self.pixel_density), told, energy, square)
 
-    def _normal_matrix(self, gradient: np.ndarray, weight: np.ndarray, smoothness: float, stride: int):
-        """Cholesky factor of the normal matrix of every `stride`-th pixel, and the weight of the energy in it."""
+    def _image_matrix(self, gradient: np.ndarray, weight: np.ndarray, stride: int) -> tuple[np.ndarray, float]:
+        """Banded matrix N of every `stride`-th gradient (pixel, 2) and weight (pixel,), and its mean diagonal."""
         band, cells = np.zeros(self.energy.shape), self.cells
         alignment.add_normal_matrix(
             cells.knots,
@@ -175,11 +232,14 @@ class WallRegion:
             stride,
             band,
         )
-        scale = band[:, -1].mean() or 1.0
-        band += scale * smoothness * self.energy
+        return band, band[:, -1].mean() or 1.0
+
+    def _factor(self, band: np.ndarray, scale: float, energy_weight: float) -> NormalMatrix:
+        """N + beta K, regularised, from N; in place."""
+        band += energy_weight * self.energy
         band[:, -1] += scale * REGULARISATION
         alignment.cholesky_banded(band)
-        return band, scale * smoothness
+        return NormalMatrix(band, energy_weight)
 
 
 def geman_mcclure(residual: np.ndarray, tolerance: float) -> np.ndarray:
