@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from echotruth.tracking.accumulation import accumulate
+from echotruth.tracking.accumulation import accumulate, follow
 
 FRAMES = np.arange(7.0)[:, None, None] * np.ones((7, 4, 4))
 """Frames whose pixels are the frame number."""
@@ -75,6 +75,25 @@ def test_bidirectional_weights_follow_the_correlation_of_each_step(points):
     t = np.arange(1, 7)
     forward, backward = 99 + 3 * (t - 1), 3 * (7 - t)
     np.testing.assert_allclose(displacement[1:, 0, 0], backward / (forward + backward))
+
+
+def test_disagreement_is_the_distance_of_both_ways_and_variance_that_of_their_mean(points):
+    class Slipping(Formula):
+        def match(self, first, second, points):
+            step, quality = super().match(first, second, points)
+            return (step + [3.0, 4.0] if (first, second) == (0.0, 1.0) else step), quality
+
+    path = follow(Slipping(lambda position, t: position), FRAMES, points, "bidirectional")
+    np.testing.assert_allclose(path.disagreement[1:], 5.0)
+    t = np.arange(1, 7)
+    np.testing.assert_allclose(path.variance[1:, 0], 3 * t * (7 - t) / 7)
+
+
+def test_one_way_has_the_variance_of_its_steps_and_no_disagreement(points):
+    for reference, expected in (("previous", 3 * np.arange(7.0)), ("ED", [0.0, *[3.0] * 6])):
+        path = follow(Formula(shear), FRAMES, points, reference)
+        np.testing.assert_allclose(path.variance[:, 0], expected)
+        assert np.isnan(path.disagreement).all()
 
 
 def test_every_image_is_prepared_once(points):

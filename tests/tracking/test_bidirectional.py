@@ -1,6 +1,11 @@
 import numpy as np
 
-from echotruth.tracking.bidirectional import forward_backward, inverse_variance_weight, weighted_mean
+from echotruth.tracking.bidirectional import (
+    combined_variance,
+    forward_backward,
+    inverse_variance_weight,
+    weighted_mean,
+)
 
 
 def test_both_directions_begin_at_end_diastole_and_are_their_own_inverse():
@@ -19,6 +24,11 @@ def test_mean_of_two_values_has_the_least_variance_with_their_weight():
 
     for other in np.linspace(0, 1, 11):
         assert (variance(best) <= variance(other) + 1e-15).all()
+
+
+def test_variance_of_the_mean_is_the_least_and_that_of_the_other_value_where_one_is_missing():
+    first, second = np.array([1.0, 2.0, 0.0, np.inf, np.inf, 0.0]), np.array([3.0, 2.0, 4.0, 5.0, np.inf, 0.0])
+    np.testing.assert_allclose(combined_variance(first, second), [0.75, 1.0, 0.0, 5.0, np.inf, 0.0])
 
 
 def test_missing_value_has_no_weight_in_the_mean():

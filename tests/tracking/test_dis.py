@@ -23,6 +23,29 @@ def test_motion_at_whole_pixels_is_the_library_s_own(pair, preset):
     np.testing.assert_allclose(moved[1], library.calc(*pair, None)[[60, 31], [40, 100]], atol=1e-5)
 
 
+def test_fine_setting_is_the_library_s_own_at_full_size_and_nearer_to_a_shear(clip):
+    """Speckle whose lateral shift changes by 2 px over 20 px along the depth, and back."""
+
+    def wave(place):
+        return np.sin(2 * np.pi * place[:, 1] / 40)
+
+    frames = clip(lambda place, t: place + t * np.stack([wave(place), 0 * place[:, 1]], axis=1), 2)
+    along = np.arange(40, 121, 4.0)
+    points = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+    errors = {}
+    for preset in ("medium", "fine"):
+        settings = Dis(preset=preset, reference="previous")
+        moved, _ = track(frames, points, np.ones((160, 160), bool), 3e-5, np.arange(2.0), 0, settings)
+        errors[preset] = np.sqrt(np.mean((moved[1, :, 0] - wave(points)) ** 2))
+    assert errors["fine"] < 0.8 * errors["medium"]
+    library = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    library.setFinestScale(0)
+    library.setPatchSize(16)
+    library.setPatchStride(6)
+    column, row = points.astype(int).T
+    np.testing.assert_allclose(moved[1], library.calc(*frames, None)[row, column], atol=1e-5)
+
+
 def test_shift_of_speckle_is_found(pair):
     flow = optical_flow(*(pair / np.float32(255)))
     assert flow.shape == (160, 160, 2)

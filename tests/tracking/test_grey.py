@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+from echotruth.config.tracking import AffineDic, PhaseCorrelation, WindowDeformation
+from echotruth.tracking import track
 from echotruth.tracking.grey import MIN_STD, decompress, grey_levels, local_ncc
 
 
@@ -50,3 +52,19 @@ def test_decompression_inverts_the_log_compression():
     np.testing.assert_allclose(np.diff(found) / np.diff(echo), np.diff(found)[0] / np.diff(echo)[0], rtol=1e-12)
     assert decompress(np.array(1e-6), 40.0) == pytest.approx(1e-6, rel=1e-5)
     np.testing.assert_array_equal(decompress(shown, 0.0), shown)
+
+
+@pytest.mark.parametrize("section", [PhaseCorrelation, WindowDeformation, AffineDic])
+def test_tracker_with_a_dynamic_range_follows_the_amplitudes(clip, section):
+    """As if it were given a clip of the amplitudes, in any unit; the grey values give another track."""
+    frames, along = clip(lambda place, t: place + t * np.array([1.3, -0.6]), 2), np.arange(40, 121, 20.0)
+    points = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+    own = {"taper": "hann", "spectral_threshold": 0.01} if section is PhaseCorrelation else {}
+
+    def moved(frames, decibels):
+        settings = section(reference="previous", dynamic_range_dB=decibels, **own)
+        return track(frames, points, np.ones((160, 160), bool), 5e-5, np.arange(2.0), 1, settings)[0][1]
+
+    found = moved(frames, 50.0)
+    np.testing.assert_allclose(found, moved(decompress(grey_levels(frames), 50.0), 0.0), atol=2e-3)
+    assert np.abs(found - moved(frames, 0.0)).max() > 0.02

@@ -17,7 +17,7 @@ from echotruth.tracking import track
 from echotruth.tracking.trackers.external import ENTRY_POINT_GROUP
 
 PAGE = (Path(__file__).parents[2] / "docs/trackers.md").read_text()
-TRACKER, PROGRAM = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+TRACKER, PROGRAM, FLOW = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 (PACKAGE,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 (CONFIGURATION,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
 SHIFT = np.array([1.3, -0.6])
@@ -43,6 +43,13 @@ def test_tracker_of_the_page_follows_shifted_speckle_to_a_tenth_of_a_pixel(speck
     error = displacement - np.multiply.outer(np.arange(5), SHIFT)[:, None]
     assert np.linalg.norm(error, axis=-1).max() < 0.1
     assert (quality == 1).all()
+
+
+def test_dense_flow_of_the_page_follows_shifted_speckle_to_a_tenth_of_a_pixel(speckle):
+    Path("mypackage.py").write_text(FLOW)
+    displacement, _ = track(*speckle, External(track="mypackage:track"))
+    error = displacement[-1] - 4 * SHIFT
+    assert np.linalg.norm(error.mean(axis=0)) < 0.1
 
 
 def test_program_of_the_page_runs(speckle):

@@ -182,7 +182,7 @@ def test_years_of_cpu_time_and_millions_of_files_are_warned_of():
     assert any("years of CPU time" in text for text in texts) and any("million files" in text for text in texts)
 
 
-@pytest.mark.parametrize("name", ["demo", "human", "learning", "sweep", "paper", "realistic", "phantoms"])
+@pytest.mark.parametrize("name", ["demo", "human", "learning", "sweep", "paper", "realistic", "phantoms", "benchmark"])
 def test_nothing_speaks_against_the_shipped_configurations_where_there_is_space(name, monkeypatch):
     # The disk on which tests run may be smaller than the sweep.
     space = SimpleNamespace(f_bavail=10**9, f_frsize=4096, f_files=10**9, f_favail=10**9)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from echotruth.cli.command import Commands, add_command, add_repeated, fail
 
-EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap", "flo", "uff", "zea")
+EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap", "tap_pickle", "flo", "uff", "zea")
 """Formats of `echotruth export`."""
 
 

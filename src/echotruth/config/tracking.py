@@ -22,6 +22,17 @@ Reference = Annotated[
 ]
 
 
+DynamicRange = Annotated[
+    FiniteFloat,
+    Field(
+        ge=0,
+        le=120,
+        description="Dynamic range of the images, by which log compression is undone before they are compared. 0 uses "
+        "the grey values.",
+    ),
+]
+
+
 class PhaseCorrelation(Section):
     """Phase-only correlation of windows, the method of the paper."""
 
@@ -38,6 +49,7 @@ class PhaseCorrelation(Section):
     spectral_threshold: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.0
     """Magnitude, relative to the largest, below which a frequency is left out: it holds only noise, to which
     phase-only correlation would give the same weight as to speckle."""
+    dynamic_range_dB: DynamicRange = 0.0
     reference: Reference = "ED"
 
     @model_validator(mode="after")
@@ -56,6 +68,7 @@ class WindowDeformation(Section):
     """Side of the windows in each pass; 8 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
     final_passes: Annotated[int, Field(ge=1, le=20)] = 3
     """Number of passes with the last size."""
+    dynamic_range_dB: DynamicRange = 0.0
     reference: Reference = "bidirectional"
 
 
@@ -66,6 +79,7 @@ class AffineDic(Section):
     """Name of the method."""
     subset_mm: Positive = 1.0
     """Side of a subset; 17 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
+    dynamic_range_dB: DynamicRange = 0.0
     reference: Reference = "bidirectional"
 
 
@@ -88,9 +102,10 @@ class BsplineDic(Section):
     speckle_pixel_um: Annotated[FiniteFloat, Field(ge=0)] = 16.0
     """Size of pixels that resolve the speckle fully: speed of sound / (6 bandwidth). Default: as suits
     `bmode.field_of_view_mm`."""
-    smoothness: Positive = 3000.0
+    smoothness: Positive | None = None
     """Weight of the bending energy of a step from one frame to the next. It is multiplied by the power of the noise
-    over that of the speckle, and by the speckle length over the distance between knots."""
+    over that of the speckle, and by the speckle length over the distance between knots. Default: what the images of the
+    step give most evidence for."""
     transmural_scale: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2
     """Scale of lengths through the wall in the bending energy; lengths along the wall have the scale 1."""
     tolerance: Positive = 4.0
@@ -112,8 +127,9 @@ class Dis(Section):
 
     method: Literal["dis"] = "dis"
     """Name of the method."""
-    preset: Literal["ultrafast", "fast", "medium"] = "medium"
-    """Preset of OpenCV."""
+    preset: Literal["ultrafast", "fast", "medium", "fine"] = "medium"
+    """Preset of OpenCV; `fine` is `medium` down to the full size of the images, with larger patches: more accurate, and
+    several times as slow."""
     reference: Reference = "bidirectional"
 
 
@@ -262,6 +278,10 @@ class Tracking(Section):
     grid_px: Annotated[int, Field(ge=1, le=128)] = 5
     """Spacing of the points at which displacement is reported, in pixels of the largest image; the points are the same
     at all image sizes and lie in the wall at end-diastole."""
+    frame_step: Annotated[int, Field(ge=1, le=1000)] = 1
+    """Trackers are given every n-th frame, as of a scanner with an n-th of the frame rate. Displacement and quality in
+    the frames between are interpolated linearly in time; the cycle closes, so that after the last given frame they lead
+    back to those of end-diastole one period later."""
     trackers: Annotated[dict[Name, Tracker], Field(min_length=1, max_length=MAX_TRACKERS)] = Field(
         default_factory=default_trackers
     )

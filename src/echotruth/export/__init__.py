@@ -37,6 +37,8 @@ class Format:
         What it can be told, beside which cases, views and sizes to write.
     table : str
         Name of one more file, of all clips, that its module writes with `write_summary`; "" for none.
+    together : bool
+        Whether all clips are in one file, which its module writes with `write_together`.
     """
 
     module: str
@@ -45,6 +47,7 @@ class Format:
     holds: Literal["clip", "view", "heart"] = "clip"
     options: tuple[str, ...] = ()
     table: str = ""
+    together: bool = False
 
     def takes(self, option: str) -> bool:
         """Whether an option, or a choice of views or sizes, does something for it."""
@@ -81,6 +84,7 @@ FORMATS = {
         "curves", ".csv", ("physiology", "tracking", "evaluation"), options=("trackers",), table="summary.csv"
     ),
     "tap": Format("tap", ".npz"),
+    "tap_pickle": Format("tap", ".pkl", together=True),
     "flo": Format("flo", ""),
     "uff": Format("uff", ".uff", (), "view"),
     "zea": Format("zea", ".hdf5", (), "view"),
@@ -139,7 +143,7 @@ class Export:
         return self.source.finished(every, form.problem)
 
     def write(self, clips: Sequence[Clip]) -> Iterator[Path]:
-        """Write a file or folder for each clip, view or heart, and give its path when it is whole.
+        """Write a file or folder for each clip, view or heart, or one for all, and give its path when it is whole.
 
         The table of a format is written last, unless `output` is the path of a single file.
 
@@ -151,6 +155,9 @@ class Export:
             If a file cannot be written.
         """
         form = FORMATS[self.format]
+        if form.together:
+            yield from self._write_together(clips)
+            return
         write = form.writer()
         options = {"overlay": self.overlay, "rate": self.rate or FRAME_RATE, "trackers": self.source.trackers}
         chosen = {name: options[name] for name in form.options}
@@ -162,6 +169,15 @@ class Export:
         if form.table and folder is not None and clips:
             with draft(folder / form.table) as path, _told(clips[0]):
                 import_module(f"echotruth.export.{form.module}").write_summary(clips, path, self.source.trackers)
+
+    def _write_together(self, clips: Sequence[Clip]) -> Iterator[Path]:
+        """Write one file of all clips, which has the name of the repository if it has no other, and give its path."""
+        form, folder = FORMATS[self.format], self._folder
+        name = f"{self.source.folder.resolve().name}{form.suffix}"
+        target = self.output if folder is None and self.output is not None else (folder or Path()) / name
+        with draft(target) as path, _told(clips[0]):
+            import_module(f"echotruth.export.{form.module}").write_together(clips, path)
+        yield target
 
     @property
     def _folder(self) -> Path | None:

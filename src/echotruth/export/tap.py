@@ -1,13 +1,17 @@
-"""Point tracks in the form of TAP-Vid: arrays `video`, `points` and `occluded` in a NumPy archive.
+"""Point tracks in the form of TAP-Vid: arrays `video`, `points` and `occluded`, in a NumPy archive or a pickle.
 
 Doersch et al., TAP-Vid: A Benchmark for Tracking Any Point in a Video, NeurIPS 2022 (arXiv:2211.03726): its files
 hold `video` (frame, height, width, 3; uint8), `points` (point, frame, 2; x, y; of the width and the height, 0 to 1) and
-`occluded` (point, frame; bool).
+`occluded` (point, frame; bool); those of its DAVIS and RGB-stacking sets are pickled dictionaries.
 """
 
 from __future__ import annotations
 
+import pickle
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +23,45 @@ POINTS_ALONG_SIDE = 64
 
 
 def write(clip: Clip, path: Path) -> None:
-    """Write the video and the paths of the points of a grid that are in the wall at end-diastole.
+    """Write the :func:`arrays` of a clip as a NumPy archive (.npz).
+
+    Parameters
+    ----------
+    clip : Clip
+    path : Path
+    """
+    with path.open("wb") as file:
+        np.savez_compressed(file, **arrays(clip))
+
+
+def write_together(clips: Sequence[Clip], path: Path) -> None:
+    """Write a pickle of a dictionary from the name of each clip to a dictionary of its :func:`arrays`.
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+    path : Path
+    """
+    with path.open("wb") as file:
+        pickler = pickle.Pickler(file, protocol=4)
+        # The pickler keeps no list of what it has written, so that only one clip at a time is in memory.
+        pickler.fast = True
+        pickler.dump(_Videos(clips))
+
+
+class _Videos:
+    """Clips that are pickled one after the other as a plain dictionary."""
+
+    def __init__(self, clips: Sequence[Clip]) -> None:
+        self.clips = clips
+
+    def __reduce__(self) -> tuple[type, tuple[()], None, None, Iterator[tuple[str, dict[str, Any]]]]:
+        # A copy, with which goes what was read of the clip.
+        return dict, (), None, None, ((clip.name, arrays(replace(clip))) for clip in self.clips)
+
+
+def arrays(clip: Clip) -> dict[str, Any]:
+    """Video and paths of the points of a grid that are in the wall at end-diastole.
 
     x is 0 at the left edge of the image and 1 at the right one, y is 0 at the upper edge, nearest the array, and 1 at
     the lower one. A point is occluded where it has left the sector or the slice of tissue that is imaged. Besides,
@@ -29,16 +71,18 @@ def write(clip: Clip, path: Path) -> None:
     Parameters
     ----------
     clip : Clip
-    path : Path
+
+    Returns
+    -------
+    dict
+        video, points, occluded, elevation_m, spacing_m, frame_time_s; see above.
     """
     found = tracks(clip, max(1, clip.size // POINTS_ALONG_SIDE))
-    with path.open("wb") as file:
-        np.savez_compressed(
-            file,
-            video=np.repeat(clip.image[..., None], 3, axis=-1),
-            points=((found["pixel"].values + 0.5) / clip.size).transpose(1, 0, 2).astype(np.float32),
-            occluded=~found["visible"].values.T,
-            elevation_m=found["elevation"].values.T.astype(np.float32),
-            spacing_m=np.float64(clip.spacing),
-            frame_time_s=np.float64(clip.frame_time),
-        )
+    return {
+        "video": np.repeat(clip.image[..., None], 3, axis=-1),
+        "points": ((found["pixel"].values + 0.5) / clip.size).transpose(1, 0, 2).astype(np.float32),
+        "occluded": ~found["visible"].values.T,
+        "elevation_m": found["elevation"].values.T.astype(np.float32),
+        "spacing_m": np.float64(clip.spacing),
+        "frame_time_s": np.float64(clip.frame_time),
+    }

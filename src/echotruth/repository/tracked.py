@@ -20,7 +20,7 @@ TRACKING = (
     ),
     array(
         *("quality", f"{_TRACKED} frame axial lateral", "float32", "1"),
-        "confidence of the tracker, 0 to 1",
+        "probability of an error within 1/256 of the side of the image, as the tracker sees it",
         QUALITY,
     ),
 )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
-from echotruth.tracking.bidirectional import forward_backward, inverse_variance_weight, weighted_mean
+from echotruth.tracking.bidirectional import combined_variance, forward_backward, inverse_variance_weight, weighted_mean
 
 
 class PairTracker(Protocol):
@@ -41,9 +42,37 @@ class PairTracker(Protocol):
         """
 
 
+@dataclass(frozen=True)
+class Path:
+    """Displacement of points since the first frame, and what tells how far it may be off.
+
+    Attributes
+    ----------
+    displacement : ndarray of shape (frame, n, 2)
+        Lateral, axial, px; NaN where the point is lost.
+    correlation : ndarray of shape (frame, n)
+        Of the images of the last step, from 0 to 1; 1 at frame 0, NaN where the point is lost.
+    variance : ndarray of shape (frame, n)
+        Variance of the displacement by the correlations of all steps, up to a factor (see :func:`variance`).
+    disagreement : ndarray of shape (frame, n)
+        Distance of the displacements forwards and backwards, px; NaN where there is only one of them.
+    """
+
+    displacement: np.ndarray
+    correlation: np.ndarray
+    variance: np.ndarray
+    disagreement: np.ndarray
+
+
 def accumulate(
     tracker: PairTracker, frames: np.ndarray, points: np.ndarray, reference: str
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement (frame, n, 2) and correlation (frame, n) of :func:`follow`, whose arguments these are."""
+    path = follow(tracker, frames, points, reference)
+    return path.displacement, path.correlation
+
+
+def follow(tracker: PairTracker, frames: np.ndarray, points: np.ndarray, reference: str) -> Path:
     """Displacement of points since the first frame.
 
     Parameters
@@ -61,14 +90,14 @@ def accumulate(
 
     Returns
     -------
-    displacement : ndarray of shape (frame, n, 2)
-        Lateral, axial, px.
-    quality : ndarray of shape (frame, n)
-        1 at frame 0.
+    Path
     """
     prepared = map(tracker.prepare, frames)
     if reference != "bidirectional":
-        return _accumulate(tracker, prepared, points, reference == "previous")
+        stepwise = reference == "previous"
+        displacement, quality = _accumulate(tracker, prepared, points, stepwise)
+        terms = variance(quality) if stepwise else step_variance(quality)
+        return Path(displacement, quality, terms, np.full_like(quality, np.nan))
     images = list(prepared)
     results = []
     for order in forward_backward(len(images)):
@@ -77,7 +106,12 @@ def accumulate(
         results.append((displacement[order], quality[order], variance(quality)[order]))
     displacements, qualities, variances = zip(*results, strict=True)
     weight = inverse_variance_weight(*variances)
-    return weighted_mean(weight[..., None], *displacements), weighted_mean(weight, *qualities)
+    return Path(
+        weighted_mean(weight[..., None], *displacements),
+        weighted_mean(weight, *qualities),
+        combined_variance(*variances),
+        np.hypot(*np.moveaxis(displacements[0] - displacements[1], -1, 0)),
+    )
 
 
 def variance(quality: np.ndarray) -> np.ndarray:
@@ -96,8 +130,13 @@ def variance(quality: np.ndarray) -> np.ndarray:
     ndarray of shape (frame, n)
         Infinite from the step on in which the point is lost.
     """
+    return np.cumsum(step_variance(quality), axis=0)
+
+
+def step_variance(quality: np.ndarray) -> np.ndarray:
+    """Variance 1 / rho^2 - 1 of single steps with correlations rho, up to a constant factor; infinite without one."""
     rho = np.where(quality > 0, np.minimum(quality, 1), np.nan)
-    return np.cumsum(np.nan_to_num(1 / rho**2 - 1, nan=np.inf), axis=0)
+    return np.nan_to_num(1 / rho**2 - 1, nan=np.inf)
 
 
 def _accumulate(tracker: PairTracker, images: Iterator[Any], points: np.ndarray, stepwise: bool):

@@ -30,6 +30,16 @@ def inverse_variance_weight(first: np.ndarray, second: np.ndarray) -> np.ndarray
     return weight
 
 
+def combined_variance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Variance w^2 var1 + (1 - w)^2 var2 of the mean with the :func:`inverse_variance_weight`; arrays of one shape."""
+    weight = inverse_variance_weight(first, second)
+    total = np.zeros(np.shape(weight))
+    for share, each in ((weight, first), (1 - weight, second)):
+        # A value that is missing has an infinite variance and the weight 0.
+        total += np.multiply(share**2, each, out=np.zeros_like(total), where=share > 0)
+    return total
+
+
 def weighted_mean(weight: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """w first + (1 - w) second; a value of weight 0 may be NaN."""
     return np.where(weight > 0, weight * first, 0.0) + np.where(weight < 1, (1 - weight) * second, 0.0)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from echotruth.tracking.accumulation import accumulate
+from echotruth.tracking.accumulation import follow
 from echotruth.tracking.grey import grey_levels, local_ncc
+from echotruth.tracking.quality import ErrorModel
 
 NCC_SIDE = 0.75e-3
 """Side of the square in which the quality of a dense flow is measured, m: half the paper's window."""
@@ -21,6 +22,7 @@ def track_by_flow(
     points: np.ndarray,
     spacing: float,
     reference: str,
+    errors: ErrorModel,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of points since the first frame.
 
@@ -35,17 +37,20 @@ def track_by_flow(
     spacing : float
         Distance of pixel centres, m.
     reference : {"ED", "previous", "bidirectional"}
-        See :func:`echotruth.tracking.accumulation.accumulate`.
+        See :func:`echotruth.tracking.accumulation.follow`.
+    errors : ErrorModel
+        Of the flow.
 
     Returns
     -------
     displacement : ndarray of shape (frame, n, 2)
         px.
     quality : ndarray of shape (frame, n)
-        Correlation of the first image with the second warped back by the flow, at least 0.
+        See :meth:`echotruth.tracking.quality.ErrorModel.probability`.
     """
     side = max(9, 2 * round(NCC_SIDE / spacing / 2) + 1)
-    return accumulate(FlowTracker(flow, side), grey_levels(frames), points, reference)
+    path = follow(FlowTracker(flow, side), grey_levels(frames), points, reference)
+    return path.displacement, errors.probability(path, frames.shape[1:])
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,11 @@ def decompress(grey: np.ndarray, decibels: float) -> np.ndarray:
     return (np.exp(k * grey) - 1) / k if k else grey
 
 
+def amplitudes(frames: np.ndarray, decibels: float) -> np.ndarray:
+    """Amplitudes (frame, axial, lateral) of a clip of any real type, see :func:`grey_levels` and :func:`decompress`."""
+    return decompress(grey_levels(frames), decibels)
+
+
 def decompression_slope(amplitude: np.ndarray, decibels: float) -> np.ndarray:
     """Derivative da/dg = 1 + k a of :func:`decompress` at amplitudes a; same shape."""
     return 1 + _nepers(decibels) * amplitude

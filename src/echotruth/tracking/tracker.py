@@ -47,7 +47,9 @@ def track(
         Since end-diastole, of the tissue that was at the point then: lateral, axial, px, positive for motion of the
         tissue; NaN where unknown, as for points outside the image.
     quality : ndarray of shape (frame, n)
-        Confidence of the tracker, from 0 to 1; NaN where there is no displacement.
+        Probability that the displacement is right within 1/256 of the longer side of the image, as the tracker sees it
+        (:mod:`echotruth.tracking.quality`; a tracker from outside may mean something else), from 0 to 1; NaN where
+        there is no displacement.
 
     Raises
     ------

@@ -172,7 +172,7 @@ def tracker_seconds(tracker: Section, config: Config, seen: Content) -> float:
     for size, wall in zip(config.bmode.sizes, seen.wall_pixels, strict=True):
         amounts = _TrackedAmounts(size**2 / PIXELS, seen.points / 760, wall / 20_000, scale)
         seconds += _method_seconds(tracker, amounts)
-    return seen.frames / FRAMES * seconds
+    return seen.frames / config.tracking.frame_step / FRAMES * seconds
 
 
 class _TrackedAmounts(NamedTuple):
@@ -195,7 +195,7 @@ def _method_seconds(tracker: Section, of: _TrackedAmounts) -> float:
         case AffineDic():
             seconds = passes * of.points * (1.1 + 7.9 * of.pixels * (tracker.subset_mm / of.scale) ** 2)
         case Dis():
-            seconds = passes * (0.1 + 1.6 * of.pixels)
+            seconds = passes * (0.1 + (7.5 if tracker.preset == "fine" else 1.6) * of.pixels)
         case Ilk():
             seconds = 146 * of.pixels
         case BsplineDic():

@@ -14,9 +14,10 @@ from scipy import ndimage
 from echotruth.config.tracking import AffineDic, WindowDeformation
 from echotruth.imaging import spline
 from echotruth.tracking import subset
-from echotruth.tracking.accumulation import accumulate
+from echotruth.tracking.accumulation import follow
 from echotruth.tracking.flow import interpolate_field
-from echotruth.tracking.grey import MIN_STD, grey_levels
+from echotruth.tracking.grey import MIN_STD, amplitudes
+from echotruth.tracking.quality import error_model
 from echotruth.tracking.trackers.window_deformation import PreparedImage, WindowDeformationTracker, window_passes
 
 MIN_HALF = 8
@@ -41,7 +42,7 @@ def track(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
 
-    The quality is the correlation of the subsets, at least 0.
+    The quality follows from the correlation of the subsets.
 
     Raises
     ------
@@ -51,7 +52,9 @@ def track(
     half = max(MIN_HALF, round(settings.si().subset / spacing / 2))
     windows = WindowDeformation(windows_mm=[ratio * 2e3 * half * spacing for ratio in INITIAL_WINDOWS], final_passes=1)
     initial = WindowDeformationTracker(window_passes(windows, frames.shape[1:], spacing))
-    return accumulate(AffineTracker(half, initial), grey_levels(frames), points, settings.reference)
+    images = amplitudes(frames, settings.dynamic_range_dB)
+    path = follow(AffineTracker(half, initial), images, points, settings.reference)
+    return path.displacement, error_model(settings).probability(path, frames.shape[1:])
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,12 @@ import numpy as np
 from echotruth.config.tracking import BsplineDic
 from echotruth.imaging import spline
 from echotruth.tracking import bidirectional
+from echotruth.tracking.accumulation import Path
 from echotruth.tracking.alignment import interpolate_with_gradient
 from echotruth.tracking.flow import interpolate_field
 from echotruth.tracking.grey import decompress, grey_levels
 from echotruth.tracking.ncc import NormalizedCrossCorrelation
+from echotruth.tracking.quality import error_model
 from echotruth.tracking.region import WallRegion, wall_region
 from echotruth.tracking.trackers.dis import MIN_IMAGE_SIDE, optical_flow
 
@@ -90,7 +92,8 @@ def track(
         tracker = WallTracker(region, ncc, coarse, block, images, settings)
         orders = bidirectional.forward_backward(len(frames))
         trajectories = list(threads.map(tracker.track, orders if settings.reference == "bidirectional" else orders[:1]))
-    return combine(region, points, trajectories[0], trajectories[-1])
+    path = combine(region, points, trajectories[0], trajectories[-1])
+    return path.displacement, error_model(settings).probability(path, mask.shape)
 
 
 def block_mean(image: np.ndarray, side: int) -> np.ndarray:
@@ -178,23 +181,37 @@ class WallTracker:
         return min(fields, key=difference)
 
 
-def combine(
-    region: WallRegion, points: np.ndarray, forward: WallTrajectory, backward: WallTrajectory
-) -> tuple[np.ndarray, np.ndarray]:
+def combine(region: WallRegion, points: np.ndarray, forward: WallTrajectory, backward: WallTrajectory) -> Path:
     """Inverse-variance weighted mean of two trajectories, which may be the same.
+
+    Parameters
+    ----------
+    region : WallRegion
+    points : ndarray of shape (n, 2)
+        Positions at end-diastole: lateral, axial, px.
+    forward, backward : WallTrajectory
 
     Returns
     -------
-    displacement : ndarray of shape (frame, n, 2)
-        px.
-    quality : ndarray of shape (frame, n)
+    Path
+        Its variance is in px^2, up to a factor, and the same for all points.
     """
     weight = bidirectional.inverse_variance_weight(forward.variance, backward.variance)[:, None]
-    coefficients = bidirectional.weighted_mean(weight[..., None], forward.coefficients, backward.coefficients)
-    flat = coefficients.transpose(1, 0, 2).reshape(region.lattice.size, -1)
-    displacement = region.lattice.evaluate(flat, points).reshape(len(points), len(weight), 2)
-    displacement = np.moveaxis(displacement, 0, 1).copy()
-    quality = bidirectional.weighted_mean(weight, np.maximum(forward.ncc, 0), np.maximum(backward.ncc, 0))
-    quality[0] += 1 - quality[0]
-    displacement[np.isnan(quality)] = np.nan
-    return displacement, quality
+    ways = [_displacement(region, points, trajectory) for trajectory in (forward, backward)]
+    displacement = bidirectional.weighted_mean(weight[..., None], *ways)
+    correlation = bidirectional.weighted_mean(weight, np.maximum(forward.ncc, 0), np.maximum(backward.ncc, 0))
+    correlation[0] += 1 - correlation[0]
+    displacement[np.isnan(correlation)] = np.nan
+    if forward is backward:
+        variance, disagreement = forward.variance, np.full_like(correlation, np.nan)
+    else:
+        variance = bidirectional.combined_variance(forward.variance, backward.variance)
+        disagreement = np.hypot(*np.moveaxis(ways[0] - ways[1], -1, 0))
+    return Path(displacement, correlation, np.broadcast_to(variance[:, None], correlation.shape), disagreement)
+
+
+def _displacement(region: WallRegion, points: np.ndarray, trajectory: WallTrajectory) -> np.ndarray:
+    """Displacement (frame, n, 2) of points, px."""
+    frames = len(trajectory.coefficients)
+    flat = trajectory.coefficients.transpose(1, 0, 2).reshape(region.lattice.size, -1)
+    return np.moveaxis(region.lattice.evaluate(flat, points).reshape(len(points), frames, 2), 0, 1).copy()

@@ -9,6 +9,7 @@ import numpy as np
 
 from echotruth.config.tracking import Dis
 from echotruth.tracking.flow import track_by_flow
+from echotruth.tracking.quality import error_model
 
 MIN_IMAGE_SIDE = 32
 """Smallest side of an image, px; for flat ones of 24 px OpenCV 5.0 reads beyond its memory."""
@@ -17,6 +18,9 @@ PRESETS = {
     "fast": cv2.DISOPTICAL_FLOW_PRESET_FAST,
     "medium": cv2.DISOPTICAL_FLOW_PRESET_MEDIUM,
 }
+"""Presets of the library, which take the images at half their size or less as the finest scale."""
+FINE_PATCH, FINE_STRIDE = 16, 6
+"""Side of a patch and distance of patches, px, of the setting `fine`; the library's preset `medium` has 8 and 3."""
 
 
 def track(
@@ -30,9 +34,10 @@ def track(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
 
-    The quality is that of :mod:`echotruth.tracking.flow`; the library has none.
+    The quality follows from the correlation of the images (:mod:`echotruth.tracking.flow`); the library has none.
     """
-    return track_by_flow(partial(optical_flow, preset=settings.preset), frames, points, spacing, settings.reference)
+    flow, errors = partial(optical_flow, preset=settings.preset), error_model(settings)
+    return track_by_flow(flow, frames, points, spacing, settings.reference, errors)
 
 
 def optical_flow(first: np.ndarray, second: np.ndarray, preset: str = "medium") -> np.ndarray:
@@ -42,8 +47,8 @@ def optical_flow(first: np.ndarray, second: np.ndarray, preset: str = "medium") 
     ----------
     first, second : ndarray of shape (axial, lateral)
         Grey values from 0 to 1, all finite.
-    preset : {"ultrafast", "fast", "medium"}
-        Preset of OpenCV.
+    preset : {"ultrafast", "fast", "medium", "fine"}
+        Preset of OpenCV; `fine` is its `medium` at the full size of the images, with larger patches.
 
     Returns
     -------
@@ -61,4 +66,14 @@ def optical_flow(first: np.ndarray, second: np.ndarray, preset: str = "medium") 
     cv2.setNumThreads(1)
     before, after = ((255 * image).round().astype(np.uint8) for image in (first, second))
     # OpenCV takes None for a flow that it is to allocate.
-    return cv2.DISOpticalFlow.create(PRESETS[preset]).calc(before, after, None)  # type: ignore[call-overload]
+    return _search(preset).calc(before, after, None)  # type: ignore[call-overload]
+
+
+def _search(preset: str) -> cv2.DISOpticalFlow:
+    """Search of the library with a preset or with the fine setting."""
+    search = cv2.DISOpticalFlow.create(PRESETS.get(preset, PRESETS["medium"]))
+    if preset == "fine":
+        search.setFinestScale(0)
+        search.setPatchSize(FINE_PATCH)
+        search.setPatchStride(FINE_STRIDE)
+    return search

@@ -9,6 +9,7 @@ from skimage.registration import optical_flow_ilk
 
 from echotruth.config.tracking import Ilk
 from echotruth.tracking.flow import track_by_flow
+from echotruth.tracking.quality import error_model
 
 
 def track(
@@ -22,9 +23,10 @@ def track(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
 
-    The quality is that of :mod:`echotruth.tracking.flow`; the library has none.
+    The quality follows from the correlation of the images (:mod:`echotruth.tracking.flow`); the library has none.
     """
-    return track_by_flow(partial(optical_flow, radius=settings.radius_px), frames, points, spacing, settings.reference)
+    flow, errors = partial(optical_flow, radius=settings.radius_px), error_model(settings)
+    return track_by_flow(flow, frames, points, spacing, settings.reference, errors)
 
 
 def optical_flow(first: np.ndarray, second: np.ndarray, radius: int = 7) -> np.ndarray:

@@ -13,8 +13,9 @@ import numpy as np
 from scipy import fft
 
 from echotruth.config.tracking import PhaseCorrelation
-from echotruth.tracking.accumulation import accumulate
-from echotruth.tracking.grey import MIN_STD
+from echotruth.tracking.accumulation import follow
+from echotruth.tracking.grey import MIN_STD, amplitudes
+from echotruth.tracking.quality import error_model
 from echotruth.tracking.windows import MIN_WINDOW_SIDE, Windows, arrange
 
 ROUNDING = 1e-9
@@ -32,13 +33,15 @@ def track(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
 
-    The quality is the height of the correlation peak. Windows cover the whole image; the mask is not used.
+    The quality follows from the height of the correlation peak. Windows cover the whole image; the mask is not used.
     """
     windows = arrange(frames.shape[1:], window_side(settings, spacing), settings.stride)
-    finite = frames[np.isfinite(frames)] if frames.dtype.kind == "f" else frames
+    images = amplitudes(frames, settings.dynamic_range_dB) if settings.dynamic_range_dB else frames
+    finite = images[np.isfinite(images)] if images.dtype.kind == "f" else images
     contrast = float(finite.max()) - float(finite.min()) if finite.size else 0.0
     tracker = PhaseCorrelationTracker(windows, settings.taper, contrast, max(settings.spectral_threshold, ROUNDING))
-    return accumulate(tracker, frames, points, settings.reference)
+    path = follow(tracker, images, points, settings.reference)
+    return path.displacement, error_model(settings).probability(path, frames.shape[1:])
 
 
 def window_side(settings: PhaseCorrelation, spacing: float) -> int:

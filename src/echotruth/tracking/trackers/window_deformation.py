@@ -14,10 +14,11 @@ import numpy as np
 
 from echotruth.config.tracking import WindowDeformation
 from echotruth.imaging import spline
-from echotruth.tracking.accumulation import accumulate
+from echotruth.tracking.accumulation import follow
 from echotruth.tracking.correlation import has_texture, match_windows
 from echotruth.tracking.field import DisplacementField, displacement_field, replace_outliers, smooth
-from echotruth.tracking.grey import grey_levels
+from echotruth.tracking.grey import amplitudes
+from echotruth.tracking.quality import error_model
 from echotruth.tracking.windows import MIN_WINDOW_SIDE, Windows, arrange
 
 STRIDE = 0.5
@@ -37,7 +38,7 @@ def track(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
 
-    The quality is the correlation of the last windows, at least 0. Windows cover the whole image; the mask is not used.
+    The quality follows from the correlation of the last windows. Windows cover the whole image; the mask is not used.
 
     Raises
     ------
@@ -45,7 +46,9 @@ def track(
         See :func:`window_passes`.
     """
     passes = window_passes(settings, frames.shape[1:], spacing)
-    return accumulate(WindowDeformationTracker(passes), grey_levels(frames), points, settings.reference)
+    images = amplitudes(frames, settings.dynamic_range_dB)
+    path = follow(WindowDeformationTracker(passes), images, points, settings.reference)
+    return path.displacement, error_model(settings).probability(path, frames.shape[1:])
 
 
 def window_passes(settings: WindowDeformation, shape: tuple[int, int], spacing: float) -> list[Windows]:

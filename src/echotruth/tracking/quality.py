@@ -1,0 +1,132 @@
+"""Quality of tracked points: the probability that a point is near its true place.
+
+Near means within 1/256 of the side of the image, the distance of 1 px of TAP-Vid (Doersch et al. 2022,
+arXiv:2211.03726). The error of a point is taken to be Gaussian in the plane. Its standard deviation follows from what a
+tracker can tell of itself: the correlation of the images along the path of the point, how far the paths forwards and
+backwards are apart, and how far the point has moved. The constants of each method are fitted by maximum likelihood on
+hearts of which none is among those that tell how well the quality holds (benchmarks/calibration.py, docs/tracking.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from echotruth.tracking.accumulation import Path
+
+IMAGE_FRACTION = 1 / 256
+"""Error within which a point is near its true place, as a fraction of the longer side of the image."""
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """Distribution of the error of a tracker; lengths are in units of 1/256 of the longer side of the image.
+
+    The variance s^2 of each coordinate of the error, with the side h of a pixel, the variance V of
+    :class:`echotruth.tracking.accumulation.Path`, the disagreement d and the tracked displacement u, is
+
+        s^2 = constant^2 + (pixel h)^2 + (correlation^2 + (pixel_correlation h)^2) V + (disagreement d)^2 + (motion u)^2
+
+    Attributes
+    ----------
+    constant, pixel, correlation, pixel_correlation, disagreement, motion : float
+        See above.
+    """
+
+    constant: float
+    pixel: float
+    correlation: float
+    pixel_correlation: float
+    disagreement: float
+    motion: float
+
+    def probability(self, path: Path, shape: tuple[int, ...]) -> np.ndarray:
+        """Probability that points are within 1/256 of the side of the image of their true places.
+
+        Parameters
+        ----------
+        path : Path
+        shape : tuple of int
+            Axial and lateral size of the image, px.
+
+        Returns
+        -------
+        ndarray of shape (frame, n)
+            From 0 to 1; 1 at frame 0, NaN where the point is lost.
+        """
+        side = 1 / (IMAGE_FRACTION * max(shape))  # of a pixel
+        displacement = np.hypot(*np.moveaxis(path.displacement, -1, 0))
+        expected = self.variance(side, path.variance, side * path.disagreement, side * displacement)
+        probability = within(1.0, expected)
+        probability[0] = 1.0
+        probability[~np.isfinite(path.displacement).all(-1)] = np.nan
+        return probability
+
+    def variance(
+        self, pixel: float | np.ndarray, variance: np.ndarray, disagreement: np.ndarray, displacement: np.ndarray
+    ) -> np.ndarray:
+        """s^2 of points; all lengths in units of 1/256 of the longer side of the image.
+
+        Parameters
+        ----------
+        pixel : float or ndarray
+            Side h of a pixel.
+        variance, disagreement, displacement : ndarray of one shape
+            V, d and u; where d is NaN, there is only one way, and it is left out.
+
+        Returns
+        -------
+        ndarray of the same shape
+        """
+        rate = self.correlation**2 + (self.pixel_correlation * pixel) ** 2
+        known = np.nan_to_num(disagreement, nan=0.0)
+        terms = (self.constant, self.pixel * pixel, self.disagreement * known, self.motion * displacement)
+        expected = np.multiply(rate, variance, out=np.zeros(np.shape(variance)), where=np.greater(rate, 0))
+        for term in terms:
+            expected += np.square(term)
+        return expected
+
+
+ERRORS = {
+    "phase_correlation_ED": ErrorModel(0.0, 0.0, 0.217, 0.117, 0.0, 0.111),
+    "phase_correlation": ErrorModel(0.0, 0.232, 0.0, 0.0732, 0.0747, 0.144),
+    "window_deformation": ErrorModel(0.28, 0.304, 0.164, 0.415, 0.0661, 0.071),
+    "affine_dic": ErrorModel(0.28, 0.191, 0.0, 0.546, 0.177, 0.0449),
+    "dis": ErrorModel(0.275, 0.349, 0.0, 0.261, 0.097, 0.0978),
+    "dis_fine": ErrorModel(0.268, 0.255, 0.0, 0.149, 0.133, 0.0648),
+    "ilk": ErrorModel(0.475, 0.0, 0.11, 0.173, 0.0, 0.0771),
+    "bspline_dic": ErrorModel(0.283, 0.0, 0.0644, 0.117, 0.221, 0.0149),
+}
+"""Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`."""
+
+
+def error_model(settings: Any) -> ErrorModel:
+    """Distribution of the error of a tracker with the settings of its section in `config/tracking.py`."""
+    return ERRORS[error_name(settings)]
+
+
+def error_name(settings: Any) -> str:
+    """Key of :data:`ERRORS` for the settings of a tracker."""
+    variants = (getattr(settings, "reference", None), getattr(settings, "preset", None))
+    special = [f"{settings.method}_{variant}" for variant in variants]
+    return next((name for name in special if name in ERRORS), settings.method)
+
+
+def within(radius: float, variance: np.ndarray) -> np.ndarray:
+    """Probability 1 - exp(-r^2 / (2 s^2)) that a Gaussian error in the plane is within a radius.
+
+    Parameters
+    ----------
+    radius : float
+        r, any unit.
+    variance : ndarray of any shape
+        s^2 of each coordinate, in the square of that unit; infinite for an unknown place.
+
+    Returns
+    -------
+    ndarray of the same shape
+    """
+    with np.errstate(divide="ignore"):
+        return -np.expm1(-np.divide(radius**2, 2 * variance))
