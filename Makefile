@@ -1,4 +1,4 @@
-# make demo and make test set up .venv from requirements.lock first; make test-all runs the slow tests too. Make
+# make demo, make benchmark and make test set up .venv from requirements.lock first; make test-all runs the slow tests too. Make
 # test-integration runs the tests that need PyTorch, an S3 server, validators of other formats, other simulators or Sphinx,
 # in an environment of their own; make docs builds the site there.
 
@@ -6,10 +6,13 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test test-all test-integration docs reference validation lock clean
+.PHONY: demo benchmark test test-all test-integration docs reference validation lock clean
 
 demo: .venv/ready
 	$(BIN)/echotruth run config/demo.yaml
+
+benchmark: .venv/ready  ## the suite that the benchmark's page reports; takes hours, and goes on where it was stopped
+	$(BIN)/echotruth run config/benchmark.yaml
 
 # Two workers; the tests of a module stay on one worker, because they share expensive fixtures.
 test: CHOICE := -m "not slow"
@@ -22,7 +25,7 @@ test test-all: .venv/ready
 
 # tests/docs builds the site.
 INTEGRATION := tests/test_torch.py tests/learning/test_baselines.py tests/description tests/repository/test_upload.py \
-	tests/repository/test_export.py tests/imaging/test_peers.py tests/docs
+	tests/repository/test_export.py tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs
 
 test-integration: .venv-integration/ready
 	.venv-integration/bin/python -m pytest -n 2 --dist loadscope $(INTEGRATION)

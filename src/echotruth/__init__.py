@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from echotruth.imaging.beamforming.scanner import Scanner
     from echotruth.imaging.rf.full_matrix import FullMatrix
     from echotruth.notebook.datasets import heart_dataset
+    from echotruth.notebook.difficulty import difficulty
     from echotruth.notebook.kinematics import kinematics
+    from echotruth.notebook.metrics import clip_metrics
     from echotruth.notebook.point_tracks import point_tracks
     from echotruth.notebook.points import load_points
     from echotruth.notebook.repositories import load_clip, load_heart, open
@@ -42,7 +44,9 @@ __all__ = [
     "TrackerFailed",
     "View",
     "beat",
+    "clip_metrics",
     "configure",
+    "difficulty",
     "evaluate",
     "expand",
     "heart_dataset",
@@ -71,7 +75,9 @@ _ORIGIN = {
     "imaging.beamforming.scanner": ("Scanner",),
     "imaging.rf.full_matrix": ("FullMatrix",),
     "notebook.datasets": ("heart_dataset",),
+    "notebook.difficulty": ("difficulty",),
     "notebook.kinematics": ("kinematics",),
+    "notebook.metrics": ("clip_metrics",),
     "notebook.point_tracks": ("point_tracks",),
     "notebook.points": ("load_points",),
     "notebook.repositories": ("load_clip", "load_heart", "open"),

@@ -76,7 +76,10 @@ def test_missing_file_is_named(tmp_path):
         load(tmp_path / "nowhere.yaml")
 
 
-@pytest.mark.parametrize("name", ["demo", "fimh25", "hearts", "paper", "realistic", "rodero", "sweep"])
+BENCHMARKS = ["benchmark", "benchmark_human", "benchmark_small"]
+
+
+@pytest.mark.parametrize("name", [*BENCHMARKS, "demo", "fimh25", "hearts", "paper", "realistic", "rodero", "sweep"])
 def test_shipped_configurations_are_accepted(name):
     assert load(ROOT / f"config/{name}.yaml").name == name
 

@@ -8,6 +8,7 @@ from difflib import get_close_matches
 
 import echotruth
 from echotruth.cli import (
+    benchmark,
     cases,
     check,
     completion,
@@ -25,7 +26,23 @@ from echotruth.cli import (
 )
 from echotruth.cli.command import Parser, fail
 
-COMMANDS = (new, check, cases, run, status, info, show, evaluate, export, describe, merge, upload, validate, completion)
+COMMANDS = (
+    new,
+    check,
+    cases,
+    run,
+    status,
+    info,
+    show,
+    evaluate,
+    benchmark,
+    export,
+    describe,
+    merge,
+    upload,
+    validate,
+    completion,
+)
 """Modules of the commands, in the order of `echotruth --help`."""
 
 PASSES_ON = "run"

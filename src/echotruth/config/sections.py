@@ -64,6 +64,9 @@ class Config(Section):
         side, rf = self.bmode.field_of_view_mm, self.rf
         for name, tracker in self.tracking.trackers.items():
             self._check_tracker(f"tracking.trackers.{name}", tracker)
+        if self.tracking.frame_step >= self.loop.frames:
+            remedy = f"must be smaller than loop.frames = {self.loop.frames}, so that trackers are given two frames"
+            raise invalid("tracking.frame_step", self.tracking.frame_step, remedy)
         if self.tracking.grid_px > self.bmode.size_px:
             remedy = f"must not exceed the largest image, {self.bmode.size_px} px"
             raise invalid("tracking.grid_px", self.tracking.grid_px, remedy)

@@ -1,0 +1,52 @@
+"""The same work on many clips, in several processes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from typing import TypeVar
+
+from echotruth.evaluation.tracker_options import EvaluationError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def in_processes(function: Callable[[Item], Result], items: Sequence[Item], jobs: int) -> Iterator[Result]:
+    """Apply a function to items, in their order for any number of processes.
+
+    Parameters
+    ----------
+    function : callable
+        Of one item; it and what it returns can be pickled.
+    items : sequence
+    jobs : int
+        Number of processes; with 1, this one.
+
+    Raises
+    ------
+    EvaluationError
+        If `jobs` is less than 1, or a process ends without an exception.
+    """
+    if jobs < 1:
+        raise EvaluationError(f"--jobs {jobs}: must be 1 or more")
+    if jobs == 1:
+        yield from map(function, items)
+        return
+    threads = max(1, (os.cpu_count() or 1) // jobs)
+    with ProcessPoolExecutor(jobs, get_context("spawn"), _limit_threads, (threads,)) as pool:
+        try:
+            yield from pool.map(function, items)
+        except BrokenProcessPool:
+            raise EvaluationError("a process ended without a word: try it with --jobs 1") from None
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _limit_threads(threads: int) -> None:
+    import numba
+
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]  # set at run time

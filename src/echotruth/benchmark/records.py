@@ -1,0 +1,161 @@
+"""What is known of the clips of repositories: labels, metrics of every tracker, and difficulty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from echotruth.benchmark.conditions import with_conditions
+from echotruth.benchmark.parallel import in_processes
+from echotruth.benchmark.splits import TEST
+from echotruth.cases import all_cases
+from echotruth.config import Config
+from echotruth.config.loading import load
+from echotruth.evaluation.clip_metrics import ClipMetrics, clip_metrics
+from echotruth.evaluation.difficulty.table import difficulties
+from echotruth.evaluation.tracker_options import EvaluationError
+from echotruth.repository import ledger
+from echotruth.repository.ledger import record_path
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CLIP = ("repository", "case", "view", "size_px")
+"""Columns that name a clip."""
+
+NEEDED = (*CLIP, "tracker", "split", "true_gls_percent", "true_gcs_percent")
+"""Columns of the tables of repositories of which no clip is evaluated."""
+
+
+@dataclass(frozen=True)
+class Suite:
+    """A repository, and how far it is.
+
+    Attributes
+    ----------
+    folder : Path
+    config : Config
+    complete : list of (case, view)
+        Clips that are tracked and evaluated.
+    expected : int
+        Number of clips that its configuration makes, whatever their sizes.
+    """
+
+    folder: Path
+    config: Config
+    complete: list[tuple[str, str]]
+    expected: int
+
+    @property
+    def name(self) -> str:
+        """Name of the configuration."""
+        return self.config.name
+
+
+@dataclass(frozen=True)
+class Records:
+    """Tables of several repositories, each with the columns `repository` and `species`.
+
+    Attributes
+    ----------
+    suites : list of Suite
+    clips, segments, reliability : DataFrame
+        As :func:`echotruth.evaluation.clip_metrics.clip_metrics` returns them, and columns of
+        :func:`echotruth.benchmark.conditions.with_conditions`.
+    difficulty : DataFrame
+        Columns `CLIP` and those of :func:`echotruth.evaluation.difficulty.difficulty`.
+    """
+
+    suites: list[Suite]
+    clips: pd.DataFrame
+    segments: pd.DataFrame
+    reliability: pd.DataFrame
+    difficulty: pd.DataFrame
+
+    def of_split(self, split: str) -> Records:
+        """The part of one half of the hearts."""
+        clips, segments, sure = (
+            table[table["split"] == split] for table in (self.clips, self.segments, self.reliability)
+        )
+        return Records(self.suites, clips, segments, sure, self.difficulty)
+
+
+def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
+    """Read the records of repositories.
+
+    Parameters
+    ----------
+    repositories : list of Path
+        Folders.
+    sizes : list of int
+        Image sizes to include, px; all if empty.
+    jobs : int
+        Number of processes.
+
+    Raises
+    ------
+    EvaluationError
+        If a folder is no repository, two have one name, or one has no clips of these sizes.
+    """
+    import pandas as pd
+
+    suites = [_suite(folder) for folder in repositories]
+    names = [suite.name for suite in suites]
+    if doubled := next((name for name in names if names.count(name) > 1), ""):
+        raise EvaluationError(f"two repositories have the name {doubled}: give each once")
+    parts: list[tuple[Suite, ClipMetrics]] = []
+    floors = []
+    for suite in suites:
+        chosen = [size for size in suite.config.bmode.sizes if size in (sizes or [size])]
+        if not chosen:
+            raise EvaluationError(f"{suite.folder}: has no images of {sizes[0]} px: use {_listed(suite.config)}")
+        metrics = partial(_metrics, suite.folder, chosen)
+        cases = list(dict.fromkeys(case for case, _ in suite.complete))
+        parts += [(suite, found) for found in in_processes(metrics, cases, jobs)]
+        difficulty = partial(_difficulty, suite.folder)
+        floors += [found.assign(repository=suite.name) for found in in_processes(difficulty, suite.complete, jobs)]
+    several = len(suites) > 1
+    clips, segments, sure = (
+        with_conditions(pd.concat([_of(suite, found[k], several) for suite, found in parts], ignore_index=True))
+        if parts
+        else pd.DataFrame(columns=list(NEEDED))
+        for k in range(3)
+    )
+    difficult = pd.concat(floors, ignore_index=True) if floors else pd.DataFrame(columns=list(CLIP))
+    return Records(suites, clips, segments, sure, difficult)
+
+
+def _suite(folder: Path) -> Suite:
+    """A repository, given its folder or its store."""
+    try:
+        folder = ledger.repository_folder(folder)
+    except FileNotFoundError as error:
+        raise EvaluationError(str(error)) from None
+    config = load(folder / "config.yaml")
+    wanted = [(case, view) for case in all_cases(config) for view in config.views]
+    records = {clip: record_path(folder, "evaluation", *clip) for clip in wanted}
+    complete = [clip for clip, path in records.items() if path.is_file() and ledger.read(path)["status"] == "complete"]
+    return Suite(folder, config, complete, len(wanted))
+
+
+def _listed(config: Config) -> str:
+    return ", ".join(map(str, config.bmode.sizes))
+
+
+def _metrics(folder: Path, sizes: list[int], case: str) -> ClipMetrics:
+    return clip_metrics(folder, cases=[case], sizes=sizes)
+
+
+def _difficulty(folder: Path, clip: tuple[str, str]) -> pd.DataFrame:
+    case, view = clip
+    return difficulties(folder, cases=[case], views=[view])
+
+
+def _of(suite: Suite, table: pd.DataFrame, several: bool) -> pd.DataFrame:
+    """A table of a repository beside those of others: hearts of two repositories may have one name."""
+    species = suite.config.geometry.preset
+    heart = f"{suite.name}/" + table["heart"] if several else table["heart"]
+    split = table["split"].replace("", TEST)
+    return table.assign(repository=suite.name, species=species, heart=heart, split=split)

@@ -1,0 +1,230 @@
+"""A tracker run again on variants of the clips of a repository, with the settings with which it was scored.
+
+The result is `external/NAME.mirrored.json` or `external/NAME.open.json` in the folder of the repository. The truth of a
+clip is read only after the tracker has returned, so that it does not find it in its process.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from echotruth.benchmark.parallel import in_processes
+from echotruth.benchmark.splits import split_of
+from echotruth.benchmark.variants import VARIANTS
+from echotruth.cases import all_cases
+from echotruth.config import Config
+from echotruth.config.loading import load
+from echotruth.evaluation import kept
+from echotruth.evaluation.availability import check_runs
+from echotruth.evaluation.clip import clips
+from echotruth.evaluation.digest import digest
+from echotruth.evaluation.displacement_error import evaluate
+from echotruth.evaluation.run import prepare
+from echotruth.evaluation.scoring import Truth, ground_truth
+from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
+from echotruth.repository import durable, ledger
+from echotruth.repository.ledger import record_path
+from echotruth.section import Section
+from echotruth.tracking.failure import TrackerFailed
+from echotruth.tracking.tracker import track
+from echotruth.workflow.job import Job
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = ("case", "view", "size_px", "clip", "error_percent", "before_percent", "failure")
+"""Columns of the result: error in the variant, and in the same frame of the clip as it was scored, as `nrmse_all` has
+them; the others are those of `external/NAME.csv`."""
+
+Row = dict[str, Any]
+"""One clip, by `COLUMNS`."""
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """A tracker, and variants of the clips of a repository on which it is run.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder of the repository.
+    config : Config
+        Its configuration.
+    tracker : str
+        Name under which it was scored.
+    settings : Section
+        Settings with which it was scored.
+    variant : str
+        One of :data:`echotruth.benchmark.variants.VARIANTS`.
+    split : str
+        Half of the hearts on whose clips it is run.
+    """
+
+    folder: Path
+    config: Config
+    tracker: str
+    settings: Section
+    variant: str
+    split: str
+
+    def case_views(self) -> list[tuple[str, str]]:
+        """Case and view of every clip of the half that the tracker has tracked.
+
+        Raises
+        ------
+        EvaluationError
+            If there is none.
+        """
+        cases = all_cases(self.config).values()
+        chosen = [case.id for case in cases if split_of(case) == self.split]
+        found = [(case, view) for case in chosen for view in self.config.views if self._is_tracked(case, view)]
+        if not found:
+            remedy = "run the repository to its end, or evaluate the tracker again with --keep"
+            raise EvaluationError(
+                f"{self.folder}: {self.tracker} has tracked no clip of the split {self.split}: {remedy}"
+            )
+        return found
+
+    def rows(self, sizes: list[int], jobs: int = 1) -> Iterator[Row]:
+        """Scores of the variants, one row each.
+
+        Parameters
+        ----------
+        sizes : list of int
+            Image sizes, px.
+        jobs : int
+            Number of processes.
+        """
+        for rows in in_processes(partial(_view_rows, self, sizes), self.case_views(), jobs):
+            yield from rows
+
+    def write(self, rows: list[Row]) -> Path:
+        """Write the scores; the file."""
+        path = result_path(self.folder, self.tracker, self.variant)
+        durable.write(path, f"{json.dumps(rows, indent=1)}\n".encode())
+        return path
+
+    def _is_tracked(self, case: str, view: str) -> bool:
+        """Whether what the tracker found in a clip is stored, and the clip is still the same."""
+        is_own = self.tracker in self.config.tracking.trackers
+        stages = ("truth", "bmode", *(("tracking",) if is_own else ()))
+        records = [record_path(self.folder, stage, case, view) for stage in stages]
+        if not all(path.is_file() and ledger.read(path)["status"] == "complete" for path in records):
+            return False
+        return is_own or self.kept_clips.get(f"{case}/{view}") == digest(self.folder, case, view)
+
+    @cached_property
+    def kept_clips(self) -> dict[str, str]:
+        """Digest of every clip of which a tracker from outside has left something, by "CASE/VIEW"."""
+        return dict(kept.KeptStore(kept.store_path(self.folder, self.tracker)).attributes.get("clips", {}))
+
+
+def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun:
+    """Prepare the run of a tracker that was scored on a repository.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository.
+    tracker : str
+        Its name, or `package.module:function` if its name was derived from that.
+    variant, split : str
+        As :class:`Rerun` has them.
+
+    Raises
+    ------
+    EvaluationError
+        If it was not scored, what was scored was not kept, or it cannot run.
+    """
+    config = load(folder / "config.yaml")
+    name = parse_tracker(tracker, None, [])[0] if ":" in tracker else tracker
+    if name in config.tracking.trackers:
+        return Rerun(folder, config, name, config.tracking.trackers[name], variant, split)
+    known = kept.trackers(folder, config)
+    if name not in known:
+        remedy = f"evaluate it with --keep first, or use one of {', '.join(known)}"
+        raise EvaluationError(f"{tracker}: what it found is not kept in {folder}: {remedy}")
+    about = kept.KeptStore(kept.store_path(folder, name)).attributes
+    settings = prepare(folder, name, about["settings"]).settings
+    check_runs(settings)
+    return Rerun(folder, config, name, settings, variant, split)
+
+
+def result_path(folder: Path, tracker: str, variant: str) -> Path:
+    """File of the scores of a tracker on variants of clips, external/NAME.VARIANT.json."""
+    return folder / "external" / f"{tracker}.{variant}.json"
+
+
+def result_of(folder: Path, tracker: str, variant: str) -> pd.DataFrame | None:
+    """Scores of a tracker on variants of clips that have not changed since; None if there are none.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository.
+    tracker, variant : str
+
+    Returns
+    -------
+    DataFrame or None
+        Columns `COLUMNS`.
+
+    Raises
+    ------
+    EvaluationError
+        If the file is not what was written.
+    """
+    import pandas as pd
+
+    path = result_path(folder, tracker, variant)
+    if not path.is_file():
+        return None
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+        table = pd.DataFrame([{name: row[name] for name in COLUMNS} for row in rows], columns=list(COLUMNS))
+        table = table.astype(
+            {"case": str, "view": str, "size_px": int, "error_percent": float, "before_percent": float}
+        )
+    except (ValueError, TypeError, KeyError) as error:
+        raise EvaluationError(f"{path}: is not what was written: delete it, and run {tracker} again") from error
+    clips_of_rows = zip(table["case"], table["view"], table["clip"], strict=True)
+    current = [digest(folder, case, view) == clip for case, view, clip in clips_of_rows]
+    return table[current].reset_index(drop=True)
+
+
+def _view_rows(run: Rerun, sizes: list[int], case_view: tuple[str, str]) -> list[Row]:
+    """Rows of the variants of the clips of one view of one heart."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        job = Job(run.folder, "tracking", *case_view)
+        found: dict[int, tuple[np.ndarray, str, int]] = {}
+        for size, clip in clips(job).items():
+            if size in sizes:
+                variant = VARIANTS[run.variant](clip)
+                try:
+                    estimate, failure = track(*variant.clip.tracker_arguments, run.settings), ""
+                except TrackerFailed as error:
+                    estimate, failure = variant.clip.no_estimate, str(error)
+                found[size] = clip.on_grid(*variant.restored(*estimate))[0], failure, variant.last
+        truth, of_clip = ground_truth(job), digest(run.folder, *case_view)
+        rows = []
+        for size, (displacement, failure, last) in found.items():
+            before = kept.read(job, "tracking", "displacement", tracker=run.tracker, size=size)["displacement"]
+            frame = min(truth.es, last)
+            errors = (_error(values, truth, frame) for values in (displacement, before))
+            rows.append(dict(zip(COLUMNS, (*case_view, size, of_clip, *errors, failure), strict=True)))
+        return rows
+
+
+def _error(displacement: np.ndarray, truth: Truth, frame: int) -> float:
+    """NRMSE in one frame, %, in which points without an estimate count as points that did not move."""
+    tracked = np.asarray(displacement, float)[:, truth.inside]
+    return float(100 * evaluate(tracked, truth.displacement, truth.wall, frame)["nrmse_all"])

@@ -1,0 +1,302 @@
+"""Tables of the page of the benchmark, in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echotruth.benchmark.conditions import PLAIN
+from echotruth.benchmark.records import Suite
+from echotruth.benchmark.splits import DEVELOP, TEST, split_of
+from echotruth.benchmark.standings import RANKED_BY
+from echotruth.cases import Case, all_cases, diagnosis
+from echotruth.repository import ledger
+from echotruth.repository.ledger import record_path
+from echotruth.workflow.job import Job
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NONE = "–"
+"""What stands where there is no value."""
+
+SPACE = "\N{NO-BREAK SPACE}"
+"""Between numbers that stay on one line."""
+
+SLASH = f"{SPACE}/{SPACE}"
+
+COLUMNS = {
+    "delta_avg_percent": ("points within 1–16 px (%)", 1),
+    "average_jaccard_percent": ("average Jaccard (%)", 1),
+    "median_trajectory_error_px256": ("median trajectory error (px)", 2),
+    "flow_epe_px256": ("end-point error of flow (px)", 3),
+    "flow_angular_error_deg": ("angular error (deg)", 1),
+    "segment_peak_error_pp": ("segmental peak strain (pp)", 1),
+    "segment_time_to_peak_error_ms": ("its time (ms)", 1),
+    "segment_strain_rate_error_per_s": ("its rate (1/s)", 2),
+    "drift_um": ("drift (µm)", 1),
+}
+"""Metric -> heading and decimals, at the largest image size."""
+
+
+def markdown(headings: Sequence[str], rows: Iterable[Sequence[str]], text: int = 1) -> str:
+    """A table in Markdown.
+
+    Parameters
+    ----------
+    headings : sequence of str
+    rows : iterable of sequence of str
+    text : int
+        Number of columns that stand to the left of their cells; the others are numbers and stand to the right.
+    """
+    lines = [headings, [*["---"] * text, *["---:"] * (len(headings) - text)], *rows]
+    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def number(value: float, decimals: int = 1) -> str:
+    """A number as text; a dash where it is not known."""
+    # Adding 0 makes 0 of -0.
+    return f"{round(float(value), decimals) + 0.0:.{decimals}f}".replace("-", "−") if np.isfinite(value) else NONE
+
+
+def interval(value: float, low: float, high: float, decimals: int = 1) -> str:
+    """A number with its interval, if it has one."""
+    if not (np.isfinite(value) and np.isfinite(low)):
+        return number(value, decimals)
+    between = "–" if low >= 0 else f"{SPACE}to{SPACE}"  # a dash before a minus sign would be read as one
+    return f"{number(value, decimals)}{SPACE}({number(low, decimals)}{between}{number(high, decimals)})"
+
+
+def rank(row: pd.Series) -> str:
+    """Range of the ranks that the intervals allow."""
+    first, last = row["rank_first"], row["rank_last"]
+    if not np.isfinite(first):
+        return NONE
+    return f"{first:.0f}" if first == last else f"{first:.0f}–{last:.0f}"
+
+
+def progress(suites: list[Suite]) -> str:
+    """How far each repository is."""
+    rows = []
+    for suite in suites:
+        hearts = {str(case.labels.get("heart") or case.id) for case in all_cases(suite.config).values()}
+        done, sizes = len(suite.complete), len(suite.config.bmode.sizes)
+        state = "whole" if done == suite.expected else f"{suite.expected - done} clips are missing"
+        rows.append([f"`{suite.name}`", str(len(hearts)), f"{done} of {suite.expected}", str(sizes), state])
+    return markdown(["repository", "hearts", "clips", "image sizes", "state"], rows)
+
+
+def hearts(suite: Suite, clips: pd.DataFrame) -> str:
+    """Hearts of a repository: half, group, what was changed, variations, and what they do.
+
+    Parameters
+    ----------
+    suite : Suite
+    clips : DataFrame
+        Of the repository, with the columns case, true_gls_percent and true_gcs_percent.
+    """
+    cases = all_cases(suite.config)
+    names = {case: str(of.labels.get("heart") or case) for case, of in cases.items()}
+    strains = clips.groupby("case")[["true_gls_percent", "true_gcs_percent"]].first()
+    rows = []
+    for heart in dict.fromkeys(names.values()):
+        own = [cases[case] for case, name in names.items() if name == heart]
+        first = own[0]
+        group = str(first.labels.get("group") or diagnosis(first.config)).replace("_", " ")
+        found = [str(of.labels.get("variation") or "") for of in own]
+        varied = ", ".join(name.replace("_", " ") for name in dict.fromkeys(found) if name not in PLAIN)
+        known = strains.loc[first.id] if first.id in strains.index else [np.nan, np.nan]
+        measured = [number(100 * ejection_fraction(suite, first.id), 0), *(number(value) for value in known)]
+        rows.append([heart, split_of(first), group, _changes(first), varied, *measured])
+    headings = ["heart", "half", "group", "disease", "variation", "EF (%)", "GLS (%)", "GCS (%)"]
+    return markdown(headings, rows, text=5)
+
+
+def ejection_fraction(suite: Suite, case: str) -> float:
+    """Ejection fraction of a heart; NaN if it was not solved."""
+    path = record_path(suite.folder, "physiology", case)
+    if not path.is_file() or ledger.read(path)["status"] != "complete":
+        return np.nan
+    job = Job(suite.folder, "physiology", case, code="read")
+    return float(job.store.read("physiology", job.row, names=("ejection_fraction",))["ejection_fraction"])
+
+
+def _changes(case: Case) -> str:
+    """Keys of the disease of a heart, and their values."""
+    found = []
+    for key, value in case.parameters.items():
+        section, _, name = key.rpartition(".")
+        if value is not None and (section.startswith("pathology") or name in ("hypertrophy", "dilation")):
+            found.append(f"{name} {value}")
+    return ", ".join(found).replace("'", "")
+
+
+def halves(suite: Suite) -> str:
+    """Number of hearts of each group in each half."""
+    groups: dict[str, dict[str, set[str]]] = {}
+    for case in all_cases(suite.config).values():
+        group = str(case.labels.get("group") or diagnosis(case.config)).replace("_", " ")
+        of_group = groups.setdefault(group, {DEVELOP: set(), TEST: set()})
+        of_group.setdefault(split_of(case), set()).add(str(case.labels.get("heart") or case.id))
+    rows = [[group, *(str(len(parts[name])) for name in (DEVELOP, TEST))] for group, parts in groups.items()]
+    return markdown(["group", "develop", "test"], rows)
+
+
+def condition(standings: pd.DataFrame, name: str) -> str:
+    """Leaderboard of one main condition: ranges of ranks, errors at all sizes, and differences to the first."""
+    of = standings[standings["is_main"] & (standings["condition"] == name) & (standings["metric"] == RANKED_BY)]
+    sizes = sorted(of["size_px"].unique(), reverse=True)
+    errors = {size: of[of["size_px"] == size].set_index("tracker") for size in sizes}
+    rows: list[list[str]] = []
+    for tracker, row in errors[sizes[0]].iterrows():
+        behind = interval(*(row[f"difference{end}"] for end in ("", "_low", "_high")))
+        cells = [_error(errors[size], tracker) for size in sizes]
+        rows.append([f"`{tracker}`", rank(row), *cells, behind if rows else NONE])
+    headings = [*(f"NRMSE at {size} px (%)" for size in sizes), f"less the first, {sizes[0]} px"]
+    return markdown(["tracker", "rank", *headings], rows)
+
+
+def others(standings: pd.DataFrame, name: str, order: list[str]) -> str:
+    """Other metrics of one main condition, at the largest image size."""
+    of = standings[standings["is_main"] & (standings["condition"] == name)]
+    of = of[of["size_px"] == of["size_px"].max()]
+    shown = [metric for metric in COLUMNS if metric in set(of["metric"])]
+    values = of.set_index(["tracker", "metric"])["value"]
+    rows = [
+        [f"`{tracker}`", *(number(values.get((tracker, metric), np.nan), COLUMNS[metric][1]) for metric in shown)]
+        for tracker in order
+    ]
+    return markdown(["tracker", *(COLUMNS[metric][0] for metric in shown)], rows)
+
+
+def _error(table: pd.DataFrame, tracker: object) -> str:
+    """Median error of a tracker with its interval."""
+    if tracker not in table.index:
+        return NONE
+    row = table.loc[tracker]
+    return interval(row["value"], row["low"], row["high"])
+
+
+def by_group(standings: pd.DataFrame, order: list[str]) -> str:
+    """Median errors at all image sizes in the groups."""
+    of = standings[~standings["is_main"] & (standings["metric"] == RANKED_BY)]
+    names, sizes = list(dict.fromkeys(of["condition"])), sorted(of["size_px"].unique(), reverse=True)
+    values = of.set_index(["tracker", "condition", "size_px"])["value"]
+    rows = []
+    for tracker in order:
+        cells = [[number(values.get((tracker, name, size), np.nan)) for size in sizes] for name in names]
+        rows.append([f"`{tracker}`", *map(SLASH.join, cells)])
+    counts = of.groupby("condition")["hearts"].max()
+    return markdown(["tracker", *(f"{name} ({counts[name]})" for name in names)], rows)
+
+
+def by_variation(varied: pd.DataFrame, order: list[str]) -> str:
+    """Median errors at all image sizes under a variation, and of the same hearts without it."""
+    names, sizes = list(dict.fromkeys(varied["variation"])), sorted(varied["size_px"].unique(), reverse=True)
+    values = varied.set_index(["tracker", "variation", "size_px"])[["varied", "plain"]]
+    rows = []
+    for tracker in order:
+        cells = []
+        for name in names:
+            known = [(tracker, name, size) in values.index for size in sizes]
+            of = [values.loc[(tracker, name, size)] if is_ else None for size, is_ in zip(sizes, known, strict=True)]
+            parts = (
+                SLASH.join(NONE if one is None else number(one[what]) for one in of) for what in ("varied", "plain")
+            )
+            cells.append("{} ({})".format(*parts))
+        rows.append([f"`{tracker}`", *cells])
+    counts = varied.groupby("variation")["hearts"].max()
+    return markdown(["tracker", *(f"{name}, {counts[name]} hearts" for name in names)], rows)
+
+
+def ahead(standings: pd.DataFrame) -> str:
+    """Who is first in each main condition, and who is not surely behind."""
+    of = standings[standings["is_main"] & (standings["metric"] == RANKED_BY)]
+    rows = []
+    for (name, size), table in of.groupby(["condition", "size_px"], sort=False):
+        known = table[table["value"].notna()]
+        if known.empty:
+            continue
+        first, rest = known.iloc[0], known.iloc[1:]
+        near = rest[~(rest["difference_low"] > 0)]["tracker"]
+        second = rest.iloc[0] if len(rest) else None
+        lead = NONE if second is None else interval(*(second[f"difference{end}"] for end in ("", "_low", "_high")))
+        told = ", ".join(f"`{tracker}`" for tracker in near) or "nobody"
+        following = NONE if second is None else f"`{second['tracker']}`"
+        rows.append(
+            [f"{name}, {size}{SPACE}px", f"`{first['tracker']}`", number(first["value"]), following, lead, told]
+        )
+    headings = ["condition", "first", "NRMSE (%)", "second", "second less first", "not surely behind"]
+    return markdown(headings, rows, text=2)
+
+
+def agreement(table: pd.DataFrame, order: list[str]) -> str:
+    """Bias and limits of agreement of GLS and GCS."""
+    columns = [
+        (acoustics, size)
+        for acoustics, size in table[["acoustics", "size_px"]].drop_duplicates().itertuples(index=False)
+    ]
+    columns = sorted(columns, key=lambda one: (one[0], -one[1]))
+    found = table.set_index(["tracker", "strain", "acoustics", "size_px"])
+    rows = []
+    for tracker in order:
+        for strain in dict.fromkeys(table["strain"]):
+            cells = []
+            for column in columns:
+                key = (tracker, strain, *column)
+                if key not in found.index:
+                    cells.append(NONE)
+                    continue
+                row = found.loc[key]
+                limits = (
+                    f"{SPACE}[{number(row['lower'])},{SPACE}{number(row['upper'])}]"
+                    if np.isfinite(row["lower"])
+                    else ""
+                )
+                cells.append(number(row["bias"], 2) + limits)
+            rows.append([f"`{tracker}`", strain.upper(), *cells])
+    names = [", ".join(filter(None, [acoustics, f"{size}{SPACE}px"])) for acoustics, size in columns]
+    return markdown(["tracker", "strain", *names], rows)
+
+
+def detection(table: pd.DataFrame, order: list[str]) -> str:
+    """Areas under the curve of the detection of infarcted segments."""
+    columns = sorted(
+        set(table[["acoustics", "size_px"]].itertuples(index=False, name=None)), key=lambda one: (one[0], -one[1])
+    )
+    found = table.set_index(["tracker", "acoustics", "size_px"])
+    rows = []
+    for tracker in order:
+        cells = []
+        for column in columns:
+            if (tracker, *column) not in found.index:
+                cells.append(NONE)
+                continue
+            row = found.loc[(tracker, *column)]
+            inner = f"; {number(row['subendocardial_auc'], 2)}" if np.isfinite(row["subendocardial_auc"]) else ""
+            cells.append(interval(row["auc"], row["auc_low"], row["auc_high"], 2) + inner)
+        rows.append([f"`{tracker}`", *cells])
+    perfect = []
+    for column in columns:
+        of = found.xs(column, level=(1, 2)).iloc[0]
+        perfect.append(f"{number(of['true_auc'], 2)}; {number(of['true_subendocardial_auc'], 2)}")
+    rows.append(["true strain", *perfect])
+    return markdown(["tracker", *(", ".join(filter(None, [one, f"{size}{SPACE}px"])) for one, size in columns)], rows)
+
+
+def difficulty(clips: pd.DataFrame, floors: pd.DataFrame, leader: str) -> str:
+    """Floors and correlations by main condition and size, and the error of the first tracker over the floor."""
+    names = ("floor_plane_percent", "floor_crb_percent", "floor_percent", "correlation_median", "correlation_least")
+    plain = clips[(clips["tracker"] == leader) & clips["variation"].isin(PLAIN)]
+    both = plain.merge(floors, on=["repository", "case", "view", "size_px"])
+    both = both.assign(ratio=both[RANKED_BY] / both["floor_percent"])
+    rows = []
+    for (name, size), of in both.groupby(["condition", "size_px"], sort=False):
+        values = [number(of[column].median(), 1 if column.startswith("floor") else 2) for column in names]
+        rows.append(
+            [f"{name}, {size}{SPACE}px", *values, number(of[RANKED_BY].median()), number(of["ratio"].median(), 1)]
+        )
+    headings = ["perfect tracker of the plane", "Cramér–Rao bound", "floor", "correlation, median", "least"]
+    return markdown(["condition", *headings, f"`{leader}`", "over the floor"], rows)

@@ -1,0 +1,83 @@
+"""A small benchmark with submissions: an honest one, and two that look the truth up."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import benchmark_repository
+import pytest
+
+from echotruth.benchmark import records
+from echotruth.benchmark.page import Page
+from echotruth.benchmark.submission import rerun
+from echotruth.evaluation.run import prepare
+
+SUBMISSIONS = '''
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from echotruth.config.tracking import Dis
+from echotruth.tracking.tracker import track
+from echotruth.workflow.job import Job
+
+
+def honest(frames, points, mask, spacing, frame_time, seed):
+    return track(frames, points, mask, spacing, frame_time, seed, Dis())
+
+
+def reading(frames, points, mask, spacing, frame_time, seed, repository):
+    """The truth of the clip with these images in the store; if there is none, no motion."""
+    for case in ("a_ideal", "b_ideal", "c_ideal"):
+        job = Job(Path(repository), "tracking", case, "mid", code="-")
+        if np.array_equal(job.read("bmode/64", "image")["image"], frames):
+            true = job.read("evaluation", "true_displacement")["true_displacement"][..., :2]
+            return true[:, np.isfinite(true[0, ..., 0])] / spacing
+    return np.zeros((len(frames), *points.shape))
+
+
+def spying(frames, points, mask, spacing, frame_time, seed):
+    """The truth that a function which has called this one holds; if none does, no motion."""
+    caller = sys._getframe()
+    while caller:
+        truth = caller.f_locals.get("truth")
+        if hasattr(truth, "displacement"):
+            return truth.displacement / spacing
+        caller = caller.f_back
+    return np.zeros((len(frames), *points.shape))
+'''
+
+
+NAMES = ("honest", "reading", "spying")
+
+
+@pytest.fixture(scope="session")
+def submitted(tmp_path_factory):
+    """Folder of the repository, in which the submissions are evaluated, kept, and run on mirrored clips."""
+    place = tmp_path_factory.mktemp("benchmark")
+    folder = benchmark_repository.make(place / "bench")
+    (place / "submissions.py").write_text(SUBMISSIONS)
+    sys.path.insert(0, str(place))
+    for name in NAMES:
+        options = {"repository": str(folder)} if name == "reading" else {}
+        settings = {"method": "external", "track": f"submissions:{name}", "options": options}
+        run = prepare(folder, name, settings, keep=True)
+        run.check_writable()
+        cases = [] if name == "honest" else ["a_ideal", "b_ideal"]
+        run.write(list(run.rows(run.case_views(cases, []), run.sizes([]))))
+        assert len(list(rerun([folder], name, "mirrored", "test", []))) == 2
+    yield folder
+    sys.path.remove(str(place))
+
+
+@pytest.fixture(scope="session")
+def page(submitted):
+    """Of the half test."""
+    return Page(records.read([submitted], []), "test")
+
+
+@pytest.fixture
+def repository(submitted, tmp_path) -> Path:
+    """A copy of it, to be changed."""
+    return Path(shutil.copytree(submitted, tmp_path / "bench"))

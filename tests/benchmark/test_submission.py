@@ -1,0 +1,151 @@
+"""Submissions: an honest one passes the checks, those that look the truth up are caught; cards; variants of clips."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from echotruth.benchmark import checks
+from echotruth.benchmark.card import Card, attach, card_of, read
+from echotruth.benchmark.page import EXAMPLE, Page
+from echotruth.benchmark.rerun import result_of
+from echotruth.benchmark.submission import attach_card, rerun
+from echotruth.benchmark.variants import VARIANTS
+from echotruth.config.reading import ConfigError
+from echotruth.evaluation.clip import Clip
+from echotruth.evaluation.tracker_options import EvaluationError
+from echotruth.repository import ledger
+from echotruth.workflow.job import Job
+
+
+def test_honest_tracker_passes_and_is_as_good_on_mirrored_clips(page):
+    verdict = page.verdict("honest")
+    assert verdict.flags == [] and verdict.mirrored.hearts == verdict.clips == 2
+    assert verdict.mirrored.value == pytest.approx(1, abs=0.2)
+    assert verdict.gap == pytest.approx(1)  # all hearts move alike
+    assert page.verdict("submissions:honest").tracker == "submissions_honest"
+
+
+@pytest.mark.parametrize("name", ["reading", "spying"])
+def test_tracker_that_looks_the_truth_up_is_caught(page, name):
+    verdict = page.verdict(name)
+    assert verdict.flags == ["worse on mirrored clips", "impossible accuracy"]
+    assert verdict.mirrored.low > 100 and verdict.impossible == verdict.clips == 2
+    assert name not in page.order and page.withheld[name] == "worse on mirrored clips; impossible accuracy"
+
+
+def test_scores_on_mirrored_clips_of_older_images_do_not_count(repository):
+    assert len(result_of(repository, "honest", "mirrored")) == 2
+    path = repository / "ledger/bmode/a_ideal/mid.json"
+    ledger.commit(path, ledger.read(path) | {"sha256": {"image": "another"}})
+    assert list(result_of(repository, "honest", "mirrored")["case"]) == ["b_ideal"]
+    (repository / "external/honest.mirrored.json").write_text("[1, 2")
+    with pytest.raises(EvaluationError, match=r"honest\.mirrored\.json: is not what was written: delete it"):
+        result_of(repository, "honest", "mirrored")
+
+
+def test_error_of_an_open_clip_is_that_of_its_last_frame(repository):
+    lines = list(rerun([repository], "dis", "open", "test", []))
+    found = result_of(repository, "dis", "open")
+    job = Job(repository, "tracking", "a_ideal", "mid", code="-")
+    stored = job.read("evaluation", "frame_nrmse")["frame_nrmse"][0, 0, 1, -1]  # one of two steps
+    assert len(lines) == 2 and found["before_percent"][0] == pytest.approx(100 * stored, rel=1e-3)
+    assert np.all(found["error_percent"] < 10)
+
+
+@pytest.fixture
+def clip():
+    random = np.random.default_rng(1)
+    size, frames = 24, 9
+    inside = random.random((5, 4)) < 0.6
+    points = random.uniform(2, size - 3, (int(inside.sum()), 2))
+    images = random.integers(256, size=(frames, size, size)).astype(np.uint8)
+    return Clip(images, random.random((size, size)) < 0.5, inside, points, 1e-4, np.arange(frames) * 1e-2, 3, 2)
+
+
+def bright(frames, points, mask):
+    """A tracker that sees its left from its right: the grey level at the point, across and down."""
+    column, row = np.rint(points).astype(int).T
+    return np.stack([frames[:, row, column] * 1.0, mask[row, column] * np.ones((len(frames), 1))], -1)
+
+
+def test_displacement_found_in_a_mirrored_clip_comes_back_with_its_point_and_its_sign(clip):
+    mirror = VARIANTS["mirrored"](clip)
+    frames, points, mask, *_ = mirror.clip.tracker_arguments
+    restored, quality = mirror.restored(bright(frames, points, mask), np.ones((len(frames), len(points))))
+    expected = bright(clip.frames[::2], clip.points, clip.mask)
+    assert np.array_equal(restored, expected * [-1, 1]) and np.all(quality == 1)
+    assert np.all(np.diff(points[:, 1]) >= 0)  # in rows, as the points of any clip
+
+
+def test_open_clip_has_the_first_half_of_the_frames_and_nothing_is_known_of_the_rest(clip):
+    half = VARIANTS["open"](clip)
+    frames, points, mask, _, times, _ = half.clip.tracker_arguments
+    assert np.array_equal(frames, clip.frames[:5:2]) and np.array_equal(times, clip.frame_time[:5:2])
+    restored, _ = half.restored(bright(frames, points, mask), np.ones((3, len(points))))
+    assert np.isfinite(restored[:3]).all() and np.isnan(restored[3:]).all() and len(restored) == 5
+    assert half.last == 4
+
+
+@pytest.mark.parametrize(
+    ("errors", "again", "flagged"),
+    [
+        ([4, 5, 6, 5], [4.1, 4.9, 6.2, 5.1], False),
+        ([4, 5, 6, 5], [8, 9, 13, 9], True),
+        ([4, 5, 6, 5], [40, 5, 6, 5], False),
+    ],
+)
+def test_ratio_is_the_geometric_mean_over_hearts_and_flagged_beyond_its_interval(errors, again, flagged):
+    keys = {"repository": "one", "case": list("abcd"), "view": "mid", "size_px": 128}
+    clips = pd.DataFrame(keys | {"heart": list("abcd")})
+    ratio = checks.paired_ratio(clips, pd.DataFrame(keys | {"error_percent": again, "before_percent": errors}))
+    assert ratio.value == pytest.approx(np.prod(np.array(again) / errors) ** 0.25)
+    assert ratio.low < ratio.value < ratio.high and checks.is_worse(ratio) is flagged
+
+
+def test_card_is_kept_beside_the_scores(repository, tmp_path):
+    file = tmp_path / "card.yaml"
+    file.write_text(yaml.safe_dump(EXAMPLE.model_dump() | {"tracker": "honest"}))
+    assert attach_card([repository], file) == str(repository / "external/honest.card.yaml")
+    assert card_of(repository, "honest") == read(file) and card_of(repository, "reading") is None
+    file.write_text(yaml.safe_dump(EXAMPLE.model_dump() | {"tracker": "onest"}))
+    with pytest.raises(EvaluationError, match="tracker = onest: was not evaluated: use one of honest, reading, spying"):
+        attach_card([repository], file)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"splits_seen": ["tset"]}, "splits_seen.0 = tset: use any of develop and test"),
+        ({"date": "2026-02-30"}, "date = 2026-02-30: must be a day of the calendar, as 2026-11-23"),
+        ({"date": "today"}, "date = today: write it so: Day on which it was scored"),
+        ({"name": "two\nlines"}, "name = two\nlines: must be one line of text"),
+        ({"authors": []}, "authors = \\[\\]: must have at least one entry"),
+        ({"traned_on": "Kubric"}, "traned_on is not a key: did you mean trained_on?"),
+    ],
+)
+def test_what_is_wrong_with_a_card_is_said_in_a_sentence(tmp_path, change, sentence):
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(EXAMPLE.model_dump() | change))
+    with pytest.raises(ConfigError, match=f"^{file}: {sentence}"):
+        read(file)
+
+
+def test_card_without_a_key_is_told_what_the_key_means(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("tracker: mine")
+    with pytest.raises(ConfigError) as error:
+        read(file)
+    assert f"{file}: trained_on is missing: it must be given: Data from which its weights" in str(error.value)
+    assert len(str(error.value).splitlines()) == 7
+
+
+def test_tracker_that_has_seen_test_is_shown_but_not_ranked(page, submitted):
+    path = attach(submitted, Card(**EXAMPLE.model_dump() | {"tracker": "honest", "splits_seen": ["develop", "test"]}))
+    try:
+        again = Page(page.whole, "test")
+    finally:
+        path.unlink()
+    assert page.order == ["dis", "honest"] and again.order == ["dis"]
+    assert again.withheld["honest"] == "its card says that it has seen the half test"
+    assert "honest" not in again.leaderboard() and "honest" in again.everyone

@@ -1,0 +1,79 @@
+"""A small benchmark: hearts that move as rigid bodies, with speckle that moves with them, and labels."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from known_repository import FRAMES, SETTINGS, SHIFT, Known
+from known_repository import _commit as commit
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+import echotruth as et
+from echotruth.cases import expand
+from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.truth import pixel_truth
+from echotruth.repository import ledger
+from echotruth.repository.ledger import GATES, VIEW_STAGES
+from echotruth.repository.publication import publish
+from echotruth.workflow.cost import Cost
+from echotruth.workflow.job import Job
+from echotruth.workflow.scripts import evaluation, tracking
+from echotruth.workflow.scripts.cases import lay_out
+
+TABLE = """case,seed,label.heart,label.split,label.group,label.acoustics,label.variation
+a_ideal,1,a,test,healthy,ideal,none
+b_ideal,2,b,test,dilation,ideal,none
+c_ideal,3,c,develop,healthy,ideal,none
+"""
+
+SIZE = 64
+
+CONFIGURED = SETTINGS | {
+    "name": "bench",
+    "bmode": {"size_px": SIZE, "downsampling": (1,)},
+    "views": {"mid": {"position": 0.5}},
+    "tracking": {"trackers": {"dis": {"method": "dis"}}, "grid_px": 4},
+}
+
+
+@cache
+def moving_speckle() -> np.ndarray:
+    """Speckle that moves with the heart, (frame, axial, lateral), uint8."""
+    texture = gaussian_filter(np.random.default_rng(1).standard_normal((2 * SIZE, 2 * SIZE)), 1.5)
+    spacing = 1e-3 * et.configure(CONFIGURED).bmode.field_of_view_mm / SIZE
+    axial, lateral = np.mgrid[:SIZE, :SIZE] + SIZE / 2
+    shifts = np.linspace(0, 1, FRAMES)[:, None] * SHIFT[:2] / spacing
+    frames = [map_coordinates(texture, [axial - shift[1], lateral - shift[0]], order=3) for shift in shifts]
+    return np.clip(120 + 60 * np.array(frames) / texture.std(), 0, 255).astype(np.uint8)
+
+
+def make(folder: Path) -> Path:
+    """Write the repository as the workflow does; tracking and evaluation are its own."""
+    (folder.parent / "hearts.csv").write_text(TABLE)
+    config = et.configure(CONFIGURED | {"cases": {"file": str(folder.parent / "hearts.csv")}})
+    heart = et.beat(et.configure(config, cases={}), progress=False)
+    cases = expand(config)
+    lay_out(folder, config, cases)
+    made = images_and_truth(Known(folder, config, heart))
+    for case in cases:
+        for stage in GATES:
+            commit(Job(folder, stage, case, code="1"), heart.arrays)
+        for stage in VIEW_STAGES:
+            job = Job(folder, stage, case, "mid", code="1")
+            if work := {"tracking": tracking.work, "evaluation": evaluation.work}.get(stage):
+                job.commit(work(job), Cost())
+            else:
+                commit(job, made)
+    ledger.commit(folder / "ledger/repository.json", publish(folder))
+    return folder
+
+
+def images_and_truth(known: Known) -> dict[str, dict[str, np.ndarray]]:
+    """Arrays of the stages before tracking, by group."""
+    plane = known.plane("mid")
+    arrays = {"phantom": {"origin": plane.origin, "axes": plane.axes}}
+    images, truth = (
+        {"image": moving_speckle()},
+        pixel_truth(known.heart, plane, *pixel_centres(known.config.bmode, SIZE)),
+    )
+    return arrays | {f"bmode/{SIZE}": images, f"truth/{SIZE}": truth}
