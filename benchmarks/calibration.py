@@ -28,7 +28,7 @@ from echotruth.evaluation import reliability
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.clip_metrics import clip_metrics
 from echotruth.evaluation.scoring import ground_truth
-from echotruth.repository import ledger
+from echotruth.evaluation.summary import is_complete
 from echotruth.section import Section
 from echotruth.tracking import accumulation, quality, track
 from echotruth.workflow.job import Job
@@ -123,8 +123,7 @@ def gathered(
 def ready(folder: Path, case: Case) -> Iterator[str]:
     """Views of a case that have images."""
     for view in case.config.views:
-        records = [ledger.record_path(folder, stage, case.id, view) for stage in ("truth", "bmode")]
-        if all(path.is_file() and ledger.read(path)["status"] == "complete" for path in records):
+        if all(is_complete(folder, stage, case.id, view) for stage in ("truth", "bmode")):
             yield view
 
 
@@ -154,10 +153,11 @@ def spread(cases: list[Case], hearts: int | None) -> list[Case]:
 
 
 def table(folder: Path) -> list[str]:
-    """Reliability of the quality in a repository, by tracker and image size."""
+    """Reliability of the quality in a repository, by tracker and image size, over the hearts of test."""
     found = clip_metrics(folder).reliability
-    if "test" in set(found["split"]):
-        found = found[found["split"] == "test"]
+    found = found[found["split"] == "test"]
+    if found.empty:
+        raise SystemExit(f"{folder}: no heart whose label split is test is evaluated: run it to its end")
     steps = sorted(found["quality_low"].unique())
     head = ["tracker", "px", "error, %", *(f"{100 * low:.0f}-{100 * low + 10:.0f}" for low in steps)]
     rows = []

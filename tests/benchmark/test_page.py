@@ -74,6 +74,14 @@ def test_ahead_is_who_is_surely_ahead_in_the_condition():
     assert [tables.rank(ranks.loc[name]) for name in "abc"] == ["1–2", "1–2", "3"]
 
 
+def test_tracker_that_was_evaluated_at_the_smaller_size_only_is_ordered_last():
+    clips = made_clips()
+    smaller = clips.assign(size_px=256)
+    more = smaller[smaller["tracker"] == "a"].assign(tracker="late")
+    table = standings(pd.concat([clips, smaller, more], ignore_index=True))
+    assert order(table) == ["a", "b", "c", "late"]
+
+
 def test_cells_of_a_table_cannot_end_it():
     assert tables.markdown(["a"], [["x | y"]]).splitlines()[-1] == "| x \\| y |"
 
@@ -122,6 +130,14 @@ def test_page_of_a_half_without_results_says_so_and_has_none(page, tmp_path):
     text = empty.write(tmp_path / "page.md", "echotruth benchmark out/bench").read_text()
     assert "No clip" in empty.leaderboard() and not (tmp_path / "page").exists()
     assert "## What is in it" in text and "## Submit your own" in text and "## Leaderboard" not in text
+
+
+def test_scores_that_cannot_be_read_are_told_in_a_sentence(repository, capsys):
+    (repository / "external/honest.csv").write_text("case,view\na_ideal,mid\n")
+    assert run(repository) == 2
+    errors = capsys.readouterr().err
+    assert "external/honest.csv: has no column size_px: evaluate that tracker again" in errors
+    assert "Traceback" not in errors
 
 
 def test_folder_without_a_repository_is_refused(tmp_path, capsys):

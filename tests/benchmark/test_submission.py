@@ -13,6 +13,7 @@ from echotruth.benchmark.submission import attach_card, rerun
 from echotruth.benchmark.variants import VARIANTS
 from echotruth.config.reading import ConfigError
 from echotruth.evaluation.clip import Clip
+from echotruth.evaluation.run import prepare
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import ledger
 from echotruth.workflow.job import Job
@@ -42,6 +43,12 @@ def test_scores_on_mirrored_clips_of_older_images_do_not_count(repository):
     (repository / "external/honest.mirrored.json").write_text("[1, 2")
     with pytest.raises(EvaluationError, match=r"honest\.mirrored\.json: is not what was written: delete it"):
         result_of(repository, "honest", "mirrored")
+
+
+def test_scores_on_mirrored_clips_go_when_the_tracker_is_evaluated_again(repository):
+    prepare(repository, "honest", {"method": "dis"}).write([])
+    assert result_of(repository, "honest", "mirrored") is None
+    assert len(result_of(repository, "reading", "mirrored")) == 2
 
 
 def test_error_of_an_open_clip_is_that_of_its_last_frame(repository):

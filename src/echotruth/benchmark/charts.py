@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from echotruth.benchmark.records import CLIP
-from echotruth.benchmark.standings import RANKED_BY
+from echotruth.evaluation.leaderboard import RANKED_BY
+from echotruth.evaluation.resampling import CLIP
 from echotruth.report import style
 from echotruth.report.style import SIZES
 

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from echotruth.benchmark.records import CLIP, Records, Suite
+from echotruth.benchmark.records import Records, Suite
 from echotruth.benchmark.rerun import result_of
 from echotruth.benchmark.splits import DEVELOP, TEST
-from echotruth.evaluation.resampling import by_heart, draws
+from echotruth.evaluation.leaderboard import RANKED_BY
+from echotruth.evaluation.resampling import CLIP, by_heart, draws, interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -117,7 +118,7 @@ def paired_ratio(clips: pd.DataFrame, again: pd.DataFrame, seed: int = 1) -> Rat
     Parameters
     ----------
     clips : DataFrame
-        Clips that count: columns `CLIP` of :mod:`.records`, and heart.
+        Clips that count: columns `CLIP` of :mod:`echotruth.evaluation.resampling`, and heart.
     again : DataFrame
         As :func:`variants_of` returns it.
     seed : int
@@ -138,10 +139,7 @@ def paired_ratio(clips: pd.DataFrame, again: pd.DataFrame, seed: int = 1) -> Rat
 def _geometric(logarithms: np.ndarray, seed: int) -> Ratio:
     """Geometric mean over hearts of values given as logarithms, with its interval."""
     hearts = len(logarithms)
-    low = high = np.nan
-    if hearts > 1:
-        means = logarithms[draws(hearts, seed)].mean(1)
-        low, high = np.exp(np.quantile(means, (0.025, 0.975)))
+    low, high = np.exp(interval(logarithms[:, None], draws(hearts, seed)))[:, 0]
     return Ratio(float(np.exp(logarithms.mean())), float(low), float(high), hearts)
 
 
@@ -156,7 +154,7 @@ def impossible(clips: pd.DataFrame, difficulty: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     clips : DataFrame
-        Columns `CLIP` of :mod:`.records`, tracker and nrmse_percent.
+        Columns `CLIP` of :mod:`echotruth.evaluation.resampling`, tracker and nrmse_percent.
     difficulty : DataFrame
         Columns `CLIP` and floor_crb_percent.
 
@@ -177,7 +175,7 @@ def split_gap(clips: pd.DataFrame) -> float:
     clips : DataFrame
         Of one tracker and image size, both splits: columns heart, split, tracker and nrmse_all_percent.
     """
-    medians = [by_heart(clips[clips["split"] == split], "nrmse_all_percent").median() for split in (TEST, DEVELOP)]
+    medians = [by_heart(clips[clips["split"] == split], RANKED_BY).median() for split in (TEST, DEVELOP)]
     test, develop = (float(one.iloc[0]) if len(one) else np.nan for one in medians)
     return test / develop if develop > 0 else np.nan
 

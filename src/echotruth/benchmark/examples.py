@@ -14,7 +14,8 @@ from matplotlib.colors import Normalize
 
 from echotruth.arrays import Floats
 from echotruth.evaluation import kept
-from echotruth.evaluation.clip import grid_positions
+from echotruth.evaluation.clip import grid_points
+from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.report import style
 from echotruth.report.clip import round_length, thin
 from echotruth.workflow.job import Job
@@ -68,7 +69,7 @@ def chosen(clips: pd.DataFrame) -> dict[str, pd.Series]:
     dict of Series
         "best", "median" and "worst" to a row; of one clip alone "best" only, of two "best" and "worst".
     """
-    ranked = clips.sort_values(["nrmse_all_percent", "case", "view"], kind="stable")
+    ranked = clips.sort_values([RANKED_BY, "case", "view"], kind="stable")
     places = {"best": 0, "median": (len(ranked) - 1) // 2, "worst": len(ranked) - 1}
     found: dict[int, str] = {}
     for name in ("best", "worst", "median"):
@@ -98,14 +99,14 @@ def example(folder: Path, clip: pd.Series, what: str) -> Example:
     tracked = kept.read(job, "tracking", "displacement", tracker=str(clip["tracker"]), size=size)["displacement"][es]
     true = job.read("evaluation", "true_displacement")["true_displacement"][es, ..., :2]
     spacing = config.bmode.si().field_of_view / size
-    here = grid_positions(config) / spacing + np.array([size / 2, 0]) - 0.5
+    here = grid_points(config, size)
     wall = np.isfinite(true).all(-1)
     here, tracked, true = here[wall], np.asarray(tracked, float)[wall], np.asarray(true, float)[wall]
     shown = thin(here, DISTANCE * size / config.bmode.sizes[0])
     error = 100 * np.linalg.norm(tracked - true, axis=-1) / np.sqrt((true**2).sum(-1).mean())
     places = here + tracked / spacing, here + true / spacing
     image = job.read(f"bmode/{size}", "image")["image"][es]
-    title = f"{what}: {clip['nrmse_all_percent']:.1f} %\n{clip['case']}, {style.title(str(clip['view'])).lower()}"
+    title = f"{what}: {clip[RANKED_BY]:.1f} %\n{clip['case']}, {style.title(str(clip['view'])).lower()}"
     return Example(title, image, spacing, places[0][shown], places[1][shown], error[shown])
 
 

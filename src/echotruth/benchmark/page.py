@@ -17,6 +17,8 @@ from echotruth.benchmark.conditions import MAIN_SPECIES, PLAIN
 from echotruth.benchmark.records import Records
 from echotruth.benchmark.standings import agreement, detections, order, standings, varied
 from echotruth.evaluation import kept, reliability
+from echotruth.evaluation.leaderboard import RANKED_BY
+from echotruth.evaluation.resampling import CLIP
 from echotruth.evaluation.tracker_options import parse_tracker
 from echotruth.repository import durable
 from echotruth.section import Section
@@ -91,7 +93,7 @@ class Page:
             return f"No clip of the half {self.split} is evaluated yet."
         of = self.standings[
             self.standings["is_main"]
-            & (self.standings["metric"] == tables.RANKED_BY)
+            & (self.standings["metric"] == RANKED_BY)
             & (self.standings["size_px"] == self.sizes[0])
         ]
         names = list(dict.fromkeys(of["condition"]))
@@ -160,8 +162,8 @@ class Page:
     def _floors(self) -> pd.DataFrame:
         """Median floor by condition and size."""
         plain = self.records.clips[self.records.clips["variation"].isin(PLAIN)]
-        clips = plain.drop_duplicates(["repository", "case", "view", "size_px"])
-        both = clips.merge(self.records.difficulty, on=["repository", "case", "view", "size_px"])
+        clips = plain.drop_duplicates(list(CLIP))
+        both = clips.merge(self.records.difficulty, on=list(CLIP))
         return both.groupby(["condition", "size_px"], sort=False)["floor_percent"].median().reset_index()
 
     def _introduction(self, command: str) -> dict[str, Any]:
@@ -172,9 +174,7 @@ class Page:
             "command": command,
             "names": ", ".join(f"`{suite.name}`" for suite in suites),
             "split": self.split,
-            "unfinished": " ".join(
-                f"`{one.name}` has {len(one.complete)} of {one.expected} clips." for one in unfinished
-            ),
+            "unfinished": " ".join("`{}` has {} of {} clips.".format(one.name, *one.clips) for one in unfinished),
             "progress": tables.progress(suites),
             "suites": [
                 {

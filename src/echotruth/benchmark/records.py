@@ -8,22 +8,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echotruth.benchmark.conditions import with_conditions
-from echotruth.benchmark.parallel import in_processes
 from echotruth.benchmark.splits import TEST
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.evaluation.clip_metrics import ClipMetrics, clip_metrics
 from echotruth.evaluation.difficulty.table import difficulties
+from echotruth.evaluation.leaderboard import scores_of_guests
+from echotruth.evaluation.parallel import in_processes
+from echotruth.evaluation.resampling import CLIP
+from echotruth.evaluation.summary import is_evaluated
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import ledger
-from echotruth.repository.ledger import record_path
 
 if TYPE_CHECKING:
     import pandas as pd
-
-CLIP = ("repository", "case", "view", "size_px")
-"""Columns that name a clip."""
 
 NEEDED = (*CLIP, "tracker", "split", "true_gls_percent", "true_gcs_percent")
 """Columns of the tables of repositories of which no clip is evaluated."""
@@ -38,9 +37,9 @@ class Suite:
     folder : Path
     config : Config
     complete : list of (case, view)
-        Clips that are tracked and evaluated.
+        Views that are tracked and evaluated.
     expected : int
-        Number of clips that its configuration makes, whatever their sizes.
+        Number of views that its configuration makes.
     """
 
     folder: Path
@@ -52,6 +51,12 @@ class Suite:
     def name(self) -> str:
         """Name of the configuration."""
         return self.config.name
+
+    @property
+    def clips(self) -> tuple[int, int]:
+        """Numbers of clips that are evaluated, and of all: each view has one of every image size."""
+        sizes = len(self.config.bmode.sizes)
+        return sizes * len(self.complete), sizes * self.expected
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,8 @@ class Records:
         As :func:`echotruth.evaluation.clip_metrics.clip_metrics` returns them, and columns of
         :func:`echotruth.benchmark.conditions.with_conditions`.
     difficulty : DataFrame
-        Columns `CLIP` and those of :func:`echotruth.evaluation.difficulty.difficulty`.
+        Columns `CLIP` of :mod:`echotruth.evaluation.resampling`, and those of
+        :func:`echotruth.evaluation.difficulty.floors.difficulty`.
     """
 
     suites: list[Suite]
@@ -97,7 +103,8 @@ def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
     Raises
     ------
     EvaluationError
-        If a folder is no repository, two have one name, or one has no clips of these sizes.
+        If a folder is no repository, two have one name, one has no clips of these sizes, or scores of a tracker from
+        outside cannot be read.
     """
     import pandas as pd
 
@@ -129,15 +136,22 @@ def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
 
 def _suite(folder: Path) -> Suite:
     """A repository, given its folder or its store."""
+    folder = folder_of(folder)
+    config = load(folder / "config.yaml")
     try:
-        folder = ledger.repository_folder(folder)
+        scores_of_guests(folder, config.tracking.trackers)
+    except ValueError as error:
+        raise EvaluationError(str(error)) from None
+    wanted = [(case, view) for case in all_cases(config) for view in config.views]
+    return Suite(folder, config, [clip for clip in wanted if is_evaluated(folder, *clip)], len(wanted))
+
+
+def folder_of(repository: Path) -> Path:
+    """Folder of a repository, given it or its store; EvaluationError if it is none."""
+    try:
+        return ledger.repository_folder(repository)
     except FileNotFoundError as error:
         raise EvaluationError(str(error)) from None
-    config = load(folder / "config.yaml")
-    wanted = [(case, view) for case in all_cases(config) for view in config.views]
-    records = {clip: record_path(folder, "evaluation", *clip) for clip in wanted}
-    complete = [clip for clip, path in records.items() if path.is_file() and ledger.read(path)["status"] == "complete"]
-    return Suite(folder, config, complete, len(wanted))
 
 
 def _listed(config: Config) -> str:

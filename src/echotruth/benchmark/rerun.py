@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from echotruth.benchmark.parallel import in_processes
 from echotruth.benchmark.splits import split_of
 from echotruth.benchmark.variants import VARIANTS
 from echotruth.cases import all_cases
@@ -26,11 +25,12 @@ from echotruth.evaluation.availability import check_runs
 from echotruth.evaluation.clip import clips
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.displacement_error import evaluate
+from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.run import prepare
 from echotruth.evaluation.scoring import Truth, ground_truth
+from echotruth.evaluation.summary import is_complete
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
-from echotruth.repository import durable, ledger
-from echotruth.repository.ledger import record_path
+from echotruth.repository import durable
 from echotruth.section import Section
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
@@ -115,8 +115,7 @@ class Rerun:
         """Whether what the tracker found in a clip is stored, and the clip is still the same."""
         is_own = self.tracker in self.config.tracking.trackers
         stages = ("truth", "bmode", *(("tracking",) if is_own else ()))
-        records = [record_path(self.folder, stage, case, view) for stage in stages]
-        if not all(path.is_file() and ledger.read(path)["status"] == "complete" for path in records):
+        if not all(is_complete(self.folder, stage, case, view) for stage in stages):
             return False
         return is_own or self.kept_clips.get(f"{case}/{view}") == digest(self.folder, case, view)
 

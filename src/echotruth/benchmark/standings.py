@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 from echotruth.benchmark.conditions import PLAIN, groups, main_conditions, variations
 from echotruth.evaluation.agreement import bland_altman
 from echotruth.evaluation.detection import detection
+from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import by_heart, standing
 
 if TYPE_CHECKING:
     import pandas as pd
-
-RANKED_BY = "nrmse_all_percent"
-"""Metric by which trackers are ranked: a point without an estimate counts as one that did not move."""
 
 METRICS = {
     RANKED_BY: False,
@@ -78,9 +76,11 @@ def order(standings: pd.DataFrame) -> list[str]:
 
     A tracker without a median in a condition stands behind those that have one in all of them.
     """
-    largest = standings["size_px"].max()
-    table = standings[standings["is_main"] & (standings["size_px"] == largest) & (standings["metric"] == RANKED_BY)]
-    medians = table.pivot(index="tracker", columns="condition", values="value")
+    main = standings[standings["is_main"] & (standings["metric"] == RANKED_BY)]
+    table = main[main["size_px"] == main["size_px"].max()]
+    # A tracker from outside may have been evaluated at smaller sizes only.
+    medians = table.pivot(index="tracker", columns="condition", values="value").reindex(main["tracker"].unique())
+    medians = medians.rename_axis("tracker")
     means = medians.mean(axis=1, skipna=False)
     keys = means.to_frame("mean").assign(partial=medians.mean(axis=1)).reset_index()
     return list(keys.sort_values(["mean", "partial", "tracker"], na_position="last", kind="stable")["tracker"])

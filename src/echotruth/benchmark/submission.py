@@ -6,18 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from echotruth.benchmark.card import attach, read
+from echotruth.benchmark.records import folder_of
 from echotruth.benchmark.rerun import Row, prepare_rerun
 from echotruth.config.loading import load
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.repository import ledger
-
-
-def folder_of(repository: Path) -> Path:
-    """Folder of a repository, given it or its store; EvaluationError if it is none."""
-    try:
-        return ledger.repository_folder(repository)
-    except FileNotFoundError as error:
-        raise EvaluationError(str(error)) from None
 
 
 def attach_card(repositories: list[Path], path: Path) -> str:

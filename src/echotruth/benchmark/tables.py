@@ -10,10 +10,11 @@ import numpy as np
 from echotruth.benchmark.conditions import PLAIN
 from echotruth.benchmark.records import Suite
 from echotruth.benchmark.splits import DEVELOP, TEST, split_of
-from echotruth.benchmark.standings import RANKED_BY
 from echotruth.cases import Case, all_cases, diagnosis
-from echotruth.repository import ledger
-from echotruth.repository.ledger import record_path
+from echotruth.evaluation.clip_metrics import hearts_of
+from echotruth.evaluation.leaderboard import RANKED_BY
+from echotruth.evaluation.resampling import CLIP
+from echotruth.evaluation.summary import is_complete
 from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
@@ -81,10 +82,10 @@ def progress(suites: list[Suite]) -> str:
     """How far each repository is."""
     rows = []
     for suite in suites:
-        hearts = {str(case.labels.get("heart") or case.id) for case in all_cases(suite.config).values()}
-        done, sizes = len(suite.complete), len(suite.config.bmode.sizes)
-        state = "whole" if done == suite.expected else f"{suite.expected - done} clips are missing"
-        rows.append([f"`{suite.name}`", str(len(hearts)), f"{done} of {suite.expected}", str(sizes), state])
+        names = set(hearts_of(all_cases(suite.config)).values())
+        (done, wanted), sizes = suite.clips, len(suite.config.bmode.sizes)
+        state = "whole" if done == wanted else f"{wanted - done} clips are missing"
+        rows.append([f"`{suite.name}`", str(len(names)), f"{done} of {wanted}", str(sizes), state])
     return markdown(["repository", "hearts", "clips", "image sizes", "state"], rows)
 
 
@@ -98,7 +99,7 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
         Of the repository, with the columns case, true_gls_percent and true_gcs_percent.
     """
     cases = all_cases(suite.config)
-    names = {case: str(of.labels.get("heart") or case) for case, of in cases.items()}
+    names = hearts_of(cases)
     strains = clips.groupby("case")[["true_gls_percent", "true_gcs_percent"]].first()
     rows = []
     for heart in dict.fromkeys(names.values()):
@@ -116,8 +117,7 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
 
 def ejection_fraction(suite: Suite, case: str) -> float:
     """Ejection fraction of a heart; NaN if it was not solved."""
-    path = record_path(suite.folder, "physiology", case)
-    if not path.is_file() or ledger.read(path)["status"] != "complete":
+    if not is_complete(suite.folder, "physiology", case):
         return np.nan
     job = Job(suite.folder, "physiology", case, code="read")
     return float(job.store.read("physiology", job.row, names=("ejection_fraction",))["ejection_fraction"])
@@ -136,10 +136,12 @@ def _changes(case: Case) -> str:
 def halves(suite: Suite) -> str:
     """Number of hearts of each group in each half."""
     groups: dict[str, dict[str, set[str]]] = {}
-    for case in all_cases(suite.config).values():
+    cases = all_cases(suite.config)
+    names = hearts_of(cases)
+    for case in cases.values():
         group = str(case.labels.get("group") or diagnosis(case.config)).replace("_", " ")
         of_group = groups.setdefault(group, {DEVELOP: set(), TEST: set()})
-        of_group.setdefault(split_of(case), set()).add(str(case.labels.get("heart") or case.id))
+        of_group.setdefault(split_of(case), set()).add(names[case.id])
     rows = [[group, *(str(len(parts[name])) for name in (DEVELOP, TEST))] for group, parts in groups.items()]
     return markdown(["group", "develop", "test"], rows)
 
@@ -290,7 +292,7 @@ def difficulty(clips: pd.DataFrame, floors: pd.DataFrame, leader: str) -> str:
     """Floors and correlations by main condition and size, and the error of the first tracker over the floor."""
     names = ("floor_plane_percent", "floor_crb_percent", "floor_percent", "correlation_median", "correlation_least")
     plain = clips[(clips["tracker"] == leader) & clips["variation"].isin(PLAIN)]
-    both = plain.merge(floors, on=["repository", "case", "view", "size_px"])
+    both = plain.merge(floors, on=list(CLIP))
     both = both.assign(ratio=both[RANKED_BY] / both["floor_percent"])
     rows = []
     for (name, size), of in both.groupby(["condition", "size_px"], sort=False):

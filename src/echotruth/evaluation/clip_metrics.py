@@ -141,7 +141,7 @@ def clip_metrics(
     guests = scores_of_guests(folder, config.tracking.trackers)
     known = [*kept.trackers(folder, config), *(name for name in guests["tracker"].unique())]
     chosen_trackers = chosen("tracker", trackers, list(dict.fromkeys(known)))
-    hearts = _hearts(by_id)
+    hearts = hearts_of(by_id)
     found: tuple[list[Row], list[Row], list[Row]] = ([], [], [])
     for case in chosen("case", cases, list(by_id)):
         for view in (view for view in chosen_views if is_evaluated(folder, case, view)):
@@ -325,7 +325,7 @@ def _unit(config: Config) -> float:
     return config.bmode.si().field_of_view / point_tracks.SIDE
 
 
-def _hearts(cases: dict[str, Case]) -> dict[str, str]:
+def hearts_of(cases: dict[str, Case]) -> dict[str, str]:
     """Heart of every case: its label; without one, that of the first case with the same motion, or the name of that."""
     motion = motions({name: case.config for name, case in cases.items()})
     first: dict[str, str] = {}

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
@@ -26,10 +23,10 @@ from echotruth.config.loading import load, validate
 from echotruth.evaluation import kept
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.digest import digest
+from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
+from echotruth.evaluation.summary import is_complete
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.repository import ledger
-from echotruth.repository.ledger import record_path
 from echotruth.section import Name, Section
 from echotruth.tracking.external_program import in_one_line
 from echotruth.tracking.failure import TrackerFailed
@@ -111,30 +108,13 @@ class EvaluationRun:
         EvaluationError
             If `jobs` is less than 1, or the tracker ends its process without an exception.
         """
-        if jobs < 1:
-            raise EvaluationError(f"--jobs {jobs}: must be 1 or more")
+        ended = f"{self.name} ended its process and cannot be scored: run it as a program, with --command"
         try:
-            yield from self._rows(case_views, sizes, jobs)
+            for rows in in_processes(partial(_score_view, self, sizes), case_views, jobs, ended):
+                yield from rows
         except BaseException:  # also when nobody asks for the rest of the rows
             self.keeping.discard()
             raise
-
-    def _rows(self, case_views: list[tuple[str, str]], sizes: list[int], jobs: int) -> Iterator[Row]:
-        score_view = partial(_score_view, self, sizes)
-        if jobs == 1:
-            for case_view in case_views:
-                yield from score_view(case_view)
-            return
-        threads = max(1, (os.cpu_count() or 1) // jobs)
-        with ProcessPoolExecutor(jobs, get_context("spawn"), _limit_threads, (threads,)) as pool:
-            try:
-                for rows in pool.map(score_view, case_views):
-                    yield from rows
-            except BrokenProcessPool:
-                remedy = "run it as a program, with --command"
-                raise EvaluationError(f"{self.name} ended its process and cannot be scored: {remedy}") from None
-            finally:
-                pool.shutdown(cancel_futures=True)
 
     def check_writable(self) -> None:
         """Make the folder of the scores, and the arrays to be kept; EvaluationError if they cannot be written there."""
@@ -148,7 +128,8 @@ class EvaluationRun:
     def write(self, rows: list[Row]) -> pd.DataFrame:
         """Write the scores atomically, and give what is kept its name; they replace earlier ones of the same name.
 
-        What an earlier evaluation of this name kept is removed also if nothing is kept now: it is not what was scored.
+        What an earlier evaluation of this name kept is removed also if nothing is kept now, and so are its scores on
+        variants of the clips (:mod:`echotruth.benchmark.rerun`): they are not of what was scored.
         """
         import pandas as pd
 
@@ -161,6 +142,8 @@ class EvaluationRun:
                 self.keeping.publish(clips, self.settings.model_dump(mode="json"))
             else:
                 kept.remove(self.folder, self.name)
+            for earlier in self.file.parent.glob(f"{self.name}.*.json"):
+                earlier.unlink()
             draft.replace(self.file)
         return table
 
@@ -185,8 +168,7 @@ class EvaluationRun:
         return [item for item in known if item in chosen or not chosen]
 
     def _is_complete(self, case: str, view: str) -> bool:
-        records = [record_path(self.folder, stage, case, view) for stage in ("truth", "bmode")]
-        return all(path.is_file() and ledger.read(path)["status"] == "complete" for path in records)
+        return all(is_complete(self.folder, stage, case, view) for stage in ("truth", "bmode"))
 
 
 def prepare(repository: Path, name: str, values: dict[str, Any], keep: bool = False) -> EvaluationRun:
@@ -224,12 +206,6 @@ def prepare(repository: Path, name: str, values: dict[str, Any], keep: bool = Fa
     tracking = {"grid_px": config.tracking.grid_px, "trackers": {name: values}}
     checked = validate(config.model_dump() | {"tracking": tracking}, f"tracker {name}")
     return EvaluationRun(folder, config, name, checked.tracking.trackers[name], keep)
-
-
-def _limit_threads(threads: int) -> None:
-    import numba
-
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]  # set at run time
 
 
 def _score_view(run: EvaluationRun, sizes: list[int], case_view: tuple[str, str]) -> list[Row]:

@@ -204,7 +204,12 @@ def _means(rows: list[Row], config: Config, keys: Row) -> Iterator[Row]:
 
 def is_evaluated(folder: Path, case: str, view: str) -> bool:
     """Whether the trackers of a repository were evaluated on a view of a heart."""
-    path = record_path(folder, "evaluation", case, view)
+    return is_complete(folder, "evaluation", case, view)
+
+
+def is_complete(folder: Path, stage: str, case: str, view: str | None = None) -> bool:
+    """Whether a stage of a heart, or of one of its views, is complete."""
+    path = record_path(folder, stage, case, view)
     return path.is_file() and ledger.read(path).get("status") == "complete"
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-NOISE_AREA = 0.06
+NOISE_AREA = 0.1
 """Area over which residuals count once, over the correlation area of the speckle. Residuals of neighbouring pixels are
 correlated; what is left of them after a fit is more so than the noise is, thus less than 1."""
 PRIOR_UNKNOWNS = 60.0
@@ -69,7 +69,7 @@ class Match:
     def variance(self, pixel_density: float) -> float:
         """Variance v of a pixel as if all were independent: the noise times the pixels whose residual counts once.
 
-        The correlation area of the speckle is 4 pi var(T) / (2 mean(g^2)) px, with the derivative g along either axis:
+        The correlation area of the speckle is 2 pi var(T) / mean(g^2) px^2, with the derivative g along either axis:
         a Gaussian correlation function exp(-x^2 / 2 l^2) has the mean square derivative var(T) / l^2 and the area
         2 pi l^2. The pixels per px^2 are `pixel_density`.
         """
@@ -80,6 +80,8 @@ class Match:
 
 def energy_weight(variance: float, told: float, energy: float, square: float) -> float:
     """Weight beta = v (gamma + a) / (E + a E_0) of the bending energy.
+
+    The prior counts for a = `PRIOR_UNKNOWNS` unknowns, of which each has the energy E_0 = `UNEVENNESS` times `square`.
 
     Parameters
     ----------

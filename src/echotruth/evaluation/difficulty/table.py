@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echotruth.cases import all_cases, expand
+from echotruth.cases import expand
 from echotruth.config.loading import load
 from echotruth.evaluation.difficulty.floors import COLUMNS, PARAMETERS, Row, difficulty
 from echotruth.evaluation.digest import digest
-from echotruth.repository import durable, ledger
-from echotruth.repository.ledger import record_path
+from echotruth.evaluation.summary import chosen, is_complete
+from echotruth.repository import durable
 from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
@@ -51,22 +51,13 @@ def difficulties(folder: Path, cases: Sequence[str] | None = None, views: Sequen
     import pandas as pd
 
     config = load(folder / "config.yaml")
-    known = {"case": list(all_cases(config)), "view": list(config.views)}
-    for what, chosen in (("case", cases), ("view", views)):
-        if unknown := [name for name in chosen or () if name not in known[what]]:
-            raise ValueError(f"{what} = {unknown[0]!r}: use one of {', '.join(known[what][:20])}.")
+    by_id = {case.id: case for case in expand(config, str(folder / "config.yaml"))}
     rows: list[Row] = []
-    for case in expand(config, str(folder / "config.yaml")):
-        for view in config.views:
-            wanted = case.id in (cases or [case.id]) and view in (views or [view])
-            if wanted and all(_is_complete(folder, stage, case.id, view) for stage in ("truth", "bmode")):
+    for case in (by_id[name] for name in chosen("case", cases, list(by_id))):
+        for view in chosen("view", views, list(config.views)):
+            if all(is_complete(folder, stage, case.id, view) for stage in ("truth", "bmode")):
                 rows += _kept(Job(folder, "tracking", case, view, code="read"))
     return pd.DataFrame(rows, columns=list(COLUMNS))
-
-
-def _is_complete(folder: Path, stage: str, case: str, view: str) -> bool:
-    path = record_path(folder, stage, case, view)
-    return path.is_file() and ledger.read(path).get("status") == "complete"
 
 
 def _kept(job: Job) -> list[Row]:

@@ -14,8 +14,13 @@ from echotruth.evaluation.tracker_options import EvaluationError
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+ENDED = "a process ended without a word: try it with --jobs 1"
+"""What is said of a process that ends without an exception, unless something else is."""
 
-def in_processes(function: Callable[[Item], Result], items: Sequence[Item], jobs: int) -> Iterator[Result]:
+
+def in_processes(
+    function: Callable[[Item], Result], items: Sequence[Item], jobs: int, ended: str = ENDED
+) -> Iterator[Result]:
     """Apply a function to items, in their order for any number of processes.
 
     Parameters
@@ -25,6 +30,8 @@ def in_processes(function: Callable[[Item], Result], items: Sequence[Item], jobs
     items : sequence
     jobs : int
         Number of processes; with 1, this one.
+    ended : str
+        What to say if a process ends without an exception.
 
     Raises
     ------
@@ -41,7 +48,7 @@ def in_processes(function: Callable[[Item], Result], items: Sequence[Item], jobs
         try:
             yield from pool.map(function, items)
         except BrokenProcessPool:
-            raise EvaluationError("a process ended without a word: try it with --jobs 1") from None
+            raise EvaluationError(ended) from None
         finally:
             pool.shutdown(cancel_futures=True)
 
