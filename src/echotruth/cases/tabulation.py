@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 
 def table(cases: list[Case]) -> pd.DataFrame:
-    """Table with one row per case: its id, its seed, diagnosis, labels and note, and every key that can be swept."""
+    """Table with one row per case: its id, its seed, diagnosis, labels and note, and every key that can be swept.
+
+    Keys of views are left out where all cases have the same value: a view may leave a repository and return.
+    """
     import pandas as pd
 
     columns: dict[str, list[Any]] = {"case": [case.id for case in cases], "seed": [case.config.seed for case in cases]}
@@ -23,7 +26,8 @@ def table(cases: list[Case]) -> pd.DataFrame:
     for name in Config.model_fields:
         if name == "views":
             for view in cases[0].config.views:
-                columns |= _columns(f"views.{view}", [case.config.views[view] for case in cases])
+                keys = _columns(f"views.{view}", [case.config.views[view] for case in cases])
+                columns |= {key: values for key, values in keys.items() if len(set(values)) > 1}
         elif isinstance(getattr(cases[0].config, name), Section) and name != "cases":
             columns |= _columns(name, [getattr(case.config, name) for case in cases])
     return pd.DataFrame(columns)
