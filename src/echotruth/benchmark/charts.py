@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from echotruth.evaluation.leaderboard import RANKED_BY
@@ -95,19 +96,17 @@ def draw_floors(path: Path, clips: pd.DataFrame, difficulty: pd.DataFrame, order
         The file.
     """
     both = clips.merge(difficulty[[*CLIP, "floor_percent"]], on=list(CLIP))
-    sizes = sorted(both["size_px"].unique(), reverse=True)[:3]
-    figure = style.figure(0.9 + 2.5 * len(sizes), 3.4)
-    panels = figure.subplots(1, len(sizes), sharex=True, sharey=True, squeeze=False)[0]
-    for panel, size in zip(panels, sizes, strict=True):
+    figure, panels = _panels(both)
+    for size, panel in panels.items():
         for k, tracker in reversed(list(enumerate(order))):
             of = both[(both["size_px"] == size) & (both["tracker"] == tracker)]
             panel.plot(of["floor_percent"], of[RANKED_BY], "o", color=style.series_colour(k), markersize=3.5, alpha=0.8)
-        panel.set_title(f"{size} px")
         panel.set_xlabel("floor of the clip (%)")
-    panels[0].set_ylabel("NRMSE at ES (%)")
-    style.plain_logarithmic(panels[0], "x", both["floor_percent"].to_numpy(float))
-    style.plain_logarithmic(panels[0], "y", both[both["tracker"].isin(order)][RANKED_BY].to_numpy(float))
-    for panel in panels:
+    first = next(iter(panels.values()))
+    first.set_ylabel("NRMSE at ES (%)")
+    style.plain_logarithmic(first, "x", both["floor_percent"].to_numpy(float))
+    style.plain_logarithmic(first, "y", both[both["tracker"].isin(order)][RANKED_BY].to_numpy(float))
+    for panel in panels.values():
         (left, right), (low, high) = panel.get_xlim(), panel.get_ylim()
         ends = np.array([min(left, low), max(right, high)])
         panel.plot(ends, ends, color=style.MUTED, linewidth=0.9, linestyle="--")
@@ -117,7 +116,7 @@ def draw_floors(path: Path, clips: pd.DataFrame, difficulty: pd.DataFrame, order
         for k, tracker in enumerate(order)
     ]
     line = Line2D([], [], color=style.MUTED, ls="--", linewidth=0.9, label="error = floor")
-    figure.legend(handles=[*marks, line], loc="outside lower center", ncols=2 * len(sizes))
+    figure.legend(handles=[*marks, line], loc="outside lower center", ncols=2 * len(panels))
     return style.save(figure, path, dpi=120)
 
 
@@ -139,24 +138,31 @@ def draw_reliability(path: Path, curves: pd.DataFrame, order: list[str]) -> Path
     Path
         The file.
     """
-    sizes = sorted(curves["size_px"].unique(), reverse=True)[:3]
-    figure = style.figure(0.9 + 2.5 * len(sizes), 3.4)
-    panels = figure.subplots(1, len(sizes), sharex=True, sharey=True, squeeze=False)[0]
-    for panel, size in zip(panels, sizes, strict=True):
+    figure, panels = _panels(curves)
+    for size, panel in panels.items():
         panel.plot([0, 100], [0, 100], color=style.MUTED, linewidth=0.9, linestyle="--")
         for k, tracker in reversed(list(enumerate(order))):
             of = curves[(curves["size_px"] == size) & (curves["tracker"] == tracker) & (curves["count"] > 0)]
             _curve(panel, of, style.series_colour(k))
-        panel.set_title(f"{size} px")
         panel.set_xlabel("stated quality (%)")
         panel.set(xlim=(0, 100), ylim=(0, 100))
-    panels[0].set_ylabel("points within 1/256 of the image (%)")
+    next(iter(panels.values())).set_ylabel("points within 1/256 of the image (%)")
     marks = [
         Line2D([], [], color=style.series_colour(k), marker="o", markersize=3, linewidth=1.2, label=tracker)
         for k, tracker in enumerate(order)
     ]
-    figure.legend(handles=marks, loc="outside lower center", ncols=2 * len(sizes))
+    figure.legend(handles=marks, loc="outside lower center", ncols=2 * len(panels))
     return style.save(figure, path, dpi=120)
+
+
+def _panels(table: pd.DataFrame) -> tuple[Figure, dict[int, Axes]]:
+    """Figure with a panel for each image size of a table, three at most, the largest first."""
+    sizes = sorted(table["size_px"].unique(), reverse=True)[:3]
+    figure = style.figure(0.9 + 2.5 * len(sizes), 3.4)
+    panels = figure.subplots(1, len(sizes), sharex=True, sharey=True, squeeze=False)[0]
+    for panel, size in zip(panels, sizes, strict=True):
+        panel.set_title(f"{size} px")
+    return figure, dict(zip(sizes, panels, strict=True))
 
 
 def _curve(axes: Axes, of: pd.DataFrame, colour: str) -> None:

@@ -143,10 +143,10 @@ class Page:
         charts.draw_floors(folder / "floors.png", clips, self.records.difficulty, first)
         charts.draw_reliability(folder / "reliability.png", reliability.curve(self.records.reliability), first)
         folders = {suite.name: suite.folder for suite in self.records.suites}
+        stored = {name for suite in self.records.suites for name in kept.trackers(suite.folder, suite.config)}
         found = []
         for tracker in self.everyone:
             of = clips[(clips["tracker"] == tracker) & (clips["size_px"] == self.sizes[0])]
-            stored = [name for suite in self.records.suites for name in kept.trackers(suite.folder, suite.config)]
             if tracker not in stored or of.empty:
                 continue
             rows = examples.chosen(of)
@@ -260,7 +260,9 @@ class Page:
             largest = of[of["size_px"] == self.sizes[0]]
             failed = int((of["failure"] != "").sum())
             cells = [f"{failed} of {len(of)}", tables.number(largest["coverage_percent"].median())]
-            open_ = [self._ratio(tracker, "open", of[of["size_px"] == size]) for size in self.sizes]
+            again = checks.variants_of(self.records.suites, tracker, "open")
+            sizes = (of[of["size_px"] == size] for size in self.sizes)
+            open_ = [None if again is None else checks.paired_ratio(of_size, again) for of_size in sizes]
             rows.append([f"`{tracker}`", tables.number(largest["drift_um"].median()), *cells, *map(_shown, open_)])
         headings = ["tracker", "drift (µm)", "clips failed", "tissue tracked (%)"]
         return tables.markdown([*headings, *(f"open, {size} px" for size in self.sizes)], rows)
@@ -280,10 +282,6 @@ class Page:
                 [f"`{found.tracker}`", _shown(found.mirrored), counted, tables.number(found.gap, 2), "; ".join(words)]
             )
         return tables.markdown(["tracker", "mirrored", "impossible", "test / develop", "verdict"], rows)
-
-    def _ratio(self, tracker: str, variant: str, clips: pd.DataFrame) -> checks.Ratio | None:
-        again = checks.variants_of(self.records.suites, tracker, variant)
-        return None if again is None else checks.paired_ratio(clips, again)
 
 
 def _settings(settings: Section) -> str:

@@ -119,8 +119,9 @@ def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
         if not chosen:
             raise EvaluationError(f"{suite.folder}: has no images of {sizes[0]} px: use {_listed(suite.config)}")
         metrics = partial(_metrics, suite.folder, chosen)
-        cases = list(dict.fromkeys(case for case, _ in suite.complete))
-        parts += [(suite, found) for found in in_processes(metrics, cases, jobs)]
+        # A share for each process: what all cases have in common is read once in each.
+        shares = _shares(list(dict.fromkeys(case for case, _ in suite.complete)), jobs)
+        parts += [(suite, found) for found in in_processes(metrics, shares, jobs)]
         difficulty = partial(_difficulty, suite.folder)
         floors += [found.assign(repository=suite.name) for found in in_processes(difficulty, suite.complete, jobs)]
     several = len(suites) > 1
@@ -158,8 +159,14 @@ def _listed(config: Config) -> str:
     return ", ".join(map(str, config.bmode.sizes))
 
 
-def _metrics(folder: Path, sizes: list[int], case: str) -> ClipMetrics:
-    return clip_metrics(folder, cases=[case], sizes=sizes)
+def _shares(cases: list[str], number: int) -> list[list[str]]:
+    """Cases in their order in as many parts of one size, the last of which may be smaller; none of no cases."""
+    size = -(-len(cases) // max(1, number))
+    return [cases[start : start + size] for start in range(0, len(cases), max(1, size))]
+
+
+def _metrics(folder: Path, sizes: list[int], cases: list[str]) -> ClipMetrics:
+    return clip_metrics(folder, cases=cases, sizes=sizes)
 
 
 def _difficulty(folder: Path, clip: tuple[str, str]) -> pd.DataFrame:

@@ -153,7 +153,7 @@ def condition(standings: pd.DataFrame, name: str) -> str:
     errors = {size: of[of["size_px"] == size].set_index("tracker") for size in sizes}
     rows: list[list[str]] = []
     for tracker, row in errors[sizes[0]].iterrows():
-        behind = interval(*(row[f"difference{end}"] for end in ("", "_low", "_high")))
+        behind = _difference(row)
         cells = [_error(errors[size], tracker) for size in sizes]
         rows.append([f"`{tracker}`", rank(row), *cells, behind if rows else NONE])
     headings = [*(f"NRMSE at {size} px (%)" for size in sizes), f"less the first, {sizes[0]} px"]
@@ -171,6 +171,11 @@ def others(standings: pd.DataFrame, name: str, order: list[str]) -> str:
         for tracker in order
     ]
     return markdown(["tracker", *(COLUMNS[metric][0] for metric in shown)], rows)
+
+
+def _difference(row: pd.Series) -> str:
+    """Difference of a tracker to the first with its interval."""
+    return interval(*(row[f"difference{end}"] for end in ("", "_low", "_high")))
 
 
 def _error(table: pd.DataFrame, tracker: object) -> str:
@@ -224,7 +229,7 @@ def ahead(standings: pd.DataFrame) -> str:
         first, rest = known.iloc[0], known.iloc[1:]
         near = rest[~(rest["difference_low"] > 0)]["tracker"]
         second = rest.iloc[0] if len(rest) else None
-        lead = NONE if second is None else interval(*(second[f"difference{end}"] for end in ("", "_low", "_high")))
+        lead = NONE if second is None else _difference(second)
         told = ", ".join(f"`{tracker}`" for tracker in near) or "nobody"
         following = NONE if second is None else f"`{second['tracker']}`"
         rows.append(
@@ -236,11 +241,7 @@ def ahead(standings: pd.DataFrame) -> str:
 
 def agreement(table: pd.DataFrame, order: list[str]) -> str:
     """Bias and limits of agreement of GLS and GCS."""
-    columns = [
-        (acoustics, size)
-        for acoustics, size in table[["acoustics", "size_px"]].drop_duplicates().itertuples(index=False)
-    ]
-    columns = sorted(columns, key=lambda one: (one[0], -one[1]))
+    columns = _imaged(table)
     found = table.set_index(["tracker", "strain", "acoustics", "size_px"])
     rows = []
     for tracker in order:
@@ -259,15 +260,12 @@ def agreement(table: pd.DataFrame, order: list[str]) -> str:
                 )
                 cells.append(number(row["bias"], 2) + limits)
             rows.append([f"`{tracker}`", strain.upper(), *cells])
-    names = [", ".join(filter(None, [acoustics, f"{size}{SPACE}px"])) for acoustics, size in columns]
-    return markdown(["tracker", "strain", *names], rows)
+    return markdown(["tracker", "strain", *map(_imaging, columns)], rows)
 
 
 def detection(table: pd.DataFrame, order: list[str]) -> str:
     """Areas under the curve of the detection of infarcted segments."""
-    columns = sorted(
-        set(table[["acoustics", "size_px"]].itertuples(index=False, name=None)), key=lambda one: (one[0], -one[1])
-    )
+    columns = _imaged(table)
     found = table.set_index(["tracker", "acoustics", "size_px"])
     rows = []
     for tracker in order:
@@ -285,7 +283,19 @@ def detection(table: pd.DataFrame, order: list[str]) -> str:
         of = found.xs(column, level=(1, 2)).iloc[0]
         perfect.append(f"{number(of['true_auc'], 2)}; {number(of['true_subendocardial_auc'], 2)}")
     rows.append(["true strain", *perfect])
-    return markdown(["tracker", *(", ".join(filter(None, [one, f"{size}{SPACE}px"])) for one, size in columns)], rows)
+    return markdown(["tracker", *map(_imaging, columns)], rows)
+
+
+def _imaged(table: pd.DataFrame) -> list[tuple[str, int]]:
+    """Acoustics and image sizes of a table, the largest size first."""
+    found = set(table[["acoustics", "size_px"]].itertuples(index=False, name=None))
+    return sorted(found, key=lambda one: (one[0], -one[1]))
+
+
+def _imaging(column: tuple[str, int]) -> str:
+    """Heading for acoustics and an image size."""
+    acoustics, size = column
+    return ", ".join(filter(None, [acoustics, f"{size}{SPACE}px"]))
 
 
 def difficulty(clips: pd.DataFrame, floors: pd.DataFrame, leader: str) -> str:

@@ -70,7 +70,7 @@ def mirrored(clip: Clip) -> Variant:
         mask=np.ascontiguousarray(clip.mask[:, ::-1]),
         points=np.column_stack([lateral, axial])[order],
     )
-    return Variant(turned, order, (-1.0, 1.0), len(clip.no_estimate[1]), len(clip.frames) - 1)
+    return Variant(turned, order, (-1.0, 1.0), len(clip.tracker_arguments[0]), len(clip.frames) - 1)
 
 
 def half(clip: Clip) -> Variant:
@@ -78,7 +78,7 @@ def half(clip: Clip) -> Variant:
     given = len(clip.frames[: len(clip.frames) // 2 + 1 : clip.frame_step])
     last = (given - 1) * clip.frame_step
     first = replace(clip, frames=clip.frames[: last + 1].copy(), frame_time=clip.frame_time[: last + 1].copy())
-    return Variant(first, np.arange(len(clip.points)), (1.0, 1.0), len(clip.no_estimate[1]), last)
+    return Variant(first, np.arange(len(clip.points)), (1.0, 1.0), len(clip.tracker_arguments[0]), last)
 
 
 VARIANTS: dict[str, Callable[[Clip], Variant]] = {"mirrored": mirrored, "open": half}
