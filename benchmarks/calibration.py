@@ -22,6 +22,7 @@ import numpy as np
 import report
 from scipy.optimize import minimize
 
+from echotruth.benchmark.splits import DEVELOP, TEST, split_of, split_of_label
 from echotruth.cases import Case, expand
 from echotruth.config.loading import load
 from echotruth.evaluation import reliability
@@ -146,7 +147,7 @@ def fitted(given: list[Samples]) -> quality.ErrorModel:
 
 def spread(cases: list[Case], hearts: int | None) -> list[Case]:
     """Cases of the hearts of develop, of `hearts` of them evenly over the table."""
-    develop = [case for case in cases if case.labels.get("split", "develop") == "develop"]
+    develop = [case for case in cases if split_of(case) == DEVELOP]
     names = list(dict.fromkeys(str(case.labels.get("heart", case.id)) for case in develop))
     chosen = names if hearts is None else [names[k] for k in np.linspace(0, len(names) - 1, hearts).round().astype(int)]
     return [case for case in develop if str(case.labels.get("heart", case.id)) in chosen]
@@ -155,9 +156,9 @@ def spread(cases: list[Case], hearts: int | None) -> list[Case]:
 def table(folder: Path) -> list[str]:
     """Reliability of the quality in a repository, by tracker and image size, over the hearts of test."""
     found = clip_metrics(folder).reliability
-    found = found[found["split"] == "test"]
+    found = found[found["split"].map(split_of_label) == TEST]
     if found.empty:
-        raise SystemExit(f"{folder}: no heart whose label split is test is evaluated: run it to its end")
+        raise SystemExit(f"{folder}: no heart of test is evaluated: run it to its end")
     steps = sorted(found["quality_low"].unique())
     head = ["tracker", "px", "error, %", *(f"{100 * low:.0f}-{100 * low + 10:.0f}" for low in steps)]
     rows = []
@@ -185,6 +186,8 @@ def main() -> None:
     if given.fit:
         cases = expand(load(folder / "config.yaml"), str(folder / "config.yaml"))
         chosen = spread(list(cases), given.hearts)
+        if not chosen:
+            raise SystemExit(f"{folder}: no heart has the label split develop: give those to be tuned on this label")
         for name, clips_of_it in gathered(folder, chosen, given.size, given.tracker).items():
             constants = ", ".join(f"{value:g}" for value in astuple(fitted(clips_of_it)))
             print(f'    "{name}": ErrorModel({constants}),', flush=True)

@@ -10,10 +10,15 @@ from echotruth.config.loading import load
 from echotruth.workflow.settings import motions
 
 ROOT = Path(__file__).parents[2]
+SUITES = {
+    "benchmark": "echotruth-benchmark-1",
+    "benchmark_human": "echotruth-benchmark-1",
+    "benchmark_small": "echotruth-benchmark-1-small",
+}
 GROUPS = {"healthy", "infarct", "late_activation", "hypertrophy", "dilation"}
 
 
-@pytest.fixture(scope="module", params=["benchmark", "benchmark_human", "benchmark_small"])
+@pytest.fixture(scope="module", params=SUITES)
 def suite(request):
     """Name of a suite and its cases, read as from the folder of a checkout."""
     with pytest.MonkeyPatch.context() as patch:
@@ -36,7 +41,11 @@ def test_heart_is_one_motion_and_no_motion_is_in_both_halves(table):
 
 
 def test_group_is_what_the_configuration_makes_of_a_heart(table):
-    assert (table["group"] == table["diagnosis"]).all() and (table["suite"] == "echotruth-benchmark-1").all()
+    assert (table["group"] == table["diagnosis"]).all()
+
+
+def test_suite_is_that_of_the_benchmark_and_the_small_one_has_another(suite, table):
+    assert (table["suite"] == SUITES[suite[0]]).all()
 
 
 def test_every_heart_has_ideal_acoustics_and_realistic_ones_have_what_clips_have(suite, table):
@@ -66,6 +75,18 @@ def test_variation_is_beside_the_same_heart_without_it_and_changes_what_it_is_na
         ), case.id
     varied = table[table["variation"] != "none"]
     assert varied.groupby(["variation", "split"]).size().unstack().to_numpy().min() >= 1
+
+
+def test_hearts_of_the_small_suite_are_those_of_the_benchmark(suite, monkeypatch):
+    name, cases = suite
+    if name != "benchmark_small":
+        return
+    monkeypatch.chdir(ROOT)
+    whole = {case.id: case for case in expand(load("config/benchmark.yaml"))}
+    for case in cases:
+        same = whole[case.id]
+        assert case.parameters == same.parameters and case.config.seed == same.config.seed
+        assert case.labels | {"suite": ""} == same.labels | {"suite": ""}
 
 
 def test_whole_suite_has_every_group_in_both_halves_and_half_of_its_hearts_in_each(suite, table):

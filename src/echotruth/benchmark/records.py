@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echotruth.benchmark.conditions import with_conditions
-from echotruth.benchmark.splits import TEST
+from echotruth.benchmark.splits import split_of_label
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
@@ -178,5 +178,5 @@ def _of(suite: Suite, table: pd.DataFrame, several: bool) -> pd.DataFrame:
     """A table of a repository beside those of others: hearts of two repositories may have one name."""
     species = suite.config.geometry.preset
     heart = f"{suite.name}/" + table["heart"] if several else table["heart"]
-    split = table["split"].replace("", TEST)
+    split = table["split"].map(split_of_label)
     return table.assign(repository=suite.name, species=species, heart=heart, split=split)

@@ -9,5 +9,10 @@ DEVELOP, TEST = "develop", "test"
 
 
 def split_of(case: Case) -> str:
-    """Half to which a case belongs; `test` without a label `split`: nobody has said that it was tuned on."""
-    return str(case.labels.get("split") or TEST)
+    """Half to which a case belongs."""
+    return split_of_label(case.labels.get("split"))
+
+
+def split_of_label(label: object) -> str:
+    """Half that a label `split` names; without one it is `test`, lest anybody tunes on a heart by accident."""
+    return str(label or TEST)

@@ -82,11 +82,13 @@ def progress(suites: list[Suite]) -> str:
     """How far each repository is."""
     rows = []
     for suite in suites:
-        names = set(hearts_of(all_cases(suite.config)).values())
+        cases = all_cases(suite.config)
+        names = set(hearts_of(cases).values())
+        versions = dict.fromkeys(str(case.labels.get("suite") or NONE) for case in cases.values())
         (done, wanted), sizes = suite.clips, len(suite.config.bmode.sizes)
         state = "whole" if done == wanted else f"{wanted - done} clips are missing"
-        rows.append([f"`{suite.name}`", str(len(names)), f"{done} of {wanted}", str(sizes), state])
-    return markdown(["repository", "hearts", "clips", "image sizes", "state"], rows)
+        rows.append([f"`{suite.name}`", ", ".join(versions), str(len(names)), f"{done} of {wanted}", str(sizes), state])
+    return markdown(["repository", "suite", "hearts", "clips", "image sizes", "state"], rows, text=2)
 
 
 def hearts(suite: Suite, clips: pd.DataFrame) -> str:

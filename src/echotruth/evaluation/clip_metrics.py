@@ -20,13 +20,14 @@ from echotruth.cases.case import Label
 from echotruth.config.loading import load
 from echotruth.evaluation import kept, point_tracks, reliability, segment_strain
 from echotruth.evaluation.agreement import REFERENCES
+from echotruth.evaluation.choice import chosen, image_size
 from echotruth.evaluation.clip import grid_points, grid_positions
 from echotruth.evaluation.courses import rate, systolic_rate
-from echotruth.evaluation.curves import REFERENCE, image_size
+from echotruth.evaluation.curves import REFERENCE
 from echotruth.evaluation.flow_error import flow_error
 from echotruth.evaluation.leaderboard import KEYS, failures_of, scores_of_guests
 from echotruth.evaluation.scoring import metrics
-from echotruth.evaluation.summary import chosen, is_evaluated
+from echotruth.evaluation.summary import is_evaluated
 from echotruth.imaging.labels import unpack
 from echotruth.imaging.tracks import visible
 from echotruth.loop.cycle import read_loop

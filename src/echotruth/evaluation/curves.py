@@ -9,6 +9,7 @@ import numpy as np
 from echotruth.config import Config
 from echotruth.evaluation import kept
 from echotruth.evaluation.agreement import REFERENCES
+from echotruth.evaluation.choice import image_size
 from echotruth.evaluation.courses import peak, rate, systolic_rate
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import schema
@@ -176,20 +177,6 @@ def twist_of(base: xr.Dataset, apex: xr.Dataset, heart_twist: np.ndarray | None 
     attributes = {key: value for key, value in base.attrs.items() if key not in ("view", "reference", "plane")}
     attributes |= {"basal_view": base.attrs["view"], "apical_view": apex.attrs["view"]}
     return xr.Dataset(found, base[["frame", "time"]].coords, attributes)
-
-
-def image_size(config: Config, size: int | None) -> int:
-    """Pixels along a side: the size asked for, or the largest.
-
-    Raises
-    ------
-    ValueError
-        If the repository has no clips of that size.
-    """
-    sizes = config.bmode.sizes
-    if size is not None and size not in sizes:
-        raise ValueError(f"size = {size}: use one of {', '.join(map(str, sizes))}.")
-    return sizes[0] if size is None else size
 
 
 def _dataset(values: dict[str, np.ndarray], time: np.ndarray, config: Config) -> xr.Dataset:

@@ -21,6 +21,7 @@ from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load, validate
 from echotruth.evaluation import kept
+from echotruth.evaluation.choice import chosen
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.parallel import in_processes
@@ -82,8 +83,8 @@ class EvaluationRun:
         EvaluationError
             If the repository does not have one of them, or has no complete clip.
         """
-        cases = self._selected("case", cases, list(all_cases(self.config)))
-        views = self._selected("view", views, list(self.config.views))
+        cases = chosen("case", cases, list(all_cases(self.config)), self.folder, EvaluationError)
+        views = chosen("view", views, list(self.config.views), self.folder, EvaluationError)
         case_views = [(case, view) for case in cases for view in views if self._is_complete(case, view)]
         if not case_views:
             raise EvaluationError(f"{self.folder} has no complete clip of these cases and views: run it to its end")
@@ -91,7 +92,7 @@ class EvaluationRun:
 
     def sizes(self, sizes: list[int]) -> list[int]:
         """Image sizes to include; all if the list is empty."""
-        return self._selected("size", sizes, list(self.config.bmode.sizes))
+        return chosen("size", sizes, self.config.bmode.sizes, self.folder, EvaluationError)
 
     def rows(self, case_views: list[tuple[str, str]], sizes: list[int], jobs: int = 1) -> Iterator[Row]:
         """Score the clips, one row each, in the order of `case_views` and image sizes for any number of jobs.
@@ -159,13 +160,6 @@ class EvaluationRun:
         except OSError as error:
             remedy = f"it must be a folder that you may write to ({error.strerror})"
             raise EvaluationError(f"{self.file.parent} cannot hold the scores: {remedy}") from error
-
-    def _selected(self, what: str, chosen: list[Any], known: list[Any]) -> list[Any]:
-        for item in chosen:
-            if item not in known:
-                choices = ", ".join(map(str, known[:20]))
-                raise EvaluationError(f"{item} is not a {what} of {self.folder}: use {choices}")
-        return [item for item in known if item in chosen or not chosen]
 
     def _is_complete(self, case: str, view: str) -> bool:
         return all(is_complete(self.folder, stage, case, view) for stage in ("truth", "bmode"))

@@ -16,8 +16,9 @@ from echotruth.config.imaging import ALL_VIEWS
 from echotruth.config.loading import load
 from echotruth.evaluation import kept
 from echotruth.evaluation.agreement import REFERENCES
+from echotruth.evaluation.choice import chosen, image_size
 from echotruth.evaluation.courses import peak, rate, systolic_rate
-from echotruth.evaluation.curves import REFERENCE, image_size, twist_views
+from echotruth.evaluation.curves import REFERENCE, twist_views
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import ledger
 from echotruth.repository.ledger import record_path
@@ -211,24 +212,3 @@ def is_complete(folder: Path, stage: str, case: str, view: str | None = None) ->
     """Whether a stage of a heart, or of one of its views, is complete."""
     path = record_path(folder, stage, case, view)
     return path.is_file() and ledger.read(path).get("status") == "complete"
-
-
-def chosen(what: str, names: Sequence[str] | None, known: list[str]) -> list[str]:
-    """Those of the known names that are asked for, in their order; all if none are.
-
-    Parameters
-    ----------
-    what : str
-        What the names are, for the message.
-    names : sequence of str or None
-    known : list of str
-
-    Raises
-    ------
-    ValueError
-        If one is not known.
-    """
-    for name in names or ():
-        if name not in known:
-            raise ValueError(f"{what} = {name!r}: use one of {', '.join(known[:20])}.")
-    return [name for name in known if not names or name in names]

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 from echotruth.cases import expand
 from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.evaluation import kept
+from echotruth.evaluation.choice import Item, chosen
 from echotruth.export.clip import Clip
 from echotruth.export.error import ExportError
 from echotruth.repository import ledger
 from echotruth.repository.ledger import GATES, record_path
-
-Item = TypeVar("Item", str, int)
 
 
 @dataclass(frozen=True)
@@ -77,9 +75,9 @@ class Source:
     def clips(self) -> Iterator[Clip]:
         """The clips of the chosen sizes of the chosen views."""
         sizes = list(self.config.bmode.sizes)
-        chosen = self._chosen("size", self.selection.sizes, sizes) if self.selection.sizes else [max(sizes)]
+        wanted = self._chosen("size", self.selection.sizes, sizes) if self.selection.sizes else [max(sizes)]
         for view in self.views():
-            for size in chosen:
+            for size in wanted:
                 yield Clip(self.folder, view.case, view.view, size)
 
     def finished(self, clips: Iterator[Clip], problem: Callable[[Clip], str]) -> tuple[list[Clip], list[str]]:
@@ -108,12 +106,8 @@ class Source:
             raise ExportError(f"{self.folder} has no hearts: look at the section cases of its config.yaml")
         return found, problems
 
-    def _chosen(self, what: str, chosen: Sequence[Item], known: list[Item]) -> list[Item]:
-        for item in chosen:
-            if item not in known:
-                choices = ", ".join(map(str, known[:20])) or "none: it has no such thing"
-                raise ExportError(f"{item} is not a {what} of {self.folder}: use {choices}")
-        return [item for item in known if item in chosen or not chosen]
+    def _chosen(self, what: str, names: Sequence[Item], known: Sequence[Item]) -> list[Item]:
+        return chosen(what, names, known, self.folder, ExportError)
 
 
 def source(repository: Path, selection: Selection) -> Source:

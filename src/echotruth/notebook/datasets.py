@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echotruth.cases import Case
-from echotruth.config import Config
 from echotruth.config.building import configure
 from echotruth.evaluation.clip import grid_positions
 from echotruth.heart import Heart
@@ -132,19 +131,3 @@ def case_of(clip: xr.Dataset) -> Case:
 def fingerprint(heart: Heart) -> str:
     """Twelve hexadecimal digits that tell one motion from another."""
     return sha256(np.ascontiguousarray(heart.displacement).tobytes()).hexdigest()[:12]
-
-
-def image_size(config: Config, size: int | None) -> int:
-    """Pixels along a side of a clip: the size asked for, or the largest.
-
-    Raises
-    ------
-    ValueError
-        If the configuration has no clips of that size.
-    """
-    sizes = config.bmode.sizes
-    if size is not None and size not in sizes:
-        raise ValueError(
-            f"size = {size}: use one of {', '.join(map(str, sizes))}, which bmode.size_px and bmode.downsampling set."
-        )
-    return sizes[0] if size is None else size

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from echotruth.evaluation.choice import image_size
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
-from echotruth.notebook.datasets import clip_dataset, image_size
+from echotruth.notebook.datasets import clip_dataset
 from echotruth.notebook.derived import MEANING, stored
 from echotruth.repository import schema
 from echotruth.repository.ledger import repository_folder, rows

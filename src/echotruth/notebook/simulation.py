@@ -16,6 +16,7 @@ from echotruth.cases import Case
 from echotruth.config import Config, Probe, View
 from echotruth.config.building import Source, configure
 from echotruth.config.tracking import External
+from echotruth.evaluation.choice import image_size
 from echotruth.evaluation.clip import Clip, grid_points
 from echotruth.evaluation.scoring import metrics, score, truth_at
 from echotruth.heart import Heart
@@ -26,7 +27,7 @@ from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.physiology import measures, violated_bound
 from echotruth.notebook.arguments import check_clip, check_heart
-from echotruth.notebook.datasets import as_stored, case_of, clip_dataset, dataset, fingerprint, image_size
+from echotruth.notebook.datasets import as_stored, case_of, clip_dataset, dataset, fingerprint
 from echotruth.seeds import generator
 from echotruth.tracking.tracker import track as track_points
 

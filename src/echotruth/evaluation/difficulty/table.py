@@ -13,9 +13,10 @@ import numpy as np
 
 from echotruth.cases import expand
 from echotruth.config.loading import load
+from echotruth.evaluation.choice import chosen
 from echotruth.evaluation.difficulty.floors import COLUMNS, PARAMETERS, Row, difficulty
 from echotruth.evaluation.digest import digest
-from echotruth.evaluation.summary import chosen, is_complete
+from echotruth.evaluation.summary import is_complete
 from echotruth.repository import durable
 from echotruth.workflow.job import Job
 
