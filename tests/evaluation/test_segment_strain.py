@@ -87,6 +87,18 @@ def test_a_segment_that_is_only_stretched_has_no_peak_and_no_time_of_it():
     ).all()
 
 
+def test_rates_of_a_stretched_segment_are_those_of_stretch_also_where_the_tracked_one_ends_up_shortened():
+    true, tracked = curves([0.0] * 3), curves([0.0] * 3)
+    true[:, 7, 1] = [0, 0.02, 0.04, *[0.05] * 8]
+    tracked[:, 7, 1] = [0, 0.01, 0.02, 0.01, *[-0.01] * 7]
+    rows = segment_rows(tracked, true, tissue(), "short_axis", TIME, es=4)
+    (row,) = (row for row in rows if row["aha"] == 8 and row["component"] == "circumferential")
+    # Differences over 20 ms: 0.04 and, of the tracked one, 0.02 at first; it shortens by 0.03 later on.
+    assert row["true_systolic_rate_per_s"] == pytest.approx(2.0)
+    assert row["tracked_systolic_rate_per_s"] == pytest.approx(1.0)
+    assert errors([row])["segment_strain_rate_error_per_s"] == pytest.approx(1.0)
+
+
 def test_a_corner_of_a_segment_has_a_row_and_does_not_count_in_the_errors_of_the_clip():
     corner = Tissue(np.ones(41, int), np.repeat([7, 8, 9], [20, 20, 1]), np.zeros(41, int), 1)
     rows = segment_rows(curves([-0.2, -0.2, -0.05]), curves([-0.2, -0.2, -0.2]), corner, "short_axis", TIME, es=5)

@@ -299,7 +299,7 @@ def _line_strain(found: Arrays, truth: ClipTruth) -> dict[str, float]:
     }
     at_es = {what: float(curve[truth.es]) for what, curve in curves.items()}
     rates = {
-        what: float(systolic_rate(rate(curve, truth.time)[: truth.es + 1], np.asarray(at_es[what])))
+        what: float(systolic_rate(rate(curve, truth.time)[: truth.es + 1], np.asarray(at_es["true"])))
         for what, curve in curves.items()
     }
     shown = "gcs" if truth.plane == "short_axis" else "gls"

@@ -94,9 +94,9 @@ def segment_rows(tracked: Floats, true: Floats, tissue: Tissue, plane: str, time
     list of dict
         One for every segment with points and component: `aha`, `component`, what :meth:`Tissue.rows` tells, and of
         `tracked_` and `true_` each `es_percent`, `peak_percent` and `time_to_peak_ms` (:func:`peak_contraction`), and
-        `systolic_rate_per_s` (:func:`.courses.systolic_rate`).
+        `systolic_rate_per_s` (:func:`.courses.systolic_rate`), both in the direction of the true end-systolic strain.
     """
-    read = {what: _readings(curves, time, es) for what, curves in zip(WHAT, (tracked, true), strict=True)}
+    read = {what: _readings(curves, time, es, true[es]) for what, curves in zip(WHAT, (tracked, true), strict=True)}
     rows: list[Row] = []
     for number, about in tissue.rows().items():
         for place, component in enumerate(COMPONENTS[plane]):
@@ -166,14 +166,14 @@ def peak_contraction(curves: Floats, time: Floats) -> tuple[Floats, Floats]:
     return value, np.where(np.abs(value) > CURVE, np.asarray(time)[frame], np.nan)
 
 
-def _readings(curves: Floats, time: Floats, es: int) -> dict[str, Floats]:
-    """Values of curves (frame, 17, component), each (17, component)."""
+def _readings(curves: Floats, time: Floats, es: int, true_at_es: Floats) -> dict[str, Floats]:
+    """Values of curves (frame, 17, component), each (17, component) as the true end-systolic strain."""
     value, when = peak_contraction(curves[..., :2], time)
     return {
         "es_percent": 100 * curves[es],
         "peak_percent": 100 * value,
         "time_to_peak_ms": 1e3 * when,
-        "systolic_rate_per_s": systolic_rate(rate(curves, time)[: es + 1], curves[es]),
+        "systolic_rate_per_s": systolic_rate(rate(curves, time)[: es + 1], true_at_es),
     }
 
 
