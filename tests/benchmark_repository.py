@@ -20,10 +20,10 @@ from echotruth.workflow.job import Job
 from echotruth.workflow.scripts import evaluation, tracking
 from echotruth.workflow.scripts.cases import lay_out
 
-TABLE = """case,seed,label.heart,label.split,label.group,label.acoustics,label.variation
-a_ideal,1,a,test,healthy,ideal,none
-b_ideal,2,b,test,dilation,ideal,none
-c_ideal,3,c,develop,healthy,ideal,none
+TABLE = """case,seed,loop.heart_rate_per_min,label.heart,label.split,label.group,label.acoustics,label.variation
+a_ideal,1,500,a,test,healthy,ideal,none
+b_ideal,2,600,b,test,dilation,ideal,none
+c_ideal,3,500,c,develop,healthy,ideal,none
 """
 
 SIZE = 64

@@ -1,18 +1,22 @@
 """Submissions: an honest one passes the checks, those that look the truth up are caught; cards; variants of clips."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
 
-from echotruth.benchmark import checks
+from echotruth.benchmark import checks, results
 from echotruth.benchmark.card import Card, attach, card_of, read
 from echotruth.benchmark.page import EXAMPLE, Page
-from echotruth.benchmark.rerun import result_of
+from echotruth.benchmark.rerun import prepare_rerun
+from echotruth.benchmark.results import result_path
 from echotruth.benchmark.submission import attach_card, rerun
-from echotruth.benchmark.variants import VARIANTS
+from echotruth.benchmark.variants import VARIANTS, anonymous
+from echotruth.config.loading import load
 from echotruth.config.reading import ConfigError
-from echotruth.evaluation.clip import Clip
+from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.run import prepare
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import ledger
@@ -35,25 +39,94 @@ def test_tracker_that_looks_the_truth_up_is_caught(page, name):
     assert name not in page.order and page.withheld[name] == "worse on mirrored clips; impossible accuracy"
 
 
+def result_of(folder, tracker, variant):
+    """Rows of the clips that count, and the number of older ones."""
+    return results.result_of(folder, load(folder / "config.yaml"), tracker, variant)
+
+
 def test_scores_on_mirrored_clips_of_older_images_do_not_count(repository):
-    assert len(result_of(repository, "honest", "mirrored")) == 2
+    assert len(result_of(repository, "honest", "mirrored").rows) == 2
     path = repository / "ledger/bmode/a_ideal/mid.json"
     ledger.commit(path, ledger.read(path) | {"sha256": {"image": "another"}})
-    assert list(result_of(repository, "honest", "mirrored")["case"]) == ["b_ideal"]
-    (repository / "external/honest.mirrored.json").write_text("[1, 2")
+    found = result_of(repository, "honest", "mirrored")
+    assert list(found.rows["case"]) == ["b_ideal"] and found.older == 1
+    result_path(repository, "honest", "mirrored").write_text("[1, 2")
     with pytest.raises(EvaluationError, match=r"honest\.mirrored\.json: is not what was written: delete it"):
         result_of(repository, "honest", "mirrored")
 
 
 def test_scores_on_mirrored_clips_go_when_the_tracker_is_evaluated_again(repository):
     prepare(repository, "honest", {"method": "dis"}).write([])
-    assert result_of(repository, "honest", "mirrored") is None
-    assert len(result_of(repository, "reading", "mirrored")) == 2
+    assert result_of(repository, "honest", "mirrored").rows.empty
+    assert len(result_of(repository, "reading", "mirrored").rows) == 2
+
+
+def test_scores_with_older_settings_of_a_tracker_of_the_repository_do_not_count_and_are_made_again(repository, page):
+    list(rerun([repository], "dis", "mirrored", "test", []))
+    config = repository / "config.yaml"
+    values = yaml.safe_load(config.read_text())
+    values["tracking"]["trackers"]["dis"]["preset"] = "fine"
+    config.write_text(yaml.safe_dump(values))
+    suites = [replace(page.whole.suites[0], folder=repository, config=load(config))]
+    verdict = checks.verdict("dis", replace(page.whole, suites=suites), "test")
+    assert verdict.mirrored is None and verdict.older == 2
+    assert "2 older results on mirrored clips do not count: check it again" in verdict.text
+    list(rerun([repository], "dis", "mirrored", "test", []))
+    again = checks.verdict("dis", replace(page.whole, suites=suites), "test")
+    assert again.words == "nothing found" and again.older == 0 and again.mirrored.hearts == 2
+
+
+def test_check_of_one_half_leaves_that_of_the_other_and_the_verdict_says_what_was_checked(repository, page):
+    suites = [replace(page.whole.suites[0], folder=repository)]
+    list(rerun([repository], "dis", "mirrored", "develop", []))
+    assert checks.verdict("dis", replace(page.whole, suites=suites), "test").words.endswith("not run on mirrored clips")
+    list(rerun([repository], "dis", "mirrored", "test", []))
+    found = result_of(repository, "dis", "mirrored").rows
+    assert list(found["case"]) == ["a_ideal", "b_ideal", "c_ideal"]
+    for split, hearts in (("test", 2), ("develop", 1)):
+        verdict = checks.verdict("dis", replace(page.whole, suites=suites), split)
+        assert verdict.words == "nothing found" and verdict.mirrored.hearts == hearts
+
+
+def test_ratio_says_of_which_clips_and_sizes_it_is():
+    keys = pd.DataFrame({"repository": "one", "case": list("abab"), "view": "mid", "size_px": [128, 128, 64, 64]})
+    again = keys.assign(error_percent=2.0, before_percent=1.0)
+    parts = [checks.paired_ratio(keys.assign(heart=keys["case"]), again[:count]).part for count in (1, 2, 3, 4)]
+    assert parts == ["1 of 4 clips (128 px)", "2 of 4 clips (128 px)", "3 of 4 clips", ""]
+
+
+def test_a_tracker_is_given_neither_seed_nor_times_by_which_it_would_know_the_clip(repository, monkeypatch):
+    given = []
+    monkeypatch.setattr(
+        "echotruth.benchmark.rerun.track", lambda *arguments: given.append(arguments) or missing(arguments)
+    )
+    run = prepare_rerun(repository, "dis", "mirrored", "test")
+    list(run.rows([64]))
+    known = [clips(Job(repository, "tracking", case, view, code="-"))[64] for case, view in run.case_views()]
+    times, seeds = ([arguments[k] for arguments in given] for k in (4, 5))
+    assert not np.array_equal(known[0].frame_time, known[1].frame_time) and known[0].seed != known[1].seed
+    # These clips have the same images, so that nothing is left that differs.
+    assert np.array_equal(*times) and seeds[0] == seeds[1] and not {clip.seed for clip in known} & set(seeds)
+    assert all(np.array_equal(*each) for each in zip(*(arguments[:4] for arguments in given), strict=True))
+
+
+def missing(arguments):
+    """An estimate without values."""
+    shape = len(arguments[0]), len(arguments[1])
+    return np.full((*shape, 2), np.nan), np.full(shape, np.nan)
+
+
+def test_seed_of_an_anonymous_clip_is_that_of_its_images(clip):
+    time = np.arange(12) * 2.0
+    other = replace(clip, seed=99, frame_time=clip.frame_time * 3)
+    first, second = anonymous(clip, time), anonymous(other, time)
+    assert first.seed == second.seed != anonymous(replace(clip, frames=clip.frames[..., ::-1]), time).seed
+    assert np.array_equal(first.frame_time, time[:9]) and np.array_equal(second.frame_time, time[:9])
 
 
 def test_error_of_an_open_clip_is_that_of_its_last_frame(repository):
     lines = list(rerun([repository], "dis", "open", "test", []))
-    found = result_of(repository, "dis", "open")
+    found = result_of(repository, "dis", "open").rows
     job = Job(repository, "tracking", "a_ideal", "mid", code="-")
     stored = job.read("evaluation", "frame_nrmse")["frame_nrmse"][0, 0, 1, -1]  # one of two steps
     assert len(lines) == 2 and found["before_percent"][0] == pytest.approx(100 * stored, rel=1e-3)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from echotruth.benchmark.records import Records, Suite
-from echotruth.benchmark.rerun import result_of
+from echotruth.benchmark.results import Result, result_of
 from echotruth.benchmark.splits import DEVELOP, TEST
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, by_heart, draws, interval
@@ -38,12 +38,15 @@ class Ratio(NamedTuple):
     value, low, high : float
         The last two are NaN with a single heart.
     hearts : int
+    part : str
+        Of which clips it is, as "24 of 72 clips (512 px)"; empty if it is of all.
     """
 
     value: float
     low: float
     high: float
     hearts: int
+    part: str
 
 
 class Verdict(NamedTuple):
@@ -54,6 +57,8 @@ class Verdict(NamedTuple):
     tracker : str
     mirrored : Ratio or None
         Error on mirrored clips over that on the clips; None if it was not run on them.
+    older : int
+        Number of results on mirrored clips that do not count, because clips or settings have changed since.
     impossible, clips : int
         Number of clips with an impossible accuracy, and of all.
     gap : float
@@ -62,6 +67,7 @@ class Verdict(NamedTuple):
 
     tracker: str
     mirrored: Ratio | None
+    older: int
     impossible: int
     clips: int
     gap: float
@@ -77,18 +83,29 @@ class Verdict(NamedTuple):
         return found
 
     @property
+    def words(self) -> str:
+        """What was found, and what was not looked at."""
+        found = "; ".join(self.flags) or "nothing found"
+        if self.mirrored is None:
+            found += ", not run on mirrored clips"
+        elif self.mirrored.part:
+            found += f", run on mirrored ones of {self.mirrored.part}"
+        if self.older:
+            found += f"; {self.older} older results on mirrored clips do not count: check it again"
+        return found
+
+    @property
     def text(self) -> str:
         """The verdict in one line."""
-        words = "; ".join(self.flags) or "nothing found"
         parts = [f"{self.impossible} of {self.clips} clips of an impossible accuracy"]
         if self.mirrored is not None:
-            value, low, high, hearts = self.mirrored
+            value, low, high, hearts, _ = self.mirrored
             between = f", 95 % interval {low:.2f} to {high:.2f}" if hearts > 1 else ""
             counted = f"{hearts} heart{'s' * (hearts > 1)}{between}"
             parts.insert(0, f"error on mirrored clips {value:.2f} times that on the clips ({counted})")
         if np.isfinite(self.gap):
             parts.append(f"test / develop {self.gap:.2f}")
-        return f"{self.tracker}: {words} ({'; '.join(parts)})"
+        return f"{self.tracker}: {self.words} ({'; '.join(parts)})"
 
 
 def verdict(tracker: str, records: Records, split: str) -> Verdict:
@@ -105,11 +122,10 @@ def verdict(tracker: str, records: Records, split: str) -> Verdict:
     whole = records.clips[records.clips["tracker"] == tracker]
     clips = whole[whole["split"] == split]
     again = variants_of(records.suites, tracker, "mirrored")
-    ratio = None if again is None else paired_ratio(clips, again)
+    ratio = paired_ratio(clips, again.rows)
     known_of = impossible(clips, records.difficulty)
-    return Verdict(
-        tracker, ratio, len(known_of), len(clips), split_gap(whole[whole["size_px"] == whole["size_px"].max()])
-    )
+    gap = split_gap(whole[whole["size_px"] == whole["size_px"].max()])
+    return Verdict(tracker, ratio, again.older, len(known_of), len(clips), gap)
 
 
 def paired_ratio(clips: pd.DataFrame, again: pd.DataFrame, seed: int = 1) -> Ratio | None:
@@ -120,7 +136,7 @@ def paired_ratio(clips: pd.DataFrame, again: pd.DataFrame, seed: int = 1) -> Rat
     clips : DataFrame
         Clips that count: columns `CLIP` of :mod:`echotruth.evaluation.resampling`, and heart.
     again : DataFrame
-        As :func:`variants_of` returns it.
+        Rows as :func:`variants_of` returns them.
     seed : int
         Of the bootstrap.
 
@@ -130,17 +146,24 @@ def paired_ratio(clips: pd.DataFrame, again: pd.DataFrame, seed: int = 1) -> Rat
         None if they have no clip in common.
     """
     both = clips[[*CLIP, "heart"]].merge(again, on=list(CLIP))
+    if both.empty:
+        return None
     errors = both[["before_percent", "error_percent"]].to_numpy(float)
     both = both.assign(logarithm=np.diff(np.log(np.maximum(errors, SMALLEST)), axis=1)[:, 0])
     means = both[np.isfinite(both["logarithm"])].groupby("heart")["logarithm"].mean().to_numpy()
-    return _geometric(means, seed) if len(means) else None
+    if not (hearts := len(means)):
+        return None
+    low, high = np.exp(interval(means[:, None], draws(hearts, seed)))[:, 0]
+    return Ratio(float(np.exp(means.mean())), float(low), float(high), hearts, _part(clips, both))
 
 
-def _geometric(logarithms: np.ndarray, seed: int) -> Ratio:
-    """Geometric mean over hearts of values given as logarithms, with its interval."""
-    hearts = len(logarithms)
-    low, high = np.exp(interval(logarithms[:, None], draws(hearts, seed)))[:, 0]
-    return Ratio(float(np.exp(logarithms.mean())), float(low), float(high), hearts)
+def _part(clips: pd.DataFrame, some: pd.DataFrame) -> str:
+    """Which of the clips some of them are; empty if they are all."""
+    if len(some) == len(clips):
+        return ""
+    sizes, known = (sorted(set(table["size_px"]), reverse=True) for table in (some, clips))
+    listed = "" if sizes == known else f" ({' and '.join(map(str, sizes))} px)"
+    return f"{len(some)} of {len(clips)} clips{listed}"
 
 
 def is_worse(ratio: Ratio) -> bool:
@@ -180,17 +203,23 @@ def split_gap(clips: pd.DataFrame) -> float:
     return test / develop if develop > 0 else np.nan
 
 
-def variants_of(suites: list[Suite], tracker: str, variant: str) -> pd.DataFrame | None:
-    """Scores of a tracker on variants of the clips of repositories; None if it was not run on any.
+def variants_of(suites: list[Suite], tracker: str, variant: str) -> Result:
+    """Scores of a tracker on variants of the clips of repositories.
 
     Parameters
     ----------
     suites : list of Suite
     tracker, variant : str
-        As :func:`echotruth.benchmark.rerun.result_of` takes them.
+        As :func:`echotruth.benchmark.results.result_of` takes them.
+
+    Returns
+    -------
+    Result
+        Of all repositories, with the column `repository`.
     """
     import pandas as pd
 
-    found = [(suite, result_of(suite.folder, tracker, variant)) for suite in suites]
-    tables = [table.assign(repository=suite.name) for suite, table in found if table is not None and len(table)]
-    return pd.concat(tables, ignore_index=True) if tables else None
+    found = [result_of(suite.folder, suite.config, tracker, variant) for suite in suites]
+    tables = [result.rows.assign(repository=suite.name) for suite, result in zip(suites, found, strict=True)]
+    filled = [table for table in tables if len(table)] or tables[:1]
+    return Result(pd.concat(filled, ignore_index=True), sum(result.older for result in found))

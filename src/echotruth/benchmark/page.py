@@ -59,6 +59,7 @@ class Page:
         self.whole, self.split = records, split
         self.records = records.of_split(split)
         self.cards = _cards(records)
+        self._verdicts: dict[str, checks.Verdict] = {}
         self.withheld = self._withheld()
         ranked = self.records.clips[~self.records.clips["tracker"].isin(self.withheld)]
         self.is_empty = ranked.empty
@@ -261,25 +262,26 @@ class Page:
             failed = int((of["failure"] != "").sum())
             cells = [f"{failed} of {len(of)}", tables.number(largest["coverage_percent"].median())]
             again = checks.variants_of(self.records.suites, tracker, "open")
-            sizes = (of[of["size_px"] == size] for size in self.sizes)
-            open_ = [None if again is None else checks.paired_ratio(of_size, again) for of_size in sizes]
-            rows.append([f"`{tracker}`", tables.number(largest["drift_um"].median()), *cells, *map(_shown, open_)])
+            ratios = (checks.paired_ratio(of[of["size_px"] == size], again.rows) for size in self.sizes)
+            open_ = ["older" if ratio is None and again.older else _with_part(ratio) for ratio in ratios]
+            rows.append([f"`{tracker}`", tables.number(largest["drift_um"].median()), *cells, *open_])
         headings = ["tracker", "drift (µm)", "clips failed", "tissue tracked (%)"]
         return tables.markdown([*headings, *(f"open, {size} px" for size in self.sizes)], rows)
 
     def verdict(self, tracker: str) -> checks.Verdict:
         """What was found of a tracker, by its name or `package.module:function`."""
         name = parse_tracker(tracker, None, [])[0] if ":" in tracker else tracker
-        return checks.verdict(name, self.whole, self.split)
+        if name not in self._verdicts:
+            self._verdicts[name] = checks.verdict(name, self.whole, self.split)
+        return self._verdicts[name]
 
     def _checks(self) -> str:
         """Verdicts on all trackers."""
         rows = []
         for found in map(self.verdict, self.everyone):
-            words = found.flags or ["nothing found" if found.mirrored else "nothing found, not run on mirrored clips"]
             counted = f"{found.impossible} of {found.clips}"
             rows.append(
-                [f"`{found.tracker}`", _shown(found.mirrored), counted, tables.number(found.gap, 2), "; ".join(words)]
+                [f"`{found.tracker}`", _shown(found.mirrored), counted, tables.number(found.gap, 2), found.words]
             )
         return tables.markdown(["tracker", "mirrored", "impossible", "test / develop", "verdict"], rows)
 
@@ -303,6 +305,11 @@ def _written(path: Path) -> dict[str, str]:
 
 def _shown(ratio: checks.Ratio | None) -> str:
     return tables.NONE if ratio is None else tables.interval(ratio.value, ratio.low, ratio.high, 2)
+
+
+def _with_part(ratio: checks.Ratio | None) -> str:
+    """A ratio, and of which clips it is if that is not all."""
+    return ", ".join(filter(None, [_shown(ratio), ratio.part if ratio else ""]))
 
 
 def _cards(records: Records) -> dict[str, Card]:

@@ -1,22 +1,22 @@
 """A tracker run again on variants of the clips of a repository, with the settings with which it was scored.
 
-The result is `external/NAME.mirrored.json` or `external/NAME.open.json` in the folder of the repository. The truth of a
-clip is read only after the tracker has returned, so that it does not find it in its process.
+The tracker is given nothing but images by which a clip could be known (:func:`echotruth.benchmark.variants.anonymous`).
+The truth of a clip is read only after it has returned, so that it does not find it in its process.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from echotruth.benchmark import results
+from echotruth.benchmark.results import COLUMNS, Row
 from echotruth.benchmark.splits import split_of
-from echotruth.benchmark.variants import VARIANTS
+from echotruth.benchmark.variants import VARIANTS, anonymous
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
@@ -30,21 +30,11 @@ from echotruth.evaluation.run import prepare
 from echotruth.evaluation.scoring import Truth, ground_truth
 from echotruth.evaluation.summary import is_complete
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
-from echotruth.repository import durable
+from echotruth.loop.cycle import read_loop
 from echotruth.section import Section
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-COLUMNS = ("case", "view", "size_px", "clip", "error_percent", "before_percent", "failure")
-"""Columns of the result: error in the variant, and in the same frame of the clip as it was scored, as `nrmse_all` has
-them; the others are those of `external/NAME.csv`."""
-
-Row = dict[str, Any]
-"""One clip, by `COLUMNS`."""
 
 
 @dataclass(frozen=True)
@@ -106,10 +96,8 @@ class Rerun:
             yield from rows
 
     def write(self, rows: list[Row]) -> Path:
-        """Write the scores; the file."""
-        path = result_path(self.folder, self.tracker, self.variant)
-        durable.write(path, f"{json.dumps(rows, indent=1)}\n".encode())
-        return path
+        """Write the scores beside those of other clips; the file."""
+        return results.write(self.folder, self.config, self.tracker, self.variant, rows)
 
     def _is_tracked(self, case: str, view: str) -> bool:
         """Whether what the tracker found in a clip is stored, and the clip is still the same."""
@@ -156,60 +144,19 @@ def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun
     return Rerun(folder, config, name, settings, variant, split)
 
 
-def result_path(folder: Path, tracker: str, variant: str) -> Path:
-    """File of the scores of a tracker on variants of clips, external/NAME.VARIANT.json."""
-    return folder / "external" / f"{tracker}.{variant}.json"
-
-
-def result_of(folder: Path, tracker: str, variant: str) -> pd.DataFrame | None:
-    """Scores of a tracker on variants of clips that have not changed since; None if there are none.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the repository.
-    tracker, variant : str
-
-    Returns
-    -------
-    DataFrame or None
-        Columns `COLUMNS`.
-
-    Raises
-    ------
-    EvaluationError
-        If the file is not what was written.
-    """
-    import pandas as pd
-
-    path = result_path(folder, tracker, variant)
-    if not path.is_file():
-        return None
-    try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
-        table = pd.DataFrame([{name: row[name] for name in COLUMNS} for row in rows], columns=list(COLUMNS))
-        table = table.astype(
-            {"case": str, "view": str, "size_px": int, "error_percent": float, "before_percent": float}
-        )
-    except (ValueError, TypeError, KeyError) as error:
-        raise EvaluationError(f"{path}: is not what was written: delete it, and run {tracker} again") from error
-    clips_of_rows = zip(table["case"], table["view"], table["clip"], strict=True)
-    current = [digest(folder, case, view) == clip for case, view, clip in clips_of_rows]
-    return table[current].reset_index(drop=True)
-
-
 def _view_rows(run: Rerun, sizes: list[int], case_view: tuple[str, str]) -> list[Row]:
     """Rows of the variants of the clips of one view of one heart."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
         job = Job(run.folder, "tracking", *case_view)
+        time = read_loop(run.config.loop).time
         found: dict[int, tuple[np.ndarray, str, int]] = {}
         for size, clip in clips(job).items():
             if size in sizes:
                 variant = VARIANTS[run.variant](clip)
                 try:
-                    estimate, failure = track(*variant.clip.tracker_arguments, run.settings), ""
+                    estimate, failure = track(*anonymous(variant.clip, time).tracker_arguments, run.settings), ""
                 except TrackerFailed as error:
                     estimate, failure = variant.clip.no_estimate, str(error)
                 found[size] = clip.on_grid(*variant.restored(*estimate))[0], failure, variant.last

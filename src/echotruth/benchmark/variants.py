@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from hashlib import sha256
 
 import numpy as np
 
@@ -79,6 +80,27 @@ def half(clip: Clip) -> Variant:
     last = (given - 1) * clip.frame_step
     first = replace(clip, frames=clip.frames[: last + 1].copy(), frame_time=clip.frame_time[: last + 1].copy())
     return Variant(first, np.arange(len(clip.points)), (1.0, 1.0), len(clip.tracker_arguments[0]), last)
+
+
+def anonymous(clip: Clip, time: np.ndarray) -> Clip:
+    """A clip that nothing but its images tells from others of the same size and number of frames.
+
+    Seeds differ from clip to clip, and times from heart to heart, so that either would lead to the truth of the clip
+    that a variant is made from.
+
+    Parameters
+    ----------
+    clip : Clip
+    time : ndarray of shape (frame,)
+        Times of a beat that all clips share, s; there may be more than the clip has frames.
+
+    Returns
+    -------
+    Clip
+        With these times and a seed drawn from its own images.
+    """
+    drawn = np.random.default_rng(list(sha256(clip.frames.tobytes()).digest()))
+    return replace(clip, frame_time=time[: len(clip.frames)], seed=int(drawn.integers(2**31)))
 
 
 VARIANTS: dict[str, Callable[[Clip], Variant]] = {"mirrored": mirrored, "open": half}

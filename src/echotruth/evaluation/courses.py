@@ -147,8 +147,8 @@ def peak(values: Floats, time: Floats) -> tuple[Floats, Floats]:
 def systolic_rate(rates: Floats, at_es: Floats) -> Floats:
     """Largest rate in the direction of an end-systolic value: the most negative one of what shortens.
 
-    A tracked rate is compared with the true one in the direction of the true value: of tissue that is stretched a little,
-    one might else be that of stretch and the other that of shortening.
+    A tracked rate is compared with the true one in the direction of the true value: of tissue that is stretched a
+    little, one might else be that of stretch and the other that of shortening.
 
     Parameters
     ----------

@@ -130,7 +130,7 @@ class EvaluationRun:
         """Write the scores atomically, and give what is kept its name; they replace earlier ones of the same name.
 
         What an earlier evaluation of this name kept is removed also if nothing is kept now, and so are its scores on
-        variants of the clips (:mod:`echotruth.benchmark.rerun`): they are not of what was scored.
+        variants of the clips (:mod:`echotruth.benchmark.results`): they are not of what was scored.
         """
         import pandas as pd
 
