@@ -87,7 +87,7 @@ def solved(number: int, elements: tuple[int, int, int]) -> dict[str, Any]:
         "twist_ivc_deg": float(np.degrees(found["twist_ivc"])),
         "radial_strain_ivc": float(found["strain_ivc"][0]),
         "tension_es_kPa": float(found["tension_es"]) / 1e3,
-        "implausible": violated_bound(found, config.physiology),
+        "implausible": violated_bound({**found, "active_tension": mechanics["active_tension"]}, config.physiology),
     }
 
 

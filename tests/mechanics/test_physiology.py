@@ -8,7 +8,7 @@ from echotruth.config.loading import override
 from echotruth.loop.cycle import read_loop
 from echotruth.loop.phases import CONTRACTION, EJECTION, FILLING, RELAXATION
 from echotruth.mechanics.beat import beat
-from echotruth.mechanics.physiology import BOUNDS, measures, violated_bound
+from echotruth.mechanics.physiology import BOUNDS, measures, tension_variation, violated_bound
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation, slice_rotation
 from echotruth.repository.schema import named
@@ -29,12 +29,19 @@ WELL = {
     "loop_error": np.array(1e-8),
     "tension_min": np.array(0.0),
     "tension_es": np.array(43e3),
+    "active_tension": 1e3 * np.array([0, 20, 40, 43, 10, 0]),
 }
 
 
 def strain(**components):
     """Six components of strain, zero but for those given."""
     return np.array([components.get(name, 0.0) for name in ("RR", "CC", "LL", "RC", "RL", "CL")])
+
+
+def judged(case):
+    """What the bounds judge of a solved heart."""
+    found = measures(*(case[name] for name in ("geometry", "mechanics", "kinematics")))
+    return {**found, "active_tension": case["mechanics"]["active_tension"]}
 
 
 def turned(mesh, degrees):
@@ -203,6 +210,10 @@ def test_a_heart_within_all_bounds_violates_none():
         ({"volume_ratio_min": np.nan}, "det F of all points and frames is nan"),
         ({"loop_error": 0.02}, "error of pressure or volume is 0.02 and must be at most 0.005"),
         ({"tension_min": -3e3}, "smallest active tension (kPa) is -3 and must be at least -1"),
+        (
+            {"active_tension": 1e3 * np.array([0, 40, 10, 40, 10, 0])},
+            "over that of one rise and fall is 1.75 and must be at most 1.5 (physiology.tension_variation_max)",
+        ),
         ({"tension_es": 12e3}, "end-systole (kPa) is 12 and must be at least 20 (physiology.tension_es_min_kPa)"),
         ({"tension_es": 120e3}, "is 120 and must be at most 90 (physiology.tension_es_max_kPa)"),
         ({"ejection_fraction": 0.05}, "the ejection fraction is 0.05 and must be at least 0.2"),
@@ -257,6 +268,16 @@ def test_a_bound_that_is_null_is_not_used():
     assert violated_bound({name: np.full_like(value, np.nan) for name, value in WELL.items()}, everything) == ""
 
 
+def test_variation_of_the_tension_is_one_for_one_rise_and_fall_and_counts_every_further_one():
+    rise_and_fall = np.array([0.0, 10, 40, 50, 30, 5])
+    assert tension_variation(rise_and_fall) == tension_variation(np.roll(rise_and_fall, 3)) == 1
+    # Up by 40, down by 20, up by 30, down by 50: 140 instead of 100.
+    assert tension_variation(np.array([0.0, 40, 20, 50])) == pytest.approx(1.4)
+    time = np.arange(40) / 40
+    assert tension_variation(1 - np.cos(2 * np.pi * 4 * time)) == pytest.approx(4)
+    assert tension_variation(np.zeros(5)) == 1
+
+
 def test_every_bound_of_the_section_is_checked():
     assert {bound.key for bound in BOUNDS} == set(Physiology.model_fields) - {"exclude_implausible"}
 
@@ -306,7 +327,7 @@ def free_heart():
 
 
 def test_a_free_heart_that_twists_backwards_before_it_ejects_is_implausible(free_heart):
-    found = measures(*(free_heart[name] for name in ("geometry", "mechanics", "kinematics")))
+    found = judged(free_heart)
     assert np.degrees(found["twist_ivc"]) < -10 and np.degrees(found["twist_es"]) < 0
     failed = {
         bound.key
@@ -322,11 +343,10 @@ def test_a_free_heart_that_twists_backwards_before_it_ejects_is_implausible(free
     scope="module", params=["mouse", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rat", "human"))]
 )
 def species(request):
-    """Configuration and measures of a species' heart, as it ships but for its mesh."""
+    """Configuration and measures of a species' heart with its tension, as it ships but for its mesh."""
     counts = COARSE.model_dump(include={"circumferential_elements", "longitudinal_elements", "transmural_elements"})
     config = Config(geometry={"preset": request.param} | counts)
-    case = beat(config)
-    return config, measures(*(case[name] for name in ("geometry", "mechanics", "kinematics")))
+    return config, judged(beat(config))
 
 
 def test_the_heart_of_a_species_is_within_its_bounds(species):
@@ -385,6 +405,5 @@ def test_the_heart_of_a_species_moves_as_measured_in_life(species):
 def test_a_heart_whose_fibres_make_it_lengthen_is_implausible_even_if_diseased():
     fibres = {"fibres.endo_deg": 60.0, "fibres.epi_deg": -30.0}
     case = beat(override(Config(geometry=COARSE, loop={"frames": 10}), FREE_HEART | fibres))
-    found = measures(*(case[name] for name in ("geometry", "mechanics", "kinematics")))
-    reason = violated_bound(found, Physiology(), healthy=False)
+    reason = violated_bound(judged(case), Physiology(), healthy=False)
     assert reason.startswith("the mean longitudinal strain at end-systole is 0.0")

@@ -33,7 +33,8 @@ class Bound(NamedTuple):
         Of the section `physiology`; it ends in `min` or `max`, and its unit.
     description : str
     value : callable
-        Values of the group `physiology` in the unit of the key; the most extreme counts.
+        Values of the group `physiology`, or of a course that they leave out, in the unit of the key; the most extreme
+        counts.
     healthy : bool
         Whether it is that of healthy hearts alone; what could not be measured violates no such bound.
     """
@@ -70,6 +71,11 @@ BOUNDS = (
     Bound("twist_max_deg", "the largest twist (deg)", lambda measured: np.abs(np.degrees(measured["twist"]))),
     *_range("ejection_fraction", "", "the ejection fraction", itemgetter("ejection_fraction"), False),
     Bound("tension_min_kPa", "the smallest active tension (kPa)", _in_kPa("tension_min")),
+    Bound(
+        "tension_variation_max",
+        "the total variation of the active tension over that of one rise and fall",
+        lambda measured: tension_variation(np.asarray(measured["active_tension"])),
+    ),
     *_range("tension_es", "_kPa", f"the active tension {_ES} (kPa)", _in_kPa("tension_es"), False),
     *_range("twist_ivc", "_deg", f"the twist {_IVC} (deg)", _in_degrees("twist_ivc"), True),
     *_range("twist_es", "_deg", f"the twist {_ES} (deg)", _in_degrees("twist_es"), True),
@@ -192,13 +198,32 @@ def _times(mechanics: Arrays) -> Arrays:
     return {name: np.asarray(number) for name, number in numbers.items()}
 
 
+def tension_variation(tension: Floats) -> float:
+    """Total variation of the active tension around the cycle, over that of one rise and one fall of the same height.
+
+    sum |T_(k+1) - T_k| / (2 (max T - min T)), from the last frame to the first too: 1 of a tension that rises once and
+    falls once, and more the more it oscillates.
+
+    Parameters
+    ----------
+    tension : ndarray of shape (frame,), Pa
+
+    Returns
+    -------
+    float
+        1 of a tension that does not change.
+    """
+    steps, height = np.abs(np.diff(tension, append=tension[0])), np.ptp(tension)
+    return 1.0 if height == 0 else float(steps.sum() / (2 * height))
+
+
 def violated_bound(measured: dict[str, ArrayLike], bounds: Physiology, healthy: bool = True) -> str:
     """The first bound that a heart violates, in one sentence; empty where there is none.
 
     Parameters
     ----------
     measured : dict of ndarray
-        As :func:`measures` returns it.
+        As :func:`measures` returns it, and `active_tension` (frame,), Pa, of the group `mechanics`.
     bounds : Physiology
     healthy : bool, optional
         Whether to check the bounds of healthy hearts too; not those of a heart with an infarct or late activation.

@@ -11,6 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from echotruth.cases import Case
 from echotruth.config import Config, Probe, View
@@ -78,7 +79,8 @@ def beat(config: Source = None, progress: bool = True) -> Heart:
     depth = arrays["fibres"]["wall_depth"]
     arrays["physiology"] = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"], depth)
     healthy = not arrays["pathology"]["region"].any()
-    reason = violated_bound(dict(arrays["physiology"]), settings.physiology, healthy)
+    judged: dict[str, ArrayLike] = {**arrays["physiology"], "active_tension": arrays["mechanics"]["active_tension"]}
+    reason = violated_bound(judged, settings.physiology, healthy)
     if reason and settings.motion.kind == "beat":
         warnings.warn(f"implausible heart: {reason}", stacklevel=2)
     return Heart.of(arrays, settings)

@@ -16,7 +16,8 @@ def work(job: Job) -> Result:
     measured: dict[str, ArrayLike] = {**measures(job.read("geometry"), mechanics, kinematics, depth)}
     solved = job.case.config.motion.kind == "beat"  # the bounds do not apply to prescribed motions
     healthy = not job.read("pathology", "region")["region"].any()
-    if solved and (reason := violated_bound(measured, job.case.config.physiology, healthy)):
+    judged = measured | {"active_tension": mechanics["active_tension"]}
+    if solved and (reason := violated_bound(judged, job.case.config.physiology, healthy)):
         job.set_verdict("implausible", reason)
         logging.getLogger("echotruth").warning("implausible: %s", reason)
     return {"physiology": measured}
