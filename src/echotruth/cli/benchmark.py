@@ -30,8 +30,8 @@ def add(commands: Commands) -> None:
     add_repeated(
         parser,
         ("card", Path, "card of a tracker that was evaluated, a YAML file, to keep beside its scores; can be repeated"),
-        ("check", str, "run this tracker again on the mirrored clips of the split; can be repeated"),
-        ("open", str, "run this tracker again on the first half of the clips of the split; can be repeated"),
+        ("check", str, "run this tracker again on the mirrored clips of the split and sizes; can be repeated"),
+        ("open", str, "run this tracker again on the first half of the clips of the split and sizes; can be repeated"),
         ("size", int, "image size, px; can be repeated (default: all)"),
     )
     parser.add_argument("--jobs", type=int, default=1, help="processes (default: 1); nothing depends on it")
