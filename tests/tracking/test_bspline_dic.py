@@ -73,6 +73,24 @@ def test_uneven_contraction_of_a_ring_is_not_evened_out(clip, harmonic, share):
     assert share < uneven / -2.4 < 1.1
 
 
+def test_tissue_in_a_shadow_counts_like_the_rest(clip):
+    """The lit side of the ring is at rest, the shadowed side contracts, and noise is as strong everywhere."""
+
+    def inward(place, t):
+        arm = place - MIDDLE
+        share = np.clip(arm[:, :1] / np.linalg.norm(arm, axis=1)[:, None], 0, None)
+        return place - 8 * beat(t) * share * arm / np.linalg.norm(arm, axis=1)[:, None]
+
+    frames = clip(inward, 6, SIZE).astype(int)
+    frames -= np.clip(4 * (np.arange(SIZE) - 54), 0, 130)  # 25 dB
+    frames = (np.clip(frames, 0, None) + np.random.default_rng(2).integers(0, 4, frames.shape)).astype(np.uint8)
+    mask, points = ring()
+    shadowed = points[points[:, 0] > 85]
+    even, uneven = (found(frames, mask, shadowed, gain_mm=mm)[0] for mm in (0.6, 0))
+    assert worst(even, 6, shadowed, inward) < 1.2
+    assert worst(uneven, 6, shadowed, inward) > 4
+
+
 @pytest.mark.parametrize("shift", [0.3, 0.5, 0.8])
 def test_sub_pixel_shifts_have_a_bias_below_a_hundredth_of_a_pixel(shifted, shift):
     mask, points = ring()

@@ -7,7 +7,7 @@ import pytest
 
 from echotruth.config.tracking import BsplineDic, Dis
 from echotruth.tracking import track
-from echotruth.tracking.closure import closing_correlation
+from echotruth.tracking.closure import closing_correlation, is_open
 
 FRAMES, SWING, SIZE = 16, 28.0, 128
 MASK = np.zeros((SIZE, SIZE), bool)
@@ -32,8 +32,18 @@ def tracked(frames, settings):
 def test_cycle_closes_and_half_of_it_does_not(swing):
     closing, consecutive = closing_correlation(swing, MASK)
     assert closing >= consecutive
+    assert not is_open(closing, consecutive)
     closing, consecutive = closing_correlation(swing[: FRAMES // 2], MASK)
     assert closing < consecutive - 0.2
+    assert is_open(closing, consecutive)
+
+
+def test_bright_tissue_at_rest_does_not_make_an_open_clip_a_closed_one(clip, swing):
+    still = clip(lambda position, frame: position, FRAMES, SIZE)[: FRAMES // 2]
+    dim = swing[: FRAMES // 2].copy()
+    dim[:, :, 36:] = np.maximum(dim[:, :, 36:], 100) - 100  # 20 dB
+    dim[:, :, :36] = still[:, :, :36]
+    assert is_open(*closing_correlation(dim, MASK))
 
 
 @pytest.mark.parametrize("settings", [Dis, BsplineDic])
@@ -56,3 +66,4 @@ def test_closed_clip_is_tracked_both_ways_without_a_word(swing, caplog):
 def test_clip_without_texture_is_taken_for_a_cycle():
     closing, consecutive = closing_correlation(np.zeros((4, SIZE, SIZE), np.uint8), MASK)
     assert np.isnan(closing) and np.isnan(consecutive)
+    assert not is_open(closing, consecutive)

@@ -3,7 +3,7 @@ import pytest
 
 from echotruth.config.tracking import AffineDic, PhaseCorrelation, WindowDeformation
 from echotruth.tracking import track
-from echotruth.tracking.grey import MIN_STD, decompress, grey_levels, local_ncc
+from echotruth.tracking.grey import MIN_GAIN_DB, MIN_STD, decompress, even_gain, grey_levels, local_ncc, rms
 
 
 def test_local_ncc_is_pearson_s_correlation_of_the_two_squares():
@@ -52,6 +52,20 @@ def test_decompression_inverts_the_log_compression():
     np.testing.assert_allclose(np.diff(found) / np.diff(echo), np.diff(found)[0] / np.diff(echo)[0], rtol=1e-12)
     assert decompress(np.array(1e-6), 40.0) == pytest.approx(1e-6, rel=1e-5)
     np.testing.assert_array_equal(decompress(shown, 0.0), shown)
+
+
+def test_even_gain_removes_a_shadow_and_leaves_black_black():
+    speckle = np.random.default_rng(1).rayleigh(size=(200, 240)).astype(np.float32)
+    speckle[::7] = 0
+    shadow = 10 ** (-1 / (1 + np.exp((np.arange(240) - 120) / 12))).astype(np.float32)  # 20 dB on the left
+    lit, dim = (even_gain(image, 15.0, rms(speckle[speckle > 0])) for image in (speckle, shadow * speckle))
+    left = np.s_[:, :60]
+    floor = 10 ** (MIN_GAIN_DB / 10)
+    assert rms(dim[left]) / rms(lit[left]) == pytest.approx(np.sqrt((1 + floor) / (1 + floor / 0.01)), abs=0.02)
+    assert rms((shadow * speckle)[left]) / rms(speckle[left]) < 0.2
+    assert (dim[::7] == 0).all()
+    assert rms(lit) / rms(speckle) == pytest.approx(1, abs=0.03)
+    np.testing.assert_array_equal(even_gain(speckle, 15.0, 0.0), speckle)
 
 
 @pytest.mark.parametrize("section", [PhaseCorrelation, WindowDeformation, AffineDic])

@@ -128,8 +128,9 @@ def make_repository(
 
     folder = Path("out") / config.name
     # Snakemake's own lock is that of the working folder, where other names may run; a repository has its lease.
-    snakemake = [sys.executable, "-m", "snakemake", "--snakefile", str(WORKFLOW / "Snakefile"), "--nolock"]
-    snakemake += ["--configfile", path]
+    # Not at the end: --configfile takes all that follows, files to make too.
+    snakemake = [sys.executable, "-m", "snakemake", "--snakefile", str(WORKFLOW / "Snakefile")]
+    snakemake += ["--configfile", path, "--nolock"]
     options = with_profiles(options)
     if any(map(is_query, options)):
         return subprocess.call([*snakemake, *options])

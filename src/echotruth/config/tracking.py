@@ -96,6 +96,9 @@ class BsplineDic(Section):
     dynamic_range_dB: Annotated[FiniteFloat, Field(ge=0, le=120)] = 45.0
     """Dynamic range of the images, by which log compression is undone: dark gaps between speckles change more than the
     bright speckles do. 0 uses the grey values."""
+    gain_mm: Annotated[FiniteFloat, Field(ge=0)] = 0.6
+    """Distance over which the gain of the images is made even, the standard deviation of a Gaussian: tissue in a shadow
+    counts like the rest. 0 leaves it as it is. Default: as suits `bmode.field_of_view_mm`."""
     blur_px: Annotated[FiniteFloat, Field(ge=0, le=5)] = 0.6
     """Standard deviation of the Gaussian blur of images with pixels much larger than `speckle_pixel_um`, against
     aliasing; images with pixels of that size are not blurred."""

@@ -1,4 +1,4 @@
-"""Grey values of clips: normalisation, inversion of the log compression, and local correlation of two images."""
+"""Grey values of clips: normalisation, inversion of the log compression, gain, and local correlation of two images."""
 
 from __future__ import annotations
 
@@ -7,6 +7,10 @@ from math import log
 import cv2
 import numpy as np
 
+MIN_GAIN_DB = -30.0
+"""Gain over a typical one that :func:`even_gain` makes up for at most."""
+PIXELS_PER_DEVIATION = 4
+"""Pixels per standard deviation with which a Gaussian mean is computed, at least."""
 MIN_STD = 1 / 255
 """Standard deviation of grey values below which a window has no texture: one level of an 8-bit image."""
 
@@ -55,6 +59,46 @@ def decompress(grey: np.ndarray, decibels: float) -> np.ndarray:
 def amplitudes(frames: np.ndarray, decibels: float) -> np.ndarray:
     """Amplitudes (frame, axial, lateral) of a clip of any real type, see :func:`grey_levels` and :func:`decompress`."""
     return decompress(grey_levels(frames), decibels)
+
+
+def rms(values: np.ndarray) -> float:
+    """Root mean square of values of any shape; 0 of none."""
+    return float(np.sqrt(np.mean(np.square(values, dtype=float)))) if values.size else 0.0
+
+
+def even_gain(amplitude: np.ndarray, deviation: float, typical: float) -> np.ndarray:
+    """Amplitudes of the same brightness everywhere: over their local RMS, times a typical one.
+
+    Shadow, depth and obliquity of the wall change the gain slowly from place to place. Where it is low, speckle is as
+    good as elsewhere, but would not count in least squares. Compare the divisive normalisation of Jarrett et al. 2009,
+    IEEE ICCV, 2146. Black pixels tell nothing of the gain and do not count. Below `MIN_GAIN_DB` it is made up for only
+    in part, lest noise becomes as bright as tissue.
+
+    Parameters
+    ----------
+    amplitude : ndarray of shape (axial, lateral), float32
+    deviation : float
+        Standard deviation of the Gaussian weights of the local RMS, px.
+    typical : float
+        Typical RMS of the amplitude in the wall.
+
+    Returns
+    -------
+    ndarray of the same shape and type
+        The amplitudes as they are if `typical` is 0.
+    """
+    if not typical > 0:
+        return amplitude
+    size = amplitude.shape[::-1]
+    # The mean is so smooth that a few pixels per standard deviation give it.
+    side = max(1, int(deviation / PIXELS_PER_DEVIATION))
+    reduced = tuple(max(1, length // side) for length in size)
+    total = np.stack([amplitude * amplitude, (amplitude > 0).astype(amplitude.dtype)], -1)
+    total = cv2.resize(total, reduced, interpolation=cv2.INTER_AREA)
+    total = cv2.GaussianBlur(total, (0, 0), deviation / side, borderType=cv2.BORDER_REFLECT)
+    mean = total[..., 0] / np.maximum(total[..., 1], np.float32(1e-6))
+    power = cv2.resize(mean, size, interpolation=cv2.INTER_LINEAR)
+    return amplitude / np.sqrt(power / np.float32(typical**2) + np.float32(10 ** (MIN_GAIN_DB / 10)))
 
 
 def decompression_slope(amplitude: np.ndarray, decibels: float) -> np.ndarray:

@@ -75,11 +75,10 @@ def _suited(settings: Section, frames: np.ndarray, mask: np.ndarray) -> Section:
     """The settings, without the way backwards if the last frame of a clip is not followed by the first."""
     if getattr(settings, "reference", None) != "bidirectional":
         return settings
-    from echotruth.tracking.closure import closing_correlation
+    from echotruth.tracking.closure import closing_correlation, is_open
 
     closing, consecutive = closing_correlation(frames, mask)
-    # Where neither can be told, the clip is taken for the cycle that it should be.
-    if not closing < consecutive:
+    if not is_open(closing, consecutive):
         return settings
     found = f"its last and first frames correlate by {closing:.2f}, consecutive ones by {consecutive:.2f} or more"
     logging.getLogger("echotruth").warning(f"the clip is no closed cycle ({found}): tracked forwards only")

@@ -1,7 +1,8 @@
 """Digital image correlation of the whole wall at once; the motion is a cubic B-spline.
 
 The displacement since end-diastole is a cubic B-spline over the wall at end-diastole. Frame by frame, it is fitted so
-that the image at the displaced positions matches a template, an earlier frame at its own displaced positions
+that the image at the displaced positions matches a template, an earlier frame at its own displaced positions; in both
+the gain is made even, so that tissue in a shadow counts like the rest
 (Gauss-Newton with robust weights, Baker and Matthews 2004, Int J Comput Vis 56:221; B-splines as Rueckert et al. 1999,
 IEEE Trans Med Imaging 18:712). A template is kept until its correlation with the tissue falls too low. If the
 cycle closes, the clip is tracked from end-diastole both forwards and backwards, and the two are averaged with weights
@@ -24,7 +25,7 @@ from echotruth.tracking import bidirectional
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.alignment import interpolate_with_gradient
 from echotruth.tracking.flow import interpolate_field
-from echotruth.tracking.grey import decompress, grey_levels
+from echotruth.tracking.grey import decompress, even_gain, grey_levels, rms
 from echotruth.tracking.ncc import NormalizedCrossCorrelation
 from echotruth.tracking.quality import error_model
 from echotruth.tracking.region import WallRegion, wall_region
@@ -80,16 +81,22 @@ def track(
     ncc = NormalizedCrossCorrelation(region.positions, region.inside, points, 2 * knot_spacing, values.dynamic_range)
     block = max(1, min(int(knot_spacing / FLOW_PIXELS_PER_KNOT), min(mask.shape) // MIN_IMAGE_SIDE))
 
-    def prepare(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    grey = grey_levels(frames)
+    typical = rms(decompress(np.nan_to_num(grey[0][mask]), values.dynamic_range))
+
+    def smooth(image: np.ndarray) -> np.ndarray:
+        return cv2.GaussianBlur(image, (0, 0), blur, borderType=cv2.BORDER_REFLECT) if blur else image
+
+    def prepare(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         amplitude = decompress(np.nan_to_num(frame), values.dynamic_range)
-        blurred = cv2.GaussianBlur(amplitude, (0, 0), blur, borderType=cv2.BORDER_REFLECT) if blur else amplitude
-        return block_mean(amplitude, block), blurred
+        even = even_gain(amplitude, values.gain / spacing, typical) if values.gain else amplitude
+        return block_mean(even, block), smooth(even), smooth(amplitude)
 
     with ThreadPoolExecutor(2) as threads:
-        coarse, blurred = zip(*threads.map(prepare, grey_levels(frames)), strict=True)
-        images = [spline.coefficients(frame) for frame in blurred]
+        coarse, even, amplitudes = zip(*threads.map(prepare, grey), strict=True)
+        images = [spline.coefficients(frame) for frame in even]
         coarse = np.array(coarse) / (np.max(coarse) or 1)
-        tracker = WallTracker(region, ncc, coarse, block, images, settings)
+        tracker = WallTracker(region, ncc, coarse, block, images, amplitudes, settings)
         orders = bidirectional.forward_backward(len(frames))
         trajectories = list(threads.map(tracker.track, orders if settings.reference == "bidirectional" else orders[:1]))
     path = combine(region, points, trajectories[0], trajectories[-1])
@@ -116,7 +123,9 @@ class WallTracker:
     block : int
         Side of a block, px.
     images : list of ndarray
-        Spline coefficients of the blurred amplitudes.
+        Spline coefficients of the blurred amplitudes with even gain.
+    amplitudes : sequence of ndarray
+        Blurred amplitudes as they are (axial, lateral): they tell whether a place has texture.
     settings : BsplineDic
     """
 
@@ -125,13 +134,15 @@ class WallTracker:
     coarse: np.ndarray
     block: int
     images: list[np.ndarray]
+    amplitudes: Sequence[np.ndarray]
     settings: BsplineDic
 
     def track(self, order: Sequence[int]) -> WallTrajectory:
         """Track the wall through the frames in an order that begins with end-diastole."""
         template = latest = interpolate_with_gradient(self.images[0], self.region.positions)
         coefficients, variance = np.zeros((len(order), self.region.lattice.size, 2)), np.zeros(len(order))
-        ncc = [self.ncc.at_points(template[:, 0], template[:, 0])] * len(order)
+        amplitude = {0: self._amplitude(0, coefficients[0])}
+        ncc = [self.ncc.at_points(amplitude[0], amplitude[0])] * len(order)
         template_frame = latest_frame = 0
         for before, now in pairwise(order):
             start = self._predict(now, before, coefficients[before], template)
@@ -142,10 +153,17 @@ class WallTracker:
                 fitted, warped = self._align(now, template, start, coefficients[before])
             coefficients[now] = fitted
             variance[now] = variance[template_frame] + self._variance(template, warped)
-            ncc[now] = self.ncc.at_points(template[:, 0], warped[:, 0])
+            amplitude[now] = self._amplitude(now, fitted)
+            ncc[now] = self.ncc.at_points(amplitude[template_frame], amplitude[now])
             if np.isfinite(variance[now]):
                 latest_frame, latest = now, warped
         return WallTrajectory(coefficients, variance, np.array(ncc))
+
+    def _amplitude(self, frame: int, coefficients: np.ndarray) -> np.ndarray:
+        """Amplitudes (pixel,) of a frame at the displaced pixels; outside the image those of its border."""
+        image = self.amplitudes[frame]
+        positions = self.region.positions + self.region.cells.evaluate(coefficients)
+        return interpolate_field(image[..., None], np.clip(positions, 0, np.array(image.shape[::-1]) - 1))[:, 0]
 
     def _ncc(self, template: np.ndarray, warped: np.ndarray) -> float:
         return self.ncc.overall(template[:, 0], warped[:, 0])
