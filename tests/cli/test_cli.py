@@ -100,9 +100,11 @@ def test_evaluation_of_no_repository_is_refused_in_one_line(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_run_needs_no_checkout(tmp_path):
-    status, output, _ = run_process("run", ROOT / "config/demo.yaml", "-n", cwd=tmp_path)
-    assert status == 0 and "mechanics" in output
+def test_run_needs_no_checkout_and_makes_only_the_files_asked_for(tmp_path):
+    config = ROOT / "config/demo.yaml"
+    file = f"out/demo/ledger/mechanics/{expand(load(config), 'demo')[0].id}.json"
+    status, output, _ = run_process("run", config, file, "-n", cwd=tmp_path)
+    assert status == 0 and "mechanics" in output and "imaging" not in output
 
 
 def test_help_names_every_command():
