@@ -90,14 +90,14 @@ class ErrorModel:
 
 
 ERRORS = {
-    "phase_correlation_ED": ErrorModel(0.0, 0.0, 0.217, 0.117, 0.0, 0.111),
-    "phase_correlation": ErrorModel(0.0, 0.232, 0.0, 0.0732, 0.0747, 0.144),
-    "window_deformation": ErrorModel(0.28, 0.304, 0.164, 0.415, 0.0661, 0.071),
-    "affine_dic": ErrorModel(0.28, 0.191, 0.0, 0.546, 0.177, 0.0449),
-    "dis": ErrorModel(0.318, 0.396, 0.025, 0.331, 0.133, 0.0612),
-    "dis_fine": ErrorModel(0.268, 0.255, 0.0, 0.149, 0.133, 0.0648),
+    "phase_correlation_ED": ErrorModel(0.0, 0.0, 0.226, 0.145, 0.0, 0.0),
+    "phase_correlation": ErrorModel(0.0, 0.307, 0.0, 0.0812, 0.0737, 0.096),
+    "window_deformation": ErrorModel(0.286, 0.257, 0.339, 0.352, 0.0853, 0.0595),
+    "affine_dic": ErrorModel(0.31, 0.192, 0.355, 0.655, 0.253, 0.0338),
+    "dis": ErrorModel(0.28, 0.386, 0.309, 0.205, 0.15, 0.0712),
+    "dis_fine": ErrorModel(0.292, 0.255, 0.294, 0.0, 0.196, 0.0516),
     "ilk": ErrorModel(0.475, 0.0, 0.11, 0.173, 0.0, 0.0771),
-    "bspline_dic": ErrorModel(0.282, 0.0, 0.0853, 0.122, 0.187, 0.0103),
+    "bspline_dic": ErrorModel(0.358, 0.0652, 0.0459, 0.0429, 0.25, 0.0221),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`."""
 

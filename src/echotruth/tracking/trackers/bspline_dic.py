@@ -35,9 +35,9 @@ MIN_KNOT_SPACING = 5.0
 """px; closer knots have more unknowns than the image has information."""
 FLOW_PIXELS_PER_KNOT = 8
 """Pixels between knots in the images of the dense flow, at least; these are block means."""
-NCC_EXPONENT = 3
+NCC_EXPONENT = 8
 """Power of the correlation in the variance of a step. The noise of one match gives 2; where the correlation is low,
-the field may also settle on other tissue that resembles the template."""
+the field may also settle on other tissue that resembles the template, and such errors weigh more."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class WallTracker:
         return self.ncc.overall(template[:, 0], warped[:, 0])
 
     def _variance(self, template: np.ndarray, warped: np.ndarray) -> float:
-        """Variance mean((T - I)^2) / mean(|grad I|^2) / NCC^3 of the match of image I and template T, px^2."""
+        """Variance mean((T - I)^2) / mean(|grad I|^2) / NCC^8 of the match of image I and template T, px^2."""
         ncc, inside = self._ncc(template, warped), self.region.inside
         if not ncc > 0:
             return np.inf
