@@ -126,7 +126,7 @@ class WallRegion:
         warped : ndarray of shape (pixel, 3)
             I(X + U), and its lateral and axial derivative per px.
         """
-        coefficients, position = start, self.positions + self.cells.evaluate(start)
+        coefficients, position = start, self.displaced(start)
         normal: NormalMatrix | None = None
         for iteration in range(MAX_ITERATIONS):
             warped = alignment.interpolate_with_gradient(image, position)
@@ -146,6 +146,10 @@ class WallRegion:
             if settled and np.sqrt(np.mean(step**2)) < CONVERGENCE * self.lattice.knot_spacing:
                 break
         return coefficients, alignment.interpolate_with_gradient(image, position)
+
+    def displaced(self, coefficients: np.ndarray) -> np.ndarray:
+        """Positions (pixel, 2) of the pixels after the displacement with coefficients (knot, 2), px."""
+        return self.positions + self.cells.evaluate(coefficients)
 
     def fit(self, flow: np.ndarray) -> np.ndarray:
         """Coefficients (knot, 2) of the field that best fits a dense flow (pixel, 2), px, with outliers down-weighted.

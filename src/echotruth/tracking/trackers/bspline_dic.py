@@ -1,12 +1,11 @@
 """Digital image correlation of the whole wall at once; the motion is a cubic B-spline.
 
 The displacement since end-diastole is a cubic B-spline over the wall at end-diastole. Frame by frame, it is fitted so
-that the image at the displaced positions matches a template, an earlier frame at its own displaced positions; in both
-the gain is made even, so that tissue in a shadow counts like the rest
+that the image at the displaced positions matches a template, an earlier frame at its own displaced positions
 (Gauss-Newton with robust weights, Baker and Matthews 2004, Int J Comput Vis 56:221; B-splines as Rueckert et al. 1999,
-IEEE Trans Med Imaging 18:712). A template is kept until its correlation with the tissue falls too low. If the
-cycle closes, the clip is tracked from end-diastole both forwards and backwards, and the two are averaged with weights
-from their variances.
+IEEE Trans Med Imaging 18:712). In both the gain is made even, so that tissue in a shadow counts like the rest. A
+template is kept until its correlation with the tissue falls too low. If the cycle closes, the clip is tracked from
+end-diastole both forwards and backwards, and the two are averaged with weights from their variances.
 """
 
 from __future__ import annotations
@@ -162,8 +161,8 @@ class WallTracker:
     def _amplitude(self, frame: int, coefficients: np.ndarray) -> np.ndarray:
         """Amplitudes (pixel,) of a frame at the displaced pixels; outside the image those of its border."""
         image = self.amplitudes[frame]
-        positions = self.region.positions + self.region.cells.evaluate(coefficients)
-        return interpolate_field(image[..., None], np.clip(positions, 0, np.array(image.shape[::-1]) - 1))[:, 0]
+        inside = np.clip(self.region.displaced(coefficients), 0, np.array(image.shape[::-1]) - 1)
+        return interpolate_field(image[..., None], inside)[:, 0]
 
     def _ncc(self, template: np.ndarray, warped: np.ndarray) -> float:
         return self.ncc.overall(template[:, 0], warped[:, 0])
@@ -182,8 +181,7 @@ class WallTracker:
 
     def _predict(self, now: int, before: int, coefficients: np.ndarray, template: np.ndarray) -> np.ndarray:
         """Coefficients advanced by the dense flow, or unchanged if they then match the template better."""
-        positions = self.region.positions + self.region.cells.evaluate(coefficients)
-        positions = (positions - (self.block - 1) / 2) / self.block
+        positions = (self.region.displaced(coefficients) - (self.block - 1) / 2) / self.block
         step = self.block * interpolate_field(optical_flow(self.coarse[before], self.coarse[now]), positions)
         advanced = coefficients + self.region.fit(np.nan_to_num(step))
         return self._best(now, template, coefficients, advanced)
@@ -192,8 +190,7 @@ class WallTracker:
         """The field with the smallest mean absolute difference between image and template."""
 
         def difference(coefficients: np.ndarray) -> float:
-            positions = self.region.positions + self.region.cells.evaluate(coefficients)
-            warped = interpolate_with_gradient(self.images[frame], positions)
+            warped = interpolate_with_gradient(self.images[frame], self.region.displaced(coefficients))
             return float(np.abs(warped[:, 0] - template[:, 0]).mean())
 
         return min(fields, key=difference)
