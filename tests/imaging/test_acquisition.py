@@ -178,15 +178,17 @@ def test_an_echo_is_faint_where_its_ray_crosses_the_rib(acquire, scanner, side):
         ramp = np.clip((projection - sign * scanner.matrix.centres) / 0.4e-3 + 0.5, 0, 1)
         passes = 10**-1.5 + (1 - 10**-1.5) * np.sin(np.pi / 2 * ramp) ** 2
         exact += passes[:, None] * passes * scanner.matrix(place[k : k + 1], amplitude[k : k + 1])
-    found = acquisition.direct(place, amplitude)
-    assert np.linalg.norm(found - exact) < 0.03 * np.linalg.norm(exact)
+    found = acquisition.echoes(place, amplitude)
+    assert np.linalg.norm(found - exact) < 2e-3 * np.linalg.norm(exact)
 
 
 def test_scatterers_before_the_rib_are_not_shaded_and_those_deep_behind_it_are(acquire, scanner):
-    rib = Rib(Config.model_validate({"realism": {"shadow": {"side": "right"}}}).realism.shadow, np.zeros(1))
+    rib = Rib(Config.model_validate({"realism": {"shadow": {"side": "right"}}}).realism.shadow)
     before, behind = np.array([[2e-3, 1.4e-3, 0]]), np.array([[5e-3, 6e-3, 0]])
     acquisition, _ = acquire(shadow={"side": "right", "level_dB": -40.0})
     one = np.ones(1)
     assert np.isinf(rib.projected_edge(before)).all()
-    assert np.allclose(acquisition.direct(before, one), scanner.matrix(before, one), rtol=1e-6)
-    assert np.allclose(acquisition.direct(behind, one), 1e-4 * scanner.matrix(behind, one), rtol=1e-4, atol=1e-12)
+    for place, passes in ((before, 1.0), (behind, 1e-4)):
+        # The clusters with and without a rib have other skeletons, and errors.
+        echo = passes * scanner.matrix(place, one)
+        assert np.linalg.norm(acquisition.echoes(place, one) - echo) < 0.03 * np.linalg.norm(echo)

@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 from echotruth.config import Probe
+from echotruth.config.realism import Shadow
 from echotruth.imaging.rf.exact import exact_matrix
 from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
+from echotruth.imaging.rf.shadow import Rib
 
 CENTRE = 25e6
 DEVIATION = 12.5e6 / np.sqrt(8 * np.log(2))
@@ -53,6 +55,20 @@ def test_other_arrays_come_as_near_to_the_exact_sum(preset, scale, half_angle):
     probe = Probe(preset=preset, attenuation_dB_per_cm_MHz=0.5)
     position, amplitude = sector(40, nearest=4e-3 * scale, farthest=10e-3 * scale, half_angle=half_angle)
     assert error(probe, position, amplitude, depth=11e-3 * scale) < PLANE_ACCURACY
+
+
+@pytest.mark.parametrize("preset, scale", [("mouse_25MHz", 1), ("human_2_7MHz", 12)])
+@pytest.mark.parametrize("depth", [1.5e-3, 4e-3])
+@pytest.mark.parametrize("edge_width", [0.0, 0.5e-3])
+def test_behind_a_rib_the_rf_is_the_exact_sum_of_what_passes(preset, scale, depth, edge_width):
+    probe = Probe(preset=preset)
+    edges = {"edge_deg": 3.0, "edge_width_mm": edge_width * scale * 1e3}
+    rib = Rib(Shadow(side="right", depth_mm=depth * scale * 1e3, **edges))
+    position, amplitude = sector(80, nearest=2e-3 * scale, farthest=10e-3 * scale, half_angle=24)
+    matrix = FullMatrix(probe, DEPTH * scale, elevation=False)
+    exact = exact_matrix(probe, position, amplitude, matrix.frequency[::24], elevation=False, rib=rib)
+    shaded, clear = matrix.behind(rib)(position, amplitude)[::24], matrix(position, amplitude)[::24]
+    assert relative(shaded, exact) < 1.5 * PLANE_ACCURACY < 1e-3 * relative(clear, exact)
 
 
 def lens_errors(probe, depth, beside, bands):

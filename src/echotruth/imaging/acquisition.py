@@ -38,13 +38,13 @@ class Acquisition:
     def __init__(self, config: Config, scanner: Scanner, medium: Medium, random: Random):
         realism = config.realism
         self._scanner, self._medium, self._random = scanner, medium, random
-        self._haze_range, self._filter, self._rib = 0.0, None, None
+        self._haze_range, self._filter, self._matrix = 0.0, None, scanner.matrix
         if realism.haze.level_dB is not None:
             echoes = reverberation(realism.haze, config.probe, imaging_depth(config.rf, config.bmode), random("haze"))
             self._haze_range = realism.haze.si().max_source_range
             self._filter = 1 + reverberation_filter(echoes, scanner.matrix.frequency, config.probe.si().sound_speed)
         if realism.shadow.side != "none":
-            self._rib = Rib(realism.shadow, scanner.matrix.centres)
+            self._matrix = scanner.matrix.behind(Rib(realism.shadow))
         snr = realism.noise.snr_dB
         self.noise = 0.0 if snr is None else self._signal_to_unit_noise() * 10 ** (-snr / 20)
 
@@ -58,25 +58,12 @@ class Acquisition:
     def echoes(self, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray | float = 0.0) -> np.ndarray:
         """Record of scatterers, their positions (n, 3), m, amplitudes (n,) and exponents (n,), without noise."""
         if self._filter is None:
-            return self.direct(position, amplitude, exponent)
+            return self._matrix(position, amplitude, exponent)
         exponent = np.broadcast_to(exponent, amplitude.shape)
         near = np.linalg.norm(position, axis=1) < self._haze_range
-        record = self.direct(position[near], amplitude[near], exponent[near])
+        record = self._matrix(position[near], amplitude[near], exponent[near])
         record *= self._filter.astype(np.complex64)[:, None, None]
-        record += self.direct(position[~near], amplitude[~near], exponent[~near])
-        return record
-
-    def direct(self, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray | float = 0.0) -> np.ndarray:
-        """Echoes without reverberation."""
-        matrix = self._scanner.matrix
-        if self._rib is None:
-            return matrix(position, amplitude, exponent)
-        exponent = np.broadcast_to(exponent, amplitude.shape)
-        record = np.zeros((len(matrix.frequency), len(matrix.centres), len(matrix.centres)), np.complex64)
-        for strip, transmission in self._rib.strips(position):
-            record += np.multiply.outer(transmission, transmission) * matrix(
-                position[strip], amplitude[strip], exponent[strip]
-            )
+        record += self._matrix(position[~near], amplitude[~near], exponent[~near])
         return record
 
     def unit_noise(self, frame: int) -> np.ndarray:

@@ -3,12 +3,13 @@
 Scatterers that an array sees at about one angle and range form a cluster. Apart from the delays of its centre, their
 echoes change so smoothly from element to element that those of a few skeleton elements determine the others: an
 interpolative decomposition (Cheng, Gimbutas, Martinsson, Rokhlin 2005, SIAM J Sci Comput 26:1389) of what echoes a
-cluster can have. The full matrix is made between skeleton elements, and expanded to all pairs after all scatterers of
-the cluster are in it.
+cluster can have, those in the shadow of a rib included. The full matrix is made between skeleton elements, and
+expanded to all pairs after all scatterers of the cluster are in it.
 """
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numba
@@ -19,6 +20,7 @@ from scipy import linalg
 from echotruth.arrays import Floats
 from echotruth.imaging.rf.kernel import Band
 from echotruth.imaging.rf.product import HEIGHT, padded, product
+from echotruth.imaging.rf.shadow import Rib
 
 SIZE = 3.0
 """Width of a cluster in the sine of the angle, in wavelengths over half the array; and its depth in 1/range, in
@@ -27,8 +29,12 @@ EXTRA_ELEMENTS = 4
 """Skeleton elements in addition to those that the tolerance requires; their errors average out."""
 RIDGE = 4.0
 """Assumed error of an element, over the tolerance; it regularises the interpolation weights."""
-SAMPLES = 6
-"""Angles, and ranges, at which the echoes of a cluster are sampled."""
+SAMPLES, SHADOW_SAMPLES = 6, 12
+"""Angles, and ranges, at which the echoes of a cluster are sampled, without and with a rib. The edge of the shadow
+falls on another part of the array for each: with 12 it moves by less than an element from one to the next."""
+SHADOW_DEPTH = 2.0
+"""Range, in depths of the rib, from which on the edge of the shadow moves slower over the array than the scatterers
+do; nearer, every element is its own skeleton."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +73,8 @@ class Clusters:
         Relative error (L2) of the echoes that are interpolated.
     """
 
+    _rib: Rib | None = None
+
     def __init__(self, centres: Floats, sound_speed: float, band: Band, max_range: float, tolerance: float) -> None:
         self._centres, self._speed, self._band, self._tolerance = centres, sound_speed, band, tolerance
         half_aperture = (centres[-1] - centres[0]) / 2
@@ -78,12 +86,21 @@ class Clusters:
         self._sectors = int(np.ceil(2 / size))
         self._clusters: dict[int, Cluster] = {}
 
+    def behind(self, rib: Rib) -> Clusters:
+        """The clusters that the array sees behind a rib."""
+        clusters = copy(self)
+        clusters._rib, clusters._clusters = rib, {}
+        return clusters
+
     def numbers(self, position: Floats) -> NDArray[np.int64]:
         """Number of the cluster of each scatterer at a position (n, 3), m: (n,)."""
         range_ = np.linalg.norm(position, axis=1)
         sector = np.clip((position[:, 0] / range_ + 1) / 2 * self._sectors, 0, self._sectors - 1).astype(np.int64)
         row = np.maximum((1 / range_ - self._min_curvature) / self._step[1], 0).astype(np.int64)
-        return np.where(row < self._rows, row * self._sectors + sector, self._rows * self._sectors)
+        far = row < self._rows
+        if self._rib:
+            far &= position[:, 1] > SHADOW_DEPTH * self._rib.depth
+        return np.where(far, row * self._sectors + sector, self._rows * self._sectors)
 
     def __getitem__(self, number: int) -> Cluster:
         """The cluster of a number; the skeleton of the greatest are all elements."""
@@ -96,7 +113,8 @@ class Clusters:
             elements = len(self._centres)
             return Cluster(np.arange(elements), np.eye(elements), np.zeros(elements))
         row, sector = divmod(number, self._sectors)
-        node = -np.cos(np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES)
+        samples = SHADOW_SAMPLES if self._rib else SAMPLES
+        node = -np.cos(np.pi * (np.arange(samples) + 0.5) / samples)
         curvature, sine = np.meshgrid(
             self._min_curvature + (row + 0.5 + node / 2) * self._step[1],
             ((sector + 0.5 + node / 2) / self._sectors) * 2 - 1,
@@ -105,7 +123,11 @@ class Clusters:
         delay = self._delays(*centre[:, None])
         late = self._delays(curvature.ravel(), sine.ravel()) - delay
         phase = np.multiply.outer(late, 2 * np.pi * self._band.frequency)
-        echoes = (np.exp(1j * phase) * np.sqrt(self._band.weight / curvature.size)).reshape(len(delay), -1)
+        echoes = np.exp(1j * phase) * np.sqrt(self._band.weight / curvature.size)
+        if self._rib:
+            place = np.stack([sine, np.sqrt(1 - sine**2), np.zeros_like(sine)], axis=-1) / curvature[..., None]
+            echoes *= self._rib.transmission(place.reshape(-1, 3), self._centres).T[..., None]
+        echoes = echoes.reshape(len(delay), -1)
         skeleton, weights = _decomposition(np.concatenate([echoes.real, echoes.imag], axis=1), self._tolerance)
         return Cluster(skeleton, weights, delay[:, 0])
 

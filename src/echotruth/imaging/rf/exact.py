@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.config import Probe
 from echotruth.imaging.rf.probe import element_centres, pulse_spectrum
+from echotruth.imaging.rf.shadow import Rib
 
 Spectra = NDArray[np.complex128]
 
@@ -32,6 +33,7 @@ def exact_matrix(
     *,
     exponent: Floats | float = 0.0,
     elevation: bool = True,
+    rib: Rib | None = None,
 ) -> Spectra:
     """Echoes S between all pairs.
 
@@ -47,12 +49,15 @@ def exact_matrix(
         Power of the frequency that the amplitude follows.
     elevation : bool
         Whether the lens is there; without it E = 1.
+    rib : Rib, optional
+        Each way u is multiplied by its transmission.
 
     Returns
     -------
     ndarray of shape (bins, elements, elements), 1/m^2
     """
-    waves = (one_way(probe, position, f, elevation=elevation) for f in frequency)
+    passes = rib.transmission(position, element_centres(probe)).T if rib else 1.0
+    waves = (passes * one_way(probe, position, f, elevation=elevation) for f in frequency)
     pulse = pulse_spectrum(probe, frequency)
     scattered = (amplitude * (f / probe.si().frequency) ** exponent for f in frequency)
     return np.array([p * (wave * a) @ wave.T for p, a, wave in zip(pulse, scattered, waves, strict=True)])

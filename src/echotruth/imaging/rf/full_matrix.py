@@ -18,6 +18,7 @@ for tables: 50 MB for the default array, however many scatterers there are.
 
 from __future__ import annotations
 
+from copy import copy
 from functools import reduce
 
 import numba
@@ -33,6 +34,7 @@ from echotruth.imaging.rf.kernel import NODES, TAPS, Band, Grid, stack_real_imag
 from echotruth.imaging.rf.lens_kernels import group_blocks, lens_kernels
 from echotruth.imaging.rf.probe import element_centres, pulse_band, pulse_spectrum, spectral_width
 from echotruth.imaging.rf.product import padded
+from echotruth.imaging.rf.shadow import Rib
 
 BLOCK = 256
 """Scatterers spread at a time."""
@@ -99,6 +101,8 @@ class FullMatrix:
     True
     """
 
+    _rib: Rib | None = None
+
     def __init__(self, probe: Probe, depth: float, max_delay: float = 0.0, elevation: bool = True) -> None:
         p = probe.si()
         low, high = pulse_band(probe)
@@ -162,6 +166,12 @@ class FullMatrix:
         self._tables = spreading.cache_aligned(len(tables))
         self._tables[:] = tables
 
+    def behind(self, rib: Rib) -> FullMatrix:
+        """The echoes that the array receives behind a rib: the same, each way times its transmission."""
+        matrix = copy(self)
+        matrix._rib, matrix._clusters = rib, self._clusters.behind(rib)
+        return matrix
+
     def in_beam(self, position: np.ndarray) -> np.ndarray:
         """Whether each scatterer at `position` (n, 3), m, is within the record and the beam: (n,), bool.
 
@@ -200,6 +210,9 @@ class FullMatrix:
             part = slice(start, min(start + BLOCK, len(position)))
             lens_terms, blocks, tables = kernels(part)
             spreading.one_way(position[part], self._mean_exponent[angle[part]], lens_terms, array, propagation)
+            if self._rib:
+                weight = propagation[1][: part.stop - start, : len(elements)]
+                weight *= self._rib.transmission(position[part], self.centres[elements])
             spreading.spread(traces, propagation, amplitude[part], blocks, (tables, size), bounds, lens, (0,) * scheme)
 
     @property
