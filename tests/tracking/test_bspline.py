@@ -8,7 +8,7 @@ from scipy import interpolate, linalg, ndimage
 from echotruth.imaging import spline
 from echotruth.tracking import alignment
 from echotruth.tracking import region as region_module
-from echotruth.tracking.bending_energy import bending_energy, wall_frame
+from echotruth.tracking.bending_energy import bending_matrix, wall_frame
 from echotruth.tracking.bspline import lattice_around
 from echotruth.tracking.evidence import Match
 from echotruth.tracking.ncc import NormalizedCrossCorrelation
@@ -93,11 +93,35 @@ def affine(region):
     return np.kron(np.linalg.lstsq(weights, fields, rcond=None)[0], np.eye(2))
 
 
-def test_affine_motion_of_the_whole_wall_has_no_bending_energy(random):
+def test_affine_motion_of_the_whole_wall_has_no_bending_matrix(random):
     region = wall_region(MASK, STEP, 3.0, 0.5)
-    random_field = region._energy_gradient(random.normal(size=(2 * region.lattice.size)))
+    random_field = region.energy.gradient(random.normal(size=(2 * region.lattice.size)))
     for field in affine(region).T:
-        assert np.abs(region._energy_gradient(field)).max() < 1e-9 * np.abs(random_field).max()
+        assert np.abs(region.energy.gradient(field)).max() < 1e-9 * np.abs(random_field).max()
+
+
+def test_more_of_the_motion_so_far_has_no_bending_energy(random):
+    region = wall_region(MASK, STEP, 3.0, 0.5)
+    so_far, other = random.normal(size=(2, 2 * region.lattice.size))
+    energy = region.energy.and_without(so_far)
+    size = np.abs(region.energy.gradient(so_far)).max()
+    assert np.abs(energy.gradient(-0.3 * so_far)).max() < 1e-9 * size
+    # Another field has the least energy that it can have with some of the motion taken from it.
+    shares = np.linspace(-2, 2, 4001)
+    least = min(field @ region.energy.gradient(field) for field in other - shares[:, None] * so_far)
+    np.testing.assert_allclose(other @ energy.gradient(other), least, rtol=1e-5)
+    assert region.energy.and_without(np.zeros_like(so_far)) is region.energy
+
+
+def test_newton_step_solves_the_equations_with_the_free_fields_taken_out(random):
+    region = wall_region(MASK, STEP, 3.0, 0.5)
+    gradient, weight = random.normal(size=region.positions.shape), random.uniform(size=len(region.positions))
+    energy = region.energy.and_without(random.normal(size=2 * region.lattice.size))
+    band, scale = region._image_matrix(gradient, weight, 1)
+    expected = dense(band) + scale * region_module.REGULARISATION * np.eye(len(band))
+    expected += 50 * np.stack([energy.gradient(unit) for unit in np.eye(len(band))], -1)
+    normal, rhs = region_module._factor(band, scale, 50.0, energy), random.normal(size=len(band))
+    np.testing.assert_allclose(normal.newton_step(rhs), linalg.solve(expected, rhs), rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("stride", [1, 3])
@@ -105,7 +129,7 @@ def test_normal_equations_are_those_of_the_dense_problem(random, stride):
     region = wall_region(MASK, STEP, 0.0, 0.5)
     count = len(region.positions)
     gradient, weight = random.normal(size=(count, 2)), random.uniform(size=count)
-    band, cells = np.zeros(region.energy.shape), region.cells
+    band, cells = np.zeros(region.energy.band.shape), region.cells
     alignment.add_normal_matrix(
         cells.knots, cells.offsets, cells.weight_x, cells.weight_y, gradient, weight, stride, band
     )
@@ -149,7 +173,7 @@ def test_fit_of_a_flow_becomes_that_by_least_squares_with_its_own_weights(random
     component = np.arange(len(flow)) % 2
     design = jacobian(region, np.eye(2)[component])
     gradient = design.T @ (weight / weight.mean() * residual[np.arange(len(flow)), component])
-    energy = FLOW_SMOOTHNESS * np.diagonal(design.T @ design).mean() * dense(region.energy)
+    energy = FLOW_SMOOTHNESS * np.diagonal(design.T @ design).mean() * dense(region.energy.band)
     fields = affine(region)
     energy -= energy @ fields @ np.linalg.solve(fields.T @ energy @ fields, fields.T @ energy)
     np.testing.assert_allclose(gradient, -energy @ found.ravel(), atol=1e-6 * np.abs(gradient).max() + 1e-6)
@@ -191,7 +215,7 @@ def test_bending_energy_of_a_parabola_is_its_thin_plate_energy_in_the_metric(tra
     positions = np.argwhere(MASK)[:, ::-1].astype(float)
     lattice = lattice_around(positions, STEP)
     metrics, turns = np.tile([1.0, 0.0, transmural_scale], (len(positions), 1)), np.zeros((len(positions), 5))
-    band = bending_energy(lattice.sort_points(positions)[0], metrics, turns, lattice.size)
+    band = bending_matrix(lattice.sort_points(positions)[0], metrics, turns, lattice.size)
     row, column = np.nonzero(lattice.index >= 0)
 
     def energy(values):
@@ -225,7 +249,7 @@ def test_bending_energy_of_a_ring_is_that_of_its_polar_components():
     _, positions, (x, y, r), known = ring(transmural_scale)
     lattice = lattice_around(positions, STEP)
     cells, order = lattice.sort_points(positions)
-    band = bending_energy(cells, *(values[order] for values in known), lattice.size)
+    band = bending_matrix(cells, *(values[order] for values in known), lattice.size)
     weights = np.stack([cells.evaluate(unit[:, None])[:, 0] for unit in np.eye(lattice.size)], -1)
 
     def energy(radial):

@@ -6,23 +6,76 @@ move alike. Derivatives are taken along and through the wall, of the components 
 contraction or rotation of a ring has no energy. Where this frame turns by the angle phi and J is the rotation by 90
 degrees, D_i u = d_i u - (d_i phi) J u, and the index of a derivative turns likewise; in a straight wall that is the
 thin-plate energy.
+
+Some fields have no energy: a field has that of what is left when the best sum of these is taken from it. They are the
+null space of a smoothing spline (Wahba 1990, Spline Models for Observational Data, doi 10.1137/1.9781611970128).
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numba
 import numpy as np
 from scipy import ndimage
 
 from echotruth.tracking import cubic
-from echotruth.tracking.alignment import add_cell_matrices
+from echotruth.tracking.alignment import add_cell_matrices, multiply_banded
 from echotruth.tracking.bspline import Cells
 
+MIN_ENERGY = 1e-9
+"""Energy of a combination of free fields, over the greatest, below which it counts as 0."""
 MIN_COHERENCE = 0.3
 """Coherence of the wall's direction around a pixel (0 to 1) below which derivatives of its angle are reduced."""
 
 
-def bending_energy(cells: Cells, metrics: np.ndarray, angle_derivatives: np.ndarray, size: int) -> np.ndarray:
+@dataclass(frozen=True)
+class BendingEnergy:
+    """Energy u^T (K - K A (A^T K A)^+ A^T K) u of fields u, which is 0 for the columns of A.
+
+    Attributes
+    ----------
+    band : ndarray of shape (unknowns, width)
+        Banded matrix K, see :func:`bending_matrix`.
+    free : ndarray of shape (unknowns, free)
+        Fields A without energy.
+    gradients : ndarray of shape (unknowns, free)
+        K A.
+    projection : ndarray of shape (unknowns, free)
+        K A (A^T K A)^+.
+    """
+
+    band: np.ndarray
+    free: np.ndarray
+    gradients: np.ndarray
+    projection: np.ndarray
+
+    @classmethod
+    def without(cls, band: np.ndarray, free: np.ndarray) -> BendingEnergy:
+        """The energy of a matrix K, with the columns of `free` (unknowns, free) free of it."""
+        gradients = np.stack([multiply_banded(band, np.ascontiguousarray(field)) for field in free.T], -1)
+        return cls._projected(band, free, gradients)
+
+    @classmethod
+    def _projected(cls, band: np.ndarray, free: np.ndarray, gradients: np.ndarray) -> BendingEnergy:
+        return cls(band, free, gradients, gradients @ np.linalg.pinv(free.T @ gradients, MIN_ENERGY, hermitian=True))
+
+    def and_without(self, field: np.ndarray) -> BendingEnergy:
+        """The energy with one more field (unknowns,) free of it; none if the field is 0."""
+        size = np.sqrt(np.mean(field**2))
+        if not size > 0:
+            return self
+        unit = field / size
+        free = np.column_stack([self.free, unit])
+        return self._projected(self.band, free, np.column_stack([self.gradients, multiply_banded(self.band, unit)]))
+
+    def gradient(self, field: np.ndarray) -> np.ndarray:
+        """Half the gradient of the energy of a field, both of shape (unknowns,)."""
+        shares = np.sum(self.gradients * field[:, None], 0)
+        return multiply_banded(self.band, field) - np.sum(self.projection * shares, 1)
+
+
+def bending_matrix(cells: Cells, metrics: np.ndarray, angle_derivatives: np.ndarray, size: int) -> np.ndarray:
     """Banded matrix of the bending energy, scaled to a mean diagonal of 1.
 
     Parameters

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-NOISE_AREA = 0.1
+NOISE_AREA = 0.17
 """Area over which residuals count once, over the correlation area of the speckle. Residuals of neighbouring pixels are
 correlated; what is left of them after a fit is more so than the noise is, thus less than 1."""
 PRIOR_UNKNOWNS = 60.0

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from echotruth.tracking import alignment
-from echotruth.tracking.bending_energy import bending_energy, wall_frame
+from echotruth.tracking.bending_energy import BendingEnergy, bending_matrix, wall_frame
 from echotruth.tracking.bspline import Cells, KnotLattice, lattice_around
 from echotruth.tracking.evidence import PROBES, Match, energy_weight, told_unknowns
 
@@ -38,30 +38,48 @@ MEDIAN_STRIDE = 4
 """Every n-th residual is used for their median."""
 MAD_TO_STD = 1.4826
 """Standard deviation of a Gaussian over its median absolute deviation."""
+SINGULAR = 1e-9
+"""Share of the greatest singular value below which one counts as 0."""
 REGULARISATION = 1e-5
 """Added to the diagonal of the normal matrix, over its mean, so that it is not singular."""
 
 
 @dataclass(frozen=True)
 class NormalMatrix:
-    """Factor of the normal matrix of image and bending energy.
+    """Normal matrix S = F - beta K A (A^T K A)^+ A^T K of image and bending energy, where F = N + beta K is banded.
 
     Attributes
     ----------
     factor : ndarray of shape (unknowns, width)
-        Of :func:`echotruth.tracking.alignment.cholesky_banded`.
+        Of F, see :func:`echotruth.tracking.alignment.cholesky_banded`.
     energy_weight : float
-        Weight of the bending energy in it.
+        Weight beta of the bending energy.
+    energy : BendingEnergy
     """
 
     factor: np.ndarray
     energy_weight: float
+    energy: BendingEnergy
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solution (unknowns,) for a right-hand side (unknowns,), which is kept."""
+        """F^-1 rhs; both of shape (unknowns,)."""
         solution = rhs.copy()
         alignment.solve_banded(self.factor, solution)
         return solution
+
+    def newton_step(self, rhs: np.ndarray) -> np.ndarray:
+        """S^-1 rhs, both of shape (unknowns,), by the Woodbury formula."""
+        step, (response, inverse) = self.solve(rhs), self._free
+        shares = np.sum(self.energy.gradients * step[:, None], 0)
+        return step + np.sum(response * np.sum(inverse * shares, 1), 1)
+
+    @cached_property
+    def _free(self) -> tuple[np.ndarray, np.ndarray]:
+        """R = beta F^-1 K A (A^T K A)^+, shape (unknowns, free), and (1 - (K A)^T R)^+, shape (free, free)."""
+        columns = np.ascontiguousarray(self.energy.projection.T)
+        response = self.energy_weight * np.stack([self.solve(column) for column in columns], -1)
+        product = np.sum(self.energy.gradients[:, :, None] * response[:, None], 0)
+        return response, np.linalg.pinv(np.eye(len(product)) - product, SINGULAR)
 
 
 @dataclass(frozen=True)
@@ -77,21 +95,15 @@ class WallRegion:
         Lateral, axial, px.
     inside : ndarray of shape (pixel,), bool
         Pixels of the wall itself.
-    energy : ndarray of shape (unknowns, width)
-        Banded matrix K of the bending energy, see :mod:`echotruth.tracking.bending_energy`.
-    energy_affine : ndarray of shape (unknowns, 6)
-        K A, where the columns of A are the affine fields of :meth:`KnotLattice.affine_fields`.
-    energy_affine_inverse : ndarray of shape (unknowns, 6)
-        K A (A^T K A)^+.
+    energy : BendingEnergy
+        Of a field without the shift, stretch, shear and rotation of the whole wall.
     """
 
     lattice: KnotLattice
     cells: Cells
     positions: np.ndarray
     inside: np.ndarray
-    energy: np.ndarray
-    energy_affine: np.ndarray
-    energy_affine_inverse: np.ndarray
+    energy: BendingEnergy
 
     def align(
         self,
@@ -103,6 +115,9 @@ class WallRegion:
         tolerance: float,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Displacement U that minimises sum w (I(X + U) - T)^2 plus the weighted bending energy of U - U_previous.
+
+        A step in proportion to U_previous has no energy: tissue that has moved more than its surroundings so far, as
+        around a scar, is expected to go on so.
 
         Parameters
         ----------
@@ -128,6 +143,7 @@ class WallRegion:
         """
         coefficients, position = start, self.displaced(start)
         normal: NormalMatrix | None = None
+        energy = self.energy.and_without(previous.ravel())
         for iteration in range(MAX_ITERATIONS):
             warped = alignment.interpolate_with_gradient(image, position)
             residual = warped[:, 0] - template
@@ -137,7 +153,7 @@ class WallRegion:
                 or iteration % MATRIX_REUSE == 0
                 or (smoothness is None and iteration in EVIDENCE_ITERATIONS)
             ):
-                normal = self._normal_matrix(match, smoothness, coefficients - previous, normal)
+                normal = self._normal_matrix(match, smoothness, coefficients - previous, normal or energy)
             force = (match.weight * residual)[:, None] * match.gradient
             change = self._newton_step(normal, force, coefficients - previous)
             step = self.cells.evaluate(change)
@@ -174,7 +190,7 @@ class WallRegion:
     def _probes(self) -> tuple[np.ndarray, np.ndarray]:
         """Vectors z of random signs, always the same, and K z, both (probe, unknowns)."""
         signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(PROBES, 2 * self.lattice.size))
-        return signs, np.array([self._energy_gradient(sign) for sign in signs])
+        return signs, np.array([self.energy.gradient(sign) for sign in signs])
 
     @cached_property
     def _flow_component(self) -> np.ndarray:
@@ -184,48 +200,43 @@ class WallRegion:
     @cached_property
     def _flow_matrix(self) -> NormalMatrix:
         band, scale = self._image_matrix(self._flow_component, np.ones(len(self.positions)), 1)
-        return self._factor(band, scale, scale * FLOW_SMOOTHNESS)
+        return _factor(band, scale, scale * FLOW_SMOOTHNESS, self.energy)
 
     def _newton_step(self, normal: NormalMatrix, force: np.ndarray, field: np.ndarray) -> np.ndarray:
         """Change of coefficients (knot, 2) from the image force (pixel, 2) and the energy of a field (knot, 2)."""
         force = self.cells.adjoint(force, self.lattice.size).ravel()
-        change = -force - normal.energy_weight * self._energy_gradient(field.ravel())
-        return normal.solve(change).reshape(-1, 2)
-
-    def _energy_gradient(self, field: np.ndarray) -> np.ndarray:
-        """Half the gradient of the bending energy of a field, both of shape (unknowns,).
-
-        (K - K A (A^T K A)^+ A^T K) u: the energy of the field less the affine field that leaves the least of it. A
-        shift or stretch of the whole wall costs nothing, although its components along and through the wall vary.
-        """
-        affine = np.sum(self.energy_affine * field[:, None], 0)
-        return alignment.multiply_banded(self.energy, field) - np.sum(self.energy_affine_inverse * affine, 1)
+        change = -force - normal.energy_weight * normal.energy.gradient(field.ravel())
+        return normal.newton_step(change).reshape(-1, 2)
 
     def _normal_matrix(
-        self, match: Match, smoothness: float | None, step: np.ndarray, before: NormalMatrix | None
+        self, match: Match, smoothness: float | None, step: np.ndarray, before: NormalMatrix | BendingEnergy
     ) -> NormalMatrix:
-        """Normal matrix of a match; its energy has the given smoothness, or the weight of :meth:`_evidence_weight`."""
+        """Normal matrix of a match; its energy has the given smoothness, or the weight of :meth:`_evidence_weight`.
+
+        The matrix before it tells the evidence; the first has only an energy.
+        """
         stride = max(1, len(self.positions) // (PIXELS_PER_CELL * len(self.cells.knots)))
         band, scale = self._image_matrix(match.gradient, match.weight, stride)
-        if smoothness is None and before is not None:
+        if smoothness is None and isinstance(before, NormalMatrix):
             weight = self._evidence_weight(match, step.ravel(), before)
             if not np.isfinite(weight):
                 weight = before.energy_weight
-            return self._factor(band, scale, max(weight, LEAST_SMOOTHNESS * scale))
+            return _factor(band, scale, max(weight, LEAST_SMOOTHNESS * scale), before.energy)
+        energy = before.energy if isinstance(before, NormalMatrix) else before
         relative = (smoothness or FIRST_SMOOTHNESS) * match.relative_noise(self.lattice.knot_spacing)
-        return self._factor(band, scale, scale * max(MIN_SMOOTHNESS, relative))
+        return _factor(band, scale, scale * max(MIN_SMOOTHNESS, relative), energy)
 
     def _evidence_weight(self, match: Match, step: np.ndarray, before: NormalMatrix) -> float:
         """Weight of the energy by the evidence of a step (unknowns,), from the normal matrix that it was found with."""
         told = told_unknowns(before.energy_weight, before.solve, *self._probes)
         vectors = step.reshape(-1, 2)
         square = float(((vectors - vectors.mean(0)) ** 2).sum(1).mean())
-        energy = float(step @ self._energy_gradient(step))
+        energy = float(step @ before.energy.gradient(step))
         return energy_weight(match.variance(self.pixel_density), told, energy, square)
 
     def _image_matrix(self, gradient: np.ndarray, weight: np.ndarray, stride: int) -> tuple[np.ndarray, float]:
         """Banded matrix N of every `stride`-th gradient (pixel, 2) and weight (pixel,), and its mean diagonal."""
-        band, cells = np.zeros(self.energy.shape), self.cells
+        band, cells = np.zeros(self.energy.band.shape), self.cells
         alignment.add_normal_matrix(
             cells.knots,
             cells.offsets,
@@ -238,12 +249,13 @@ class WallRegion:
         )
         return band, band[:, -1].mean() or 1.0
 
-    def _factor(self, band: np.ndarray, scale: float, energy_weight: float) -> NormalMatrix:
-        """N + beta K, regularised, from N; in place."""
-        band += energy_weight * self.energy
-        band[:, -1] += scale * REGULARISATION
-        alignment.cholesky_banded(band)
-        return NormalMatrix(band, energy_weight)
+
+def _factor(band: np.ndarray, scale: float, energy_weight: float, energy: BendingEnergy) -> NormalMatrix:
+    """N + beta K, regularised, from N; in place."""
+    band += energy_weight * energy.band
+    band[:, -1] += scale * REGULARISATION
+    alignment.cholesky_banded(band)
+    return NormalMatrix(band, energy_weight, energy)
 
 
 def geman_mcclure(residual: np.ndarray, tolerance: float) -> np.ndarray:
@@ -278,8 +290,6 @@ def wall_region(mask: np.ndarray, knot_spacing: float, margin: float, transmural
     lattice = lattice_around(positions, knot_spacing)
     cells, order = lattice.sort_points(positions)
     metrics, angle_derivatives = wall_frame(mask, used, knot_spacing, transmural_scale)
-    energy = bending_energy(cells, metrics[order], angle_derivatives[order], lattice.size)
-    affine = lattice.affine_fields()
-    energy_affine = np.stack([alignment.multiply_banded(energy, field) for field in affine.T], -1)
-    energy_affine_inverse = energy_affine @ np.linalg.pinv(affine.T @ energy_affine)
-    return WallRegion(lattice, cells, positions[order], mask[used][order], energy, energy_affine, energy_affine_inverse)
+    matrix = bending_matrix(cells, metrics[order], angle_derivatives[order], lattice.size)
+    energy = BendingEnergy.without(matrix, lattice.affine_fields())
+    return WallRegion(lattice, cells, positions[order], mask[used][order], energy)
