@@ -94,21 +94,27 @@ def main() -> None:
     parser.add_argument("repository", type=Path, help="folder of a repository with a view mid, as out/demo")
     folder, config = parser.parse_args().repository, Config()
     job = Job(folder, "tracking", next(iter(ledger.rows(folder / "registry.txt"))), "mid")
-    rings = {harmonic: ring(config, harmonic)[config.bmode.sizes[0]] for harmonic in HARMONICS}
+    rings = {harmonic: ring(config, harmonic) for harmonic in HARMONICS}
+
+    def cells(size: int, tracker: BsplineDic) -> list[str]:
+        found = [recovered(frames[size], config, harmonic, tracker) for harmonic, frames in rings.items()]
+        pairs = [(f"{error:.1f}", f"{inside:.2f}, {outside:.2f}") for error, (inside, outside) in found]
+        return [cell for pair in pairs for cell in pair]
+
+    largest, *coarser = config.bmode.sizes
     lines = []
     for smoothness in SMOOTHNESS:
-        tracker, cells = BsplineDic(smoothness=smoothness), [f"{smoothness:g}" if smoothness else "by the images"]
-        for harmonic, frames in rings.items():
-            error, (inside, outside) = recovered(frames, config, harmonic, tracker)
-            cells += [f"{error:.1f}", f"{inside:.2f}, {outside:.2f}"]
-        lines.append([*cells, *heart(job, tracker)])
+        tracker, name = BsplineDic(smoothness=smoothness), f"{smoothness:g}" if smoothness else "by the images"
+        lines.append([name, *cells(largest, tracker), *heart(job, tracker)])
         print(*lines[-1], sep=" | ", flush=True)
-    head = ["smoothness"]
+    head = []
     for harmonic in HARMONICS:
         head += [f"m = {harmonic}: error, %", f"m = {harmonic}: shares inside, outside"]
-    head += [f"even heart, {size} px: NRMSE, %" for size in config.bmode.sizes]
-    text = ["# What smoothness evens out", "", "`bspline_dic` on rings of 512 px that contract unevenly.", ""]
-    (RESULTS / "tracking_uneven.md").write_text("\n".join([*text, *report.table(head, lines), ""]))
+    of_heart = [f"even heart, {size} px: NRMSE, %" for size in config.bmode.sizes]
+    text = ["# What smoothness evens out", "", f"`bspline_dic` on rings of {largest} px that contract unevenly.", ""]
+    text += [*report.table(["smoothness", *head, *of_heart], lines), "", "In smaller images, by the images:", ""]
+    text += report.table(["image, px", *head], [[str(size), *cells(size, BsplineDic())] for size in coarser])
+    (RESULTS / "tracking_uneven.md").write_text("\n".join([*text, ""]))
 
 
 if __name__ == "__main__":

@@ -18,12 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-NOISE_AREA = 0.17
+NOISE_AREA = 0.11
 """Area over which residuals count once, over the correlation area of the speckle. Residuals of neighbouring pixels are
 correlated; what is left of them after a fit is more so than the noise is, thus less than 1."""
 PRIOR_UNKNOWNS = 60.0
 """Unknowns that the prior of the weight counts for."""
-UNEVENNESS = 4e-4
+UNEVENNESS = 1e-4
 """Energy per unknown that this prior expects, over the mean square of the displacement less its mean."""
 AFFINE_UNKNOWNS = 6
 """Unknowns without energy: the affine fields."""
