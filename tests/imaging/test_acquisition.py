@@ -188,7 +188,7 @@ def test_scatterers_before_the_rib_are_not_shaded_and_those_deep_behind_it_are(a
     acquisition, _ = acquire(shadow={"side": "right", "level_dB": -40.0})
     one = np.ones(1)
     assert np.isinf(rib.projected_edge(before)).all()
-    for place, passes in ((before, 1.0), (behind, 1e-4)):
-        # The clusters with and without a rib have other skeletons, and errors.
+    # The clusters with and without a rib have other skeletons, and errors.
+    for place, passes, error in ((before, 1.0, 0.01), (behind, 1e-4, 0.03)):
         echo = passes * scanner.matrix(place, one)
-        assert np.linalg.norm(acquisition.echoes(place, one) - echo) < 0.03 * np.linalg.norm(echo)
+        assert np.linalg.norm(acquisition.echoes(place, one) - echo) < error * np.linalg.norm(echo)

@@ -93,7 +93,7 @@ def affine(region):
     return np.kron(np.linalg.lstsq(weights, fields, rcond=None)[0], np.eye(2))
 
 
-def test_affine_motion_of_the_whole_wall_has_no_bending_matrix(random):
+def test_affine_motion_of_the_whole_wall_has_no_bending_energy(random):
     region = wall_region(MASK, STEP, 3.0, 0.5)
     random_field = region.energy.gradient(random.normal(size=(2 * region.lattice.size)))
     for field in affine(region).T:

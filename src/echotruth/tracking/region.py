@@ -153,7 +153,7 @@ class WallRegion:
                 or iteration % MATRIX_REUSE == 0
                 or (smoothness is None and iteration in EVIDENCE_ITERATIONS)
             ):
-                normal = self._normal_matrix(match, smoothness, coefficients - previous, normal or energy)
+                normal = self._normal_matrix(match, smoothness, energy, coefficients - previous, normal)
             force = (match.weight * residual)[:, None] * match.gradient
             change = self._newton_step(normal, force, coefficients - previous)
             step = self.cells.evaluate(change)
@@ -209,20 +209,21 @@ class WallRegion:
         return normal.newton_step(change).reshape(-1, 2)
 
     def _normal_matrix(
-        self, match: Match, smoothness: float | None, step: np.ndarray, before: NormalMatrix | BendingEnergy
+        self,
+        match: Match,
+        smoothness: float | None,
+        energy: BendingEnergy,
+        step: np.ndarray,
+        before: NormalMatrix | None,
     ) -> NormalMatrix:
-        """Normal matrix of a match; its energy has the given smoothness, or the weight of :meth:`_evidence_weight`.
-
-        The matrix before it tells the evidence; the first has only an energy.
-        """
+        """Normal matrix of a match; its energy has the given smoothness, or the weight of :meth:`_evidence_weight`."""
         stride = max(1, len(self.positions) // (PIXELS_PER_CELL * len(self.cells.knots)))
         band, scale = self._image_matrix(match.gradient, match.weight, stride)
-        if smoothness is None and isinstance(before, NormalMatrix):
+        if smoothness is None and before is not None:
             weight = self._evidence_weight(match, step.ravel(), before)
             if not np.isfinite(weight):
                 weight = before.energy_weight
-            return _factor(band, scale, max(weight, LEAST_SMOOTHNESS * scale), before.energy)
-        energy = before.energy if isinstance(before, NormalMatrix) else before
+            return _factor(band, scale, max(weight, LEAST_SMOOTHNESS * scale), energy)
         relative = (smoothness or FIRST_SMOOTHNESS) * match.relative_noise(self.lattice.knot_spacing)
         return _factor(band, scale, scale * max(MIN_SMOOTHNESS, relative), energy)
 
