@@ -18,7 +18,7 @@ from echotruth.workflow import lease
 from echotruth.workflow.progress import write_expected
 from echotruth.workflow.status import Status, StatusError, status_before, status_of
 from echotruth.workflow.status_text import MAX_REASONS, text
-from echotruth.workflow.summary import Spent, unfinished
+from echotruth.workflow.summary import NO_HEART, Spent, unfinished
 from echotruth.workflow.summary import finished as finished_text
 
 CONFIG = configured(seeds=(1, 2))
@@ -204,8 +204,12 @@ def test_run_ends_with_hearts_reasons_time_and_places(folder):
         start_seconds=0,
     )
     assert spent.cpu_seconds(folder) >= 500, "jobs that ran elsewhere count by their records"
-    said = finished_text(folder, spent)
+    said, exit_status = finished_text(folder, spent)
+    assert exit_status == 0
     for word in ("1 complete, 1 implausible", "it twists by 50 deg", "8 min of CPU time", "small.zarr", "report.html"):
         assert word in said
+    record(folder, "physiology", FIRST, status="implausible", reason="it twists by 50 deg")
+    said, exit_status = finished_text(folder, spent)
+    assert "No heart is complete" in said and exit_status == NO_HEART
     shutil.rmtree(folder / "ledger/bmode" / FIRST)
     assert "images 2/4" in unfinished(folder) and f"echotruth status {folder}" in unfinished(folder)

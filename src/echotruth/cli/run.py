@@ -28,6 +28,7 @@ STATUSES = {
     1: "the configuration is not valid, or jobs failed",
     2: "an option is wrong, or it does not fit this machine or makes no sense; --yes runs the latter nevertheless",
     3: "everything is made, but not everything is uploaded",
+    4: "everything is made, but no heart is complete: each failed or is implausible",
 }
 
 WRITABLE = "the working folder must be writable and have space"
@@ -109,7 +110,8 @@ def make_repository(
 ) -> int:
     """Run the workflow of a configuration and write its report; return the exit status of Snakemake.
 
-    If all went well but the upload, the status is :data:`echotruth.workflow.uploading.NOT_UPLOADED`.
+    If all jobs went well, the status is :data:`echotruth.workflow.summary.NO_HEART` if no heart is complete, and
+    :data:`echotruth.workflow.uploading.NOT_UPLOADED` if not everything is uploaded.
 
     Parameters
     ----------
@@ -173,7 +175,8 @@ def _make(
     if status:
         print(f"\nechotruth: {unfinished(folder)}", file=sys.stderr)
     elif (folder / "report.html").is_file():
-        print(finished(folder, spent))
+        lines, status = finished(folder, spent)
+        print(lines)
     return status
 
 

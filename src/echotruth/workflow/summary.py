@@ -13,6 +13,9 @@ from echotruth.workflow.progress import format_duration
 from echotruth.workflow.status import Status, StatusError, status_of
 from echotruth.workflow.status_text import verdicts
 
+NO_HEART = 4
+"""Exit status of a run that made everything, of which no heart is complete."""
+
 
 class Spent:
     """Time and CPU time since this was made."""
@@ -57,8 +60,8 @@ def _recorded(ledger: Path, since: float) -> Iterator[float]:
                 continue
 
 
-def finished(folder: Path, spent: Spent) -> str:
-    """Lines that end a run which went well.
+def finished(folder: Path, spent: Spent) -> tuple[str, int]:
+    """Lines that end a run in which all jobs went well, and its exit status: 0, or `NO_HEART` if no heart is complete.
 
     Parameters
     ----------
@@ -68,15 +71,19 @@ def finished(folder: Path, spent: Spent) -> str:
         Since the run began.
     """
     try:
-        hearts = verdicts(status_of(folder))
+        status = status_of(folder)
     except StatusError:
-        hearts = []
+        hearts, has_heart = [], True
+    else:
+        hearts, has_heart = verdicts(status), status.verdicts["complete"] > 0
     lines = [
         f"Time:       {spent} ({format_duration(spent.cpu_seconds(folder))} of CPU time)",
         f"Repository: {folder / f'{folder.name}.zarr'}",
     ]
     report = folder / "report.html"
-    return "\n".join([*hearts, *lines, *([f"Report:     {report}"] if report.is_file() else [])])
+    lines += [f"Report:     {report}"] if report.is_file() else []
+    lines += [] if has_heart else ["No heart is complete, so there are no images."]
+    return "\n".join([*hearts, *lines]), 0 if has_heart else NO_HEART
 
 
 def unfinished(folder: Path) -> str:
