@@ -1,4 +1,4 @@
-"""Read a repository: global longitudinal strain and ejection fraction of every heart in it.
+"""Read a repository: mean longitudinal strain of the wall and ejection fraction of every heart in it.
 
 python examples/global_strain.py out/demo
 """

@@ -19,7 +19,7 @@ class Fibres(Section):
     endo_deg: Angle = 66.0
     """Helix angle at the endocardium: from the circumferential direction, positive towards the base. DT-MRI of mice has
     52 +- 5 deg, and -41 +- 3 at the epicardium (Angeli 2014, doi 10.1186/s12968-014-0077-x), averaged over depth;
-    benchmarks/results/physiology.md says why these defaults. `rat`: 72 and -44,
+    docs/physiology.md says why these defaults. `rat`: 72 and -44,
     `human`: 70 and -53; the paper: 84 and -42."""
     epi_deg: Angle = -42.0
     """Helix angle at the epicardium."""

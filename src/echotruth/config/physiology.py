@@ -29,7 +29,7 @@ class Physiology(Section):
     healthy hearts (Young & Cowan 2012, doi 10.1186/1532-429X-14-49); with the wrong fibres it is 60 to 90 deg."""
     volume_ratio_min: Fraction | None = 0.2
     """Smallest det F at any point in any frame. Lower values mean that elements nearly collapse, whereas myocardium
-    hardly changes its volume; the default heart has about 0.5 at the apex."""
+    hardly changes its volume; the default heart has 0.56."""
     loop_error_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.005
     """Largest relative difference between prescribed and solved pressure or volume in any frame."""
     tension_min_kPa: FiniteFloat | None = -1.0

@@ -6,11 +6,12 @@ line of tissue along it, L / L_0 - 1 = sqrt(1 + 2 E) - 1; it is what echocardiog
 al., Eur Heart J Cardiovasc Imaging 16 (2015) 1, doi 10.1093/ehjci/jeu184).
 
 The quadratic terms matter at the borders of the wall, where all points lie to one side: a linear fit takes the gradient
-of the interior there, and radial strain varies steeply. On the true motion of the default heart at ES
-(basal slice, radius 0.45 mm, 35 points) they halve the error of the operator's radial strain, 11.1 to 5.6 percentage
-points RMS (bias -3.5 to -1.5), and lower that of the circumferential from 1.6 to 1.0; white noise of 5 um then makes
-2.2 and 0.5 instead of 0.9 and 0.4, which is below that error. A radius of 0.40 mm gives 5.2 and 0.9 with noise of 2.3
-and 0.6; one of 0.60 mm 7.1 and 1.2 with 1.2 and 0.3.
+of the interior there, and radial strain varies steeply. On the true motion of a mouse's heart with the fibres of
+config/paper.yaml at ES (basal slice, radius 0.45 mm, 35 points) they halve the error of the operator's radial strain,
+11.1 to 5.6 percentage points RMS (bias -3.5 to -1.5), and lower that of the circumferential from 1.6 to 1.0; white
+noise of 5 um then makes 2.2 and 0.5 instead of 0.9 and 0.4, which is below that error. A radius of 0.40 mm gives 5.2
+and 0.9 with noise of 2.3 and 0.6; one of 0.60 mm 7.1 and 1.2 with 1.2 and 0.3. docs/conventions.md has the error in the
+default heart.
 """
 
 from __future__ import annotations

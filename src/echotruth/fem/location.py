@@ -44,8 +44,8 @@ def locate(positions: Floats, cells: Integers, points: Floats) -> MaterialPoints
     Returns
     -------
     MaterialPoints of length n
-        Their map by :func:`interpolate` is `points` to round-off; `cell` is -1 outside the mesh. A point on the
-        faces of several cells is in the first of them.
+        Their map by :func:`.tetrahedra.interpolate` is `points` to round-off; `cell` is -1 outside the mesh. A point on
+        the faces of several cells is in the first of them.
     """
     points = np.ascontiguousarray(points, float)
     if not len(points):

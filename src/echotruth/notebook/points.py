@@ -46,7 +46,7 @@ def load_points(
     -------
     Dataset
         displacement (frame, axial, lateral, plane), m, quality (frame, axial, lateral) and strain (frame, axial,
-        lateral, wall_component) of the tracker, the strain by the operator of docs/tracking.md; true_displacement
+        lateral, wall_component) of the tracker, the strain by the operator of docs/conventions.md; true_displacement
         (frame, axial, lateral, vector), m; true_strain (reference, frame, axial, lateral, wall_component); and
         layer and segment (axial, lateral) of the point, 0 outside the wall. Motion is from end-diastole.
 

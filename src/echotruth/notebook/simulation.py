@@ -240,7 +240,7 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
     Returns
     -------
     Series
-        The metrics of the leaderboard, each with its unit in its name, as `nrmse_percent` (docs/tracking.md).
+        The metrics of the leaderboard, each with its unit in its name, as `nrmse_percent` (docs/conventions.md).
 
     Raises
     ------
