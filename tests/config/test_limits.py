@@ -88,7 +88,7 @@ MALFORMED = {
     "a set": ("geometry: !!set {a, b}", "the tag set is not read: leave it out"),
     "an ordered mapping": ("geometry: !!omap [a: 1]", "the tag omap is not read: leave it out"),
     "a time": ("seed: !!timestamp hello", "the tag timestamp is not read: leave it out"),
-    "a date": ("seed: 2020-99-99", "seed = '2020-99-99': should be a valid integer"),
+    "a date": ("seed: 2020-99-99", "seed = '2020-99-99': must be a whole number"),
     "not an integer": ("seed: !!int hello", "line 1: 'hello' is not a valid int: write a plain value"),
     "not a float": ("geometry: {scale: !!float hello}", "'hello' is not a valid float: write a plain value"),
     "not a truth value": ("seed: !!bool hello", "'hello' is not a valid bool: write a plain value"),

@@ -32,7 +32,7 @@ BAD = {
     "motion: {kind: file}": "motion.file.path = null: must be given with motion.kind = file",
     FILE.format("a.npy"): "geometry.file = null: must be given, because a.npy holds positions and no tetrahedra",
     FILE.format("a.pvd"): "loop.heart_rate_per_min = null: must be given with motion.kind = file",
-    FILE.format("a.pvd") + "geometry: {remesh: true}": "geometry.remesh = True: must be false with motion.kind = file",
+    FILE.format("a.pvd") + "geometry: {remesh: true}": "geometry.remesh = true: must be false with motion.kind = file",
     FILE.format("a.pvd, frames: [5, 5]"): "motion.file.frames = [5, 5]: must be the first and, after it, the last",
     FILE.format("a.pvd, frames: [5, 9], ed_frame: 4"): "motion.file.ed_frame = 4: must be one of the frames 5 to 9",
 }

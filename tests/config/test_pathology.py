@@ -21,7 +21,7 @@ BAD = [
     (INFARCT, {"segment": [1]}, "segment is not a key: did you mean pathology.infarct.segments?"),
     (LATE, {"delay_ms": {18: 3}}, "delay_ms.18 = 18: should be less than or equal to 17"),
     (LATE, {"delay_ms": {5: -3}}, "delay_ms.5 = -3: should be greater than or equal to 0"),
-    (LATE, {"delay_ms": {"lateral": 3}}, "delay_ms.lateral = 'lateral': should be a valid integer"),
+    (LATE, {"delay_ms": {"lateral": 3}}, "delay_ms.lateral = 'lateral': must be a whole number"),
     (LATE, {"preset": "lbbb", "delay_ms": {5: 3}}, "delay_ms = {5: 3.0}: give either preset or delay_ms"),
     (LATE, {"preset": "rbbb"}, "preset = 'rbbb': should be 'lbbb'"),
 ]

@@ -136,7 +136,7 @@ def test_labels_of_the_table_can_be_asked_for():
         ("loop.edv_uL > 5", "in {'seed': 1}: needs a number in place of null"),
         ("seed", "in {'seed': 1}: is 1 and neither true nor false"),
         ("seed() > 1", "has a call of a function"),
-        ([3], "cases.where.0 = 3: should be a valid string"),
+        ([3], "cases.where.0 = 3: must be text: put it in quotes"),
         (["seed > 0"] * 101, "must have at most 100 entries"),
     ],
 )

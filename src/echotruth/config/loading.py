@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 from pathlib import Path
 from reprlib import Repr
@@ -121,7 +122,7 @@ def _message(error: ErrorDetails) -> str:
         return f"{shown_key(keys)}.{selector} = {value}: should be {_alternatives(sections)}"
     dotted_key = shown_key(keys)
     if error["type"] == "extra_forbidden":
-        return f"{dotted_key} is not a key{_variant(model, sections)}{_suggestion(keys, list(model.model_fields))}"
+        return f"{dotted_key} is not a key{_variant(model, sections)}{_suggestion(keys, model, bool(sections))}"
     if error["type"] == "missing":
         return f"{dotted_key} is missing: it must be given"
     value = context["value"] if error["type"] == "invalid" else error["input"]
@@ -131,7 +132,9 @@ def _message(error: ErrorDetails) -> str:
 
 def _shown_value(value: Any) -> str:
     """The value in one line of at most 80 characters, as it is in the file."""
-    text = "null" if value is None else _REPR.repr(value)
+    if value is None or isinstance(value, bool):
+        return "null" if value is None else str(value).lower()
+    text = _REPR.repr(value)
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
@@ -145,7 +148,11 @@ def _variant(model: type[BaseModel], sections: dict[str, type[Section]]) -> str:
 
 
 def _remedy(error: ErrorDetails, context: dict[str, Any]) -> str:
-    message = _MESSAGES.get(error["type"], error["msg"])
+    message = _MESSAGES.get(context.get("class_name", "")) or _MESSAGES.get(error["type"], error["msg"])
+    if error["type"] in ("int_type", "float_type", "bool_type", "string_type"):
+        return f"{message}{_written(error['type'], error['input'])}"
+    if error["type"] == "list_type" and isinstance(error["input"], str | int | float):
+        return f"must be a list, such as [{_shown_value(error['input'])}]"
     if error["type"] == "string_pattern_mismatch":
         signs = (
             "letters, digits, `_`, `.` and `-`" if ".-]" in context["pattern"] else "letters, digits and underscores"
@@ -158,34 +165,83 @@ def _remedy(error: ErrorDetails, context: dict[str, Any]) -> str:
     return message.removeprefix("Input ").removeprefix("String ").removeprefix("Value error, ")
 
 
+def _written(wanted: str, value: Any) -> str:
+    """How YAML writes what was probably meant by a value of the wrong type; "" if that is not known."""
+    if wanted == "string_type" and isinstance(value, bool | int | float):
+        return ": put it in quotes"
+    text = value.strip() if isinstance(value, str) else ""
+    if wanted == "int_type" and _NUMBER.fullmatch(text) and float(text).is_integer():
+        return f": write {float(text):.0f} without quotes"
+    if wanted == "float_type" and _NUMBER.fullmatch(text) and "e" in text.lower():
+        number = repr(float(text))
+        return f": write {number if '.' in number else number.replace('e', '.0e')}, because YAML reads {text} as text"
+    quoted = (wanted == "float_type" and _NUMBER.fullmatch(text)) or (wanted == "bool_type" and text in _BOOLEANS)
+    return f": write {text} without quotes" if quoted else ""
+
+
+_BOOLEANS = ("true", "false")
+_NUMBER = re.compile(r"[-+]?\d{1,15}(\.\d{0,15})?([eE][-+]?\d{1,2})?")
+"""Text that people read as a number."""
+
 _REPR = Repr()
 _REPR.maxlevel, _REPR.maxlist, _REPR.maxdict, _REPR.maxtuple = 4, 12, 12, 12
 _REPR.maxstring = _REPR.maxother = _REPR.maxlong = 80
 
 _MESSAGES = {
+    "int_type": "must be a whole number",
+    "float_type": "must be a number",
+    "bool_type": "must be true or false",
+    "string_type": "must be text",
     "model_type": "must be a mapping of keys to values",
+    "Distribution": "must be a distribution, such as {uniform: [1, 2]}",
     "dict_type": "must be a mapping of names to settings",
     "list_type": "must be a list, such as [1, 2]",
     "tuple_type": "must be a list, such as [1, 2, 4]",
     "too_short": "must have at least one entry",
     "invalid_key": "is not a key: keys are text",
 }
-"""Error type of pydantic -> message in the terms of YAML."""
+"""Error type of pydantic, or the section that it is not -> message in the terms of YAML."""
 
 
 _UNKNOWN_VARIANT = ("union_tag_invalid", "union_tag_not_found")
 
 
-def _suggestion(keys: list[Any], known: list[str]) -> str:
-    close = get_close_matches(str(keys[-1])[:200], known, n=1, cutoff=0.5)
-    if close:
-        return f": did you mean {'.'.join(map(str, [*keys[:-1], close[0]]))}?"
-    return f": the keys here are {', '.join(known)}"
+def _suggestion(keys: list[Any], model: type[BaseModel], is_variant: bool) -> str:
+    known = list(model.model_fields)
+    key, place = str(keys[-1])[:200], "".join(f"{part}." for part in keys[:-1])
+    close = get_close_matches(key, known, n=1, cutoff=0.6)
+    if close and (close[0].startswith(f"{key}_") or get_close_matches(key, close, cutoff=0.8)):
+        return f": did you mean {place}{close[0]}?"
+    # It may be a key of another section, one in this section before others; or of another variant, which were named.
+    all_keys = [] if is_variant else list(dict.fromkeys(_dotted_keys(Config, "")))
+    elsewhere = [found for found in all_keys if found.rpartition(".")[2] == key]
+    elsewhere = [found for found in elsewhere if found.startswith(place)] or elsewhere
+    if 0 < len(elsewhere) <= MAX_SUGGESTIONS:
+        return f": did you mean {_joined(elsewhere)}?"
+    return f": did you mean {place}{close[0]}?" if close else f": the keys here are {', '.join(known)}"
+
+
+MAX_SUGGESTIONS = 5
+"""Largest number of keys of other sections that are named in place of one that is not known."""
+
+
+def _dotted_keys(model: type[BaseModel], prefix: str) -> Iterator[str]:
+    """Dotted keys of a section, of those in it, and of their variants; NAME stands for a name that the user chooses."""
+    for key, field in model.model_fields.items():
+        yield f"{prefix}{key}"
+        name = "NAME." if get_origin(field.annotation) is dict else ""
+        section = _section_of(field.annotation)
+        for inner in variants(field.annotation).values() or ([section] if section else []):
+            yield from _dotted_keys(inner, f"{prefix}{key}.{name}")
 
 
 def _alternatives(names: Iterable[str]) -> str:
-    *first, last = map(repr, names)
-    return f"{', '.join(first)} or {last}"
+    return _joined([repr(name) for name in names])
+
+
+def _joined(names: list[str]) -> str:
+    *first, last = names
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def _locate(location: list[Any]) -> tuple[list[Any], type[BaseModel], dict[str, type[Section]]]:
