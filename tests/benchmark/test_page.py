@@ -112,11 +112,11 @@ def test_command_writes_the_page_twice_alike_and_keeps_what_a_person_wrote(repos
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["--check", "nobody"], "nobody: what it found is not kept in"),
+        (["--check", "nobody"], "nobody: the motion that it tracked is not kept in"),
         (["--check", "honest", "--size", "100"], "--size 100: is not an image size of"),
         (["--check", "honest", "--jobs", "0"], "--jobs 0: must be 1 or more"),
         (["--card", "absent.yaml"], "absent.yaml: cannot be read"),
-        (["--page", "page"], "--page page: is a Markdown file: give it a name that ends in .md"),
+        (["--page", "page"], "--page page: must be a Markdown file: give a name that ends in .md"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_sentence(submitted, capsys, arguments, sentence):

@@ -80,3 +80,17 @@ def test_each_line_on_the_terminal_has_the_name_of_the_program(call, tmp_path):
     (tmp_path / "bad.yaml").write_text("seed: -1\nfibres: {endo_deg: 95}\n")
     status, output, errors = call("check", "bad.yaml")
     assert (status, output) == (1, "") and [line[:20] for line in errors.splitlines()] == ["echotruth: bad.yaml:"] * 2
+
+
+@pytest.mark.parametrize(
+    ("path", "remedy"),
+    [
+        ("mous", "did you mean mouse?"),
+        ("config/mouse.yaml", "did you mean mouse?"),
+        ("heart_mine", "did you mean hearts_mine.yaml?"),
+        ("out/mouse_1", "give a YAML file, a name that echotruth new --list shows, or the folder of a repository"),
+    ],
+)
+def test_configuration_that_does_not_exist_is_told_with_one_that_is_like_it(call, tmp_path, path, remedy):
+    (tmp_path / "hearts_mine.yaml").write_text("seed: 1\n")
+    assert call("check", path) == (1, "", f"echotruth: {path}: does not exist: {remedy}\n")

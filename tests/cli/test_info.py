@@ -73,7 +73,7 @@ def test_repository_that_no_run_has_published_is_told_so(call, finished, tmp_pat
 @pytest.mark.parametrize(
     ("place", "sentence"),
     [
-        ("nowhere", "nowhere: is not a repository: give the folder that a run made, as out/demo"),
+        ("nowhere", "nowhere: is not a repository: give the folder that a run made, such as out/demo"),
         ("s3://bucket/demo", "s3://bucket/demo: is an address and not a folder"),
     ],
 )

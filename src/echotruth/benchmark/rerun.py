@@ -137,7 +137,7 @@ def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun
     known = kept.trackers(folder, config)
     if name not in known:
         remedy = f"evaluate it with --keep first, or use one of {', '.join(known)}"
-        raise EvaluationError(f"{tracker}: what it found is not kept in {folder}: {remedy}")
+        raise EvaluationError(f"{tracker}: the motion that it tracked is not kept in {folder}: {remedy}")
     about = kept.KeptStore(kept.store_path(folder, name)).attributes
     settings = prepare(folder, name, about["settings"]).settings
     check_runs(settings)

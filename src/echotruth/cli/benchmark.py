@@ -30,11 +30,12 @@ def add(commands: Commands) -> None:
     add_repeated(
         parser,
         ("card", Path, "card of a tracker that was evaluated, a YAML file, to keep beside its scores; can be repeated"),
-        ("check", str, "run this tracker again on the mirrored clips of the split and sizes; can be repeated"),
-        ("open", str, "run this tracker again on the first half of the clips of the split and sizes; can be repeated"),
+        ("check", str, "run this tracker again on mirrored clips of the split and sizes; can be repeated"),
+        ("open", str, "run this tracker again on the first half of the cycle of these clips; can be repeated"),
         ("size", int, "image size, px; can be repeated (default: all)"),
     )
-    parser.add_argument("--jobs", type=int, default=1, help="processes (default: 1); nothing depends on it")
+    text = "number of processes (default: 1); results do not depend on it"
+    parser.add_argument("--jobs", type=int, default=1, help=text)
 
 
 def benchmark(arguments: argparse.Namespace) -> int:
@@ -45,10 +46,10 @@ def benchmark(arguments: argparse.Namespace) -> int:
     from echotruth.evaluation.tracker_options import EvaluationError
 
     if arguments.page is not None and arguments.page.suffix != ".md":
-        return fail(f"--page {arguments.page}: is a Markdown file: give it a name that ends in .md")
+        return fail(f"--page {arguments.page}: must be a Markdown file: give a name that ends in .md")
     try:
         _submit(arguments)
-        print("Reading the clips; their difficulty takes some 4 s a clip when it is read first.", file=sys.stderr)
+        print("Reading the clips; their difficulty is computed the first time, in about 4 s a clip.", file=sys.stderr)
         page = Page(records.read(arguments.repository, arguments.size, arguments.jobs), arguments.split)
         print(page.leaderboard())
         if arguments.page is not None:

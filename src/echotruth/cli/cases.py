@@ -25,7 +25,7 @@ def add(commands: Commands) -> None:
         {0: "they are printed", 1: "the configuration is not valid"},
     )
     add_configuration(parser)
-    parser.add_argument("--all", action="store_true", help="print the columns too that are the same in all cases")
+    parser.add_argument("--all", action="store_true", help="also print the columns that are the same in all cases")
 
 
 def cases(arguments: argparse.Namespace) -> int:

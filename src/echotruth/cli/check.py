@@ -42,9 +42,9 @@ def check(arguments: argparse.Namespace) -> int:
         from echotruth.workflow.integrity import check_repository
 
         return check_repository(Path(arguments.config), arguments.heal, arguments.quick)
-    from echotruth.cli.configuration import load_cases
+    from echotruth.cli.configuration import LISTED, load_cases
 
-    config, cases = load_cases(arguments.config)
+    config, cases = load_cases(arguments.config, f"a YAML file, {LISTED}, or the folder of a repository")
     print(f"{arguments.config}: valid; cases: {len(cases)}, views per case: {len(config.views)}")
     from echotruth.cli.estimation import estimated, print_concerns
     from echotruth.workflow.estimate_text import short

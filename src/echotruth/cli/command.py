@@ -30,6 +30,9 @@ class Parser(argparse.ArgumentParser):
             close = get_close_matches(given, re.findall(r"[\w.-]+", listed), n=1)
             remedy = f"did you mean {close[0]}?" if close else f"use one of {listed.replace(chr(39), '')}"
             message = f"{argument} = {given}: {remedy}"
+        elif match := re.search(r"argument (\S+): invalid (int|float) value: '(.*)'", message):
+            argument, kind, given = match.groups()
+            message = f"{argument.partition('/')[0]} = {given}: give a {'whole ' * (kind == 'int')}number"
         elif meant := self._meant():
             message = meant  # what is missing is there, under another name
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")

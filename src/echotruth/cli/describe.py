@@ -19,7 +19,7 @@ def add(commands: Commands) -> None:
         {0: "all documents are written", 2: "it cannot be described"},
     )
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
-    parser.add_argument("-o", "--output", type=Path, help="another folder for the documents")
+    parser.add_argument("-o", "--output", type=Path, help="folder for the documents (default: that of the repository)")
     parser.add_argument("--license", help="identifier of SPDX, such as CC-BY-4.0, or an address (default: none)")
     text = "'Family, Given; ORCID; affiliation; its web address', or a group as 'Name; web address'; can be repeated"
     parser.add_argument("--author", action="append", default=[], help=text)

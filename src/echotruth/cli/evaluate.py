@@ -24,7 +24,7 @@ def add(commands: Commands) -> None:
     )
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     tracker = parser.add_mutually_exclusive_group(required=True)
-    tracker.add_argument("--tracker", help="package.module:function, an entry point, or a method of config/README.md")
+    tracker.add_argument("--tracker", help="package.module:function, an entry point, or a method such as dis")
     # `arguments.command` is the name of the subcommand.
     tracker.add_argument("--command", dest="program", help='a program, such as "track {input} {output}"')
     parser.add_argument("--timeout", type=float, help="longest time of the program per clip, s (default: 3600)")
@@ -39,7 +39,9 @@ def add(commands: Commands) -> None:
         ("view", str, "name of the view; can be repeated (default: all)"),
         ("size", int, "image size, px; can be repeated (default: all)"),
     )
-    parser.add_argument("--jobs", type=int, default=1, help="processes (default: 1); scores do not depend on it")
+    parser.add_argument(
+        "--jobs", type=int, default=1, help="processes at a time (default: 1); scores do not depend on it"
+    )
 
 
 def evaluate(arguments: argparse.Namespace) -> int:

@@ -57,6 +57,8 @@ def export(arguments: argparse.Namespace) -> int:
         return fail(str(error))
     except OSError as error:
         place, said = error.filename or arguments.output or arguments.repository, error.strerror or str(error)
+        if isinstance(error, FileExistsError | NotADirectoryError):
+            return fail(f"{place}: is a file and not a folder: give another folder with --output")
         return fail(f"{place}: {' '.join(said.split())}: the folder for the files must be writable and have space")
     except KeyboardInterrupt:
         return fail("interrupted; the files that were named are whole")

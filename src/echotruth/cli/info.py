@@ -34,7 +34,7 @@ def add(commands: Commands) -> None:
         ["info", "info out/demo"],
         {0: "it is printed", 2: "there is no such repository"},
     )
-    text = "folder of a repository, such as out/demo (default: none, but the installation and the machine)"
+    text = "folder of a repository, such as out/demo (default: show the installation and the machine)"
     parser.add_argument("repository", nargs="?", help=text)
 
 

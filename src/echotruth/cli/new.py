@@ -25,7 +25,8 @@ def add(commands: Commands) -> None:
         ["new", "new human -o patient.yaml", "new sweep --all", "new --list"],
         {0: "the file is written", 2: "it cannot be written"},
     )
-    parser.add_argument("preset", nargs="?", default="mouse", help="mouse, rat, human or another of --list (mouse)")
+    text = "mouse, rat, human or another of --list (default: mouse)"
+    parser.add_argument("preset", nargs="?", default="mouse", help=text)
     parser.add_argument("-o", "--output", metavar="FILE", help="file to write (default: PRESET.yaml; - prints it)")
     parser.add_argument("--all", action="store_true", help="write all keys, with their defaults commented out")
     parser.add_argument("--list", action="store_true", help="list the presets")

@@ -52,7 +52,7 @@ def add(commands: Commands) -> None:
     )
     add_configuration(parser)
     parser.allow_abbrev = False  # what looks like the beginning of an option may be one of Snakemake
-    text = "upload all that is committed (docs/storage.md); exit status 3 if all is made but not uploaded"
+    text = "upload each result when it is finished (docs/storage.md); exit status 3 if all is made but not uploaded"
     parser.add_argument(
         "--estimate", action="store_true", help="only print what it will take: CPU time, GB, files, jobs"
     )

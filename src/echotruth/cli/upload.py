@@ -19,7 +19,8 @@ def add(commands: Commands) -> None:
         {0: "everything is there", 1: "something is damaged", 2: "it cannot be uploaded"},
     )
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
-    parser.add_argument("url", metavar="s3://BUCKET/FOLDER", help="where it has the same files; empty at first")
+    text = "folder in object storage, empty or with an earlier upload of this repository"
+    parser.add_argument("url", metavar="s3://BUCKET/FOLDER", help=text)
     parser.add_argument("--verify", action="store_true", help="read back all that is there, and compare it")
 
 

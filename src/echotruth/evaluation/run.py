@@ -188,7 +188,7 @@ def prepare(repository: Path, name: str, values: dict[str, Any], keep: bool = Fa
     """
     folder = repository.parent if repository.suffix == ".zarr" else repository
     if not (folder / "config.yaml").is_file() or not (folder / "registry.txt").is_file():
-        raise EvaluationError(f"{repository} is not a repository: give the folder that a run made, as out/demo")
+        raise EvaluationError(f"{repository} is not a repository: give the folder that a run made, such as out/demo")
     config = load(folder / "config.yaml")
     try:
         TypeAdapter(Name).validate_python(name)

@@ -128,7 +128,7 @@ def source(repository: Path, selection: Selection) -> Source:
     """
     folder = repository.parent if repository.suffix == ".zarr" else repository
     if not (folder / "config.yaml").is_file() or not (folder / "registry.txt").is_file():
-        raise ExportError(f"{repository} is not a repository: give the folder that a run made, as out/demo")
+        raise ExportError(f"{repository} is not a repository: give the folder that a run made, such as out/demo")
     return Source(folder, load(folder / "config.yaml"), selection)
 
 

@@ -90,7 +90,7 @@ class Repository:
 
     def __init__(self, folder: Path) -> None:
         if not (folder / "config.yaml").is_file():
-            raise CheckError(f"{folder}: is not a repository: give the folder that a run made, as out/demo")
+            raise CheckError(f"{folder}: is not a repository: give the folder that a run made, such as out/demo")
         try:
             self.config: Config = load(folder / "config.yaml")
             self.cases = all_cases(self.config)

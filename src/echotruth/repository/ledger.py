@@ -66,7 +66,7 @@ def repository_folder(repository: str | Path) -> Path:
     folder = Path(repository)
     folder = folder.parent if folder.suffix == ".zarr" else folder
     if not (folder / "registry.txt").is_file():
-        raise FileNotFoundError(f"{repository}: is not a repository: give the folder that a run made, as out/demo")
+        raise FileNotFoundError(f"{repository}: is not a repository: give the folder that a run made, such as out/demo")
     configuration = folder / "config.yaml"
     # An empty file would be read as a configuration of defaults.
     if configuration.is_file() and configuration.stat().st_size == 0:

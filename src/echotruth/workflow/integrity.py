@@ -31,7 +31,7 @@ def check_repository(folder: Path, healing: bool, quick: bool = False) -> int:
     """
     try:
         if not (folder / "config.yaml").is_file():
-            raise CheckError(f"{folder}: is not a repository: give the folder that a run made, as out/demo")
+            raise CheckError(f"{folder}: is not a repository: give the folder that a run made, such as out/demo")
         if not healing:
             _tell_of_run(folder)
             return _print(folder, check(folder, progress=_progress, quick=quick))

@@ -140,7 +140,7 @@ def status_of(folder: Path) -> Status:
     if not (folder / "config.yaml").is_file():
         if holder is None:
             problem = "is not a repository" if folder.is_dir() else "does not exist"
-            raise StatusError(f"{folder}: {problem}: give the folder that a run makes, such as out/demo")
+            raise StatusError(f"{folder}: {problem}: give the folder that a run made, such as out/demo")
         state = "running" if lives else "stopped" if holder.released else "killed"
         return Status(folder, state, {}, 0, {}, {}, str(holder), "planning" if lives else "")
     cases, views = _cases(folder), _views(folder)

@@ -103,7 +103,7 @@ def upload_repository(folder: Path, url: str, reading_back: bool) -> int:
     """
     try:
         if not (folder / "config.yaml").is_file():
-            raise RemoteError(f"{folder}: is not a repository: give the folder that a run made, as out/demo")
+            raise RemoteError(f"{folder}: is not a repository: give the folder that a run made, such as out/demo")
         upload = Upload(folder, Remote(url))
         faults = list(upload.send().faults)
         if reading_back:
