@@ -162,11 +162,13 @@ def test_jobs_that_were_not_run_yet_are_told_and_are_no_damage(folder, capsys):
 
 def test_command_names_each_fault_in_one_line_and_what_heals_it(folder, capsys):
     delete(folder / "small.zarr/bmode/64/image/c/0/0/0/0/0", None)
+    assert check_repository(folder, healing=False) == 1
+    assert capsys.readouterr().out.splitlines()[-1].startswith(f"To mend it: echotruth check {folder} --heal, and then")
     assert check_repository(folder, healing=True) == 1
     lines = capsys.readouterr().out.splitlines()
     job = f"bmode of {CASES[0]}, mid"
-    assert lines[0] == f"small.zarr/bmode/64/image/c/0/0/0/0/0: is missing: run makes it again ({job})"
-    assert lines[-1] == "dropped: 1 records, 0 files: echotruth run makes them again"
+    assert lines[0] == f"small.zarr/bmode/64/image/c/0/0/0/0/0: is missing: echotruth run makes it again ({job})"
+    assert lines[-1] == "dropped: 1 records and 0 files: echotruth run makes them again"
     assert check_repository(folder, healing=False) == 0
 
 

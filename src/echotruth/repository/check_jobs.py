@@ -36,7 +36,7 @@ class JobFaults:
 def check_job(repository: Repository, job: JobRecord, quick: bool) -> JobFaults:
     """Record of a job, its files, and their values unless it is to be quick."""
     name = repository.name(job.path)
-    remedy = f"run makes it again ({job.job})"
+    remedy = f"echotruth run makes it again ({job.job})"
     record, problem = _read_record(job)
     if record is None:
         return JobFaults([Fault(name, problem, remedy, (job.path,))])

@@ -18,10 +18,13 @@ from echotruth.repository.inventory import Fault, Repository, files_below, reaso
 from echotruth.repository.provenance import settings_version
 from echotruth.repository.store import Store
 
+_REWRITTEN = "echotruth run writes it again"
+"""Remedy of a file that no job wrote."""
+
 
 def check_structure(repository: Repository, pool: ThreadPoolExecutor) -> tuple[set[str] | None, list[Fault]]:
     """Files that no job wrote, and their faults; None if no record of them can be read."""
-    record, remedy, publish = repository.structure_record, "run writes it again", (repository.publication_record,)
+    record, remedy, publish = repository.structure_record, _REWRITTEN, (repository.publication_record,)
     if repository.is_older:
         return None, []
     try:
@@ -60,7 +63,7 @@ def check_registries(repository: Repository) -> Iterator[Fault]:
             known.clear()
             known.update({label: row for row, label in enumerate(labels)})
             problem = f"does not have the {dimension}s of the store in their order" if path.is_file() else "is missing"
-            yield Fault(name, problem, "run writes it again", (repository.publication_record,), (path,))
+            yield Fault(name, problem, _REWRITTEN, (repository.publication_record,), (path,))
 
 
 def check_others(repository: Repository) -> Iterator[Fault]:
@@ -70,10 +73,10 @@ def check_others(repository: Repository) -> Iterator[Fault]:
             ledger.read(repository.publication_record)
         except ValueError as error:
             path, problem = repository.publication_record, f"cannot be read ({reason(error)})"
-            yield Fault(repository.name(path), problem, "run writes it again", (path,))
+            yield Fault(repository.name(path), problem, _REWRITTEN, (path,))
     for path in sorted(repository.folder.glob("configs/*.json")):
         if _content_version(path) != path.stem:
-            yield Fault(repository.name(path), "differs from what was written", "run writes it again", files=(path,))
+            yield Fault(repository.name(path), "differs from what was written", _REWRITTEN, files=(path,))
 
 
 def _content_version(path: Path) -> str:
@@ -139,11 +142,11 @@ def strangers(repository: Repository, listed: Listed, structure: set[str] | None
         file = repository.store / path
         array, _, index = path.partition("/c/")
         if path.endswith(".partial"):
-            problem = "is what a killed process left of a file"
+            problem = "is unfinished, of a process that was killed"
         elif index and array in repository.shard_paths:
             problem = "" if _has_owner(repository, array, index, listed) else "belongs to no job"
         else:
-            problem = "" if structure is None or path in structure else "belongs to nothing"
+            problem = "" if structure is None or path in structure else "belongs to no array of the repository"
         if problem:
             yield Fault(repository.name(file), problem, "--heal deletes it", files=(file,))
 

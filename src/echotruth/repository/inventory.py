@@ -95,7 +95,7 @@ class Repository:
             self.config: Config = load(folder / "config.yaml")
             self.cases = all_cases(self.config)
         except ConfigError as error:
-            raise CheckError(f"{error}: run the configuration again, which writes it") from None
+            raise CheckError(f"{error}; or run the configuration again, which writes the file") from None
         self.folder = folder
         self.store = folder / f"{self.config.name}.zarr"
         self.structure_record = folder / "ledger/structure.json"

@@ -34,7 +34,11 @@ def check_repository(folder: Path, healing: bool, quick: bool = False) -> int:
             raise CheckError(f"{folder}: is not a repository: give the folder that a run made, such as out/demo")
         if not healing:
             _tell_of_run(folder)
-            return _print(folder, check(folder, progress=_progress, quick=quick))
+            report = check(folder, progress=_progress, quick=quick)
+            status = _print(folder, report)
+            if any(fault.records or fault.files for fault in report.faults):
+                print(f"To mend it: echotruth check {folder} --heal, and then echotruth run with its configuration")
+            return status
         held = lease.acquire(folder, uuid4().hex, wait=False)
         try:
             return _heal(folder, quick)
@@ -49,7 +53,7 @@ def _tell_of_run(folder: Path) -> None:
     try:
         lease.follow(folder)
     except lease.LeaseError as error:
-        print(f"{error}: what it is just making may be told as a fault")
+        print(f"{error}: files that it is writing may be reported as faults")
 
 
 def _heal(folder: Path, quick: bool) -> int:
@@ -57,14 +61,14 @@ def _heal(folder: Path, quick: bool) -> int:
     status = _print(folder, report)
     records, files = heal(folder, report)
     if records or files:
-        print(f"dropped: {records} records, {files} files: echotruth run makes them again")
+        print(f"dropped: {records} records and {files} files: echotruth run makes them again")
     return status
 
 
 def _print(folder: Path, report: Report) -> int:
     for line in (*report.faults, *report.notes):
         print(line)
-    found = f"{len(report.faults)} faults" if report.faults else "no faults"
+    found = f"{len(report.faults)} fault{'s' * (len(report.faults) > 1)}" if report.faults else "no faults"
     print(f"{folder}: {found} in {report.files} files of {report.jobs} jobs and of the structure")
     return 1 if report.faults else 0
 
