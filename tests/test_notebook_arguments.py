@@ -37,3 +37,12 @@ def test_address_in_place_of_a_folder_is_told_as_one(read):
 def test_configuration_that_is_no_mapping_is_refused():
     with pytest.raises(et.config.loading.ConfigError, match=r"^configuration: 3: must be a mapping of keys to values$"):
         et.configure(3)
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"),
+    [("mous", "did you mean mouse"), ("heart.yaml", "did you mean heart"), ("x", "give a YAML file")],
+)
+def test_configuration_that_does_not_exist_is_told_in_a_sentence(name, remedy):
+    with pytest.raises(et.ConfigError, match=rf"^{name}: does not exist: {remedy}.*$"):
+        et.configure(name)

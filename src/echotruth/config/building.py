@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from echotruth.config import shipped
-from echotruth.config.loading import read_yaml, validate
+from echotruth.config.loading import ConfigError, read_yaml, validate
 from echotruth.config.sections import Config
 
 Source = Config | dict[str, Any] | str | Path | None
@@ -47,7 +47,12 @@ def configure(source: Source = None, **keys: Any) -> Config:
     if isinstance(source, Config):
         values, name = _given(source), source.name
     elif isinstance(source, str | Path):
-        values, name = read_yaml(Path(shipped.found(str(source)))), str(source)
+        name = str(source)
+        path = Path(shipped.found(name))
+        if not path.exists():
+            remedy = shipped.meant(path) or f"give a YAML file, or one of {', '.join(shipped.names())}"
+            raise ConfigError(f"{name}: does not exist: {remedy}")
+        values = read_yaml(path)
     else:
         values, name = source or {}, "configuration"
     for key, value in keys.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
+from difflib import get_close_matches
 from pathlib import Path
 
 FOLDERS = (Path(__file__).parents[1] / "examples", Path(__file__).parents[3] / "config")
@@ -28,6 +29,16 @@ def path_of(name: str) -> Path:
 def found(path: str) -> str:
     """The path itself, or the file of a shipped configuration if nothing has this path and it is the name of one."""
     return str(path_of(path)) if path in names() and not Path(path).exists() else path
+
+
+def meant(path: Path) -> str:
+    """Question for the configuration that may be meant by a path that does not exist; "" if none is like it."""
+    beside = [file.name for file in sorted(path.parent.glob("*.yaml"))]
+    if close := get_close_matches(f"{path.stem}.yaml", beside, n=1, cutoff=0.8):
+        return f"did you mean {path.with_name(close[0])}?"
+    is_name = path.suffix in (".yaml", ".yml") or str(path) == path.name
+    close = get_close_matches(path.stem, names(), n=1, cutoff=0.75) if is_name else []
+    return f"did you mean {close[0]}?" if close else ""
 
 
 def summary(name: str) -> str:
