@@ -107,6 +107,12 @@ def test_run_needs_no_checkout_and_makes_only_the_files_asked_for(tmp_path):
     assert status == 0 and "mechanics" in output and "imaging" not in output
 
 
+def test_option_that_snakemake_does_not_take_is_not_told_as_an_interrupted_run(tmp_path):
+    status, _, errors = run_process("run", ROOT / "config/demo.yaml", "--coress", "2", cwd=tmp_path)
+    assert status == 2 and "unrecognized arguments: --coress" in errors
+    assert errors.splitlines()[-1] == "echotruth: Snakemake does not take these options: see echotruth run --help"
+
+
 def test_help_names_every_command():
     status, output, _ = run_cli("--help")
     assert status == 0

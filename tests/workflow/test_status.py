@@ -68,7 +68,7 @@ def test_what_was_never_begun_waits(tmp_path):
 
 @pytest.mark.parametrize("name", ["nothing", ""])
 def test_other_folder_is_refused_with_a_sentence(tmp_path, name):
-    with pytest.raises(StatusError, match="give the folder that a run makes"):
+    with pytest.raises(StatusError, match="give the folder that a run made"):
         status_of(tmp_path / name)
 
 

@@ -31,6 +31,9 @@ STATUSES = {
     4: "everything is made, but no heart is complete: each failed or is implausible",
 }
 
+WRONG_OPTION = 2
+"""Exit status of Snakemake, and of the command, if it does not take an option."""
+
 WRITABLE = "the working folder must be writable and have space"
 
 
@@ -172,7 +175,9 @@ def _make(
     if status := _remake(folder, config, command, environment):
         return status
     status = execute(command, log, config.name, expected, environment)
-    if status:
+    if status == WRONG_OPTION:
+        print("\nechotruth: Snakemake does not take these options: see echotruth run --help", file=sys.stderr)
+    elif status:
         print(f"\nechotruth: {unfinished(folder)}", file=sys.stderr)
     elif (folder / "report.html").is_file():
         lines, status = finished(folder, spent)

@@ -66,7 +66,7 @@ def status(arguments: argparse.Namespace) -> int:
 def _found(path: Path) -> Status:
     from echotruth.workflow.status import status_before, status_of
 
-    if path.is_dir() or path.suffix not in (".yaml", ".yml"):
+    if not path.is_file() or path.suffix not in (".yaml", ".yml"):
         return status_of(path.parent if path.suffix == ".zarr" else path)
     from echotruth.cli.configuration import load_cases
 

@@ -73,7 +73,7 @@ def _left(estimate: Estimate) -> list[str]:
     if estimate.seconds_left >= 0.999 * estimate.seconds:
         return []
     left = f"{format_duration(estimate.seconds_left)} of CPU time, about {format_duration(estimate.wall_seconds_left)}"
-    return [f"Left:     {left}, if nothing that stands has changed"]
+    return [f"Left:     {left}, if settings and code are still those of what is made"]
 
 
 def _basis(estimate: Estimate) -> str:

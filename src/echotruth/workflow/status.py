@@ -139,7 +139,7 @@ def status_of(folder: Path) -> Status:
     holder, lives = lease.current(folder)
     if not (folder / "config.yaml").is_file():
         if holder is None:
-            problem = "is not a repository" if folder.is_dir() else "does not exist"
+            problem = "is not a repository" if folder.exists() else "does not exist"
             raise StatusError(f"{folder}: {problem}: give the folder that a run made, such as out/demo")
         state = "running" if lives else "stopped" if holder.released else "killed"
         return Status(folder, state, {}, 0, {}, {}, str(holder), "planning" if lives else "")
