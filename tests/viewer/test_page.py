@@ -95,7 +95,7 @@ def test_unfinished_case_is_said_so(unfinished):
     page = Page(catalogue, first(catalogue), Document())
     for colour in ("none", "strain", "tracked_strain", "segment"):
         choose(page, colour=colour, other=TRUTH)
-        assert "Not made yet" in page.message.text and "images" in page.message.text
+        assert "Not made for this case" in page.message.text and "images" in page.message.text
         assert "<b>unfinished</b>" in page.facts.text
         assert not page.clip.data["grey"][0].any()
 

@@ -14,7 +14,7 @@ from echotruth.evaluation.tracker_options import EvaluationError
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-ENDED = "a process ended without a word: try it with --jobs 1"
+ENDED = "a process ended without an error, as when memory is short: try --jobs 1"
 """What is said of a process that ends without an exception, unless something else is."""
 
 

@@ -187,7 +187,7 @@ class Page:
         if chosen == getattr(self.choice, name):  # the page set it itself
             return
         if name == "case" and value not in self.catalogue.rows:
-            self._say(f"There is no case {value}: choose one of the list.")
+            self._say(f"There is no case {value}: choose one from the list.")
             return
         self.choice = replace(self.choice, **{name: chosen})  # type: ignore[arg-type]  # each has its type
         self._say("Reading ...")
@@ -327,7 +327,7 @@ class Page:
         """What is not there."""
         if clip.missing:
             lacking = ", ".join(MISSING[part] for part in clip.missing)
-            return [f"Not made yet, or not to be made, for this case and view: {lacking}."]
+            return [f"Not made for this case and view: {lacking}. The run is not finished, or the heart not complete."]
         if not clip.has_curves:
             return ["There are no curves: an earlier version made this repository. Run its configuration again."]
         return []

@@ -56,7 +56,7 @@ def serve(repository: str | Path, port: int = 0) -> Server:
     try:
         server = Server({"/": Application(FunctionHandler(page))}, port=port, address=LOCAL)
     except OSError as error:
-        raise ShowError(f"port {port}: {error.strerror or error}: give another by --port, or none for any") from None
+        raise ShowError(f"port {port}: {error.strerror or error}: give another with --port, or leave it out") from None
     server.start()
     return server
 

@@ -62,7 +62,7 @@ def merge_repositories(into: Path, sources: list[Path]) -> int:
 def _merge(into: Path, sources: list[Path], config: Config, run: str) -> None:
     command = [sys.executable, str(SCRIPT), str(into), "-"]
     if subprocess.run(command, input=config.model_dump_json(), text=True, check=False).returncode:
-        raise MergeError(f"{into}: could not be laid out")
+        raise MergeError(f"{into}: could not be laid out: see the error above")
     all_taken: list[JobRecord] = []
     for source in sources:
         taken, known = take_over(source, into)

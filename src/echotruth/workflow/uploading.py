@@ -115,7 +115,7 @@ def upload_repository(folder: Path, url: str, reading_back: bool) -> int:
     for fault in faults:
         print(f"echotruth: {fault}", file=sys.stderr)
     if others and not faults:
-        print(f"{url}: holds {len(others)} other objects, first: {others[0]}")
+        print(f"{url}: holds {len(others)} objects of which this repository has no file, first: {others[0]}")
     print(f"{url}: {_summary(upload)}")
     if reading_back and not faults:
         print(f"{url}: read back all {len(upload.total.names)} files; each is the same as here")
