@@ -64,6 +64,8 @@ BAD = {
     "mechanics: {material: fung}": "mechanics.material = 'fung': must be a mapping of keys to values",
     "mechanics: {material: {shear: -1.0}}": "mechanics.material.shear = -1.0: should be greater than 0",
     "name: a/b": "name = 'a/b': use letters, digits",
+    "views: {a b: {}}": "views: the name 'a b': use letters, digits and underscores only, and begin with a letter",
+    "tracking: {trackers: {2d: {}}}": "tracking.trackers: the name '2d': use letters, digits and underscores only",
     "a: [": "line 1: did not find expected node content: correct the YAML",
     "seed: 1\nseed: 2": "key 'seed' is given twice",
     "- 3": "contains a list: write a mapping",

@@ -127,6 +127,8 @@ def _message(error: ErrorDetails) -> str:
         return f"{dotted_key} is missing: it must be given"
     value = context["value"] if error["type"] == "invalid" else error["input"]
     given = f"{dotted_key} = {_shown_value(value)}" if keys else _shown_value(value)
+    if error["type"].startswith("string_") and error["loc"][-1:] == ("[key]",):
+        given = f"{shown_key(keys[:-1])}: the name {_shown_value(value)}"
     return f"{given}: {_remedy(error, context)}"
 
 
@@ -154,10 +156,9 @@ def _remedy(error: ErrorDetails, context: dict[str, Any]) -> str:
     if error["type"] == "list_type" and isinstance(error["input"], str | int | float):
         return f"must be a list, such as [{_shown_value(error['input'])}]"
     if error["type"] == "string_pattern_mismatch":
-        signs = (
-            "letters, digits, `_`, `.` and `-`" if ".-]" in context["pattern"] else "letters, digits and underscores"
-        )
-        return f"use {signs} only (pattern {context['pattern']})"
+        is_file_name = ".-]" in context["pattern"]
+        signs, first = ("`_`, `.` and `-`", "letter or digit") if is_file_name else ("underscores", "letter")
+        return f"use letters, digits{',' if is_file_name else ' and'} {signs} only, and begin with a {first}"
     if error["type"] == "too_long":
         return f"must have at most {context['max_length']} entries"
     if error["type"] == "too_short" and context["min_length"] > 1:
