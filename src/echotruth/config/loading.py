@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
 from reprlib import Repr
 from typing import Any, get_args, get_origin
@@ -214,8 +215,7 @@ def _suggestion(keys: list[Any], model: type[BaseModel], is_variant: bool) -> st
     if close and (close[0].startswith(f"{key}_") or get_close_matches(key, close, cutoff=0.8)):
         return f": did you mean {place}{close[0]}?"
     # It may be a key of another section, one in this section before others; or of another variant, which were named.
-    all_keys = [] if is_variant else list(dict.fromkeys(_dotted_keys(Config, "")))
-    elsewhere = [found for found in all_keys if found.rpartition(".")[2] == key]
+    elsewhere = [] if is_variant else _places().get(key, [])
     elsewhere = [found for found in elsewhere if found.startswith(place)] or elsewhere
     if 0 < len(elsewhere) <= MAX_SUGGESTIONS:
         return f": did you mean {_joined(elsewhere)}?"
@@ -224,6 +224,15 @@ def _suggestion(keys: list[Any], model: type[BaseModel], is_variant: bool) -> st
 
 MAX_SUGGESTIONS = 5
 """Largest number of keys of other sections that are named in place of one that is not known."""
+
+
+@cache
+def _places() -> dict[str, list[str]]:
+    """Last part of every dotted key -> the keys that end in it."""
+    found: dict[str, list[str]] = {}
+    for dotted in dict.fromkeys(_dotted_keys(Config, "")):
+        found.setdefault(dotted.rpartition(".")[2], []).append(dotted)
+    return found
 
 
 def _dotted_keys(model: type[BaseModel], prefix: str) -> Iterator[str]:
