@@ -106,6 +106,29 @@ def test_a_step_of_nine_pixels_is_followed(shifted):
     assert np.abs(displacement[1] - [9, 0]).max() < 0.1
 
 
+def test_sudden_thickening_of_a_part_of_the_wall_is_found_beyond_the_nearest_speckle(speckle):
+    size, middle = 192, np.array([95.5, 95.5])
+
+    def inward(place, amount=9):
+        arm = place - middle
+        radius, angle = np.linalg.norm(arm, axis=1), np.arctan2(*arm.T[::-1])
+        inward = amount * np.exp(-(((angle + np.pi / 2) / 0.6) ** 2)) * (80 - radius) / 50
+        return place - (inward / np.maximum(radius, 1))[:, None] * arm
+
+    def with_noise(image, seed):
+        noise = speckle(size, lambda place: place + np.random.default_rng(seed).normal(0, 30, place.shape), blur=1.5)
+        amplitude = np.hypot(*(weight * 10 ** (each / 102) for weight, each in ((1, image), (0.2, noise))))
+        return np.clip(102 * np.log10(amplitude), 0, 255).round().astype(np.uint8)
+
+    mask, points = ring(size, 30, 80)
+    images = [speckle(size, lambda place: place, blur=1.5), speckle(size, inward, blur=1.5)]
+    frames = np.stack([with_noise(image, seed) for seed, image in enumerate(images)])
+    displacement, _ = found(frames, mask, points, reference="previous")
+    moved = np.linalg.norm(inward(points) - points, axis=1) > 2
+    error = (displacement[1] - (inward(points) - points))[moved]
+    assert np.sqrt((error**2).sum(1).mean()) < 0.7, "1.3 px if the alignment does not begin with blurred images"
+
+
 def test_clip_without_texture_has_no_displacement():
     mask, points = ring()
     for value in (0, 200, 0.1, np.nan):

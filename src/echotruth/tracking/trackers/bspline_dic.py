@@ -3,9 +3,10 @@
 The displacement since end-diastole is a cubic B-spline over the wall at end-diastole. Frame by frame, it is fitted so
 that the image at the displaced positions matches a template, an earlier frame at its own displaced positions
 (Gauss-Newton with robust weights, Baker and Matthews 2004, Int J Comput Vis 56:221; B-splines as Rueckert et al. 1999,
-IEEE Trans Med Imaging 18:712). In both the gain is made even, so that tissue in a shadow counts like the rest. A
-template is kept until its correlation with the tissue falls too low. If the cycle closes, the clip is tracked from
-end-diastole both forwards and backwards, and the two are averaged with weights from their variances.
+IEEE Trans Med Imaging 18:712). Both are blurred at first, so that a motion beyond the size of a speckle is found. Their
+gain is made even, so that tissue in a shadow counts like the rest. A template is kept until its correlation with the
+tissue falls too low. If the cycle closes, the clip is tracked from end-diastole both forwards and backwards, and the
+two are averaged with weights from their variances.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import cv2
@@ -34,6 +36,11 @@ MIN_KNOT_SPACING = 5.0
 """px; closer knots have more unknowns than the image has information."""
 FLOW_PIXELS_PER_KNOT = 8
 """Pixels between knots in the images of the dense flow, at least; these are block means."""
+COARSE_BLUR = 0.25
+"""Standard deviation of the blur with which an alignment begins, over the knot spacing: with that of the mouse 0.1 mm,
+twice the size of a speckle. The next speckle, a false match, then lies no longer between start and solution."""
+MIN_COARSE_BLUR = 2.0
+"""px; where that blur is less, pixels are as large as speckle, and an alignment begins with the images as they are."""
 NCC_EXPONENT = 8
 """Power of the correlation in the variance of a step. The noise of one match gives 2; where the correlation is low,
 the field may also settle on other tissue that resembles the template, and such errors weigh more."""
@@ -77,35 +84,57 @@ def track(
     blur = values.blur_px * np.sqrt(max(0.0, 1 - (values.speckle_pixel / spacing) ** 2))
     knot_spacing = max(values.knots / spacing, MIN_KNOT_SPACING)
     region = wall_region(mask, knot_spacing, values.margin / spacing, values.transmural_scale)
+    coarse_blur = COARSE_BLUR * knot_spacing if COARSE_BLUR * knot_spacing >= MIN_COARSE_BLUR else 0.0
     ncc = NormalizedCrossCorrelation(region.positions, region.inside, points, 2 * knot_spacing, values.dynamic_range)
     block = max(1, min(int(knot_spacing / FLOW_PIXELS_PER_KNOT), min(mask.shape) // MIN_IMAGE_SIDE))
 
     grey = grey_levels(frames)
     typical = rms(decompress(np.nan_to_num(grey[0][mask]), values.dynamic_range))
 
-    def smooth(image: np.ndarray) -> np.ndarray:
-        return cv2.GaussianBlur(image, (0, 0), blur, borderType=cv2.BORDER_REFLECT) if blur else image
-
     def prepare(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         amplitude = decompress(np.nan_to_num(frame), values.dynamic_range)
         even = even_gain(amplitude, values.gain / spacing, typical) if values.gain else amplitude
-        return block_mean(even, block), smooth(even), smooth(amplitude)
+        return block_mean(even, block), gaussian(even, blur), gaussian(amplitude, blur)
 
     with ThreadPoolExecutor(2) as threads:
         coarse, even, amplitudes = zip(*threads.map(prepare, grey), strict=True)
         images = [spline.coefficients(frame) for frame in even]
+        blurred = list(threads.map(partial(gaussian, deviation=coarse_blur), images)) if coarse_blur else []
         coarse = np.array(coarse) / (np.max(coarse) or 1)
-        tracker = WallTracker(region, ncc, coarse, block, images, amplitudes, settings)
+        tracker = WallTracker(region, ncc, coarse, block, images, blurred, amplitudes, settings)
         orders = bidirectional.forward_backward(len(frames))
         trajectories = list(threads.map(tracker.track, orders if settings.reference == "bidirectional" else orders[:1]))
     path = combine(region, points, trajectories[0], trajectories[-1])
     return path.displacement, error_model(settings).probability(path, mask.shape)
 
 
+def gaussian(image: np.ndarray, deviation: float) -> np.ndarray:
+    """Image (rows, columns) blurred by a Gaussian of a standard deviation, px; as it is for 0."""
+    return cv2.GaussianBlur(image, (0, 0), deviation, borderType=cv2.BORDER_REFLECT) if deviation else image
+
+
 def block_mean(image: np.ndarray, side: int) -> np.ndarray:
     """Mean over blocks of side x side pixels; rows and columns left over at the end are dropped."""
     rows, columns = (length // side for length in image.shape)
     return image[: rows * side, : columns * side].reshape(rows, side, columns, side).mean((1, 3))
+
+
+@dataclass(frozen=True)
+class Template:
+    """What the tissue looks like in an earlier frame, to which others are aligned.
+
+    Attributes
+    ----------
+    frame : int
+    warped : ndarray of shape (pixel, 3)
+        Image at the displaced pixels, and its lateral and axial derivative per px.
+    blurred : ndarray of shape (pixel,) or None
+        Blurred image there; None if none is used.
+    """
+
+    frame: int
+    warped: np.ndarray
+    blurred: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -122,7 +151,9 @@ class WallTracker:
     block : int
         Side of a block, px.
     images : list of ndarray
-        Spline coefficients of the blurred amplitudes with even gain.
+        Spline coefficients of the amplitudes with even gain.
+    blurred : list of ndarray
+        The same, blurred by `COARSE_BLUR`; empty if an alignment begins with the images as they are.
     amplitudes : sequence of ndarray
         Blurred amplitudes as they are (axial, lateral): they tell whether a place has texture.
     settings : BsplineDic
@@ -133,30 +164,37 @@ class WallTracker:
     coarse: np.ndarray
     block: int
     images: list[np.ndarray]
+    blurred: list[np.ndarray]
     amplitudes: Sequence[np.ndarray]
     settings: BsplineDic
 
     def track(self, order: Sequence[int]) -> WallTrajectory:
         """Track the wall through the frames in an order that begins with end-diastole."""
-        template = latest = interpolate_with_gradient(self.images[0], self.region.positions)
         coefficients, variance = np.zeros((len(order), self.region.lattice.size, 2)), np.zeros(len(order))
+        warped = interpolate_with_gradient(self.images[0], self.region.positions)
+        template = latest = self._template(0, coefficients[0], warped)
         amplitude = {0: self._amplitude(0, coefficients[0])}
         ncc = [self.ncc.at_points(amplitude[0], amplitude[0])] * len(order)
-        template_frame = latest_frame = 0
         for before, now in pairwise(order):
             start = self._predict(now, before, coefficients[before], template)
             fitted, warped = self._align(now, template, start, coefficients[before])
-            if template_frame != latest_frame and not self._ncc(template, warped) > self.settings.template_update_ncc:
-                template_frame, template = latest_frame, latest
+            if template is not latest and not self._ncc(template, warped) > self.settings.template_update_ncc:
+                template = latest
                 start = self._best(now, template, start, fitted)
                 fitted, warped = self._align(now, template, start, coefficients[before])
             coefficients[now] = fitted
-            variance[now] = variance[template_frame] + self._variance(template, warped)
+            variance[now] = variance[template.frame] + self._variance(template, warped)
             amplitude[now] = self._amplitude(now, fitted)
-            ncc[now] = self.ncc.at_points(amplitude[template_frame], amplitude[now])
+            ncc[now] = self.ncc.at_points(amplitude[template.frame], amplitude[now])
             if np.isfinite(variance[now]):
-                latest_frame, latest = now, warped
+                latest = self._template(now, fitted, warped)
         return WallTrajectory(coefficients, variance, np.array(ncc))
+
+    def _template(self, frame: int, coefficients: np.ndarray, warped: np.ndarray) -> Template:
+        if not self.blurred:
+            return Template(frame, warped, None)
+        blurred = interpolate_with_gradient(self.blurred[frame], self.region.displaced(coefficients))
+        return Template(frame, warped, blurred[:, 0])
 
     def _amplitude(self, frame: int, coefficients: np.ndarray) -> np.ndarray:
         """Amplitudes (pixel,) of a frame at the displaced pixels; outside the image those of its border."""
@@ -164,34 +202,38 @@ class WallTracker:
         inside = np.clip(self.region.displaced(coefficients), 0, np.array(image.shape[::-1]) - 1)
         return interpolate_field(image[..., None], inside)[:, 0]
 
-    def _ncc(self, template: np.ndarray, warped: np.ndarray) -> float:
-        return self.ncc.overall(template[:, 0], warped[:, 0])
+    def _ncc(self, template: Template, warped: np.ndarray) -> float:
+        return self.ncc.overall(template.warped[:, 0], warped[:, 0])
 
-    def _variance(self, template: np.ndarray, warped: np.ndarray) -> float:
+    def _variance(self, template: Template, warped: np.ndarray) -> float:
         """Variance mean((T - I)^2) / mean(|grad I|^2) / NCC^8 of the match of image I and template T, px^2."""
         ncc, inside = self._ncc(template, warped), self.region.inside
         if not ncc > 0:
             return np.inf
-        difference = np.mean((template[inside, 0] - warped[inside, 0]) ** 2)
+        difference = np.mean((template.warped[inside, 0] - warped[inside, 0]) ** 2)
         return difference / np.mean(warped[inside, 1:] ** 2) / ncc**NCC_EXPONENT
 
-    def _align(self, frame: int, template: np.ndarray, start: np.ndarray, previous: np.ndarray):
+    def _align(self, frame: int, template: Template, start: np.ndarray, previous: np.ndarray):
+        """Align a frame with a template, blurred at first; see :meth:`WallRegion.align`."""
         smoothness, tolerance = self.settings.smoothness, self.settings.tolerance
-        return self.region.align(self.images[frame], template[:, 0], start, previous, smoothness, tolerance)
+        if template.blurred is not None:
+            found, _ = self.region.align(self.blurred[frame], template.blurred, start, previous, smoothness, tolerance)
+            start = self._best(frame, template, start, found)
+        return self.region.align(self.images[frame], template.warped[:, 0], start, previous, smoothness, tolerance)
 
-    def _predict(self, now: int, before: int, coefficients: np.ndarray, template: np.ndarray) -> np.ndarray:
+    def _predict(self, now: int, before: int, coefficients: np.ndarray, template: Template) -> np.ndarray:
         """Coefficients advanced by the dense flow, or unchanged if they then match the template better."""
         positions = (self.region.displaced(coefficients) - (self.block - 1) / 2) / self.block
         step = self.block * interpolate_field(optical_flow(self.coarse[before], self.coarse[now]), positions)
         advanced = coefficients + self.region.fit(np.nan_to_num(step))
         return self._best(now, template, coefficients, advanced)
 
-    def _best(self, frame: int, template: np.ndarray, *fields: np.ndarray) -> np.ndarray:
+    def _best(self, frame: int, template: Template, *fields: np.ndarray) -> np.ndarray:
         """The field with the smallest mean absolute difference between image and template."""
 
         def difference(coefficients: np.ndarray) -> float:
             warped = interpolate_with_gradient(self.images[frame], self.region.displaced(coefficients))
-            return float(np.abs(warped[:, 0] - template[:, 0]).mean())
+            return float(np.abs(warped[:, 0] - template.warped[:, 0]).mean())
 
         return min(fields, key=difference)
 
