@@ -69,7 +69,8 @@ def collection(facts: Facts) -> str:
     """How the data came about."""
     texts = {
         "beat": "A finite-element model of the left ventricle beats through a pressure-volume loop (quadratic "
-        "tetrahedra, a passive law, active tension along the fibres solved so that pressure and volume are met).",
+        "tetrahedra, a passive law, active tension along the fibres, and in part across them, solved so that pressure "
+        "and volume are met).",
         "file": "The motion of the heart was computed elsewhere and read from files.",
     }
     formula = "The body moves by a formula, of which displacement and strain are exact."
@@ -113,7 +114,7 @@ def biases(facts: Facts) -> list[str]:
     texts = [
         f"{varied}: the spread of real hearts, probes, operators and machines is not represented.",
         "Ranges and combinations of the sweep are those of a design, not frequencies in a population.",
-        "All views are placed exactly; nobody chose, tilted or lost a plane.",
+        "All views are placed exactly as the configuration says; nobody searched for a plane, or lost it.",
         "Trackers are scored on images of one simulator: an advantage that rests on it need not carry over to others.",
     ]
     if sum(facts.count(status) for status in ("implausible", "failed")):
@@ -172,7 +173,7 @@ _HEARTS = {
         "Pressure and volume are prescribed by a loop; the heart does not respond to its circulation.",
         "One set of fibre angles serves the whole ventricle; measured transverse angles change sign from base to apex "
         "(Geerts 2002, Am J Physiol 283, H139).",
-        "The base stays in its plane and its mean rotation is zero unless mechanics.base is elastic.",
+        "The base stays plane and its mean rotation is zero unless mechanics.base is elastic.",
     ),
     "file": ("How far the motion is that of a heart depends on the simulation that was read.",),
 }
