@@ -113,6 +113,7 @@ class WallRegion:
         previous: np.ndarray,
         smoothness: float | None,
         tolerance: float,
+        iterations: int = MAX_ITERATIONS,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Displacement U that minimises sum w (I(X + U) - T)^2 plus the weighted bending energy of U - U_previous.
 
@@ -133,6 +134,8 @@ class WallRegion:
             :mod:`echotruth.tracking.evidence`.
         tolerance : float
             Residual, in standard deviations, at which the weight w of a pixel is 1/4.
+        iterations : int
+            Number of iterations at most.
 
         Returns
         -------
@@ -144,7 +147,7 @@ class WallRegion:
         coefficients, position = start, self.displaced(start)
         normal: NormalMatrix | None = None
         energy = self.energy.and_without(previous.ravel())
-        for iteration in range(MAX_ITERATIONS):
+        for iteration in range(iterations):
             warped = alignment.interpolate_with_gradient(image, position)
             residual = warped[:, 0] - template
             match = Match(template, residual, warped[:, 1:], geman_mcclure(residual, tolerance))

@@ -39,6 +39,8 @@ FLOW_PIXELS_PER_KNOT = 8
 COARSE_BLUR = 0.25
 """Standard deviation of the blur with which an alignment begins, over the knot spacing: with that of the mouse 0.1 mm,
 twice the size of a speckle. The next speckle, a false match, then lies no longer between start and solution."""
+COARSE_ITERATIONS = 6
+"""Iterations with blurred images at most: their solution is a start."""
 MIN_COARSE_BLUR = 2.0
 """px; where that blur is less, pixels are as large as speckle, and an alignment begins with the images as they are."""
 NCC_EXPONENT = 8
@@ -215,11 +217,12 @@ class WallTracker:
 
     def _align(self, frame: int, template: Template, start: np.ndarray, previous: np.ndarray):
         """Align a frame with a template, blurred at first; see :meth:`WallRegion.align`."""
-        smoothness, tolerance = self.settings.smoothness, self.settings.tolerance
+        how = self.settings.smoothness, self.settings.tolerance
         if template.blurred is not None:
-            found, _ = self.region.align(self.blurred[frame], template.blurred, start, previous, smoothness, tolerance)
+            image = self.blurred[frame]
+            found, _ = self.region.align(image, template.blurred, start, previous, *how, COARSE_ITERATIONS)
             start = self._best(frame, template, start, found)
-        return self.region.align(self.images[frame], template.warped[:, 0], start, previous, smoothness, tolerance)
+        return self.region.align(self.images[frame], template.warped[:, 0], start, previous, *how)
 
     def _predict(self, now: int, before: int, coefficients: np.ndarray, template: Template) -> np.ndarray:
         """Coefficients advanced by the dense flow, or unchanged if they then match the template better."""
