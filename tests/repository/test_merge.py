@@ -22,7 +22,7 @@ FIRST = finished.configured("first", seeds=(1, 2))
 SECOND = finished.configured("second", seeds=(2, 3), views=("long_axis", "mid"))
 
 
-pytestmark = pytest.mark.usefixtures("script")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("script")]
 
 
 @pytest.fixture(scope="module")

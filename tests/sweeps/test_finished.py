@@ -18,6 +18,8 @@ from echotruth.repository.check import check
 from echotruth.workflow.assignment import handed_case, write_configuration, write_sweep
 from echotruth.workflow.merging import merge_repositories
 
+pytestmark = pytest.mark.slow
+
 TABLE = """\
 case,fibres.endo_deg,pathology.infarct.segments,label.group,label.age_weeks,note
 m1,60,"[7, 8]",sham,12,"first, of ""two"" hearts"

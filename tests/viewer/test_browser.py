@@ -3,12 +3,15 @@
 import io
 
 import numpy as np
+import pytest
 from known_repository import FRAMES, SIZES, known_images
 from matplotlib.colors import to_rgb
 from PIL import Image
 
 from echotruth.viewer.panel import ARROWS
 from echotruth.viewer.tint import COLOURS
+
+pytestmark = pytest.mark.slow
 
 MODEL = "name => Bokeh.documents[0].get_model_by_name(name)"
 PATIENCE = 60_000

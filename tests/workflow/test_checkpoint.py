@@ -23,6 +23,8 @@ from echotruth.workflow.job import Job
 from echotruth.workflow.scripts.cases import lay_out
 from echotruth.workflow.series import BEGUN, command, run_ahead, run_series
 
+pytestmark = pytest.mark.slow
+
 IMAGES = ("phantom", "truth", "rf", "bmode")
 SMALL = {
     "name": "small",

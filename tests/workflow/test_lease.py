@@ -14,6 +14,8 @@ import pytest
 from echotruth.workflow import lease
 from echotruth.workflow.lease import Holder, LeaseError
 
+pytestmark = pytest.mark.slow
+
 
 def python(code, *arguments, **variables):
     """Process that runs some code, with a pipe from its output."""
