@@ -62,6 +62,7 @@ def test_second_heart_takes_over_the_motion_without_solving_it(shared, monkeypat
     mechanics(folder, second, "--same-as", first)
     one, other = (ledger.read(record_path(folder, case)) for case in (first, second))
     assert (other["status"], other["shared_with"], other["case"]) == ("complete", first, second)
+    assert other["cpu_seconds"] < one["cpu_seconds"]
     assert list(one["sha256"].values()) == list(other["sha256"].values())
     sources, targets = files(folder, 0), files(folder, 1)
     assert len(sources) == len(targets) > 30

@@ -204,12 +204,13 @@ def test_run_ends_with_hearts_reasons_time_and_places(folder):
         start_seconds=0,
     )
     assert spent.cpu_seconds(folder) >= 500, "jobs that ran elsewhere count by their records"
-    said, exit_status = finished_text(folder, spent)
+    said, exit_status = finished_text(folder, spent, True)
     assert exit_status == 0
     for word in ("1 complete, 1 implausible", "it twists by 50 deg", "8 min of CPU time", "small.zarr", "report.html"):
         assert word in said
     record(folder, "physiology", FIRST, status="implausible", reason="it twists by 50 deg")
-    said, exit_status = finished_text(folder, spent)
+    said, exit_status = finished_text(folder, spent, True)
     assert "No heart is complete" in said and exit_status == NO_HEART
+    assert finished_text(folder, spent, False)[1] == 0, "implausible hearts are imaged too"
     shutil.rmtree(folder / "ledger/bmode" / FIRST)
     assert "images 2/4" in unfinished(folder) and f"echotruth status {folder}" in unfinished(folder)

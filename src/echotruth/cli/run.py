@@ -28,7 +28,7 @@ STATUSES = {
     1: "the configuration is not valid, or jobs failed",
     2: "an option is wrong, or it does not fit this machine or makes no sense; --yes runs the latter nevertheless",
     3: "everything is made, but not everything is uploaded",
-    4: "everything is made, but no heart is complete: each failed or is implausible",
+    4: "everything is made, but no heart is complete: each failed or is implausible, and none is imaged",
 }
 
 WRONG_OPTION = 2
@@ -180,7 +180,7 @@ def _make(
     elif status:
         print(f"\nechotruth: {unfinished(folder)}", file=sys.stderr)
     elif (folder / "report.html").is_file():
-        lines, status = finished(folder, spent)
+        lines, status = finished(folder, spent, config.physiology.exclude_implausible)
         print(lines)
     return status
 

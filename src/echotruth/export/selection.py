@@ -141,7 +141,7 @@ def unfinished(clip: Clip, *stages: str) -> str:
     *stages : str
         Stages of which it needs the arrays.
     """
-    gates = ("complete",) if clip.case.config.physiology.exclude_implausible else ("complete", "implausible")
+    gates = ledger.imaged_statuses(clip.case.config.physiology.exclude_implausible)
     for stage in stages:
         view, accepted = (None, gates) if stage in GATES else (clip.view, ("complete",))
         path = record_path(clip.folder, stage, clip.case.id, view)

@@ -15,7 +15,7 @@ from echotruth.cases.labels import diagnosis
 from echotruth.config import Config
 from echotruth.report import style
 from echotruth.report.hearts import statuses
-from echotruth.repository.ledger import GATES, VIEW_STAGES, read
+from echotruth.repository.ledger import GATES, VIEW_STAGES, imaged_statuses, read
 
 LISTED = 20
 """Largest number of failures of a kind that are listed."""
@@ -50,7 +50,7 @@ def numbers(tree: xr.DataTree, folder: Path, config: Config) -> list[tuple[str, 
     """The largest facts: label and number."""
     status = statuses(tree)
     present = int(np.count_nonzero(status != "retired"))
-    imaged = np.isin(status, ("complete",) if config.physiology.exclude_implausible else ("complete", "implausible"))
+    imaged = np.isin(status, imaged_statuses(config.physiology.exclude_implausible))
     count, frames, sizes = int(imaged.sum()), config.loop.frames, config.bmode.sizes
     clips = count * len(config.views) * len(sizes)
     found = [

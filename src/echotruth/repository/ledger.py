@@ -17,6 +17,11 @@ VIEW_STAGES = ("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
 """Stages with a record for every view of a case."""
 
 
+def imaged_statuses(exclude_implausible: bool) -> tuple[str, ...]:
+    """Statuses of the hearts that are imaged and tracked, by the key `physiology.exclude_implausible`."""
+    return ("complete",) if exclude_implausible else ("complete", "implausible")
+
+
 def record_path(folder: Path, stage: str, case: str, view: str | None = None) -> Path:
     """Path of the record of a job: ledger/STAGE/CASE.json or ledger/STAGE/CASE/VIEW.json."""
     name = f"{case}.json" if view is None else f"{case}/{view}.json"

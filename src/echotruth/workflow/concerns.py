@@ -12,6 +12,7 @@ import psutil
 
 from echotruth.config import Config
 from echotruth.workflow.estimate import Estimate
+from echotruth.workflow.estimate_text import format_bytes
 from echotruth.workflow.imaged_tissue import imaged_tissue
 
 YEAR_SECONDS = 365.25 * 86_400
@@ -76,7 +77,9 @@ def _of_the_disk(estimate: Estimate, folder: Path) -> Iterator[Concern]:
     needed = max(0.0, estimate.bytes + estimate.scratch_bytes - stands)
     if needed > (1 - DISK_RESERVE) * free:
         remedy = "make space, ask for fewer cases, views or frames, a smaller bmode.size_px, or an empty rf.keep"
-        yield Concern(f"{place}: has {_gigabytes(free)} free, and the run needs {_gigabytes(needed)}: {remedy}", True)
+        yield Concern(
+            f"{place}: has {format_bytes(free)} free, and the run needs {format_bytes(needed)}: {remedy}", True
+        )
     if system.f_files and estimate.files > system.f_favail:
         remedy = "use a file system with more, or fewer cases and views"
         yield Concern(
@@ -104,21 +107,13 @@ def _of_the_machine(estimate: Estimate, is_local: bool) -> Iterator[Concern]:
     most = estimate.megabytes[rule]
     if most > memory:
         remedy = _smaller(rule)
-        text = (
-            f"a job of {rule} takes {_gigabytes(1e6 * most)} of memory, and this machine has {_gigabytes(1e6 * memory)}"
-        )
-        yield Concern(f"{text}: {remedy}", True)
+        text = f"a job of {rule} takes {format_bytes(1e6 * most)} of memory"
+        yield Concern(f"{text}, and this machine has {format_bytes(1e6 * memory)}: {remedy}", True)
     elif min(estimate.cores, estimate.hearts * estimate.views) * most > memory:
         cores = max(1, int(memory / most))
-        together = f"{estimate.cores} jobs of {_gigabytes(1e6 * most)} at the same time"
-        text = f"{together} exceed the {_gigabytes(1e6 * memory)} of memory"
+        together = f"{estimate.cores} jobs of {format_bytes(1e6 * most)} at the same time"
+        text = f"{together} exceed the {format_bytes(1e6 * memory)} of memory"
         yield Concern(f"--cores {estimate.cores}: {text}: use --cores {cores}", False)
-
-
-def _gigabytes(number: float) -> str:
-    """Rounded size, such as `1.2 GB`, also of what no machine has."""
-    gigabytes = number / 1e9
-    return f"{gigabytes:.0f} GB" if gigabytes >= 1000 else f"{gigabytes:.3g} GB"
 
 
 def _smaller(rule: str) -> str:

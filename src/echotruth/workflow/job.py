@@ -176,7 +176,7 @@ class Job:
         for gate in takewhile(lambda stage: stage != self.stage, GATES):
             path = record_path(self.folder, gate, self.case.id)
             record = ledger.read(path) if path.exists() else {"status": "complete"}
-            accepted = ("complete",) if self.case.config.physiology.exclude_implausible else ("complete", "implausible")
+            accepted = ledger.imaged_statuses(self.case.config.physiology.exclude_implausible)
             if record["status"] not in accepted:
                 return record["reason"]
         return ""

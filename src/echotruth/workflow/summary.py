@@ -9,12 +9,13 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from echotruth.repository.ledger import imaged_statuses
 from echotruth.workflow.progress import format_duration
 from echotruth.workflow.status import Status, StatusError, status_of
 from echotruth.workflow.status_text import verdicts
 
 NO_HEART = 4
-"""Exit status of a run that made everything, of which no heart is complete."""
+"""Exit status of a run that made everything, of which no heart is imaged."""
 
 
 class Spent:
@@ -60,8 +61,8 @@ def _recorded(ledger: Path, since: float) -> Iterator[float]:
                 continue
 
 
-def finished(folder: Path, spent: Spent) -> tuple[str, int]:
-    """Lines that end a run in which all jobs went well, and its exit status: 0, or `NO_HEART` if no heart is complete.
+def finished(folder: Path, spent: Spent, exclude_implausible: bool) -> tuple[str, int]:
+    """Lines that end a run in which all jobs went well, and its exit status: 0, or `NO_HEART` if no heart is imaged.
 
     Parameters
     ----------
@@ -69,13 +70,15 @@ def finished(folder: Path, spent: Spent) -> tuple[str, int]:
         Folder of the repository, `out/NAME`.
     spent : Spent
         Since the run began.
+    exclude_implausible : bool
+        The key of `physiology`: whether only complete hearts are imaged.
     """
     try:
         status = status_of(folder)
     except StatusError:
         hearts, has_heart = [], True
     else:
-        hearts, has_heart = verdicts(status), status.verdicts["complete"] > 0
+        hearts, has_heart = verdicts(status), any(map(status.verdicts.get, imaged_statuses(exclude_implausible)))
     lines = [
         f"Time:       {spent} ({format_duration(spent.cpu_seconds(folder))} of CPU time)",
         f"Repository: {folder / f'{folder.name}.zarr'}",

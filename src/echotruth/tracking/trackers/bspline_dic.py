@@ -86,7 +86,7 @@ def track(
     blur = values.blur_px * np.sqrt(max(0.0, 1 - (values.speckle_pixel / spacing) ** 2))
     knot_spacing = max(values.knots / spacing, MIN_KNOT_SPACING)
     region = wall_region(mask, knot_spacing, values.margin / spacing, values.transmural_scale)
-    coarse_blur = COARSE_BLUR * knot_spacing if COARSE_BLUR * knot_spacing >= MIN_COARSE_BLUR else 0.0
+    coarse_blur = COARSE_BLUR * knot_spacing
     ncc = NormalizedCrossCorrelation(region.positions, region.inside, points, 2 * knot_spacing, values.dynamic_range)
     block = max(1, min(int(knot_spacing / FLOW_PIXELS_PER_KNOT), min(mask.shape) // MIN_IMAGE_SIDE))
 
@@ -101,7 +101,11 @@ def track(
     with ThreadPoolExecutor(2) as threads:
         coarse, even, amplitudes = zip(*threads.map(prepare, grey), strict=True)
         images = [spline.coefficients(frame) for frame in even]
-        blurred = list(threads.map(partial(gaussian, deviation=coarse_blur), images)) if coarse_blur else []
+        blurred = (
+            list(threads.map(partial(gaussian, deviation=coarse_blur), images))
+            if coarse_blur >= MIN_COARSE_BLUR
+            else []
+        )
         coarse = np.array(coarse) / (np.max(coarse) or 1)
         tracker = WallTracker(region, ncc, coarse, block, images, blurred, amplitudes, settings)
         orders = bidirectional.forward_backward(len(frames))
