@@ -120,7 +120,7 @@ def full(tmp_path):
 
 def test_full_disk_is_told_in_one_line(full):
     done = run(full)
-    assert is_refused(done) and "has 0 GB free" in done.stderr, done.stderr
+    assert is_refused(done) and "has less than 1 MB free" in done.stderr, done.stderr
     done = run(full, "--yes")
     assert is_refused(done) and "No space left on device" in done.stderr, done.stderr
 

@@ -99,4 +99,4 @@ def format_bytes(number: float) -> str:
     for unit, factor in (("TB", 1e12), ("GB", 1e9)):
         if number >= factor:
             return f"{number / factor:.3g} {unit}"
-    return f"{max(number / 1e6, 1):.0f} MB"
+    return f"{number / 1e6:.0f} MB" if number >= 1e6 else "less than 1 MB"
