@@ -96,7 +96,7 @@ def test_unknown_option_is_refused_in_one_line():
 
 def test_evaluation_of_no_repository_is_refused_in_one_line(tmp_path):
     status, output, errors = run_cli("evaluate", "out/demo", "--tracker", "mypackage:track", cwd=tmp_path)
-    assert is_refused(status, output, errors) and "out/demo is not a repository" in errors
+    assert is_refused(status, output, errors) and "out/demo: is not a repository" in errors
     assert not list(tmp_path.iterdir())
 
 

@@ -388,7 +388,7 @@ def test_invalid_evaluation_is_refused_in_one_sentence(made, evaluate, case):
 @pytest.mark.parametrize("name", ["nowhere", "."])
 def test_folder_that_is_no_repository_is_refused_in_one_sentence(evaluate, name):
     status, output, errors = evaluate("--tracker", "a:b", repository=name)
-    assert (status, output, errors.count("\n")) == (2, "", 1) and f"{name} is not a repository" in errors
+    assert (status, output, errors.count("\n")) == (2, "", 1) and f"{name}: is not a repository" in errors
 
 
 def test_repository_that_was_not_run_is_refused_in_one_sentence(made, evaluate, tmp_path):

@@ -19,8 +19,9 @@ total                   6
 """
 
 
-def began(rule, job):
-    return f"[Sun Nov 22 02:39:38 2026]\nrule {rule}:\n    input: a\n    log: {rule}.log\n    jobid: {job}\n"
+def began(rule, job, log=""):
+    log = log or f"{rule}.log"
+    return f"[Sun Nov 22 02:39:38 2026]\nrule {rule}:\n    input: a\n    log: {log}\n    jobid: {job}\n"
 
 
 def ended(rule, job):
@@ -93,6 +94,24 @@ def test_work_that_is_done_ahead_counts_once():
     run = Run(mechanics=40, imaging=100, tracking=60)
     run.read("Provided cores: 2\ntracking                4\n")
     assert run.progress.seconds_left == pytest.approx(4 * 60 / 2)
+
+
+def test_jobs_whose_work_was_done_ahead_do_not_count_as_fast_ones():
+    run = Run(imaging=100, tracking=60)
+    run.read("Provided cores: 1\nimaging               3\ntracking              5\n")
+    run.read(began("tracking", 1, "logs/tracking/imaged_before/mid.log"))
+    run.now = 60
+    run.read(ended("tracking", 1))
+    assert run.progress.seconds_left == pytest.approx(3 * 160 + 60), "as fast as expected"
+    run.read(began("imaging", 2, "logs/imaging/new/mid.log"))
+    run.now = 220
+    run.read(ended("imaging", 2) + began("tracking", 3, "logs/tracking/new/mid.log"))
+    run.now = 221
+    run.read(ended("tracking", 3))
+    assert run.progress.seconds_left == pytest.approx(2 * 160 + 60)
+    assert run.progress.fraction_done == pytest.approx(220 / 600)
+    run.read(began("tracking", 4, "logs/tracking/imaged_before/apex.log"))
+    assert run.progress.running == "tracking (3 of 5)"
 
 
 def test_share_never_falls_and_ends_at_one():

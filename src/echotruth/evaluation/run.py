@@ -28,6 +28,7 @@ from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
 from echotruth.evaluation.summary import is_complete
 from echotruth.evaluation.tracker_options import EvaluationError
+from echotruth.repository.ledger import repository_folder
 from echotruth.section import Name, Section
 from echotruth.tracking.external_program import in_one_line
 from echotruth.tracking.failure import TrackerFailed
@@ -186,9 +187,10 @@ def prepare(repository: Path, name: str, values: dict[str, Any], keep: bool = Fa
     ConfigError
         If the settings are invalid.
     """
-    folder = repository.parent if repository.suffix == ".zarr" else repository
-    if not (folder / "config.yaml").is_file() or not (folder / "registry.txt").is_file():
-        raise EvaluationError(f"{repository} is not a repository: give the folder that a run made, such as out/demo")
+    try:
+        folder = repository_folder(repository)
+    except FileNotFoundError as error:
+        raise EvaluationError(str(error)) from None
     config = load(folder / "config.yaml")
     try:
         TypeAdapter(Name).validate_python(name)

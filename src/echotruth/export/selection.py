@@ -14,7 +14,7 @@ from echotruth.evaluation.choice import Item, chosen
 from echotruth.export.clip import Clip
 from echotruth.export.error import ExportError
 from echotruth.repository import ledger
-from echotruth.repository.ledger import GATES, record_path
+from echotruth.repository.ledger import GATES, record_path, repository_folder
 
 
 @dataclass(frozen=True)
@@ -126,9 +126,10 @@ def source(repository: Path, selection: Selection) -> Source:
     ConfigError
         If its configuration cannot be read.
     """
-    folder = repository.parent if repository.suffix == ".zarr" else repository
-    if not (folder / "config.yaml").is_file() or not (folder / "registry.txt").is_file():
-        raise ExportError(f"{repository} is not a repository: give the folder that a run made, such as out/demo")
+    try:
+        folder = repository_folder(repository)
+    except FileNotFoundError as error:
+        raise ExportError(str(error)) from None
     return Source(folder, load(folder / "config.yaml"), selection)
 
 

@@ -17,7 +17,7 @@ from echotruth.config import Config
 from echotruth.config.loading import ConfigError, load
 from echotruth.repository import layout, ledger, schema
 from echotruth.repository.array import Array
-from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
+from echotruth.repository.ledger import GATES, NOT_A_REPOSITORY, VIEW_STAGES, record_path
 
 
 class CheckError(ValueError):
@@ -90,7 +90,7 @@ class Repository:
 
     def __init__(self, folder: Path) -> None:
         if not (folder / "config.yaml").is_file():
-            raise CheckError(f"{folder}: is not a repository: give the folder that a run made, such as out/demo")
+            raise CheckError(f"{folder}: {NOT_A_REPOSITORY}")
         try:
             self.config: Config = load(folder / "config.yaml")
             self.cases = all_cases(self.config)

@@ -13,6 +13,8 @@ from echotruth.repository import durable
 GATES = ("mechanics", "physiology")
 """Stages that decide whether the later ones process a heart."""
 
+NOT_A_REPOSITORY = "is not a repository: give the folder that a run made, such as out/demo"
+"""What an error says of a folder, whose path stands before it."""
 VIEW_STAGES = ("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
 """Stages with a record for every view of a case."""
 
@@ -71,7 +73,7 @@ def repository_folder(repository: str | Path) -> Path:
     folder = Path(repository)
     folder = folder.parent if folder.suffix == ".zarr" else folder
     if not (folder / "registry.txt").is_file():
-        raise FileNotFoundError(f"{repository}: is not a repository: give the folder that a run made, such as out/demo")
+        raise FileNotFoundError(f"{repository}: {NOT_A_REPOSITORY}")
     configuration = folder / "config.yaml"
     # An empty file would be read as a configuration of defaults.
     if configuration.is_file() and configuration.stat().st_size == 0:

@@ -151,7 +151,7 @@ def check_sources(sources: list[Path]) -> dict[Path, Config]:
     """
     for source in sources:
         if not (source / "config.yaml").is_file():
-            raise MergeError(f"{source}: is not a repository: give the folder that a run made, such as out/demo")
+            raise MergeError(f"{source}: {ledger.NOT_A_REPOSITORY}")
         if not (source / "views.txt").is_file():
             raise _older(source)
     try:

@@ -154,7 +154,7 @@ def rf_seconds(config: Config, seen: Content) -> float:
     rf, elements = config.rf, config.probe.elements / 64
     waves = rf.lines * rf.focal_zones if rf.transmit == "focused" else 8 * (rf.transmits + rf.lines)
     # Many of those around the heart, and at the apex, are so near the array that every pair of elements is computed.
-    scatterers = (1.3 if seen.is_long_axis else 1.0) * (seen.scatterers - seen.around) + 2 * seen.around
+    scatterers = (1.3 if seen.is_long_axis else 1.0) * (seen.scatterers - seen.around) + 1.3 * seen.around
     echo = (9e-6 * lens_size(config) ** 1.5 if rf.elevation_beam else 5e-6) * sqrt(elements)
     start, kept = 1.2 + 3e-3 * elements * waves, (1.0 if "channels" in rf.keep else 0.0) * elements**2
     return start + seen.frames * (echo * scatterers + 0.15 * elements**2 + 6e-4 * elements * waves + kept)

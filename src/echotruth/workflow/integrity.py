@@ -9,6 +9,7 @@ from uuid import uuid4
 from echotruth.repository.check import Report, check
 from echotruth.repository.healing import heal
 from echotruth.repository.inventory import CheckError
+from echotruth.repository.ledger import NOT_A_REPOSITORY
 from echotruth.workflow import lease
 
 
@@ -31,7 +32,7 @@ def check_repository(folder: Path, healing: bool, quick: bool = False) -> int:
     """
     try:
         if not (folder / "config.yaml").is_file():
-            raise CheckError(f"{folder}: is not a repository: give the folder that a run made, such as out/demo")
+            raise CheckError(f"{folder}: {NOT_A_REPOSITORY}")
         if not healing:
             _tell_of_run(folder)
             report = check(folder, progress=_progress, quick=quick)

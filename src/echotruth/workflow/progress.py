@@ -61,6 +61,11 @@ class RunningJob:
     start: float
     log: Path | None = None
 
+    @property
+    def subject(self) -> str:
+        """Case, or case and view, that it is about: the path of its log in the folder of its rule."""
+        return "" if self.log is None else self.log.as_posix().rpartition(f"/{self.rule}/")[2]
+
 
 class Progress:
     """Progress of a run.
@@ -77,7 +82,9 @@ class Progress:
         self._expected, self._clock = DEFAULT_SECONDS | expected, clock
         self._planned: Counter[str] = Counter()
         self._running: dict[str, RunningJob] = {}
-        self._durations: dict[str, list[float]] = defaultdict(list)
+        self._durations: dict[str, list[float]] = defaultdict(list)  # of jobs that did the work themselves
+        self._done_ahead: dict[str, set[str]] = defaultdict(set)  # rule -> subjects
+        self._found_done: Counter[str] = Counter()  # rule -> finished jobs whose work was done ahead
         self._cores, self._fraction_done = 1, 0.0
         self._rule, self._failed = "", False
         self._job, self._log = "", cast("Path | None", None)
@@ -100,10 +107,19 @@ class Progress:
             self._restart(match[1])
         elif (match := _FINISHED.match(line)) and match[2] in self._expected:  # the rule `all` does no work
             job = self._running.pop(match[1], RunningJob(match[2], self._clock()))
-            # Compilation is not part of what the next job of the rule will take.
-            usual = self._usual_seconds(job.rule)
-            share = usual / (usual + self._compilation(job.rule)) if usual else 1.0
-            self._durations[job.rule].append(share * (self._clock() - job.start))
+            self._finish(job)
+
+    def _finish(self, job: RunningJob) -> None:
+        """A job was finished."""
+        if job.subject in self._done_ahead[job.rule]:
+            self._found_done[job.rule] += 1
+            return
+        # Compilation is not part of what the next job of the rule will take.
+        usual = self._usual_seconds(job.rule)
+        share = usual / (usual + self._compilation(job.rule)) if usual else 1.0
+        self._durations[job.rule].append(share * (self._clock() - job.start))
+        if job.log and job.rule in AHEAD:
+            self._done_ahead[AHEAD[job.rule]].add(job.subject)
 
     def _start_or_fail(self, job: str) -> None:
         """A job was started, or failed: its number follows the name of its rule."""
@@ -176,10 +192,17 @@ class Progress:
         return ", ".join(texts).replace("_", " ") or "starting"
 
     def _job_number(self, rule: str) -> int:
-        return min(self._planned[rule], len(self._durations[rule]) + 1)
+        return min(self._planned[rule], self._finished(rule) + 1)
+
+    def _finished(self, rule: str) -> int:
+        return len(self._durations[rule]) + self._found_done[rule]
 
     def _unfinished(self, rule: str) -> int:
-        return self._planned[rule] - len(self._durations[rule])
+        return self._planned[rule] - self._finished(rule)
+
+    def _planned_ahead(self, rule: str) -> int:
+        """Number of jobs of a rule whose work is done by jobs of another."""
+        return sum(min(self._planned[first], self._planned[later]) for first, later in AHEAD.items() if later == rule)
 
     def _elapsed(self, rule: str) -> float:
         return sum(self._clock() - job.start for job in self._running.values() if job.rule == rule)
@@ -190,15 +213,9 @@ class Progress:
         return sum(durations) / len(durations) if durations else self._usual_seconds(rule) * self._slowdown
 
     def _usual_seconds(self, rule: str) -> float:
-        """Expected duration of a job, s, with the work that it does ahead, and without that which was done ahead."""
-        seconds = self._expected[rule]
-        for first, later in AHEAD.items():
-            both = min(self._planned[first], self._planned[later])
-            if rule == first and both:
-                seconds += self._expected[later]
-            elif rule == later and both:
-                seconds *= 1 - both / self._planned[later]
-        return seconds
+        """Expected duration of a job that does its work itself, s, with the work that it does ahead."""
+        later = AHEAD.get(rule, "")
+        return self._expected[rule] + (self._expected[later] if self._planned_ahead(later) else 0.0)
 
     @property
     def _slowdown(self) -> float:
@@ -209,10 +226,15 @@ class Progress:
     def _remaining_work(self, rule: str) -> float:
         """Remaining work of the unfinished jobs of a rule, s; each running job has at least 1/20 of its work left."""
         expected = self._expected_seconds(rule)
-        starts = [job.start for job in self._running.values() if job.rule == rule]
+        starts = [
+            job.start
+            for job in self._running.values()
+            if job.rule == rule and job.subject not in self._done_ahead[rule]
+        ]
+        waiting = self._planned[rule] - self._planned_ahead(rule) - len(self._durations[rule]) - len(starts)
         running = sum(max(expected - (self._clock() - start), expected / 20) for start in starts)
         compilation = self._compilation(rule) if self._unfinished(rule) > 0 else 0.0
-        return running + compilation + max(0, self._unfinished(rule) - len(starts)) * expected
+        return running + compilation + max(0, waiting) * expected
 
     def _compilation(self, rule: str) -> float:
         """Time for which the first job of the mechanics compiles, s; the others load what it made."""

@@ -18,7 +18,7 @@ import yaml
 
 from echotruth.config import Config
 from echotruth.repository import ledger
-from echotruth.repository.ledger import GATES, record_path
+from echotruth.repository.ledger import GATES, NOT_A_REPOSITORY, record_path
 from echotruth.workflow import lease
 from echotruth.workflow.progress import Progress, expected_durations, replay
 from echotruth.workflow.requests import existing_records
@@ -139,8 +139,7 @@ def status_of(folder: Path) -> Status:
     holder, lives = lease.current(folder)
     if not (folder / "config.yaml").is_file():
         if holder is None:
-            problem = "is not a repository" if folder.exists() else "does not exist"
-            raise StatusError(f"{folder}: {problem}: give the folder that a run made, such as out/demo")
+            raise StatusError(f"{folder}: {NOT_A_REPOSITORY if folder.exists() else 'does not exist'}")
         state = "running" if lives else "stopped" if holder.released else "killed"
         return Status(folder, state, {}, 0, {}, {}, str(holder), "planning" if lives else "")
     cases, views = _cases(folder), _views(folder)

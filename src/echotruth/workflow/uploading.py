@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from echotruth.repository.ledger import NOT_A_REPOSITORY
 from echotruth.repository.remote import Remote, RemoteError
 from echotruth.repository.upload import Upload
 
@@ -103,7 +104,7 @@ def upload_repository(folder: Path, url: str, reading_back: bool) -> int:
     """
     try:
         if not (folder / "config.yaml").is_file():
-            raise RemoteError(f"{folder}: is not a repository: give the folder that a run made, such as out/demo")
+            raise RemoteError(f"{folder}: {NOT_A_REPOSITORY}")
         upload = Upload(folder, Remote(url))
         faults = list(upload.send().faults)
         if reading_back:
