@@ -5,9 +5,8 @@ from math import log, pi
 import pytest
 
 from echotruth.config import Bmode, Config, Geometry, Probe, Rf, anatomy
-from echotruth.config.defaults import ARRAY_DEFAULTS
 from echotruth.config.loading import ConfigError, validate
-from echotruth.config.transducers import ARRAY_PRESETS
+from echotruth.config.transducers import ARRAY_DEFAULTS, ARRAY_PRESETS
 
 
 def configured(**sections):

@@ -168,6 +168,13 @@ def test_heart_outside_its_image_is_refused():
     assert "bmode.field_of_view_mm = 45" in concern.text
 
 
+def test_file_that_holds_no_wall_is_refused(tmp_path):
+    file = tmp_path / "heart.vtu"
+    file.write_text("no mesh")
+    (concern,) = absurdities({"geometry": {"file": str(file), "remesh": True}})
+    assert f"{file}: cannot be read as .vtu" in concern.text
+
+
 def test_more_than_the_disk_holds_is_refused():
     config = validate({"rf": {"keep": ["channels"]}}, "x")
     found = estimate(config, expand(config) * 60_000, 1, AS_MEASURED, Path("none"))

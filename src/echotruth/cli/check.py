@@ -9,7 +9,7 @@ from echotruth.cli.command import Commands, add_command, add_configuration
 
 STATUSES = {
     0: "nothing is wrong (jobs not run yet are no damage)",
-    1: "the configuration is not valid, or something is damaged",
+    1: "the configuration is not valid, a run would refuse it, or something is damaged",
     2: "it cannot be checked",
 }
 
@@ -52,4 +52,4 @@ def check(arguments: argparse.Namespace) -> int:
     found, concerns = estimated(config, cases, [])
     print(f"A run takes {short(found)}.")
     print_concerns(concerns)
-    return 0
+    return int(any(concern.is_absurd for concern in concerns))

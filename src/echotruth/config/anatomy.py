@@ -19,6 +19,8 @@ human
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Literal
+
 Lengths = dict[str, float]
 
 HEART_PRESETS: dict[str, Lengths] = {
@@ -27,3 +29,7 @@ HEART_PRESETS: dict[str, Lengths] = {
     "human": {"endo_radius_mm": 21.6, "endo_length_mm": 54.8, "wall_mm": 9.95, "apex_wall_mm": 3.98, "base_mm": 21.8},
 }
 """Species -> length, mm, of each key of the section `geometry`."""
+if TYPE_CHECKING:
+    Species = str
+else:
+    Species = Literal[tuple(HEART_PRESETS)]

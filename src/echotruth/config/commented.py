@@ -13,6 +13,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from echotruth.config.allowed import allowed
+from echotruth.config.anatomy import HEART_PRESETS
 from echotruth.config.loading import validate
 from echotruth.section import Section, unit_of
 
@@ -29,9 +30,6 @@ FIRST = (
     *("bmode.size_px", "bmode.downsampling", "tracking.grid_px", "tracking.trackers", "cases"),
 )
 """Keys that most people want to see first; what is said of them is in the models."""
-
-SPECIES = ("mouse", "rat", "human")
-"""Presets of the heart, which other defaults follow."""
 
 
 @dataclass(frozen=True)
@@ -204,7 +202,7 @@ def _end(node: yaml.Node) -> int:
 
 def _following() -> set[str]:
     """Dotted keys whose default differs between the presets of the heart."""
-    dumps = [dict(_flat(validate({"geometry": {"preset": name}}, name), "")) for name in SPECIES]
+    dumps = [dict(_flat(validate({"geometry": {"preset": name}}, name), "")) for name in HEART_PRESETS]
     return {key for key in dumps[0] if any(dump[key] != dumps[0][key] for dump in dumps)} - {"geometry.preset"}
 
 

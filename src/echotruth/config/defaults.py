@@ -1,11 +1,5 @@
 """Defaults that follow from other sections: loop and array from the heart, scan from the array, lengths of trackers
 from the field of view.
-
-The heart lies at the transmit focus and entirely in the field of view. A resolution cell (beam width x pulse length x
-slice thickness) contains at least ten scatterers; with the 2800 per mm^3 of mouse_25MHz the speckle SNR is 1.816, and
-1.913 for fully developed speckle, and tracker error shows no consistent trend with density in a heart
-with the fibres of config/paper.yaml (benchmarks/results/density.md). Focal zones are about half a depth of field apart,
-which is 7 wavelength (focus / aperture)^2, and their foci extend over most of the heart.
 """
 
 from __future__ import annotations
@@ -13,6 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 from echotruth.config.tracking import DEFAULT, METHODS, default_trackers, name_of
+from echotruth.config.transducers import ARRAY_DEFAULTS
 
 HEART_DEFAULTS: dict[str, dict[str, Any]] = {
     "mouse": {"loop.file": "mouse", "probe.preset": "mouse_25MHz"},
@@ -36,24 +31,6 @@ HEART_DEFAULTS: dict[str, dict[str, Any]] = {
     },
 }
 """`geometry.preset` -> default of dotted keys."""
-
-_KEYS = (
-    "phantom.density_per_mm3",
-    "rf.focus_mm",
-    "rf.focal_zones",
-    "rf.focal_spacing_mm",
-    "rf.sector_deg",
-    "bmode.field_of_view_mm",
-)
-_SCANS = {
-    "mouse_25MHz": (2800.0, 6.5, 5, 1.0, 64.0, 12.0),
-    "mouse_30MHz": (5300.0, 6.5, 5, 1.0, 64.0, 12.0),
-    "mouse_40MHz": (9500.0, 6.5, 5, 1.0, 64.0, 12.0),
-    "rat_15MHz": (620.0, 10.8, 5, 1.7, 64.0, 20.0),
-    "human_2_7MHz": (5.0, 70.0, 3, 25.0, 75.0, 150.0),
-}
-ARRAY_DEFAULTS: dict[str, dict[str, float]] = {n: dict(zip(_KEYS, row, strict=True)) for n, row in _SCANS.items()}
-"""`probe.preset` -> default of dotted keys."""
 
 ARRAY_SUFFIXES = (".npy", ".npz")
 """Files of positions without a mesh."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat
 
-from echotruth.config.anatomy import HEART_PRESETS, Lengths
+from echotruth.config.anatomy import HEART_PRESETS, Lengths, Species
 from echotruth.section import Positive, Section, check, invalid
 
 Factor = Annotated[FiniteFloat, Field(ge=0.2, le=5)]
@@ -40,7 +40,7 @@ class Geometry(Section):
     shape: Literal["ellipsoid", "tube"] = "ellipsoid"
     """`tube`: open at both ends, about the long axis, with the length of the ellipsoid's cavity (`endo_length_mm` +
     `base_mm`) and the radii of the ellipsoids at the equator. It has no closed cavity and cannot beat: see `motion`."""
-    preset: Literal["mouse", "rat", "human"] = "mouse"
+    preset: Species = "mouse"
     """Ellipsoid whose lengths are the defaults of the keys below."""
     endo_radius_mm: Positive | None = None
     """Short semi-axis of the endocardial ellipsoid. Default: from `preset`."""

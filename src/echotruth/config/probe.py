@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Optional, TypeVar
 
 from pydantic import Field, FiniteFloat, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from echotruth.config.transducers import ARRAY_PRESETS, PRESET_KEYS, sampling_frequency
+from echotruth.config.transducers import ARRAY_PRESETS, PRESET_KEYS, ArrayName, sampling_frequency
 from echotruth.section import Positive, Section, invalid
 
 T = TypeVar("T")
@@ -24,7 +24,7 @@ FROM_PRESET: Any = None
 class Probe(Section):
     """Phased array: a preset, and values that replace those of the preset."""
 
-    preset: Literal["mouse_25MHz", "mouse_30MHz", "mouse_40MHz", "rat_15MHz", "human_2_7MHz"] = "mouse_25MHz"
+    preset: ArrayName = "mouse_25MHz"
     """Array whose values are the defaults of the keys below. Default: the array for `geometry.preset`."""
     elements: Filled[Annotated[int, Field(ge=2, le=512)]] = FROM_PRESET
     """Number of elements. Default: from `preset`."""

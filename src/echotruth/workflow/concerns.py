@@ -66,6 +66,7 @@ def concerns(config: Config, estimate: Estimate, folder: Path, is_local: bool = 
         Whether the jobs run on this machine.
     """
     found = [*_of_the_disk(estimate, folder), *_of_the_machine(estimate, is_local), *_of_the_array(config)]
+    found += _of_the_mesh(config)
     return sorted(found, key=lambda concern: not concern.is_absurd)
 
 
@@ -148,6 +149,19 @@ def _of_the_array(config: Config) -> Iterator[Concern]:
             least = int(MIN_LINES_PER_BEAM * radians(config.rf.sector_deg) / beam) + 2
             text = f"lines lie {spacing / beam:.2g} widths of the beam apart, so that speckle is lost between them"
             yield Concern(f"rf.lines = {config.rf.lines}: {text}: use {least} or more", False)
+
+
+def _of_the_mesh(config: Config) -> Iterator[Concern]:
+    """A file that holds no wall; whether the wall has a solution, only the mechanics tells."""
+    if config.geometry.file is None or config.motion.kind == "file":
+        return
+    from echotruth.mechanics.geometry import imported_mesh
+    from echotruth.mechanics.geometry.mesh_quality import GeometryError
+
+    try:
+        imported_mesh.read(config.geometry)
+    except GeometryError as error:
+        yield Concern(str(error), True)
 
 
 def _outside_the_image(config: Config) -> Iterator[Concern]:

@@ -139,7 +139,7 @@ def status_of(folder: Path) -> Status:
     holder, lives = lease.current(folder)
     if not (folder / "config.yaml").is_file():
         if holder is None:
-            raise StatusError(f"{folder}: {NOT_A_REPOSITORY if folder.exists() else 'does not exist'}")
+            raise StatusError(f"{folder}: {NOT_A_REPOSITORY}")
         state = "running" if lives else "stopped" if holder.released else "killed"
         return Status(folder, state, {}, 0, {}, {}, str(holder), "planning" if lives else "")
     cases, views = _cases(folder), _views(folder)
