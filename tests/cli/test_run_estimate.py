@@ -55,6 +55,11 @@ def test_check_tells_what_a_run_takes(folder):
     assert status == 0 and "valid; cases: 2," in output and "of CPU time" in output
 
 
+def test_check_fails_where_a_run_would_be_refused(folder):
+    status, output, errors = run_cli("check", "absurd.yaml", cwd=folder)
+    assert status == 1 and "absurd.yaml: valid" in output and "echotruth: probe.frequency_MHz = 25:" in errors
+
+
 @pytest.mark.parametrize("options, cores", [
     (["--cores", "3"], 3), (["--cores=5"], 5), (["-c", "2"], 2), (["-c7"], 7), (["-j", "9"], 9),
     (["--profile", "slurm"], 200), (["--profile", "slurm", "--jobs", "30"], 30),
