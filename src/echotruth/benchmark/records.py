@@ -17,9 +17,8 @@ from echotruth.evaluation.difficulty.table import difficulties
 from echotruth.evaluation.leaderboard import scores_of_guests
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.resampling import CLIP
-from echotruth.evaluation.summary import is_evaluated
+from echotruth.evaluation.summary import folder_of, is_evaluated
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.repository import ledger
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,14 +144,6 @@ def _suite(folder: Path) -> Suite:
         raise EvaluationError(str(error)) from None
     wanted = [(case, view) for case in all_cases(config) for view in config.views]
     return Suite(folder, config, [clip for clip in wanted if is_evaluated(folder, *clip)], len(wanted))
-
-
-def folder_of(repository: Path) -> Path:
-    """Folder of a repository, given it or its store; EvaluationError if it is none."""
-    try:
-        return ledger.repository_folder(repository)
-    except FileNotFoundError as error:
-        raise EvaluationError(str(error)) from None
 
 
 def _listed(config: Config) -> str:

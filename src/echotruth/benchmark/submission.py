@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from echotruth.benchmark.card import attach, read
-from echotruth.benchmark.records import folder_of
 from echotruth.benchmark.rerun import prepare_rerun
 from echotruth.benchmark.results import Row
 from echotruth.config.loading import load
+from echotruth.evaluation.summary import folder_of
 from echotruth.evaluation.tracker_options import EvaluationError
 
 

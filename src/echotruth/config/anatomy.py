@@ -33,3 +33,4 @@ if TYPE_CHECKING:
     Species = str
 else:
     Species = Literal[tuple(HEART_PRESETS)]
+"""What `geometry.preset` may be; a type checker cannot read names from a table."""

@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     ArrayName = str
 else:
     ArrayName = Literal[tuple(_ARRAYS)]
+"""What `probe.preset` may be; a type checker cannot read names from a table."""
 
 PRESET_KEYS = (*_PROBE, "sampling_MHz")
 """Keys of the section `probe` whose defaults follow from the preset."""

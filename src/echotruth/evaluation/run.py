@@ -26,9 +26,8 @@ from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
-from echotruth.evaluation.summary import is_complete
+from echotruth.evaluation.summary import folder_of, is_complete
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.repository.ledger import repository_folder
 from echotruth.section import Name, Section
 from echotruth.tracking.external_program import in_one_line
 from echotruth.tracking.failure import TrackerFailed
@@ -187,10 +186,7 @@ def prepare(repository: Path, name: str, values: dict[str, Any], keep: bool = Fa
     ConfigError
         If the settings are invalid.
     """
-    try:
-        folder = repository_folder(repository)
-    except FileNotFoundError as error:
-        raise EvaluationError(str(error)) from None
+    folder = folder_of(repository)
     config = load(folder / "config.yaml")
     try:
         TypeAdapter(Name).validate_python(name)

@@ -19,6 +19,7 @@ from echotruth.evaluation.agreement import REFERENCES
 from echotruth.evaluation.choice import chosen, image_size
 from echotruth.evaluation.courses import peak, rate, systolic_rate
 from echotruth.evaluation.curves import REFERENCE, twist_views
+from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import ledger
 from echotruth.repository.ledger import record_path
@@ -206,6 +207,14 @@ def _means(rows: list[Row], config: Config, keys: Row) -> Iterator[Row]:
 def is_evaluated(folder: Path, case: str, view: str) -> bool:
     """Whether the trackers of a repository were evaluated on a view of a heart."""
     return is_complete(folder, "evaluation", case, view)
+
+
+def folder_of(repository: Path) -> Path:
+    """Folder of a repository, given it or its store; EvaluationError if it is none."""
+    try:
+        return ledger.repository_folder(repository)
+    except FileNotFoundError as error:
+        raise EvaluationError(str(error)) from None
 
 
 def is_complete(folder: Path, stage: str, case: str, view: str | None = None) -> bool:
