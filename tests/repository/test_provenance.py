@@ -96,6 +96,17 @@ def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_
     assert "echotruth.tracking.trackers.phase_correlation" not in dependencies("mechanics") | dependencies("rf")
 
 
+def test_import_that_is_left_out_is_not_followed_from_there_but_from_elsewhere(tmp_path):
+    script, other = tmp_path / "script.py", tmp_path / "other.py"
+    script.write_text("from echotruth.tracking.trackers import dis\n")
+    other.write_text("from echotruth.tracking import closure\n")
+    dis = "echotruth.tracking.trackers.dis"
+    unless = frozenset({(str(script), dis)})
+    assert dis in _dependencies((str(script),)) and dis not in _dependencies((str(script),), unless)
+    assert dis in _dependencies((str(script), str(other)), unless), "closure imports it"
+    assert code_version(str(script)) != code_version(str(script), unless=unless)
+
+
 def test_cache_of_compiled_functions_has_the_version_of_all_modules_that_compile():
     scripts = tuple(str(script) for script in (ROOT / "src/echotruth/workflow/scripts").glob("*.py"))
     texts = {path: path.read_text() for path in (ROOT / "src").rglob("*.py")}

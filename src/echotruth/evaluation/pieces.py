@@ -13,7 +13,8 @@ import zarr
 
 from echotruth.evaluation.clip import Clip
 from echotruth.repository.checksums import is_whole
-from echotruth.repository.provenance import settings_version
+from echotruth.repository.provenance import code_version, settings_version
+from echotruth.tracking import trackers
 from echotruth.workflow import superseded
 
 if TYPE_CHECKING:
@@ -60,13 +61,12 @@ class Pieces:
         self._known = entry.get("pieces", {}) if entry.get("index") == list(job.index) else {}
 
     def fingerprint(self, tracker: Section, clip: Clip) -> str:
-        """Hash of all that a piece is made from: code, settings of the tracker, and what the tracker is given.
+        """Hash of all that a piece is made from: code and settings of the tracker, and what the tracker is given.
 
         Empty for a tracker from outside, whose code is not known: it is never taken for the same.
         """
-        if getattr(tracker, "method", None) == "external":
-            return ""
-        return settings_version(self._job.code, tracker, digest(clip))
+        method = getattr(tracker, "method", "external")
+        return "" if method == "external" else settings_version(_code(method), tracker, digest(clip))
 
     def find(self, size: int, name: str, fingerprint: str) -> Piece | None:
         """Find the piece of a tracker at an image size, if it was made from the same and its files are whole."""
@@ -94,6 +94,14 @@ class Pieces:
             opened = cast(Any, zarr.open_array(root / group, mode="r"))
             found.append(np.asarray(opened[self._job.index]))
         return tuple(found)
+
+
+def _code(method: str) -> str:
+    """Version of the code of one method: a change of the others leaves its results as they are."""
+    call = "echotruth.tracking.tracker"
+    names = {file.stem for file in Path(*trackers.__path__).glob("*.py")} - {method}
+    others = frozenset((call, f"{trackers.__name__}.{name}") for name in names)
+    return code_version("echotruth.evaluation.clip", call, unless=others)
 
 
 def digest(clip: Clip) -> str:

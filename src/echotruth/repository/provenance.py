@@ -39,7 +39,7 @@ _EXCLUDED = ("echotruth.config", "echotruth.cases", "echotruth.repository", "ech
 
 
 @cache
-def code_version(*modules: str) -> str:
+def code_version(*modules: str, unless: frozenset[tuple[str, str]] = frozenset()) -> str:
     """Hash of the parsed source of modules and of all modules of echotruth that they import.
 
     It does not depend on comments, layout and docstrings.
@@ -48,9 +48,11 @@ def code_version(*modules: str) -> str:
     ----------
     *modules : str
         Names such as "echotruth.mechanics", or paths of scripts.
+    unless : frozenset of (str, str), optional
+        Imports that are not followed: the module that imports, and the one that is imported.
     """
     digest = sha256()
-    for name in sorted(_dependencies(modules)):
+    for name in sorted(_dependencies(modules, unless)):
         digest.update(_source(name).digest.encode())
     _keep_parsed()
     return digest.hexdigest()[:16]
@@ -95,7 +97,7 @@ def packages() -> dict[str, str]:
     return versions
 
 
-def _dependencies(modules: tuple[str, ...]) -> set[str]:
+def _dependencies(modules: tuple[str, ...], unless: frozenset[tuple[str, str]] = frozenset()) -> set[str]:
     """The modules and all modules of echotruth that they import, directly or not."""
     visited: set[str] = set()
     pending = list(modules)
@@ -103,7 +105,7 @@ def _dependencies(modules: tuple[str, ...]) -> set[str]:
         name = pending.pop()
         if name not in visited and not name.startswith(_EXCLUDED):
             visited.add(name)
-            pending.extend(_imports(name))
+            pending.extend(imported for imported in _imports(name) if (name, imported) not in unless)
     return visited
 
 
