@@ -64,6 +64,21 @@ def test_against_end_diastole_and_bidirectionally_a_lost_point_comes_back(points
     np.testing.assert_allclose(displacement[6], shear(points, 6.0) - points, atol=1e-12)
 
 
+def test_way_that_is_known_counts_alone_even_if_a_step_of_it_says_nothing(points):
+    class Doubtful(Formula):
+        def match(self, first, second, points):
+            step, quality = super().match(first, second, points)
+            if first == 0 and second == 1:
+                quality[:] = 0.0  # forwards, of the first step
+            if second == 6:
+                step[:] = np.nan  # backwards, all is lost
+            return step, quality
+
+    displacement, _ = accumulate(Doubtful(shear), FRAMES, points, "bidirectional")
+    truth = np.stack([shear(points, t) - points for t in range(7)])
+    np.testing.assert_allclose(displacement[:6], truth[:6], atol=1e-12)
+
+
 def test_bidirectional_weights_follow_the_correlation_of_each_step(points):
     class Slipping(Formula):
         def match(self, first, second, points):

@@ -7,7 +7,7 @@ import pytest
 
 from echotruth.config.tracking import BsplineDic, Dis
 from echotruth.tracking import track
-from echotruth.tracking.closure import closing_correlation, is_open
+from echotruth.tracking.closure import closure
 
 FRAMES, SWING, SIZE = 16, 28.0, 128
 MASK = np.zeros((SIZE, SIZE), bool)
@@ -30,12 +30,38 @@ def tracked(frames, settings):
 
 
 def test_cycle_closes_and_half_of_it_does_not(swing):
-    closing, consecutive = closing_correlation(swing, MASK)
-    assert closing >= consecutive
-    assert not is_open(closing, consecutive)
-    closing, consecutive = closing_correlation(swing[: FRAMES // 2], MASK)
-    assert closing < consecutive - 0.2
-    assert is_open(closing, consecutive)
+    whole, half = closure(swing, MASK), closure(swing[: FRAMES // 2], MASK)
+    assert whole.closing >= whole.consecutive and whole.displacement < 0.1
+    assert not whole.is_open
+    assert half.closing < half.consecutive - 0.2
+    assert half.is_open
+
+
+@pytest.mark.parametrize(("swing_px", "shown"), [(10.0, 9), (3.0, 8)])
+def test_clip_is_open_if_tissue_is_far_away_though_its_speckle_is_the_same(clip, swing_px, shown):
+    away = swing_px / SWING
+    frames = clip(lambda position, frame: position + np.array([away * lateral(frame), 0.0]), FRAMES, SIZE)
+    found = closure(frames[:shown], MASK)
+    assert found.closing > 0.9 and found.displacement > 0.9
+    assert found.is_open and not closure(frames, MASK).is_open
+
+
+@pytest.mark.parametrize("noise", [0, 8])
+def test_clip_of_which_nothing_moves_is_taken_for_a_cycle(clip, noise):
+    still = clip(lambda position, frame: position, FRAMES, SIZE)
+    noisy = still + np.random.default_rng(1).integers(-noise, noise + 1, still.shape)
+    found = closure(np.clip(noisy, 0, 255).astype(np.uint8), MASK)
+    assert np.isnan(found.displacement) and not found.is_open
+
+
+def test_two_frames_are_taken_for_a_cycle(swing):
+    assert not closure(swing[[0, 4]], MASK).is_open
+
+
+def test_black_frame_does_not_make_an_open_clip_a_closed_one(swing):
+    half = swing[: FRAMES // 2].copy()
+    half[3] = 0
+    assert np.isfinite(closure(half, MASK).consecutive) and closure(half, MASK).is_open
 
 
 def test_bright_tissue_at_rest_does_not_make_an_open_clip_a_closed_one(clip, swing):
@@ -43,7 +69,7 @@ def test_bright_tissue_at_rest_does_not_make_an_open_clip_a_closed_one(clip, swi
     dim = swing[: FRAMES // 2].copy()
     dim[:, :, 36:] = np.maximum(dim[:, :, 36:], 100) - 100  # 20 dB
     dim[:, :, :36] = still[:, :, :36]
-    assert is_open(*closing_correlation(dim, MASK))
+    assert closure(dim, MASK).is_open
 
 
 @pytest.mark.parametrize("settings", [Dis, BsplineDic])
@@ -64,6 +90,6 @@ def test_closed_clip_is_tracked_both_ways_without_a_word(swing, caplog):
 
 
 def test_clip_without_texture_is_taken_for_a_cycle():
-    closing, consecutive = closing_correlation(np.zeros((4, SIZE, SIZE), np.uint8), MASK)
-    assert np.isnan(closing) and np.isnan(consecutive)
-    assert not is_open(closing, consecutive)
+    found = closure(np.zeros((4, SIZE, SIZE), np.uint8), MASK)
+    assert np.isnan(found.closing) and np.isnan(found.consecutive)
+    assert not found.is_open

@@ -247,6 +247,11 @@ def test_program_may_leave_the_quality_out(arguments, tmp_path):
         ("pass", "wrote no {output}, an .npz file with displacement"),
         ("open(output, 'w').write('hello')", "wrote an {output} that cannot be read as .npz"),
         ("np.savez(output, motion=np.zeros(3))", "wrote an {output} without displacement"),
+        (
+            "np.savez_compressed(output, displacement=np.zeros((3, 4, 2))); file = open(output, 'r+b'); "
+            "file.seek(66); file.write(bytes(4 * [255]))",  # where the compressed data begin
+            "wrote an {output} that cannot be read as .npz",
+        ),
         ("np.savez(output, displacement=np.array([None]))", "wrote an {output} that cannot be read as .npz"),
         ("np.savez(output, displacement=np.zeros((4, 2)))", "displacement of shape (4, 2), not (3, 4, 2)"),
     ],

@@ -106,6 +106,9 @@ def follow(tracker: PairTracker, frames: np.ndarray, points: np.ndarray, referen
         results.append((displacement[order], quality[order], variance(quality)[order]))
     displacements, qualities, variances = zip(*results, strict=True)
     weight = inverse_variance_weight(*variances)
+    # A way may be known of which the variance is not, as after a step of quality 0.
+    forward, backward = (np.isfinite(each).all(-1) for each in displacements)
+    weight[forward & ~backward], weight[backward & ~forward] = 1.0, 0.0
     return Path(
         weighted_mean(weight[..., None], *displacements),
         weighted_mean(weight, *qualities),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import zlib
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,6 +16,9 @@ import numpy as np
 from numpy.lib.format import write_array
 
 from echotruth.tracking.failure import TrackerFailed
+
+UNREADABLE = (OSError, ValueError, TypeError, AttributeError, EOFError, NotImplementedError, BadZipFile, zlib.error)
+"""What NumPy raises of a file that is damaged, or no .npz file."""
 
 
 def run(command: list[str], entries: dict[str, Any], timeout: float) -> Any:
@@ -96,5 +100,5 @@ def _read(path: Path) -> Any:
             return (displacement, file["quality"]) if "quality" in file else displacement
     except KeyError as error:
         raise TrackerFailed("wrote an {output} without displacement") from error
-    except (OSError, ValueError, TypeError, AttributeError, EOFError, BadZipFile) as error:
+    except UNREADABLE as error:
         raise TrackerFailed(f"wrote an {{output}} that cannot be read as .npz ({in_one_line(str(error))})") from error

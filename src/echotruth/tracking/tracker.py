@@ -75,12 +75,11 @@ def _suited(settings: Section, frames: np.ndarray, mask: np.ndarray) -> Section:
     """The settings, without the way backwards if the last frame of a clip is not followed by the first."""
     if getattr(settings, "reference", None) != "bidirectional":
         return settings
-    from echotruth.tracking.closure import closing_correlation, is_open
+    from echotruth.tracking.closure import closure
 
-    closing, consecutive = closing_correlation(frames, mask)
-    if not is_open(closing, consecutive):
+    found = closure(frames, mask)
+    if not found.is_open:
         return settings
-    found = f"its last and first frames correlate by {closing:.2f}, consecutive ones by {consecutive:.2f} or more"
     logging.getLogger("echotruth").warning(f"the clip is no closed cycle ({found}): tracked forwards only")
     return settings.model_copy(update={"reference": "previous"})
 
