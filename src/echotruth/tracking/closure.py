@@ -61,11 +61,10 @@ class Closure:
         return bool(self.displacement > OPEN_DISPLACEMENT or last > OPEN_VARIANCE * largest)
 
     def __str__(self) -> str:
-        left = f"{100 * self.displacement:.0f} % of its largest displacement is left in its last frame"
-        alike = (
-            f"that correlates with the first by {self.closing:.2f}, consecutive ones by {self.consecutive:.2f} or more"
-        )
-        return f"{left}; {alike}"
+        alike = f"its last frame correlates with the first by {self.closing:.2f}, consecutive ones by"
+        text = f"{alike} {self.consecutive:.2f} or more"
+        left = f"{100 * self.displacement:.0f} % of its largest displacement is left there"
+        return text if np.isnan(self.displacement) else f"{text}, and {left}"
 
 
 def closure(frames: np.ndarray, mask: np.ndarray) -> Closure:
