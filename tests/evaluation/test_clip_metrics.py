@@ -4,7 +4,9 @@ import pytest
 from finished_repository import configured, finish
 
 import echotruth as et
+from echotruth.cases import expand
 from echotruth.config import Cases
+from echotruth.evaluation.clip_metrics import hearts_of
 from echotruth.evaluation.resampling import by_heart
 
 TABLE = """case,seed,motion.affine.position,label.heart,label.split,label.group
@@ -35,3 +37,10 @@ def test_without_a_label_cases_of_one_motion_are_one_heart(clips):
     hearts = clips.set_index("case")["heart"].to_dict()
     assert hearts == {"a": "first", "b": "first", "c": "first", "d": "second", "e": "e", "f": "e"}
     assert by_heart(clips, "nrmse_all_percent").index.tolist() == ["first", "second", "e"]
+
+
+def test_hearts_whose_labels_are_long_numbers_stay_apart():
+    given = {"a": "20240101", "b": "20240102", "c": "1.5", "d": "3.0", "e": "0.1", "f": "1.23456789"}
+    rows = "".join(f"{case},{number},{label}\n" for number, (case, label) in enumerate(given.items()))
+    cases = expand(configured(views=("mid",), cases=Cases(table=f"case,seed,label.heart\n{rows}")))
+    assert hearts_of({case.id: case for case in cases}) == given | {"d": "3"}

@@ -293,8 +293,18 @@ def test_table_of_a_repository_is_kept_until_its_images_change(known, monkeypatc
     assert list(again["size_px"]) == list(SIZES) and (again["floor_plane_percent"] < 0.2).all()
 
 
+def test_table_is_made_again_for_the_points_of_another_grid(known, monkeypatch):
+    asked = []
+    monkeypatch.setattr(table, "difficulty", lambda job: asked.append(job.case.config.tracking.grid_px) or [])
+    finer = replace(known.case, config=et.configure(known.case.config, tracking={"grid_px": 3}))
+    for case in (known.case, known.case, finer):
+        table._kept(Job(known.folder, "tracking", case, "long", code="read"))
+    assert asked[-2:] == [5, 3] and len(asked) == 2
+
+
 def test_unknown_case_or_view_is_named(known):
     with pytest.raises(ValueError, match="view = 'apex': use one of mid, long"):
         et.difficulty(known.folder, known.case.id, "apex")
-    with pytest.raises(ValueError, match="case = 'nobody': use one of"):
-        table.difficulties(known.folder, cases=["nobody"])
+    for names in (["nobody"], "nobody"):
+        with pytest.raises(ValueError, match="case = 'nobody': use one of"):
+            table.difficulties(known.folder, cases=names)

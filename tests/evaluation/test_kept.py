@@ -11,6 +11,8 @@ from known_repository import SETTINGS, make
 
 import echotruth as et
 from echotruth.evaluation import kept
+from echotruth.evaluation.detection import COLUMNS, detection
+from echotruth.evaluation.reliability import calibration_error, curve
 from echotruth.evaluation.run import prepare
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import ledger
@@ -206,6 +208,23 @@ def test_metrics_of_a_tracker_that_was_not_kept_are_those_of_its_scores(reposito
     assert len(clips) == 4 and (clips["failure"] == "").all() and (clips["points"] > 0).all()
     everything = et.clip_metrics(repository).clips
     assert everything.loc[everything["tracker"] == "mine", "delta_avg_percent"].isna().all()
+
+
+def test_one_name_may_be_given_for_a_list_of_one(repository):
+    of_lists = et.clip_metrics(repository, ["heart"], ["mid"], trackers=["one"])
+    for table, of_list in zip(et.clip_metrics(repository, "heart", "mid", trackers="one"), of_lists, strict=True):
+        pd.testing.assert_frame_equal(table, of_list)
+    with pytest.raises(ValueError, match=r"^case = 'other': use one of heart\.$"):
+        et.clip_metrics(repository, "other")
+
+
+def test_tables_without_a_row_have_their_columns_and_nothing_to_say(repository):
+    evaluate(repository, keep=False)
+    full, empty = et.clip_metrics(repository), et.clip_metrics(repository, trackers=["mine"])
+    assert list(empty.segments) == list(full.segments) and list(empty.reliability) == list(full.reliability)
+    assert empty.segments.empty and detection(empty.segments).empty and list(detection(empty.segments)) == [*COLUMNS]
+    assert curve(empty.reliability).empty and list(curve(empty.reliability)) == list(curve(full.reliability))
+    assert np.isnan(calibration_error(empty.reliability))
 
 
 def test_metrics_of_a_failed_clip_are_the_worst_or_unknown_and_its_reason_is_told(repository):

@@ -25,6 +25,7 @@ def chosen(
     what : str
         What the names are, for the message.
     names : sequence or None
+        A text is a single name.
     known : sequence
     folder : Path, optional
         Folder of the repository, for the message to a user of the command line.
@@ -36,6 +37,8 @@ def chosen(
     ValueError
         If one is not known.
     """
+    if isinstance(names, str):
+        names = [names]
     for name in names or ():
         if name not in known:
             choices = ", ".join(map(str, known[:20])) or "none: it has no such thing"

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.cases import Case, diagnosis, expand
 from echotruth.cases.case import Label
+from echotruth.cases.ids import integer_if_whole
 from echotruth.config.loading import load
 from echotruth.evaluation import kept, point_tracks, reliability, segment_strain
 from echotruth.evaluation.agreement import REFERENCES
@@ -133,8 +134,6 @@ def clip_metrics(
     ValueError
         If the repository does not have one of them, or the scores of a tracker from outside cannot be read.
     """
-    import pandas as pd
-
     config = load(folder / "config.yaml")
     by_id = {case.id: case for case in expand(config, str(folder / "config.yaml"))}
     chosen_views = chosen("view", views, list(config.views))
@@ -151,12 +150,16 @@ def clip_metrics(
                 for table, more in zip(found, rows, strict=True):
                     about: Row = {"case": case, "view": view, "plane": job.view.plane, **_sorts(job.case, hearts[case])}
                     table += [about | row for row in more]
-    return ClipMetrics(*(pd.DataFrame(rows).reindex(columns=_columns(rows)) for rows in found))
+    clips, segments, steps = found
+    return ClipMetrics(_table(clips), _table(segments, segment_strain.COLUMNS), _table(steps, reliability.COLUMNS))
 
 
-def _columns(rows: list[Row]) -> list[str]:
-    """Columns of a table, those of `BEGIN` first."""
-    return list(dict.fromkeys([*BEGIN, *(name for row in rows for name in row)]))
+def _table(rows: list[Row], columns: Sequence[str] = ()) -> pd.DataFrame:
+    """A table of which the columns of `BEGIN` are first, and then those that are given, also without rows."""
+    import pandas as pd
+
+    names = dict.fromkeys([*BEGIN, *columns, *(name for row in rows for name in row)])
+    return pd.DataFrame(rows).reindex(columns=list(names))
 
 
 def clip_truth(job: Job) -> ClipTruth:
@@ -328,11 +331,14 @@ def _unit(config: Config) -> float:
 
 def hearts_of(cases: dict[str, Case]) -> dict[str, str]:
     """Heart of every case: its label; without one, that of the first case with the same motion, or the name of that."""
+    told = {name: _text(case.labels.get("heart")) for name, case in cases.items()}
+    if all(told.values()):
+        return told
     motion = motions({name: case.config for name, case in cases.items()})
     first: dict[str, str] = {}
-    for name, case in cases.items():
-        first.setdefault(motion[name], _text(case.labels.get("heart")) or name)
-    return {name: _text(case.labels.get("heart")) or first[motion[name]] for name, case in cases.items()}
+    for name, heart in told.items():
+        first.setdefault(motion[name], heart or name)
+    return {name: heart or first[motion[name]] for name, heart in told.items()}
 
 
 def _sorts(case: Case, heart: str) -> Row:
@@ -345,5 +351,5 @@ def _sorts(case: Case, heart: str) -> Row:
 
 
 def _text(label: Label) -> str:
-    """A label as text; "" if there is none."""
-    return f"{label:g}" if isinstance(label, float) else str(label or "")
+    """A label as text, a whole number without a decimal point; "" if there is none."""
+    return "" if label is None else str(integer_if_whole(label))

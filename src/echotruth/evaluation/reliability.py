@@ -26,6 +26,9 @@ WITHIN = 1.0
 COUNTS = ("count", "quality_sum", "within_count")
 """Columns that are added over clips."""
 
+COLUMNS = ("quality_low", "quality_high", *COUNTS)
+"""Columns of the rows of steps."""
+
 
 def counts(quality: Floats, within: NDArray[np.bool_]) -> list[dict[str, float]]:
     """Number of points by their quality, and how many of them are right.

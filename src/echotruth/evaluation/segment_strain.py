@@ -27,6 +27,16 @@ MOVING = 5.0
 
 WHAT = ("tracked", "true")
 
+COLUMNS = (
+    *("aha", "component", "points", "infarct_share", "infarct_extent", "epicardial_share"),
+    *(
+        f"{what}_{name}"
+        for what in WHAT
+        for name in ("es_percent", "peak_percent", "time_to_peak_ms", "systolic_rate_per_s")
+    ),
+)
+"""Columns of the rows of segments."""
+
 Row = dict[str, str | int | float]
 
 

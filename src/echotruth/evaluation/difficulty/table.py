@@ -30,7 +30,8 @@ _VERSION = 1
 def difficulties(folder: Path, cases: Sequence[str] | None = None, views: Sequence[str] | None = None) -> pd.DataFrame:
     """Determine how difficult the clips of a repository are to track.
 
-    What was found of a clip is kept in the folder `scratch` of the repository, until its images or truth change.
+    What was found of a clip is kept in the folder `scratch` of the repository, until its images or truth change, or the
+    frames and points at which it is to be tracked.
 
     Parameters
     ----------
@@ -62,10 +63,10 @@ def difficulties(folder: Path, cases: Sequence[str] | None = None, views: Sequen
 
 
 def _kept(job: Job) -> list[Row]:
-    """Rows of a clip, as they were kept of the same images and truth, or determined now and kept."""
+    """Rows of a clip, as they were kept of the same images, truth and points, or determined now and kept."""
     path = job.scratch / "difficulty.json"
-    step = job.case.config.tracking.frame_step
-    key = [_VERSION, PARAMETERS, step, digest(job.folder, job.case.id, str(job.view_name))]
+    tracking, images = job.case.config.tracking, digest(job.folder, job.case.id, str(job.view_name))
+    key = [_VERSION, PARAMETERS, tracking.frame_step, tracking.grid_px, images]
     with suppress(OSError, ValueError, KeyError, TypeError):  # there is none, or it is damaged
         kept = json.loads(path.read_text())
         if kept["key"] == key:
