@@ -93,6 +93,23 @@ def test_a_mean_over_views_is_one_of_hearts():
     assert list(found["nrmse_all_percent"]) == [12, 6, 18] and list(found["view"]) == ["all", "mid", "apex"]
 
 
+def test_cases_of_one_heart_are_drawn_together_with_their_mean():
+    """As if there were one case a heart with the mean of its cases; without hearts, each case is one."""
+    hearts = {"heart0": "a", "heart1": "b", "heart2": "a", "heart3": "c"}
+    of_cases = scores({"one": [4, 7, 6, 3], "two": [5, 2, 9, 8]}, views=("mid", "apex"))
+    of_hearts = scores({"one": [5, 7, 3], "two": [7, 2, 8]}, views=("mid", "apex"))
+    found = standings(of_cases, 1, hearts)
+    pd.testing.assert_frame_equal(found, standings(of_hearts, 1))
+    assert set(found["hearts"]) == {3} and set(standings(of_cases, 1)["hearts"]) == {4}
+    pd.testing.assert_frame_equal(standings(of_cases, 1), standings(of_cases, 1, {case: case for case in hearts}))
+
+
+def test_a_tracker_not_tried_on_a_case_of_a_heart_does_not_have_the_heart():
+    whole = scores({"a": [5, 5, 5], "b": [1, 1, 1]})
+    table = standings(whole.drop(index=whole.index[-1]), 1, {"heart0": "x", "heart1": "y", "heart2": "y"})
+    assert list(overall(table)["hearts"]) == [2, 1] and np.isnan(overall(table).loc["b", "rank"])
+
+
 def test_the_seed_decides_the_draws():
     table = scores({"a": np.random.default_rng(0).normal(9, 1, 7), "b": np.random.default_rng(1).normal(9, 1, 7)})
     pd.testing.assert_frame_equal(standings(table, 3), standings(table, 3))

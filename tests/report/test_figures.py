@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 import xarray as xr
+from finished_repository import configured, finish
 
-from echotruth.config import Config, Physiology
+from echotruth.config import Cases, Config, Physiology
 from echotruth.report.figures import PARTS, Figures
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # of the little store that stands for a repository
@@ -33,3 +34,13 @@ def test_without_a_heart_a_sentence_stands_in_place_of_every_figure(tmp_path):
     names = {name for part in PARTS.values() for name in part}
     assert {path.stem for path in tmp_path.glob("*.png")} == {path.stem for path in tmp_path.glob("*.svg")} == names
     assert {path.name for path in tmp_path.glob("*.[gmc]*")} == {"clip.gif", "clip.mp4", "leaderboard.csv"}
+
+
+@pytest.mark.parametrize(("label", "hearts"), [("heart", 2), ("group", 3)])
+def test_hearts_of_the_leaderboard_are_told_apart_by_their_label(tmp_path, label, hearts):
+    """Without one, cases are hearts, although these have the same motion."""
+    table = f"case,seed,label.{label}\na,1,20240101\nb,2,20240102\nc,3,20240101\n"
+    config = configured(name="labelled", views=("mid",), cases=Cases(table=table))
+    folder = finish(tmp_path / "labelled", config)
+    found = Figures(folder / "labelled.zarr", config, folder / "figures").standings
+    assert set(found["hearts"]) == {hearts}

@@ -1,5 +1,7 @@
 """Leaderboard of trackers: means over the hearts of a repository, with bootstrap intervals, and ranks.
 
+Cases are hearts, unless they are said to be of one: the heart then has the mean over the clips of all of them.
+
 Trackers are ranked by `nrmse_all_percent`, in which a point without an estimate counts as one that did not move: a
 tracker gains nothing by leaving out difficult points, and one that fails has 100 %. Where every point has an estimate
 it is the NRMSE. A metric that a tracker lacks on one clip is missing from its mean too, since the mean of its other
@@ -10,7 +12,7 @@ Ann Stat 1979; 7:1), in which all trackers share the resampled hearts. A single 
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +33,9 @@ log = logging.getLogger("echotruth")
 
 KEYS = ("case", "view", "size_px", "tracker")
 """Columns that identify a row of :func:`rows`."""
+
+HEART = "heart"
+"""Column that tells the hearts apart."""
 
 RANKED_BY = "nrmse_all_percent"
 """Metric by which trackers are ranked."""
@@ -73,7 +78,7 @@ def rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path) 
     return pd.concat(tables, ignore_index=True)
 
 
-def standings(rows: pd.DataFrame, seed: int) -> pd.DataFrame:
+def standings(rows: pd.DataFrame, seed: int, hearts: Mapping[str, str] | None = None) -> pd.DataFrame:
     """The leaderboard.
 
     Parameters
@@ -82,28 +87,31 @@ def standings(rows: pd.DataFrame, seed: int) -> pd.DataFrame:
         As :func:`rows` returns them.
     seed : int
         Seed of the bootstrap.
+    hearts : mapping, optional
+        Case to heart. Default: every case is one.
 
     Returns
     -------
     DataFrame
         One row for every image size, view (`all`: the mean over the views of a heart) and tracker, the best first:
-        `rank` (equal trackers share one; NaN for a tracker that was not evaluated on every heart and view), `hearts`
-        and `failures` (number of clips), the mean over the hearts of every metric, NaN where the tracker failed on a
-        clip or lacks a value that another tracker has there, and `_low` and `_high` of the rank, of
+        `rank` (equal trackers share one; NaN for a tracker that was not evaluated on every case and view), `hearts`
+        and `failures` (number of clips), the mean over the hearts of every metric, NaN where the tracker has no
+        value on a clip on which another tracker has one or it failed, and `_low` and `_high` of the rank, of
         `nrmse_all_percent` and of the RMS errors of strain: the bootstrap interval, NaN with a single heart and where
         there is no mean.
     """
-    cases, views = (list(dict.fromkeys(rows[name])) for name in ("case", "view"))
-    resamples = draws(len(cases), seed)
+    rows = rows.assign(**{HEART: rows["case"] if hearts is None else rows["case"].map(hearts)})
+    cases_of = rows.groupby(HEART, sort=False)["case"].nunique()
+    views, resamples = list(dict.fromkeys(rows["view"])), draws(len(cases_of), seed)
     tables = []
     for size in dict.fromkeys(rows["size_px"]):
         of_size = rows[rows["size_px"] == size]
         for view in (ALL_VIEWS, *views):
             clips = of_size if view == ALL_VIEWS else of_size[of_size["view"] == view]
-            clips_per_heart = len(views) if view == ALL_VIEWS else 1
-            tables.append(_table(clips, cases, clips_per_heart, resamples).assign(size_px=size, view=view))
+            clips_of = cases_of * (len(views) if view == ALL_VIEWS else 1)
+            tables.append(_table(clips, clips_of, resamples).assign(size_px=size, view=view))
     table = pd.concat(tables, ignore_index=True)
-    others = [name for name in rows if name not in (*KEYS, "failure", RANKED_BY)]
+    others = [name for name in rows if name not in (*KEYS, HEART, "failure", RANKED_BY)]
     first = ("size_px", "view", "tracker", "hearts", "failures")
     values = [f"{name}{suffix}" for name in ("rank", RANKED_BY, *others) for suffix in ("", "_low", "_high")]
     return table[[*first, *(name for name in values if name in table)]]
@@ -115,21 +123,21 @@ def best(standings: pd.DataFrame) -> list[str]:
     return list(table.sort_values("rank", kind="stable", na_position="last")["tracker"])
 
 
-def _table(clips: pd.DataFrame, cases: list[str], clips_per_heart: int, resamples: np.ndarray) -> pd.DataFrame:
-    """Rows of one image size and view."""
-    columns = [str(name) for name in clips if name not in (*KEYS, "failure")]
-    # Hearts with a missing view are left out: their mean would be over other clips than that of other trackers.
-    every_view = clips.groupby(["tracker", "case"], sort=False).size() == clips_per_heart
-    means = means_of_hearts(clips, columns)[every_view]
+def _table(clips: pd.DataFrame, clips_of: pd.Series, resamples: np.ndarray) -> pd.DataFrame:
+    """Rows of one image size and view, in which the hearts have so many clips."""
+    columns = [str(name) for name in clips if name not in (*KEYS, HEART, "failure")]
+    # Hearts with a missing clip are left out: their mean would be over other clips than that of other trackers.
+    every_clip = clips.groupby(["tracker", HEART], sort=False).size().eq(clips_of, level=HEART)
+    means = means_of_hearts(clips, columns, HEART)[every_clip]
     trackers = list(dict.fromkeys(clips["tracker"]))
     table = pd.DataFrame({"tracker": trackers}).set_index("tracker")
-    table["hearts"] = every_view.groupby("tracker").sum()
+    table["hearts"] = every_clip.groupby("tracker").sum()
     table["failures"] = (clips["failure"] != "").groupby(clips["tracker"]).sum()
     for name in (RANKED_BY, "e_cc_rms_pp", "e_ll_rms_pp", "e_rr_rms_pp"):
-        values = means[name].unstack("case").reindex(index=trackers, columns=cases).to_numpy().T
+        values = means[name].unstack(HEART).reindex(index=trackers, columns=clips_of.index).to_numpy().T
         if name == RANKED_BY:
             table["rank"] = ranks(values.mean(0))
-            table["rank_low"], table["rank_high"] = percentiles(ranks(values[resamples].mean(1)), len(cases))
+            table["rank_low"], table["rank_high"] = percentiles(ranks(values[resamples].mean(1)), len(values))
         table[f"{name}_low"], table[f"{name}_high"] = interval(values, resamples)
     by_tracker = means.groupby("tracker", sort=False)
     known_for_all = by_tracker.count().eq(by_tracker.size(), axis=0)

@@ -65,7 +65,7 @@ class Board:
     interval: str
 
 
-def of(standings: pd.DataFrame, size: int) -> Board:
+def of(standings: pd.DataFrame, size: int, cases: int) -> Board:
     """The table at one image size, over all views.
 
     Parameters
@@ -74,6 +74,8 @@ def of(standings: pd.DataFrame, size: int) -> Board:
         As :func:`echotruth.evaluation.leaderboard.standings` returns it.
     size : int
         px.
+    cases : int
+        Their number; several may be of one heart.
 
     Returns
     -------
@@ -92,10 +94,11 @@ def of(standings: pd.DataFrame, size: int) -> Board:
         for entry in table.to_dict("records")
     ]
     hearts = int(table["hearts"].max())
+    of_cases = f" (label.heart) of the {cases} cases" if hearts < cases else ""
     interval = (
         "With a single heart there are no intervals."
         if hearts < 2
-        else f"Bars are 95 % intervals of a bootstrap over the {hearts} hearts."
+        else f"Bars are 95 % intervals of a bootstrap over the {hearts} hearts{of_cases}."
     )
     return Board(size, [Column(name, COLUMNS[name][0]) for name in metrics], rows, _sentence(table, hearts), interval)
 

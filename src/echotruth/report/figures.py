@@ -11,9 +11,10 @@ import xarray as xr
 from numpy.typing import NDArray
 from PIL import Image
 
-from echotruth.cases import find_case
+from echotruth.cases import all_cases, find_case
 from echotruth.config import Config
 from echotruth.evaluation import kept
+from echotruth.evaluation.clip_metrics import hearts_of
 from echotruth.evaluation.leaderboard import best, rows, standings
 from echotruth.heart import Heart
 from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
@@ -225,8 +226,11 @@ class Figures:
 
     @cached_property
     def standings(self) -> pd.DataFrame:
-        """The leaderboard, including external trackers."""
-        return standings(rows(self.tree, self.config, self.complete, self.folder.parent), self.config.seed)
+        """The leaderboard, including external trackers; without a label `heart`, every case is one."""
+        cases = all_cases(self.config)
+        labelled = any(case.labels.get("heart") is not None for case in cases.values())
+        table = rows(self.tree, self.config, self.complete, self.folder.parent)
+        return standings(table, self.config.seed, hearts_of(cases) if labelled else None)
 
     @property
     def order(self) -> list[str]:

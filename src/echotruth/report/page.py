@@ -93,7 +93,7 @@ def _context(tree: xr.DataTree, folder: Path, config: Config, shown: np.ndarray)
         "figure": lambda name, title: Markup(vector.inline(folder / f"figures/{name}.svg", title)),
         "numbers": account.numbers(tree, folder, config),
         "facts": account.facts(config),
-        "board": board.of(standings, config.bmode.sizes[0]) if standings is not None else None,
+        "board": board.of(standings, config.bmode.sizes[0], len(shown)) if standings is not None else None,
         "shown": case,
         "best": leader,
         "views": [(view, style.title(view)) for view in config.views],
