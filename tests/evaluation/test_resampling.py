@@ -126,3 +126,11 @@ def test_a_tracker_that_lacks_a_clip_has_no_value_of_its_heart():
     del rows["h", "c", "long", "c"]
     found = by_heart(clips(rows), "gls").loc["h"]
     assert found["a"] == 1 and np.isnan(found["b"]) and np.isnan(found["c"])
+
+
+def test_a_clip_on_which_a_tracker_failed_counts_with_the_value_it_has_there():
+    rows = clips({("h", "c", view, name): 10.0 for name in "ab" for view in ("mid", "long")})
+    failed = (rows["tracker"] == "b") & (rows["view"] == "mid")
+    rows.loc[failed, ["gls", "failure"]] = 100.0, "no motion"
+    assert by_heart(rows, "gls").loc["h"].tolist() == [10, 55]
+    assert np.isnan(by_heart(rows.assign(gls=rows["gls"].mask(failed)), "gls").loc["h", "b"])

@@ -121,8 +121,9 @@ def by_heart(clips: pd.DataFrame, column: str) -> pd.DataFrame:
     -------
     DataFrame
         Hearts as rows and trackers as columns, both in the order of the clips: the mean over the clips of the heart.
-        NaN where a tracker failed on one, has no value that another one has there, or was not tried on it. Hearts in
-        whose clips no tracker has the metric are left out.
+        NaN where a tracker was not tried on one, or has no value where another one has one or where it failed. A
+        metric in which points without an estimate count has a value where a tracker failed, and counts as that. Hearts
+        in whose clips no tracker has the metric are left out.
     """
     hearts, trackers = (list(dict.fromkeys(clips[name])) for name in ("heart", "tracker"))
     means = means_of_hearts(clips, [column], "heart")[column].unstack("tracker").reindex(hearts, columns=trackers)
