@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+import yaml
 
 from echotruth.export import Export, ExportError, Selection, source
 
@@ -45,6 +46,12 @@ def brightest(rf):
     return line, rf.range.values[sample]
 
 
+def places_about(rf):
+    """Points (lateral, axial), m, at the `OFFSETS` of range about the brightest sample."""
+    line, along = brightest(rf)
+    return [(along + off) * np.array([np.sin(rf.line_angle[line]), np.cos(rf.line_angle[line])]) for off in OFFSETS]
+
+
 def compounded(channels, element, source, delay, place):
     """Delay and sum at a point (lateral, axial) of channels (samples, receivers, waves), as the toolbox counts time."""
     spectra = np.fft.rfft(channels, axis=0)[1:-1] * 2 / len(channels)
@@ -81,9 +88,7 @@ def test_waves_of_the_uff_focus_where_the_lines_do(folder, rf):
         delay = np.array([wave["delay"][()] for wave in waves])
         channels, element = data["data"][0].T, data["probe/geometry"][0]
     source = np.column_stack([distance * np.sin(azimuth), distance * np.cos(azimuth)])
-    line, along = brightest(rf)
-    at = [(along + off) * np.array([np.sin(rf.line_angle[line]), np.cos(rf.line_angle[line])]) for off in OFFSETS]
-    levels = [compounded(channels, element, source, delay, place) for place in at]
+    levels = [compounded(channels, element, source, delay, place) for place in places_about(rf)]
     assert abs(OFFSETS[int(np.argmax(levels))]) < 20e-6
 
 
@@ -114,6 +119,34 @@ def test_zea_is_read_by_its_own_library(folder, rf, monkeypatch):
     assert (parameters.n_tx, parameters.n_el) == (ELEMENTS, ELEMENTS)
     assert float(parameters.sound_speed) == SPEED
     np.testing.assert_allclose(parameters.probe_geometry[:, 0], rf.element, rtol=1e-6)
+
+
+def compounded_by_zea(file, place):
+    """Delay and sum of the first frame at a point (lateral, axial), as zea's `calculate_delays` counts time.
+
+    The way out is the shortest over the elements that send, less the initial time, and more by 1/f0, where the file has
+    no waveforms, for the peak of the pulse.
+    """
+    scan, data = file["tracks/track_0/scan"], file["tracks/track_0/data/raw_data"][0, ..., 0]
+    values = {name: scan[name][()].astype(float) for name in SCALARS}
+    back = np.linalg.norm(file["probe/probe_geometry"][()] - [place[0], 0, place[1]], axis=1) / values["sound_speed"]
+    sent = np.where(scan["tx_apodizations"][()] == 0, np.inf, scan["t0_delays"][()] + back)
+    out = sent.min(axis=1) - scan["initial_times"][()] + 1 / values["center_frequency"]
+    cycles = np.fft.rfftfreq(data.shape[1])[1:-1]
+    spectra = np.fft.rfft(data, axis=1)[:, 1:-1]
+    samples = values["sampling_frequency"] * (out[:, None, None] + back)
+    return abs((spectra * np.exp(2j * np.pi * cycles[:, None] * samples)).sum())
+
+
+SCALARS = ("sound_speed", "center_frequency", "sampling_frequency")
+
+
+def test_transmits_of_zea_focus_where_the_lines_do(folder, rf):
+    """The brightest sample of the lines is the brightest near it when zea's rule of time focuses the file."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(written(folder, "zea")) as file:
+        levels = [compounded_by_zea(file, place) for place in places_about(rf)]
+    assert abs(OFFSETS[int(np.argmax(levels))]) < 20e-6  # a pulse that peaks 1/f0 late is 31 um off
 
 
 SHAPES = {
@@ -160,6 +193,40 @@ def test_uff_is_laid_out_as_the_toolbox_writes_it(folder, rf):
         assert len(data["sequence"]) == ELEMENTS and data["sequence/sequence_0001"].attrs["class"] == "uff.wave"
         assert data["probe/geometry"].shape == (7, ELEMENTS)
         assert sorted(file["beamformed_data/data"]) == ["imag", "real"]
+        assert file.attrs["version"].tolist() == ["v1.2.0"]  # `read_object` takes the first of a list
+
+
+BEAMFORMED = {"scan", "data", "probe", "pulse", "sequence", "phantom"}
+BEAMFORMED |= {"sampling_frequency", "modulation_frequency", "frame_rate"}
+"""Properties of `uff.beamformed_data` of USTB, to which `read_object` assigns what a file holds."""
+
+
+def test_lines_of_the_uff_have_the_properties_of_their_class_and_the_sampling_in_depth(folder, rf):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(written(folder, "uff")) as file:
+        assert set(file["beamformed_data"]) <= BEAMFORMED
+        steps = np.diff(rf.range)
+        np.testing.assert_allclose(SPEED / (2 * file["beamformed_data/sampling_frequency"][()]), steps, rtol=1e-6)
+        assert file["channel_data/sound_speed"][()] == SPEED
+        assert file["channel_data/sampling_frequency"][()] == rf.attrs["sampling_frequency"]
+
+
+SIZES = {"element_width": 30e-6, "element_height": 3e-3}
+
+
+def test_size_of_the_elements_is_that_of_the_case(rf_repository):
+    """A case of which both are swept."""
+    h5py = pytest.importorskip("h5py")
+    folder = rf_repository()
+    config = yaml.safe_load((folder / "config.yaml").read_text())
+    config["cases"] = {"table": "case,probe.width_um,probe.height_mm\nheart,30,3\n"}
+    (folder / "config.yaml").write_text(yaml.safe_dump(config))
+    with h5py.File(written(folder, "uff")) as uff, h5py.File(written(folder, "zea")) as zea:
+        for name, value in SIZES.items():
+            for group in (uff["channel_data/probe"], uff["beamformed_data/probe"], zea["probe"]):
+                assert group[name][()] == pytest.approx(value)
+        geometry = uff["channel_data/probe/geometry"][5:]
+    np.testing.assert_allclose(geometry.T, np.tile(list(SIZES.values()), (ELEMENTS, 1)))
 
 
 @pytest.mark.parametrize("name, suffix", [("uff", ".uff"), ("zea", ".hdf5")])

@@ -33,10 +33,12 @@ def sample_positions(rf: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 
 def open_rf(clip: Clip) -> xr.Dataset:
-    """Open the group `rf` of one case and view, without reading its arrays."""
+    """Open the group `rf` of one case and view, without reading its arrays; the size of the elements is the case's."""
     import xarray as xr
 
     rf = xr.open_zarr(clip.job.store.path, group="rf", consolidated=False, chunks=None)
+    probe = clip.case.config.probe.si()
+    rf = rf.assign_attrs(element_width=probe.width, element_height=probe.height)
     return rf.sel(case=clip.case.id, view=clip.view)
 
 

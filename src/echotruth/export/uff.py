@@ -14,10 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from echotruth.export.error import optional
 from echotruth.export.rf import sample_positions, scaled_channels
 
 if TYPE_CHECKING:
     import xarray as xr
+
+VERSION = "v1.2.0"
+"""Version of the format, without which USTB reads no file."""
 
 SPHERICAL = 1
 """`uff.wavefront.spherical`"""
@@ -32,6 +36,7 @@ def write(file: Any, rf: xr.Dataset) -> None:
     rf : Dataset
         The group `rf` of one case and view.
     """
+    file.attrs["version"] = np.array([VERSION], optional("h5py").string_dtype())
     if "channels" in rf:
         _channel_data(_object(file, "channel_data", "uff.channel_data"), rf)
     if "lines" in rf:
@@ -39,7 +44,8 @@ def write(file: Any, rf: xr.Dataset) -> None:
 
 
 def _channel_data(group: Any, rf: xr.Dataset) -> None:
-    _settings(group, rf, modulation_frequency=0.0)
+    _settings(group, rf, rf.attrs["sampling_frequency"], modulation_frequency=0.0)
+    _array(group, "sound_speed", rf.attrs["sound_speed"])
     _array(group, "initial_time", float(rf["sample"][0]))
     sequence = _object(group, "sequence", "uff.wave", len(rf.transmitter))
     for number, lateral in enumerate(rf.transmitter.values, start=1):
@@ -63,7 +69,9 @@ def _wave(group: Any, lateral: float, rf: xr.Dataset) -> None:
 
 
 def _beamformed_data(group: Any, rf: xr.Dataset) -> None:
-    _settings(group, rf, modulation_frequency=rf.attrs["demodulation_frequency"])
+    spacing = float(rf.range[1] - rf.range[0])
+    in_depth = rf.attrs["sound_speed"] / (2 * spacing)  # as the class wants it, not that of the channels
+    _settings(group, rf, in_depth, modulation_frequency=rf.attrs["demodulation_frequency"])
     sector = rf.attrs["scan"] == "sector"
     scan = _object(group, "scan", "uff.sector_scan" if sector else "uff.linear_scan")
     _array(scan, "azimuth_axis" if sector else "x_axis", rf.line_angle if sector else rf.line_origin)
@@ -81,9 +89,9 @@ def _beamformed_data(group: Any, rf: xr.Dataset) -> None:
         data[name].attrs["imaginary"] = [int(name == "imag")]
 
 
-def _settings(group: Any, rf: xr.Dataset, modulation_frequency: float) -> None:
-    _array(group, "sound_speed", rf.attrs["sound_speed"])
-    _array(group, "sampling_frequency", rf.attrs["sampling_frequency"])
+def _settings(group: Any, rf: xr.Dataset, sampling_frequency: float, modulation_frequency: float) -> None:
+    """Properties of both classes; the toolbox refuses a file with one that its class does not have."""
+    _array(group, "sampling_frequency", sampling_frequency)
     _array(group, "modulation_frequency", modulation_frequency)
     pulse = _object(group, "pulse", "uff.pulse")
     _array(pulse, "center_frequency", rf.attrs["centre_frequency"])

@@ -67,12 +67,14 @@ def _scan(group: Any, rf: xr.Dataset) -> None:
     """Transmits: every element alone, one after the other."""
     element = rf.element.values
     ones = np.ones(len(element))
+    # Without waveforms, zea takes the pulse to peak 1/f0 after it is sent; here it peaks when it is sent.
+    initial_time = float(rf["sample"][0]) + 1 / rf.attrs["centre_frequency"]
     values = {
         "sampling_frequency": rf.attrs["sampling_frequency"],
         "center_frequency": rf.attrs["centre_frequency"],
         "demodulation_frequency": rf.attrs["centre_frequency"],
         "sound_speed": rf.attrs["sound_speed"],
-        "initial_times": float(rf["sample"][0]) * ones,
+        "initial_times": initial_time * ones,
         "t0_delays": np.zeros((len(element), len(element))),
         "tx_apodizations": np.eye(len(element)),
         "focus_distances": -SOURCE_DISTANCE * ones,
