@@ -72,7 +72,8 @@ SI units, sampling_frequency (of the channels), demodulation_frequency (of the l
 bandwidth, element_width, element_height, elevation_focus, attenuation (nepers per metre and hertz); transmit, scan,
 apodization and f_number, as in the section `rf`; foci (ranges of the foci of focused transmits; transmit number `zone`
 x lines + `line` belongs to that line and zone); accuracy (largest error of the RF relative to the exact sum) and
-accuracy_from (range from which that holds).
+accuracy_from (range from which that holds). Of these, those that differ among the cases are left out: the group `cases`
+has the keys that they follow from.
 """
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+import yaml
 import zarr
 
 from echotruth.cases import expand
@@ -12,6 +13,7 @@ from echotruth.imaging.recorder import channels, decimated_samples, quantise
 from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.repository import schema
 from echotruth.repository.store import Store
+from echotruth.workflow.scripts.cases import lay_out
 
 WAVES = ("focused", "plane", "diverging", "synthetic_aperture")
 
@@ -139,6 +141,22 @@ def test_what_shapes_the_rf_is_not_swept_where_it_is_kept(key):
 def test_width_of_the_elements_is_swept_where_rf_is_kept():
     cases = expand(Config(rf=Rf(keep=["lines"]), cases={"probe.width_um": [30.0, 41.0]}))
     assert [case.config.probe.width_um for case in cases] == [30, 41]
+
+
+def attributes_for(folder, cases):
+    """Attributes of the group, of the configuration of a repository with other cases, laid out anew."""
+    config = validate(yaml.safe_load((folder / "config.yaml").read_text()) | {"cases": cases}, "config.yaml")
+    lay_out(folder, config, expand(config))
+    return zarr.open_group(folder / "small.zarr", path="rf", mode="r").attrs.asdict()
+
+
+def test_group_says_nothing_that_differs_among_the_cases(rf_repository):
+    folder = rf_repository()
+    alike = attributes_for(folder, {"probe.width_um": [30.0]})
+    assert alike["element_width"] == pytest.approx(30e-6)  # of the cases, not of the configuration without them
+    swept = attributes_for(folder, {"probe.width_um": [30.0, 35.0], "probe.height_mm": [2.0, 3.0]})
+    assert set(alike) - set(swept) == {"element_width", "element_height", "accuracy_from"}
+    assert all(swept[name] == alike[name] for name in swept if name != "labels")
 
 
 @pytest.mark.parametrize("keep", ["lines", ["line"], ["lines", "lines"]])

@@ -25,8 +25,14 @@ NOT_SWEPT = (
 _SWEPT_WITHIN = re.compile(r"views\.\w+\.(position|rotation_deg|tilt_deg)|tracking\.frame_step")
 """Keys that can be swept within those that cannot."""
 
-RF_INDEPENDENT = ("probe.width_um", "probe.height_mm", "probe.elevation_focus_mm", "probe.attenuation_dB_per_cm_MHz")
-"""Keys of the probe that can be swept even if RF is kept: they change neither its length nor the scan lines."""
+RF_INDEPENDENT = {
+    "probe.width_um": ("element_width",),
+    "probe.height_mm": ("element_height", "accuracy_from"),
+    "probe.elevation_focus_mm": ("elevation_focus", "accuracy_from"),
+    "probe.attenuation_dB_per_cm_MHz": ("attenuation",),
+}
+"""Keys of the probe that can be swept even if RF is kept, because they change neither its length nor the scan lines,
+and the attributes of the group `rf` that follow from them."""
 
 
 def can_be_swept(key: str) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from echotruth.cases import Case, expand, table
+from echotruth.cases import RF_INDEPENDENT, Case, expand, table
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, validate
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
@@ -44,15 +44,19 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
         times[rows[case.id]] = frame_times(case.config.loop)
     case_table = table(cases)
     columns = layout.columns(case_table, list(rows))
-    scanner = config.rf.keep and Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
-    values, lengths, settings = metadata(config, scanner) if scanner else ({}, {}, {})
+    first = cases[0].config
+    scanner = first.rf.keep and Scanner(first.probe, first.rf, imaging_depth(first.rf, first.bmode))
+    values, lengths, settings = metadata(first, scanner) if scanner else ({}, {}, {})
+    constants = layout.constants(case_table)
+    swept = {name for key, names in RF_INDEPENDENT.items() if key not in constants for name in names}
+    settings = {name: value for name, value in settings.items() if name not in swept}
     sizes = layout.sizes(mesh) | lengths
     labels = layout.labels(config, list(rows), times, list(views)) | columns
     labels |= layout.positions(config, pixel_centres, grid)
     labels |= {f"rf:{name}": value for name, value in values.items()}
     arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
     superseded.set_aside(folder, config)
-    store.lay_out(arrays, sizes, labels, {"rf": settings, "cases": {"constants": layout.constants(case_table)}})
+    store.lay_out(arrays, sizes, labels, {"rf": settings, "cases": {"constants": constants}})
     settings_file = yaml.dump(config.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False, allow_unicode=True)
     texts = {"cases.csv": case_table.to_csv(index=False), "config.yaml": settings_file}
     durable.update_all({folder / name: text.encode() for name, text in texts.items()})
