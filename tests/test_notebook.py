@@ -7,10 +7,14 @@ from dataclasses import replace
 import learning_repository
 import numpy as np
 import pytest
+import xarray as xr
 
 import echotruth as et
 from echotruth.config import View
 from echotruth.config.loading import ConfigError
+from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.tracks import visible
+from echotruth.notebook.derived import derived
 from echotruth.tracking import TrackerFailed
 
 TUBE = {
@@ -105,6 +109,23 @@ def test_tissue_leaves_and_enters_where_it_moves_farther_than_half_the_slice(lif
         assert lifted[mask].any() and (lifted["mask"] & ~lifted[mask] & elevation.notnull()).any()
     assert not lifted["enters"].isel(frame=0).any() and not lifted["leaves"].isel(frame=-1).any()
     assert lifted["thickness"].attrs["units"] == "m"
+
+
+@pytest.mark.parametrize("scan", ["sector", "linear"])
+def test_slice_is_as_thick_as_it_is_for_points_at_the_same_place(scan):
+    """A point within half the thickness of its pixel is visible, and one just beyond it is not."""
+    config = et.configure(rf={"scan": scan})
+    axial, lateral = pixel_centres(config.bmode, 64)
+    flow = np.zeros((1, 2, 64, 64, 3))
+    dims = ("frame", "to", "axial", "lateral", "vector")
+    coordinates = {"axial": axial, "lateral": lateral, "to": ["previous", "next"]}
+    clip = xr.Dataset({"flow": (dims, flow)}, coordinates | {"vector": ["lateral", "axial", "elevation"]})
+    half = derived(clip, config)["thickness"].values / 2
+    points = np.stack([*np.meshgrid(lateral, axial), 0 * half], axis=-1)
+    shown = visible(config, points)
+    assert shown.mean() > 0.2
+    np.testing.assert_array_equal(visible(config, points + 0.999 * half[..., None] * [0, 0, 1]), shown)
+    assert not visible(config, points + 1.001 * half[..., None] * [0, 0, 1]).any()
 
 
 def test_only_the_variables_asked_for_are_read(repository, lifted):

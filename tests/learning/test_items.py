@@ -2,15 +2,18 @@
 
 import multiprocessing
 import pickle
+import shutil
 from hashlib import sha256
 
 import numpy as np
 import pytest
+import yaml
 from learning_repository import GRADIENT
 
 import echotruth as et
 from echotruth import learning
 from echotruth.config import Config
+from echotruth.imaging.beamforming.scan import scan_width
 from echotruth.imaging.flow import slice_thickness
 from echotruth.mechanics.prescribed import motion_amplitude
 
@@ -53,6 +56,17 @@ def centres(items):
     return np.stack(np.broadcast_arrays(index, axial[:, None], 0.0), axis=-1)
 
 
+@pytest.fixture(scope="module")
+def linear(repository, tmp_path_factory):
+    """A copy of the repository whose configuration has a linear scan."""
+    folder = tmp_path_factory.mktemp("linear") / repository.name
+    shutil.copytree(repository, folder)
+    config = yaml.safe_load((folder / "config.yaml").read_text())
+    config["rf"]["scan"] = "linear"
+    (folder / "config.yaml").write_text(yaml.safe_dump(config))
+    return folder
+
+
 def quantum(items):
     """Step of the stored flow, m."""
     return items.reader.array(f"truth/{items.size}/flow").attrs["quantum"]
@@ -75,11 +89,28 @@ def test_flow_is_the_affine_motion_from_frame_to_frame(repository, size):
 def test_tissue_leaves_and_enters_where_the_motion_takes_it_beyond_half_the_slice(repository):
     pairs = learning.FlowPairs(repository, views=["mid"])
     axial, lateral = (pairs.reader.read(f"truth/{SIZE}/{name}", ...) for name in ("axial", "lateral"))
-    half = slice_thickness(Config(), np.hypot(axial[:, None], lateral)) / 2
+    assert_leaves_and_enters(pairs, slice_thickness(Config(), np.hypot(axial[:, None], lateral)) / 2)
+
+
+def test_slice_of_a_linear_scan_is_as_thick_as_at_its_depth(linear):
+    pairs = learning.FlowPairs(linear, views=["mid"])
+    axial = pairs.reader.read(f"truth/{SIZE}/axial", ...)
+    assert_leaves_and_enters(pairs, slice_thickness(Config(), np.tile(axial[:, None], SIZE)) / 2)
+    position, seen = (learning.PointTracks(linear, views=["mid"], points=200)[0][name] for name in NAMES)
+    half = slice_thickness(Config(), position[..., 1]) / 2
+    in_scan = np.abs(position[..., 0]) <= scan_width(pairs.reader.config.probe, pairs.reader.config.rf) / 2
+    np.testing.assert_array_equal(seen, in_scan & (np.abs(position[..., 2]) <= half))
+
+
+NAMES = ("position_m", "visible")
+
+
+def assert_leaves_and_enters(pairs, half):
+    """Assert that tissue leaves and enters a slice of half the thickness `half` (axial, lateral), m."""
     for item in pairs[: FRAMES - 1]:
         first, second = item["frame"], item["frame"] + 1
         forth, back = (moved(centres(pairs), *way)[..., 2] for way in ((first, second), (second, first)))
-        after = learning.Segmentation(repository, views=["mid"])[second]["label"].astype(bool)
+        after = learning.Segmentation(pairs.reader.folder, views=["mid"])[second]["label"].astype(bool)
         for name, wall, elevation in (("leaves", item["wall"], forth), ("enters", after, back)):
             beyond = np.abs(elevation) - half
             sure = np.abs(beyond) > quantum(pairs)

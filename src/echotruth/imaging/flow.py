@@ -68,7 +68,7 @@ def slice_thickness(config: Config, range_: Floats) -> Floats:
     ----------
     config : Config
     range_ : ndarray of any shape, m
-        Distance from the centre of the array.
+        Along the lines of the scan: in a sector the distance from the centre of the array.
 
     Returns
     -------

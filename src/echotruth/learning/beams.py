@@ -9,6 +9,7 @@ import numpy as np
 from echotruth.arrays import Floats
 from echotruth.cases import find_case
 from echotruth.config import Config
+from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.flow import slice_thickness
 from echotruth.learning.reading import Reader
 
@@ -38,6 +39,11 @@ class Beams:
             config = self._reader.config
             self._configs[key] = find_case(config, case).config if key else config
         return self._configs[key]
+
+    def range_(self, case: str, lateral: Floats, axial: Floats) -> Floats:
+        """Range of points of the image along the lines of the scan, m: in a sector from the centre of the array."""
+        config = self.config(case)
+        return scan_lines(config.probe, config.rf).to_scan_coordinates(lateral, axial)[1]
 
     def thickness(self, case: str, range_: Floats) -> Floats:
         """Thickness of the slice at ranges within the image, m, of any shape; it is computed once."""

@@ -71,7 +71,8 @@ class FlowPairs(Items):
         key = self._beams.key(place.case)
         if key not in self._thicknesses:
             axial, lateral = (self.reader.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
-            self._thicknesses[key] = slice_thickness(self._beams.config(place.case), np.hypot(axial[:, None], lateral))
+            range_ = self._beams.range_(place.case, lateral, axial[:, None])
+            self._thicknesses[key] = slice_thickness(self._beams.config(place.case), range_)
         return self._thicknesses[key]
 
     @cached_property

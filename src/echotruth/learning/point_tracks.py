@@ -87,7 +87,9 @@ class PointTracks(Items):
         axial, lateral = (self.reader.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
         followed = self._followed(place, start, np.column_stack([lateral[pixels[:, 1]], axial[pixels[:, 0]]]))
         position = (followed[..., :2] - [lateral[0], axial[0]]) / self.spacing
-        thickness = self._beams.thickness(place.case, np.hypot(followed[..., 0], followed[..., 1]))
+        thickness = self._beams.thickness(
+            place.case, self._beams.range_(place.case, followed[..., 0], followed[..., 1])
+        )
         return {
             "image": self.image(place),
             "time": frame_time(self, place),

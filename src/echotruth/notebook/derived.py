@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.config import Config
+from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.flow import out_of_slice, slice_thickness
 from echotruth.imaging.labels import unpack
 
@@ -53,7 +53,9 @@ def derived(clip: xr.Dataset, config: Config) -> xr.Dataset:
     if "labels" in clip:
         found |= {name: (("frame", *image), values) for name, values in unpack(clip["labels"].values).items()}
     if "flow" in clip:
-        thickness = slice_thickness(config, np.hypot(clip["axial"].values[:, None], clip["lateral"].values))
+        scan = scan_lines(config.probe, config.rf)
+        _, range_ = scan.to_scan_coordinates(clip["lateral"].values, clip["axial"].values[:, None])
+        thickness = slice_thickness(config, range_)
         elevation = clip["flow"].sel(vector="elevation")
         for name, to in (("leaves", "next"), ("enters", "previous")):
             found[name] = (("frame", *image), out_of_slice(elevation.sel(to=to).values, thickness))
