@@ -92,6 +92,7 @@ def test_png_has_every_grey_level_and_its_pixels_per_metre(exported, known):
 
 def test_rate_is_that_of_the_video(exported):
     assert frames(exported("mp4", rate=50.0))[1] == pytest.approx(50)
+    assert frames(exported("mp4", rate=0.125))[1] == 0.125
     assert frames(exported("gif", rate=25.0))[1] == pytest.approx(25)
 
 

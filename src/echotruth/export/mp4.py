@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,8 @@ def write(clip: Clip, path: Path, overlay: Sequence[str], rate: float) -> None:
         (frames.shape[2], frames.shape[1]),
         pix_fmt_in="gray" if frames.ndim == 3 else "rgb24",
         fps=rate,
+        # Once more, because older versions of the package round fps to two decimals.
+        input_params=["-r", str(Fraction(rate).limit_denominator())],
         codec="libx264",
         macro_block_size=2,
         ffmpeg_log_level="quiet",
