@@ -107,7 +107,7 @@ def _legend(figure: Figure, trackers: Sequence[str]) -> None:
     for number, name in enumerate(trackers):
         lines.append(Line2D([], [], color=style.series_colour(number), linewidth=1.3, label=name))
     lines += [Line2D([], [], color=style.MUTED, linewidth=0.9, linestyle=":", label="ES")]
-    figure.legend(handles=lines, loc="outside lower center", ncols=min(len(lines), 7))
+    style.legend_below(figure, lines)
 
 
 def segment_title(number: int) -> str:

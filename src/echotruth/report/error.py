@@ -72,4 +72,4 @@ def _legend(figure: Figure, trackers: Mapping[str, Mapping[int, np.ndarray]]) ->
         Line2D([], [], color=style.MUTED, ls=line, marker="D", markersize=5, fillstyle=fill, linewidth=1.2, label=name)
         for (line, fill), name in zip(TRACKERS, trackers, strict=False)
     ]
-    figure.legend(handles=[*marks, *lines], loc="outside lower center", ncols=len(marks) + len(lines))
+    style.legend_below(figure, [*marks, *lines])

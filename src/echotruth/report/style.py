@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 RADIAL, CIRCUMFERENTIAL, LONGITUDINAL = "#b5382a", "#1f5fa8", "#2f8550"
@@ -156,6 +159,24 @@ def plain_logarithmic(axes: Axes, which: Literal["x", "y"], values: np.ndarray) 
     axis.set_major_locator(LogLocator(10, (1.0, 2.0, 5.0) if limits[1] / limits[0] < 60 else (1.0, 3.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def legend_below(figure: Figure, handles: Sequence[Artist]) -> Legend:
+    """Legend below the panels, in as few rows as the figure is wide enough for, and as even ones as these can be.
+
+    Parameters
+    ----------
+    figure : Figure
+    handles : sequence of Artist
+        Artists with labels.
+    """
+    for rows in range(1, len(handles) + 1):
+        columns = -(-len(handles) // rows)
+        legend = figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            break
+        legend.remove()
+    return legend
 
 
 def series_colour(number: int) -> str:
