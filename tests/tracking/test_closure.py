@@ -7,7 +7,7 @@ import pytest
 
 from echotruth.config.tracking import BsplineDic, Dis
 from echotruth.tracking import track
-from echotruth.tracking.closure import closure
+from echotruth.tracking.closure import Closure, closure
 
 FRAMES, SWING, SIZE = 16, 28.0, 128
 MASK = np.zeros((SIZE, SIZE), bool)
@@ -32,9 +32,9 @@ def tracked(frames, settings):
 def test_cycle_closes_and_half_of_it_does_not(swing):
     whole, half = closure(swing, MASK), closure(swing[: FRAMES // 2], MASK)
     assert whole.closing >= whole.consecutive and whole.displacement < 0.1
-    assert not whole.is_open
+    assert not whole.is_open and whole.is_followed
     assert half.closing < half.consecutive - 0.2
-    assert half.is_open
+    assert half.is_open and not half.is_followed
 
 
 @pytest.mark.parametrize(("swing_px", "shown"), [(10.0, 9), (3.0, 8)])
@@ -44,6 +44,32 @@ def test_clip_is_open_if_tissue_is_far_away_though_its_speckle_is_the_same(clip,
     found = closure(frames[:shown], MASK)
     assert found.closing > 0.9 and found.displacement > 0.9
     assert found.is_open and not closure(frames, MASK).is_open
+
+
+@pytest.mark.parametrize(
+    ("displacement", "closing", "is_open", "is_followed"),
+    [
+        (0.1, 0.9, False, True),
+        (0.1, 0.7, False, True),  # speckle does not come back as it was
+        (0.1, 0.2, True, False),  # other tissue
+        (0.9, 0.9, True, True),
+        (0.9, 0.7, True, False),
+    ],
+)
+def test_last_frame_is_followed_to_the_first_where_it_is_as_like_as_others_or_near(
+    displacement, closing, is_open, is_followed
+):
+    found = Closure(displacement, closing, consecutive=0.8)
+    assert (found.is_open, found.is_followed) == (is_open, is_followed)
+
+
+@pytest.mark.parametrize("settings", [Dis, BsplineDic])
+def test_open_clip_that_stays_alike_is_tracked_both_ways_with_a_word(clip, settings, caplog):
+    frames = clip(lambda position, frame: position + np.array([lateral(frame) / 9, 0.0]), FRAMES, SIZE)[: FRAMES // 2]
+    with caplog.at_level(logging.WARNING):
+        found = tracked(frames, settings())
+    assert "no closed cycle" in caplog.text and "both ways" in caplog.text
+    np.testing.assert_allclose(found[-1, :, 0], lateral(FRAMES // 2 - 1) / 9, atol=0.3)
 
 
 @pytest.mark.parametrize("noise", [0, 8])
@@ -69,7 +95,7 @@ def test_bright_tissue_at_rest_does_not_make_an_open_clip_a_closed_one(clip, swi
     dim = swing[: FRAMES // 2].copy()
     dim[:, :, 36:] = np.maximum(dim[:, :, 36:], 100) - 100  # 20 dB
     dim[:, :, :36] = still[:, :, :36]
-    assert closure(dim, MASK).is_open
+    assert closure(dim, MASK).is_open and not closure(dim, MASK).is_followed
 
 
 @pytest.mark.parametrize("settings", [Dis, BsplineDic])

@@ -17,7 +17,7 @@ Reference = Annotated[
         description="Frame with which each frame is compared: `ED`; or the `previous` one, with the steps added along "
         "the path of the tissue; or `bidirectional`, likewise from ED both forwards and, as the cycle closes, "
         "backwards, and both averaged with weights from the correlation of the frames; a clip that is no closed cycle "
-        "is tracked forwards only."
+        "is tracked forwards only, unless its last frame is like the first."
     ),
 ]
 
@@ -120,7 +120,7 @@ class BsplineDic(Section):
         Field(
             description="Forwards from ED only (`previous`), or `bidirectional`: backwards too, as the cycle closes, "
             "and both averaged with weights from their variances; a clip that is no closed cycle is tracked forwards "
-            "only."
+            "only, unless its last frame is like the first."
         ),
     ] = "bidirectional"
 

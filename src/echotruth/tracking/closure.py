@@ -24,10 +24,11 @@ which may be a scar that hardly moves."""
 OPEN_DISPLACEMENT = 0.5
 """Displacement that is left in the last frame, over the largest, above which a clip is open. In the hearts of the
 benchmark's half develop it is 0.12 at most over the whole cycle, and 0.93 at least over its first half."""
-OPEN_VARIANCE = 10.0
-"""Variance of the step from the last frame to the first over the largest of consecutive frames, above which a clip is
-open, whatever its displacement seems to be: the images are not of the same tissue. In those hearts it is 2 at most over
-the whole cycle."""
+LOST_VARIANCE, DOUBTFUL_VARIANCE = 10.0, 1.5
+"""Variance of the step from the last frame to the first over the largest of consecutive frames, above which this step
+is not taken in a closed cycle, and in an open clip, where it is a long one. In those hearts it is 2 at most over the
+whole cycle; over the first half it is above 1.5 in most, and where it is below, tracking both ways has the smaller
+error."""
 LEAST_MOTION = 0.5
 """RMS displacement below which nothing moves that could come back, px of the block means."""
 
@@ -52,13 +53,25 @@ class Closure:
 
     @property
     def is_open(self) -> bool:
-        """Whether the clip is no closed cycle; not if that cannot be told, as it should be one.
+        """Whether the clip is no closed cycle; not if that cannot be told, as it should be one."""
+        return self.displacement > OPEN_DISPLACEMENT or not self._is_below(LOST_VARIANCE)
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether the tissue of the last frame can be followed to the first, so that a clip can be tracked backwards.
+
+        In an open clip this is a long step, which only images that are as alike as consecutive ones allow.
+        """
+        return self._is_below(DOUBTFUL_VARIANCE if self.is_open else LOST_VARIANCE)
+
+    def _is_below(self, largest_ratio: float) -> bool:
+        """Whether the last step has less than this multiple of the variance of any other, or neither is known.
 
         Correlations are compared by the variance of a shift that is found with them, see
         :func:`echotruth.tracking.accumulation.step_variance`.
         """
         last, largest = step_variance(np.array([self.closing, self.consecutive]))
-        return bool(self.displacement > OPEN_DISPLACEMENT or last > OPEN_VARIANCE * largest)
+        return not last > largest_ratio * largest
 
     def __str__(self) -> str:
         alike = f"its last frame correlates with the first by {self.closing:.2f}, consecutive ones by"

@@ -27,7 +27,8 @@ def track(
     Parameters
     ----------
     frames : ndarray of shape (frame, axial, lateral)
-        B-mode clip, any real type; frame 0 is end-diastole. If it is no closed cycle, it is tracked forwards only.
+        B-mode clip, any real type; frame 0 is end-diastole. A clip that is no closed cycle is told, and tracked
+        forwards only unless its last frame is like the first.
     points : ndarray of shape (n, 2)
         Positions at end-diastole: lateral, axial, px (0 is the centre of the first pixel).
     mask : ndarray of shape (axial, lateral), bool
@@ -72,16 +73,16 @@ def track(
 
 
 def _suited(settings: Section, frames: np.ndarray, mask: np.ndarray) -> Section:
-    """The settings, without the way backwards if the last frame of a clip is not followed by the first."""
+    """The settings, without the way backwards if the tissue of the last frame cannot be followed to the first."""
     if getattr(settings, "reference", None) != "bidirectional":
         return settings
     from echotruth.tracking.closure import closure
 
     found = closure(frames, mask)
-    if not found.is_open:
-        return settings
-    logging.getLogger("echotruth").warning(f"the clip is no closed cycle ({found}): tracked forwards only")
-    return settings.model_copy(update={"reference": "previous"})
+    if found.is_open:
+        ways = "both ways, as they are alike" if found.is_followed else "forwards only"
+        logging.getLogger("echotruth").warning(f"the clip is no closed cycle ({found}): tracked {ways}")
+    return settings if found.is_followed else settings.model_copy(update={"reference": "previous"})
 
 
 def _method(settings: Any) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
