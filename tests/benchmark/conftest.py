@@ -1,4 +1,4 @@
-"""A small benchmark with submissions: an honest one, and two that look the truth up."""
+"""A small benchmark with submissions: an honest one, and two that look the truth up, of which one finds it."""
 
 import shutil
 import sys
@@ -49,7 +49,15 @@ def spying(frames, points, mask, spacing, frame_time, seed):
 '''
 
 
-NAMES = ("honest", "reading", "spying")
+NAMES = ("honest", "reading")
+
+
+def evaluated(folder, name, cases, **options):
+    """Scores of a submission, which is evaluated on the repository and kept."""
+    settings = {"method": "external", "track": f"submissions:{name}", "options": options}
+    run = prepare(folder, name, settings, keep=True)
+    run.check_writable()
+    return run.write(list(run.rows(run.case_views(cases, []), run.sizes([]))))
 
 
 @pytest.fixture(scope="session")
@@ -61,11 +69,7 @@ def submitted(tmp_path_factory):
     sys.path.insert(0, str(place))
     for name in NAMES:
         options = {"repository": str(folder)} if name == "reading" else {}
-        settings = {"method": "external", "track": f"submissions:{name}", "options": options}
-        run = prepare(folder, name, settings, keep=True)
-        run.check_writable()
-        cases = [] if name == "honest" else ["a_ideal", "b_ideal"]
-        run.write(list(run.rows(run.case_views(cases, []), run.sizes([]))))
+        evaluated(folder, name, [] if name == "honest" else ["a_ideal", "b_ideal"], **options)
         assert len(list(rerun([folder], name, "mirrored", "test", []))) == 2
     yield folder
     sys.path.remove(str(place))
@@ -75,6 +79,11 @@ def submitted(tmp_path_factory):
 def page(submitted):
     """Of the half test."""
     return Page(records.read([submitted], []), "test")
+
+
+@pytest.fixture(scope="session")
+def evaluate_submission():
+    return evaluated
 
 
 @pytest.fixture

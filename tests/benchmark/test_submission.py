@@ -1,5 +1,6 @@
 """Submissions: an honest one passes the checks, those that look the truth up are caught; cards; variants of clips."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from echotruth.benchmark import checks, results
+from echotruth.benchmark import checks, records, results
 from echotruth.benchmark.card import Card, attach, card_of, read
 from echotruth.benchmark.page import EXAMPLE, Page
 from echotruth.benchmark.rerun import prepare_rerun
@@ -31,12 +32,17 @@ def test_honest_tracker_passes_and_is_as_good_on_mirrored_clips(page):
     assert page.verdict("submissions:honest").tracker == "submissions_honest"
 
 
-@pytest.mark.parametrize("name", ["reading", "spying"])
-def test_tracker_that_looks_the_truth_up_is_caught(page, name):
+def test_tracker_that_looks_the_truth_up_is_caught(page):
+    name = "reading"
     verdict = page.verdict(name)
     assert verdict.flags == ["worse on mirrored clips", "impossible accuracy"]
     assert verdict.mirrored.low > 100 and verdict.impossible == verdict.clips == 2
     assert name not in page.order and page.withheld[name] == "worse on mirrored clips; impossible accuracy"
+
+
+def test_tracker_does_not_find_the_truth_in_its_process(repository, evaluate_submission):
+    scores = evaluate_submission(repository, "spying", [])
+    assert len(scores) == 3 and np.allclose(scores["nrmse_all_percent"], 100)  # it has found nothing that moves
 
 
 def result_of(folder, tracker, variant):
@@ -189,8 +195,35 @@ def test_card_is_kept_beside_the_scores(repository, tmp_path):
     assert attach_card([repository], file) == str(repository / "external/honest.card.yaml")
     assert card_of(repository, "honest") == read(file) and card_of(repository, "reading") is None
     file.write_text(yaml.safe_dump(EXAMPLE.model_dump() | {"tracker": "onest"}))
-    with pytest.raises(EvaluationError, match="tracker = onest: was not evaluated: use one of honest, reading, spying"):
+    with pytest.raises(EvaluationError, match=r"tracker = onest: was not evaluated: use one of honest, reading\Z"):
         attach_card([repository], file)
+    file.write_text(yaml.safe_dump(EXAMPLE.model_dump() | {"tracker": "dis"}))
+    with pytest.raises(
+        EvaluationError, match=r"tracker = dis: is in the configuration of .*: only a tracker from outs"
+    ):
+        attach_card([repository], file)
+
+
+def test_only_sizes_at_which_a_tracker_was_scored_are_run_again(repository):
+    config = repository / "config.yaml"
+    config.write_text(config.read_text().replace("downsampling:\n  - 1\n", "downsampling:\n  - 1\n  - 2\n"))
+    assert load(config).bmode.sizes == (64, 32)
+    assert prepare_rerun(repository, "honest", "mirrored", "test").sizes == [64]
+    assert prepare_rerun(repository, "dis", "mirrored", "test").sizes == [64, 32]
+    with pytest.raises(EvaluationError, match=r"--size 32: honest was not evaluated at it on .*: use 64"):
+        list(rerun([repository], "honest", "mirrored", "test", [32]))
+
+
+@pytest.mark.parametrize("content", ["[1, 2", "", None])
+def test_damaged_store_of_what_a_tracker_found_is_told_in_a_sentence(repository, content):
+    shutil.rmtree(store := repository / "external/honest.zarr")
+    store.mkdir()
+    if content is not None:
+        (store / "zarr.json").write_text(content)
+    sentence = r"honest\.zarr: is not what echotruth evaluate --keep wrote: evaluate honest again"
+    for what in (lambda: records.read([repository], []), lambda: prepare_rerun(repository, "honest", "open", "test")):
+        with pytest.raises(EvaluationError, match=sentence):
+            what()
 
 
 @pytest.mark.parametrize(
@@ -200,6 +233,10 @@ def test_card_is_kept_beside_the_scores(repository, tmp_path):
         ({"date": "2026-02-30"}, "date = 2026-02-30: must be a day of the calendar, as 2026-11-23"),
         ({"date": "today"}, "date = today: write it so: Day on which it was scored"),
         ({"name": "two\nlines"}, "name = two\nlines: must be one line of text"),
+        ({"authors": "A"}, "authors = A: must be a list, such as \\[A. Author, B. Author\\]"),
+        ({"splits_seen": "test"}, "splits_seen = test: must be a list, such as \\[develop\\]"),
+        ({"splits_seen": ["test", "test"]}, "splits_seen = \\[test, test\\]: must name each half once"),
+        ({"tracker": "my-net"}, "tracker = my-net: use letters, digits and underscores, 40 at most and a letter first"),
         ({"authors": []}, "authors = \\[\\]: must have at least one entry"),
         ({"traned_on": "Kubric"}, "traned_on is not a key: did you mean trained_on?"),
     ],
@@ -228,4 +265,6 @@ def test_tracker_that_has_seen_test_is_shown_but_not_ranked(page, submitted):
         path.unlink()
     assert page.order == ["dis", "honest"] and again.order == ["dis"]
     assert again.withheld["honest"] == "its card says that it has seen the half test"
-    assert "honest" not in again.leaderboard() and "honest" in again.everyone
+    text = again.leaderboard()
+    assert "\nhonest  " in page.leaderboard() and "\nhonest  " not in text and "honest" in again.everyone
+    assert "\nhonest is not ranked: its card says that it has seen the half test." in text

@@ -53,6 +53,11 @@ class Card(Section):
         except ValueError:
             raise invalid("date", self.date, "must be a day of the calendar, as 2026-11-23") from None
 
+    @check
+    def _check_splits(self) -> None:
+        if len(set(self.splits_seen)) < len(self.splits_seen):
+            raise invalid("splits_seen", f"[{', '.join(self.splits_seen)}]", "must name each half once")
+
     @property
     def has_seen_test(self) -> bool:
         """Whether it used hearts on which it is scored."""
@@ -119,11 +124,13 @@ def card_of(folder: Path, tracker: str) -> Card | None:
 
 _REMEDIES = {
     "missing": "is missing: it must be given",
-    "list_type": "must be a list, such as [develop]",
     "string_type": "must be text",
     "too_short": "must have at least one entry",
     "string_too_short": "must not be empty",
 }
+
+_LISTS = {"authors": "[A. Author, B. Author]", "splits_seen": "[develop]"}
+"""Examples of values that are lists."""
 
 
 def _message(error: ErrorDetails) -> str:
@@ -139,7 +146,11 @@ def _message(error: ErrorDetails) -> str:
         return f"{key} is not a key: " + (f"did you mean {close[0]}?" if close else f"use {', '.join(known)}")
     if error["type"] == "missing":
         return f"{key} {_REMEDIES['missing']}: {Card.model_fields[keys[0]].description}"
-    if error["type"] == "literal_error":
+    if error["type"] == "list_type":
+        remedy = f"must be a list, such as {_LISTS[key]}"
+    elif key == "tracker" and error["type"] != "string_type":
+        remedy = "use letters, digits and underscores, 40 at most and a letter first"
+    elif error["type"] == "literal_error":
         remedy = f"use any of {context['expected'].replace(chr(39), '').replace(' or ', ' and ')}"
     elif error["type"] == "string_pattern_mismatch":
         described = Card.model_fields[keys[0]].description or ""

@@ -25,6 +25,7 @@ from echotruth.evaluation.availability import check_runs
 from echotruth.evaluation.clip import clips
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.displacement_error import evaluate
+from echotruth.evaluation.leaderboard import scores_of_guests
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.run import prepare
 from echotruth.evaluation.scoring import Truth, ground_truth
@@ -82,6 +83,14 @@ class Rerun:
             )
         return found
 
+    @property
+    def sizes(self) -> list[int]:
+        """Image sizes at which the tracker was scored, px."""
+        own, known = self.config.tracking.trackers, self.config.bmode.sizes
+        table = scores_of_guests(self.folder, own)
+        scored = set(table[table["tracker"] == self.tracker]["size_px"])
+        return [size for size in known if self.tracker in own or size in scored] or list(known)
+
     def rows(self, sizes: list[int], jobs: int = 1) -> Iterator[Row]:
         """Scores of the variants, one row each.
 
@@ -110,7 +119,7 @@ class Rerun:
     @cached_property
     def kept_clips(self) -> dict[str, str]:
         """Digest of every clip of which a tracker from outside has left something, by "CASE/VIEW"."""
-        return dict(kept.KeptStore(kept.store_path(self.folder, self.tracker)).attributes.get("clips", {}))
+        return dict(kept.about(self.folder, self.tracker)["clips"])
 
 
 def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun:
@@ -138,7 +147,7 @@ def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun
     if name not in known:
         remedy = f"evaluate it with --keep first, or use one of {', '.join(known)}"
         raise EvaluationError(f"{tracker}: the motion that it tracked is not kept in {folder}: {remedy}")
-    about = kept.KeptStore(kept.store_path(folder, name)).attributes
+    about = kept.about(folder, name)
     settings = prepare(folder, name, about["settings"]).settings
     check_runs(settings)
     return Rerun(folder, config, name, settings, variant, split)

@@ -64,7 +64,7 @@ def settings_of(folder: Path, config: Config, tracker: str) -> dict[str, Any]:
         return config.tracking.trackers[tracker].model_dump(mode="json")
     if tracker not in kept.trackers(folder, config):
         return {}
-    return dict(kept.KeptStore(kept.store_path(folder, tracker)).attributes["settings"])
+    return dict(kept.about(folder, tracker)["settings"])
 
 
 def write(folder: Path, config: Config, tracker: str, variant: str, rows: list[Row]) -> Path:
@@ -110,9 +110,10 @@ def result_of(folder: Path, config: Config, tracker: str, variant: str) -> Resul
     import pandas as pd
 
     path = result_path(folder, tracker, variant)
+    settings = settings_of(folder, config, tracker)
     try:
         values = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {"settings": {}, "clips": []}
-        same = values["settings"] == settings_of(folder, config, tracker)
+        same = values["settings"] == settings
         rows = [{name: row[name] for name in COLUMNS} for row in values["clips"]]
         table = pd.DataFrame(rows, columns=list(COLUMNS)).astype(
             {"case": str, "view": str, "size_px": int, "error_percent": float, "before_percent": float}

@@ -37,6 +37,9 @@ def attach_card(repositories: list[Path], path: Path) -> str:
     folders = [folder_of(repository) for repository in repositories]
     scored = [folder for folder in folders if (folder / "external" / f"{card.tracker}.csv").is_file()]
     if not scored:
+        if own := [folder for folder in folders if card.tracker in load(folder / "config.yaml").tracking.trackers]:
+            remedy = f"is in the configuration of {own[0]}: only a tracker from outside has a card"
+            raise EvaluationError(f"{path}: tracker = {card.tracker}: {remedy}")
         known = sorted({file.stem for folder in folders for file in (folder / "external").glob("[A-Za-z]*.csv")})
         remedy = f"use one of {', '.join(known)}" if known else "run echotruth evaluate --keep first"
         raise EvaluationError(f"{path}: tracker = {card.tracker}: was not evaluated: {remedy}")
@@ -76,11 +79,15 @@ def rerun(
             choices = ", ".join(map(str, known))
             raise EvaluationError(f"--size {missing[0]}: is not an image size of {folder}: use {choices}")
         try:
-            runs.append(
-                (prepare_rerun(folder, tracker, variant, split), [size for size in known if size in (sizes or known)])
-            )
+            run = prepare_rerun(folder, tracker, variant, split)
         except EvaluationError as error:
             reasons.append(str(error))
+            continue
+        if chosen := [size for size in run.sizes if size in (sizes or known)]:
+            runs.append((run, chosen))
+        else:
+            choices = ", ".join(map(str, run.sizes))
+            reasons.append(f"--size {sizes[0]}: {tracker} was not evaluated at it on {folder}: use {choices}")
     if not runs:
         raise EvaluationError("\n".join(reasons))
     for run, chosen in runs:

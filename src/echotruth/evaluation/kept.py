@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from echotruth.config import Config
 from echotruth.evaluation.digest import digest
+from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.repository import layout, ledger, schema
 from echotruth.repository.store import Store
@@ -61,6 +62,31 @@ def store_path(folder: Path, tracker: str) -> Path:
     tracker : str
     """
     return folder / "external" / f"{tracker}.zarr"
+
+
+def about(folder: Path, tracker: str) -> dict[str, Any]:
+    """What is kept of a tracker from outside, as :attr:`KeptStore.attributes`.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository.
+    tracker : str
+
+    Raises
+    ------
+    EvaluationError
+        If it is damaged.
+    """
+    path = store_path(folder, tracker)
+    try:
+        found = KeptStore(path).attributes
+    except (ValueError, KeyError, TypeError, OSError):  # what it is said to be by zarr is no help
+        found = {}
+    if not {"settings", "clips"} <= set(found):
+        remedy = f"evaluate {tracker} again with --keep"
+        raise EvaluationError(f"{path}: is not what echotruth evaluate --keep wrote: {remedy}")
+    return found
 
 
 def trackers(folder: Path, config: Config) -> list[str]:
@@ -121,9 +147,9 @@ def read(job: Job, group: str, *names: str, tracker: str, size: int) -> dict[str
 def _checked(job: Job, tracker: str) -> KeptStore:
     """The store of a tracker from outside, if it holds this clip as it is now."""
     store, clip = KeptStore(store_path(job.folder, tracker)), f"{job.case.id}/{job.view_name}"
-    about = store.attributes
-    made_of, grid_and_sizes = about.get("clips", {}).get(clip), _grid_and_sizes(job.case.config)
-    if {name: about.get(name) for name in grid_and_sizes} != grid_and_sizes:
+    known, grid_and_sizes = about(job.folder, tracker), _grid_and_sizes(job.case.config)
+    made_of = known["clips"].get(clip)
+    if {name: known.get(name) for name in grid_and_sizes} != grid_and_sizes:
         raise NotEvaluated(
             f"tracker = {tracker!r}: it was evaluated with another tracking.grid_px or other image sizes: "
             "run echotruth evaluate --keep again."

@@ -35,6 +35,7 @@ from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
 
 Row = dict[str, Any]
@@ -207,12 +208,13 @@ def _score_view(run: EvaluationRun, sizes: list[int], case_view: tuple[str, str]
     with threadpool_limits(1):
         # The random numbers of a job depend on its stage: a tracker is to draw the same as in the workflow.
         job = Job(run.folder, "tracking", *case_view)
-        try:
-            truth, clip_of_size = ground_truth(job), clips(job)
-        except (ValueError, KeyError, OSError) as error:
-            remedy = f"run it again ({in_one_line(str(error))})"
-            raise EvaluationError(f"{run.folder} cannot be read at {' '.join(case_view)}: {remedy}") from error
-        found = {size: _score_clip(run, case_view, clip, truth) for size, clip in clip_of_size.items() if size in sizes}
+        with _reading(run, case_view):
+            clip_of_size = {size: clip for size, clip in clips(job).items() if size in sizes}
+        tracked = {size: _track(run, clip) for size, clip in clip_of_size.items()}
+        # The truth is read only now, so that a tracker does not find it in its process.
+        with _reading(run, case_view):
+            truth = ground_truth(job)
+        found = {size: _score_clip(run, case_view, clip_of_size[size], truth, *tracked[size]) for size in tracked}
         if run.keep:
             try:
                 run.keeping.write(job, {size: arrays for size, (_, arrays) in found.items()})
@@ -221,12 +223,33 @@ def _score_view(run: EvaluationRun, sizes: list[int], case_view: tuple[str, str]
         return [row for row, _ in found.values()]
 
 
-def _score_clip(run: EvaluationRun, case_view: tuple[str, str], clip: Clip, truth: Truth) -> tuple[Row, kept.Found]:
-    """Row of a clip, and the arrays of the tracker by group."""
+@contextmanager
+def _reading(run: EvaluationRun, case_view: tuple[str, str]) -> Iterator[None]:
+    """EvaluationError if a clip or its truth cannot be read."""
     try:
-        estimate, failure = track(*clip.tracker_arguments, run.settings), ""
+        yield
+    except (ValueError, KeyError, OSError) as error:
+        remedy = f"run it again ({in_one_line(str(error))})"
+        raise EvaluationError(f"{run.folder} cannot be read at {' '.join(case_view)}: {remedy}") from error
+
+
+def _track(run: EvaluationRun, clip: Clip) -> tuple[tuple[np.ndarray, np.ndarray], str]:
+    """Displacement and quality that the tracker found in a clip, and why it failed, or ""."""
+    try:
+        return track(*clip.tracker_arguments, run.settings), ""
     except TrackerFailed as error:
-        estimate, failure = clip.no_estimate, str(error)
+        return clip.no_estimate, str(error)
+
+
+def _score_clip(
+    run: EvaluationRun,
+    case_view: tuple[str, str],
+    clip: Clip,
+    truth: Truth,
+    estimate: tuple[np.ndarray, np.ndarray],
+    failure: str,
+) -> tuple[Row, kept.Found]:
+    """Row of a clip, and the arrays of the tracker by group."""
     keys = {"case": case_view[0], "view": case_view[1], "size_px": clip.size, "tracker": run.name}
     keys["clip"] = digest(run.folder, *case_view)
     displacement, quality = clip.on_grid(*estimate)
