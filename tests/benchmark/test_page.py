@@ -2,6 +2,7 @@
 
 import shutil
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -10,8 +11,10 @@ import pytest
 from echotruth.benchmark import tables
 from echotruth.benchmark.conditions import groups, main_conditions, variations, with_conditions
 from echotruth.benchmark.page import Page
-from echotruth.benchmark.standings import METRICS, RANKED_BY, order, standings, varied
+from echotruth.benchmark.records import Records
+from echotruth.benchmark.standings import METRICS, RANKED_BY, agreement, order, standings, varied
 from echotruth.cli import main
+from echotruth.evaluation.tracker_options import EvaluationError
 
 HEARTS = 12
 
@@ -82,6 +85,84 @@ def test_tracker_that_was_evaluated_at_the_smaller_size_only_is_ordered_last():
     assert order(table) == ["a", "b", "c", "late"]
 
 
+def strain_clips(failed):
+    """Three hearts in two planes by one tracker, whose GLS is 1 pp too small; it failed on the clips (heart, view)."""
+    rows = []
+    for heart in range(3):
+        for view, name, other in (("mid", "gcs", "gls"), ("long", "gls", "gcs")):
+            is_failed, true = (heart, view) in failed, -12.0 - heart
+            values = {f"true_{name}_percent": true, f"tracked_{name}_percent": np.nan if is_failed else true + 1}
+            values |= {f"{what}_{other}_percent": np.nan for what in ("true", "tracked")}
+            clip = {"repository": "made", "case": f"h{heart}", "heart": f"h{heart}", "view": view, "size_px": 512}
+            labels = {"variation": "", "acoustics": "ideal", "failure": "lost" if is_failed else "", "tracker": "a"}
+            rows.append(clip | labels | values)
+    return pd.DataFrame(rows)
+
+
+@pytest.mark.parametrize(("failed", "hearts"), [([], 3), ([(1, "mid")], 3), ([(1, "long")], 2)])
+def test_agreement_of_a_strain_is_over_the_hearts_whose_clips_of_its_plane_were_tracked(failed, hearts):
+    found = agreement(strain_clips(failed)).set_index("strain").loc["gls"]
+    assert (found["hearts"], found["of_hearts"]) == (hearts, 3) and found["bias"] == pytest.approx(1)
+    text = tables.agreement(agreement(strain_clips(failed)), ["a"])
+    line = next(line for line in text.splitlines() if "GLS" in line)
+    assert (", 2 of 3 hearts" in line) == (hearts == 2)
+
+
+def beside(known, species, size=64, factor=1.0, name="other", preset="medium"):
+    """Records of a repository beside another one, the same but for species, image size, test errors and `dis`."""
+    of = {"repository": name, "species": species}
+    suite = known.suites[0]
+    config = suite.config.model_copy(update={"name": name})
+    tracking = {
+        **config.tracking.trackers,
+        "dis": config.tracking.trackers["dis"].model_copy(update={"preset": preset}),
+    }
+    config = config.model_copy(update={"tracking": config.tracking.model_copy(update={"trackers": tracking})})
+    more = []
+    for table in (known.clips, known.segments, known.reliability):
+        factors = np.where(table["split"] == "test", factor, 1)
+        scaled = {column: table[column] * factors for column in (RANKED_BY, "drift_um") if column in table}
+        more.append(with_conditions(table.assign(**of, **scaled, size_px=size, heart=name + table["heart"])))
+    difficulty = known.difficulty.assign(repository=name, size_px=size)
+    both = zip((known.clips, known.segments, known.reliability, known.difficulty), (*more, difficulty), strict=True)
+    return Records([suite, replace(suite, config=config)], *(pd.concat(each, ignore_index=True) for each in both))
+
+
+def test_drift_quality_and_gap_are_of_the_main_species_and_the_page_says_so(page, tmp_path):
+    alone, both = page, Page(beside(page.whole, "human", factor=100), "test")
+    for what in (Page._failures, Page._reliability):
+        assert what(both) == what(alone)
+    assert both.verdict("dis").gap == alone.verdict("dis").gap
+    text = both.write(tmp_path / "page.md", "echotruth benchmark").read_text()
+    assert "### Human, ideal" in text and "Everything\nelse is of the species mouse alone" in text
+    assert "of the species" not in alone.write(tmp_path / "alone.md", "echotruth benchmark").read_text()
+
+
+def test_rank_is_at_the_largest_size_of_the_main_species(page):
+    both = Page(beside(page.whole, "human", size=128), "test")
+    assert both.largest == 64 and both.order == page.order and both.sizes == [64]
+    text = both.leaderboard()
+    assert text.startswith("NRMSE at end-systole, % at 64 px") and "human, ideal (128 px)" in text
+    assert "rank" in tables.condition(both.standings, "human, ideal", 64)
+    assert "tracker, at 128" in tables.others(both.standings, "human, ideal", both.order, 64)
+    with pytest.raises(EvaluationError, match=r"no image size in common: bench \(64 px\), other \(128 px\)"):
+        Page(beside(page.whole, "mouse", size=128), "test")
+
+
+def test_settings_that_differ_are_told_of_each_repository(page):
+    assert page._own_settings("dis") == "`dis` of echotruth"
+    both = Page(beside(page.whole, "human", preset="fine"), "test")
+    assert both._own_settings("dis") == "In `bench`: `dis` of echotruth. In `other`: `dis` of echotruth; preset fine"
+    assert page._own_settings("honest") == "no card"
+
+
+def test_strain_of_a_heart_is_that_of_a_case_that_is_finished(page, monkeypatch):
+    monkeypatch.setattr(tables, "hearts_of", lambda cases: dict.fromkeys(cases, "one"))
+    strains = {"true_gls_percent": -11.5, "true_gcs_percent": -14.5}
+    clips = pd.DataFrame([{"case": "b_ideal"} | strains])
+    assert "| −11.5 | −14.5 |" in tables.hearts(page.whole.suites[0], clips)
+
+
 def test_cells_of_a_table_cannot_end_it():
     assert tables.markdown(["a"], [["x | y"]]).splitlines()[-1] == "| x \\| y |"
 
@@ -116,13 +197,49 @@ def test_command_writes_the_page_twice_alike_and_keeps_what_a_person_wrote(repos
         (["--check", "honest", "--size", "100"], "--size 100: is not an image size of"),
         (["--check", "honest", "--jobs", "0"], "--jobs 0: must be 1 or more"),
         (["--card", "absent.yaml"], "absent.yaml: cannot be read"),
+        (["--page", "hearts.csv/page.md"], "hearts.csv: it must be a folder that you may write to"),
         (["--page", "page"], "--page page: must be a Markdown file: give a name that ends in .md"),
     ],
 )
-def test_what_cannot_be_done_is_said_in_a_sentence(submitted, capsys, arguments, sentence):
+def test_what_cannot_be_done_is_said_in_a_sentence(submitted, capsys, monkeypatch, arguments, sentence):
+    monkeypatch.chdir(submitted.parent)
     assert run(submitted, *arguments) == 2
     errors = capsys.readouterr().err
     assert sentence in errors and "Traceback" not in errors
+
+
+@pytest.mark.parametrize("arguments", [["bench", "bench"], ["bench", "--page", "hearts.csv/page.md"]])
+def test_what_is_wrong_is_told_before_a_tracker_runs_again(submitted, monkeypatch, capsys, arguments):
+    monkeypatch.chdir(submitted.parent)
+    assert run(*arguments, "--check", "honest") == 2
+    output, errors = capsys.readouterr()
+    assert output == "" and errors.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "sentence"),
+    [
+        ("c,develop", "c,Develop", "case c_ideal: label.split = Develop: use develop or test"),
+        ("c,develop", "a,develop", "heart a is in both halves (a_ideal: test, c_ideal: develop): give its cases one"),
+    ],
+)
+def test_half_that_is_not_clear_is_refused(repository, capsys, before, after, sentence):
+    config = repository / "config.yaml"
+    config.write_text(config.read_text().replace(before, after))
+    assert run(repository) == 2
+    errors = capsys.readouterr().err
+    assert f"{repository}: {sentence}" in errors and errors.count("\n") == 1
+
+
+def test_what_is_not_true_of_the_hearts_is_not_printed(page, repository, tmp_path):
+    text = page.write(tmp_path / "page.md", "echotruth benchmark").read_text()
+    assert "each half has hearts of each group" not in text and "are in one half" in text  # dilation is in test only
+    config = repository / "config.yaml"
+    config.write_text(config.read_text().replace("develop", "test"))
+    assert run(repository, "--split", "develop", "--page", tmp_path / "page.md") == 0
+    text = (tmp_path / "page.md").read_text()
+    assert "All hearts are in the half **test**" in text
+    assert "No clip of the half develop is evaluated: the repositories have no heart of it." in text
 
 
 def test_page_of_a_half_without_results_says_so_and_has_none(page, tmp_path):

@@ -62,7 +62,8 @@ class Verdict(NamedTuple):
     impossible, clips : int
         Number of clips with an impossible accuracy, and of all.
     gap : float
-        Median error on the test half over that on the other; NaN if it lacks either.
+        Median error on the test half over that on the other, of the main species at the largest size that its
+        repositories have in common; NaN if it lacks either.
     """
 
     tracker: str
@@ -124,7 +125,8 @@ def verdict(tracker: str, records: Records, split: str) -> Verdict:
     again = variants_of(records.suites, tracker, "mirrored")
     ratio = paired_ratio(clips, again.rows)
     known_of = impossible(clips, records.difficulty)
-    gap = split_gap(whole[whole["size_px"] == whole["size_px"].max()])
+    largest, main = records.of_split(split).of_main_species().largest, records.of_main_species().clips
+    gap = split_gap(main[(main["tracker"] == tracker) & (main["size_px"] == largest)])
     return Verdict(tracker, ratio, again.older, len(known_of), len(clips), gap)
 
 

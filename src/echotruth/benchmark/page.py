@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,13 +14,15 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from echotruth.benchmark import card, charts, checks, examples, tables
 from echotruth.benchmark.card import Card
-from echotruth.benchmark.conditions import MAIN_SPECIES, PLAIN
-from echotruth.benchmark.records import Records
-from echotruth.benchmark.standings import agreement, detections, order, standings, varied
+from echotruth.benchmark.conditions import PLAIN, main_conditions
+from echotruth.benchmark.records import Records, Suite
+from echotruth.benchmark.splits import split_of
+from echotruth.benchmark.standings import agreement, detections, order, shown_size, standings, varied
+from echotruth.cases import all_cases
 from echotruth.evaluation import kept, reliability
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP
-from echotruth.evaluation.tracker_options import parse_tracker
+from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.repository import durable
 from echotruth.section import Section
 
@@ -58,13 +61,15 @@ class Page:
     def __init__(self, records: Records, split: str) -> None:
         self.whole, self.split = records, split
         self.records = records.of_split(split)
+        self.main = self.records.of_main_species()
+        self.sizes, self.largest = self.main.sizes, self.main.largest
         self.cards = _cards(records)
         self._verdicts: dict[str, checks.Verdict] = {}
         self.withheld = self._withheld()
         ranked = self.records.clips[~self.records.clips["tracker"].isin(self.withheld)]
-        self.is_empty = ranked.empty
+        self.is_empty = ranked.empty or not main_conditions(ranked)
         self.standings = ranked if self.is_empty else standings(ranked)
-        self.order = [] if self.is_empty else order(self.standings)
+        self.order = [] if self.is_empty else order(self.standings, self.largest)
 
     def _withheld(self) -> dict[str, str]:
         """Trackers from outside that are shown but not ranked, and why."""
@@ -83,31 +88,36 @@ class Page:
         """All trackers, those without a rank last."""
         return [*self.order, *self.withheld]
 
-    @property
-    def sizes(self) -> list[int]:
-        """Image sizes, the largest first."""
-        return sorted((int(size) for size in self.records.clips["size_px"].unique()), reverse=True)
-
     def leaderboard(self) -> str:
         """The short leaderboard as text: median error by main condition at the largest size, with ranges of ranks."""
+        withheld = [f"{tracker} is not ranked: {reason}." for tracker, reason in self.withheld.items()]
         if self.is_empty:
-            return f"No clip of the half {self.split} is evaluated yet."
-        of = self.standings[
-            self.standings["is_main"]
-            & (self.standings["metric"] == RANKED_BY)
-            & (self.standings["size_px"] == self.sizes[0])
-        ]
-        names = list(dict.fromkeys(of["condition"]))
-        rows = []
-        for tracker in self.order:
-            cells = [tracker]
-            for name in names:
-                row = of[(of["condition"] == name) & (of["tracker"] == tracker)]
-                known = len(row) and np.isfinite(row["value"].iloc[0])
-                cells.append(f"{row['value'].iloc[0]:.1f} [{tables.rank(row.iloc[0])}]" if known else "-")
-            rows.append(cells)
-        title = f"NRMSE at end-systole, % at {self.sizes[0]} px, median over the {self.split} hearts [rank]"
-        return f"{title}\n\n{_aligned([['tracker', *names], *rows])}"
+            return "\n".join([self.nothing, *withheld])
+        of = self.standings[self.standings["is_main"] & (self.standings["metric"] == RANKED_BY)]
+        columns = [["tracker", *self.order]]
+        for name, part in of.groupby("condition", sort=False):
+            size = shown_size(part, self.largest)
+            rows = part[part["size_px"] == size].set_index("tracker")
+            known = [tracker in rows.index and np.isfinite(rows["value"][tracker]) for tracker in self.order]
+            cells = [
+                f"{rows['value'][tracker]:.1f} [{tables.rank(rows.loc[tracker])}]" if is_known else "-"
+                for tracker, is_known in zip(self.order, known, strict=True)
+            ]
+            columns.append([str(name) if size == self.largest else f"{name} ({size} px)", *cells])
+        title = f"NRMSE at end-systole, % at {self.largest} px, median over the {self.split} hearts [rank]"
+        lines = [title, "", _aligned(map(list, zip(*columns, strict=True))), *([""] if withheld else []), *withheld]
+        return "\n".join(lines)
+
+    @property
+    def nothing(self) -> str:
+        """Why there is no result; empty if there is one."""
+        if not self.is_empty:
+            return ""
+        if not any(parts.get(self.split) for parts in _groups(self.records.suites)):
+            return f"No clip of the half {self.split} is evaluated: the repositories have no heart of it."
+        if set(self.records.clips["tracker"]) - set(self.withheld):
+            return f"No clip of the half {self.split} is evaluated yet but those of a variation, which rank nobody."
+        return "No tracker is ranked." if self.withheld else f"No clip of the half {self.split} is evaluated yet."
 
     def write(self, path: Path, command: str) -> Path:
         """Write the page, and beside it a folder with its figures and `leaderboard.csv`.
@@ -128,7 +138,7 @@ class Page:
             The file. The same repositories give the same bytes.
         """
         folder = path.with_suffix("")
-        values = self._introduction(command) | {"kept": _written(path), "is_empty": self.is_empty}
+        values = self._introduction(command) | {"kept": _written(path), "nothing": self.nothing}
         if not self.is_empty:
             folder.mkdir(parents=True, exist_ok=True)
             values |= self._results(self._draw(folder))
@@ -139,15 +149,15 @@ class Page:
 
     def _draw(self, folder: Path) -> list[tuple[str, str, str]]:
         """Draw the figures; tracker, file and description of those of examples."""
-        clips, first = self.records.clips, self.order[:DRAWN]
+        clips, first = self.main.clips, self.order[:DRAWN]
         charts.draw_conditions(folder / "conditions.png", self.standings, self._floors(), self.order)
         charts.draw_floors(folder / "floors.png", clips, self.records.difficulty, first)
-        charts.draw_reliability(folder / "reliability.png", reliability.curve(self.records.reliability), first)
+        charts.draw_reliability(folder / "reliability.png", reliability.curve(self.main.reliability), first)
         folders = {suite.name: suite.folder for suite in self.records.suites}
         stored = {name for suite in self.records.suites for name in kept.trackers(suite.folder, suite.config)}
         found = []
         for tracker in self.everyone:
-            of = clips[(clips["tracker"] == tracker) & (clips["size_px"] == self.sizes[0])]
+            of = clips[(clips["tracker"] == tracker) & (clips["size_px"] == self.largest)]
             if tracker not in stored or of.empty:
                 continue
             rows = examples.chosen(of)
@@ -175,6 +185,9 @@ class Page:
             "command": command,
             "names": ", ".join(f"`{suite.name}`" for suite in suites),
             "split": self.split,
+            "is_balanced": all(all(parts.values()) for parts in _groups(suites)),
+            "halves": sorted({split_of(case) for suite in suites for case in all_cases(suite.config).values()}),
+            "withheld": list(self.withheld.items()),
             "unfinished": " ".join("`{}` has {} of {} clips.".format(one.name, *one.clips) for one in unfinished),
             "progress": tables.progress(suites),
             "suites": [
@@ -190,24 +203,28 @@ class Page:
 
     def _results(self, pictures: list[tuple[str, str, str]]) -> dict[str, Any]:
         """Tables of the results."""
-        clips, segments = self.records.clips, self.records.segments
-        mice = [table[table["species"] == MAIN_SPECIES] for table in (clips, segments)]
-        main, parts = mice if len(mice[0]) else (clips, segments)
-        variations, found = varied(clips), detections(parts)
+        clips, variations, found = self.records.clips, varied(self.records.clips), detections(self.main.segments)
         conditions = dict.fromkeys(self.standings[self.standings["is_main"]]["condition"])
         return {
-            "largest": self.sizes[0],
+            "largest": self.largest,
+            "species": self.records.species,
+            "main_species": self.main.species,
+            "ranked": len(self.order),
+            "drawn": DRAWN,
             "sizes": " / ".join(map(str, self.sizes)),
             "conditions": [
-                (name, tables.condition(self.standings, name), tables.others(self.standings, name, self.order))
+                (
+                    name,
+                    tables.condition(self.standings, name, self.largest),
+                    tables.others(self.standings, name, self.order, self.largest),
+                )
                 for name in conditions
             ],
             "ahead": tables.ahead(self.standings),
             "groups": tables.by_group(self.standings, self.order) if (~self.standings["is_main"]).any() else "",
             "variations": tables.by_variation(variations, self.everyone) if len(variations) else "",
-            "withheld": list(self.withheld.items()),
             "trackers": self._trackers(),
-            "agreement": tables.agreement(agreement(main), self.everyone),
+            "agreement": tables.agreement(agreement(self.main.clips), self.everyone),
             "detection": tables.detection(found, self.everyone) if len(found) else "",
             "reliability": self._reliability(),
             "difficulty": tables.difficulty(clips, self.records.difficulty, self.order[0]),
@@ -228,12 +245,21 @@ class Page:
                 seen = ", ".join(of.splits_seen) or "neither"
                 rows.append([f"`{tracker}`", name, of.code, of.trained_on, of.tuned_on, seen])
             else:
-                own = [suite.config.tracking.trackers.get(tracker) for suite in self.records.suites]
-                settings = next((one for one in own if one is not None), None)
-                rows.append([f"`{tracker}`", "no card" if settings is None else _settings(settings), *[""] * 4])
+                rows.append([f"`{tracker}`", self._own_settings(tracker), *[""] * 4])
         headings = ["tracker", "what it is", "code", "trained on", "tuned on", "halves seen"]
         shown = len(headings) if self.cards else 2
         return tables.markdown(headings[:shown], [row[:shown] for row in rows], text=shown)
+
+    def _own_settings(self, tracker: str) -> str:
+        """Settings of a tracker in the configurations, and of which each is if they differ."""
+        found: dict[str, list[str]] = {}
+        for suite in self.records.suites:
+            if tracker in suite.config.tracking.trackers:
+                words = _settings(suite.config.tracking.trackers[tracker])
+                found.setdefault(words, []).append(f"`{suite.name}`")
+        if len(found) > 1:
+            return ". ".join(f"In {' and '.join(names)}: {words}" for words, names in found.items())
+        return next(iter(found), "no card")
 
     def _reliability(self) -> str:
         """Stated and observed share of right points, and the calibration error, by size."""
@@ -241,7 +267,7 @@ class Page:
         for tracker in self.everyone:
             cells = []
             for size in self.sizes:
-                of = self.records.reliability
+                of = self.main.reliability
                 of = of[(of["tracker"] == tracker) & (of["size_px"] == size)]
                 count = of["count"].sum() if len(of) else 0
                 if not count:
@@ -255,10 +281,10 @@ class Page:
 
     def _failures(self) -> str:
         """Drift, failures and coverage, and the error in open clips over that in closed ones."""
-        clips, rows = self.records.clips, []
+        clips, rows = self.main.clips, []
         for tracker in self.everyone:
             of = clips[clips["tracker"] == tracker]
-            largest = of[of["size_px"] == self.sizes[0]]
+            largest = of[of["size_px"] == self.largest]
             failed = int((of["failure"] != "").sum())
             cells = [f"{failed} of {len(of)}", tables.number(largest["coverage_percent"].median())]
             again = checks.variants_of(self.records.suites, tracker, "open")
@@ -284,6 +310,25 @@ class Page:
                 [f"`{found.tracker}`", _shown(found.mirrored), counted, tables.number(found.gap, 2), found.words]
             )
         return tables.markdown(["tracker", "mirrored", "impossible", "test / develop", "verdict"], rows)
+
+
+def check_writable(path: Path) -> None:
+    """Check that a page can be written; EvaluationError if not."""
+    if path.is_dir():
+        raise EvaluationError(f"--page {path}: is a folder: give the name of a file")
+    folders = [next(parent for parent in path.absolute().parents if parent.exists()), path.with_suffix("")]
+    for folder in filter(Path.exists, folders):
+        try:
+            with TemporaryFile(dir=folder):
+                pass
+        except OSError as error:
+            remedy = f"it must be a folder that you may write to ({error.strerror})"
+            raise EvaluationError(f"--page {path}: cannot be written in {folder}: {remedy}") from error
+
+
+def _groups(suites: list[Suite]) -> list[dict[str, set[str]]]:
+    """Hearts by half, of every group of every repository."""
+    return [parts for suite in suites for parts in tables.hearts_by_group(suite).values()]
 
 
 def _settings(settings: Section) -> str:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echotruth.benchmark.conditions import with_conditions
-from echotruth.benchmark.splits import split_of_label
+from echotruth.benchmark.conditions import MAIN_SPECIES, with_conditions
+from echotruth.benchmark.splits import check_halves, split_of_label
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
-from echotruth.evaluation.clip_metrics import ClipMetrics, clip_metrics
+from echotruth.evaluation.clip_metrics import ClipMetrics, clip_metrics, hearts_of
 from echotruth.evaluation.difficulty.table import difficulties
 from echotruth.evaluation.leaderboard import scores_of_guests
 from echotruth.evaluation.parallel import in_processes
@@ -86,6 +87,41 @@ class Records:
         )
         return Records(self.suites, clips, segments, sure, self.difficulty)
 
+    @property
+    def species(self) -> list[str]:
+        """Species of the clips."""
+        return [] if self.clips.empty else list(dict.fromkeys(self.clips["species"]))
+
+    def of_main_species(self) -> Records:
+        """The part of the main species; all if no clip is of it."""
+        if MAIN_SPECIES not in self.species:
+            return self
+        clips, segments, sure = (
+            table[table["species"] == MAIN_SPECIES] for table in (self.clips, self.segments, self.reliability)
+        )
+        return Records(self.suites, clips, segments, sure, self.difficulty)
+
+    @property
+    def sizes(self) -> list[int]:
+        """Image sizes, px, the largest first."""
+        return sorted((int(size) for size in self.clips["size_px"].unique()), reverse=True)
+
+    @property
+    def largest(self) -> int:
+        """Largest image size that all repositories have, px; 0 without clips.
+
+        Raises
+        ------
+        EvaluationError
+            If they have none in common.
+        """
+        found = {str(name): set(part["size_px"]) for name, part in self.clips.groupby("repository")}
+        common = set.intersection(*found.values()) if found else {0}
+        if not common:
+            listed = ", ".join(f"{name} ({_listed(sorted(sizes, reverse=True))} px)" for name, sizes in found.items())
+            raise EvaluationError(f"the repositories have no image size in common: {listed}: rank each by itself")
+        return int(max(common))
+
 
 def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
     """Read the records of repositories.
@@ -102,21 +138,18 @@ def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
     Raises
     ------
     EvaluationError
-        If a folder is no repository, two have one name, one has no clips of these sizes, or scores of a tracker from
-        outside cannot be read.
+        As :func:`read_suites` does, and if a repository has no clips of these sizes.
     """
     import pandas as pd
 
-    suites = [_suite(folder) for folder in repositories]
-    names = [suite.name for suite in suites]
-    if doubled := next((name for name in names if names.count(name) > 1), ""):
-        raise EvaluationError(f"two repositories have the name {doubled}: give each once")
+    suites = read_suites(repositories)
     parts: list[tuple[Suite, ClipMetrics]] = []
     floors = []
     for suite in suites:
         chosen = [size for size in suite.config.bmode.sizes if size in (sizes or [size])]
         if not chosen:
-            raise EvaluationError(f"{suite.folder}: has no images of {sizes[0]} px: use {_listed(suite.config)}")
+            choices = _listed(suite.config.bmode.sizes)
+            raise EvaluationError(f"{suite.folder}: has no images of {sizes[0]} px: use {choices}")
         metrics = partial(_metrics, suite.folder, chosen)
         # A share for each process: what all cases have in common is read once in each.
         shares = _shares(list(dict.fromkeys(case for case, _ in suite.complete)), jobs)
@@ -134,6 +167,27 @@ def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
     return Records(suites, clips, segments, sure, difficult)
 
 
+def read_suites(repositories: list[Path]) -> list[Suite]:
+    """See how far repositories are.
+
+    Parameters
+    ----------
+    repositories : list of Path
+        Folders.
+
+    Raises
+    ------
+    EvaluationError
+        If a folder is no repository, two have one name, a heart is not in one half, or scores of a tracker from outside
+        cannot be read.
+    """
+    suites = [_suite(folder) for folder in repositories]
+    names = [suite.name for suite in suites]
+    if doubled := next((name for name in names if names.count(name) > 1), ""):
+        raise EvaluationError(f"two repositories have the name {doubled}: give each once")
+    return suites
+
+
 def _suite(folder: Path) -> Suite:
     """A repository, given its folder or its store."""
     folder = folder_of(folder)
@@ -142,12 +196,17 @@ def _suite(folder: Path) -> Suite:
         scores_of_guests(folder, config.tracking.trackers)
     except ValueError as error:
         raise EvaluationError(str(error)) from None
-    wanted = [(case, view) for case in all_cases(config) for view in config.views]
+    cases = all_cases(config)
+    try:
+        check_halves(cases, hearts_of(cases))
+    except EvaluationError as error:
+        raise EvaluationError(f"{folder}: {error}") from None
+    wanted = [(case, view) for case in cases for view in config.views]
     return Suite(folder, config, [clip for clip in wanted if is_evaluated(folder, *clip)], len(wanted))
 
 
-def _listed(config: Config) -> str:
-    return ", ".join(map(str, config.bmode.sizes))
+def _listed(sizes: Sequence[int]) -> str:
+    return ", ".join(map(str, sizes))
 
 
 def _shares(cases: list[str], number: int) -> list[list[str]]:

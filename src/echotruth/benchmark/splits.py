@@ -2,17 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from echotruth.cases import Case
+from echotruth.evaluation.tracker_options import EvaluationError
 
 DEVELOP, TEST = "develop", "test"
 """Values of the label `split`: hearts on which trackers may be tuned, and those on which they are reported."""
 
 
 def split_of(case: Case) -> str:
-    """Half to which a case belongs."""
-    return split_of_label(case.labels.get("split"))
+    """Half to which a case belongs; EvaluationError if its label `split` names neither."""
+    split = split_of_label(case.labels.get("split"))
+    if split not in (DEVELOP, TEST):
+        raise EvaluationError(f"case {case.id}: label.split = {split}: use {DEVELOP} or {TEST}")
+    return split
 
 
 def split_of_label(label: object) -> str:
     """Half that a label `split` names; without one it is `test`, lest anybody tunes on a heart by accident."""
-    return str(label or TEST)
+    return ("" if label is None else str(label)) or TEST
+
+
+def check_halves(cases: Mapping[str, Case], hearts: Mapping[str, str]) -> None:
+    """Check that each heart is in one half.
+
+    Parameters
+    ----------
+    cases : mapping
+        By their names.
+    hearts : mapping
+        Case to heart.
+
+    Raises
+    ------
+    EvaluationError
+        If the label `split` of a case names neither half, or the cases of a heart are in both.
+    """
+    first: dict[str, str] = {}
+    for name, case in cases.items():
+        other = first.setdefault(hearts[name], name)
+        if split_of(case) != split_of(cases[other]):
+            both = f"{other}: {split_of(cases[other])}, {name}: {split_of(case)}"
+            raise EvaluationError(f"heart {hearts[name]} is in both halves ({both}): give its cases one label.split")

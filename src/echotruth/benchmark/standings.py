@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from echotruth.benchmark.conditions import PLAIN, groups, main_conditions, variations
 from echotruth.evaluation.agreement import bland_altman
 from echotruth.evaluation.detection import detection
 from echotruth.evaluation.leaderboard import RANKED_BY
-from echotruth.evaluation.resampling import by_heart, standing
+from echotruth.evaluation.resampling import CLIP, by_heart, standing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,13 +73,26 @@ def standings(clips: pd.DataFrame) -> pd.DataFrame:
     return found[[*first, *(name for name in found if name not in first)]]
 
 
-def order(standings: pd.DataFrame) -> list[str]:
-    """Trackers by the mean of their medians over the main conditions at the largest size, the best first.
+def shown_size(table: pd.DataFrame, largest: int) -> int:
+    """Image size of a table by which trackers are ranked, px: a given one, or the largest where it has not that."""
+    sizes = set(table["size_px"])
+    return largest if largest in sizes else int(max(sizes))
+
+
+def order(standings: pd.DataFrame, largest: int | None = None) -> list[str]:
+    """Trackers by the mean of their medians over the main conditions at one size, the best first.
 
     A tracker without a median in a condition stands behind those that have one in all of them.
+
+    Parameters
+    ----------
+    standings : DataFrame
+        As :func:`standings` returns them.
+    largest : int, optional
+        Image size, px; conditions that do not have it do not count. Default: the largest.
     """
     main = standings[standings["is_main"] & (standings["metric"] == RANKED_BY)]
-    table = main[main["size_px"] == main["size_px"].max()]
+    table = main[main["size_px"] == (main["size_px"].max() if largest is None else largest)]
     # A tracker from outside may have been evaluated at smaller sizes only.
     medians = table.pivot(index="tracker", columns="condition", values="value").reindex(main["tracker"].unique())
     medians = medians.rename_axis("tracker")
@@ -124,21 +139,29 @@ def agreement(clips: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         Columns acoustics, size_px, tracker, strain (gls or gcs) and those of
-        :func:`echotruth.evaluation.agreement.bland_altman`, percentage points.
+        :func:`echotruth.evaluation.agreement.bland_altman`, percentage points; and of_hearts, the number of hearts of
+        which the true strain is known.
     """
     import pandas as pd
 
+    columns = ["acoustics", "size_px", "tracker", "strain", *bland_altman(np.empty(0), np.empty(0)), "of_hearts"]
     rows = []
     plain = clips[clips["variation"].isin(PLAIN)]
     for (acoustics, size), part in plain.groupby(["acoustics", "size_px"], sort=True):
         for strain in STRAINS:
-            tracked, true = (by_heart(part, f"{what}_{strain}_percent") for what in ("tracked", "true"))
+            # A clip of another plane has nothing to say of this strain, also if its tracker failed.
+            shown = part[part[f"true_{strain}_percent"].notna()]
+            if shown.empty:
+                continue
+            clip = [name for name in CLIP if name in shown]
+            truth = shown.drop_duplicates(clip).groupby("heart")[f"true_{strain}_percent"].mean()
+            tracked = by_heart(shown, f"tracked_{strain}_percent")
             for tracker in tracked:
-                pair = tracked[tracker], true[tracker].reindex(tracked.index)
+                pair = tracked[tracker], truth.reindex(tracked.index)
                 found = bland_altman(*(values.to_numpy(float) for values in pair))
                 keys = {"acoustics": acoustics, "size_px": size, "tracker": tracker, "strain": strain}
-                rows.append(keys | dict(found))
-    return pd.DataFrame(rows)
+                rows.append(keys | found | {"of_hearts": len(truth)})
+    return pd.DataFrame(rows, columns=columns)
 
 
 def detections(segments: pd.DataFrame) -> pd.DataFrame:

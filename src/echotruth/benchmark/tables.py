@@ -10,6 +10,7 @@ import numpy as np
 from echotruth.benchmark.conditions import PLAIN
 from echotruth.benchmark.records import Suite
 from echotruth.benchmark.splits import DEVELOP, TEST, split_of
+from echotruth.benchmark.standings import shown_size
 from echotruth.cases import Case, all_cases, diagnosis
 from echotruth.evaluation.clip_metrics import hearts_of
 from echotruth.evaluation.leaderboard import RANKED_BY
@@ -102,7 +103,9 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
     """
     cases = all_cases(suite.config)
     names = hearts_of(cases)
-    strains = clips.groupby("case")[["true_gls_percent", "true_gcs_percent"]].first()
+    columns = ["true_gls_percent", "true_gcs_percent"]
+    # That of a case which is not finished yet is that of another one with the same motion and planes.
+    strains = clips.groupby("case")[columns].first()
     rows = []
     for heart in dict.fromkeys(names.values()):
         own = [cases[case] for case, name in names.items() if name == heart]
@@ -110,8 +113,10 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
         group = str(first.labels.get("group") or diagnosis(first.config)).replace("_", " ")
         found = [str(of.labels.get("variation") or "") for of in own]
         varied = ", ".join(name.replace("_", " ") for name in dict.fromkeys(found) if name not in PLAIN)
-        known = strains.loc[first.id] if first.id in strains.index else [np.nan, np.nan]
-        measured = [number(100 * ejection_fraction(suite, first.id), 0), *(number(value) for value in known)]
+        plain = [of.id for of in own if str(of.labels.get("variation") or "") in PLAIN] or [first.id]
+        known = strains.reindex(plain).bfill().iloc[0]
+        fraction = next(filter(np.isfinite, (ejection_fraction(suite, case) for case in plain)), np.nan)
+        measured = [number(100 * fraction, 0), *(number(value) for value in known)]
         rows.append([heart, split_of(first), group, _changes(first), varied, *measured])
     headings = ["heart", "half", "group", "disease", "variation", "EF (%)", "GLS (%)", "GCS (%)"]
     return markdown(headings, rows, text=5)
@@ -137,42 +142,51 @@ def _changes(case: Case) -> str:
 
 def halves(suite: Suite) -> str:
     """Number of hearts of each group in each half."""
+    rows = [
+        [group, *(str(len(parts[name])) for name in (DEVELOP, TEST))] for group, parts in hearts_by_group(suite).items()
+    ]
+    return markdown(["group", "develop", "test"], rows)
+
+
+def hearts_by_group(suite: Suite) -> dict[str, dict[str, set[str]]]:
+    """Names of the hearts by group and half."""
     groups: dict[str, dict[str, set[str]]] = {}
     cases = all_cases(suite.config)
     names = hearts_of(cases)
     for case in cases.values():
         group = str(case.labels.get("group") or diagnosis(case.config)).replace("_", " ")
-        of_group = groups.setdefault(group, {DEVELOP: set(), TEST: set()})
-        of_group.setdefault(split_of(case), set()).add(names[case.id])
-    rows = [[group, *(str(len(parts[name])) for name in (DEVELOP, TEST))] for group, parts in groups.items()]
-    return markdown(["group", "develop", "test"], rows)
+        groups.setdefault(group, {DEVELOP: set(), TEST: set()})[split_of(case)].add(names[case.id])
+    return groups
 
 
-def condition(standings: pd.DataFrame, name: str) -> str:
-    """Leaderboard of one main condition: ranges of ranks, errors at all sizes, and differences to the first."""
+def condition(standings: pd.DataFrame, name: str, largest: int) -> str:
+    """Leaderboard of one main condition: ranges of ranks at one size, errors at all, and differences to the first."""
     of = standings[standings["is_main"] & (standings["condition"] == name) & (standings["metric"] == RANKED_BY)]
     sizes = sorted(of["size_px"].unique(), reverse=True)
     errors = {size: of[of["size_px"] == size].set_index("tracker") for size in sizes}
     rows: list[list[str]] = []
-    for tracker, row in errors[sizes[0]].iterrows():
+    shown = shown_size(of, largest)
+    for tracker, row in errors[shown].iterrows():
         behind = _difference(row)
         cells = [_error(errors[size], tracker) for size in sizes]
         rows.append([f"`{tracker}`", rank(row), *cells, behind if rows else NONE])
-    headings = [*(f"NRMSE at {size} px (%)" for size in sizes), f"less the first, {sizes[0]} px"]
+    headings = [*(f"NRMSE at {size} px (%)" for size in sizes), f"less the first, {shown} px"]
     return markdown(["tracker", "rank", *headings], rows)
 
 
-def others(standings: pd.DataFrame, name: str, order: list[str]) -> str:
-    """Other metrics of one main condition, at the largest image size."""
+def others(standings: pd.DataFrame, name: str, order: list[str], largest: int) -> str:
+    """Other metrics of one main condition, at the image size by which it is ranked."""
     of = standings[standings["is_main"] & (standings["condition"] == name)]
-    of = of[of["size_px"] == of["size_px"].max()]
+    size = shown_size(of, largest)
+    of = of[of["size_px"] == size]
     shown = [metric for metric in COLUMNS if metric in set(of["metric"])]
     values = of.set_index(["tracker", "metric"])["value"]
     rows = [
         [f"`{tracker}`", *(number(values.get((tracker, metric), np.nan), COLUMNS[metric][1]) for metric in shown)]
         for tracker in order
     ]
-    return markdown(["tracker", *(COLUMNS[metric][0] for metric in shown)], rows)
+    first = "tracker" if size == largest else f"tracker, at {size}{SPACE}px"
+    return markdown([first, *(COLUMNS[metric][0] for metric in shown)], rows)
 
 
 def _difference(row: pd.Series) -> str:
@@ -260,7 +274,8 @@ def agreement(table: pd.DataFrame, order: list[str]) -> str:
                     if np.isfinite(row["lower"])
                     else ""
                 )
-                cells.append(number(row["bias"], 2) + limits)
+                number_of, of = int(row["hearts"]), int(row["of_hearts"])
+                cells.append(number(row["bias"], 2) + limits + (f", {number_of} of {of} hearts" * (number_of < of)))
             rows.append([f"`{tracker}`", strain.upper(), *cells])
     return markdown(["tracker", "strain", *map(_imaging, columns)], rows)
 

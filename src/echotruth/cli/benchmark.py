@@ -41,13 +41,17 @@ def add(commands: Commands) -> None:
 def benchmark(arguments: argparse.Namespace) -> int:
     """Rank trackers; return 0, 1 if a check fails, or 2 if it cannot be done."""
     from echotruth.benchmark import records
-    from echotruth.benchmark.page import Page
+    from echotruth.benchmark.page import Page, check_writable
     from echotruth.config.loading import ConfigError
     from echotruth.evaluation.tracker_options import EvaluationError
 
     if arguments.page is not None and arguments.page.suffix != ".md":
         return fail(f"--page {arguments.page}: must be a Markdown file: give a name that ends in .md")
     try:
+        # What is wrong is told before trackers run for hours.
+        records.read_suites(arguments.repository)
+        if arguments.page is not None:
+            check_writable(arguments.page)
         _submit(arguments)
         print("Reading the clips; their difficulty is computed the first time, in about 4 s a clip.", file=sys.stderr)
         page = Page(records.read(arguments.repository, arguments.size, arguments.jobs), arguments.split)
