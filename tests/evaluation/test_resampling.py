@@ -55,8 +55,14 @@ def test_a_small_difference_on_every_heart_is_sure_however_much_the_hearts_diffe
     assert list(found["rank_first"]) == [1, 2] == list(found["rank_last"])
 
 
+@pytest.mark.parametrize(("hearts", "last"), [(5, [1, 2]), (4, [2, 2]), (2, [2, 2])])
+def test_nobody_is_surely_first_by_fewer_than_five_hearts(hearts, last):
+    better = np.arange(1.0, 1 + hearts)
+    assert list(standing(table(a=better, b=better + 10))["rank_last"]) == last
+
+
 def test_where_more_is_better_the_largest_is_first_and_intervals_stay_in_order():
-    found = standing(table(a=[1, 2, 3, 4], b=[11, 12, 14, 13]), descending=True)
+    found = standing(table(a=[1, 2, 3, 4, 2.5], b=[11, 12, 14, 13, 12.5]), descending=True)
     assert list(found.index) == ["b", "a"] and list(found["value"]) == [12.5, 2.5]
     assert (found["low"] <= found["value"]).all() and (found["value"] <= found["high"]).all()
     assert (

@@ -14,7 +14,7 @@ from echotruth.benchmark.standings import shown_size
 from echotruth.cases import Case, all_cases, diagnosis
 from echotruth.evaluation.clip_metrics import hearts_of
 from echotruth.evaluation.leaderboard import RANKED_BY
-from echotruth.evaluation.resampling import CLIP
+from echotruth.evaluation.resampling import CLIP, LEAST_HEARTS
 from echotruth.evaluation.summary import is_complete
 from echotruth.workflow.job import Job
 
@@ -243,7 +243,7 @@ def ahead(standings: pd.DataFrame) -> str:
         if known.empty:
             continue
         first, rest = known.iloc[0], known.iloc[1:]
-        near = rest[~(rest["difference_low"] > 0)]["tracker"]
+        near = rest[~((rest["difference_low"] > 0) & (rest["hearts"] >= LEAST_HEARTS))]["tracker"]
         second = rest.iloc[0] if len(rest) else None
         lead = NONE if second is None else _difference(second)
         told = ", ".join(f"`{tracker}`" for tracker in near) or "nobody"

@@ -29,6 +29,10 @@ LEVELS = (0.025, 0.975)
 STATISTICS: dict[str, Callable[..., Floats]] = {"mean": np.mean, "median": np.median}
 """What is said of the values of the hearts; a value that is not known makes it unknown."""
 
+LEAST_HEARTS = 5
+"""Number of hearts from which on one tracker can surely be before another: in fewer, it is better in all of them by
+chance in more than one case of twenty."""
+
 CLIP = ("repository", "case", "view", "size_px")
 """Columns that identify a clip; tables of a single repository lack the first."""
 
@@ -157,8 +161,8 @@ def standing(values: pd.DataFrame, seed: int = 1, statistic: str = "median", des
         of the value less that of the first tracker, with `difference_low` and `difference_high`; `p_value`, that of
         Wilcoxon's signed-rank test of these differences, adjusted for the number of trackers (Holm, Scand J Stat 1979;
         6:65); and `rank_first` to `rank_last`, the ranks that are possible: a tracker is surely before another one if
-        the interval of their paired difference does not reach 0. NaN where there is no value, and intervals of a single
-        heart.
+        the interval of their paired difference does not reach 0, which takes :data:`LEAST_HEARTS`. NaN where there is
+        no value, and intervals of a single heart.
     """
     import pandas as pd
 
@@ -237,7 +241,7 @@ def _sure(values: Floats, resamples: NDArray[np.integer], statistic: str) -> tup
     hearts, k = values.shape
     difference = (values[:, :, None] - values[:, None, :]).reshape(hearts, k * k)
     _, high = _intervals(difference, resamples, statistic)
-    before = high.reshape(k, k) < 0
+    before = (high.reshape(k, k) < 0) & (hearts >= LEAST_HEARTS)
     return before.sum(axis=1), before.sum(axis=0)
 
 
