@@ -98,3 +98,33 @@ def test_whole_suite_has_every_group_in_both_halves_and_half_of_its_hearts_in_ea
     laws = pd.Series({case.labels["heart"]: case.config.mechanics.material.law for case in suite[1]})
     of_split = laws.groupby(hearts.set_index("heart")["split"]).agg(set)
     assert of_split["develop"] == of_split["test"] == {"fung", "guccione", "holzapfel_ogden"}
+
+
+def differences(one, other, key=""):
+    """Dotted keys in which two configurations differ, but for their name, trackers and table."""
+    for name in (name for name in one if f"{key}{name}" not in ("name", "tracking", "cases")):
+        if isinstance(one[name], dict) and isinstance(other[name], dict):
+            yield from differences(one[name], other[name], f"{key}{name}.")
+        elif one[name] != other[name]:
+            yield f"{key}{name}"
+
+
+def test_ablation_has_hearts_of_develop_with_one_thing_taken_from_their_acoustics(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    whole = {case.id: case for case in expand(load("config/benchmark.yaml"))}
+    taken = {
+        "five_foci": {"rf.focal_zones"},
+        "no_rib": {"realism.shadow.side"},
+        "no_decorrelation": {"realism.decorrelation.time_ms"},
+        "no_surroundings": {"realism.blood.level_dB", "realism.surroundings.level_dB"},
+        "no_noise": {"realism.noise.snr_dB", "realism.haze.level_dB"},
+        "no_through_plane": {"phantom.in_plane_only"},
+    }
+    found = set()
+    for case in expand(load("config/ablation.yaml")):
+        heart, acoustics, variation = (case.labels[name] for name in ("heart", "acoustics", "variation"))
+        same = whole[f"{heart}_{acoustics}"]
+        assert same.labels["split"] == "develop" and case.id == f"{same.id}_{variation}"
+        assert set(differences(case.config.model_dump(), same.config.model_dump())) == taken[variation]
+        found.add(variation)
+    assert found == set(taken)
