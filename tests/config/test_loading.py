@@ -92,9 +92,7 @@ def test_missing_file_is_named(tmp_path):
 BENCHMARKS = ["ablation", "benchmark", "benchmark_human", "benchmark_small"]
 
 
-@pytest.mark.parametrize(
-    "name", [*BENCHMARKS, "demo", "fimh25", "hearts", "paper", "realistic", "rodero", "sweep"]
-)
+@pytest.mark.parametrize("name", [*BENCHMARKS, "demo", "fimh25", "hearts", "paper", "realistic", "rodero", "sweep"])
 def test_shipped_configurations_are_accepted(name):
     assert load(ROOT / f"config/{name}.yaml").name == name
 
