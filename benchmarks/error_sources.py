@@ -33,7 +33,7 @@ from echotruth.benchmark.conditions import PLAIN, main_conditions
 from echotruth.benchmark.records import read
 from echotruth.benchmark.splits import TEST
 from echotruth.evaluation.clip import clips
-from echotruth.evaluation.difficulty.plane import plane_path
+from echotruth.evaluation.difficulty.plane import both_ways, plane_path
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
 from echotruth.heart import Heart
@@ -41,7 +41,7 @@ from echotruth.imaging.bmode import downsample
 from echotruth.imaging.view import Plane
 from echotruth.notebook.repositories import job_of
 from echotruth.tracking import track
-from echotruth.tracking.bidirectional import forward_backward, inverse_variance_weight, weighted_mean
+from echotruth.tracking.bidirectional import forward_backward
 
 RESULTS = Path(__file__).parent / "results"
 NAME = "bspline_dic"
@@ -88,11 +88,8 @@ def perfect_tracker(heart: Heart, plane: Plane, truth: Truth) -> np.ndarray:
         ways.append((path - truth.wall.position)[np.argsort(order)])
     # The variance of a way is that of its steps: after frame of frames, and as many as are left.
     steps = np.arange(frames)[:, None] / frames
-    known = [np.isfinite(way).all(-1) for way in ways]
-    after = [np.where(way, done, np.inf) for way, done in zip(known, (steps, 1 - steps), strict=True)]
-    weight = inverse_variance_weight(*after)[..., None]
     found = np.full((frames, *truth.inside.shape, 2), np.nan)
-    found[:, truth.inside] = np.where((known[0] | known[1])[..., None], weighted_mean(weight, *ways), np.nan)
+    found[:, truth.inside] = both_ways(*ways, (steps, 1 - steps))
     return found
 
 
@@ -166,17 +163,17 @@ def main() -> None:
     parser.add_argument("ablation", type=Path, help="folder of the repository of config/ablation.yaml")
     parser.add_argument("--jobs", type=int, default=1, help="number of processes (default: 1)")
     given = parser.parse_args()
-    text = ["# Whose the error is", "", f"NRMSE of `{NAME}` at end-systole, %.", ""]
-    text += ["## The half test of the benchmark", ""]
-    text += [
-        "Median over the hearts of the mean over the views. `own`: on images without a beam. `plane`: of a perfect"
-    ]
-    text += ["tracker of the plane. `rest`: what is left of `images`, in squares: the beam and the acoustics.", ""]
     records = read([given.benchmark], [], given.jobs)
-    tables = sources(given.benchmark, records.of_split(TEST).clips, given.jobs)
-    text += [*tables, "", "## One thing taken away", ""]
-    text += ["Hearts of the half develop, mean over the views, 512 / 256 / 128 px.", ""]
-    text += [*ablation(given.ablation, records.clips, given.jobs), ""]
+    text = [
+        *("# Whose the error is", "", f"NRMSE of `{NAME}` at end-systole, %.", ""),
+        *("## The half test of the benchmark", ""),
+        "Median over the hearts of the mean over the views. `own`: on images without a beam. `plane`: of a perfect",
+        "tracker of the plane. `rest`: what is left of `images`, in squares: the beam and the acoustics.",
+        *("", *sources(given.benchmark, records.of_split(TEST).clips, given.jobs), ""),
+        *("## One thing taken away", ""),
+        "Hearts of the half develop, mean over the views, 512 / 256 / 128 px.",
+        *("", *ablation(given.ablation, records.clips, given.jobs), ""),
+    ]
     (RESULTS / "error_sources.md").write_text("\n".join(text))
 
 

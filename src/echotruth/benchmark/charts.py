@@ -71,7 +71,7 @@ def draw_conditions(path: Path, standings: pd.DataFrame, floors: pd.DataFrame, o
         for size, (colour, marker) in zip(sizes, SIZES, strict=False)
     ]
     floor = Line2D([], [], color=style.MUTED, ls=":", linewidth=1.0, label="floor")
-    figure.legend(handles=[*marks, floor], loc="outside lower center", ncols=len(marks) + 1)
+    style.legend_below(figure, [*marks, floor])
     return style.save(figure, path, dpi=120)
 
 

@@ -39,9 +39,10 @@ def check_halves(cases: Mapping[str, Case], hearts: Mapping[str, str]) -> None:
     EvaluationError
         If the label `split` of a case names neither half, or the cases of a heart are in both.
     """
+    halves = {name: split_of(case) for name, case in cases.items()}
     first: dict[str, str] = {}
-    for name, case in cases.items():
+    for name, half in halves.items():
         other = first.setdefault(hearts[name], name)
-        if split_of(case) != split_of(cases[other]):
-            both = f"{other}: {split_of(cases[other])}, {name}: {split_of(case)}"
+        if half != halves[other]:
+            both = f"{other}: {halves[other]}, {name}: {half}"
             raise EvaluationError(f"heart {hearts[name]} is in both halves ({both}): give its cases one label.split")

@@ -60,14 +60,6 @@ class Pieces:
         # A piece is read at the place of this job, which must be that at which it was written.
         self._known = entry.get("pieces", {}) if entry.get("index") == list(job.index) else {}
 
-    def fingerprint(self, tracker: Section, clip: Clip) -> str:
-        """Hash of all that a piece is made from: code and settings of the tracker, and what the tracker is given.
-
-        Empty for a tracker from outside, whose code is not known: it is never taken for the same.
-        """
-        method = getattr(tracker, "method", "external")
-        return "" if method == "external" else settings_version(_code(method), tracker, digest(clip))
-
     def find(self, size: int, name: str, fingerprint: str) -> Piece | None:
         """Find the piece of a tracker at an image size, if it was made from the same and its files are whole."""
         pieces = self._known.get(str(size), {})
@@ -94,6 +86,15 @@ class Pieces:
             opened = cast(Any, zarr.open_array(root / group, mode="r"))
             found.append(np.asarray(opened[self._job.index]))
         return tuple(found)
+
+
+def fingerprint(tracker: Section, clip: Clip) -> str:
+    """Hash of all that a piece is made from: code and settings of the tracker, and what the tracker is given.
+
+    Empty for a tracker from outside, whose code is not known: it is never taken for the same.
+    """
+    method = getattr(tracker, "method", "external")
+    return "" if method == "external" else settings_version(_code(method), tracker, digest(clip))
 
 
 def _code(method: str) -> str:

@@ -10,14 +10,14 @@ from echotruth.arrays import Floats
 from echotruth.evaluation.agreement import REFERENCES
 from echotruth.evaluation.clip import Clip, between_frames, clips
 from echotruth.evaluation.difficulty.bound import AlignedImages
-from echotruth.evaluation.difficulty.plane import plane_path, tissue_path
+from echotruth.evaluation.difficulty.plane import both_ways, plane_path, tissue_path
 from echotruth.evaluation.displacement_error import evaluate
 from echotruth.evaluation.scoring import Truth, ground_truth
 from echotruth.imaging import spline
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.view import Plane
 from echotruth.tracking.alignment import interpolate_with_gradient
-from echotruth.tracking.bidirectional import forward_backward, inverse_variance_weight, weighted_mean
+from echotruth.tracking.bidirectional import forward_backward
 from echotruth.tracking.closure import DYNAMIC_RANGE
 from echotruth.tracking.grey import decompress, grey_levels
 from echotruth.workflow.job import Job
@@ -191,9 +191,7 @@ def _plane(scene: _Scene, ways: list[_Way]) -> Row:
     """Error of a perfect tracker of the plane, forwards, backwards, and of the mean of both as trackers take it."""
     variances = [np.trace(scene.at_es(way.variance)) for way in ways]
     forward, backward = (scene.at_es(way.displacement) for way in ways)
-    known = [np.asarray(np.isfinite(displacement).all(-1)) for displacement in (forward, backward)]
-    weight = inverse_variance_weight(*(np.where(k, v, np.inf) for k, v in zip(known, variances, strict=True)))
-    both = np.where((known[0] | known[1])[:, None], weighted_mean(weight[:, None], forward, backward), np.nan)
+    both = both_ways(forward, backward, variances)
     row: Row = {}
     for name, displacement in (("", both), ("_forward", forward), ("_backward", backward)):
         found = evaluate(displacement[None], scene.truth.displacement[scene.truth.es][None], scene.truth.wall, 0)

@@ -13,6 +13,7 @@ from echotruth.fem.tetrahedra import MaterialPoints, interpolate
 from echotruth.heart import Heart
 from echotruth.imaging.tracks import follow
 from echotruth.imaging.view import Plane
+from echotruth.tracking.bidirectional import inverse_variance_weight, weighted_mean
 
 _NOWHERE = 1e3
 """Coordinate, m, at which there is no tissue, for points that are lost."""
@@ -58,3 +59,24 @@ def tissue_path(heart: Heart, plane: Plane, start: Floats, order: Sequence[int])
     """
     positions = np.stack([heart.positions(frame) for frame in order])
     return follow(positions, heart.cells, plane, start)[..., :2]
+
+
+def both_ways(forward: Floats, backward: Floats, variances: Sequence[Floats]) -> Floats:
+    """Mean of two ways around the cycle by their variances, and of one alone where a point is lost on the other.
+
+    Parameters
+    ----------
+    forward, backward : ndarray of shape (..., n, 2), m
+        NaN where a point is lost.
+    variances : sequence of two ndarray
+        Of the ways, of shapes that broadcast to (..., n), any unit.
+
+    Returns
+    -------
+    ndarray of shape (..., n, 2), m
+        NaN where a point is lost on both.
+    """
+    known = [np.asarray(np.isfinite(way).all(-1)) for way in (forward, backward)]
+    weight = inverse_variance_weight(*(np.where(k, v, np.inf) for k, v in zip(known, variances, strict=True)))
+    mean = weighted_mean(weight[..., None], forward, backward)
+    return np.where((known[0] | known[1])[..., None], mean, np.nan)

@@ -5,7 +5,7 @@ import logging
 import numpy as np
 
 from echotruth.evaluation.clip import Clip, clips
-from echotruth.evaluation.pieces import ARRAYS, Piece, Pieces, known
+from echotruth.evaluation.pieces import ARRAYS, Piece, Pieces, fingerprint, known
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job, Result, main
@@ -29,16 +29,16 @@ def _stacked(pieces: dict[int, dict[str, Piece]], name: str) -> np.ndarray:
 def _piece(job: Job, name: str, clip: Clip, earlier: Pieces) -> Piece:
     """What a tracker found before; else what it finds now, or no estimate, and the reason in the record."""
     tracker = job.case.config.tracking.trackers[name]
-    fingerprint = earlier.fingerprint(tracker, clip)
-    if piece := earlier.find(clip.size, name, fingerprint):
+    made_from = fingerprint(tracker, clip)
+    if piece := earlier.find(clip.size, name, made_from):
         logging.getLogger("echotruth").info("%s at %d px: taken up", name, clip.size)
         return piece
     try:
-        return Piece(*clip.on_grid(*track(*clip.tracker_arguments, tracker)), fingerprint)
+        return Piece(*clip.on_grid(*track(*clip.tracker_arguments, tracker)), made_from)
     except TrackerFailed as error:
         logging.getLogger("echotruth").warning("%s at %d px: %s", name, clip.size, error)
         job.verdict.setdefault("failures", {})[f"{name}/{clip.size}"] = str(error)
-        return Piece(*clip.on_grid(*clip.no_estimate), fingerprint, str(error))
+        return Piece(*clip.on_grid(*clip.no_estimate), made_from, str(error))
 
 
 if __name__ == "__main__":
