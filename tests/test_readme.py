@@ -30,7 +30,7 @@ def test_five_lines_open_a_repository_and_show_motion_upright(tmp_path, monkeypa
     lay_out(tmp_path / "out/demo", config, [case])
     learning_repository.make(tmp_path / "out/demo", case)
     publish(tmp_path / "out/demo")
-    lines = PYTHON[0].replace("frame=20", "frame=2")
+    lines = PYTHON[0].replace("frame=10", "frame=2")
     assert len(lines.split("\n\n")[-1].splitlines()) + lines.count("import ") == 5
     names = {}
     exec(lines, names)

@@ -33,5 +33,5 @@ def test_the_realistic_preset_is_the_demo_with_all_of_it_on():
     off = Config().realism
     assert all(getattr(preset.realism, name) != getattr(off, name) for name in type(off).model_fields)
     assert preset.rf == demo.rf.model_copy(update={"focal_zones": 1})
-    same = {"realism": off, "name": demo.name, "rf": demo.rf, "tracking": demo.tracking}
+    same = {"realism": off, "name": demo.name, "rf": demo.rf, "loop": demo.loop, "tracking": demo.tracking}
     assert preset.model_copy(update=same) == demo

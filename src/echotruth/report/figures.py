@@ -46,7 +46,6 @@ ARROW_SPACING = 0.45e-3
 
 PARTS = {
     "motion": (
-        "heart",
         "loop",
         "strain",
         "physiology",
@@ -57,7 +56,7 @@ PARTS = {
         "error",
         "leaderboard",
     ),
-    "images": ("clip", "resolutions", "views"),
+    "images": ("heart", "clip", "resolutions", "views"),
 }
 """Figures that one job draws together, by the name of the part."""
 

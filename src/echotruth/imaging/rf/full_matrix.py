@@ -19,7 +19,7 @@ for tables: 50 MB for the default array, however many scatterers there are.
 from __future__ import annotations
 
 from copy import copy
-from functools import reduce
+from functools import lru_cache, reduce
 
 import numba
 import numpy as np
@@ -105,11 +105,10 @@ class FullMatrix:
 
     def __init__(self, probe: Probe, depth: float, max_delay: float = 0.0, elevation: bool = True) -> None:
         p = probe.si()
-        low, high = pulse_band(probe)
         self._width = p.width * p.frequency / p.sound_speed
         self._scheme = (LENS if self._width <= MAX_NARROW_WIDTH else WIDE) if elevation else PLANE
-        grid = Grid(max(p.sampling, high / MAX_BAND[elevation]), SHARPNESS[elevation])
-        self.sampling = grid.sampling
+        band = _band(probe, elevation)
+        self.sampling = band.grid.sampling
         half_pulse = 4.5 / (2 * np.pi * spectral_width(probe))
         self.max_range = depth + p.sound_speed * half_pulse / 2
         last = 2 * self.max_range / p.sound_speed + p.elements * p.pitch / p.sound_speed + half_pulse
@@ -123,15 +122,14 @@ class FullMatrix:
         loss = p.attenuation * p.frequency
         self._scales = self.sampling / p.sound_speed, loss, p.frequency / p.sound_speed
         self._directivity = directivity.directivity_table(self._width)
-        self._set_filters(probe, grid, low, high)
-        band = _band(probe, grid, low, high)
-        self._lens = Lens(probe, self.max_range, band) if elevation else None
+        self._set_filters(probe, band.grid)
+        self._lens = _lens(probe, self.max_range) if elevation else None
         self._clusters = Clusters(self.centres, p.sound_speed, band, self.max_range, CLUSTER_TOLERANCE[elevation])
         self._tabulate(band, band.frequency / p.frequency)
 
-    def _set_filters(self, probe: Probe, grid: Grid, low: float, high: float) -> None:
+    def _set_filters(self, probe: Probe, grid: Grid) -> None:
         """Set the filters that convert gridded traces to echoes: pairs of a function of time and a response."""
-        p = probe.si()
+        p, (low, high) = probe.si(), pulse_band(probe)
         cycles = np.arange(self.samples // 2 + 1) / self.samples
         inside = np.flatnonzero((cycles * self.sampling >= low) & (cycles * self.sampling <= high))
         self.first_bin = int(inside[0])
@@ -352,7 +350,16 @@ def _damping(p, frequency: np.ndarray) -> np.ndarray:
     return p.attenuation * (frequency - p.frequency) * p.sound_speed
 
 
-def _band(probe: Probe, grid: Grid, low: float, high: float) -> Band:
+@lru_cache(maxsize=1)
+def _lens(probe: Probe, max_range: float) -> Lens:
+    """Lens of a probe, kept for the next matrix of the same: its tables take most of the time to set one up."""
+    return Lens(probe, max_range, _band(probe, True))
+
+
+def _band(probe: Probe, elevation: bool) -> Band:
+    """Band of the pulse, and the grid that samples it, with or without the lens."""
+    low, high = pulse_band(probe)
+    grid = Grid(max(probe.si().sampling, high / MAX_BAND[elevation]), SHARPNESS[elevation])
     node, weight = np.polynomial.legendre.leggauss(NODES)
     frequency = (low + high) / 2 + node * (high - low) / 2
     energy = weight * pulse_spectrum(probe, frequency) ** 2

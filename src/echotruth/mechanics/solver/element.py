@@ -11,10 +11,13 @@ functions, are turned once.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import get_num_threads, njit
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
@@ -151,9 +154,10 @@ def allocate_response(n_cells: int, with_tangent: bool) -> Response:
     return Response(np.empty((n_cells, 4, DOFS)), np.empty(n_cells), tangent)
 
 
-@njit(**COMPILED)
 def evaluate(nodes: Floats, elements: Elements, law: WallLaw, state: CellState, out: Response) -> None:
     """Evaluate forces, volumes and tangents of all cells.
+
+    The cells are shared out among as many threads as numba uses; the results do not depend on their number.
 
     Parameters
     ----------
@@ -165,9 +169,17 @@ def evaluate(nodes: Floats, elements: Elements, law: WallLaw, state: CellState, 
     out : Response
         Filled.
     """
+    bounds = np.linspace(0, len(elements.cells), get_num_threads() + 1).astype(int).tolist()
+    with ThreadPoolExecutor(len(bounds) - 1) as threads:
+        list(threads.map(partial(_evaluate_cells, nodes, elements, law, state, out), pairwise(bounds)))
+
+
+@njit(nogil=True, **COMPILED)
+def _evaluate_cells(nodes, elements, law, state, out, bounds):
+    """Evaluate the cells from the first of the `bounds` to the one before the last."""
     with_tangent = out.tangent.shape[0] > 0
     x, ke, dP_du, work = np.empty((10, 3)), np.empty((DOFS, WIDTH)), np.zeros((9, WIDTH)), point.allocate()
-    for cell in range(elements.cells.shape[0]):
+    for cell in range(*bounds):
         force = out.force[cell]
         force[:], out.volume[cell] = 0.0, 0.0
         if with_tangent:

@@ -8,6 +8,13 @@ finds the records.
 IMAGING = handed("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
 
 
+def longest_first(wildcards):
+    """Priority of a view, from 0 to 1: its expected time over that of the longest."""
+    config = CASES[wildcards.case].config
+    seconds = {view: sum(expected_cost.view_seconds(config, view, is_rough=True).values()) for view in config.views}
+    return seconds[wildcards.view] / max(seconds.values())
+
+
 rule imaging:
     input:
         record("physiology"),
@@ -21,6 +28,8 @@ rule imaging:
         settings=lambda wildcards: imaging_settings(CASES[wildcards.case].config, wildcards.view),
     group:
         "view"
+    # A core that has nothing left to do waits for the longest view, of one heart; of many, hearts are finished in turn.
+    priority: longest_first if len(CASES) == 1 else 0
     log:
         FOLDER / "logs/imaging/{case}/{view}.log",
     resources:

@@ -13,7 +13,7 @@ rule report:
         rules.repository.output,
         external=sorted(FOLDER.glob("external/*.csv")),
     output:
-        figures("heart", "loop", "strain", "physiology", "population"),
+        figures("loop", "strain", "physiology", "population"),
         figures("curves", "segments", "bullseye", "error", "leaderboard"),
         standings=FIGURES / "leaderboard.csv",
     params:
@@ -33,7 +33,7 @@ rule report_images:
     input:
         rules.repository.output,
     output:
-        figures("resolutions", "views"),
+        figures("heart", "resolutions", "views"),
         clip=FIGURES / "clip.gif",
         movie=FIGURES / "clip.mp4",
     params:

@@ -20,6 +20,7 @@ rule tracking:
         settings=lambda wildcards: tracking_settings(wildcards.case),
     group:
         "view"
+    priority: 1
     log:
         FOLDER / "logs/tracking/{case}/{view}.log",
     resources:
