@@ -1,5 +1,5 @@
 # make demo, make benchmark and make test set up .venv from requirements.lock first; make test-all runs the slow tests too. Make
-# test-integration runs the tests that need PyTorch, an S3 server, validators of other formats, other simulators or Sphinx,
+# test-integration runs the tests that need PyTorch, an S3 server, SLURM, validators of other formats, other simulators or Sphinx,
 # in an environment of their own; make docs builds the site there.
 
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
@@ -25,7 +25,7 @@ test test-all: .venv/ready
 
 # tests/docs builds the site.
 INTEGRATION := tests/test_torch.py tests/learning/test_baselines.py tests/description tests/repository/test_upload.py \
-	tests/repository/test_export.py tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs
+	tests/repository/test_export.py tests/cluster tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs
 
 test-integration: .venv-integration/ready
 	.venv-integration/bin/python -m pytest -n 2 --dist loadscope $(INTEGRATION)
