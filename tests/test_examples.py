@@ -45,6 +45,7 @@ def test_speckle_is_rayleigh_distributed():
     assert run("speckle")["snr"] == pytest.approx(np.sqrt(np.pi / (4 - np.pi)), rel=0.05)
 
 
+@pytest.mark.slow
 def test_tracker_finds_the_motion_that_one_at_rest_misses():
     rest, dis = sorted(run("own_tracker")["errors"].values(), reverse=True)
     assert rest == pytest.approx(100, abs=0.1)
@@ -57,6 +58,7 @@ def test_example_of_a_repository_says_how_to_get_one(monkeypatch):
         run("global_strain")
 
 
+@pytest.mark.slow
 def test_blocks_of_the_page_about_python_run_one_after_the_other():
     page, names = (EXAMPLES.parent / "docs/python.md").read_text(), {}
     blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
@@ -67,6 +69,7 @@ def test_blocks_of_the_page_about_python_run_one_after_the_other():
     assert float(names["mechanics"]["volume"][0]) == pytest.approx(50e-9, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_block_of_the_page_about_motion_from_files_runs_on_a_series(tmp_path, monkeypatch, coarse_mesh):
     import pyvista
 

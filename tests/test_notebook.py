@@ -214,6 +214,7 @@ def test_true_displacement_in_place_of_a_tracked_one_has_no_error(clip, heart):
     assert et.evaluate(exact, heart)["rms_error_um"] < 0.1
 
 
+@pytest.mark.slow
 def test_other_probe_view_and_size_are_imaged(heart):
     other = et.image(heart, View(plane="long_axis"), probe="mouse_30MHz", size=64)
     assert other["image"].shape == (3, 64, 64)

@@ -12,6 +12,9 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 
+pytestmark = pytest.mark.slow
+
+
 def build(target: str, source: Path, folder: Path) -> Path:
     """Build an archive with the installed hatchling, without a network."""
     command = [sys.executable, "-m", "hatchling", "build", "--target", target, "--directory", str(folder)]

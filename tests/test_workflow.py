@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[1]
 CONFIG = """\
 name: tiny
 geometry: {circumferential_elements: 12, longitudinal_elements: 6, transmural_elements: 1}
-loop: {frames: 10}
+loop: {frames: 6}
 views:
   mid: {position: 0.5}
   long_axis: {plane: long_axis}
@@ -212,7 +212,7 @@ def test_figures_stand_beside_the_repository_and_of_scratch_only_checkpoints_sta
 def test_jobs_of_a_view_find_all_that_they_call_compiled(tmp_path):
     """The miniature compiles all functions that the jobs call, with the same types."""
     made = Workspace(tmp_path / "echotruth", share_cache=False)
-    (made.folder / "tiny.yaml").write_text(CONFIG.replace("[1, 2]\n", "[1]\n").replace("frames: 10", "frames: 4"))
+    (made.folder / "tiny.yaml").write_text(CONFIG.replace("[1, 2]\n", "[1]\n").replace("frames: 6", "frames: 4"))
     made.snakemake("--cores", "2", "--until", "tracking")
     records = [json.loads(path.read_text()) for path in made.out.glob("ledger/*/*/*.json")]
     assert {record["stage"] for record in records} == {"phantom", "truth", "rf", "bmode", "tracking", "evaluation"}

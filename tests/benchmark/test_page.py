@@ -175,6 +175,7 @@ def run(*arguments):
     return left.value.code
 
 
+@pytest.mark.slow
 def test_command_writes_the_page_twice_alike_and_keeps_what_a_person_wrote(repository, tmp_path, capsys):
     (repository / "ledger/evaluation/b_ideal/mid.json").unlink()
     shutil.rmtree(repository / "external")

@@ -100,6 +100,7 @@ def test_evaluation_of_no_repository_is_refused_in_one_line(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_run_needs_no_checkout_and_makes_only_the_files_asked_for(tmp_path):
     config = ROOT / "config/demo.yaml"
     file = f"out/demo/ledger/mechanics/{expand(load(config), 'demo')[0].id}.json"

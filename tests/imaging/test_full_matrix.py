@@ -46,6 +46,7 @@ def test_in_the_plane_the_rf_is_the_exact_sum_with_directivity_and_attenuation(a
     assert error(probe, *sector(60)) < PLANE_ACCURACY
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "preset, scale, half_angle",
     [("mouse_30MHz", 1, 24), ("mouse_40MHz", 1, 24), ("rat_15MHz", 2, 32), ("human_2_7MHz", 12, 32)],
@@ -90,6 +91,7 @@ def test_under_the_lens_the_rf_is_the_fresnel_integral_at_all_ranges(attenuation
     assert (lens_errors(probe, DEPTH, 0.7e-3, bands) < 0.015).all()
 
 
+@pytest.mark.slow
 def test_under_the_lens_of_another_array_too():
     probe = Probe(preset="mouse_40MHz", attenuation_dB_per_cm_MHz=0.5)
     assert (lens_errors(probe, DEPTH, 0.7e-3, [(5.5, 10)]) < 0.015).all()

@@ -46,6 +46,7 @@ def test_in_the_plane_tissues_with_different_powers_add_up_to_the_exact_sum(plan
     assert relative(plane(*scatterers, exponent)[::6], exact) < PLANE_ACCURACY * 2
 
 
+@pytest.mark.slow
 def test_under_the_lens_tissues_with_different_powers_add_up_to_the_exact_sum():
     matrix = FullMatrix(PROBE, DEPTH)
     position, amplitude = sector(60, elevation=0.7e-3)

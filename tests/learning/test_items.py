@@ -165,6 +165,7 @@ def test_strain_and_diagnosis_are_those_of_the_heart(repository):
         assert diagnosis["diagnosis"] == ("infarct" if diagnosis["label"] else "healthy")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["fork", "spawn"])
 def test_workers_read_the_same_items_however_they_are_started(repository, start):
     sequences = [sequence(repository, kind, size=32) for kind in KINDS]

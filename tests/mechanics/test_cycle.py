@@ -61,6 +61,7 @@ def test_pressure_alone_fills_the_passive_heart_as_its_volume_does(cycle, driven
     np.testing.assert_allclose(back.pressure, pressure, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_interrupted_beat_resumes_and_ends_in_the_same_bytes(cycle, driven, tmp_path, caplog):
     uninterrupted = solved(cycle, checkpoints=Checkpoints(tmp_path))
     for late in sorted(tmp_path.glob("*.frame"))[5:]:

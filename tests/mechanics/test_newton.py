@@ -76,6 +76,7 @@ def test_heart_that_cannot_be_filled_says_what_to_change():
         beat(small)
 
 
+@pytest.mark.slow
 def test_load_without_equilibrium_ends_in_one_sentence(hemisphere, caplog):
     stepper = LoadStepper(hemisphere, C)
     with (

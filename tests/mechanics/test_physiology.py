@@ -326,6 +326,7 @@ def free_heart():
     return beat(override(Config(geometry=COARSE), FREE_HEART))
 
 
+@pytest.mark.slow
 def test_a_free_heart_that_twists_backwards_before_it_ejects_is_implausible(free_heart):
     found = judged(free_heart)
     assert np.degrees(found["twist_ivc"]) < -10 and np.degrees(found["twist_es"]) < 0
@@ -402,6 +403,7 @@ def test_the_heart_of_a_species_moves_as_measured_in_life(species):
     np.testing.assert_allclose(found["apex_motion"], 0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_heart_whose_fibres_make_it_lengthen_is_implausible_even_if_diseased():
     fibres = {"fibres.endo_deg": 60.0, "fibres.epi_deg": -30.0}
     case = beat(override(Config(geometry=COARSE, loop={"frames": 10}), FREE_HEART | fibres))

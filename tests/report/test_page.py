@@ -18,7 +18,10 @@ from shown_repository import SHIFT
 from echotruth.config.loading import load
 from echotruth.report import page
 
-pytestmark = pytest.mark.filterwarnings("ignore")  # of a store whose text Zarr calls unstable
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore"),  # of a store whose text Zarr calls unstable
+]
 
 
 class Elements(HTMLParser):

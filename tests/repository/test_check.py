@@ -109,6 +109,7 @@ def test_healing_makes_the_damaged_jobs_again_and_no_others_byte_for_byte(folder
     assert not (folder / "healing.json").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed, harm", list(enumerate([flip, flip, flip, truncate, empty])))
 def test_damaged_records_are_found_and_made_again(folder, seed, harm):
     before, random = finished.content(folder), np.random.default_rng(seed)
@@ -126,6 +127,7 @@ def test_damaged_records_are_found_and_made_again(folder, seed, harm):
     assert all(path.stat().st_mtime_ns <= time for path, time in times.items())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harm", [flip, delete])
 @pytest.mark.parametrize("name", ["ledger/structure.json", "ledger/repository.json", "registry.txt", "views.txt"])
 def test_damaged_record_of_the_structure_and_registries_are_found_and_written_again(folder, harm, name):

@@ -88,7 +88,8 @@ def lay_out(folder: Path, cases: int) -> Store:
     return store
 
 
-@pytest.mark.parametrize("writers, cases", [(4, 8), pytest.param(32, 320, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("writers, cases", [(4, 8), (32, 320)])
 def test_writers_beside_a_reader_and_a_publisher_lose_nothing(tmp_path, writers, cases):
     store, each = lay_out(tmp_path, cases), cases // writers
     before = {path: path.read_bytes() for path in store.path.rglob("zarr.json") if path.parent != store.path}

@@ -78,6 +78,7 @@ def test_uff_is_read_by_its_own_library(folder, rf):
         assert wave.wavefront == pyuff.Wavefront.spherical
 
 
+@pytest.mark.slow
 def test_waves_of_the_uff_focus_where_the_lines_do(folder, rf):
     """The brightest sample of the lines is the brightest near it when the toolbox's rule of time focuses the file."""
     h5py = pytest.importorskip("h5py")
@@ -141,6 +142,7 @@ def compounded_by_zea(file, place):
 SCALARS = ("sound_speed", "center_frequency", "sampling_frequency")
 
 
+@pytest.mark.slow
 def test_transmits_of_zea_focus_where_the_lines_do(folder, rf):
     """The brightest sample of the lines is the brightest near it when zea's rule of time focuses the file."""
     h5py = pytest.importorskip("h5py")

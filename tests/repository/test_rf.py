@@ -150,6 +150,7 @@ def attributes_for(folder, cases):
     return zarr.open_group(folder / "small.zarr", path="rf", mode="r").attrs.asdict()
 
 
+@pytest.mark.slow
 def test_group_says_nothing_that_differs_among_the_cases(rf_repository):
     folder = rf_repository()
     alike = attributes_for(folder, {"probe.width_um": [30.0]})

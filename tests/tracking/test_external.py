@@ -265,6 +265,7 @@ def test_missing_program_is_explained_in_one_sentence(arguments):
     assert failure(arguments, settings) == "did not start: no_such_program: No such file or directory"
 
 
+@pytest.mark.slow
 def test_program_that_takes_too_long_is_ended_with_all_it_started(arguments, tmp_path):
     beat = tmp_path / "beat"
     child = f"import time\nwhile True: open({str(beat)!r}, 'a').write('.'); time.sleep(0.02)"

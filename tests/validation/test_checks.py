@@ -5,7 +5,7 @@ import pytest
 
 from validation.page import CHECKS
 
-SLOW = {"ventricle", "refinement", "inflation"}
+SLOW = {"ventricle", "refinement", "inflation", "beam"}
 
 
 def named(check):

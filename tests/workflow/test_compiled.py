@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from echotruth.workflow.compiled import CACHE_GROUPS, cache_folder
 
 SCRIPTS = Path(__file__).parents[2] / "src/echotruth/workflow/scripts"
@@ -23,6 +25,7 @@ print([twice(form) for form in forms], sum(twice.stats.cache_hits.values()))
 """
 
 
+@pytest.mark.slow
 def test_processes_that_compile_forms_of_a_function_at_once_keep_them_all(tmp_path):
     """Without a lock both would get the same number, and one of them the code of the other."""
     (tmp_path / "forms.py").write_text(FORMS)

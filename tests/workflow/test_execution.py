@@ -140,6 +140,7 @@ def run_writer(folder, file, lines):
     )
 
 
+@pytest.mark.slow
 def test_nothing_outlives_a_runner_that_was_killed_alone(tmp_path):
     file = tmp_path / "written"
     run = run_writer(tmp_path, file, 3000)
@@ -150,6 +151,7 @@ def test_nothing_outlives_a_runner_that_was_killed_alone(tmp_path):
     wait_for(lambda: not any(map(is_running, members(tmp_path))), 20)
 
 
+@pytest.mark.slow
 def test_run_started_at_once_after_its_runner_was_killed_alone_is_the_only_writer(tmp_path):
     file = tmp_path / "written"
     first = run_writer(tmp_path, file, 3000)
@@ -165,6 +167,7 @@ def test_run_started_at_once_after_its_runner_was_killed_alone_is_the_only_write
     assert len(set(writers[:later])) == 1 and set(writers[later:]) == {writers[-1]} and len(writers) - later == 50
 
 
+@pytest.mark.slow
 def test_nothing_outlives_a_snakemake_that_was_killed_alone(tmp_path):
     file = tmp_path / "written"
     run = run_writer(tmp_path, file, 3000)

@@ -36,6 +36,7 @@ def test_remeshed_ellipsoid_keeps_its_volumes(human, file_heart, write_surface, 
     assert "the new wall lies 0." in caplog.text
 
 
+@pytest.mark.slow
 def test_tetrahedra_and_surface_give_the_same_wall(human, file_heart, write_mesh, write_surface):
     nodes = 1e3 * human.nodes @ file_heart.turn + file_heart.shift
     whole = left_ventricle(Geometry(file=write_mesh(nodes, human.cells[:, :4]), remesh=True))
@@ -62,6 +63,7 @@ def test_bent_heart_is_followed(human, write_surface):
     assert cavity_volume(mesh.nodes, mesh.endo) == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
 def test_cut_is_as_deep_as_asked(human, write_surface):
     file = write_surface(1e3 * human.nodes, surface(human))
     depth = [-left_ventricle(Geometry(file=file, remesh=True, cut_mm=cut)).nodes[:, 2].min() for cut in (5.0, 15.0)]

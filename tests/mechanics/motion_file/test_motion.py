@@ -54,6 +54,7 @@ def test_wall_of_linear_tetrahedra_stays_straight_between_its_vertices(affine_he
     np.testing.assert_allclose(moved[cell[:, 4:]], ends.mean(axis=2), rtol=0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_frames_of_the_files_are_not_interpolated_and_others_are_near_the_formula(
     affine_heart, write_series, configured
 ):
@@ -69,6 +70,7 @@ def test_frames_of_the_files_are_not_interpolated_and_others_are_near_the_formul
     np.testing.assert_array_equal(third["mechanics"]["displacement"], as_recorded[::3])
 
 
+@pytest.mark.slow
 def test_cycle_begins_at_the_largest_cavity_or_the_named_frame_and_may_repeat_its_first(
     affine_heart, write_series, configured
 ):
@@ -142,6 +144,7 @@ def test_end_diastole_is_the_first_frame_of_an_isovolumic_contraction():
     assert first_of_largest(np.array([4.99, 5.0, 4.0, 3.0])) == 1
 
 
+@pytest.mark.slow
 def test_beat_that_is_written_and_read_again_moves_as_before(write_series):
     """Displacement, gradient, volume and the truth in an image; the base is plane, and x is the axis of the files."""
     from echotruth.imaging.bmode import pixel_centres
