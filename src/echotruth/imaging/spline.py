@@ -103,7 +103,7 @@ def value(padded, row, column):
     return total
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(cache=True)
 def evaluate(padded, row, column, values):
     """Values of a spline at points.
 
@@ -116,5 +116,5 @@ def evaluate(padded, row, column, values):
     values
         Written: shape (points,), float32.
     """
-    for k in numba.prange(len(row)):
+    for k in range(len(row)):
         values[k] = value(padded, row[k], column[k])

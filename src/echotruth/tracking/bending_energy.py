@@ -164,7 +164,8 @@ def _add(knots, offsets, basis_x, basis_y, metrics, angle_derivatives, band):
                     for e in range(4):
                         cell_matrices[0, k, m] += parallel[k, e] * parallel[m, e] + rotated[k, e] * rotated[m, e]
                         cell_matrices[1, k, m] += rotated[k, e] * parallel[m, e] - parallel[k, e] * rotated[m, e]
-        cell_matrices[2] = cell_matrices[0]
+                    # Not all at once, which takes longer to compile than the rest.
+                    cell_matrices[2, k, m] = cell_matrices[0, k, m]
         add_cell_matrices(knots[cell], cell_matrices, band)
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numba
 import numpy as np
 
 from echotruth.imaging.beamforming.aperture import Aperture, apodization_weight
 from echotruth.imaging.beamforming.interpolation import LEAD_TAPS, PHASE_BITS, TAP_FLOATS, add_taps, interpolator_table
 from echotruth.imaging.rf.kernel import TAPS
+from echotruth.threads import share
 
 BLOCK_RANGES = 64
 """Samples of a line that are summed over all elements at a time, to stay in the first-level cache."""
@@ -97,9 +100,9 @@ def add_tap_sums(sums, line):
         line[n] += np.complex64(complex(real, imaginary))
 
 
-@numba.njit(parallel=True, cache=True)
-def focus(lines, first, channels, transmit, path, geometry, array, table):
-    """Add the delayed, weighted echoes of all elements to some lines; one thread makes a line.
+@numba.njit(nogil=True, cache=True)
+def focus(lines, first, channels, waves, geometry, array, table, part):
+    """Add the delayed, weighted echoes of all elements to some lines.
 
     Parameters
     ----------
@@ -109,10 +112,8 @@ def focus(lines, first, channels, transmit, path, geometry, array, table):
         The first of these lines.
     channels
         Shape (transmits, elements, 2 samples), float32: real and imaginary parts in turn.
-    transmit
-        Transmit of each of these lines, shape (n,).
-    path
-        Transmit path to the points of these lines, shape (n, ranges), m.
+    waves
+        Transmit of each of these lines, shape (n,), and transmit path to their points, shape (n, ranges), m.
     geometry
         Of all lines, shape (lines, 4, ranges): lateral and axial coordinates of the points (m), centre (m) and
         1 / width (1/m) of their apertures.
@@ -121,11 +122,13 @@ def focus(lines, first, channels, transmit, path, geometry, array, table):
         carrier, cycles per sample.
     table
         See :func:`echotruth.imaging.beamforming.interpolation.interpolator_table`.
+    part
+        First of these lines to be added to, and the one after the last.
     """
-    centres, rate, tapered, carrier = array
+    (transmit, path), (centres, rate, tapered, carrier) = waves, array
     elements, floats = channels.shape[1:]
     channel = rate, floats // 2 - TAPS, carrier
-    for n in numba.prange(len(transmit)):
+    for n in range(*part):
         line, flat = first + n, channels[transmit[n]].reshape(elements * floats)
         sums = np.empty(BLOCK_RANGES * TAP_FLOATS, np.float32)
         sample, phase = np.empty(BLOCK_RANGES, np.int32), np.empty(BLOCK_RANGES, np.int32)
@@ -184,4 +187,5 @@ class ReceiveFocus:
         path
             Transmit path to the points of these lines, shape (n, ranges), m.
         """
-        focus(lines, first, channels.view(np.float32), transmit, path, self._geometry, self._array, self._table)
+        fixed = self._geometry, self._array, self._table
+        share(partial(focus, lines, first, channels.view(np.float32), (transmit, path), *fixed), len(transmit))

@@ -8,6 +8,7 @@ their band, and with their spectrum divided by that of the interpolator.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numba
 import numpy as np
@@ -18,6 +19,7 @@ from echotruth.imaging.beamforming.gate import Gate, Sampling
 from echotruth.imaging.beamforming.transmit import Transmits
 from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.imaging.rf.product import HEIGHT, padded, product
+from echotruth.threads import share
 
 BLOCK_TRANSMITS = 128
 """Transmits synthesised at a time. Memory is this * elements * samples * 8 bytes, 31 MB for the default array."""
@@ -52,8 +54,8 @@ def rotate(weights, rotation):
             weights[1, j, k] = a * rotation[1, j, k] + b * rotation[0, j, k]
 
 
-@numba.njit(parallel=True, cache=True)
-def synthesise(matrix, start, rotation, factor, bins, spectra):
+@numba.njit(nogil=True, cache=True)
+def synthesise(matrix, start, rotation, factor, bins, spectra, tiles):
     """Channel spectra of transmits.
 
     Parameters
@@ -68,10 +70,12 @@ def synthesise(matrix, start, rotation, factor, bins, spectra):
         Indices of the frequencies in the spectra, shape (bins,).
     spectra
         Written at `bins`: shape (transmits, elements, samples), complex64.
+    tiles
+        First tile of frequencies to be written, and the one after the last.
     """
     elements, transmits = matrix.shape[1], len(spectra)
     rows, columns = -(-elements // HEIGHT) * HEIGHT, rotation.shape[2]
-    for tile in numba.prange(len(start)):
+    for tile in range(*tiles):
         first = tile * TILE_BINS
         count = min(TILE_BINS, len(bins) - first)
         result = np.empty((count, 2 * rows + 1, columns - ROW_PADDING), np.float32)
@@ -174,7 +178,7 @@ class TransmitSynthesis:
         for block, (start, rotation) in zip(self._blocks, self._weights, strict=True):
             spectra = memory[: block.stop - block.start]
             spectra[:] = 0
-            synthesise(matrix, start, rotation, self._factor, self._bins, spectra)
+            share(partial(synthesise, matrix, start, rotation, self._factor, self._bins, spectra), len(start))
             yield block, fft.ifft(spectra, axis=2, overwrite_x=True, workers=numba.get_num_threads())
 
 

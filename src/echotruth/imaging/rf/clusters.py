@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
+from functools import partial
 
 import numba
 import numpy as np
@@ -21,6 +22,7 @@ from echotruth.arrays import Floats
 from echotruth.imaging.rf.kernel import Band
 from echotruth.imaging.rf.product import HEIGHT, padded, product
 from echotruth.imaging.rf.shadow import Rib
+from echotruth.threads import share
 
 SIZE = 3.0
 """Width of a cluster in the sine of the angle, in wavelengths over half the array; and its depth in 1/range, in
@@ -186,12 +188,13 @@ class Expansion:
             Spectra of the pairs of skeleton elements, cluster by cluster.
         """
         matrix = np.empty((len(spectra), self._elements, self._elements), np.complex64)
-        expand(spectra, self._first, self._skeleton, self._weights, self._phasor, matrix)
+        loop = partial(expand, spectra, self._first, self._skeleton, self._weights, self._phasor, matrix)
+        share(loop, len(spectra))
         return matrix
 
 
-@numba.njit(parallel=True, cache=True)
-def expand(spectra, first, skeleton, weights, phasor, matrix):
+@numba.njit(nogil=True, cache=True)
+def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
     """Write the echoes of all pairs of elements, summed over clusters.
 
     A cluster of skeleton echoes M, weights W and phasors z = exp(-2 pi i f delay) adds C^T M' C, with C = W diag(z) and
@@ -211,9 +214,11 @@ def expand(spectra, first, skeleton, weights, phasor, matrix):
         Real and imaginary part of z for each cluster, shape (bins, clusters, 2, width), float32.
     matrix
         Written: shape (bins, elements, elements), complex64.
+    bins
+        First bin to be written, and the one after the last.
     """
     width, count = weights.shape[1], matrix.shape[1]
-    for f in numba.prange(len(spectra)):
+    for f in range(*bins):
         real, imaginary = np.empty((width, width), np.float32), np.empty((width, width), np.float32)
         pair = 0
         for k in range(len(first) - 1):

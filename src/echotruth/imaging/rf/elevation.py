@@ -153,7 +153,7 @@ def subaperture_bounds(elements: int, subapertures: int) -> NDArray[np.int64]:
     return -(-np.arange(subapertures + 1) * elements // subapertures)
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(cache=True)
 def _look_up(position, centres, grid, log_derivative, delay, sound_speed, index, terms):
     """Write index and terms as :meth:`Lens.lens_terms` returns them, by bilinear interpolation.
 
@@ -165,7 +165,7 @@ def _look_up(position, centres, grid, log_derivative, delay, sound_speed, index,
         First curvature and step of curvatures, 1/m, and step of slopes.
     """
     rows, columns = log_derivative.shape
-    for n in numba.prange(len(position)):
+    for n in range(len(position)):
         for part in range(len(centres)):
             range_ = np.sqrt((position[n, 0] - centres[part]) ** 2 + position[n, 1] ** 2)
             row = min(max((1 / range_ - grid[0]) / grid[1], 0.0), rows - 1.001)

@@ -19,7 +19,7 @@ for tables: 50 MB for the default array, however many scatterers there are.
 from __future__ import annotations
 
 from copy import copy
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 
 import numba
 import numpy as np
@@ -35,6 +35,7 @@ from echotruth.imaging.rf.lens_kernels import group_blocks, lens_kernels
 from echotruth.imaging.rf.probe import element_centres, pulse_band, pulse_spectrum, spectral_width
 from echotruth.imaging.rf.product import padded
 from echotruth.imaging.rf.shadow import Rib
+from echotruth.threads import share
 
 BLOCK = 256
 """Scatterers spread at a time."""
@@ -211,7 +212,8 @@ class FullMatrix:
             if self._rib:
                 weight = propagation[1][: part.stop - start, : len(elements)]
                 weight *= self._rib.transmission(position[part], self.centres[elements])
-            spreading.spread(traces, propagation, amplitude[part], blocks, (tables, size), bounds, lens, (0,) * scheme)
+            added = (propagation, amplitude[part]), blocks, (tables, size), bounds, lens, (0,) * scheme
+            share(partial(spreading.spread, traces, *added), spreading.TRANSMIT_GROUPS)
 
     @property
     def accurate_from(self) -> float:

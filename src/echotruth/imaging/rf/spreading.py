@@ -152,7 +152,7 @@ def _matrices(*kinds):
     return tuple(types.Array(kind, 2, "C") for kind in kinds)
 
 
-@numba.njit(parallel=True, cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy")
 def one_way(position, mean_exponent, lens_terms, array, propagation):
     """Write the one-way time, weight and pair terms between every scatterer and every element.
 
@@ -182,7 +182,7 @@ def one_way(position, mean_exponent, lens_terms, array, propagation):
     samples, loss, waves = scales
     unit = samples * (1 << FRACTION_BITS)
     elements = len(centres)
-    for k in numba.prange(len(position)):
+    for k in range(len(position)):
         axial, beside = position[k, 1] * position[k, 1], position[k, 2] * position[k, 2]
         for element in range(elements):
             lateral = (position[k, 0] - centres[element]) ** 2
@@ -213,8 +213,8 @@ def one_way(position, mean_exponent, lens_terms, array, propagation):
             weight[k, element] = strength
 
 
-@numba.njit(parallel=True, cache=True)
-def spread(traces, propagation, amplitude, kernel_blocks, tables, bounds, lens, scheme):
+@numba.njit(nogil=True, cache=True)
+def spread(traces, scatterers, kernel_blocks, tables, bounds, lens, scheme, groups):
     """Add the echoes of some scatterers to the traces of all pairs.
 
     Parameters
@@ -222,10 +222,9 @@ def spread(traces, propagation, amplitude, kernel_blocks, tables, bounds, lens, 
     traces
         Shape (pairs, samples), float32; added to. Sample LEAD is time 0. Pairs (i, j), i <= j, in the order of
         `numpy.triu_indices`.
-    propagation
-        As :func:`one_way` writes it, each of shape (scatterers, elements or more, a multiple of LANES).
-    amplitude
-        Shape (scatterers,), float32.
+    scatterers
+        Their propagation as :func:`one_way` writes it, each of shape (scatterers, elements or more, a multiple of
+        LANES), and their amplitude, shape (scatterers,), float32.
     kernel_blocks
         Blocks of samples to add, shape (blocks, 5): scatterer, where its table begins, first sample from the echo, and
         the subapertures of the transmitters and of the receivers, the former not after the latter.
@@ -238,13 +237,16 @@ def spread(traces, propagation, amplitude, kernel_blocks, tables, bounds, lens, 
         leaves (b_i - b_j)^2.
     scheme
         Tuple whose length is the number of the scheme in :data:`COEFFICIENTS`.
+    groups
+        First of the `TRANSMIT_GROUPS` groups of transmitters to be added, and the one after the last.
     """
+    propagation, amplitude = scatterers
     time, weight, spectral_exponent, inverse_range_offset = propagation
     values, size = tables
     elements, samples, width = bounds[-1], traces.shape[1], time.shape[1]
     flat = traces.reshape(traces.size)
     planar = np.float32(lens == 0)
-    for group in numba.prange(TRANSMIT_GROUPS):
+    for group in range(*groups):
         pairs = np.empty((2, width), np.int32), np.empty((5, width), np.float32)
         for block in range(len(kernel_blocks)):
             k, base, shift, transmitters, receivers = kernel_blocks[block]

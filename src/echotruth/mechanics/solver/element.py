@@ -11,13 +11,11 @@ functions, are turned once.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import njit
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
@@ -26,6 +24,7 @@ from echotruth.fem.tetrahedra import Mesh
 from echotruth.mechanics.fibres import material_gradients
 from echotruth.mechanics.solver import stress_point as point
 from echotruth.mechanics.solver.stress_point import COMPILED, PASSIVE, TOTAL, VOLUMETRIC
+from echotruth.threads import share
 
 DOFS = 30
 """Displacements of a cell, node by node."""
@@ -157,7 +156,7 @@ def allocate_response(n_cells: int, with_tangent: bool) -> Response:
 def evaluate(nodes: Floats, elements: Elements, law: WallLaw, state: CellState, out: Response) -> None:
     """Evaluate forces, volumes and tangents of all cells.
 
-    The cells are shared out among as many threads as numba uses; the results do not depend on their number.
+    Threads share the cells; see :func:`echotruth.threads.share`.
 
     Parameters
     ----------
@@ -169,14 +168,12 @@ def evaluate(nodes: Floats, elements: Elements, law: WallLaw, state: CellState, 
     out : Response
         Filled.
     """
-    bounds = np.linspace(0, len(elements.cells), get_num_threads() + 1).astype(int).tolist()
-    with ThreadPoolExecutor(len(bounds) - 1) as threads:
-        list(threads.map(partial(_evaluate_cells, nodes, elements, law, state, out), pairwise(bounds)))
+    share(partial(_evaluate_cells, nodes, elements, law, state, out), len(elements.cells))
 
 
 @njit(nogil=True, **COMPILED)
 def _evaluate_cells(nodes, elements, law, state, out, bounds):
-    """Evaluate the cells from the first of the `bounds` to the one before the last."""
+    """Evaluate the cells from the first of the `bounds` to the one before the second."""
     with_tangent = out.tangent.shape[0] > 0
     x, ke, dP_du, work = np.empty((10, 3)), np.empty((DOFS, WIDTH)), np.zeros((9, WIDTH)), point.allocate()
     for cell in range(*bounds):
