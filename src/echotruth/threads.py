@@ -26,11 +26,12 @@ def share(loop: Callable[[tuple[int, int]], object], count: int) -> None:
     count : int
         Number of turns.
     """
-    threads = min(get_num_threads(), count)
-    if threads < 2:
+    threads = get_num_threads()
+    parts = min(threads, count)
+    if parts < 2:
         loop((0, count))
         return
-    bounds = [count * thread // threads for thread in range(threads + 1)]
+    bounds = [count * part // parts for part in range(parts + 1)]
     list(_pool(threads).map(loop, pairwise(bounds)))
 
 
