@@ -41,6 +41,8 @@ NORMAL = {"RR": style.RADIAL, "CC": style.CIRCUMFERENTIAL, "LL": style.LONGITUDI
 SHEAR = {"RC": "#8a4f9e", "RL": "#c98a1b", "CL": "#2f9aa0"}
 """Component -> colour."""
 
+HEADROOM = 0.06
+"""Room above the curves for the word ES, over the height of the others."""
 _GREY = style.MUTED
 _UL, _MM = 1e-9, 1e-3
 
@@ -188,7 +190,8 @@ def _at_es(name: str, value: float, decimals: int = 1) -> str:
 def _finish(axes: Axes, smallest: float, below: float = 0.02) -> None:
     """Give the axis a smallest limit to both sides, lest it show rounding errors, and values at ES below it."""
     low, high = axes.get_ylim()
-    axes.set_ylim(min(low, -smallest), max(high, smallest))
+    low, high = min(low, -smallest), max(high, smallest)
+    axes.set_ylim(low, high + HEADROOM * (high - low))
     axes.legend(
         loc="upper center",
         bbox_to_anchor=(0.5, -below),
