@@ -107,36 +107,46 @@ def add_cell_matrices(knots, cell_matrices, band):
 
 @numba.njit(cache=True, nogil=True)
 def cholesky_banded(band):
-    """Cholesky factor of a symmetric positive definite banded matrix (see :func:`add_normal_matrix`), in place."""
+    """Cholesky factor of a symmetric positive definite banded matrix (see :func:`add_normal_matrix`), in place.
+
+    Returns its columns, shape (unknowns, width): entry d of row j is the factor in row j + d and column j.
+    """
     n, width = band.shape
     last = width - 1
-    column = np.empty(width)
+    columns, column = np.zeros((n, width)), np.empty(width)
     for j in range(n):
         height = min(width, n - j)
         pivot = np.sqrt(band[j, last])
         for d in range(height):
             column[d] = band[j + d, last - d] / pivot
-            band[j + d, last - d] = column[d]
+            band[j + d, last - d] = columns[j, d] = column[d]
         # Row by row, so that the compiler need not reorder a sum to be fast.
         for d in range(1, height):
             row = band[j + d]
             for e in range(1, d + 1):
                 row[last - d + e] -= column[d] * column[e]
+    return columns
 
 
 @numba.njit(cache=True, nogil=True)
-def solve_banded(factor, rhs):
-    """Solve for a right-hand side (unknowns,), in place, with the factor of :func:`cholesky_banded`."""
+def solve_banded(factor, columns, rhs):
+    """Solve for a right-hand side (unknowns,), in place, with factor and columns of :func:`cholesky_banded`."""
     n, width = factor.shape
     last = width - 1
     for j in range(n):
         rhs[j] /= factor[j, last]
-        for d in range(1, min(width, n - j)):
-            rhs[j + d] -= factor[j + d, last - d] * rhs[j]
+        subtract_multiple(columns[j, 1 : n - j], rhs[j], rhs[j + 1 : j + width])
     for j in range(n - 1, -1, -1):
-        for d in range(1, min(width, n - j)):
-            rhs[j] -= factor[j + d, last - d] * rhs[j + d]
         rhs[j] /= factor[j, last]
+        before = max(0, j - last)
+        subtract_multiple(factor[j, before - j + last : last], rhs[j], rhs[before:j])
+
+
+@numba.njit(cache=True, nogil=True)
+def subtract_multiple(values, factor, result):
+    """Subtract values (n,) times a number from a result (n,), in place."""
+    for k in range(len(result)):
+        result[k] -= values[k] * factor
 
 
 @numba.njit(cache=True, nogil=True)

@@ -52,19 +52,22 @@ class NormalMatrix:
     ----------
     factor : ndarray of shape (unknowns, width)
         Of F, see :func:`echotruth.tracking.alignment.cholesky_banded`.
+    columns : ndarray of shape (unknowns, width)
+        Of the factor.
     energy_weight : float
         Weight beta of the bending energy.
     energy : BendingEnergy
     """
 
     factor: np.ndarray
+    columns: np.ndarray
     energy_weight: float
     energy: BendingEnergy
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """F^-1 rhs; both of shape (unknowns,)."""
         solution = rhs.copy()
-        alignment.solve_banded(self.factor, solution)
+        alignment.solve_banded(self.factor, self.columns, solution)
         return solution
 
     def newton_step(self, rhs: np.ndarray) -> np.ndarray:
@@ -258,8 +261,8 @@ def _factor(band: np.ndarray, scale: float, energy_weight: float, energy: Bendin
     """N + beta K, regularised, from N; in place."""
     band += energy_weight * energy.band
     band[:, -1] += scale * REGULARISATION
-    alignment.cholesky_banded(band)
-    return NormalMatrix(band, energy_weight, energy)
+    columns = alignment.cholesky_banded(band)
+    return NormalMatrix(band, columns, energy_weight, energy)
 
 
 def geman_mcclure(residual: np.ndarray, tolerance: float) -> np.ndarray:

@@ -19,7 +19,7 @@ from echotruth.tracking.cubic import bspline_weights, first_derivatives
 
 MAX_ITERATIONS = 30
 CONVERGENCE = 1e-3
-"""Largest displacement of a corner of the subset in the last iteration, px (Pan, Li and Tong 2013)."""
+"""Size of the last iteration's step, see :func:`step_size`, px (Pan, Li and Tong 2013)."""
 MAX_DEPARTURE = 0.25
 """Distance from the initial estimate, over half the side of a subset, at which an alignment is rejected."""
 ZERO, ONE, TWO, THREE = np.float32(0), np.uintp(1), np.uintp(2), np.uintp(3)
@@ -73,9 +73,9 @@ def warped_subset(padded, centre, half, warp, values):
     """Write the zero-mean values g - mean g at the warped positions of a subset; return |g - mean g|."""
     side, columns = 2 * half + 1, np.int32(padded.shape[1])
     right, bottom = np.float32(padded.shape[1] - 4.001), np.float32(padded.shape[0] - 4.001)
-    flat, row_length = padded.reshape(-1), np.uintp(columns)
     step_x, step_y = np.float32(1 + warp[1]), np.float32(warp[4])
-    first, lateral, axial = np.empty(side, np.int32), np.empty(side, np.float32), np.empty(side, np.float32)
+    first, lateral, axial = np.empty(side, np.int32), np.empty(side, np.float32), np.empty((4, side), np.float32)
+    sums = np.empty(4 * side, np.float32)
     for row in range(side):
         dy = row - half
         x = np.float32(centre[0] + warp[0] + warp[2] * dy)
@@ -84,20 +84,30 @@ def warped_subset(padded, centre, half, warp, values):
             dx = np.float32(k - half)
             u, v = min(max(x + step_x * dx, ZERO), right), min(max(y + step_y * dx, ZERO), bottom)
             j, i = np.int32(u), np.int32(v)
-            first[k], lateral[k], axial[k] = i * columns + j, u - np.float32(j), v - np.float32(i)
-        # Unsigned indices: for signed ones the compiler would test whether they count from the end.
+            first[k], lateral[k] = i * columns + j, u - np.float32(j)
+            axial[0, k], axial[1, k], axial[2, k], axial[3, k] = spline.bspline_weights(v - np.float32(i))
+        sum_axially(padded.reshape(-1), np.uintp(columns), first, axial, sums)
         for k in range(side):
-            a = np.uintp(first[k])
-            b, c, d = a + row_length, a + row_length + row_length, a + row_length + row_length + row_length
-            p, q, r, s = spline.bspline_weights(axial[k])
+            a = np.uintp(4) * np.uintp(k)
             e, f, g, h = spline.bspline_weights(lateral[k])
-            values[row, k] = (
-                e * (p * flat[a] + q * flat[b] + r * flat[c] + s * flat[d])
-                + f * (p * flat[a + ONE] + q * flat[b + ONE] + r * flat[c + ONE] + s * flat[d + ONE])
-                + g * (p * flat[a + TWO] + q * flat[b + TWO] + r * flat[c + TWO] + s * flat[d + TWO])
-                + h * (p * flat[a + THREE] + q * flat[b + THREE] + r * flat[c + THREE] + s * flat[d + THREE])
-            )
+            values[row, k] = e * sums[a] + f * sums[a + ONE] + g * sums[a + TWO] + h * sums[a + THREE]
     return subtract_mean(values)
+
+
+@numba.njit(cache=True, nogil=True)
+def sum_axially(flat, row_length, first, weights, sums):
+    """Write the sums of 4 x 4 coefficients (first and three beside it, in four rows) times weights (4, n); (4 n,)."""
+    # Unsigned indices: for signed ones the compiler would test whether they count from the end. Written out, the four
+    # columns are loaded and summed as one vector.
+    for k in range(len(first)):
+        a, out = np.uintp(first[k]), np.uintp(4) * np.uintp(k)
+        b, c, d = a + row_length, a + row_length + row_length, a + row_length + row_length + row_length
+        p, q, r, s = weights[0, k], weights[1, k], weights[2, k], weights[3, k]
+        e = p * flat[a] + q * flat[b] + r * flat[c] + s * flat[d]
+        f = p * flat[a + ONE] + q * flat[b + ONE] + r * flat[c + ONE] + s * flat[d + ONE]
+        g = p * flat[a + TWO] + q * flat[b + TWO] + r * flat[c + TWO] + s * flat[d + TWO]
+        h = p * flat[a + THREE] + q * flat[b + THREE] + r * flat[c + THREE] + s * flat[d + THREE]
+        sums[out], sums[out + ONE], sums[out + TWO], sums[out + THREE] = e, f, g, h
 
 
 @numba.njit(cache=True, nogil=True)
@@ -161,10 +171,23 @@ def hessian(gradient_x, gradient_y):
 @numba.njit(cache=True, nogil=True)
 def project(gradient_x, gradient_y, values):
     """sum (df/dp)^T values, (6,)."""
-    result = np.empty(6)
-    lateral, axial = moments(gradient_x, values), moments(gradient_y, values)
-    for i in range(3):
-        result[i], result[i + 3] = lateral[i], axial[i]
+    half, side = len(values) // 2, len(values)
+    columns, result = np.zeros((4, side)), np.zeros(6)
+    for row in range(side):
+        dy = row - half
+        for k in range(side):
+            value = np.float64(values[row, k])
+            lateral, axial = gradient_x[row, k] * value, gradient_y[row, k] * value
+            columns[0, k] += lateral
+            columns[1, k] += dy * lateral
+            columns[2, k] += axial
+            columns[3, k] += dy * axial
+    for k in range(side):
+        dx = k - half
+        for c in range(2):
+            result[3 * c] += columns[2 * c, k]
+            result[3 * c + 1] += dx * columns[2 * c, k]
+            result[3 * c + 2] += columns[2 * c + 1, k]
     return result
 
 
@@ -215,14 +238,15 @@ def compose_inverse(warp, step):
 
 
 @numba.njit(cache=True, nogil=True)
-def corner_displacement(step, half):
-    """Upper bound of the displacement of a corner of a subset, px."""
-    return abs(step[0]) + abs(step[3]) + half * (abs(step[1]) + abs(step[2]) + abs(step[4]) + abs(step[5]))
+def step_size(step, half):
+    """Norm of a warp whose gradients are multiplied by half a side, px (Pan, Li and Tong 2013)."""
+    gradients = step[1] * step[1] + step[2] * step[2] + step[4] * step[4] + step[5] * step[5]
+    return np.sqrt(step[0] * step[0] + step[3] * step[3] + half * half * gradients)
 
 
 @numba.njit(cache=True, nogil=True)
-def refine(padded, centre, half, template_terms, warp):
-    """Refine one warp in place; return False if the alignment is rejected.
+def refine(padded, centre, half, template_terms, warp, warped):
+    """Refine one warp in place.
 
     Parameters
     ----------
@@ -236,25 +260,32 @@ def refine(padded, centre, half, template_terms, warp):
         f - mean f, df/dx, df/dy, each (side, side), |f - mean f|, and the Cholesky factor of the Hessian (6, 6).
     warp
         Initial estimate, replaced by the result.
+    warped
+        Output: g - mean g (side, side) before the last step, which is too small to matter.
+
+    Returns
+    -------
+    |g - mean g|; 0 if the alignment is rejected.
     """
     values, gradient_x, gradient_y, norm, lower = template_terms
-    warped, template_projection = np.empty_like(values), project(gradient_x, gradient_y, values)
+    template_projection = project(gradient_x, gradient_y, values)
     start_x, start_y = warp[0], warp[3]
+    warped_norm = 0.0
     for _ in range(MAX_ITERATIONS):
         warped_norm = warped_subset(padded, centre, half, warp, warped)
         if warped_norm == 0:
-            return False
+            return 0.0
         step = project(gradient_x, gradient_y, warped)
         for i in range(6):
             step[i] = norm / warped_norm * step[i] - template_projection[i]
         solve_cholesky(lower, step)
         if not compose_inverse(warp, step):
-            return False
+            return 0.0
         if np.hypot(warp[0] - start_x, warp[3] - start_y) > MAX_DEPARTURE * half:
-            return False
-        if corner_displacement(step, half) < CONVERGENCE:
+            return 0.0
+        if step_size(step, half) < CONVERGENCE:
             break
-    return True
+    return warped_norm
 
 
 @numba.njit(cache=True, nogil=True)
@@ -284,12 +315,15 @@ def align(first, second, points, half, min_std, warps, ncc):
         norm = template(first, centre, half, values, gradient_x, gradient_y)
         lower = hessian(gradient_x, gradient_y)
         cholesky(lower)
-        refined = warps[point].copy()
-        template_terms = (values, gradient_x, gradient_y, norm, lower)
-        if lower[0, 0] > 0 and refine(second, centre, half, template_terms, refined):
+        refined, warped_norm = warps[point].copy(), 0.0
+        if lower[0, 0] > 0:
+            template_terms = (values, gradient_x, gradient_y, norm, lower)
+            warped_norm = refine(second, centre, half, template_terms, refined, warped)
+        if warped_norm > 0:
             for i in range(6):
                 warps[point, i] = refined[i]
-        warped_norm = warped_subset(second, centre, half, warps[point], warped)
+        else:
+            warped_norm = warped_subset(second, centre, half, warps[point], warped)
         if min(norm, warped_norm) > min_std * side:
             ncc[point] = moments(values, warped)[0] / (norm * warped_norm)
         else:
