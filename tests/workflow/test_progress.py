@@ -87,6 +87,15 @@ def test_compilation_in_the_first_heart_does_not_count_for_the_others():
     assert run.progress.seconds_left == pytest.approx(2 * 80)
 
 
+def test_compiling_longer_than_expected_does_not_make_the_rest_longer():
+    run = Run(mechanics=40, imaging=100, compile=1)
+    run.read("Provided cores: 1\ncompile               1\nmechanics               1\nimaging               4\n")
+    run.read(began("compile", 1))
+    run.now = 30
+    run.read(ended("compile", 1))
+    assert run.progress.seconds_left == pytest.approx(40 + 4 * 100)
+
+
 def test_work_that_is_done_ahead_counts_once():
     run = Run(mechanics=40, imaging=100, tracking=60)
     run.read(PLAN + "tracking                5\n")

@@ -14,8 +14,7 @@ from echotruth.repository.provenance import code_version
 
 CACHE_GROUPS = {
     "mechanics": ("mechanics", "physiology"),
-    "imaging": ("phantom", "truth", "rf", "bmode"),
-    "tracking": ("tracking", "evaluation"),
+    "view": ("phantom", "truth", "rf", "bmode", "tracking", "evaluation"),
     "report": ("report",),
 }
 """Stages that share a cache, because they run in the same jobs or call the same functions."""

@@ -236,8 +236,7 @@ def _durations(
         "imaging": parts["images"].seconds / clips,
         "tracking": parts["tracking"].seconds / clips,
         COMPILATION: compiled.get("mechanics", 0.0),
-        "compile_imaging": compiled.get("imaging", 1.0),
-        "compile_tracking": compiled.get("tracking", 1.0),
+        "compile": compiled.get("view", expected_cost.MINIATURE_SECONDS),
         "repository": report * 0.2,
         "report": report * 0.3,
         "report_images": report * 0.3,
@@ -253,13 +252,12 @@ def _wall_seconds(parts: dict[str, Part], expected: dict[str, float], hearts: in
         parts["snakemake"].seconds,
         expected["repository"] + max(expected["report"], expected["report_images"]) + expected["report_page"],
     )
-    compile_ = expected[COMPILATION] + expected["compile_imaging"] + expected["compile_tracking"]
+    compile_ = expected[COMPILATION] + expected["compile"]
     if hearts * (1 + views) > MAX_SIMULATED:
         return first + last + (compile_ + hearts * (expected["mechanics"] + views * clip)) / cores
     free = [0.0] * cores
     heapq.heapify(free)
-    for name in ("compile_imaging", "compile_tracking"):
-        heapq.heappush(free, heapq.heappop(free) + expected[name])
+    heapq.heappush(free, heapq.heappop(free) + expected["compile"])
     ready = []
     for heart in range(hearts):
         end = heapq.heappop(free) + expected["mechanics"] + (expected[COMPILATION] if heart == 0 else 0.0)

@@ -16,8 +16,7 @@ DEFAULT_SECONDS = {
     "physiology": 3.0,
     "imaging": 100.0,
     "tracking": 60.0,
-    "compile_imaging": 45.0,
-    "compile_tracking": 40.0,
+    "compile": 35.0,
     "repository": 3.0,
     "report": 12.0,
     "report_images": 12.0,
@@ -187,7 +186,7 @@ class Progress:
         """Running rules, such as `imaging (2 of 4)`."""
         running = {job.rule for job in self._running.values()}
         rules = [rule for rule in self._planned if rule in running]
-        shown = [rule for rule in rules if not rule.startswith("compile")] or rules
+        shown = [rule for rule in rules if rule != "compile"] or rules
         texts = (f"{rule} ({self._job_number(rule)} of {self._planned[rule]})" for rule in shown)
         return ", ".join(texts).replace("_", " ") or "starting"
 
@@ -219,9 +218,10 @@ class Progress:
 
     @property
     def _slowdown(self) -> float:
-        """Measured over expected duration of the finished jobs."""
-        expected = sum(self._usual_seconds(rule) * len(durations) for rule, durations in self._durations.items())
-        return sum(map(sum, self._durations.values())) / expected if expected else 1.0
+        """Measured over expected duration of the finished jobs; what there is to compile tells nothing of others."""
+        finished = {rule: durations for rule, durations in self._durations.items() if rule != "compile"}
+        expected = sum(self._usual_seconds(rule) * len(durations) for rule, durations in finished.items())
+        return sum(map(sum, finished.values())) / expected if expected else 1.0
 
     def _remaining_work(self, rule: str) -> float:
         """Remaining work of the unfinished jobs of a rule, s; each running job has at least 1/20 of its work left."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import os
 import shutil
 from importlib import import_module
 from pathlib import Path
@@ -34,7 +33,6 @@ def command() -> argparse.ArgumentParser:
         "--then", nargs="+", default=[], help="stages of other rules, to be carried out ahead of these"
     )
     command.add_argument("--ahead", type=Path, help="folder for the records of stages that are carried out ahead")
-    command.add_argument("--cache", help="folder with the compiled functions of stages that are carried out ahead")
     return command
 
 
@@ -79,7 +77,6 @@ def run_ahead(arguments: argparse.Namespace, cost: Cost) -> None:
     ahead.mkdir(parents=True)
     begun.touch()
     try:
-        _use_cache(arguments.cache)
         for stage, job in _open(arguments.then, arguments).items():
             prepare(job, arguments.threads)
             job.ahead = ahead
@@ -124,12 +121,3 @@ def _share(job: Job, case: str, cost: Cost) -> None:
 def _work(stage: str) -> Work:
     """Work of a stage; its script is imported when it is needed."""
     return import_module(f"echotruth.workflow.scripts.{stage}").work
-
-
-def _use_cache(folder: str | None) -> None:
-    """Compiled functions of modules that are imported from now on stand in another folder."""
-    if folder is not None:
-        import numba
-
-        os.environ["NUMBA_CACHE_DIR"] = folder
-        numba.config.CACHE_DIR = folder  # type: ignore[attr-defined]  # set at run time

@@ -177,8 +177,10 @@ def _look_up(position, centres, grid, log_derivative, delay, sound_speed, index,
             g = a * log_derivative[i, j] + b * log_derivative[i + 1, j]
             g += c * log_derivative[i, j + 1] + d * log_derivative[i + 1, j + 1]
             late = a * delay[i, j] + b * delay[i + 1, j] + c * delay[i, j + 1] + d * delay[i + 1, j + 1]
-            index[n, part] = row, column
-            terms[n, part] = 1 / range_, late * sound_speed, g.real, g.imag
+            # Entry by entry, which compiles in half the time.
+            index[n, part, 0], index[n, part, 1] = row, column
+            terms[n, part, 0], terms[n, part, 1] = 1 / range_, late * sound_speed
+            terms[n, part, 2], terms[n, part, 3] = g.real, g.imag
 
 
 def _log_derivative(beam: NDArray, derivative: NDArray, band: Band, centre: float) -> NDArray:

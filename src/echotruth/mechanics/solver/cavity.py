@@ -101,17 +101,17 @@ def volume_hessian(nodes: Floats, endo: Integers, hessian: Floats) -> None:
 def _facet_hessian(nodes: Floats, facet: Integers, hessian: Floats) -> None:
     """Sum over the points of the second derivatives of -weight / 3 det(x, x,1, x,2)."""
     hessian[:] = 0.0
-    columns, operators, axis = np.empty((3, 3)), np.empty((6, 3)), np.empty(3)
+    columns, axis = np.empty((3, 3)), np.empty(3)
     for q in range(_WEIGHT.shape[0]):
-        operators[:, 0], operators[:, 1:] = _N[q], _DN_DXI[q]
+        operators = _OPERATORS[:, q]
         columns[:] = 0.0
         for a in range(6):
             for s in range(3):
                 for i in range(3):
-                    columns[s, i] += operators[a, s] * nodes[facet[a], i]
+                    columns[s, i] += operators[s, a] * nodes[facet[a], i]
         for a in range(6):
             for b in range(6):
-                _hessian_axis(operators[a], operators[b], columns, -_WEIGHT[q] / 3, axis)
+                _hessian_axis(operators[:, a], operators[:, b], columns, -_WEIGHT[q] / 3, axis)
                 _add_cross(axis, hessian[3 * a : 3 * a + 3, 3 * b : 3 * b + 3])
 
 

@@ -38,9 +38,8 @@ rule imaging:
     shell:
         """
         {{
-            {COMPILE[tracking]}
-            {COMPILE[imaging]}
+            {COMPILE[view]}
             {RUN}/series.py {FOLDER} {wildcards.case} phantom truth rf bmode --view {wildcards.view} {IMAGING:{wildcards.case}} \\
-                --threads {threads} --then tracking evaluation --ahead {TRACKING_AHEAD:{wildcards.case}/{wildcards.view}/} --cache {TRACKING_CACHE}
+                --threads {threads} --then tracking evaluation --ahead {TRACKING_AHEAD:{wildcards.case}/{wildcards.view}/}
         }} &> {log}
         """

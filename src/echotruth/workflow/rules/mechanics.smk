@@ -28,8 +28,8 @@ rule mechanics:
         heart_group
     log:
         FOLDER / "logs/mechanics/{case}.log",
-    # One core is left for the jobs that compile at the same time.
-    threads: max(1, ((workflow.cores or 1) - any(not Path(mark).exists() for mark in MARKS.values())) // len(CASES))
+    # One core is left for the job that compiles at the same time.
+    threads: max(1, ((workflow.cores or 1) - (not Path(MARK).exists())) // len(CASES))
     priority: 3
     resources:
         runtime=minutes(demand.mechanics),

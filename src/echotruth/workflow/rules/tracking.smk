@@ -3,7 +3,6 @@
 The job of the images has mostly done this already. Then its records are only moved to the ledger.
 """
 
-TRACKING_CACHE = quote(str(Path(CACHE["tracking"]).absolute()))
 TRACKING_CODE = code("tracking", "evaluation")
 
 TRACKING = handed("tracking", "evaluation")
@@ -34,7 +33,7 @@ rule tracking:
                 mv $ahead/tracking.json {output.tracking}
                 mv $ahead/evaluation.json {output.evaluation}
             else
-                {COMPILE[tracking]}
+                {COMPILE[view]}
                 {RUN}/series.py {FOLDER} {wildcards.case} tracking evaluation --view {wildcards.view} {TRACKING:{wildcards.case}} \\
                     --threads {threads}
             fi

@@ -1,4 +1,4 @@
-"""Compile and cache the functions that a group of stages calls, by running the stages on a miniature."""
+"""Compile and cache the functions that the stages of a view call, by running the stages on a miniature."""
 
 import argparse
 import fcntl
@@ -16,21 +16,14 @@ from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.mechanics.prescribed import prescribed_motion
-from echotruth.seeds import generator
 from echotruth.workflow import lease
 from echotruth.workflow.assignment import single
+from echotruth.workflow.compiled import CACHE_GROUPS
 from echotruth.workflow.cost import Cost
-from echotruth.workflow.job import Job, Result, parser, run
+from echotruth.workflow.job import parser, run
 from echotruth.workflow.miniature import miniature
 
-STAGES = {"imaging": ("phantom", "truth", "rf", "bmode"), "tracking": ("phantom", "truth", "tracking", "evaluation")}
-"""Group -> stages that are run on the miniature; the images that are tracked are noise."""
-
-
-def noise_images(job: Job) -> Result:
-    config, random = job.case.config, generator(job.case, str(job.view_name), "bmode")
-    size = config.bmode.size_px
-    return {f"bmode/{size}": {"image": random.integers(256, size=(config.loop.frames, size, size), dtype=np.uint8)}}
+STAGES = CACHE_GROUPS["view"]
 
 
 def image_all_ranges(config: Config) -> None:
@@ -40,7 +33,7 @@ def image_all_ranges(config: Config) -> None:
     Scanner(config.probe, config.rf, depth).lines(position, np.ones(100))
 
 
-def run_miniature(group: str, path: Path) -> None:
+def run_miniature(path: Path) -> None:
     config = miniature(single(load(path)))
     with tempfile.TemporaryDirectory() as repository:
         cases = expand(config)
@@ -48,20 +41,16 @@ def run_miniature(group: str, path: Path) -> None:
         cost, case = Cost(), [repository, cases[0].id]
         arguments = parser("mechanics", None, False).parse_args(case)
         run("mechanics", lambda job: prescribed_motion(job.case.config), arguments, cost)
-        if group == "imaging":
-            image_all_ranges(config)
+        image_all_ranges(config)
         for view in config.views:
-            arguments = parser(group, None).parse_args([*case, view])
-            if group == "tracking":
-                run("bmode", noise_images, arguments, cost)
-            for stage in STAGES[group]:
+            arguments = parser("view", None).parse_args([*case, view])
+            for stage in STAGES:
                 run(stage, import_module(stage).work, arguments, cost)
 
 
 def main() -> None:
     command = argparse.ArgumentParser(description=__doc__)
     command.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
-    command.add_argument("group", choices=STAGES)
     command.add_argument("mark", type=Path, help="empty file written at the end; if it exists, nothing is done")
     command.add_argument("--config", type=Path, help="file with the configuration (default: config.yaml there)")
     arguments = command.parse_args()
@@ -76,7 +65,7 @@ def main() -> None:
         if arguments.mark.exists():
             return
         try:
-            run_miniature(arguments.group, arguments.config or arguments.repository / "config.yaml")
+            run_miniature(arguments.config or arguments.repository / "config.yaml")
         except (Exception, SystemExit):
             logging.getLogger("echotruth").exception("the miniature failed: every job compiles its functions itself")
         arguments.mark.touch()
