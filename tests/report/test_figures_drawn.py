@@ -73,6 +73,7 @@ def coloured(picture, colour):
     return np.count_nonzero((abs(picture.astype(int) - wanted) < 4).all(axis=-1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("species", [*physiology.PUBLISHED, "none"])
 def test_physiology(tmp_path, species):
     published = physiology.PUBLISHED.get(species, {})
@@ -83,6 +84,7 @@ def test_physiology(tmp_path, species):
     assert shades > 10000 + coloured(bare, style.SHADE), "isovolumic phases are shaded where there are any"
 
 
+@pytest.mark.slow
 def test_physiology_of_a_prescribed_motion_has_words_in_place_of_pressure_and_volume(tmp_path):
     nothing = physiology.draw(tmp_path / "a.png", cycle(np.full(10, np.nan), (np.nan,) * 3), {})
     curves = physiology.draw(tmp_path / "b.png", cycle(500 + 13000 * WAVE, (np.nan,) * 3), {})
@@ -96,6 +98,7 @@ def test_resolutions(tmp_path):
     seen(resolutions.draw(tmp_path / "one.png", images[:1], 120e-3))
 
 
+@pytest.mark.slow
 def test_views(tmp_path):
     image = np.random.default_rng(0).integers(0, 256, (64, 64)).astype(np.uint8)
     layer = np.zeros((64, 64), int)
@@ -120,6 +123,7 @@ def test_error(tmp_path):
     seen(error.draw(tmp_path / "error.png", {"mid": errors, "long_axis": errors}, ["long_axis"]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hearts", [1, 5])
 def test_leaderboard(tmp_path, hearts):
     random = np.random.default_rng(0)
@@ -192,6 +196,18 @@ def panel(tracked):
 def test_curves(tmp_path):
     rows = [[panel({"one": -17 * WAVE, "two": np.full(10, np.nan)}), None], [panel({}), panel({"one": -17 * WAVE})]]
     seen(curves.draw(tmp_path / "curves.png", rows))
+
+
+def test_panel_whose_trackers_have_no_values_says_so_and_others_do_not():
+    nothing = np.full(10, np.nan)
+
+    def words(tracked):
+        axes = Figure().subplots()
+        curves._panel(axes, panel(tracked))
+        return [text.get_text() for text in axes.texts]
+
+    assert words({"one": nothing, "two": nothing}) == [curves.NO_VALUES]
+    assert words({"one": nothing, "two": WAVE}) == words({}) == []
 
 
 def test_axis_of_curves_shows_truth_and_best_tracker_and_is_not_ruled_by_the_worst():

@@ -18,6 +18,9 @@ ROOM = 0.6
 """Range of an axis beyond that of the truth and of the best tracker, to either side, over it; the curves of other
 trackers may leave it."""
 
+NO_VALUES = "no tracked values:\nis the grid too coarse?"
+"""Words in a panel without curves of trackers: strain needs several points through the wall (`tracking.grid_px`)."""
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -82,6 +85,9 @@ def _panel(axes: Axes, panel: Panel) -> None:
     axes.plot(panel.time, panel.true, color=style.TRUTH, linewidth=2.6, zorder=2)
     for number, (_, values) in reversed(list(enumerate(panel.tracked.items()))):
         axes.plot(panel.time, values, color=style.series_colour(number), linewidth=1.3, zorder=3)
+    if panel.tracked and not np.isfinite(list(panel.tracked.values())).any():
+        text = axes.text(0.5, 0.4, NO_VALUES, transform=axes.transAxes, color=style.MUTED, fontsize=7, zorder=4)
+        text.set(ha="center", va="center", bbox={"facecolor": style.PAPER, "edgecolor": "none", "pad": 2})
     axes.set_ylim(*_limits(panel))
     axes.margins(x=0.01)
     axes.set_title(f"{panel.title} ({panel.unit})", fontsize=8, loc="left")
