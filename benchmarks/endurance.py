@@ -1,24 +1,27 @@
-"""Sweeps that run unattended: killed at random moments, or on other numbers of cores, they give the same bytes.
+"""Sweeps that run unattended, are killed, or run on other cores or a cluster give the same bytes, in a bucket too.
 
     python benchmarks/endurance.py kills --folder /tmp/kills --kills 20
     python benchmarks/endurance.py hearts --folder /tmp/hearts --hearts 100
 
 `kills` makes a repository of small beating hearts in one go. Then it makes it again and again, and kills with SIGKILL,
 at random moments and in turn, all processes of the run, its runner alone, its Snakemake alone, or one job. After each
-kill the run is started again. `hearts` makes a hundred hearts on two cores and on one. Both compare all files of the
-hierarchy, and add to results/endurance.json.
+kill the run is started again. `hearts` makes a hundred hearts on two cores, on a SLURM of this machine
+(tests/cluster/slurm.sh), on two cores with a bucket of an S3 server on this machine, and on one core. Both compare all
+files of the hierarchy, of the bucket its objects, and add to results/endurance.json.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import logging
 import os
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 
@@ -39,6 +42,8 @@ physiology: {{exclude_implausible: false}}
 cases: {{mechanics.material.stiffness_kPa: {stiffnesses}}}
 """
 RESULTS = Path(__file__).parent / "results/endurance.json"
+CLUSTER = Path(__file__).parents[1] / "tests/cluster/slurm.sh"
+TWO_CORES = ("--cores", "2")
 SHORTEST, LONGEST = 2.0, 25.0
 """Time until a kill, s."""
 RESTARTS = 200
@@ -58,25 +63,17 @@ def configure(folder: Path, hearts: int) -> Path:
     return folder
 
 
-def start(folder: Path, cores: int) -> subprocess.Popen[bytes]:
-    """Start a run in a folder."""
-    command = [
-        sys.executable,
-        "-c",
-        "from echotruth.cli import main; main()",
-        "run",
-        "small.yaml",
-        "--cores",
-        str(cores),
-    ]
+def start(folder: Path, *options: str, prefix: Sequence[str] = ()) -> subprocess.Popen[bytes]:
+    """Start a run in a folder with options of `echotruth run`; the prefix is a command that runs a command."""
+    command = [*prefix, sys.executable, "-c", "from echotruth.cli import main; main()", "run", "small.yaml", *options]
     with (folder / "output.txt").open("ab") as output:
         return subprocess.Popen(command, cwd=folder, stdout=output, stderr=output, start_new_session=True)
 
 
-def finish(folder: Path, cores: int) -> float:
+def finish(folder: Path, *options: str, prefix: Sequence[str] = ()) -> float:
     """Run to the end; give the time, s."""
     begin = time.monotonic()
-    if start(folder, cores).wait():
+    if start(folder, *options, prefix=prefix).wait():
         raise RuntimeError(f"{folder}: the run failed: see {folder / 'output.txt'}")
     return time.monotonic() - begin
 
@@ -141,14 +138,14 @@ def kill(run: subprocess.Popen[bytes], victim: str) -> bool:
 def kills(folder: Path, number: int, hearts: int) -> dict:
     """Kill runs until a number of kills is reached and the repository is made; do so with as many as it takes."""
     random = np.random.default_rng(2026)
-    finish(whole := configure(folder / "whole", hearts), 2)
+    finish(whole := configure(folder / "whole", hearts), *TWO_CORES)
     expected, done, lost, rounds = content(whole), {name: 0 for name in VICTIMS}, [], 0
     while sum(done.values()) < number:
         rounds += 1
         killed = configure(folder / f"killed_{rounds}", hearts)
         for _ in range(RESTARTS):
             victim = list(VICTIMS)[sum(done.values()) % len(VICTIMS)]
-            run, moment = start(killed, 2), float(random.uniform(SHORTEST, LONGEST))
+            run, moment = start(killed, *TWO_CORES), float(random.uniform(SHORTEST, LONGEST))
             before = records(killed)
             try:
                 run.wait(moment)
@@ -166,14 +163,62 @@ def kills(folder: Path, number: int, hearts: int) -> dict:
     return {"kills": done, "repositories": rounds, "files": len(expected), "most_records_lost": max(lost)}
 
 
-def unattended(folder: Path, hearts: int) -> dict:
-    """Make many hearts on two cores and on one."""
-    folders = {cores: configure(folder / f"cores_{cores}", hearts) for cores in (2, 1)}
-    seconds = {cores: round(finish(folders[cores], cores)) for cores in folders}
-    first, second = (content(path) for path in folders.values())
-    if first != second:
-        raise RuntimeError(f"{folder}: the bytes depend on the number of cores")
-    return {"hearts": hearts, "files": len(first), "seconds": seconds, "same_bytes": first == second}
+@contextmanager
+def bucket() -> Iterator[Callable[[], dict[str, str]]]:
+    """An S3 server on this machine; what is given reads the hierarchy in it: path of every file -> hash."""
+    import boto3
+    from moto.server import ThreadedMotoServer
+
+    os.environ |= {"AWS_ACCESS_KEY_ID": "some", "AWS_SECRET_ACCESS_KEY": "secret", "AWS_REGION": "us-east-1"}
+    logging.getLogger("werkzeug").setLevel(logging.ERROR)  # it would print a line for every object
+    server = ThreadedMotoServer("127.0.0.1", port=0, verbose=False)
+    server.start()
+    host, port = server.get_host_and_port()
+    os.environ["AWS_ENDPOINT_URL"] = f"http://{host}:{port}"
+    client = boto3.client("s3", region_name="us-east-1")
+    client.create_bucket(Bucket="bucket")
+    prefix = "hearts/small.zarr/"
+
+    def objects() -> dict[str, str]:
+        pages = client.get_paginator("list_objects_v2").paginate(Bucket="bucket", Prefix=prefix)
+        keys = [entry["Key"] for page in pages for entry in page.get("Contents", [])]
+        bodies = ((key, client.get_object(Bucket="bucket", Key=key)["Body"].read()) for key in keys)
+        return {key.removeprefix(prefix): sha256(body).hexdigest() for key, body in bodies}
+
+    try:
+        yield objects
+    finally:
+        server.stop()
+
+
+def unattended(folder: Path, hearts: int) -> Iterator[dict]:
+    """Make many hearts in four ways; after each, what has been found."""
+    seconds: dict[str, int] = {}
+    expected: dict[str, str] = {}
+
+    def compared(way: str, found: dict[str, str]) -> dict:
+        if found != (expected or found):
+            raise RuntimeError(f"{folder / way}: other bytes than {folder / 'two_cores'}")
+        expected.update(found)
+        return {"hearts": hearts, "files": len(expected), "seconds": dict(seconds), "same_bytes": True}
+
+    def made(way: str, *options: str, prefix: Sequence[str] = ()) -> dict[str, str]:
+        seconds[way] = round(finish(configure(folder / way, hearts), *options, prefix=prefix))
+        return content(folder / way)
+
+    yield compared("two_cores", made("two_cores", *TWO_CORES))
+    yield compared("slurm", made("slurm", "--profile", "slurm", prefix=[str(CLUSTER)]))
+    with bucket() as objects:
+        made("s3", *TWO_CORES, "--upload", "s3://bucket/hearts")
+        yield compared("s3", objects())
+    yield compared("one_core", made("one_core", "--cores", "1"))
+
+
+def save(what: str, row: dict) -> None:
+    """Add a row to the results."""
+    print(json.dumps(row), flush=True)
+    rows = json.loads(RESULTS.read_text()) if RESULTS.is_file() else {}
+    RESULTS.write_text(json.dumps(rows | {what: row}, indent=1) + "\n")
 
 
 def main() -> None:
@@ -186,12 +231,10 @@ def main() -> None:
     arguments = parser.parse_args()
     os.environ["MPLBACKEND"] = "agg"
     if arguments.what == "kills":
-        row = kills(arguments.folder, arguments.kills, arguments.hearts or 4)
+        save("kills", kills(arguments.folder, arguments.kills, arguments.hearts or 4))
     else:
-        row = unattended(arguments.folder, arguments.hearts or 100)
-    print(json.dumps(row))
-    rows = json.loads(RESULTS.read_text()) if RESULTS.is_file() else {}
-    RESULTS.write_text(json.dumps(rows | {arguments.what: row}, indent=1) + "\n")
+        for row in unattended(arguments.folder, arguments.hearts or 100):
+            save("hearts", row)
 
 
 if __name__ == "__main__":
