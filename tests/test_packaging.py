@@ -72,7 +72,7 @@ def test_command_works_from_the_wheel_in_an_empty_folder(wheel, tmp_path):
 def test_shipped_configurations_travel_in_the_wheel_and_are_found_there(wheel, tmp_path):
     assert files(ROOT / "config") == files(wheel / "echotruth/examples")
     code = f"import sys; sys.path.insert(0, {str(wheel)!r}); from echotruth.cli import main; main()"
-    for arguments in (["new", "hearts"], ["check", "hearts.yaml"], ["check", "sweep"]):
+    for arguments in (["new", "hearts"], ["cases", "hearts.yaml"], ["cases", "sweep"]):
         done = subprocess.run(
             [sys.executable, "-c", code, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
         )

@@ -46,7 +46,7 @@ def is_refused(status, output, errors):
 
 
 @pytest.mark.parametrize("name, cases", [("demo", 1), ("sweep", 108), ("human", 1), ("hearts", 24)])
-def test_check_accepts_a_shipped_configuration(name, cases):
+def test_check_accepts_a_shipped_configuration(name, cases, roomy_disk):
     status, output, errors = run_cli("check", f"config/{name}.yaml")
     assert (status, errors) == (0, "")
     assert f"valid; cases: {cases}," in output

@@ -20,6 +20,8 @@ from echotruth.viewer.page import Page
 from echotruth.viewer.server import ShowError, opened, serve
 from echotruth.workflow.scripts.cases import lay_out
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def page(catalogue):
@@ -119,14 +121,14 @@ def test_damaged_file_is_said_and_nothing_else_is_shown(shown, tmp_path):
 
 def test_kept_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_missing(shown, tmp_path, monkeypatch):
     folder = Path(shutil.copytree(shown.folder, tmp_path / "known"))
-    (tmp_path / "mine.py").write_text(
+    (tmp_path / "diagonal.py").write_text(
         "import numpy as np\n"
         "def track(frames, points, mask, spacing, frame_time, seed):\n"
         "    course = np.arange(len(frames))[:, None, None]\n"
         "    return course * np.ones((1, len(points), 2)), np.ones((len(frames), len(points)))\n"
     )
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
-    run = prepare(folder, "outside", {"method": "external", "track": "mine:track"}, True)
+    run = prepare(folder, "outside", {"method": "external", "track": "diagonal:track"}, True)
     case_views, sizes = run.case_views([], ["mid"]), run.sizes([SIZES[0]])
     run.check_writable()
     run.write(list(run.rows(case_views, sizes)))

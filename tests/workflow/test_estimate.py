@@ -3,7 +3,6 @@
 import json
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from finished_repository import configured, finish
@@ -51,6 +50,7 @@ def test_memory_of_a_job_is_enough_and_not_twice_what_one_took(name):
     assert 0.75 * stages["mechanics"]["memory_MB"] < found["mechanics"] < 2 * stages["mechanics"]["memory_MB"]
 
 
+@pytest.mark.slow
 def test_this_machine_is_as_fast_as_its_records_say(tmp_path):
     config = configured(seeds=(1, 2))
     folder = tmp_path / config.name
@@ -79,6 +79,7 @@ def test_without_records_the_constants_stand(tmp_path):
     assert measured_speed(tmp_path) == Speed({}), "a folder without a configuration tells nothing"
 
 
+@pytest.mark.slow
 def test_files_are_those_of_a_finished_repository(tmp_path):
     config = configured(seeds=(1, 2, 3))
     folder = tmp_path / config.name
@@ -97,6 +98,7 @@ def test_files_are_those_of_a_finished_repository(tmp_path):
     assert hearts - logs_and_checkpoints == made
 
 
+@pytest.mark.slow
 def test_work_that_is_recorded_is_not_left(tmp_path):
     config = configured(seeds=(1, 2))
     folder = tmp_path / config.name
@@ -190,10 +192,7 @@ def test_years_of_cpu_time_and_millions_of_files_are_warned_of():
 
 
 @pytest.mark.parametrize("name", ["demo", "human", "learning", "sweep", "paper", "realistic", "phantoms", "benchmark"])
-def test_nothing_speaks_against_the_shipped_configurations_where_there_is_space(name, monkeypatch):
-    # The disk on which tests run may be smaller than the sweep.
-    space = SimpleNamespace(f_bavail=10**9, f_frsize=4096, f_files=10**9, f_favail=10**9)
-    monkeypatch.setattr("echotruth.workflow.concerns.os.statvfs", lambda path: space)
+def test_nothing_speaks_against_the_shipped_configurations_where_there_is_space(name, roomy_disk):
     config = load(ROOT / f"config/{name}.yaml")
     assert not concerns(config, estimated(config), Path("none"))
 
