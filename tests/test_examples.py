@@ -12,6 +12,8 @@ import echotruth as et
 from echotruth.config import Config
 from echotruth.loop.cycle import read_loop
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 

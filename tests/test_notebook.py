@@ -60,6 +60,7 @@ def test_every_public_name_is_found_and_a_wrong_one_is_refused():
         _ = et.bead
 
 
+@pytest.mark.slow
 def test_clip_carries_the_exact_shift_and_its_units(clip):
     moved = clip["displacement"].isel(frame=1).where(clip["mask"].isel(frame=1))
     quantum = clip["displacement"].attrs["quantum"]
@@ -260,6 +261,7 @@ def test_another_heart_than_the_one_imaged_is_refused(clip):
         et.point_tracks(other, clip, [[1.0, 2.0]])
 
 
+@pytest.mark.slow
 def test_scores_of_smaller_images_are_at_the_same_points_of_the_tissue(clip, heart):
     small = et.image(heart, size=64)
     at_all, at_half = (et.evaluate(et.track(each, "dis"), heart) for each in (clip, small))
@@ -267,6 +269,7 @@ def test_scores_of_smaller_images_are_at_the_same_points_of_the_tissue(clip, hea
     assert np.isfinite(at_all["e_rr_rms_pp"]) and np.isfinite(at_half["e_rr_rms_pp"])
 
 
+@pytest.mark.slow
 def test_lines_are_kept_where_asked(heart, clip):
     lines = et.image(heart, size=64, keep_lines=True)["lines"]
     assert lines.dims == ("frame", "line", "range") and lines.shape[:2] == (3, 48) and lines.dtype == np.complex64

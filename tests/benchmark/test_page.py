@@ -16,6 +16,8 @@ from echotruth.benchmark.standings import METRICS, RANKED_BY, agreement, order, 
 from echotruth.cli import main
 from echotruth.evaluation.tracker_options import EvaluationError
 
+pytestmark = pytest.mark.slow
+
 HEARTS = 12
 
 

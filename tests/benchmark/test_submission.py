@@ -23,6 +23,8 @@ from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import ledger
 from echotruth.workflow.job import Job
 
+pytestmark = pytest.mark.slow
+
 
 def test_honest_tracker_passes_and_is_as_good_on_mirrored_clips(page):
     verdict = page.verdict("honest")

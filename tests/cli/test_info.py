@@ -38,6 +38,7 @@ def test_installation_is_told(call):
     assert float(found["disk"].split()[0]) == pytest.approx(shutil.disk_usage(".").free / 2**30, abs=5)
 
 
+@pytest.mark.slow
 def test_repository_is_told_and_opens_as_it_says(call, finished):
     (finished / "external").mkdir(exist_ok=True)
     (finished / "external/mine.csv").write_text("case\n")

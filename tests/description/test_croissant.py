@@ -7,6 +7,8 @@ from hashlib import sha256
 import pandas as pd
 import pytest
 
+pytestmark = pytest.mark.slow
+
 NEURIPS = {
     *("rai:dataLimitations", "rai:dataBiases", "rai:personalSensitiveInformation", "rai:dataUseCases"),
     *("rai:dataSocialImpact", "rai:hasSyntheticData", "prov:wasDerivedFrom", "prov:wasGeneratedBy"),

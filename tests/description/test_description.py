@@ -18,6 +18,8 @@ from echotruth.repository import ledger
 from echotruth.repository.check import check
 from echotruth.repository.description import DescriptionError, attribution, describe
 
+pytestmark = pytest.mark.slow
+
 SCHEMA = Path(__file__).parent / "cff-1.2.0-schema.json"
 """Schema of the Citation File Format 1.2.0 (Druskat et al., CC BY 4.0, doi 10.5281/zenodo.5171937)."""
 DOCUMENTS = ["clips.csv", "checksums.sha256", "README.md", "CITATION.cff", "croissant.json", "ro-crate-metadata.json"]

@@ -49,6 +49,7 @@ def demo(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PUBLIC)
 def test_examples_of_the_library_run_and_give_what_they_say(name, demo, monkeypatch):
     monkeypatch.chdir(demo)

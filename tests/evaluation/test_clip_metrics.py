@@ -9,6 +9,8 @@ from echotruth.config import Cases
 from echotruth.evaluation.clip_metrics import hearts_of
 from echotruth.evaluation.resampling import by_heart
 
+pytestmark = pytest.mark.slow
+
 TABLE = """case,seed,motion.affine.position,label.heart,label.split,label.group
 a,1,,first,develop,healthy
 b,2,,first,develop,

@@ -8,6 +8,8 @@ import echotruth as et
 from echotruth.repository.rounding import rounded
 from echotruth.workflow.job import Job
 
+pytestmark = pytest.mark.slow
+
 VIEWS = {
     "apical": {"position": 0.8},
     "mid": {"position": 0.5},

@@ -239,6 +239,7 @@ def carried(known, fades):
     return clips
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("view", ["mid", "long"])
 def test_speckle_that_moves_as_a_rigid_body_has_no_floor_and_stays_the_same(known, monkeypatch, view):
     monkeypatch.setattr(floors, "clips", carried(known, fades=False))

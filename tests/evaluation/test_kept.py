@@ -19,6 +19,8 @@ from echotruth.repository import ledger
 from echotruth.repository.ledger import record_path
 from echotruth.workflow.job import Job
 
+pytestmark = pytest.mark.slow
+
 TRACKER = """
 import numpy as np
 

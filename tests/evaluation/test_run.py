@@ -267,6 +267,7 @@ def test_scores_that_could_not_be_written_are_refused_before_the_first_clip(made
     assert (status, output, errors.count("\n")) == (2, "", 1) and "taken/external cannot hold the scores" in errors
 
 
+@pytest.mark.slow
 def test_tracker_that_ends_its_process_is_told_in_one_sentence(made, evaluate):
     status, _, errors = evaluate("--tracker", "custom:crash", "--view", "apex", "--jobs", "2")
     assert status == 2 and errors.count("\n") == 1 and "--command" in errors

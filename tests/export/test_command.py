@@ -30,6 +30,7 @@ def test_command_and_page_have_all_formats():
     assert re.findall(r"`(\w+)`", "".join(rows)) == list(FORMATS)
 
 
+@pytest.mark.slow
 def test_default_is_every_view_at_the_largest_size_beside_the_repository(known, monkeypatch, capsys):
     assert call(monkeypatch, known.folder, "--format", "gif") == 0
     folder = known.folder / "export/gif"
@@ -205,6 +206,7 @@ def test_draft_is_replaced_with_fewer_files(tmp_path):
         assert len(list((tmp_path / "clip").iterdir())) == count
 
 
+@pytest.mark.slow
 def test_sweep_gives_a_file_for_each_heart(monkeypatch, tmp_path):
     folder = finished_repository.finish(tmp_path / "small", finished_repository.configured())
     cases = [case.id for case in expand(finished_repository.configured())]

@@ -21,6 +21,7 @@ def curve(table, quantity, place="", component="", measure="", tracker=""):
     return found
 
 
+@pytest.mark.slow
 def test_every_curve_has_one_row_a_frame_at_its_time(table):
     keys = ["tracker", "quantity", "measure", "place", "component"]
     assert (table.groupby(keys).size() == FRAMES).all() and not table[[*keys, "frame"]].duplicated().any()

@@ -115,6 +115,7 @@ def composed(beating):
     return error, np.abs(elevation).max(axis=0)
 
 
+@pytest.mark.slow
 def test_flow_composes_to_the_motion_since_end_diastole_where_tissue_does_not_leave_the_plane(composed):
     error, elevation = composed
     kept = np.isfinite(error) & (elevation < 1e-6)

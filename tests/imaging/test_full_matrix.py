@@ -58,9 +58,11 @@ def test_other_arrays_come_as_near_to_the_exact_sum(preset, scale, half_angle):
     assert error(probe, position, amplitude, depth=11e-3 * scale) < PLANE_ACCURACY
 
 
-@pytest.mark.parametrize("preset, scale", [("mouse_25MHz", 1), ("human_2_7MHz", 12)])
+@pytest.mark.parametrize(
+    "preset, scale", [("mouse_25MHz", 1), pytest.param("human_2_7MHz", 12, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("depth", [1.5e-3, 4e-3])
-@pytest.mark.parametrize("edge_width", [0.0, 0.5e-3])
+@pytest.mark.parametrize("edge_width", [pytest.param(0.0, marks=pytest.mark.slow), 0.5e-3])
 def test_behind_a_rib_the_rf_is_the_exact_sum_of_what_passes(preset, scale, depth, edge_width):
     probe = Probe(preset=preset)
     edges = {"edge_deg": 3.0, "edge_width_mm": edge_width * scale * 1e3}

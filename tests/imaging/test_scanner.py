@@ -120,6 +120,7 @@ def test_every_transmit_puts_a_point_where_it_is(keys):
     assert peak_position(scanner.angle, image[:, sample]) == pytest.approx(angle, abs=WAVELENGTH / 20 / 5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transmit", ["focused", "plane", "synthetic_aperture"])
 @pytest.mark.usefixtures("exact_record")
 def test_a_linear_scan_puts_a_point_where_it_is(transmit):
@@ -134,6 +135,7 @@ def test_a_linear_scan_puts_a_point_where_it_is(transmit):
     assert peak_position(scanner.scan.line_origin, image[:, sample]) == pytest.approx(lateral, abs=WAVELENGTH / 20)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("exact_record")
 def test_a_synthetic_aperture_is_in_focus_everywhere():
     """Two ways in focus at every depth: the width grows with the depth, where a focused beam is widest off focus."""

@@ -40,6 +40,7 @@ def test_in_the_plane_the_rf_is_the_exact_sum_with_that_power(plane, exponent):
     assert relative(plane(*scatterers, exponent)[::6], exact) < PLANE_ACCURACY * (1 + exponent / 2)
 
 
+@pytest.mark.slow
 def test_in_the_plane_tissues_with_different_powers_add_up_to_the_exact_sum(plane):
     scatterers, exponent = sector(90), np.resize(TISSUES, 90)
     exact = exact_matrix(PROBE, *scatterers, plane.frequency[::6], exponent=exponent, elevation=False)
@@ -86,6 +87,7 @@ def test_at_the_centre_frequency_the_echo_does_not_depend_on_the_power(plane):
     assert np.allclose(steep[middle], factor * flat[middle], rtol=1e-5, atol=1e-6 * np.abs(flat[middle]).max())
 
 
+@pytest.mark.slow
 def test_a_power_of_zero_leaves_every_byte_as_it_is(plane):
     position, amplitude = sector(200)
     assert plane(position, amplitude, np.zeros(200)).tobytes() == plane(position, amplitude).tobytes()

@@ -4,6 +4,8 @@ import pytest
 
 from echotruth import learning
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def table(repository):

@@ -21,6 +21,7 @@ def test_numbers_are_normal_with_standard_deviation_one(positions):
     assert np.mean(values**4) / np.var(values) ** 2 == pytest.approx(3, abs=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", [0.25, 1.0, 2.0, 4.0])
 def test_correlation_falls_with_the_distance_as_a_bell_curve(positions, lengths):
     way = np.random.default_rng(2).normal(size=positions.shape)

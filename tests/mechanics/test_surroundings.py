@@ -132,6 +132,7 @@ def test_pressure_does_the_work_that_wall_and_surroundings_take_up():
     assert works.loop[5] > 0.0
 
 
+@pytest.mark.slow
 def test_a_dashpot_alone_delays_and_a_slow_beat_does_not_feel_it():
     """Its force falls as the rate: at a tenth of the heart rate the tension of the free heart comes back."""
 
@@ -161,6 +162,7 @@ def base_motion(axial_spring, circumferential_spring):
     return endo - epi, np.abs(moved[np.unique(mesh.base), 2]).max()
 
 
+@pytest.mark.slow
 def test_base_on_soft_springs_shears_and_lifts_and_on_stiff_ones_does_neither():
     """Nothing else resists turning: the springs balance each other, and the rims turn against one another."""
     (soft, lifted), (stiff, held) = base_motion(5.0, 0.5), base_motion(1e5, 1e4)
@@ -169,6 +171,7 @@ def test_base_on_soft_springs_shears_and_lifts_and_on_stiff_ones_does_neither():
     assert lifted > 1e-5
 
 
+@pytest.mark.slow
 def test_holding_the_apex_shifts_the_heart_along_its_axis_and_changes_nothing_else():
     loop = Loop(frames=6)
     base, apex = (beat(Config(geometry=COARSE, loop=loop, mechanics=Mechanics(hold=hold))) for hold in ("base", "apex"))

@@ -20,6 +20,7 @@ def config(**loop):
     return Config(geometry=IMAGE, loop=Loop(frames=2, **loop), mechanics=wall)
 
 
+@pytest.mark.slow
 def test_heart_imaged_at_end_diastole_is_met_there():
     arrays, image = beat(config()), left_ventricle(IMAGE)
     geometry, mechanics = arrays["geometry"], arrays["mechanics"]

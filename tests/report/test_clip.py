@@ -42,6 +42,7 @@ def test_gif_and_video(made, tmp_path):
     assert video[4:8] == b"ftyp" and len(video) > 1000
 
 
+@pytest.mark.slow
 def test_gif_of_noise_stays_small(tmp_path):
     frames = np.random.default_rng(0).integers(0, 256, (40, 400, 400, 1)).astype(np.uint8).repeat(3, -1)
     assert clip.gif(tmp_path / "clip.gif", frames).stat().st_size < 1.3 * clip.MAX_GIF_BYTES

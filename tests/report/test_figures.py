@@ -36,6 +36,7 @@ def test_without_a_heart_a_sentence_stands_in_place_of_every_figure(tmp_path):
     assert {path.name for path in tmp_path.glob("*.[gmc]*")} == {"clip.gif", "clip.mp4", "leaderboard.csv"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("label", "hearts"), [("heart", 2), ("group", 3)])
 def test_hearts_of_the_leaderboard_are_told_apart_by_their_label(tmp_path, label, hearts):
     """Without one, cases are hearts, although these have the same motion."""

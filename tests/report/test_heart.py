@@ -37,6 +37,7 @@ def test_centroid_of_straight_cells_is_the_mean_of_the_vertices():
     np.testing.assert_allclose(found, straight[mesh.cells[:, :4]].mean(1), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_heart_with_filling_is_drawn(tmp_path):
     mesh = left_ventricle(Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1))
     count = len(mesh.cells)

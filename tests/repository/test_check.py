@@ -89,7 +89,10 @@ def test_every_damaged_file_is_found_wherever_it_is(folder, harm, count):
     assert set(faults(folder)) == set(files)
 
 
-@pytest.mark.parametrize("seed, harm", list(enumerate([flip, truncate, empty, delete])))
+@pytest.mark.parametrize(
+    "seed, harm",
+    [(0, flip), (3, delete), *(pytest.param(*each, marks=pytest.mark.slow) for each in ((1, truncate), (2, empty)))],
+)
 def test_healing_makes_the_damaged_jobs_again_and_no_others_byte_for_byte(folder, seed, harm):
     before, owners, random = finished.content(folder), finished.owners(folder), np.random.default_rng(seed)
     times = {path: path.stat().st_mtime_ns for path in (folder / "ledger").rglob("*.json")}
@@ -143,6 +146,7 @@ def test_damaged_record_of_the_structure_and_registries_are_found_and_written_ag
     assert check(folder).faults == []
 
 
+@pytest.mark.slow
 def test_strangers_are_found_and_deleted_and_what_is_not_made_yet_is_no_stranger(folder):
     before = finished.content(folder)
     strays = ["bmode/64/image/c/0/0/0/0/0.0123.partial", "bmode/64/image/c/7/0/0/0/0", "mechanics/note.txt", "stray"]
@@ -162,6 +166,7 @@ def test_jobs_that_were_not_run_yet_are_told_and_are_no_damage(folder, capsys):
     assert "1 of 28 jobs have not been run yet" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_command_names_each_fault_in_one_line_and_what_heals_it(folder, capsys):
     delete(folder / "small.zarr/bmode/64/image/c/0/0/0/0/0", None)
     assert check_repository(folder, healing=False) == 1

@@ -10,6 +10,8 @@ import yaml
 
 from echotruth.export import Export, ExportError, Selection, source
 
+pytestmark = pytest.mark.slow
+
 ELEMENTS, FRAMES, SPEED = 24, 2, 1540.0
 
 

@@ -66,6 +66,7 @@ def focused_again(rf, frame, line, along):
     return total * np.exp(-4j * np.pi * rf.attrs["demodulation_frequency"] * along / speed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame, line", [(0, 0), (1, 9)])
 def test_lines_are_the_delayed_sum_of_the_channels_that_are_stored(rf, frame, line):
     near = np.flatnonzero((rf.range > 4e-3) & (rf.range < 8e-3))[::7]

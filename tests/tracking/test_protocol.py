@@ -128,6 +128,7 @@ def test_invalid_input_is_refused(changed, message):
         track(**arguments | changed, settings=PhaseCorrelation())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [np.int16, np.float32])
 def test_any_real_type_of_grey_value_gives_the_same_motion(tall, tracker, kind):
     frames = tall(lambda place, t: place + t * np.array([1.5, 0.5]), 2)

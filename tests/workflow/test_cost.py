@@ -28,6 +28,7 @@ def test_seconds_of_a_stage_are_its_own():
     assert second["cpu_seconds"] < 0.1 and second["seconds"] < second["start_seconds"]
 
 
+@pytest.mark.slow
 def test_compiling_counts_once_however_deep():
     inner = numba.njit(lambda x: np.sort(x).sum())
     outer = numba.njit(lambda x: inner(x) + 1)

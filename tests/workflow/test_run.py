@@ -42,6 +42,7 @@ def test_numbers_of_cores_that_snakemake_takes_are_no_errors(options):
     assert option_errors(options) == []
 
 
+@pytest.mark.slow
 def test_profile_that_is_none_is_refused_before_anything_is_written(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/config.yaml").write_text("jobs: 2\n")

@@ -74,6 +74,7 @@ def test_second_heart_takes_over_the_motion_without_solving_it(shared, monkeypat
             np.testing.assert_array_equal(array, store.read(group, 1, names=(name,))[name])
 
 
+@pytest.mark.slow
 def test_files_are_copied_where_links_are_not_possible(shared, monkeypatch):
     folder, first, second = shared
 
@@ -96,6 +97,7 @@ def test_heart_that_is_written_later_leaves_the_other_as_it_was(shared):
     assert (store.read("mechanics", 1, names=("pressure",))["pressure"] == 1).all()
 
 
+@pytest.mark.slow
 def test_motion_taken_over_twice_leaves_no_drafts(shared):
     folder, first, second = shared
     for _ in range(2):

@@ -25,6 +25,7 @@ def counts(surface):
     return [int(np.sum(surface.labels == number)) for number in range(3)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "geometry",
     [

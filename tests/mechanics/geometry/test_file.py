@@ -88,6 +88,7 @@ def test_keys_that_a_surface_cannot_have(file_heart, surface, write_surface, key
         left_ventricle(Geometry(file=write_surface(file_heart.nodes, surface), **keys))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", ["m", "um"])
 def test_wrong_unit(file_heart, write_mesh, unit):
     with pytest.raises(

@@ -59,6 +59,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fibre", "sheet"), REFUSED)
 def test_refused(file, fibre, sheet):
     with pytest.raises(GeometryError, match=REFUSED[fibre, sheet]):

@@ -45,6 +45,7 @@ def test_tetrahedra_and_surface_give_the_same_wall(human, file_heart, write_mesh
     np.testing.assert_array_equal(whole.cells, shell.cells)
 
 
+@pytest.mark.slow
 def test_numbering_is_that_of_the_ellipsoid(human, write_surface):
     file = write_surface(1e3 * human.nodes, surface(human))
     mesh, other = left_ventricle(Geometry(file=file, remesh=True, **FEW)), left_ventricle(Geometry(**FEW))
@@ -52,6 +53,7 @@ def test_numbering_is_that_of_the_ellipsoid(human, write_surface):
     assert [len(mesh.endo), len(mesh.base)] == [len(other.endo), len(other.base)]
 
 
+@pytest.mark.slow
 def test_bent_heart_is_followed(human, write_surface):
     """A heart bent into a banana by 8 mm, with a bulge in the septum."""
     nodes = 1e3 * human.nodes

@@ -13,7 +13,8 @@ from echotruth.mechanics.motion_file.wall import first_of_largest
 from echotruth.mechanics.physiology import measures
 from echotruth.mechanics.solver.cavity import cavity_volume
 
-FORMATS = ("vtk", "vtu", "pvtu", "pvd", "xdmf XML", "xdmf HDF", "xdmf Binary", "npy", "npz")
+SLOW_FORMATS = ("vtk", "pvtu", "pvd", "xdmf XML", "xdmf HDF", "xdmf Binary", "npz")
+FORMATS = ("vtu", "npy", *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW_FORMATS))
 
 
 def check_affine(arrays, frames, rtol=1e-6):
@@ -93,6 +94,7 @@ def test_frames_select_one_cycle_of_several(affine_heart, write_series, configur
     check_affine(motion_from_file(configured(section)), FRAMES)
 
 
+@pytest.mark.slow
 def test_uneven_times_tell_when_the_frames_were(affine_heart, write_series, configured):
     """Frames at warped phases, with their times, against the formula at equal steps; without them it is not met."""
     _, cells = affine_heart.of_order[1]
@@ -104,6 +106,7 @@ def test_uneven_times_tell_when_the_frames_were(affine_heart, write_series, conf
         check_affine(motion_from_file(configured(section)), FRAMES, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_times_of_a_pvd_file_are_read(affine_heart, write_series, configured):
     _, cells = affine_heart.of_order[1]
     even = np.arange(41) / 40
@@ -112,6 +115,7 @@ def test_times_of_a_pvd_file_are_read(affine_heart, write_series, configured):
     check_affine(motion_from_file(configured(section)), FRAMES, rtol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit, scale", [("mm", 0.1), ("um", 100.0)])
 def test_unit_is_any_length(affine_heart, write_series, configured, unit, scale):
     _, cells = affine_heart.of_order[1]
