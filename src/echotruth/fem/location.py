@@ -141,7 +141,8 @@ def _locate(points, grid, start, candidates, straight, least, derivatives):  # p
             near = _near(straight[cell], least[cell], points[p], local)
             if near and _invert(straight[cell, 0], derivatives[cell], points[p], local, work):
                 cells[p] = cell
-                xi[p, 0], xi[p, 1], xi[p, 2] = local
+                for i in range(3):
+                    xi[p, i] = local[i]
                 break
     return cells, xi
 

@@ -84,7 +84,7 @@ def correlate(first, second, corners, side, ncc):
     template, search = np.empty((side, side), np.float32), np.zeros((side + lags - 1, side + lanes), np.float32)
     products = np.empty((lags, lanes), np.float32)
     for window in range(len(corners)):
-        top, left = corners[window]
+        top, left = corners[window, 0], corners[window, 1]
         norm = extract_zero_mean(first, top, left, template)
         for y in range(side + lags - 1):
             for x in range(side + lags - 1):

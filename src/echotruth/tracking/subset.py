@@ -114,17 +114,17 @@ def sum_axially(flat, row_length, first, weights, sums):
 def subtract_mean(values):
     """Subtract the mean from values, in place; return the root of the sum of their squares."""
     columns = np.zeros(values.shape[1])
-    for row in values:
+    for row in range(len(values)):
         for k in range(len(columns)):
-            columns[k] += row[k]
+            columns[k] += values[row, k]
     mean, square = 0.0, 0.0
     for k in range(len(columns)):
         mean += columns[k] / values.size
         columns[k] = 0
-    for row in values:
+    for row in range(len(values)):
         for k in range(len(columns)):
-            row[k] -= np.float32(mean)
-            columns[k] += row[k] * row[k]
+            values[row, k] -= np.float32(mean)
+            columns[k] += values[row, k] * values[row, k]
     for k in range(len(columns)):
         square += columns[k]
     return np.sqrt(square)
@@ -200,7 +200,7 @@ def cholesky(lower):
             for i in range(j, 6):
                 lower[i, j] -= lower[i, k] * lower[j, k]
         if lower[j, j] <= floor:
-            lower[:] = 0
+            lower.fill(0)
             return
         pivot = np.sqrt(lower[j, j])
         for i in range(j, 6):

@@ -137,7 +137,7 @@ def focus(lines, first, channels, waves, geometry, array, table, part):
         time = np.empty(BLOCK_RANGES)
         for start in range(0, path.shape[1], BLOCK_RANGES):
             block = start, min(start + BLOCK_RANGES, path.shape[1])
-            sums[:] = 0
+            sums.fill(0)
             for element in range(elements):
                 times = time, sample, phase, fraction, real, imaginary
                 echo_times(path[n], geometry[line], block, centres[element], channel, tapered, times)

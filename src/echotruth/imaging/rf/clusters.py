@@ -223,7 +223,7 @@ def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
         pair = 0
         for k in range(len(first) - 1):
             own, size = weights[first[k] : first[k + 1]], first[k + 1] - first[k]
-            c, s = phasor[f, k]
+            c, s = phasor[f, k, 0], phasor[f, k, 1]
             a, b = np.zeros((size, size), np.float32), np.zeros((size, size), np.float32)
             pair += remove_delay(spectra[f, pair:], skeleton[first[k] : first[k + 1]], c, s, a, b)
             half, carry = np.empty((2, size, width), np.float32), np.empty((2 * size, width), np.float32)

@@ -329,7 +329,9 @@ class _LensKernels:
         entries = self._entries[own] - [part.start, 0, 0, 0]
         tables = self._tables[: len(entries)]
         groups = group_blocks(entries[:, 1])
-        lens_kernels(self._index[part], self._angle[part], self._full._lookup, self._terms, entries, groups, tables)
+        scatterers = self._index[part], self._angle[part]
+        made = partial(lens_kernels, *scatterers, self._full._lookup, self._terms, entries, tables, groups)
+        share(made, len(groups))
         blocks = np.column_stack([entries[:, 0], self._base[: len(entries)], self._first[own], entries[:, 2:]])
         return self._lens_terms[part], blocks, tables.ravel()
 

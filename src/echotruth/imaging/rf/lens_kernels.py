@@ -28,8 +28,8 @@ def group_blocks(blocks):
     return groups.reshape(-1, HEIGHT)
 
 
-@numba.njit(parallel=True, cache=True)
-def lens_kernels(index, angle, lookup, terms, entries, groups, tables):
+@numba.njit(nogil=True, cache=True)
+def lens_kernels(index, angle, lookup, terms, entries, tables, groups, part):
     """Make the tables of echoes that a lens has shaped.
 
     Parameters
@@ -49,27 +49,37 @@ def lens_kernels(index, angle, lookup, terms, entries, groups, tables):
         the lens and the pair spectrum whose product they are: shape (terms, 4).
     entries
         Blocks to make, shape (entries, 4): scatterer, block, subapertures of transmitter and of receiver.
-    groups
-        Entries of the same block, as :func:`group_blocks` gives them.
     tables
         Written: shape (entries, phases, rows, TAPS), float32.
+    groups
+        Entries of the same block, as :func:`group_blocks` gives them.
+    part
+        First of the groups to be made, and the one after the last.
     """
     responses, pair_spectra, maps = lookup
-    nodes, phases = pair_spectra.shape[2], tables.shape[1]
-    for group in numba.prange(len(groups)):
-        members = groups[group][groups[group] >= 0]
-        spectra, factors = np.empty((HEIGHT, 3, 2 * nodes), np.float32), np.zeros((2 * nodes, HEIGHT), np.float32)
-        for n, entry in enumerate(members):
-            k, _, transmitter, receiver = entries[entry]
+    nodes, width = pair_spectra.shape[2], tables.shape[1] * TAPS
+    spectra, factors = np.empty((HEIGHT, 3, 2 * nodes), np.float32), np.zeros((2 * nodes, HEIGHT), np.float32)
+    second, first = np.empty((HEIGHT, QUADRATIC * width), np.float32), np.empty((HEIGHT, 2 * width), np.float32)
+    for group in range(*part):
+        members = 0
+        while members < HEIGHT and groups[group, members] >= 0:
+            members += 1
+        # Entry by entry: taking a row apart compiles for longer.
+        for n in range(members):
+            entry = groups[group, n]
+            k, transmitter, receiver = entries[entry, 0], entries[entry, 2], entries[entry, 3]
             lens_spectra(responses, index[k, transmitter], index[k, receiver], transmitter == receiver, spectra[n])
-        block, row = entries[members[0], 1], 0
-        for _, count, spectrum, pair in terms:
-            for n, entry in enumerate(members):
-                multiply(spectra[n, spectrum], pair_spectra[angle[entries[entry, 0]], pair], factors[:, n])
-            coefficients = np.empty((HEIGHT, count * phases * TAPS), np.float32)
-            product(factors, maps[0][block] if count == QUADRATIC else maps[1][block], coefficients)
-            for n, entry in enumerate(members):
-                write_rows(tables[entry], row, count, coefficients[n])
+        block, row = entries[groups[group, 0], 1], 0
+        for term in range(len(terms)):
+            count, spectrum, pair = terms[term, 1], terms[term, 2], terms[term, 3]
+            for n in range(members):
+                k = entries[groups[group, n], 0]
+                multiply(spectra[n, spectrum], pair_spectra[angle[k], pair], factors[:, n])
+            quadratic = count == QUADRATIC
+            coefficients = second if quadratic else first
+            product(factors, maps[0][block] if quadratic else maps[1][block], coefficients)
+            for n in range(members):
+                write_rows(tables[groups[group, n]], row, count, coefficients[n])
             row += count
 
 
