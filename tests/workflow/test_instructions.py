@@ -58,9 +58,10 @@ def test_kind_is_the_level_in_a_job_and_the_processor_elsewhere():
     assert result.stdout.decode().startswith("native ")
 
 
-@pytest.mark.parametrize("features", [{}, {"avx": True, "fma": True, "avx2": False}, {"neon": True}])
-def test_processor_without_the_level_keeps_its_own_instructions_and_is_named(monkeypatch, features):
-    monkeypatch.setattr(instructions, "_host_features", lambda: features)
+@pytest.mark.parametrize("cpuinfo", ["", "flags\t: fpu avx fma abm f16c\n", "Features\t: fp asimd\n"])
+def test_processor_without_the_level_keeps_its_own_instructions_and_is_named(monkeypatch, tmp_path, cpuinfo):
+    (tmp_path / "cpuinfo").write_text(f"processor\t: 0\n{cpuinfo}")
+    monkeypatch.setattr(instructions, "_CPUINFO", tmp_path / "cpuinfo")
     assert environment() == {}
     assert exports() == ""
     assert kind.__wrapped__().startswith("native ")
@@ -76,8 +77,18 @@ def test_kind_names_the_processor_where_mkl_has_no_fixed_branch(monkeypatch, pro
 
 
 def test_wider_vectors_of_opencv_are_disabled_only_where_there_are_some(monkeypatch):
-    level = dict.fromkeys(instructions._FEATURES, True)
-    monkeypatch.setattr(instructions, "_host_features", lambda: level)
+    monkeypatch.setattr(instructions, "_processor_flags", lambda: instructions._FLAGS)
     assert "OPENCV_CPU_DISABLE" not in environment()
-    monkeypatch.setattr(instructions, "_host_features", lambda: level | {"avx512f": True})
+    monkeypatch.setattr(instructions, "_processor_flags", lambda: instructions._FLAGS | {"avx512f"})
     assert environment()["OPENCV_CPU_DISABLE"] == "AVX512-SKX"
+
+
+@pytest.mark.skipif(not instructions._CPUINFO.is_file(), reason="needs Linux")
+def test_flags_of_the_processor_are_those_that_llvm_sees():
+    import llvmlite.binding
+
+    names = {"abm": "lzcnt", "bmi1": "bmi"}
+    seen = llvmlite.binding.get_host_cpu_features()
+    assert {flag for flag in instructions._FLAGS if seen.get(names.get(flag, flag))} == (
+        instructions._FLAGS & instructions._processor_flags()
+    )

@@ -1,15 +1,17 @@
-"""Planning remembers the parameters of the functions in rules, and they are those that they have."""
+"""Planning in less time and memory plans what Snakemake does without."""
 
 import gc
 from inspect import signature
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from snakemake.common import get_function_params, get_input_function_aux_params
 from snakemake.resources import Resource
+from snakemake.settings.types import Batch
 
 from echotruth.workflow import planning
-from echotruth.workflow.planning import hasten
+from echotruth.workflow.planning import hasten, in_batch
 
 
 @pytest.fixture(autouse=True)
@@ -40,3 +42,24 @@ def test_parameters_are_those_of_the_function():
     hasten([SimpleNamespace(input=[], params=[function], group=None, resources={})])
     assert get_function_params(function) == signature(function).parameters
     assert gc.get_threshold()[0] == planning.OBJECTS_BETWEEN_COLLECTIONS
+
+
+FILES = [Path(f"ledger/evaluation/{name}.json") for name in "gbdface"]
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_batch_has_the_files_that_snakemake_would_choose_from_all_and_chooses_once(number):
+    batch = Batch("repository", number, 3)
+    expected = Batch("repository", number, 3).get_batch([str(path) for path in FILES])
+    for _ in range(2):  # Snakemake may ask again
+        files = in_batch(FILES, "repository", batch)
+        assert files == expected
+        assert batch.get_batch(files) == expected
+
+
+def test_last_batch_and_other_rules_keep_all_files():
+    paths = [str(path) for path in FILES]
+    last = Batch("repository", 3, 3)
+    assert in_batch(FILES, "repository", last) == paths
+    assert last.get_batch(paths) == sorted(paths)[5:]
+    assert in_batch(FILES, "repository", Batch("report", 1, 3)) == in_batch(FILES, "repository", None) == paths

@@ -87,8 +87,8 @@ def read_loop(loop: Loop) -> Cycle:
     LoopError
         If the file cannot be read or holds no valid cycle: one sentence with the file, the row and the remedy.
     """
-    recording = _read_recording(loop)
-    time, curves = recording.si("time"), _scaled_curves(recording, loop)
+    recording, curves = _read_recording(loop), recorded_curves(loop)
+    time = curves.pop("time")
     assert time is not None
     period, phase = _period(recording, loop), np.arange(loop.frames) / loop.frames
     given = {name: values for name, values in curves.items() if values is not None}
@@ -109,7 +109,7 @@ def check_loop(loop: Loop) -> None:
     LoopError
         If the file cannot be read or holds no valid cycle.
     """
-    _scaled_curves(_read_recording(loop), loop)
+    recorded_curves(loop)
 
 
 def frame_times(loop: Loop) -> Floats:
@@ -123,9 +123,25 @@ def frame_times(loop: Loop) -> Floats:
     return np.arange(loop.frames) / loop.frames * _period(_read_recording(loop), loop)
 
 
-def _scaled_curves(recording: Recording, loop: Loop) -> dict[str, Floats | None]:
-    """Curves at the rows of the file, mapped to the volumes and pressures of the loop, SI units."""
-    si, curves = loop.si(), {quantity: recording.si(quantity) for quantity in _CURVES}
+def recorded_curves(loop: Loop) -> dict[str, Floats | None]:
+    """Curves at the rows of the file, mapped to the volumes and pressures of the loop.
+
+    Parameters
+    ----------
+    loop : Loop
+
+    Returns
+    -------
+    dict
+        `time` (s, as in the file), `pressure` (Pa), `volume` (m^3) and `tension` (Pa), each (n_rows,) or None.
+
+    Raises
+    ------
+    LoopError
+        If the file cannot be read or its curves are not valid.
+    """
+    recording, si = _read_recording(loop), loop.si()
+    curves = {quantity: recording.si(quantity) for quantity in ("time", *_CURVES)}
     if curves["pressure"] is not None:
         curves["pressure"] = _map_pressure(recording.path, curves["pressure"], curves["volume"], si)
     if curves["volume"] is not None:

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import os
 from functools import cache
+from pathlib import Path
 from shlex import quote
 
 LEVEL = "x86-64-v3"
 
-_FEATURES = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
-"""Features of the level by their names in LLVM; older levels are implied."""
+_FLAGS = {"abm", "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"}
+"""Flags of the level by their names in Linux; older levels are implied."""
 
+_CPUINFO = Path("/proc/cpuinfo")
 
 _AMD = ("znver", "bdver", "btver", "amdfam")
 """Beginnings of LLVM's names of AMD's processors."""
@@ -32,8 +34,8 @@ def environment() -> dict[str, str]:
     dict
         Name -> value; empty if the processor lacks these instructions.
     """
-    features = _host_features()
-    if not all(features.get(name) for name in _FEATURES):
+    flags = _processor_flags()
+    if not flags >= _FLAGS:
         return {}
     variables = {
         # Numba's bytes do not depend on it, but the keys of its cache do: one serves all machines.
@@ -45,7 +47,7 @@ def environment() -> dict[str, str]:
         "OPENCV_IPP": "avx2",
     }
     # OpenCV prints a warning about features that the processor does not have.
-    return variables | ({"OPENCV_CPU_DISABLE": "AVX512-SKX"} if features.get("avx512f") else {})
+    return variables | ({"OPENCV_CPU_DISABLE": "AVX512-SKX"} if "avx512f" in flags else {})
 
 
 def exports() -> str:
@@ -72,13 +74,12 @@ def kind() -> str:
     return f"{LEVEL}, MKL for {processor}" if processor.startswith(_AMD) else LEVEL
 
 
-def _host_features() -> dict[str, bool]:
-    import llvmlite.binding
-
-    try:
-        return dict(llvmlite.binding.get_host_cpu_features())
-    except RuntimeError:  # LLVM does not know the features of every processor
-        return {}
+def _processor_flags() -> set[str]:
+    """Flags of the processor; of Linux and not of LLVM, which takes 40 MB of every process that plans a sweep."""
+    if not _CPUINFO.is_file():
+        return set()
+    lines = _CPUINFO.read_text().splitlines()
+    return set(next((line.partition(":")[2] for line in lines if line.startswith("flags")), "").split())
 
 
 def _numpy_features_beyond() -> list[str]:

@@ -1,24 +1,29 @@
-"""Plan a large sweep in less time and memory: what Snakemake computes for every job anew is computed once."""
+"""Plan a large sweep in less time and memory: what Snakemake makes for every job anew is made once, or not at all.
+
+Nothing of this is part of Snakemake's interface: a version that has changed it plans as it does without.
+"""
 
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from functools import cache
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from snakemake.rules import Rule
+    from snakemake.settings.types import Batch
 
 OBJECTS_BETWEEN_COLLECTIONS = 200_000
 """Objects made before Python looks for garbage. A plan only grows, and each search goes over all of it."""
 
 
 def hasten(rules: Iterable[Rule]) -> None:
-    """Remember the parameters of all functions in rules, for which Snakemake asks several times a job.
-
-    Nothing of this is part of Snakemake's interface: a version that has changed it plans as it does without.
+    """Remember the parameters of all functions in rules, for which Snakemake asks several times a job, and save memory.
 
     Parameters
     ----------
@@ -28,12 +33,42 @@ def hasten(rules: Iterable[Rule]) -> None:
     gc.freeze()
     gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS, 20, 100)
     with suppress(ImportError, AttributeError):
+        from snakemake import iocontainers
+        from snakemake.io import IOCache
+
+        # Each list of files, params or wildcards has two of these, which do nothing but refuse to be called.
+        iocontainers.AttributeGuard = cache(iocontainers.AttributeGuard)
+        # A dry run saves what it knows of all files, which later runs do not trust: an empty copy will do.
+        IOCache._simple_copy = lambda self: type(self)(self.max_wait_time)
+    with suppress(ImportError, AttributeError):
         from snakemake.common import overwrite_function_params
         from snakemake.resources import Resource
 
         functions = [Resource.evaluate, *(function for rule in rules for function in _functions(rule))]
         for function in functions:
             overwrite_function_params(function, signature(function).parameters)
+
+
+def in_batch(files: Sequence[Path], rule: str, batch: Batch | None) -> list[str]:
+    """Files of the batch of a rule that is planned; all of them if none is, or the last, which looks for all others.
+
+    Snakemake would make an object for each file before it chooses those of the batch.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        All input files of the rule.
+    rule : str
+        Name of the rule.
+    batch : Batch or None
+        What the option `--batch` chooses.
+    """
+    paths = [path.as_posix() for path in files]
+    if batch is None or batch.rulename != rule or batch.is_final:
+        return paths
+    chosen: list[str] = type(batch).get_batch(batch, paths)
+    batch.get_batch = list  # type: ignore[method-assign]  # they are chosen already
+    return chosen
 
 
 def _functions(rule: Rule) -> Iterator[Any]:

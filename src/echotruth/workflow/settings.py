@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import Any
 
 from echotruth.config import Config, Geometry, Loop
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times, recorded_curves
 from echotruth.repository.provenance import settings_version
 
 APART = ("name", "cases", "views", "tracking", "physiology")
@@ -17,11 +17,15 @@ LINES = ("phantom", "rf")
 
 
 @lru_cache(maxsize=1000)
-def _curves(loop: Loop) -> list[Any]:
-    """Time and prescribed curves of a loop, read once for all hearts that share it."""
-    cycle = read_loop(loop)
-    curves = (cycle.time, cycle.pressure, cycle.volume, cycle.tension)
-    return [None if values is None else values.tolist() for values in curves]
+def _curves(loop: Loop) -> dict[str, Any]:
+    """Curves that are prescribed, read once for all hearts that share them."""
+    return {name: None if values is None else values.tolist() for name, values in recorded_curves(loop).items()}
+
+
+@lru_cache(maxsize=1000)
+def _times(loop: Loop) -> list[float]:
+    """Times of the frames, s."""
+    return frame_times(loop).tolist()
 
 
 def mechanics_settings(config: Config) -> str:
@@ -40,7 +44,7 @@ def mechanics_settings(config: Config) -> str:
     formula = getattr(config.motion, config.motion.kind)
     if config.motion.kind == "file":
         formula = settings_version(formula, _series_hash(str(config.motion.file.path)))
-    amplitude = (_curves(config.loop)[0], config.motion.time_course)
+    amplitude = (_times(config.loop), config.motion.time_course)
     return settings_version(*anatomy, *amplitude, formula, config.rf.focus_mm)
 
 
@@ -110,7 +114,7 @@ def stage_settings(stage: str, config: Config, view: str, motion: dict[str, str]
     sections = {name: _values(getattr(config, name)) for name in type(config).model_fields if name not in APART}
     if stage in LINES:
         sections["bmode"] = config.bmode.field_of_view_mm
-    return settings_version(sections, config.views[view], _curves(config.loop)[0], motion)
+    return settings_version(sections, config.views[view], _times(config.loop), motion)
 
 
 def _values(setting: Any) -> Any:

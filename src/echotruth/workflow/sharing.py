@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from echotruth.repository import durable, ledger, schema
 from echotruth.repository.checksums import verify
 from echotruth.repository.ledger import record_path
-from echotruth.repository.store import NotWritten
 from echotruth.workflow.failure import CaseFailed
 
 if TYPE_CHECKING:
@@ -65,6 +64,8 @@ def take_over(job: Job, case: str) -> Result:
     ChecksumError
         If a file of the other case is missing or differs from what its job wrote.
     """
+    from echotruth.repository.store import NotWritten  # loads Zarr, which a plan does without
+
     path, root = record_path(job.folder, job.stage, case), job.store.path
     if not path.is_file():
         raise NotWritten(f"{path}: file not found: run the stage {job.stage} of {case} first")

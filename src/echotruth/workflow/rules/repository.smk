@@ -18,7 +18,9 @@ onstart:
 rule repository:
     input:
         # A function, because Snakemake keeps every path that a rule names twice.
-        lambda wildcards: requested_records(FOLDER, CASES, CONFIG.views),
+        lambda wildcards: in_batch(
+            requested_records(FOLDER, CASES, CONFIG.views), "repository", workflow.dag_settings.batch
+        ),
     output:
         FOLDER / "ledger/repository.json",
     params:
