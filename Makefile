@@ -25,7 +25,7 @@ test test-all: .venv/ready
 
 # tests/cluster takes longest, and so comes first; tests/docs builds the site.
 INTEGRATION := tests/cluster tests/test_torch.py tests/learning/test_baselines.py tests/description tests/repository/test_upload.py \
-	tests/repository/test_export.py tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs
+	tests/repository/test_export.py tests/repository/test_tensorstore.py tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs
 
 test-integration: .venv-integration/ready
 	.venv-integration/bin/python -m pytest -n 2 --dist loadscope $(INTEGRATION)
