@@ -81,18 +81,45 @@ def test_records_keep_their_times_so_that_nothing_is_run_again(out):
         assert paths[0].stat().st_mtime_ns == paths[1].stat().st_mtime_ns
 
 
+def rewrite(out, stage, group, index, instructions, **values):
+    """Write arrays of a job of the first repository's second heart anew, as a machine of some kind would."""
+    case, store = finished.expand(FIRST)[1], Store(out / "first/first.zarr")
+    store.write(group, values, *index)
+    path = record_path(out / "first", stage, case.id, "mid" if len(index) > 1 else None)
+    record = ledger.read(path)
+    new = checksums(store.files(group, *index), store.path)
+    ledger.commit(path, record | {"sha256": record["sha256"] | new, "instructions": instructions})
+    return case.id
+
+
 def test_same_heart_with_other_bytes_is_refused_by_name_before_anything_changes(out, capsys):
-    case = finished.expand(FIRST)[1]
-    store = Store(out / "first/first.zarr")
-    store.write("bmode/64", {"image": np.zeros((finished.FRAMES, 64, 64))}, 1, 0)
-    path = record_path(out / "first", "bmode", case.id, "mid")
-    files = store.files("bmode/64", 1, 0)
-    changed = {"sha256": checksums(files, store.path), "instructions": "native older"}
-    ledger.commit(path, ledger.read(path) | changed)
+    images = np.zeros((finished.FRAMES, 64, 64))
+    kind = ledger.read(record_path(out / "first", "bmode", finished.expand(FIRST)[1].id, "mid"))["instructions"]
+    case = rewrite(out, "bmode", "bmode/64", (1, 0), kind, image=images)
     assert merge_repositories(out / "both", [out / "first", out / "second"]) == 2
-    message = capsys.readouterr().err
-    assert f"bmode of {case.id}, mid has other bytes" in message and " and native older): make both" in message
+    assert f"bmode of {case}, mid has other bytes than in" in capsys.readouterr().err
     assert not (out / "both").exists()
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_heart_of_two_kinds_of_machines_that_differs_by_rounding_is_merged_and_stays_as_it_was(out, first):
+    displacement = Store(out / "first/first.zarr").read("mechanics", 1)["displacement"]
+    rewrite(out, "mechanics", "mechanics", (1,), "native older", displacement=displacement * (1 + 1e-8))
+    into, other = ("first", "second") if first else ("second", "first")
+    row = 1 if first else 0
+    before = Store(out / f"{into}/{into}.zarr").read("mechanics", row)["displacement"]
+    assert merge_repositories(out / into, [out / other]) == 0
+    assert check(out / into).faults == []
+    np.testing.assert_array_equal(Store(out / f"{into}/{into}.zarr").read("mechanics", row)["displacement"], before)
+
+
+def test_heart_of_two_kinds_of_machines_that_differs_by_more_is_refused_with_the_array(out, capsys):
+    displacement = Store(out / "first/first.zarr").read("mechanics", 1)["displacement"]
+    case = rewrite(out, "mechanics", "mechanics", (1,), "native older", displacement=displacement + 1e-8)
+    assert merge_repositories(out / "both", [out / "first", out / "second"]) == 2
+    told = capsys.readouterr().err
+    assert f"mechanics of {case} was made with other instructions (" in told and "native older" in told
+    assert "and mechanics/displacement differs by more than rounding from" in told and told.count("\n") == 1
 
 
 def test_damaged_repository_is_not_merged(out, capsys):

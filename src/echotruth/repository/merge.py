@@ -16,6 +16,7 @@ from echotruth.config import Cases, Config
 from echotruth.config.loading import ConfigError, load, validate
 from echotruth.repository import durable, ledger
 from echotruth.repository.checksums import ChecksumError, verify
+from echotruth.repository.equivalence import first_difference
 from echotruth.repository.inventory import JobRecord, Repository
 from echotruth.section import Section
 
@@ -212,17 +213,23 @@ def _renamed(record: JobRecord, giving: Repository, receiving: Repository) -> It
 
 
 def _compare(record: JobRecord, giving: Repository, receiving: Repository) -> None:
-    """Both must have the same bytes of a job that both have."""
+    """Both must have the same bytes of a job that both have, or but for rounding if machines of two kinds made them."""
     mine = ledger.read(_in(record, giving, receiving))
     theirs = ledger.read(record.path)
     same = {path: hash for _, path, hash in _renamed(record, giving, receiving)} == mine.get("sha256", {})
-    if not same or any(mine.get(key) != theirs.get(key) for key in ("status", "reason")):
-        kinds = [str(found.get("instructions")) for found in (theirs, mine)]
-        cause = f", as it was made with other instructions ({' and '.join(kinds)})" if kinds[0] != kinds[1] else ""
-        raise MergeError(
-            f"{record.path}: {record.job} has other bytes than in {receiving.folder}{cause}: "
-            f"make both by the same code on machines of one kind, or delete the case in one of them"
-        )
+    verdicts_are_same = all(mine.get(key) == theirs.get(key) for key in ("status", "reason"))
+    if same and verdicts_are_same:
+        return
+    kinds = [str(found.get("instructions")) for found in (theirs, mine)]
+    what = "has other bytes than in"
+    remedy = "make both by the same code, or delete the case in one of them"
+    if kinds[0] != kinds[1]:
+        different = first_difference(record, giving, receiving) if verdicts_are_same else "its status"
+        if different is None:
+            return
+        made = f"was made with other instructions ({' and '.join(kinds)})"
+        what = f"{made}, and {different} differs by more than rounding from"
+    raise MergeError(f"{record.path}: {record.job} {what} {receiving.folder}: {remedy}")
 
 
 def _copy(record: JobRecord, giving: Repository, receiving: Repository) -> None:

@@ -1,0 +1,84 @@
+"""Results of the same job on machines of two kinds: other bytes, but the same within rounding.
+
+docs/determinism.md says where the differences come from, and how large they were where instructions were held back.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+
+from echotruth.repository import schema
+from echotruth.repository.inventory import JobRecord, Repository
+
+TOLERANCE = {
+    "mechanics": 1e-6,
+    "physiology": 1e-5,
+    "phantom": 1e-6,
+    "truth": 1e-6,
+    "rf": 1e-4,
+    "bmode": 1e-4,
+    "tracking": 1e-3,
+    "evaluation": 1e-3,
+}
+"""Stage -> largest difference over the largest number of an array, of a pack over the largest in the same unit; some
+ten times and more what was measured."""
+
+STEPPED = ("rf", "bmode")
+"""Stages whose whole numbers are measured, in steps, and may be off by one; those of others are labels."""
+
+EXCEPTIONS = 1e-3
+"""Share of the numbers of an array that may differ by more: labels of pixels at an edge, points that a tracker lost."""
+
+NOISE = ("mechanics/residual", "mechanics/newton_steps")
+"""Arrays that hold how the solution was found."""
+
+
+def first_difference(record: JobRecord, giving: Repository, receiving: Repository) -> str | None:
+    """Path of the first array of a job that differs by more than rounding between two repositories.
+
+    Parameters
+    ----------
+    record : JobRecord
+        A job that both have made.
+    giving, receiving : Repository
+
+    Returns
+    -------
+    str or None
+        None if all arrays are the same within :data:`TOLERANCE`.
+    """
+    for path, array in giving.shard_paths.items():
+        group = path.rpartition("/")[0]
+        if giving.stages[group] != record.stage or path in NOISE or path not in receiving.shard_paths:
+            continue
+        one, other = (np.asarray(kept.opened[path][kept.row(record) or ()]) for kept in (giving, receiving))
+        allowed = TOLERANCE[record.stage] * _scale(giving, group, path, one) + (array.quantum or 0)
+        if one.dtype.kind in "iu":
+            allowed = float(record.stage in STEPPED)
+        if one.shape != other.shape or not _are_close(one, other, allowed):
+            return path
+    return None
+
+
+def _scale(repository: Repository, group: str, path: str, values: NDArray[Any]) -> Any:
+    """Largest magnitude of an array; of a pack that of the numbers in the same unit, (n_numbers,)."""
+    magnitude = np.nan_to_num(np.abs(values.astype(complex if values.dtype.kind == "c" else float)))
+    for pack in schema.PACKS.get(group, ()):
+        if path == f"{group}/{pack.array.name}":
+            largest = magnitude.reshape(-1, magnitude.shape[-1]).max(0)
+            units = zarr.open_array(repository.store, path=f"{group}/{pack.dimension}_units", mode="r")[...]
+            return np.array([largest[units == unit].max() for unit in np.asarray(units)])
+    return magnitude.max(initial=0)
+
+
+def _are_close(one: NDArray[Any], other: NDArray[Any], allowed: Any) -> bool:
+    """Whether all but a few exceptions differ by no more than is allowed; what is not a number is so in both."""
+    if one.dtype.kind in "iu":
+        one, other = one.astype(np.int64), other.astype(np.int64)
+    with np.errstate(invalid="ignore"):
+        same = (np.abs(one - other) <= allowed) | (np.isnan(one) & np.isnan(other))
+    return bool(same.size - np.count_nonzero(same) <= EXCEPTIONS * same.size)
