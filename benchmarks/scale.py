@@ -25,8 +25,9 @@ import yaml
 import echotruth.workflow
 from echotruth.cases import expand
 from echotruth.config import Config
-from echotruth.config.loading import validate
+from echotruth.config.loading import load, validate
 from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
+from echotruth.repository.store import Store
 
 RESULTS = Path(__file__).parent / "results"
 WORKFLOW = Path(echotruth.workflow.__file__).parent
@@ -44,6 +45,25 @@ PLAN = (*SNAKEMAKE, "--cores", "1", "--dry-run", "--quiet")
 HEARTS_PER_SEED = 20
 """Hearts that differ in more than the seed: 4 materials x 5 fibre angles."""
 
+
+TURNS = 5
+"""Number of processes that read a repository."""
+READ = """\
+import json, resource, sys, time
+import echotruth as et, xarray, zarr
+et.open  # what is imported is not counted
+times = [time.perf_counter()]
+tree = et.open(sys.argv[1])
+times.append(time.perf_counter())
+table = tree["cases"].to_dataset().to_dataframe()
+times.append(time.perf_counter())
+frame = tree["bmode/64/image"].sel(case=sys.argv[2], view="mid", frame=2).values
+times.append(time.perf_counter())
+assert sys.argv[2] in table.index
+spent = [end - begin for begin, end in zip(times, times[1:])]
+print(json.dumps([*spent, int(frame.sum()), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
+"""
+"""Opens a repository and reads from it: seconds of the clock of each step, sum of the frame, and memory, MiB."""
 
 NOTHING = "Nothing to be done"
 """What Snakemake says of a finished sweep."""
@@ -175,12 +195,33 @@ def resume(hearts: int) -> Measurement:
 
 
 def lay_out(hearts: int) -> list[Measurement]:
-    """Lay out the repository of a sweep, as before the first job, and again when it stands."""
+    """Lay out the repository of a sweep, as before the first job, and again when it stands; then read it."""
     command = (sys.executable, str(WORKFLOW / "scripts/cases.py"), "out/scale", "scale.yaml")
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         (folder / "scale.yaml").write_text(yaml.safe_dump(sweep(hearts).model_dump(mode="json")))
-        return [measure(name, hearts, folder, command) for name in ("lay out", "lay out again")]
+        laid_out = [measure(name, hearts, folder, command) for name in ("lay out", "lay out again")]
+        return laid_out + read(hearts, folder / "out/scale")
+
+
+def read(hearts: int, folder: Path) -> list[Measurement]:
+    """Open the repository, read its table, and a frame by the labels of case and view; medians of several processes."""
+    config = load(folder / "config.yaml")
+    row, id = hearts // 2, expand(config)[hearts // 2].id
+    noise = np.random.default_rng(1).integers(0, 255, (config.loop.frames, 64, 64), np.uint8)
+    Store(folder / "scale.zarr").write("bmode/64", {"image": noise}, row, list(config.views).index("mid"))
+    times = []
+    for _ in range(TURNS):
+        found = subprocess.run([sys.executable, "-c", READ, folder, id], stdout=subprocess.PIPE, text=True, check=True)
+        *seconds, total, memory = json.loads(found.stdout)
+        if total != int(noise[2].sum()):
+            sys.exit(f"the frame of {id} is not what was written")
+        times.append((*seconds, memory))
+    *spent, memory = np.median(times, axis=0)
+    names = ("open", "read the table", "read a frame by its labels")
+    for name, seconds in zip(names, spent, strict=True):
+        print(f"{name}, {hearts} hearts: {seconds:.4f} s", flush=True)
+    return [Measurement(name, hearts, round(float(s), 4), round(memory)) for name, s in zip(names, spent, strict=True)]
 
 
 def write(measured: list[Measurement]) -> None:
@@ -200,11 +241,12 @@ def write(measured: list[Measurement]) -> None:
         "",
         "| | hearts | CPU s | MiB |",
         "|---|---|---|---|",
-        *(f"| {item.name} | {item.hearts} | {item.cpu_s:.1f} | {item.memory_MiB:.0f} |" for item in rows),
+        *(f"| {item.name} | {item.hearts} | {item.cpu_s:.3g} | {item.memory_MiB:.0f} |" for item in rows),
         "",
         "*plan*: the graph of all jobs of a sweep of which nothing is made; *plan 1/10*: of its first batch alone",
         "(`--batch repository=1/10`); *check* and *plan of a table*: of hearts that all differ in motion and loop;",
-        "*resume*: nothing is to be done; *lay out*: arrays, coordinates and table of the cases, before the first job.",
+        "*resume*: nothing is to be done; *lay out*: arrays, coordinates and table of the cases, before the first job;",
+        "*open*, *read the table*, *read a frame by its labels*: seconds of the clock, in this order in a new process.",
     ]
     (RESULTS / "scale.md").write_text("\n".join(lines) + "\n")
 
