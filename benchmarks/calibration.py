@@ -26,12 +26,14 @@ from echotruth.benchmark.splits import DEVELOP, TEST, split_of, split_of_label
 from echotruth.cases import Case, expand
 from echotruth.config.loading import load
 from echotruth.evaluation import reliability
+from echotruth.evaluation.choice import is_complete
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.clip_metrics import clip_metrics
 from echotruth.evaluation.scoring import ground_truth
-from echotruth.evaluation.summary import is_complete
 from echotruth.section import Section
-from echotruth.tracking import accumulation, quality, track
+from echotruth.tracking import accumulation, quality
+from echotruth.tracking.tracker import tracked_path
+from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.workflow.job import Job
 
 RESULTS = Path(__file__).parent / "results"
@@ -64,26 +66,9 @@ class Samples(NamedTuple):
     weight: np.ndarray
 
 
-class Recorder(quality.ErrorModel):
-    """Keeps the path of which the quality is asked."""
-
-    path: accumulation.Path
-
-    def probability(self, path: accumulation.Path, shape: tuple[int, ...]) -> np.ndarray:
-        Recorder.path = path
-        return super().probability(path, shape)
-
-
 def tracked(clip: Clip, settings: Section) -> accumulation.Path:
     """Path of the points of a clip."""
-    name = quality.error_name(settings)
-    own = quality.ERRORS[name]
-    quality.ERRORS[name] = Recorder(*astuple(own))
-    try:
-        track(*clip.tracker_arguments, settings)
-    finally:
-        quality.ERRORS[name] = own
-    return Recorder.path
+    return tracked_path(TrackerInput(*clip.tracker_arguments), settings)
 
 
 def samples(clip: Clip, true: np.ndarray, path: accumulation.Path) -> Samples:
@@ -124,7 +109,7 @@ def gathered(
 def ready(folder: Path, case: Case) -> Iterator[str]:
     """Views of a case that have images."""
     for view in case.config.views:
-        if all(is_complete(folder, stage, case.id, view) for stage in ("truth", "bmode")):
+        if is_complete(folder, case.id, view, "truth", "bmode"):
             yield view
 
 

@@ -32,6 +32,7 @@ from tracking_split import TRACKER, blobs
 from echotruth.benchmark.conditions import PLAIN, main_conditions
 from echotruth.benchmark.records import read
 from echotruth.benchmark.splits import TEST
+from echotruth.evaluation.choice import job_of
 from echotruth.evaluation.clip import clips
 from echotruth.evaluation.difficulty.plane import both_ways, plane_path
 from echotruth.evaluation.parallel import in_processes
@@ -39,7 +40,6 @@ from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import downsample
 from echotruth.imaging.view import Plane
-from echotruth.notebook.repositories import job_of
 from echotruth.tracking import track
 from echotruth.tracking.bidirectional import forward_backward
 

@@ -9,7 +9,7 @@ import pytest
 
 from echotruth.benchmark import records
 from echotruth.benchmark.page import Page
-from echotruth.benchmark.submission import rerun
+from echotruth.benchmark.rerun import rerun
 from echotruth.evaluation.run import prepare
 
 SUBMISSIONS = '''

@@ -9,11 +9,10 @@ import pytest
 import yaml
 
 from echotruth.benchmark import checks, records, results
-from echotruth.benchmark.card import Card, attach, card_of, read
+from echotruth.benchmark.card import Card, attach, attach_card, card_of, read
 from echotruth.benchmark.page import EXAMPLE, Page
-from echotruth.benchmark.rerun import prepare_rerun
+from echotruth.benchmark.rerun import prepare_rerun, rerun
 from echotruth.benchmark.results import result_path
-from echotruth.benchmark.submission import attach_card, rerun
 from echotruth.benchmark.variants import VARIANTS, anonymous
 from echotruth.config.loading import load
 from echotruth.config.reading import ConfigError
@@ -106,7 +105,7 @@ def test_ratio_says_of_which_clips_and_sizes_it_is():
 def test_a_tracker_is_given_neither_seed_nor_times_by_which_it_would_know_the_clip(repository, monkeypatch):
     given = []
     monkeypatch.setattr(
-        "echotruth.benchmark.rerun.track", lambda *arguments: given.append(arguments) or missing(arguments)
+        "echotruth.evaluation.run.track", lambda *arguments: given.append(arguments) or missing(arguments)
     )
     run = prepare_rerun(repository, "dis", "mirrored", "test")
     list(run.rows([64]))

@@ -6,7 +6,7 @@ from finished_repository import configured, finish
 import echotruth as et
 from echotruth.cases import expand
 from echotruth.config import Cases
-from echotruth.evaluation.clip_metrics import hearts_of
+from echotruth.evaluation.choice import hearts_of
 from echotruth.evaluation.resampling import by_heart
 
 pytestmark = pytest.mark.slow

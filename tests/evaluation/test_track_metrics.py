@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from echotruth.evaluation.flow_error import flow_error
-from echotruth.evaluation.point_tracks import median_trajectory_error, survival, tap_vid
+from echotruth.evaluation.point_tracks import flow_error, median_trajectory_error, survival, tap_vid
 from echotruth.evaluation.reliability import calibration_error, counts, curve, summary
 
 FRAMES, POINTS = 7, 40

@@ -18,8 +18,14 @@ def mid(twisting_heart):
 
 
 @pytest.fixture(scope="module")
-def around(twisting_heart, mid):
+def seeded(twisting_heart, mid):
     return seed_surroundings(CONFIG, twisting_heart, mid, np.random.default_rng(5))
+
+
+@pytest.fixture(scope="module")
+def around(seeded):
+    """Positions at end-diastole."""
+    return seeded[0]
 
 
 def ellipsoid_radius(position):
@@ -31,7 +37,7 @@ def ellipsoid_radius(position):
 @pytest.mark.parametrize("frame", [0, 1])
 def test_none_is_in_the_heart(around, twisting_heart, affine, frame):
     matrix, shift = affine
-    position = SurroundingsMotion(twisting_heart, around.position, 0.5e-3)(frame)
+    position = SurroundingsMotion(twisting_heart, around, 0.5e-3)(frame)
     position = position[outside_heart(twisting_heart, frame, position)]
     unloaded = (position - shift) @ np.linalg.inv(matrix).T if frame else position
     below = unloaded[:, 2] < 0
@@ -71,11 +77,11 @@ def test_their_motion_fades_exponentially_with_the_distance(twisting_heart):
 
 
 def test_those_that_do_not_follow_stand_still(around, twisting_heart):
-    assert np.array_equal(SurroundingsMotion(twisting_heart, around.position, 0.0)(1), around.position)
+    assert np.array_equal(SurroundingsMotion(twisting_heart, around, 0.0)(1), around)
 
 
 def test_they_fill_the_sector_from_where_they_begin(around, mid):
-    lateral, axial, elevation = mid.to_image(around.position).T
+    lateral, axial, elevation = mid.to_image(around).T
     angle, range_ = np.degrees(np.arctan2(lateral, axial)), np.hypot(lateral, axial)
     assert angle.min() == pytest.approx(-35.2, abs=0.5)
     assert angle.max() == pytest.approx(35.2, abs=0.5)
@@ -86,9 +92,10 @@ def test_they_fill_the_sector_from_where_they_begin(around, mid):
     assert np.abs(elevation[at_focus]).max() > 0.36e-3
 
 
-def test_their_power_in_a_volume_is_that_of_muscle_times_the_level(around, mid):
-    lateral, axial, elevation = mid.to_image(around.position).T
+def test_their_power_in_a_volume_is_that_of_muscle_times_the_level(seeded, mid):
+    around, amplitude = seeded
+    lateral, axial, elevation = mid.to_image(around).T
     box = (np.abs(lateral) < 2e-3) & (np.abs(axial - 7e-3) < 3e-3) & (np.abs(elevation) < 0.15e-3)
-    power = (around.amplitude[box] ** 2).sum() / (4e-3 * 6e-3 * 0.3e-3)
+    power = (amplitude[box] ** 2).sum() / (4e-3 * 6e-3 * 0.3e-3)
     error = 10 / np.log(10) * np.sqrt(3 / box.sum())
     assert 10 * np.log10(power / CONFIG.phantom.si().density) == pytest.approx(-12, abs=4 * error)

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from echotruth.config.tracking import BsplineDic
-from echotruth.tracking.trackers.bspline_dic import track
+from echotruth.tracking import track
 
 SPACING = 25e-6
 SIZE = 128

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from echotruth.tracking import evidence
-from echotruth.tracking.evidence import Match, energy_weight, told_unknowns
+from echotruth.tracking.evidence import Match, effective_parameters, energy_weight
 
 
 @pytest.fixture
@@ -16,11 +16,11 @@ def log_evidence(beta, image, energy, data, variance):
     return -0.5 * np.sum(np.log(total) + data**2 / total)
 
 
-def test_told_unknowns_are_those_of_independent_unknowns(random):
+def test_effective_parameters_are_those_of_independent_unknowns(random):
     image, energy = random.uniform(0.1, 10, 40), random.uniform(0.1, 10, 40)
     energy[:6] = 0
     probes = random.choice([-1.0, 1.0], size=(2, 40))
-    found = told_unknowns(3.0, lambda rhs: rhs / (image + 3 * energy), probes, probes * energy)
+    found = effective_parameters(3.0, lambda rhs: rhs / (image + 3 * energy), probes, probes * energy)
     assert found == pytest.approx((image / (image + 3 * energy))[6:].sum())
 
 
@@ -33,8 +33,10 @@ def test_weight_settles_where_the_evidence_is_greatest(random, monkeypatch):
     probes, beta = random.choice([-1.0, 1.0], size=(1, 400)), 1.0
     for _ in range(200):
         fitted = image * data / (image + beta * energy)
-        told = told_unknowns(beta, lambda rhs, beta=beta: rhs / (image + beta * energy), probes, probes * energy)
-        beta = energy_weight(variance, told, float(fitted @ (energy * fitted)), 1.0)
+        effective = effective_parameters(
+            beta, lambda rhs, beta=beta: rhs / (image + beta * energy), probes, probes * energy
+        )
+        beta = energy_weight(variance, effective, float(fitted @ (energy * fitted)), 1.0)
     grid = np.geomspace(0.5, 50, 2001)
     values = [log_evidence(trial, image[6:], energy[6:], data[6:], variance) for trial in grid]
     assert beta == pytest.approx(grid[np.argmax(values)], rel=3e-3)

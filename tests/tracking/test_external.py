@@ -15,9 +15,15 @@ from echotruth.config.loading import ConfigError, validate
 from echotruth.config.tracking import TRACKER_ARGUMENTS, External
 from echotruth.tracking import TrackerFailed
 from echotruth.tracking import track as track_any
-from echotruth.tracking.trackers.external import track
+from echotruth.tracking.tracker_input import TrackerInput
+from echotruth.tracking.trackers import external as external_module
 
 TIMES, POINTS = 3, 4
+
+
+def track(frames, points, mask, spacing, frame_time, seed, settings):
+    """What the tracker returns, before points without a displacement are marked."""
+    return external_module.track(TrackerInput(frames, points, mask, spacing, frame_time, seed), settings)
 
 
 @pytest.fixture

@@ -9,10 +9,8 @@ from echotruth.tracking.windows import arrange
 
 
 def match(first, second, side, taper="none"):
-    windows = arrange(first.shape, side, 0.5)
-    return phase_correlation.window_shifts(
-        *(phase_correlation.phase_spectra(image, windows, taper, 255) for image in (first, second)), side
-    )
+    tracker = phase_correlation.PhaseCorrelationTracker(arrange(first.shape, side, 0.5), taper, 255)
+    return phase_correlation.window_shifts(tracker.prepare(first), tracker.prepare(second), side)
 
 
 @pytest.mark.parametrize("shift", [(0, 0), (5, 0), (0, -7), (-3, 11)])

@@ -11,7 +11,10 @@ import yaml
 from pydantic import Field, StringConstraints, ValidationError
 from pydantic_core import ErrorDetails
 
+from echotruth.config.loading import load
 from echotruth.config.reading import ConfigError, read_yaml, shown_key
+from echotruth.evaluation.choice import folder_of
+from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import durable
 from echotruth.section import Name, Section, check, invalid
 
@@ -108,6 +111,24 @@ def attach(folder: Path, card: Card) -> Path:
     values = card.model_dump(mode="json", exclude_none=True)
     durable.write(path, yaml.safe_dump(values, sort_keys=False, allow_unicode=True, width=120).encode())
     return path
+
+
+def attach_card(repositories: list[Path], path: Path) -> str:
+    """Keep the card of a YAML file beside the scores of its tracker in every repository that has them; the files.
+
+    ConfigError if it is no card, EvaluationError if none of the repositories has scores of its tracker.
+    """
+    card = read(path)
+    folders = [folder_of(repository) for repository in repositories]
+    scored = [folder for folder in folders if (folder / "external" / f"{card.tracker}.csv").is_file()]
+    if not scored:
+        if own := [folder for folder in folders if card.tracker in load(folder / "config.yaml").tracking.trackers]:
+            remedy = f"is in the configuration of {own[0]}: only a tracker from outside has a card"
+            raise EvaluationError(f"{path}: tracker = {card.tracker}: {remedy}")
+        known = sorted({file.stem for folder in folders for file in (folder / "external").glob("[A-Za-z]*.csv")})
+        remedy = f"use one of {', '.join(known)}" if known else "run echotruth evaluate --keep first"
+        raise EvaluationError(f"{path}: tracker = {card.tracker}: was not evaluated: {remedy}")
+    return ", ".join(str(attach(folder, card)) for folder in scored)
 
 
 def card_of(folder: Path, tracker: str) -> Card | None:

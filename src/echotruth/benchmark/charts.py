@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from echotruth.benchmark.standings import main_errors
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP
 from echotruth.report import style
@@ -39,7 +40,7 @@ def draw_conditions(path: Path, standings: pd.DataFrame, floors: pd.DataFrame, o
     Path
         The file.
     """
-    table = standings[standings["is_main"] & (standings["metric"] == RANKED_BY)]
+    table = main_errors(standings)
     conditions, sizes = list(dict.fromkeys(table["condition"])), sorted(table["size_px"].unique(), reverse=True)[:3]
     columns = min(len(conditions), 2)
     lines = -(-len(conditions) // columns)

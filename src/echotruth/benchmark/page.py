@@ -17,10 +17,9 @@ from echotruth.benchmark.card import Card
 from echotruth.benchmark.conditions import PLAIN, main_conditions
 from echotruth.benchmark.records import Records, Suite
 from echotruth.benchmark.splits import split_of
-from echotruth.benchmark.standings import agreement, detections, order, shown_size, standings, varied
+from echotruth.benchmark.standings import agreement, detections, main_errors, order, shown_size, standings, varied
 from echotruth.cases import all_cases
 from echotruth.evaluation import kept, reliability
-from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.repository import durable
@@ -93,9 +92,8 @@ class Page:
         withheld = [f"{tracker} is not ranked: {reason}." for tracker, reason in self.withheld.items()]
         if self.is_empty:
             return "\n".join([self.nothing, *withheld])
-        of = self.standings[self.standings["is_main"] & (self.standings["metric"] == RANKED_BY)]
         columns = [["tracker", *self.order]]
-        for name, part in of.groupby("condition", sort=False):
+        for name, part in main_errors(self.standings).groupby("condition", sort=False):
             size = shown_size(part, self.largest)
             rows = part[part["size_px"] == size].set_index("tracker")
             known = [tracker in rows.index and np.isfinite(rows["value"][tracker]) for tracker in self.order]

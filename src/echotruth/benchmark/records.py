@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,12 +13,12 @@ from echotruth.benchmark.splits import check_halves, split_of_label
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
-from echotruth.evaluation.clip_metrics import ClipMetrics, clip_metrics, hearts_of
+from echotruth.evaluation.choice import folder_of, hearts_of, is_complete
+from echotruth.evaluation.clip_metrics import ClipMetrics, clip_metrics
 from echotruth.evaluation.difficulty.table import difficulties
 from echotruth.evaluation.leaderboard import scores_of_guests
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.resampling import CLIP
-from echotruth.evaluation.summary import folder_of, is_evaluated
 from echotruth.evaluation.tracker_options import EvaluationError
 
 if TYPE_CHECKING:
@@ -82,10 +82,7 @@ class Records:
 
     def of_split(self, split: str) -> Records:
         """The part of one half of the hearts."""
-        clips, segments, sure = (
-            table[table["split"] == split] for table in (self.clips, self.segments, self.reliability)
-        )
-        return Records(self.suites, clips, segments, sure, self.difficulty)
+        return self._where("split", split)
 
     @property
     def species(self) -> list[str]:
@@ -94,12 +91,11 @@ class Records:
 
     def of_main_species(self) -> Records:
         """The part of the main species; all if no clip is of it."""
-        if MAIN_SPECIES not in self.species:
-            return self
-        clips, segments, sure = (
-            table[table["species"] == MAIN_SPECIES] for table in (self.clips, self.segments, self.reliability)
-        )
-        return Records(self.suites, clips, segments, sure, self.difficulty)
+        return self._where("species", MAIN_SPECIES) if MAIN_SPECIES in self.species else self
+
+    def _where(self, column: str, value: str) -> Records:
+        tables = {name: getattr(self, name) for name in ("clips", "segments", "reliability")}
+        return replace(self, **{name: table[table[column] == value] for name, table in tables.items()})
 
     @property
     def sizes(self) -> list[int]:
@@ -150,7 +146,7 @@ def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
         if not chosen:
             choices = _listed(suite.config.bmode.sizes)
             raise EvaluationError(f"{suite.folder}: has no images of {sizes[0]} px: use {choices}")
-        metrics = partial(_metrics, suite.folder, chosen)
+        metrics = partial(clip_metrics, suite.folder, sizes=chosen)
         # A share for each process: what all cases have in common is read once in each.
         shares = _shares(list(dict.fromkeys(case for case, _ in suite.complete)), jobs)
         parts += [(suite, found) for found in in_processes(metrics, shares, jobs)]
@@ -202,7 +198,7 @@ def _suite(folder: Path) -> Suite:
     except EvaluationError as error:
         raise EvaluationError(f"{folder}: {error}") from None
     wanted = [(case, view) for case in cases for view in config.views]
-    return Suite(folder, config, [clip for clip in wanted if is_evaluated(folder, *clip)], len(wanted))
+    return Suite(folder, config, [clip for clip in wanted if is_complete(folder, *clip, "evaluation")], len(wanted))
 
 
 def _listed(sizes: Sequence[int]) -> str:
@@ -213,10 +209,6 @@ def _shares(cases: list[str], number: int) -> list[list[str]]:
     """Cases in their order in as many parts of one size, the last of which may be smaller; none of no cases."""
     size = -(-len(cases) // max(1, number))
     return [cases[start : start + size] for start in range(0, len(cases), max(1, size))]
-
-
-def _metrics(folder: Path, sizes: list[int], cases: list[str]) -> ClipMetrics:
-    return clip_metrics(folder, cases=cases, sizes=sizes)
 
 
 def _difficulty(folder: Path, clip: tuple[str, str]) -> pd.DataFrame:

@@ -22,19 +22,17 @@ from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.evaluation import kept
 from echotruth.evaluation.availability import check_runs
+from echotruth.evaluation.choice import folder_of, is_complete
 from echotruth.evaluation.clip import clips
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.displacement_error import evaluate
 from echotruth.evaluation.leaderboard import scores_of_guests
 from echotruth.evaluation.parallel import in_processes
-from echotruth.evaluation.run import prepare
+from echotruth.evaluation.run import prepare, track_clip
 from echotruth.evaluation.scoring import Truth, ground_truth
-from echotruth.evaluation.summary import is_complete
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.loop.cycle import read_loop
 from echotruth.section import Section
-from echotruth.tracking.failure import TrackerFailed
-from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job
 
 
@@ -112,7 +110,7 @@ class Rerun:
         """Whether what the tracker found in a clip is stored, and the clip is still the same."""
         is_own = self.tracker in self.config.tracking.trackers
         stages = ("truth", "bmode", *(("tracking",) if is_own else ()))
-        if not all(is_complete(self.folder, stage, case, view) for stage in stages):
+        if not is_complete(self.folder, case, view, *stages):
             return False
         return is_own or self.kept_clips.get(f"{case}/{view}") == digest(self.folder, case, view)
 
@@ -153,6 +151,46 @@ def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun
     return Rerun(folder, config, name, settings, variant, split)
 
 
+def rerun(
+    repositories: list[Path], tracker: str, variant: str, split: str, sizes: list[int], jobs: int = 1
+) -> Iterator[str]:
+    """Run a tracker again on variants of the clips of repositories, and keep the scores; a line of text for every clip.
+
+    Repositories that have not kept what it found are left out. The tracker is named as in :func:`prepare_rerun`; image
+    sizes are in px, all if none is given. EvaluationError if the tracker was not evaluated on any of the repositories,
+    or an image size is that of none.
+    """
+    runs, reasons = [], []
+    for folder in map(folder_of, repositories):
+        known = load(folder / "config.yaml").bmode.sizes
+        if missing := [size for size in sizes if size not in known]:
+            choices = ", ".join(map(str, known))
+            raise EvaluationError(f"--size {missing[0]}: is not an image size of {folder}: use {choices}")
+        try:
+            run = prepare_rerun(folder, tracker, variant, split)
+        except EvaluationError as error:
+            reasons.append(str(error))
+            continue
+        if chosen := [size for size in run.sizes if size in (sizes or known)]:
+            runs.append((run, chosen))
+        else:
+            choices = ", ".join(map(str, run.sizes))
+            reasons.append(f"--size {sizes[0]}: {tracker} was not evaluated at it on {folder}: use {choices}")
+    if not runs:
+        raise EvaluationError("\n".join(reasons))
+    for run, chosen in runs:
+        rows = []
+        for row in run.rows(chosen, jobs):
+            rows.append(row)
+            yield _line(row, variant)
+        run.write(rows)
+
+
+def _line(row: Row, variant: str) -> str:
+    outcome = row["failure"] or f"NRMSE {row['error_percent']:.1f} % (before {row['before_percent']:.1f})"
+    return f"{row['case']} {row['view']} {row['size_px']} px, {variant}: {outcome}"
+
+
 def _view_rows(run: Rerun, sizes: list[int], case_view: tuple[str, str]) -> list[Row]:
     """Rows of the variants of the clips of one view of one heart."""
     from threadpoolctl import threadpool_limits
@@ -164,10 +202,7 @@ def _view_rows(run: Rerun, sizes: list[int], case_view: tuple[str, str]) -> list
         for size, clip in clips(job).items():
             if size in sizes:
                 variant = VARIANTS[run.variant](clip)
-                try:
-                    estimate, failure = track(*anonymous(variant.clip, time).tracker_arguments, run.settings), ""
-                except TrackerFailed as error:
-                    estimate, failure = variant.clip.no_estimate, str(error)
+                estimate, failure = track_clip(anonymous(variant.clip, time), run.settings)
                 found[size] = clip.on_grid(*variant.restored(*estimate))[0], failure, variant.last
         truth, of_clip = ground_truth(job), digest(run.folder, *case_view)
         rows = []

@@ -73,6 +73,11 @@ def standings(clips: pd.DataFrame) -> pd.DataFrame:
     return found[[*first, *(name for name in found if name not in first)]]
 
 
+def main_errors(standings: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the main conditions with the metric by which trackers are ranked."""
+    return standings[standings["is_main"] & (standings["metric"] == RANKED_BY)]
+
+
 def shown_size(table: pd.DataFrame, largest: int) -> int:
     """Image size of a table by which trackers are ranked, px: a given one, or the largest where it has not that."""
     sizes = set(table["size_px"])
@@ -91,7 +96,7 @@ def order(standings: pd.DataFrame, largest: int | None = None) -> list[str]:
     largest : int, optional
         Image size, px; conditions that do not have it do not count. Default: the largest.
     """
-    main = standings[standings["is_main"] & (standings["metric"] == RANKED_BY)]
+    main = main_errors(standings)
     table = main[main["size_px"] == (main["size_px"].max() if largest is None else largest)]
     # A tracker from outside may have been evaluated at smaller sizes only.
     medians = table.pivot(index="tracker", columns="condition", values="value").reindex(main["tracker"].unique())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,12 +10,11 @@ import numpy as np
 from echotruth.benchmark.conditions import PLAIN
 from echotruth.benchmark.records import Suite
 from echotruth.benchmark.splits import DEVELOP, TEST, split_of
-from echotruth.benchmark.standings import shown_size
+from echotruth.benchmark.standings import main_errors, shown_size
 from echotruth.cases import Case, all_cases, diagnosis
-from echotruth.evaluation.clip_metrics import hearts_of
+from echotruth.evaluation.choice import hearts_of, is_complete
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, LEAST_HEARTS
-from echotruth.evaluation.summary import is_complete
 from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
@@ -110,24 +109,28 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
     for heart in dict.fromkeys(names.values()):
         own = [cases[case] for case, name in names.items() if name == heart]
         first = own[0]
-        group = str(first.labels.get("group") or diagnosis(first.config)).replace("_", " ")
         found = [str(of.labels.get("variation") or "") for of in own]
         varied = ", ".join(name.replace("_", " ") for name in dict.fromkeys(found) if name not in PLAIN)
         plain = [of.id for of in own if str(of.labels.get("variation") or "") in PLAIN] or [first.id]
         known = strains.reindex(plain).bfill().iloc[0]
         fraction = next(filter(np.isfinite, (ejection_fraction(suite, case) for case in plain)), np.nan)
         measured = [number(100 * fraction, 0), *(number(value) for value in known)]
-        rows.append([heart, split_of(first), group, _changes(first), varied, *measured])
+        rows.append([heart, split_of(first), _group(first), _changes(first), varied, *measured])
     headings = ["heart", "half", "group", "disease", "variation", "EF (%)", "GLS (%)", "GCS (%)"]
     return markdown(headings, rows, text=5)
 
 
 def ejection_fraction(suite: Suite, case: str) -> float:
     """Ejection fraction of a heart; NaN if it was not solved."""
-    if not is_complete(suite.folder, "physiology", case):
+    if not is_complete(suite.folder, case, None, "physiology"):
         return np.nan
     job = Job(suite.folder, "physiology", case, code="read")
     return float(job.store.read("physiology", job.row, names=("ejection_fraction",))["ejection_fraction"])
+
+
+def _group(case: Case) -> str:
+    """Group of a case: its label, or its diagnosis."""
+    return str(case.labels.get("group") or diagnosis(case.config)).replace("_", " ")
 
 
 def _changes(case: Case) -> str:
@@ -154,21 +157,21 @@ def hearts_by_group(suite: Suite) -> dict[str, dict[str, set[str]]]:
     cases = all_cases(suite.config)
     names = hearts_of(cases)
     for case in cases.values():
-        group = str(case.labels.get("group") or diagnosis(case.config)).replace("_", " ")
-        groups.setdefault(group, {DEVELOP: set(), TEST: set()})[split_of(case)].add(names[case.id])
+        groups.setdefault(_group(case), {DEVELOP: set(), TEST: set()})[split_of(case)].add(names[case.id])
     return groups
 
 
 def condition(standings: pd.DataFrame, name: str, largest: int) -> str:
     """Leaderboard of one main condition: ranges of ranks at one size, errors at all, and differences to the first."""
-    of = standings[standings["is_main"] & (standings["condition"] == name) & (standings["metric"] == RANKED_BY)]
+    errors = main_errors(standings)
+    of = errors[errors["condition"] == name]
     sizes = sorted(of["size_px"].unique(), reverse=True)
-    errors = {size: of[of["size_px"] == size].set_index("tracker") for size in sizes}
+    of_size = {size: of[of["size_px"] == size].set_index("tracker") for size in sizes}
     rows: list[list[str]] = []
     shown = shown_size(of, largest)
-    for tracker, row in errors[shown].iterrows():
+    for tracker, row in of_size[shown].iterrows():
         behind = _difference(row)
-        cells = [_error(errors[size], tracker) for size in sizes]
+        cells = [cell for size in sizes for cell in _cells(of_size[size], [tracker], _error)]
         rows.append([f"`{tracker}`", rank(row), *cells, behind if rows else NONE])
     headings = [*(f"NRMSE at {size} px (%)" for size in sizes), f"less the first, {shown} px"]
     return markdown(["tracker", "rank", *headings], rows)
@@ -194,11 +197,8 @@ def _difference(row: pd.Series) -> str:
     return interval(*(row[f"difference{end}"] for end in ("", "_low", "_high")))
 
 
-def _error(table: pd.DataFrame, tracker: object) -> str:
+def _error(row: pd.Series) -> str:
     """Median error of a tracker with its interval."""
-    if tracker not in table.index:
-        return NONE
-    row = table.loc[tracker]
     return interval(row["value"], row["low"], row["high"])
 
 
@@ -207,10 +207,7 @@ def by_group(standings: pd.DataFrame, order: list[str]) -> str:
     of = standings[~standings["is_main"] & (standings["metric"] == RANKED_BY)]
     names, sizes = list(dict.fromkeys(of["condition"])), sorted(of["size_px"].unique(), reverse=True)
     values = of.set_index(["tracker", "condition", "size_px"])["value"]
-    rows = []
-    for tracker in order:
-        cells = [[number(values.get((tracker, name, size), np.nan)) for size in sizes] for name in names]
-        rows.append([f"`{tracker}`", *map(SLASH.join, cells)])
+    rows = [[f"`{tracker}`", *(_at_sizes(values, (tracker, name), sizes) for name in names)] for tracker in order]
     counts = of.groupby("condition")["hearts"].max()
     return markdown(["tracker", *(f"{name} ({counts[name]})" for name in names)], rows)
 
@@ -218,27 +215,20 @@ def by_group(standings: pd.DataFrame, order: list[str]) -> str:
 def by_variation(varied: pd.DataFrame, order: list[str]) -> str:
     """Median errors at all image sizes under a variation, and of the same hearts without it."""
     names, sizes = list(dict.fromkeys(varied["variation"])), sorted(varied["size_px"].unique(), reverse=True)
-    values = varied.set_index(["tracker", "variation", "size_px"])[["varied", "plain"]]
+    values = varied.set_index(["tracker", "variation", "size_px"])
     rows = []
     for tracker in order:
-        cells = []
-        for name in names:
-            known = [(tracker, name, size) in values.index for size in sizes]
-            of = [values.loc[(tracker, name, size)] if is_ else None for size, is_ in zip(sizes, known, strict=True)]
-            parts = (
-                SLASH.join(NONE if one is None else number(one[what]) for one in of) for what in ("varied", "plain")
-            )
-            cells.append("{} ({})".format(*parts))
-        rows.append([f"`{tracker}`", *cells])
+        keys = [(tracker, name) for name in names]
+        found, plain = ([_at_sizes(values[what], key, sizes) for key in keys] for what in ("varied", "plain"))
+        rows.append([f"`{tracker}`", *(f"{one} ({other})" for one, other in zip(found, plain, strict=True))])
     counts = varied.groupby("variation")["hearts"].max()
     return markdown(["tracker", *(f"{name}, {counts[name]} hearts" for name in names)], rows)
 
 
 def ahead(standings: pd.DataFrame) -> str:
     """Who is first in each main condition, and who is not surely behind."""
-    of = standings[standings["is_main"] & (standings["metric"] == RANKED_BY)]
     rows = []
-    for (name, size), table in of.groupby(["condition", "size_px"], sort=False):
+    for (name, size), table in main_errors(standings).groupby(["condition", "size_px"], sort=False):
         known = table[table["value"].notna()]
         if known.empty:
             continue
@@ -255,28 +245,20 @@ def ahead(standings: pd.DataFrame) -> str:
     return markdown(headings, rows, text=2)
 
 
+def _at_sizes(values: pd.Series, key: tuple[str, str], sizes: list[int]) -> str:
+    """Values of a tracker under a condition at all image sizes."""
+    return SLASH.join(number(values.get((*key, size), np.nan)) for size in sizes)
+
+
 def agreement(table: pd.DataFrame, order: list[str]) -> str:
     """Bias and limits of agreement of GLS and GCS."""
     columns = _imaged(table)
     found = table.set_index(["tracker", "strain", "acoustics", "size_px"])
-    rows = []
-    for tracker in order:
-        for strain in dict.fromkeys(table["strain"]):
-            cells = []
-            for column in columns:
-                key = (tracker, strain, *column)
-                if key not in found.index:
-                    cells.append(NONE)
-                    continue
-                row = found.loc[key]
-                limits = (
-                    f"{SPACE}[{number(row['lower'])},{SPACE}{number(row['upper'])}]"
-                    if np.isfinite(row["lower"])
-                    else ""
-                )
-                number_of, of = int(row["hearts"]), int(row["of_hearts"])
-                cells.append(number(row["bias"], 2) + limits + (f", {number_of} of {of} hearts" * (number_of < of)))
-            rows.append([f"`{tracker}`", strain.upper(), *cells])
+    rows = [
+        [f"`{tracker}`", strain.upper(), *_cells(found, [(tracker, strain, *column) for column in columns], _limits)]
+        for tracker in order
+        for strain in dict.fromkeys(table["strain"])
+    ]
     return markdown(["tracker", "strain", *map(_imaging, columns)], rows)
 
 
@@ -284,23 +266,32 @@ def detection(table: pd.DataFrame, order: list[str]) -> str:
     """Areas under the curve of the detection of infarcted segments."""
     columns = _imaged(table)
     found = table.set_index(["tracker", "acoustics", "size_px"])
-    rows = []
-    for tracker in order:
-        cells = []
-        for column in columns:
-            if (tracker, *column) not in found.index:
-                cells.append(NONE)
-                continue
-            row = found.loc[(tracker, *column)]
-            inner = f"; {number(row['subendocardial_auc'], 2)}" if np.isfinite(row["subendocardial_auc"]) else ""
-            cells.append(interval(row["auc"], row["auc_low"], row["auc_high"], 2) + inner)
-        rows.append([f"`{tracker}`", *cells])
+    rows = [[f"`{one}`", *_cells(found, [(one, *column) for column in columns], _area)] for one in order]
     perfect = []
     for column in columns:
         of = found.xs(column, level=(1, 2)).iloc[0]
         perfect.append(f"{number(of['true_auc'], 2)}; {number(of['true_subendocardial_auc'], 2)}")
     rows.append(["true strain", *perfect])
     return markdown(["tracker", *map(_imaging, columns)], rows)
+
+
+def _cells(table: pd.DataFrame, keys: Iterable[Hashable], text: Callable[[pd.Series], str]) -> list[str]:
+    """Text of the rows of some keys; a dash where there is none."""
+    return [text(table.loc[key]) if key in table.index else NONE for key in keys]
+
+
+def _limits(row: pd.Series) -> str:
+    """Bias with its limits of agreement, and of how many hearts if these are not all."""
+    known = np.isfinite(row["lower"])
+    limits = f"{SPACE}[{number(row['lower'])},{SPACE}{number(row['upper'])}]" if known else ""
+    hearts, of = int(row["hearts"]), int(row["of_hearts"])
+    return number(row["bias"], 2) + limits + (f", {hearts} of {of} hearts" if hearts < of else "")
+
+
+def _area(row: pd.Series) -> str:
+    """Area under the curve with its interval, and that of subendocardial infarcts."""
+    inner = f"; {number(row['subendocardial_auc'], 2)}" if np.isfinite(row["subendocardial_auc"]) else ""
+    return interval(row["auc"], row["auc_low"], row["auc_high"], 2) + inner
 
 
 def _imaged(table: pd.DataFrame) -> list[tuple[str, int]]:

@@ -67,7 +67,8 @@ def benchmark(arguments: argparse.Namespace) -> int:
 
 def _submit(arguments: argparse.Namespace) -> None:
     """Keep the cards, and run trackers again."""
-    from echotruth.benchmark.submission import attach_card, rerun
+    from echotruth.benchmark.card import attach_card
+    from echotruth.benchmark.rerun import rerun
 
     for card in arguments.card:
         print(f"Card: {attach_card(arguments.repository, card)}")

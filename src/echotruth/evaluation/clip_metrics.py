@@ -15,32 +15,28 @@ import zarr
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.cases import Case, diagnosis, expand
-from echotruth.cases.case import Label
-from echotruth.cases.ids import integer_if_whole
+from echotruth.cases import Case, diagnosis
 from echotruth.config.loading import load
 from echotruth.evaluation import kept, point_tracks, reliability, segment_strain
 from echotruth.evaluation.agreement import REFERENCES
-from echotruth.evaluation.choice import chosen, image_size
+from echotruth.evaluation.choice import cases_of, chosen, hearts_of, image_size, jobs_of, label_text
 from echotruth.evaluation.clip import grid_points, grid_positions
 from echotruth.evaluation.courses import rate, systolic_rate
 from echotruth.evaluation.curves import REFERENCE
-from echotruth.evaluation.flow_error import flow_error
 from echotruth.evaluation.leaderboard import KEYS, failures_of, scores_of_guests
 from echotruth.evaluation.scoring import metrics
-from echotruth.evaluation.summary import is_evaluated
+from echotruth.evaluation.segment_strain import Row
 from echotruth.imaging.labels import unpack
 from echotruth.imaging.tracks import visible
 from echotruth.loop.cycle import read_loop
+from echotruth.repository.ledger import repository_folder
 from echotruth.repository.schema import LABELS
 from echotruth.repository.tracked import EVALUATION_PACKS
 from echotruth.workflow.job import Job
-from echotruth.workflow.settings import motions
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from echotruth.config import Config
 
 SORTS = ("heart", "split", "group", "acoustics", "variation")
 """Labels of the table of cases that sort clips; `heart` is the one that hearts are told apart by."""
@@ -56,7 +52,6 @@ SCORES = next(pack.names for pack in EVALUATION_PACKS if pack.array.name == "sco
 
 _ENGINEERING, _MIDDLE = LABELS["measure"].index("engineering"), LABELS["contour"].index("middle")
 
-Row = dict[str, str | int | float]
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -89,6 +84,8 @@ class ClipTruth(NamedTuple):
         Since end-diastole: lateral, axial, elevation, 1/256 of the side of the image.
     visible : ndarray of shape (frame, point), bool
         Whether the image shows the point.
+    unit : float
+        1/256 of the side of the image, m.
     tissue : Tissue
     plane : {"short_axis", "long_axis"}
     time : ndarray of shape (frame,), s
@@ -101,6 +98,7 @@ class ClipTruth(NamedTuple):
     inside: NDArray[np.bool_]
     displacement: Floats
     visible: NDArray[np.bool_]
+    unit: float
     tissue: segment_strain.Tissue
     plane: str
     time: Floats
@@ -109,47 +107,57 @@ class ClipTruth(NamedTuple):
 
 
 def clip_metrics(
-    folder: Path,
+    repository: str | Path,
     cases: Sequence[str] | None = None,
     views: Sequence[str] | None = None,
     sizes: Sequence[int] | None = None,
     trackers: Sequence[str] | None = None,
 ) -> ClipMetrics:
-    """Read the metrics of clips.
+    """Read the metrics of all clips and trackers, as benchmarks of trackers and of strain print them (docs/metrics.md).
 
     Parameters
     ----------
-    folder : Path
-        Folder of the repository.
+    repository : str or Path
+        A repository, finished or not.
     cases, views, sizes, trackers : sequence, optional
-        Those to include. Default: all that were evaluated.
+        Those to include. Default: all that was evaluated.
 
     Returns
     -------
     ClipMetrics
-        As :func:`echotruth.clip_metrics` returns it.
+        Three tables. `clips` has a row per case, view, size_px and tracker; `segments` one per clip, tracker, AHA
+        segment and component of strain; `reliability` one per clip, tracker and tenth of quality. docs/metrics.md
+        tells their columns, which name their units. All begin with case, view, plane, size_px and tracker, and with
+        heart, split, group, acoustics and variation, which are labels of the table of cases, "" where it has none
+        (without a label, heart is that of the first case with the same motion), and the diagnosis.
 
     Raises
     ------
-    ValueError
-        If the repository does not have one of them, or the scores of a tracker from outside cannot be read.
+    FileNotFoundError, ValueError
+        If there is no such repository, case, view, size or tracker, or the scores of one from outside cannot be read.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> clips = et.clip_metrics("out/demo", views=["mid"], sizes=[128], trackers=["dis", "bspline_dic"]).clips
+    >>> list(clips["tracker"]), bool(clips["delta_avg_percent"].between(0, 100).all())
+    (['dis', 'bspline_dic'], True)
     """
+    folder = repository_folder(repository)
     config = load(folder / "config.yaml")
-    by_id = {case.id: case for case in expand(config, str(folder / "config.yaml"))}
-    chosen_views = chosen("view", views, list(config.views))
     chosen_sizes = [image_size(config, size) for size in sizes or config.bmode.sizes]
     guests = scores_of_guests(folder, config.tracking.trackers)
-    known = [*kept.trackers(folder, config), *(name for name in guests["tracker"].unique())]
+    known = [*kept.trackers(folder, config), *guests["tracker"].unique()]
     chosen_trackers = chosen("tracker", trackers, list(dict.fromkeys(known)))
+    by_id = cases_of(folder, config)
     hearts = hearts_of(by_id)
     found: tuple[list[Row], list[Row], list[Row]] = ([], [], [])
-    for case in chosen("case", cases, list(by_id)):
-        for view in (view for view in chosen_views if is_evaluated(folder, case, view)):
-            job = Job(folder, "tracking", by_id[case], view, code="read")
-            for rows in _of_view(job, chosen_sizes, chosen_trackers, guests):
-                for table, more in zip(found, rows, strict=True):
-                    about: Row = {"case": case, "view": view, "plane": job.view.plane, **_sorts(job.case, hearts[case])}
-                    table += [about | row for row in more]
+    for job in jobs_of(folder, by_id, cases, views, "evaluation"):
+        keys: Row = {"case": job.case.id, "view": str(job.view_name), "plane": job.view.plane}
+        keys |= _sorts(job.case, hearts[job.case.id])
+        for rows in _of_view(job, chosen_sizes, chosen_trackers, guests):
+            for table, more in zip(found, rows, strict=True):
+                table += [keys | row for row in more]
     clips, segments, steps = found
     return ClipMetrics(_table(clips), _table(segments, segment_strain.COLUMNS), _table(steps, reliability.COLUMNS))
 
@@ -171,6 +179,7 @@ def clip_truth(job: Job) -> ClipTruth:
         Of the stage tracking of the view, which was evaluated.
     """
     config, largest = job.case.config, job.case.config.bmode.sizes[0]
+    unit = config.bmode.si().field_of_view / point_tracks.SIDE
     stored = job.read("evaluation", "true_displacement", *(f"true_{name}" for name in COURSES))
     # Only those of frame 0, of which each frame is a chunk.
     labels = zarr.open_array(job.store.path, path=f"truth/{largest}/labels", mode="r")
@@ -184,8 +193,9 @@ def clip_truth(job: Job) -> ClipTruth:
     segments = stored["true_segment_strain"][REFERENCES.index(REFERENCE), :, _ENGINEERING].astype(float)
     return ClipTruth(
         inside=inside,
-        displacement=displacement / _unit(config),
+        displacement=displacement / unit,
         visible=visible(config, position + displacement),
+        unit=unit,
         tissue=segment_strain.Tissue(**named, layers=config.fibres.layers),
         plane=job.view.plane,
         time=read_loop(config.loop).time,
@@ -208,9 +218,9 @@ def track_metrics(displacement: Floats, quality: Floats, truth: ClipTruth) -> di
     Returns
     -------
     dict of float
-        The results of :func:`.point_tracks.tap_vid` and :func:`.flow_error.flow_error`; median_trajectory_error_px256,
-        survival_percent and survival_8px_percent. In the median trajectory error and in those of flow, a point without
-        an estimate counts as one that did not move; elsewhere it is wrong.
+        The results of :func:`.point_tracks.tap_vid` and :func:`.point_tracks.flow_error`;
+        median_trajectory_error_px256, survival_percent and survival_8px_percent. In the median trajectory error and in
+        those of flow, a point without an estimate counts as one that did not move; elsewhere it is wrong.
     """
     true = truth.displacement[..., :2]
     error = np.linalg.norm(displacement - true, axis=-1)
@@ -222,7 +232,7 @@ def track_metrics(displacement: Floats, quality: Floats, truth: ClipTruth) -> di
         "median_trajectory_error_px256": trajectory,
         "survival_percent": point_tracks.survival(error),
         "survival_8px_percent": point_tracks.survival(error, point_tracks.LOST_IN_A_WALL),
-        **flow_error(at_rest, true),
+        **point_tracks.flow_error(at_rest, true),
     }
 
 
@@ -230,7 +240,7 @@ def _of_view(
     job: Job, sizes: list[int], trackers: list[str], guests: pd.DataFrame
 ) -> Iterator[tuple[list[Row], list[Row], list[Row]]]:
     """Rows of the three tables, less those columns that all clips of a view share."""
-    truth, unit = clip_truth(job), _unit(job.case.config)
+    truth = clip_truth(job)
     failures = failures_of(job.folder, job.case.id, str(job.view_name))
     scored = guests[(guests["case"] == job.case.id) & (guests["view"] == job.view_name)]
     told = {(row["size_px"], row["tracker"]): row for row in scored.to_dict("records")}
@@ -238,24 +248,24 @@ def _of_view(
         keys: Row = {"size_px": size, "tracker": tracker}
         of_guest = told.pop((size, tracker), {})
         reason = failures.get(f"{tracker}/{size}", of_guest.get("failure", ""))
-        clip, segments, steps = _of_clip(found, truth, unit)
+        clip, segments, steps = _of_clip(found, truth)
         yield [{**keys, "failure": reason, **clip}], [keys | row for row in segments], [keys | step for step in steps]
     for (size, tracker), row in told.items():
         if size in sizes and tracker in trackers:
             values = {name: value for name, value in row.items() if name not in KEYS[:2]}
-            yield [values | _truth_metrics(truth, unit)], [], []
+            yield [values | _truth_metrics(truth)], [], []
 
 
-def _of_clip(found: Arrays, truth: ClipTruth, unit: float) -> tuple[Row, list[Row], list[Row]]:
+def _of_clip(found: Arrays, truth: ClipTruth) -> tuple[Row, list[Row], list[Row]]:
     """Rows of the three tables of one clip and tracker, less their keys."""
     displacement, quality = (found[name][:, truth.inside].astype(float) for name in ("displacement", "quality"))
-    displacement /= unit
+    displacement /= truth.unit
     within = np.linalg.norm(displacement - truth.displacement[..., :2], axis=-1) < reliability.WITHIN
     tracked = found["tracked_segment_strain"][:, _ENGINEERING].astype(float)
     true = truth.curves["segment_strain"]
     segments = segment_strain.segment_rows(tracked, true, truth.tissue, truth.plane, truth.time, truth.es)
     clip: Row = {
-        **_truth_metrics(truth, unit),
+        **_truth_metrics(truth),
         **metrics(found, truth.plane),
         **track_metrics(displacement, quality, truth),
         **reliability.summary(quality[1:], within[1:]),
@@ -267,31 +277,15 @@ def _of_clip(found: Arrays, truth: ClipTruth, unit: float) -> tuple[Row, list[Ro
 
 def _tracked(job: Job, sizes: list[int], trackers: list[str]) -> Iterator[tuple[int, str, Arrays]]:
     """What trackers found in the clips of a view; those from outside that did not keep it are left out."""
-    config, own = job.case.config, list(job.case.config.tracking.trackers)
     names = {
         "tracking": ("displacement", "quality"),
         "evaluation": (*SCORES, *(f"tracked_{name}" for name in COURSES)),
     }
-    stored: Arrays = {}
-    if set(own) & set(trackers):
-        stored = {
-            name: values for group, members in names.items() for name, values in job.read(group, *members).items()
-        }
-    stored_of = kept.trackers(job.folder, config)
-    for size in sizes:
-        for tracker in (name for name in trackers if name in stored_of):
-            if tracker in own:
-                place = config.bmode.sizes.index(size), own.index(tracker)
-                yield size, tracker, {name: values[place] for name, values in stored.items()}
-                continue
-            try:
-                found = [
-                    kept.read(job, group, *members, tracker=tracker, size=size) for group, members in names.items()
-                ]
-            except kept.NotEvaluated:
-                continue
-            if any(np.isfinite(found[1]["nrmse_all"]).ravel()):  # it may have been evaluated at other sizes only
-                yield size, tracker, found[0] | found[1]
+    stored = kept.trackers(job.folder, job.case.config)
+    for size, tracker, found in kept.read_each(job, sizes, [name for name in trackers if name in stored], names):
+        # One from outside may have been evaluated at other sizes only.
+        if tracker in job.case.config.tracking.trackers or np.isfinite(found["nrmse_all"]).any():
+            yield size, tracker, found
 
 
 def _line_strain(found: Arrays, truth: ClipTruth) -> dict[str, float]:
@@ -317,39 +311,17 @@ def _line_strain(found: Arrays, truth: ClipTruth) -> dict[str, float]:
     }
 
 
-def _truth_metrics(truth: ClipTruth, unit: float) -> Row:
+def _truth_metrics(truth: ClipTruth) -> Row:
     """Number of points, and their RMS displacement out of the plane at end-systole, um."""
     elevation = truth.displacement[truth.es, :, 2]
-    rms = float(1e6 * unit * np.sqrt(np.mean(elevation**2))) if elevation.size else np.nan
+    rms = float(1e6 * truth.unit * np.sqrt(np.mean(elevation**2))) if elevation.size else np.nan
     return {"points": len(elevation), "through_plane_rms_um": rms}
-
-
-def _unit(config: Config) -> float:
-    """1/256 of the side of the image, m."""
-    return config.bmode.si().field_of_view / point_tracks.SIDE
-
-
-def hearts_of(cases: dict[str, Case]) -> dict[str, str]:
-    """Heart of every case: its label; without one, that of the first case with the same motion, or the name of that."""
-    told = {name: _text(case.labels.get("heart")) for name, case in cases.items()}
-    if all(told.values()):
-        return told
-    motion = motions({name: case.config for name, case in cases.items()})
-    first: dict[str, str] = {}
-    for name, heart in told.items():
-        first.setdefault(motion[name], heart or name)
-    return {name: heart or first[motion[name]] for name, heart in told.items()}
 
 
 def _sorts(case: Case, heart: str) -> Row:
     """Labels of a case as text, its heart, and its diagnosis."""
     return {
-        **{name: _text(case.labels.get(name)) for name in SORTS},
+        **{name: label_text(case.labels.get(name)) for name in SORTS},
         "heart": heart,
         "diagnosis": diagnosis(case.config),
     }
-
-
-def _text(label: Label) -> str:
-    """A label as text, a whole number without a decimal point; "" if there is none."""
-    return "" if label is None else str(integer_if_whole(label))

@@ -99,16 +99,8 @@ def contours(heart: Heart, plane: Plane) -> Contours:
 def _pieces(surface: Cut, ed: Floats, fields: Floats) -> Floats:
     """Values of fields at the ends of the segments in which the plane of elevation 0 cuts a surface.
 
-    Parameters
-    ----------
-    surface : Cut of shape (triangle, 3)
-    ed : ndarray of shape (node, 3), m
-        Positions in the image: lateral, axial, elevation.
-    fields : ndarray of shape (node, field, 2)
-
-    Returns
-    -------
-    ndarray of shape (segment, 2, field, 2)
+    The surface is a cut of shape (triangle, 3), `ed` the positions in the image (node, 3), m, lateral, axial and
+    elevation; fields (node, field, 2) give values (segment, 2, field, 2).
     """
     corners = Cut(surface.start.ravel(), surface.end.ravel(), surface.share.ravel())
     triangles = np.arange(len(corners.start)).reshape(-1, 3)

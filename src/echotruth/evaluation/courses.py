@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from echotruth.arrays import Floats
 from echotruth.evaluation import statistics
@@ -122,14 +122,16 @@ def rate(values: Floats, time: Floats) -> Floats:
     return np.gradient(values, time, axis=0, edge_order=2)
 
 
-def peak(values: Floats, time: Floats) -> tuple[Floats, Floats]:
-    """Peak over the cycle: the value of largest magnitude, with its sign, and its time.
+def peak(values: Floats, time: Floats, sign: ArrayLike | None = None) -> tuple[Floats, Floats]:
+    """Peak over the cycle: the value of largest magnitude, or the largest one in a direction, and its time.
 
     Parameters
     ----------
     values : ndarray of shape (frame, ...)
         NaN where unknown.
     time : ndarray of shape (frame,), s
+    sign : array_like, optional
+        Direction, 1 or -1, in which the values along the last axis are to be large.
 
     Returns
     -------
@@ -139,7 +141,8 @@ def peak(values: Floats, time: Floats) -> tuple[Floats, Floats]:
     """
     values = np.asarray(values)
     known = np.isfinite(values).all(axis=0)
-    frame = np.argmax(np.where(known, np.abs(values), 0), axis=0)
+    sizes = np.abs(values) if sign is None else values * np.asarray(sign, float)
+    frame = np.argmax(np.where(known, sizes, 0), axis=0)
     found = np.where(known, np.take_along_axis(values, frame[None], axis=0)[0], np.nan)
     return found, np.where(np.abs(found) > CURVE, np.asarray(time)[frame], np.nan)
 

@@ -9,7 +9,7 @@ import numpy as np
 from echotruth.config import Config
 from echotruth.evaluation import kept
 from echotruth.evaluation.agreement import REFERENCES
-from echotruth.evaluation.choice import image_size
+from echotruth.evaluation.choice import image_size, known_name
 from echotruth.evaluation.courses import peak, rate, systolic_rate
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import schema
@@ -52,8 +52,7 @@ def strain_curves(job: Job, tracker: str, size: int | None = None, reference: st
     """
     config, es = job.case.config, int(job.store.read("mechanics", job.row, names=("es_frame",))["es_frame"])
     size = image_size(config, size)
-    if reference not in REFERENCES:
-        raise ValueError(f"reference = {reference!r}: use one of {', '.join(REFERENCES)}.")
+    known_name("reference", reference, REFERENCES)
     names = [f"{what}_{name}" for name in NAMES for what in ("tracked", "true")]
     values = kept.read(job, "evaluation", *names, tracker=tracker, size=size)
     for name in ("true_region_strain", "true_segment_strain"):
@@ -72,39 +71,46 @@ def strain_curves(job: Job, tracker: str, size: int | None = None, reference: st
     )
 
 
-def strain_peaks(curves: xr.Dataset) -> xr.Dataset:
-    """Read end-systolic value, peak and time to peak off curves.
+def strain_peaks(strain: xr.Dataset) -> xr.Dataset:
+    """Read end-systolic strain, peak strain, time to peak and the largest rate of systole off curves.
 
     Parameters
     ----------
-    curves : Dataset
+    strain : Dataset
         As :func:`strain_curves` or :func:`twist_curves` returns it.
 
     Returns
     -------
     Dataset
-        For every curve NAME without `_rate`, without the dimension frame: `NAME_es`, its value at end-systole;
-        `NAME_peak`, its value of largest magnitude over the cycle; and `NAME_time_to_peak`, s since end-diastole. Of
-        every rate NAME_rate: `NAME_systolic_rate`, the largest rate from end-diastole to end-systole in the direction
-        of the end-systolic value (of shortening the most negative one).
+        For every curve NAME, without the dimension frame: `NAME_es`, its value at end-systole; `NAME_peak`, its value
+        of largest magnitude over the cycle; `NAME_time_to_peak`, s since end-diastole; and `NAME_systolic_rate`, the
+        largest rate from end-diastole to end-systole in the direction of the end-systolic value (of shortening the
+        most negative one).
 
     Raises
     ------
     ValueError
         If the data set has lost its attributes.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> peaks = et.strain_peaks(et.strain_curves("out/demo", view="mid"))
+    >>> peaks["tracked_segment_strain_es"].sel(measure="engineering", wall_component="TT").dims
+    ('aha',)
     """
     import xarray as xr
 
-    if "es_frame" not in curves.attrs:
+    if "es_frame" not in strain.attrs:
         raise ValueError("The data set has lost its attribute es_frame: keep those that echotruth gave it.")
-    es, time = curves.attrs["es_frame"], curves["time"].values
+    es, time = strain.attrs["es_frame"], strain["time"].values
     found = {}
-    for name, curve in curves.data_vars.items():
+    for name, curve in strain.data_vars.items():
         dims, units = [dim for dim in curve.dims if dim != "frame"], {"units": curve.attrs["units"]}
         values = curve.transpose("frame", ...).values
         if str(name).endswith("_rate"):
             of = str(name).removesuffix("_rate")
-            at_es = curves[of].isel(frame=es).transpose(*dims).values
+            at_es = strain[of].isel(frame=es).transpose(*dims).values
             found[f"{of}_systolic_rate"] = (dims, systolic_rate(values[: es + 1], at_es), units)
             continue
         value, when = peak(values, time)
@@ -113,37 +119,8 @@ def strain_peaks(curves: xr.Dataset) -> xr.Dataset:
             f"{name}_peak": (dims, value, units),
             f"{name}_time_to_peak": (dims, when, {"units": "s"}),
         }
-    coordinates = {name: array for name, array in curves.coords.items() if "frame" not in array.dims}
-    return xr.Dataset(found, coordinates, curves.attrs)
-
-
-def twist_curves(job: Job, tracker: str, size: int | None = None) -> xr.Dataset:
-    """Read the twist of a heart over the cycle, tracked and true: the rotation of the apex less that of the base.
-
-    Parameters
-    ----------
-    job : Job
-        Any job of the heart.
-    tracker : str
-    size : int, optional
-        Pixels along a side. Default: the largest.
-
-    Returns
-    -------
-    Dataset
-        As :func:`echotruth.twist_curves` returns it.
-
-    Raises
-    ------
-    ValueError
-        If the repository has fewer than two short-axis views, or the tracker was not evaluated on these.
-    """
-    views = twist_views(job.case.config)
-    if views is None:
-        raise ValueError("Twist needs two short-axis views at different positions, and the repository has not.")
-    jobs = (Job(job.folder, "tracking", job.case, view, code="read") for view in views)
-    base, apex = (strain_curves(of_view, tracker, size) for of_view in jobs)
-    return twist_of(base, apex, job.store.read("physiology", job.row, names=("twist",))["twist"])
+    coordinates = {name: array for name, array in strain.coords.items() if "frame" not in array.dims}
+    return xr.Dataset(found, coordinates, strain.attrs)
 
 
 def twist_views(config: Config) -> tuple[str, str] | None:

@@ -6,9 +6,9 @@ this one tracker, and without what does not depend on a tracker.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections import ChainMap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ import zarr
 from numpy.typing import ArrayLike, NDArray
 
 from echotruth.config import Config
+from echotruth.evaluation.choice import known_name
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.imaging.bmode import pixel_centres
@@ -132,9 +133,8 @@ def read(job: Job, group: str, *names: str, tracker: str, size: int) -> dict[str
         If it was not evaluated on this clip as it is now.
     """
     config = job.case.config
-    known, own = trackers(job.folder, config), list(config.tracking.trackers)
-    if tracker not in known:
-        raise ValueError(f"tracker = {tracker!r}: use one of {', '.join(known)}.")
+    known_name("tracker", tracker, trackers(job.folder, config))
+    own = list(config.tracking.trackers)
     of_tracker = [array.name for array in schema.named(group) if "tracker" in array.dims and array.name in names]
     others = [name for name in names if name not in of_tracker]
     index = (config.bmode.sizes.index(size), own.index(tracker) if tracker in own else 0)
@@ -142,6 +142,31 @@ def read(job: Job, group: str, *names: str, tracker: str, size: int) -> dict[str
     found = store.read(group, *job.index, names=tuple(of_tracker)) if of_tracker else {}
     values = {name: array[index] for name, array in found.items()}
     return values | (job.read(group, *others) if others else {})
+
+
+def read_each(
+    job: Job, sizes: Sequence[int], trackers: Sequence[str], names: Mapping[str, Sequence[str]]
+) -> Iterator[tuple[int, str, dict[str, NDArray[Any]]]]:
+    """Size, tracker and arrays of the clips of a view; without those that a tracker from outside did not keep.
+
+    Names are those of arrays that depend on the tracker, by group; sizes and trackers are as :func:`read` takes one of
+    each.
+    """
+    config, own = job.case.config, list(job.case.config.tracking.trackers)
+    stored: dict[str, NDArray[Any]] = {}
+    for group, members in names.items() if set(own) & set(trackers) else ():
+        stored |= job.read(group, *members)
+    for size in sizes:
+        for tracker in trackers:
+            if tracker in own:
+                index = config.bmode.sizes.index(size), own.index(tracker)
+                yield size, tracker, {name: values[index] for name, values in stored.items()}
+                continue
+            try:
+                found = [read(job, group, *members, tracker=tracker, size=size) for group, members in names.items()]
+            except NotEvaluated:
+                continue
+            yield size, tracker, dict(ChainMap(*found))
 
 
 def _checked(job: Job, tracker: str) -> KeptStore:
@@ -194,7 +219,11 @@ class Keeping:
         time = np.asarray(zarr.open_array(repository, path="mechanics/time", mode="r")[...])
         labels = layout.labels(self.config, rows, time, views) | {"tracker": [self.tracker]}
         labels |= layout.positions(self.config, pixel_centres, grid)
-        KeptStore(self.draft).lay_out({group: _arrays(group, self.config) for group in GROUPS}, {}, labels)
+        arrays = {
+            group: tuple(array for array in schema.groups(self.config)[group] if "tracker" in array.dims)
+            for group in GROUPS
+        }
+        KeptStore(self.draft).lay_out(arrays, {}, labels)
 
     def write(self, job: Job, clips: Mapping[int, Found]) -> None:
         """Write what was found in the clips of one view.
@@ -226,10 +255,7 @@ class Keeping:
         store, path = KeptStore(self.draft), store_path(self.folder, self.tracker)
         about = {"tracker": self.tracker, "settings": settings, "clips": clips}
         store.describe(about | _grid_and_sizes(self.config))
-        earlier = path.with_name(f".{path.name}.earlier")
-        rmtree(earlier, ignore_errors=True)
-        if path.exists():
-            path.rename(earlier)
+        earlier = _set_aside(path)
         self.draft.rename(path)
         rmtree(earlier, ignore_errors=True)
 
@@ -240,19 +266,18 @@ class Keeping:
 
 def remove(folder: Path, tracker: str) -> None:
     """Remove what was kept of a tracker: it was evaluated anew, and the scores are not those of what was kept."""
-    path = store_path(folder, tracker)
+    rmtree(_set_aside(store_path(folder, tracker)), ignore_errors=True)
+
+
+def _set_aside(path: Path) -> Path:
+    """Hide a store, if there is one, under a name that is to be deleted; at once, as deleting it takes long."""
     hidden = path.with_name(f".{path.name}.earlier")
-    if path.exists():
-        rmtree(hidden, ignore_errors=True)
-        os.rename(path, hidden)
     rmtree(hidden, ignore_errors=True)
+    if path.exists():
+        path.rename(hidden)
+    return hidden
 
 
 def _grid_and_sizes(config: Config) -> dict[str, Any]:
     """What the points and the clips of a tracker depend on, besides the images."""
     return {"grid_px": config.tracking.grid_px, "sizes": list(config.bmode.sizes)}
-
-
-def _arrays(group: str, config: Config) -> tuple[schema.Array, ...]:
-    """Arrays of a group that depend on the tracker."""
-    return tuple(replace(array) for array in schema.groups(config)[group] if "tracker" in array.dims)

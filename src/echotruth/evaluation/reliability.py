@@ -45,14 +45,9 @@ def counts(quality: Floats, within: NDArray[np.bool_]) -> list[dict[str, float]]
     list of dict
         One for each step of quality, with quality_low, quality_high, count, quality_sum and within_count.
     """
-    stated = np.clip(np.nan_to_num(quality, nan=0.0), 0, 1).ravel()
-    step = np.minimum((stated * BINS).astype(int), BINS - 1)
-    columns = [
-        np.bincount(step, weight, BINS) for weight in (np.ones(stated.size), stated, within.ravel().astype(float))
-    ]
     return [
         {"quality_low": k / BINS, "quality_high": (k + 1) / BINS} | dict(zip(COUNTS, map(float, values), strict=True))
-        for k, values in enumerate(zip(*columns, strict=True))
+        for k, values in enumerate(zip(*_counts(quality, within), strict=True))
     ]
 
 
@@ -71,11 +66,11 @@ def summary(quality: Floats, within: NDArray[np.bool_]) -> dict[str, float]:
         :func:`calibration_error`; brier_score, the mean of (quality - right)^2 (Brier, Mon Weather Rev 1950; 78:1).
     """
     stated = np.clip(np.nan_to_num(quality, nan=0.0), 0, 1)
-    nothing, columns = not stated.size, _added(counts(quality, within))
+    nothing = not stated.size
     return {
         "quality_percent": np.nan if nothing else float(100 * np.mean(stated)),
         "within_percent": np.nan if nothing else float(100 * np.mean(within)),
-        "calibration_error_percent": _expected_error(*columns),
+        "calibration_error_percent": _expected_error(*_counts(quality, within)),
         "brier_score": np.nan if nothing else float(np.mean((stated - within) ** 2)),
     }
 
@@ -122,9 +117,12 @@ def calibration_error(table: pd.DataFrame) -> float:
     return _expected_error(*(added[name].to_numpy(float) for name in COUNTS))
 
 
-def _added(steps: list[dict[str, float]]) -> list[Floats]:
+def _counts(quality: Floats, within: NDArray[np.bool_]) -> list[Floats]:
     """Columns of `COUNTS`, each (step,)."""
-    return [np.array([step[name] for step in steps]) for name in COUNTS]
+    stated = np.clip(np.nan_to_num(quality, nan=0.0), 0, 1).ravel()
+    step = np.minimum((stated * BINS).astype(int), BINS - 1)
+    weights = np.ones(stated.size), stated, within.ravel().astype(float)
+    return [np.asarray(np.bincount(step, weight, BINS), float) for weight in weights]
 
 
 def _expected_error(count: Floats, quality_sum: Floats, within_count: Floats) -> float:

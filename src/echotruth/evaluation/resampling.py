@@ -173,10 +173,10 @@ def standing(values: pd.DataFrame, seed: int = 1, statistic: str = "median", des
     value = middle(table, axis=0) if len(table) else np.full(table.shape[1], np.nan)
     order = np.argsort(np.where(known, value, np.inf), kind="stable")
     table, known, value = table[:, order], known[order], value[order]
-    low, high = _intervals(table, resamples, statistic)
+    low, high = interval(table, resamples, statistic)
     ahead, behind = _sure(table, resamples, statistic)
     difference = table - table[:, :1]
-    differs_low, differs_high = _intervals(difference, resamples, statistic)
+    differs_low, differs_high = interval(difference, resamples, statistic)
     p_value = [np.nan, *_holm([_signed_rank(column) for column in difference.T[1:]])]
     found = {
         "hearts": len(table),
@@ -198,12 +198,8 @@ def paired(values: pd.DataFrame, seed: int = 1, statistic: str = "median") -> pd
 
     Parameters
     ----------
-    values : DataFrame
-        Hearts as rows, trackers as columns, as :func:`by_heart` returns it.
-    seed : int
-        Of the bootstrap.
-    statistic : {"mean", "median"}
-        Over the hearts.
+    values, seed, statistic
+        As for :func:`standing`.
 
     Returns
     -------
@@ -216,7 +212,7 @@ def paired(values: pd.DataFrame, seed: int = 1, statistic: str = "median") -> pd
     names, table = list(values.columns), values.to_numpy(float)
     one, other = np.triu_indices(len(names), 1)
     difference = table[:, one] - table[:, other]
-    low, high = _intervals(difference, draws(len(table), seed), statistic)
+    low, high = interval(difference, draws(len(table), seed), statistic)
     found = {
         "first": [names[i] for i in one],
         "second": [names[i] for i in other],
@@ -229,18 +225,11 @@ def paired(values: pd.DataFrame, seed: int = 1, statistic: str = "median") -> pd
     return pd.DataFrame(found)
 
 
-def _intervals(values: Floats, resamples: NDArray[np.integer], statistic: str) -> tuple[Floats, Floats]:
-    """Intervals of columns (heart, k), each (k,); NaN of those with a value that is not known."""
-    low, high = interval(values, resamples, statistic)
-    known = np.isfinite(values).all(axis=0)
-    return np.where(known, low, np.nan), np.where(known, high, np.nan)
-
-
 def _sure(values: Floats, resamples: NDArray[np.integer], statistic: str) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
     """Number of columns that each of (heart, k) is surely before, and surely behind."""
     hearts, k = values.shape
     difference = (values[:, :, None] - values[:, None, :]).reshape(hearts, k * k)
-    _, high = _intervals(difference, resamples, statistic)
+    _, high = interval(difference, resamples, statistic)
     before = (high.reshape(k, k) < 0) & (hearts >= LEAST_HEARTS)
     return before.sum(axis=1), before.sum(axis=0)
 

@@ -21,12 +21,11 @@ from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load, validate
 from echotruth.evaluation import kept
-from echotruth.evaluation.choice import chosen
+from echotruth.evaluation.choice import chosen, folder_of, is_complete
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
-from echotruth.evaluation.summary import folder_of, is_complete
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.section import Name, Section
 from echotruth.tracking.external_program import in_one_line
@@ -86,7 +85,8 @@ class EvaluationRun:
         """
         cases = chosen("case", cases, list(all_cases(self.config)), self.folder, EvaluationError)
         views = chosen("view", views, list(self.config.views), self.folder, EvaluationError)
-        case_views = [(case, view) for case in cases for view in views if self._is_complete(case, view)]
+        every = [(case, view) for case in cases for view in views]
+        case_views = [clip for clip in every if is_complete(self.folder, *clip, "truth", "bmode")]
         if not case_views:
             raise EvaluationError(f"{self.folder} has no complete clip of these cases and views: run it to its end")
         return case_views
@@ -162,9 +162,6 @@ class EvaluationRun:
             remedy = f"it must be a folder that you may write to ({error.strerror})"
             raise EvaluationError(f"{self.file.parent} cannot hold the scores: {remedy}") from error
 
-    def _is_complete(self, case: str, view: str) -> bool:
-        return all(is_complete(self.folder, stage, case, view) for stage in ("truth", "bmode"))
-
 
 def prepare(repository: Path, name: str, values: dict[str, Any], keep: bool = False) -> EvaluationRun:
     """Prepare the evaluation of a tracker that is not one of the repository's.
@@ -210,7 +207,7 @@ def _score_view(run: EvaluationRun, sizes: list[int], case_view: tuple[str, str]
         job = Job(run.folder, "tracking", *case_view)
         with _reading(run, case_view):
             clip_of_size = {size: clip for size, clip in clips(job).items() if size in sizes}
-        tracked = {size: _track(run, clip) for size, clip in clip_of_size.items()}
+        tracked = {size: track_clip(clip, run.settings) for size, clip in clip_of_size.items()}
         # The truth is read only now, so that a tracker does not find it in its process.
         with _reading(run, case_view):
             truth = ground_truth(job)
@@ -233,10 +230,10 @@ def _reading(run: EvaluationRun, case_view: tuple[str, str]) -> Iterator[None]:
         raise EvaluationError(f"{run.folder} cannot be read at {' '.join(case_view)}: {remedy}") from error
 
 
-def _track(run: EvaluationRun, clip: Clip) -> tuple[tuple[np.ndarray, np.ndarray], str]:
-    """Displacement and quality that the tracker found in a clip, and why it failed, or ""."""
+def track_clip(clip: Clip, settings: Section) -> tuple[tuple[np.ndarray, np.ndarray], str]:
+    """Displacement and quality that a tracker finds in a clip, and why it failed, or ""."""
     try:
-        return track(*clip.tracker_arguments, run.settings), ""
+        return track(*clip.tracker_arguments, settings), ""
     except TrackerFailed as error:
         return clip.no_estimate, str(error)
 

@@ -9,15 +9,19 @@ from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.evaluation import statistics
-from echotruth.evaluation.courses import rate, systolic_rate
+from echotruth.evaluation.courses import peak, rate, systolic_rate
 from echotruth.evaluation.displacement_error import SEGMENTS
 from echotruth.mechanics.pathology import INFARCT
-from echotruth.repository.rounding import CURVE
 
 COMPONENTS = {"short_axis": ("radial", "circumferential"), "long_axis": ("radial", "longitudinal")}
 """Plane to the first two components of strain along the axes of the wall in it."""
 
 RADIAL = "radial"
+
+CONTRACTION = (1, -1)
+"""Signs of radial and tangential strain in a contraction. The largest thickening and the largest shortening, unlike the
+value of largest magnitude, stay the same feature of the curve where an infarct, or a segment that is activated late, is
+first stretched by the others as much as it shortens."""
 
 SHOWN = 0.25
 """Share of the points of the fullest segment of a view below which the view shows a corner of a segment only."""
@@ -103,7 +107,7 @@ def segment_rows(tracked: Floats, true: Floats, tissue: Tissue, plane: str, time
     -------
     list of dict
         One for every segment with points and component: `aha`, `component`, what :meth:`Tissue.rows` tells, and of
-        `tracked_` and `true_` each `es_percent`, `peak_percent` and `time_to_peak_ms` (:func:`peak_contraction`), and
+        `tracked_` and `true_` each `es_percent`, `peak_percent` and `time_to_peak_ms` (of the :data:`CONTRACTION`), and
         `systolic_rate_per_s` (:func:`.courses.systolic_rate`), both in the direction of the true end-systolic strain.
     """
     read = {what: _readings(curves, time, es, true[es]) for what, curves in zip(WHAT, (tracked, true), strict=True)}
@@ -151,34 +155,9 @@ def errors(rows: list[Row]) -> dict[str, float]:
     }
 
 
-def peak_contraction(curves: Floats, time: Floats) -> tuple[Floats, Floats]:
-    """Largest thickening and largest shortening over the cycle, and their times.
-
-    Unlike the value of largest magnitude, it stays the same feature of the curve where an infarct, or a segment that is
-    activated late, is first stretched by the others as much as it shortens.
-
-    Parameters
-    ----------
-    curves : ndarray of shape (frame, ..., 2)
-        Radial and tangential strain since end-diastole, 0 in the first frame.
-    time : ndarray of shape (frame,), s
-
-    Returns
-    -------
-    value, time : ndarray of shape (..., 2)
-        The largest radial and the smallest tangential strain, and s: that of the frame. Both are NaN where a frame is
-        unknown, and there is no time of a peak that is no more than the rounding of stored curves.
-    """
-    contraction = curves * np.array([1.0, -1.0])
-    known = np.isfinite(contraction).all(axis=0)
-    frame = np.argmax(np.where(known, contraction, 0), axis=0)
-    value = np.where(known, np.take_along_axis(curves, frame[None], axis=0)[0], np.nan)
-    return value, np.where(np.abs(value) > CURVE, np.asarray(time)[frame], np.nan)
-
-
 def _readings(curves: Floats, time: Floats, es: int, true_at_es: Floats) -> dict[str, Floats]:
     """Values of curves (frame, 17, component), each (17, component) as the true end-systolic strain."""
-    value, when = peak_contraction(curves[..., :2], time)
+    value, when = peak(curves[..., :2], time, CONTRACTION)
     return {
         "es_percent": 100 * curves[es],
         "peak_percent": 100 * value,

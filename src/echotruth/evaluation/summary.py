@@ -4,25 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.cases import all_cases, expand
 from echotruth.config import Config
 from echotruth.config.imaging import ALL_VIEWS
 from echotruth.config.loading import load
 from echotruth.evaluation import kept
 from echotruth.evaluation.agreement import REFERENCES
-from echotruth.evaluation.choice import chosen, image_size
+from echotruth.evaluation.choice import cases_of, chosen, image_size, jobs_of
 from echotruth.evaluation.courses import peak, rate, systolic_rate
 from echotruth.evaluation.curves import REFERENCE, twist_views
-from echotruth.evaluation.tracker_options import EvaluationError
+from echotruth.evaluation.segment_strain import Row
 from echotruth.loop.cycle import read_loop
-from echotruth.repository import ledger
-from echotruth.repository.ledger import record_path
+from echotruth.repository.ledger import repository_folder
 from echotruth.repository.schema import LABELS
 from echotruth.workflow.job import Job
 
@@ -68,8 +67,6 @@ MEAN_OF = {"gls": "long_axis", "gls_endocardial": "long_axis"} | dict.fromkeys(
 )
 """Quantities whose mean over the views of one kind of plane is that of the heart."""
 
-Row = dict[str, str | int | float]
-
 ANGLES = ("rotation", "twist")
 """Quantities that are angles."""
 
@@ -77,45 +74,51 @@ WHAT = ("tracked", "true")
 
 
 def strain_summary(
-    folder: Path,
+    repository: str | Path,
     cases: Sequence[str] | None = None,
     views: Sequence[str] | None = None,
     sizes: Sequence[int] | None = None,
     trackers: Sequence[str] | None = None,
 ) -> pd.DataFrame:
-    """Read the strain of clips into a table.
+    """Read GLS, GCS, radial strain, rotation and twist of clips into a table, tracked and true.
 
     Parameters
     ----------
-    folder : Path
-        Folder of the repository.
+    repository : str or Path
     cases, views, sizes, trackers : sequence, optional
-        Those to include. Default: all views and trackers of the cases that were evaluated, at the largest size.
+        Those to include. Default: all that was evaluated, at the largest size.
 
     Returns
     -------
     DataFrame
-        As :func:`echotruth.strain_summary` returns it.
+        One row per case, view, size_px, tracker and `quantity`: gls and gls_endocardial (long axis), gcs and
+        gcs_endocardial (short axis), radial (engineering, mean of the wall, in the plane), all in %, and rotation
+        (short axis), in degrees. Rows of the view "all" are those of the heart: gls as the mean over its long-axis
+        views, gcs and radial over its short-axis views, if all of these are included, and twist. Columns `tracked_`
+        and `true_` each: `es` and `peak`, in the `unit`; `time_to_peak_ms`; and `systolic_rate`, in the `rate_unit`.
 
     Raises
     ------
-    ValueError
-        If the repository does not have one of them.
+    FileNotFoundError, ValueError
+        If there is no such repository, case, view, size or tracker.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> table = et.strain_summary("out/demo", trackers=["bspline_dic"])
+    >>> gls = table.query("quantity == 'gls' and view == 'long_axis'")[["tracked_es", "true_es", "unit"]]
+    >>> list(gls["unit"])
+    ['percent']
     """
     import pandas as pd
 
+    folder = repository_folder(repository)
     config = load(folder / "config.yaml")
-    known = kept.trackers(folder, config)
-    chosen_cases = chosen("case", cases, list(all_cases(config)))
-    chosen_views = chosen("view", views, list(config.views))
     chosen_sizes = [image_size(config, size) for size in sizes or config.bmode.sizes[:1]]
-    chosen_trackers = chosen("tracker", trackers, known)
-    by_id = {case.id: case for case in expand(config, str(folder / "config.yaml"))}
-    rows: list[Row] = []
-    for case in chosen_cases:
-        evaluated = [view for view in chosen_views if is_evaluated(folder, case, view)]
-        jobs = [Job(folder, "tracking", by_id[case], view, code="read") for view in evaluated]
-        rows += _rows(jobs, chosen_sizes, chosen_trackers)
+    chosen_trackers = chosen("tracker", trackers, kept.trackers(folder, config))
+    jobs = jobs_of(folder, cases_of(folder, config), cases, views, "evaluation")
+    by_heart = (list(of_heart) for _, of_heart in groupby(jobs, lambda job: job.case.id))
+    rows = [row for of_heart in by_heart for row in _rows(of_heart, chosen_sizes, chosen_trackers)]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -129,8 +132,6 @@ COLUMNS = (
 
 def _rows(jobs: list[Job], sizes: list[int], trackers: list[str]) -> Iterator[Row]:
     """Rows of one heart: of each view, and of the heart as a whole."""
-    if not jobs:
-        return
     heart, config = jobs[0], jobs[0].case.config
     es = int(heart.store.read("mechanics", heart.row, names=("es_frame",))["es_frame"])
     read = partial(_row, time=read_loop(config.loop).time, es=es)
@@ -156,25 +157,14 @@ def _rows(jobs: list[Job], sizes: list[int], trackers: list[str]) -> Iterator[Ro
 
 def _curves(job: Job, sizes: list[int], trackers: list[str]) -> dict[tuple[int, str], dict[str, Floats]]:
     """Curves of one view, tracked and true, by size and tracker; without those that were not evaluated on it."""
-    config, own = job.case.config, list(job.case.config.tracking.trackers)
     names = list(dict.fromkeys(quantity.curve for quantity in QUANTITIES))
-    stored = job.read("evaluation", *(f"{what}_{name}" for name in names for what in WHAT))
-    stored["true_region_strain"] = stored["true_region_strain"][REFERENCES.index(REFERENCE)]
-    true = {f"true_{name}": stored[f"true_{name}"] for name in names}
-    found = {}
-    for size in sizes:
-        for tracker in trackers:
-            if tracker in own:
-                place = config.bmode.sizes.index(size), own.index(tracker)
-                tracked = {f"tracked_{name}": stored[f"tracked_{name}"][place] for name in names}
-            else:
-                try:
-                    wanted = [f"tracked_{name}" for name in names]
-                    tracked = kept.read(job, "evaluation", *wanted, tracker=tracker, size=size)
-                except kept.NotEvaluated:
-                    continue
-            found[size, tracker] = {name: np.asarray(values, float) for name, values in (true | tracked).items()}
-    return found
+    true = job.read("evaluation", *(f"true_{name}" for name in names))
+    true["true_region_strain"] = true["true_region_strain"][REFERENCES.index(REFERENCE)]
+    read = kept.read_each(job, sizes, trackers, {"evaluation": [f"tracked_{name}" for name in names]})
+    return {
+        (size, tracker): {name: np.asarray(values, float) for name, values in (true | tracked).items()}
+        for size, tracker, tracked in read
+    }
 
 
 def _row(name: str, tracked: Floats, true: Floats, time: Floats, es: int) -> Row:
@@ -202,22 +192,3 @@ def _means(rows: list[Row], config: Config, keys: Row) -> Iterator[Row]:
                 if column.startswith(("tracked_", "true_"))
             }
             yield of_plane[0] | keys | {"view": ALL_VIEWS} | means
-
-
-def is_evaluated(folder: Path, case: str, view: str) -> bool:
-    """Whether the trackers of a repository were evaluated on a view of a heart."""
-    return is_complete(folder, "evaluation", case, view)
-
-
-def folder_of(repository: Path) -> Path:
-    """Folder of a repository, given it or its store; EvaluationError if it is none."""
-    try:
-        return ledger.repository_folder(repository)
-    except FileNotFoundError as error:
-        raise EvaluationError(str(error)) from None
-
-
-def is_complete(folder: Path, stage: str, case: str, view: str | None = None) -> bool:
-    """Whether a stage of a heart, or of one of its views, is complete."""
-    path = record_path(folder, stage, case, view)
-    return path.is_file() and ledger.read(path).get("status") == "complete"

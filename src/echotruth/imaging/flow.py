@@ -37,11 +37,11 @@ def flow(heart: Heart, frame: int, points: MaterialPoints) -> Floats:
     ndarray of shape (2, n, 3), m
         In the heart frame: to the previous and to the next frame; NaN where there is none.
     """
-    found = np.full((len(STEPS), len(points), 3), np.nan)
-    for row, step in zip(found, STEPS.values(), strict=True):
+    displacement = np.full((len(STEPS), len(points), 3), np.nan)
+    for row, step in zip(displacement, STEPS.values(), strict=True):
         if 0 <= frame + step < len(heart.displacement):
             row[:] = interpolate(heart.displacement[frame + step] - heart.displacement[frame], heart.cells, points)
-    return found
+    return displacement
 
 
 def out_of_slice(elevation: NDArray[np.floating], thickness: NDArray[np.floating]) -> NDArray[np.bool_]:

@@ -109,11 +109,8 @@ def metadata(config: Config, scanner: Scanner) -> tuple[Arrays, dict[str, int], 
     arrays, sizes, attributes : dict
         The group `rf` of the repository: coordinates and transmits, lengths of dimensions, settings in SI units.
     """
-    waves, scan, matrix = (
-        TRANSMIT_SEQUENCES[config.rf.transmit](config.probe, config.rf, scanner.scan),
-        scanner.scan,
-        scanner.matrix,
-    )
+    scan, matrix = scanner.scan, scanner.matrix
+    waves = TRANSMIT_SEQUENCES[config.rf.transmit](config.probe, config.rf, scan)
     arrays = {f"transmit_{name}": getattr(waves, name) for name in ("delay", "weight", "origin", "t0_distance")}
     arrays |= {"line_angle": scan.angle, "line_origin": scan.line_origin, "range": scanner.range}
     arrays |= dict.fromkeys(("element", "transmitter", "receiver"), matrix.centres)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echotruth.learning.items import Item, Items, Place, frame_time
+from echotruth.learning.items import Item, Items, Place
 
 TRUTH = ("displacement", "strain", "wall_depth", "labels", "flow")
 """Arrays of the truth, in the group truth/SIZE of docs/schema.md."""
@@ -55,7 +55,7 @@ class Clips(Items):
         return (*super().arrays, *(f"truth/{self.size}/{name}" for name in self.names))
 
     def item(self, place: Place, within: int) -> Item:
-        known = {"image": self.image(place), "time": frame_time(self, place)}
+        known = {"image": self.image(place), "time": self.time(place)}
         return known | {name: self._channels_first(name, self.truth(place, name)) for name in self.names}
 
     @staticmethod

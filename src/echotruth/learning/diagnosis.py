@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echotruth.learning.items import Item, Items, Place, frame_time
+from echotruth.learning.items import Item, Items, Place
 from echotruth.learning.measurements import scar_size
 from echotruth.learning.table import cases as read_cases
 
@@ -65,7 +65,7 @@ class Diagnosis(Items):
         name = self._diagnosis[place.case]
         return {
             "image": self.image(place),
-            "time": frame_time(self, place),
+            "time": self.time(place),
             "es_frame": int(self.reader.read("mechanics/es_frame", place.row)),
             "diagnosis": name,
             "label": self.classes.index(name),

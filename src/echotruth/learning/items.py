@@ -11,6 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from echotruth.evaluation.choice import known_name
 from echotruth.learning.reading import Reader
 
 Item = dict[str, Any]
@@ -76,17 +77,17 @@ class Items(Sequence[Item]):
     ) -> None:
         self.reader = Reader(repository)
         config = self.reader.config
-        self.size = _chosen("size", config.bmode.sizes[0] if size is None else size, config.bmode.sizes)
+        self.size = known_name("size", config.bmode.sizes[0] if size is None else size, config.bmode.sizes)
         self.frames = config.loop.frames
         self.spacing = config.bmode.si().field_of_view / self.size
         """Distance of pixel centres, m."""
         ids = _complete(self.reader) if cases is None else _listed(cases.index if hasattr(cases, "columns") else cases)
         names = list(config.views) if views is None else _listed(views)
-        self.places = self._places(ids, [_chosen("view", name, list(config.views)) for name in names])
+        self.places = self._places(ids, [known_name("view", name, list(config.views)) for name in names])
 
     def _places(self, cases: list[str], views: list[str]) -> list[Place]:
         rows, indices = self.reader.cases, self.reader.views
-        pairs = [(_chosen("case", case, rows), view) for case in cases for view in views]
+        pairs = [(known_name("case", case, rows), view) for case in cases for view in views]
         places = [Place(case, view, rows[case], indices[view]) for case, view in pairs]
         for place in places:
             for path in self.arrays:
@@ -141,17 +142,9 @@ class Items(Sequence[Item]):
         """Part of an array of the truth of a clip."""
         return self.reader.read(f"truth/{self.size}/{name}", place.row, place.index, *index)
 
-
-def frame_time(items: Items, place: Place) -> NDArray[np.float32]:
-    """Time of each frame since end-diastole, (frame,), s."""
-    return items.reader.read(f"bmode/{items.size}/time", place.row).astype(np.float32)
-
-
-def _chosen(name: str, value: Any, known: Any) -> Any:
-    if value not in known:
-        listed = ", ".join(map(str, list(known)[:20]))
-        raise ValueError(f"{name} = {value!r}: use one of {listed}.")
-    return value
+    def time(self, place: Place) -> NDArray[np.float32]:
+        """Time of each frame since end-diastole, (frame,), s."""
+        return self.reader.read(f"bmode/{self.size}/time", place.row).astype(np.float32)
 
 
 def _listed(names: Any) -> list[str]:

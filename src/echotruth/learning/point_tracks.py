@@ -16,7 +16,7 @@ from echotruth.imaging.labels import LABELS
 from echotruth.imaging.tracks import follow, visible
 from echotruth.imaging.view import Plane
 from echotruth.learning.beams import Beams
-from echotruth.learning.items import Item, Items, Place, frame_time
+from echotruth.learning.items import Item, Items, Place
 
 
 class PointTracks(Items):
@@ -92,7 +92,7 @@ class PointTracks(Items):
         )
         return {
             "image": self.image(place),
-            "time": frame_time(self, place),
+            "time": self.time(place),
             "start": start,
             "position": position.astype(np.float32),
             "position_m": followed.astype(np.float32),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from echotruth.evaluation.choice import known_name
 from echotruth.imaging.labels import LABELS
 from echotruth.learning.items import Item, Items, Place
 
@@ -43,9 +44,7 @@ class Segmentation(Items):
         size: int | None = None,
         target: str = "wall",
     ) -> None:
-        if target not in TARGETS:
-            raise ValueError(f"target = {target!r}: use one of {', '.join(TARGETS)}.")
-        self.target = target
+        self.target = known_name("target", target, TARGETS)
         super().__init__(repository, cases, views, size)
 
     @property

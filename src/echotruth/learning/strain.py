@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echotruth.learning.items import Item, Items, Place, frame_time
+from echotruth.learning.items import Item, Items, Place
 from echotruth.learning.measurements import physiology
 
 INDICES = ("ejection_fraction", "gls", "twist_peak")
@@ -37,7 +37,7 @@ class Strain(Items):
         mean, layers = (self.reader.read(f"kinematics/{name}", place.row).astype(np.float32) for name in kinematics)
         return {
             "image": self.image(place),
-            "time": frame_time(self, place),
+            "time": self.time(place),
             "strain": mean,
             "layer_strain": layers,
             "es_frame": int(self.reader.read("mechanics/es_frame", place.row)),

@@ -128,6 +128,13 @@ def case_of(clip: xr.Dataset) -> Case:
     return Case(clip.attrs["case"], {}, configure(json.loads(clip.attrs["config"])))
 
 
+def plane_of(clip: xr.Dataset, heart: Heart) -> Plane:
+    """The plane of a clip, or of what was tracked in it; ValueError if it was made of another heart."""
+    if clip.attrs.get("heart", fingerprint(heart)) != fingerprint(heart):
+        raise ValueError("The clip was made of another heart: give the one that was imaged.")
+    return Plane(np.array(clip.attrs["plane_origin"]), np.reshape(clip.attrs["plane_axes"], (3, 3)))
+
+
 def fingerprint(heart: Heart) -> str:
     """Twelve hexadecimal digits that tell one motion from another."""
     return sha256(np.ascontiguousarray(heart.displacement).tobytes()).hexdigest()[:12]

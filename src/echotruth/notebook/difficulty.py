@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from echotruth.evaluation.choice import job_of
 from echotruth.evaluation.difficulty.table import difficulties
-from echotruth.notebook.repositories import job_of
 from echotruth.repository.ledger import repository_folder
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from echotruth.heart import Heart
 from echotruth.imaging.tracks import follow, visible
-from echotruth.imaging.view import Plane
 from echotruth.notebook.arguments import check_clip, check_heart
-from echotruth.notebook.datasets import case_of, fingerprint
+from echotruth.notebook.datasets import case_of, plane_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,13 +60,10 @@ def point_tracks(
 
     check_heart(heart)
     check_clip(clip)
-    case = case_of(clip)
-    if clip.attrs.get("heart", fingerprint(heart)) != fingerprint(heart):
-        raise ValueError("The clip was made of another heart: give the one that was imaged.")
+    case, plane = case_of(clip), plane_of(clip, heart)
     given, start = _checked(points, frame, len(heart.displacement))
     if thickness is not None and not thickness > 0:
         raise ValueError(f"thickness = {thickness}: give a positive length, in m.")
-    plane = Plane(np.array(clip.attrs["plane_origin"]), np.reshape(clip.attrs["plane_axes"], (3, 3)))
     first = np.array([clip["lateral"].values[0], clip["axial"].values[0]])
     spacing = case.config.bmode.si().field_of_view / clip.sizes["axial"]
     followed = follow(heart.nodes + heart.displacement, heart.cells, plane, first + given * spacing, start)

@@ -10,13 +10,12 @@ import numpy as np
 
 from echotruth.config import Config
 from echotruth.evaluation import kept
-from echotruth.evaluation.choice import image_size
+from echotruth.evaluation.choice import image_size, job_of
 from echotruth.evaluation.clip import grid_positions
 from echotruth.evaluation.scoring import truth_at
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.imaging.view import Plane
 from echotruth.notebook.datasets import as_stored, dataset
-from echotruth.notebook.repositories import job_of
 
 if TYPE_CHECKING:
     import xarray as xr

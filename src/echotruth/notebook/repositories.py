@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.evaluation.choice import image_size
+from echotruth.evaluation.choice import image_size, job_of
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
 from echotruth.notebook.datasets import clip_dataset
 from echotruth.notebook.derived import MEANING, stored
 from echotruth.repository import schema
-from echotruth.repository.ledger import repository_folder, rows
+from echotruth.repository.ledger import repository_folder
 from echotruth.repository.remote import hierarchy, is_url
-from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -188,21 +187,3 @@ def _indexed(groups: dict[str, xr.Dataset]) -> dict[str, xr.Dataset]:
         indexed[path] = group.assign_coords(xr.Coordinates(variables, indexes))
         indexed[path].attrs.pop("labels", None)
     return indexed
-
-
-def job_of(repository: str | Path, case: str, view: str | None = None) -> Job:
-    """The job that tracks a view of a heart, through which a repository is read.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        If there is no such repository, case or view.
-    """
-    folder = repository_folder(repository)
-    known = rows(folder / "registry.txt")
-    if case not in known:
-        raise ValueError(f"case = {case!r}: use one of {', '.join(list(known)[:20])}.")
-    job = Job(folder, "tracking", case, view)
-    if view is not None and view not in job.case.config.views:
-        raise ValueError(f"view = {view!r}: use one of {', '.join(job.case.config.views)}.")
-    return job

@@ -24,11 +24,11 @@ from echotruth.heart import Heart
 from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
-from echotruth.imaging.view import Plane, imaging_plane
+from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.physiology import measures, violated_bound
 from echotruth.notebook.arguments import check_clip, check_heart
-from echotruth.notebook.datasets import as_stored, case_of, clip_dataset, dataset, fingerprint
+from echotruth.notebook.datasets import as_stored, case_of, clip_dataset, dataset, plane_of
 from echotruth.seeds import generator
 from echotruth.tracking.tracker import track as track_points
 
@@ -261,14 +261,11 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
     check_heart(heart)
     if "displacement" not in tracked or set(tracked["displacement"].dims) != {"frame", "axial", "lateral", "plane"}:
         raise ValueError("tracked: has no displacement (frame, axial, lateral, plane): give what et.track returns.")
-    case, attributes = case_of(tracked), tracked.attrs
-    if attributes.get("heart", fingerprint(heart)) != fingerprint(heart):
-        raise ValueError("The clip was made of another heart: give the one that was imaged.")
+    case, attributes, plane = case_of(tracked), tracked.attrs, plane_of(tracked, heart)
     frames = len(heart.displacement)
     if tracked.sizes["frame"] != frames:
         raise ValueError(f"The displacement has {tracked.sizes['frame']} frames, and the heart has {frames}.")
     kind = case.config.views[attributes["view"]].plane
-    plane = Plane(np.array(attributes["plane_origin"]), np.reshape(attributes["plane_axes"], (3, 3)))
     lateral, axial = np.meshgrid(tracked["lateral"].values, tracked["axial"].values)
     position = np.stack([lateral, axial], axis=-1)
     truth = truth_at(heart, plane, kind, position, case.config)
@@ -296,9 +293,10 @@ def _settings(config: Config, tracker: str | Callable[..., Any], options: dict[s
     known = config.tracking.trackers
     if tracker in known:
         given = known[tracker].model_dump() | options
+    elif ":" in tracker:
+        given = {"method": "external", "track": tracker, "options": options}
     else:
-        given = {"method": "external", "track": tracker, "options": options} if ":" in tracker else {}
-        given = given or {"method": tracker, **options}
+        given = {"method": tracker, **options}
     return configure(config, tracking={"trackers": {"tracker": given}}).tracking.trackers["tracker"]
 
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echotruth.evaluation import curves, summary
-from echotruth.notebook.repositories import job_of
-from echotruth.repository.ledger import repository_folder
+from echotruth.evaluation import curves
+from echotruth.evaluation.choice import job_of
+from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
 
 
@@ -69,37 +67,6 @@ def strain_curves(
     return curves.strain_curves(job_of(repository, case, view), tracker, size, reference)
 
 
-def strain_peaks(strain: xr.Dataset) -> xr.Dataset:
-    """Read end-systolic strain, peak strain, time to peak and the largest rate of systole off curves.
-
-    Parameters
-    ----------
-    strain : Dataset
-        As :func:`strain_curves` or :func:`twist_curves` returns it.
-
-    Returns
-    -------
-    Dataset
-        For every curve NAME, without the dimension frame: `NAME_es`, its value at end-systole; `NAME_peak`, its value
-        of largest magnitude over the cycle; `NAME_time_to_peak`, s since end-diastole; and `NAME_systolic_rate`, the
-        largest rate from end-diastole to end-systole in the direction of the end-systolic value (of shortening the
-        most negative one).
-
-    Raises
-    ------
-    ValueError
-        If the data set has lost its attributes.
-
-    Examples
-    --------
-    >>> import echotruth as et
-    >>> peaks = et.strain_peaks(et.strain_curves("out/demo", view="mid"))
-    >>> peaks["tracked_segment_strain_es"].sel(measure="engineering", wall_component="TT").dims
-    ('aha',)
-    """
-    return curves.strain_peaks(strain)
-
-
 def twist_curves(
     repository: str | Path, case: str = "heart", tracker: str = "bspline_dic", size: int | None = None
 ) -> xr.Dataset:
@@ -131,45 +98,10 @@ def twist_curves(
     >>> twist.attrs["apical_view"], twist.attrs["basal_view"], twist["tracked_twist"].units
     ('apex', 'base', 'rad')
     """
-    return curves.twist_curves(job_of(repository, case), tracker, size)
-
-
-def strain_summary(
-    repository: str | Path,
-    cases: Sequence[str] | None = None,
-    views: Sequence[str] | None = None,
-    sizes: Sequence[int] | None = None,
-    trackers: Sequence[str] | None = None,
-) -> pd.DataFrame:
-    """Read GLS, GCS, radial strain, rotation and twist of clips into a table, tracked and true.
-
-    Parameters
-    ----------
-    repository : str or Path
-    cases, views, sizes, trackers : sequence, optional
-        Those to include. Default: all that was evaluated, at the largest size.
-
-    Returns
-    -------
-    DataFrame
-        One row per case, view, size_px, tracker and `quantity`: gls and gls_endocardial (long axis), gcs and
-        gcs_endocardial (short axis), radial (engineering, mean of the wall, in the plane), all in %, and rotation
-        (short axis), in degrees. Rows of the view "all" are those of the heart: gls as the mean over its long-axis
-        views, gcs and radial over its short-axis views, if all of these are included, and twist. Columns `tracked_`
-        and `true_` each: `es` and `peak`, in the `unit`; `time_to_peak_ms`; and `systolic_rate`, in the `rate_unit`.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        If there is no such repository, case, view, size or tracker.
-
-    Examples
-    --------
-    >>> import echotruth as et
-    >>> table = et.strain_summary("out/demo", trackers=["bspline_dic"])
-    >>> gls = table.query("quantity == 'gls' and view == 'long_axis'")[["tracked_es", "true_es", "unit"]]
-    >>> list(gls["unit"])
-    ['percent']
-    """
-    folder = repository_folder(repository)
-    return summary.strain_summary(folder, cases, views, sizes, trackers)
+    job = job_of(repository, case)
+    views = curves.twist_views(job.case.config)
+    if views is None:
+        raise ValueError("Twist needs two short-axis views at different positions, and the repository has not.")
+    jobs = (Job(job.folder, "tracking", job.case, view, code="read") for view in views)
+    base, apex = (curves.strain_curves(of_view, tracker, size) for of_view in jobs)
+    return curves.twist_of(base, apex, job.store.read("physiology", job.row, names=("twist",))["twist"])

@@ -14,7 +14,7 @@ from PIL import Image
 from echotruth.cases import all_cases, find_case
 from echotruth.config import Config
 from echotruth.evaluation import kept
-from echotruth.evaluation.clip_metrics import hearts_of
+from echotruth.evaluation.choice import hearts_of
 from echotruth.evaluation.leaderboard import best, rows, standings
 from echotruth.heart import Heart
 from echotruth.mechanics.derived import centroid_kinematics, fibre_angles

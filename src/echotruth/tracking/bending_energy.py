@@ -73,8 +73,8 @@ class BendingEnergy:
 
     def gradient(self, field: np.ndarray) -> np.ndarray:
         """Half the gradient of the energy of a field, both of shape (unknowns,)."""
-        shares = np.sum(self.gradients * field[:, None], 0)
-        return multiply_banded(self.band, field) - np.sum(self.projection * shares, 1)
+        products = np.sum(self.gradients * field[:, None], 0)
+        return multiply_banded(self.band, field) - np.sum(self.projection * products, 1)
 
 
 def bending_matrix(cells: Cells, metrics: np.ndarray, angle_derivatives: np.ndarray, size: int) -> np.ndarray:

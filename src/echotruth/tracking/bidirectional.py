@@ -34,9 +34,9 @@ def combined_variance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Variance w^2 var1 + (1 - w)^2 var2 of the mean with the :func:`inverse_variance_weight`; arrays of one shape."""
     weight = inverse_variance_weight(first, second)
     total = np.zeros(np.shape(weight))
-    for share, each in ((weight, first), (1 - weight, second)):
+    for factor, variance in ((weight, first), (1 - weight, second)):
         # A value that is missing has an infinite variance and the weight 0.
-        total += np.multiply(share**2, each, out=np.zeros_like(total), where=share > 0)
+        total += np.multiply(factor**2, variance, out=np.zeros_like(total), where=factor > 0)
     return total
 
 

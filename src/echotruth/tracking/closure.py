@@ -107,13 +107,13 @@ def closure(frames: np.ndarray, mask: np.ndarray) -> Closure:
     amplitudes = [even_gain(amplitude, GAIN_SHARE * max(size), typical) for amplitude in amplitudes]
     images = list(np.array(amplitudes) / (np.max(amplitudes) or 1))
     flows = [optical_flow(first, second) for first, second in pairwise(images)]
-    around = optical_flow(images[0], images[-1])
+    closing = optical_flow(images[0], images[-1])
     correlations = [_correlation(*pair, flow, inside) for pair, flow in zip(pairwise(images), flows, strict=True)]
     # A frame without texture, as a black one, tells nothing.
     known = [correlation for correlation in correlations if np.isfinite(correlation)]
     return Closure(
-        _left(flows, around, inside),
-        _correlation(images[0], images[-1], around, inside),
+        _remaining(flows, closing, inside),
+        _correlation(images[0], images[-1], closing, inside),
         float(min(known, default=np.nan)),
     )
 
@@ -123,14 +123,14 @@ def _reduced(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     return cv2.resize(image, size, interpolation=cv2.INTER_AREA)
 
 
-def _left(flows: list[np.ndarray], around: np.ndarray, inside: np.ndarray) -> float:
+def _remaining(flows: list[np.ndarray], closing: np.ndarray, inside: np.ndarray) -> float:
     """RMS flow from the first frame to the last, over the largest RMS distance of points that the others carry."""
     points = _points(inside)
     position, farthest = points, 0.0
     for flow in flows:
         position = position + interpolate_field(flow, _within(position, inside.shape))
         farthest = max(farthest, _length(position - points))
-    return _length(around[inside]) / farthest if len(flows) > 1 and farthest > LEAST_MOTION else np.nan
+    return _length(closing[inside]) / farthest if len(flows) > 1 and farthest > LEAST_MOTION else np.nan
 
 
 def _correlation(first: np.ndarray, second: np.ndarray, flow: np.ndarray, inside: np.ndarray) -> float:

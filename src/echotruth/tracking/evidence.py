@@ -1,14 +1,14 @@
 """Weight of the bending energy of a step that the images give most evidence for.
 
 The step d from one frame to the next is fitted by least squares with the bending energy as prior, v / beta per unknown
-of the energy: the images tell gamma of the unknowns, the prior the rest. The evidence is greatest where the energy of
-the fitted step is what the prior expects of the unknowns that the images tell, beta = v gamma / (d^T K d) (MacKay 1992,
-Neural Comput 4:415, doi 10.1162/neco.1992.4.3.415, his alpha = gamma / 2 E_W). A step that is uneven beyond the noise
-so gets a small weight, and an even one a large weight.
+of the energy: the images determine gamma of the unknowns (the effective number of parameters), the prior the rest. The
+evidence is greatest where the energy of the fitted step is what the prior expects of these gamma,
+beta = v gamma / (d^T K d) (MacKay 1992, Neural Comput 4:415, doi 10.1162/neco.1992.4.3.415, his alpha =
+gamma / 2 E_W). A step that is uneven beyond the noise so gets a small weight, and an even one a large weight.
 
-Where few unknowns are told, that rule runs away: a smoother step has less energy, which asks for more smoothness. So
-the weight has a gamma distribution as its own prior, worth `PRIOR_UNKNOWNS` unknowns that were told, whose energy is
-the share `UNEVENNESS` of the squared displacement of the step.
+Where gamma is small, that rule runs away: a smoother step has less energy, which asks for more smoothness. So the
+weight has a gamma distribution as its own prior, worth `PRIOR_UNKNOWNS` more unknowns, whose energy is `UNEVENNESS`
+times the squared displacement of the step.
 """
 
 from __future__ import annotations
@@ -78,51 +78,25 @@ class Match:
         return NOISE_AREA * self.noise * area * pixel_density
 
 
-def energy_weight(variance: float, told: float, energy: float, square: float) -> float:
-    """Weight beta = v (gamma + a) / (E + a E_0) of the bending energy.
+def energy_weight(variance: float, effective: float, energy: float, square: float) -> float:
+    """Weight beta = v (gamma + a) / (E + a E_0) of the bending energy; infinite without motion and energy.
 
-    The prior counts for a = `PRIOR_UNKNOWNS` unknowns, of which each has the energy E_0 = `UNEVENNESS` times `square`.
-
-    Parameters
-    ----------
-    variance : float
-        v, see :meth:`Match.variance`.
-    told : float
-        Number gamma of unknowns that the images tell.
-    energy : float
-        Bending energy E of the step.
-    square : float
-        Mean square of the displacement of the step less its mean, px^2.
-
-    Returns
-    -------
-    float
-        Infinite where there is neither motion nor energy.
+    The variance v is that of :meth:`Match.variance`, gamma the number of :func:`effective_parameters`, and E the
+    bending energy of the step. The prior counts for a = `PRIOR_UNKNOWNS` unknowns, of which each has the energy E_0 =
+    `UNEVENNESS` times `square`, the mean square of the displacement of the step less its mean, px^2.
     """
     total = energy + PRIOR_UNKNOWNS * UNEVENNESS * square
-    return variance * (max(told, 0.0) + PRIOR_UNKNOWNS) / total if total > 0 else np.inf
+    return variance * (max(effective, 0.0) + PRIOR_UNKNOWNS) / total if total > 0 else np.inf
 
 
-def told_unknowns(
+def effective_parameters(
     beta: float, solve: Callable[[np.ndarray], np.ndarray], probes: np.ndarray, products: np.ndarray
 ) -> float:
-    """Number gamma = n - 6 - beta trace((N + beta K)^-1 K) of unknowns that the images tell.
+    """Effective number gamma = n - 6 - beta trace((N + beta K)^-1 K) of parameters, which the images determine.
 
     The trace is the mean of z^T (N + beta K)^-1 K z over vectors z of random signs (Hutchinson 1990, Commun Stat Simul
-    Comput 19:433, doi 10.1080/03610919008812866).
-
-    Parameters
-    ----------
-    beta : float
-        Weight of the energy.
-    solve : callable
-        (unknowns,) to (N + beta K)^-1 times it.
-    probes, products : ndarray of shape (probe, unknowns)
-        Vectors z, and K z.
-
-    Returns
-    -------
-    float
+    Comput 19:433, doi 10.1080/03610919008812866): `probes`, with the `products` K z, both (probe, unknowns). `solve`
+    multiplies (unknowns,) by (N + beta K)^-1.
     """
     trace = np.mean([solve(probe) @ product for probe, product in zip(probes, products, strict=True)])
     return float(probes.shape[1] - AFFINE_UNKNOWNS - beta * trace)

@@ -8,49 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from echotruth.tracking.accumulation import follow
+from echotruth.tracking.accumulation import Path, follow
 from echotruth.tracking.grey import grey_levels, local_ncc
-from echotruth.tracking.quality import ErrorModel
+from echotruth.tracking.tracker_input import TrackerInput
 
+Flow = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Two images with grey values from 0 to 1 to the motion (axial, lateral, 2) of all pixels between them, px."""
 NCC_SIDE = 0.75e-3
 """Side of the square in which the quality of a dense flow is measured, m: half the paper's window."""
 
 
-def track_by_flow(
-    flow: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    frames: np.ndarray,
-    points: np.ndarray,
-    spacing: float,
-    reference: str,
-    errors: ErrorModel,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement of points since the first frame.
-
-    Parameters
-    ----------
-    flow : callable
-        Flow (axial, lateral, 2) of all pixels from one image to another, px; both have grey values from 0 to 1.
-    frames : ndarray of shape (frame, axial, lateral)
-        Any real type.
-    points : ndarray of shape (n, 2)
-        Lateral, axial, px.
-    spacing : float
-        Distance of pixel centres, m.
-    reference : {"ED", "previous", "bidirectional"}
-        See :func:`echotruth.tracking.accumulation.follow`.
-    errors : ErrorModel
-        Of the flow.
-
-    Returns
-    -------
-    displacement : ndarray of shape (frame, n, 2)
-        px.
-    quality : ndarray of shape (frame, n)
-        See :meth:`echotruth.tracking.quality.ErrorModel.probability`.
-    """
-    side = max(9, 2 * round(NCC_SIDE / spacing / 2) + 1)
-    path = follow(FlowTracker(flow, side), grey_levels(frames), points, reference)
-    return path.displacement, errors.probability(path, frames.shape[1:])
+def track_by_flow(flow: Flow, clip: TrackerInput, reference: str) -> Path:
+    """Path of the points of a clip; the correlation is that of the images in a square around each point."""
+    side = max(9, 2 * round(NCC_SIDE / clip.spacing / 2) + 1)
+    return follow(FlowTracker(flow, side), grey_levels(clip.frames), clip.points, reference)
 
 
 @dataclass(frozen=True)
@@ -59,13 +30,12 @@ class FlowTracker:
 
     Attributes
     ----------
-    flow : callable
-        See :func:`track_by_flow`.
+    flow : Flow
     side : int
         Side of the square in which the quality is measured, px, odd.
     """
 
-    flow: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    flow: Flow
     side: int
 
     def prepare(self, image: np.ndarray) -> np.ndarray:

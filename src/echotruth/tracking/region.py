@@ -11,7 +11,7 @@ from scipy import ndimage
 from echotruth.tracking import alignment
 from echotruth.tracking.bending_energy import BendingEnergy, bending_matrix, wall_frame
 from echotruth.tracking.bspline import Cells, KnotLattice, lattice_around
-from echotruth.tracking.evidence import PROBES, Match, energy_weight, told_unknowns
+from echotruth.tracking.evidence import PROBES, Match, effective_parameters, energy_weight
 
 MAX_ITERATIONS = 24
 MATRIX_REUSE = 8
@@ -73,8 +73,8 @@ class NormalMatrix:
     def newton_step(self, rhs: np.ndarray) -> np.ndarray:
         """S^-1 rhs, both of shape (unknowns,), by the Woodbury formula."""
         step, (response, inverse) = self.solve(rhs), self._free
-        shares = np.sum(self.energy.gradients * step[:, None], 0)
-        return step + np.sum(response * np.sum(inverse * shares, 1), 1)
+        products = np.sum(self.energy.gradients * step[:, None], 0)
+        return step + np.sum(response * np.sum(inverse * products, 1), 1)
 
     @cached_property
     def _free(self) -> tuple[np.ndarray, np.ndarray]:
@@ -235,11 +235,11 @@ class WallRegion:
 
     def _evidence_weight(self, match: Match, step: np.ndarray, before: NormalMatrix) -> float:
         """Weight of the energy by the evidence of a step (unknowns,), from the normal matrix that it was found with."""
-        told = told_unknowns(before.energy_weight, before.solve, *self._probes)
+        effective = effective_parameters(before.energy_weight, before.solve, *self._probes)
         vectors = step.reshape(-1, 2)
         square = float(((vectors - vectors.mean(0)) ** 2).sum(1).mean())
         energy = float(step @ before.energy.gradient(step))
-        return energy_weight(match.variance(self.pixel_density), told, energy, square)
+        return energy_weight(match.variance(self.pixel_density), effective, energy, square)
 
     def _image_matrix(self, gradient: np.ndarray, weight: np.ndarray, stride: int) -> tuple[np.ndarray, float]:
         """Banded matrix N of every `stride`-th gradient (pixel, 2) and weight (pixel,), and its mean diagonal."""

@@ -1,16 +1,18 @@
-"""Call of any tracker, with checks of its input."""
+"""Call of any tracker."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from echotruth.section import Section
+from echotruth.tracking.accumulation import Path
 from echotruth.tracking.failure import TrackerFailed
+from echotruth.tracking.quality import error_model
+from echotruth.tracking.tracker_input import TrackerInput
 
 
 def track(
@@ -59,36 +61,50 @@ def track(
     TrackerFailed
         If the method cannot process the clip, or an external tracker raises or returns an invalid result.
     """
-    clip = (np.asarray(frames), np.asarray(points, float), np.asarray(mask, bool), spacing, np.asarray(frame_time))
-    _check(*clip)
+    arrays = np.asarray(frames), np.asarray(points, float), np.asarray(mask, bool)
+    clip = TrackerInput(*arrays, spacing, np.asarray(frame_time), seed)
     try:
-        displacement, quality = _method(_suited(settings, clip[0], clip[2]))(*clip, seed)
+        displacement, quality = _track(clip, settings)
     except ValueError as error:
         raise TrackerFailed(str(error)) from error
-    half = np.array(clip[2].shape[::-1]) / 2
-    inside = (np.abs(clip[1] + 0.5 - half) <= half).all(1)
+    half = np.array(clip.shape[::-1]) / 2
+    inside = (np.abs(clip.points + 0.5 - half) <= half).all(1)
     lost = ~(np.isfinite(displacement).all(-1) & inside)
     displacement[lost], quality[lost] = np.nan, np.nan
     return displacement, quality
 
 
-def _suited(settings: Section, frames: np.ndarray, mask: np.ndarray) -> Section:
-    """The settings, without the way backwards if the tissue of the last frame cannot be followed to the first."""
-    if getattr(settings, "reference", None) != "bidirectional":
-        return settings
-    from echotruth.tracking.closure import closure
+def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and quality of the points of a clip, by a method of ours or from outside."""
+    if settings.method == "external":
+        from echotruth.tracking.trackers.external import track
 
-    found = closure(frames, mask)
-    if found.is_open:
-        ways = "both ways, as they are alike" if found.is_followed else "forwards only"
-        logging.getLogger("echotruth").warning(f"the clip is no closed cycle ({found}): tracked {ways}")
-    return settings if found.is_followed else settings.model_copy(update={"reference": "previous"})
+        return track(clip, settings)
+    path = tracked_path(clip, settings)
+    return path.displacement, error_model(settings).probability(path, clip.shape)
 
 
-def _method(settings: Any) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
+def tracked_path(clip: TrackerInput, settings: Any) -> Path:
+    """Path of the points of a clip by a method of ours.
+
+    If the tissue of the last frame cannot be followed to the first, it is tracked forwards only.
+    """
+    if getattr(settings, "reference", None) == "bidirectional":
+        from echotruth.tracking.closure import closure
+
+        closing = closure(clip.frames, clip.mask)
+        if closing.is_open:
+            ways = "both ways, as they are alike" if closing.is_followed else "forwards only"
+            logging.getLogger("echotruth").warning(f"the clip is no closed cycle ({closing}): tracked {ways}")
+        if not closing.is_followed:
+            settings = settings.model_copy(update={"reference": "previous"})
+    return _method(settings.method)(clip, settings)
+
+
+def _method(name: str) -> Callable[[TrackerInput, Any], Path]:
     """Function `track` of a method; its module is imported only here, because some take long to import."""
-    function: Callable[..., tuple[np.ndarray, np.ndarray]]
-    match settings.method:
+    function: Callable[[TrackerInput, Any], Path]
+    match name:
         case "phase_correlation":
             from echotruth.tracking.trackers.phase_correlation import track as function
         case "window_deformation":
@@ -101,19 +117,4 @@ def _method(settings: Any) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
             from echotruth.tracking.trackers.dis import track as function
         case "ilk":
             from echotruth.tracking.trackers.ilk import track as function
-        case "external":
-            from echotruth.tracking.trackers.external import track as function
-    return partial(function, settings=settings)
-
-
-def _check(frames: np.ndarray, points: np.ndarray, mask: np.ndarray, spacing: float, frame_time: np.ndarray) -> None:
-    if frames.ndim != 3 or len(frames) < 2:
-        raise ValueError(f"A clip needs two or more frames, shape (frame, axial, lateral), not {frames.shape}.")
-    if points.ndim != 2 or points.shape[1] != 2:
-        raise ValueError(f"Points must have the shape (point, 2), not {points.shape}.")
-    if mask.shape != frames.shape[1:]:
-        raise ValueError(f"The mask must have the shape of a frame, {frames.shape[1:]}, not {mask.shape}.")
-    if not (np.isfinite(spacing) and spacing > 0):
-        raise ValueError(f"The pixel spacing must be a positive length in metres, not {spacing}.")
-    if frame_time.shape != frames.shape[:1] or not (np.diff(frame_time) > 0).all():
-        raise ValueError(f"The {len(frames)} frames need {len(frames)} increasing times, not {frame_time}.")
+    return function

@@ -114,16 +114,9 @@ class _Scene:
 class _Way:
     """One way through a clip.
 
-    Attributes
-    ----------
-    displacement : ndarray of shape (given frame, point, 2), m
-        Of a perfect tracker of the plane at the points of the grid.
-    images : AlignedImages
-        In the order of the visits.
-    variance : ndarray of shape (given frame, 2, 2), m^2
-        Least covariance of the displacement, mean over the wall.
-    step_variance : ndarray of shape (visits - 1,), m^2
-        Least variance of a step, sum of both components.
+    It has the displacement (given frame, point, 2), m, of a perfect tracker of the plane at the points of the grid; the
+    images in the order of the visits; the least covariance `variance` of the displacement, mean over the wall, (given
+    frame, 2, 2), m^2; and the least variance `step_variance` of a step, sum of both components, (visits - 1,), m^2.
     """
 
     displacement: Floats
@@ -136,14 +129,8 @@ class _Way:
 class _Paths:
     """Paths of a perfect tracker of the plane, one way through a clip.
 
-    Attributes
-    ----------
-    order : list of int
-        Frames in the order of the visits.
-    points : ndarray of shape (visit, point, 2), m
-        Of the points of the grid.
-    pixels : dict
-        Of the pixels of the wall, (visit, n, 2), m, by image size.
+    It has the frames in the `order` of the visits; `points` (visit, point, 2), m, of the grid; and `pixels` of the wall
+    (visit, n, 2), m, by image size.
     """
 
     order: list[int]

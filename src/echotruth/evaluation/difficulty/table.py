@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echotruth.cases import expand
 from echotruth.config.loading import load
-from echotruth.evaluation.choice import chosen
+from echotruth.evaluation.choice import cases_of, jobs_of
 from echotruth.evaluation.difficulty.floors import COLUMNS, PARAMETERS, Row, difficulty
 from echotruth.evaluation.digest import digest
-from echotruth.evaluation.summary import is_complete
 from echotruth.repository import durable
 from echotruth.workflow.job import Job
 
@@ -52,13 +50,8 @@ def difficulties(folder: Path, cases: Sequence[str] | None = None, views: Sequen
     """
     import pandas as pd
 
-    config = load(folder / "config.yaml")
-    by_id = {case.id: case for case in expand(config, str(folder / "config.yaml"))}
-    rows: list[Row] = []
-    for case in (by_id[name] for name in chosen("case", cases, list(by_id))):
-        for view in chosen("view", views, list(config.views)):
-            if all(is_complete(folder, stage, case.id, view) for stage in ("truth", "bmode")):
-                rows += _kept(Job(folder, "tracking", case, view, code="read"))
+    known = cases_of(folder, load(folder / "config.yaml"))
+    rows = [row for job in jobs_of(folder, known, cases, views, "truth", "bmode") for row in _kept(job)]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 

@@ -106,17 +106,7 @@ class Scanner:
 
 
 class _ZoneBeamformer:
-    """Beamforming of the samples of the lines in a focal zone.
-
-    Parameters
-    ----------
-    probe, rf
-        Array, lines and transmits of the scanner.
-    scanner
-        Its scan, ranges and matrix.
-    zone
-        The waves, the samples of a line that they serve, and their weights there.
-    """
+    """Beamforming of the samples of the lines in a focal zone, with the scan, ranges and matrix of a scanner."""
 
     def __init__(self, probe: Probe, rf: Rf, scanner: Scanner, zone: Zone):
         p, scan = probe.si(), scanner.scan
@@ -136,12 +126,9 @@ class _ZoneBeamformer:
         )
 
     def __call__(self, matrix: np.ndarray) -> np.ndarray:
-        """Lines before demodulation, (lines, ranges of the zone), complex64.
+        """Lines (lines, ranges of the zone), complex64, before demodulation.
 
-        Parameters
-        ----------
-        matrix
-            Full matrix of the whole record, or of the gate of the zone: shape (bins, elements, elements).
+        The full matrix (bins, elements, elements) is that of the whole record, or of the gate of the zone.
         """
         transmits = self.zone.transmits
         lines = np.zeros(self._points[0].shape, np.complex64)

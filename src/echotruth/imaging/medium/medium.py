@@ -59,9 +59,9 @@ def seed_medium(config: Config, heart: Heart, plane: Plane, random: Random, in_b
         nearest = (_moved_towards_plane(plane.to_image(position), offset) for position in carried)
         arrays |= _ever_in_beam(candidates, nearest, in_beam)
     if config.realism.surroundings.level_dB is not None:
-        tissue = seed_surroundings(config, heart, plane, random("surroundings"))
-        motion = SurroundingsMotion(heart, tissue.position, config.realism.surroundings.si().motion_decay)
-        candidates = {"surroundings_position": tissue.position, "surroundings_amplitude": tissue.amplitude}
+        position, amplitude = seed_surroundings(config, heart, plane, random("surroundings"))
+        motion = SurroundingsMotion(heart, position, config.realism.surroundings.si().motion_decay)
+        candidates = {"surroundings_position": position, "surroundings_amplitude": amplitude}
         arrays |= _ever_in_beam(candidates, (plane.to_image(motion(k)) for k in range(len(frames))), in_beam)
     return arrays
 

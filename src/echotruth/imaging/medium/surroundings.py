@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -18,21 +16,6 @@ from echotruth.imaging.view import Plane
 
 NEIGHBOURS = 8
 """Epicardial nodes from which the motion of a scatterer is interpolated."""
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """Scatterers around the heart.
-
-    Attributes
-    ----------
-    position : ndarray of shape (n, 3), m
-        At end-diastole, in the heart frame. Scatterers inside the heart are hidden until the heart moves away.
-    amplitude : ndarray of shape (n,)
-    """
-
-    position: Floats
-    amplitude: Floats
 
 
 class SurroundingsMotion:
@@ -86,7 +69,7 @@ def outside_heart(heart: Heart, frame: int, position: Floats) -> NDArray[np.bool
     return outside
 
 
-def seed_surroundings(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> Surroundings:
+def seed_surroundings(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> tuple[Floats, Floats]:
     """Draw scatterers uniformly over what the probe images.
 
     Parameters
@@ -115,7 +98,7 @@ def seed_surroundings(config: Config, heart: Heart, plane: Plane, random: np.ran
     imaged = (np.abs(2 * line / (len(scan.angle) - 1) - 1) < 1.1) & (range_ > start) & (range_ < depth)
     imaged &= np.abs(position[:, 2]) < beam_half_thickness(config, range_) + margin
     position = position[imaged]
-    return Surroundings(plane.to_heart(position), settings.amplitude_std * random.standard_normal(len(position)))
+    return plane.to_heart(position), settings.amplitude_std * random.standard_normal(len(position))
 
 
 def beam_half_thickness(config: Config, range_: Floats) -> Floats:

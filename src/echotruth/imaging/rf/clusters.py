@@ -127,8 +127,8 @@ class Clusters:
         phase = np.multiply.outer(late, 2 * np.pi * self._band.frequency)
         echoes = np.exp(1j * phase) * np.sqrt(self._band.weight / curvature.size)
         if self._rib:
-            place = np.stack([sine, np.sqrt(1 - sine**2), np.zeros_like(sine)], axis=-1) / curvature[..., None]
-            echoes *= self._rib.transmission(place.reshape(-1, 3), self._centres).T[..., None]
+            position = np.stack([sine, np.sqrt(1 - sine**2), np.zeros_like(sine)], axis=-1) / curvature[..., None]
+            echoes *= self._rib.transmission(position.reshape(-1, 3), self._centres).T[..., None]
         echoes = echoes.reshape(len(delay), -1)
         skeleton, weights = _decomposition(np.concatenate([echoes.real, echoes.imag], axis=1), self._tolerance)
         return Cluster(skeleton, weights, delay[:, 0])

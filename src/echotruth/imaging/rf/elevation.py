@@ -157,12 +157,8 @@ def subaperture_bounds(elements: int, subapertures: int) -> NDArray[np.int64]:
 def _look_up(position, centres, grid, log_derivative, delay, sound_speed, index, terms):
     """Write index and terms as :meth:`Lens.lens_terms` returns them, by bilinear interpolation.
 
-    Parameters
-    ----------
-    centres : ndarray of shape (subapertures,), m
-        Lateral coordinates of the centres of the subapertures.
-    grid : (float, float, float)
-        First curvature and step of curvatures, 1/m, and step of slopes.
+    The lateral coordinates of the centres of the subapertures (subapertures,) are in m. The grid is the first curvature
+    and the step of curvatures, 1/m, and the step of slopes.
     """
     rows, columns = log_derivative.shape
     for n in range(len(position)):

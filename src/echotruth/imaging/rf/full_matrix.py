@@ -296,14 +296,8 @@ class _PlaneKernels:
 class _LensKernels:
     """Tables of echoes under the lens, made for every scatterer.
 
-    Parameters
-    ----------
-    full : FullMatrix
-    position : ndarray of shape (n, 3), m
-    angle : ndarray of shape (n,)
-        Index of the angle from the centre of the array of each.
-    subapertures : int
-        Number of subapertures with a separate table lookup per scatterer.
+    The positions (n, 3) are in m; `angle` (n,) is the index of the angle of each from the centre of the array, and
+    `subapertures` the number of those with a separate table lookup per scatterer.
     """
 
     def __init__(self, full: FullMatrix, position: np.ndarray, angle: np.ndarray, subapertures: int) -> None:

@@ -202,11 +202,11 @@ def one_way(position, mean_exponent, lens_terms, array, propagation):
                 offset = 1 / np.sqrt(lateral + axial) - inverse_range
                 inverse_range_offset[k, element] = offset
                 # To first order; beyond that, beside the beam, it would grow without bounds.
-                turn = min(max(phase_slope * offset, -MAX_CORRECTION), MAX_CORRECTION)
-                distance += delay - turn / (2 * np.pi * waves)
-                growth = min(max(amplitude_slope * offset, -MAX_CORRECTION), MAX_CORRECTION)
+                phase = min(max(phase_slope * offset, -MAX_CORRECTION), MAX_CORRECTION)
+                distance += delay - phase / (2 * np.pi * waves)
+                log_gain = min(max(amplitude_slope * offset, -MAX_CORRECTION), MAX_CORRECTION)
                 # The exponential of so little is its Taylor polynomial to 2e-5.
-                strength *= 1 + growth * (1 + growth * (1 / 2 + growth * (1 / 6 + growth / 24)))
+                strength *= 1 + log_gain * (1 + log_gain * (1 / 2 + log_gain * (1 / 6 + log_gain / 24)))
             else:
                 inverse_range_offset[k, element] = 2 * exponent * exponent
             time[k, element] = np.int32(distance * unit + 0.5)
@@ -260,8 +260,8 @@ def spread(traces, scatterers, kernel_blocks, tables, bounds, lens, scheme, grou
                 i = start + (np.int64(group) if even else TRANSMIT_GROUPS - 1 - np.int64(group))
                 if i < first or i >= last:
                     continue
-                loudness = weight[k, i] * amplitude[k]
-                transmitter = time[k, i], loudness, spectral_exponent[k, i], inverse_range_offset[k, i], planar
+                strength = weight[k, i] * amplitude[k]
+                transmitter = time[k, i], strength, spectral_exponent[k, i], inverse_range_offset[k, i], planar
                 table = np.int32(base), np.int32(size)
                 for j in range(max(i, nearest) // LANES * LANES, beyond, LANES):
                     combine(propagation, k, j, transmitter, table, scheme, pairs)

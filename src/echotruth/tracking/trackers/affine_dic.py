@@ -14,10 +14,10 @@ from scipy import ndimage
 from echotruth.config.tracking import AffineDic, WindowDeformation
 from echotruth.imaging import spline
 from echotruth.tracking import subset
-from echotruth.tracking.accumulation import follow
+from echotruth.tracking.accumulation import Path, follow
 from echotruth.tracking.flow import interpolate_field
 from echotruth.tracking.grey import MIN_STD, amplitudes
-from echotruth.tracking.quality import error_model
+from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.trackers.window_deformation import PreparedImage, WindowDeformationTracker, window_passes
 
 MIN_HALF = 8
@@ -31,30 +31,14 @@ INITIAL_WINDOWS = (1.5, 0.75)
 """Windows of the initial estimate, over the side of a subset."""
 
 
-def track(
-    frames: np.ndarray,
-    points: np.ndarray,
-    mask: np.ndarray,
-    spacing: float,
-    frame_time: np.ndarray,
-    seed: int,
-    settings: AffineDic,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
-
-    The quality follows from the correlation of the subsets.
-
-    Raises
-    ------
-    ValueError
-        See :func:`echotruth.tracking.trackers.window_deformation.window_passes`.
-    """
-    half = max(MIN_HALF, round(settings.si().subset / spacing / 2))
-    windows = WindowDeformation(windows_mm=[ratio * 2e3 * half * spacing for ratio in INITIAL_WINDOWS], final_passes=1)
-    initial = WindowDeformationTracker(window_passes(windows, frames.shape[1:], spacing))
-    images = amplitudes(frames, settings.dynamic_range_dB)
-    path = follow(AffineTracker(half, initial), images, points, settings.reference)
-    return path.displacement, error_model(settings).probability(path, frames.shape[1:])
+def track(clip: TrackerInput, settings: AffineDic) -> Path:
+    """Path of the points of a clip, with the correlation of the subsets; raises as :func:`window_passes`."""
+    half = max(MIN_HALF, round(settings.si().subset / clip.spacing / 2))
+    sides = [ratio * 2e3 * half * clip.spacing for ratio in INITIAL_WINDOWS]
+    windows = WindowDeformation(windows_mm=sides, final_passes=1)
+    initial = WindowDeformationTracker(window_passes(windows, clip.shape, clip.spacing))
+    images = amplitudes(clip.frames, settings.dynamic_range_dB)
+    return follow(AffineTracker(half, initial), images, clip.points, settings.reference)
 
 
 @dataclass(frozen=True)

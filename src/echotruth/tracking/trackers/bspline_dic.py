@@ -28,8 +28,8 @@ from echotruth.tracking.alignment import interpolate_with_gradient
 from echotruth.tracking.flow import interpolate_field
 from echotruth.tracking.grey import decompress, even_gain, grey_levels, rms
 from echotruth.tracking.ncc import NormalizedCrossCorrelation
-from echotruth.tracking.quality import error_model
 from echotruth.tracking.region import WallRegion, wall_region
+from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.trackers.dis import MIN_IMAGE_SIDE, optical_flow
 
 MIN_KNOT_SPACING = 5.0
@@ -67,30 +67,23 @@ class WallTrajectory:
     ncc: np.ndarray
 
 
-def track(
-    frames: np.ndarray,
-    points: np.ndarray,
-    mask: np.ndarray,
-    spacing: float,
-    frame_time: np.ndarray,
-    seed: int,
-    settings: BsplineDic,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
-
-    Points outside the wall and its surroundings have none.
-    """
+def track(clip: TrackerInput, settings: BsplineDic) -> Path:
+    """Path of the points of a clip; those outside the wall and its surroundings are lost."""
+    mask, spacing = clip.mask, clip.spacing
     if not mask.any():
-        return np.full((len(frames), len(points), 2), np.nan), np.full((len(frames), len(points)), np.nan)
+        unknown = np.full((len(clip.frames), len(clip.points)), np.nan)
+        return Path(np.stack([unknown, unknown], -1), unknown, unknown, unknown)
     values = settings.si()
     blur = values.blur_px * np.sqrt(max(0.0, 1 - (values.speckle_pixel / spacing) ** 2))
     knot_spacing = max(values.knots / spacing, MIN_KNOT_SPACING)
     region = wall_region(mask, knot_spacing, values.margin / spacing, values.transmural_scale)
     coarse_blur = COARSE_BLUR * knot_spacing
-    ncc = NormalizedCrossCorrelation(region.positions, region.inside, points, 2 * knot_spacing, values.dynamic_range)
+    ncc = NormalizedCrossCorrelation(
+        region.positions, region.inside, clip.points, 2 * knot_spacing, values.dynamic_range
+    )
     block = max(1, min(int(knot_spacing / FLOW_PIXELS_PER_KNOT), min(mask.shape) // MIN_IMAGE_SIDE))
 
-    grey = grey_levels(frames)
+    grey = grey_levels(clip.frames)
     typical = rms(decompress(np.nan_to_num(grey[0][mask]), values.dynamic_range))
 
     def prepare(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -101,17 +94,13 @@ def track(
     with ThreadPoolExecutor(2) as threads:
         coarse, even, amplitudes = zip(*threads.map(prepare, grey), strict=True)
         images = [spline.coefficients(frame) for frame in even]
-        blurred = (
-            list(threads.map(partial(gaussian, deviation=coarse_blur), images))
-            if coarse_blur >= MIN_COARSE_BLUR
-            else []
-        )
+        resolved = images if coarse_blur >= MIN_COARSE_BLUR else []
+        blurred = list(threads.map(partial(gaussian, deviation=coarse_blur), resolved))
         coarse = np.array(coarse) / (np.max(coarse) or 1)
         tracker = WallTracker(region, ncc, coarse, block, images, blurred, amplitudes, settings)
-        orders = bidirectional.forward_backward(len(frames))
+        orders = bidirectional.forward_backward(len(clip.frames))
         trajectories = list(threads.map(tracker.track, orders if settings.reference == "bidirectional" else orders[:1]))
-    path = combine(region, points, trajectories[0], trajectories[-1])
-    return path.displacement, error_model(settings).probability(path, mask.shape)
+    return combine(region, clip.points, trajectories[0], trajectories[-1])
 
 
 def gaussian(image: np.ndarray, deviation: float) -> np.ndarray:
@@ -224,8 +213,8 @@ class WallTracker:
         how = self.settings.smoothness, self.settings.tolerance
         if template.blurred is not None:
             image = self.blurred[frame]
-            found, _ = self.region.align(image, template.blurred, start, previous, *how, COARSE_ITERATIONS)
-            start = self._best(frame, template, start, found)
+            coarse, _ = self.region.align(image, template.blurred, start, previous, *how, COARSE_ITERATIONS)
+            start = self._best(frame, template, start, coarse)
         return self.region.align(self.images[frame], template.warped[:, 0], start, previous, *how)
 
     def _predict(self, now: int, before: int, coefficients: np.ndarray, template: Template) -> np.ndarray:

@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 
 from echotruth.config.tracking import Dis
+from echotruth.tracking.accumulation import Path
 from echotruth.tracking.flow import track_by_flow
-from echotruth.tracking.quality import error_model
+from echotruth.tracking.tracker_input import TrackerInput
 
 MIN_IMAGE_SIDE = 32
 """Smallest side of an image, px; for flat ones of 24 px OpenCV 5.0 reads beyond its memory."""
@@ -23,21 +24,9 @@ FINE_PATCH, FINE_STRIDE = 16, 6
 """Side of a patch and distance of patches, px, of the setting `fine`; the library's preset `medium` has 8 and 3."""
 
 
-def track(
-    frames: np.ndarray,
-    points: np.ndarray,
-    mask: np.ndarray,
-    spacing: float,
-    frame_time: np.ndarray,
-    seed: int,
-    settings: Dis,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
-
-    The quality follows from the correlation of the images (:mod:`echotruth.tracking.flow`); the library has none.
-    """
-    flow, errors = partial(optical_flow, preset=settings.preset), error_model(settings)
-    return track_by_flow(flow, frames, points, spacing, settings.reference, errors)
+def track(clip: TrackerInput, settings: Dis) -> Path:
+    """Path of the points of a clip by the flow of the library."""
+    return track_by_flow(partial(optical_flow, preset=settings.preset), clip, settings.reference)
 
 
 def optical_flow(first: np.ndarray, second: np.ndarray, preset: str = "medium") -> np.ndarray:

@@ -19,6 +19,7 @@ from echotruth.config.tracking import TRACKER_ARGUMENTS, External
 from echotruth.tracking import external_program
 from echotruth.tracking.external_program import in_one_line
 from echotruth.tracking.failure import TrackerFailed
+from echotruth.tracking.tracker_input import TrackerInput
 
 ENTRY_POINT_GROUP = "echotruth.trackers"
 """Group of entry points under which a package names its trackers."""
@@ -30,23 +31,16 @@ MAX_INITIAL_DISPLACEMENT_PX = 1.0
 """Median displacement in frame 0, where it is 0 by definition, above which the result is not a displacement."""
 
 
-def track(
-    frames: np.ndarray,
-    points: np.ndarray,
-    mask: np.ndarray,
-    spacing: float,
-    frame_time: np.ndarray,
-    seed: int,
-    settings: External,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Run an external tracker; arrays, shapes and units are those of :func:`echotruth.tracking.tracker.track`.
+def track(clip: TrackerInput, settings: External) -> tuple[np.ndarray, np.ndarray]:
+    """Run an external tracker: displacement and quality, as :func:`echotruth.tracking.tracker.track` returns them.
 
     Raises
     ------
     TrackerFailed
         If the tracker cannot be found, raises, exits, takes too long or returns an invalid result.
     """
-    arguments = (frames.copy(), points.copy(), mask.copy(), float(spacing), frame_time.copy(), int(seed))
+    arrays = clip.frames.copy(), clip.points.copy(), clip.mask.copy()
+    arguments = (*arrays, float(clip.spacing), clip.frame_time.copy(), int(clip.seed))
     command = settings.command or []
     try:
         if settings.track is not None:
@@ -54,7 +48,7 @@ def track(
         else:
             entries = dict(zip(TRACKER_ARGUMENTS, arguments, strict=True)) | settings.options
             result = external_program.run(command, entries, settings.timeout_s)
-        return _checked(result, (len(frames), len(points)))
+        return _checked(result, (len(clip.frames), len(clip.points)))
     except TrackerFailed as error:
         name = getattr(settings.track, "__name__", settings.track) or " ".join(command)
         raise TrackerFailed(f"{name} {error}") from error.__cause__

@@ -8,25 +8,14 @@ import numpy as np
 from skimage.registration import optical_flow_ilk
 
 from echotruth.config.tracking import Ilk
+from echotruth.tracking.accumulation import Path
 from echotruth.tracking.flow import track_by_flow
-from echotruth.tracking.quality import error_model
+from echotruth.tracking.tracker_input import TrackerInput
 
 
-def track(
-    frames: np.ndarray,
-    points: np.ndarray,
-    mask: np.ndarray,
-    spacing: float,
-    frame_time: np.ndarray,
-    seed: int,
-    settings: Ilk,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
-
-    The quality follows from the correlation of the images (:mod:`echotruth.tracking.flow`); the library has none.
-    """
-    flow, errors = partial(optical_flow, radius=settings.radius_px), error_model(settings)
-    return track_by_flow(flow, frames, points, spacing, settings.reference, errors)
+def track(clip: TrackerInput, settings: Ilk) -> Path:
+    """Path of the points of a clip by the flow of the library."""
+    return track_by_flow(partial(optical_flow, radius=settings.radius_px), clip, settings.reference)
 
 
 def optical_flow(first: np.ndarray, second: np.ndarray, radius: int = 7) -> np.ndarray:

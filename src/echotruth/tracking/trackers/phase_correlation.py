@@ -13,35 +13,23 @@ import numpy as np
 from scipy import fft
 
 from echotruth.config.tracking import PhaseCorrelation
-from echotruth.tracking.accumulation import follow
+from echotruth.tracking.accumulation import Path, follow
 from echotruth.tracking.grey import MIN_STD, amplitudes
-from echotruth.tracking.quality import error_model
+from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.windows import MIN_WINDOW_SIDE, Windows, arrange
 
 ROUNDING = 1e-9
 """Magnitude, relative to the largest, of a frequency that is rounding error and has a random phase."""
 
 
-def track(
-    frames: np.ndarray,
-    points: np.ndarray,
-    mask: np.ndarray,
-    spacing: float,
-    frame_time: np.ndarray,
-    seed: int,
-    settings: PhaseCorrelation,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
-
-    The quality follows from the height of the correlation peak. Windows cover the whole image; the mask is not used.
-    """
-    windows = arrange(frames.shape[1:], window_side(settings, spacing), settings.stride)
-    images = amplitudes(frames, settings.dynamic_range_dB) if settings.dynamic_range_dB else frames
+def track(clip: TrackerInput, settings: PhaseCorrelation) -> Path:
+    """Path of the points of a clip, with the height of the correlation peaks; windows cover the whole image."""
+    windows = arrange(clip.shape, window_side(settings, clip.spacing), settings.stride)
+    images = amplitudes(clip.frames, settings.dynamic_range_dB) if settings.dynamic_range_dB else clip.frames
     finite = images[np.isfinite(images)] if images.dtype.kind == "f" else images
     contrast = float(finite.max()) - float(finite.min()) if finite.size else 0.0
     tracker = PhaseCorrelationTracker(windows, settings.taper, contrast, max(settings.spectral_threshold, ROUNDING))
-    path = follow(tracker, images, points, settings.reference)
-    return path.displacement, error_model(settings).probability(path, frames.shape[1:])
+    return follow(tracker, images, clip.points, settings.reference)
 
 
 def window_side(settings: PhaseCorrelation, spacing: float) -> int:
@@ -74,7 +62,7 @@ class PhaseCorrelationTracker:
     taper : {"none", "hann"}
         Weights of the pixels of a window.
     contrast : float
-        Range of grey values in the clip.
+        Range of grey values in the clip; a window with less than 1/255 of it as standard deviation has no texture.
     spectral_threshold : float
         Magnitude, relative to the largest, below which a frequency is left out.
     """
@@ -82,11 +70,23 @@ class PhaseCorrelationTracker:
     windows: Windows
     taper: str
     contrast: float
-    spectral_threshold: float
+    spectral_threshold: float = ROUNDING
 
     def prepare(self, image: np.ndarray) -> PhaseSpectra:
-        """:func:`phase_spectra` of an image."""
-        return phase_spectra(image, self.windows, self.taper, self.contrast, self.spectral_threshold)
+        """Fourier transforms of the windows of an image (axial, lateral), tapered after subtraction of their means."""
+        side = self.windows.side
+        values = self.windows.extract(image)
+        values -= values.mean((-2, -1), keepdims=True)
+        textured = values.std((-2, -1)) > MIN_STD * (self.contrast or np.inf)
+        values = values[textured]
+        if self.taper == "hann":
+            # Sampled at pixel centres, so that the weights are symmetric and none is 0.
+            hann = np.sin(np.pi * (np.arange(side) + 0.5) / side) ** 2
+            values *= hann[:, None] * hann
+        spectrum = fft.rfft2(values)
+        magnitude = np.abs(spectrum)
+        used = magnitude > self.spectral_threshold * magnitude.max((-2, -1), keepdims=True)
+        return PhaseSpectra(textured, np.divide(spectrum, magnitude, out=np.zeros_like(spectrum), where=used))
 
     def match(self, first: PhaseSpectra, second: PhaseSpectra, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step (n, 2) in px and quality (n,) of points, linear between the windows."""
@@ -109,42 +109,6 @@ class PhaseSpectra:
 
     textured: np.ndarray
     spectrum: np.ndarray
-
-
-def phase_spectra(
-    image: np.ndarray, windows: Windows, taper: str, contrast: float, spectral_threshold: float = ROUNDING
-) -> PhaseSpectra:
-    """Fourier transforms of the windows of an image, normalised to unit magnitude.
-
-    Parameters
-    ----------
-    image : ndarray of shape (axial, lateral)
-        Grey values.
-    windows : Windows
-    taper : {"none", "hann"}
-        Weights of the pixels of a window, applied after subtraction of its mean.
-    contrast : float
-        Range of grey values in the clip; a window with less than 1/255 of it as standard deviation has no texture.
-    spectral_threshold : float
-        Magnitude, relative to the largest, below which a frequency is left out.
-
-    Returns
-    -------
-    PhaseSpectra
-    """
-    side = windows.side
-    values = windows.extract(image)
-    values -= values.mean((-2, -1), keepdims=True)
-    textured = values.std((-2, -1)) > MIN_STD * (contrast or np.inf)
-    values = values[textured]
-    if taper == "hann":
-        # Sampled at pixel centres, so that the weights are symmetric and none is 0.
-        hann = np.sin(np.pi * (np.arange(side) + 0.5) / side) ** 2
-        values *= hann[:, None] * hann
-    spectrum = fft.rfft2(values)
-    magnitude = np.abs(spectrum)
-    used = magnitude > spectral_threshold * magnitude.max((-2, -1), keepdims=True)
-    return PhaseSpectra(textured, np.divide(spectrum, magnitude, out=np.zeros_like(spectrum), where=used))
 
 
 def window_shifts(first: PhaseSpectra, second: PhaseSpectra, side: int) -> tuple[np.ndarray, np.ndarray]:

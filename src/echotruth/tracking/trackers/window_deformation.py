@@ -14,11 +14,11 @@ import numpy as np
 
 from echotruth.config.tracking import WindowDeformation
 from echotruth.imaging import spline
-from echotruth.tracking.accumulation import follow
+from echotruth.tracking.accumulation import Path, follow
 from echotruth.tracking.correlation import has_texture, match_windows
 from echotruth.tracking.field import DisplacementField, displacement_field, replace_outliers, smooth
 from echotruth.tracking.grey import amplitudes
-from echotruth.tracking.quality import error_model
+from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.windows import MIN_WINDOW_SIDE, Windows, arrange
 
 STRIDE = 0.5
@@ -27,28 +27,10 @@ MAX_SHIFT = 0.25
 """Largest shift over the side of a window (Keane and Adrian 1990, Meas Sci Technol 1:1202)."""
 
 
-def track(
-    frames: np.ndarray,
-    points: np.ndarray,
-    mask: np.ndarray,
-    spacing: float,
-    frame_time: np.ndarray,
-    seed: int,
-    settings: WindowDeformation,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement of points since the first frame: see :func:`echotruth.tracking.tracker.track`.
-
-    The quality follows from the correlation of the last windows. Windows cover the whole image; the mask is not used.
-
-    Raises
-    ------
-    ValueError
-        See :func:`window_passes`.
-    """
-    passes = window_passes(settings, frames.shape[1:], spacing)
-    images = amplitudes(frames, settings.dynamic_range_dB)
-    path = follow(WindowDeformationTracker(passes), images, points, settings.reference)
-    return path.displacement, error_model(settings).probability(path, frames.shape[1:])
+def track(clip: TrackerInput, settings: WindowDeformation) -> Path:
+    """Path of the points of a clip, with the correlation of the last windows, which cover the whole image."""
+    tracker = WindowDeformationTracker(window_passes(settings, clip.shape, clip.spacing))
+    return follow(tracker, amplitudes(clip.frames, settings.dynamic_range_dB), clip.points, settings.reference)
 
 
 def window_passes(settings: WindowDeformation, shape: tuple[int, int], spacing: float) -> list[Windows]:
@@ -74,9 +56,8 @@ def window_passes(settings: WindowDeformation, shape: tuple[int, int], spacing: 
     passes = [arrange(shape, side, STRIDE) for side in window_sides(settings, spacing)]
     for windows in passes:
         if min(len(windows.top), len(windows.left)) < 2:
-            raise ValueError(
-                f"An image of {shape[0]} x {shape[1]} px has no room for two windows of {windows.side} px."
-            )
+            size = f"{shape[0]} x {shape[1]}"
+            raise ValueError(f"An image of {size} px has no room for two windows of {windows.side} px.")
     return passes
 
 
