@@ -90,7 +90,8 @@ class Ours:
         everywhere = Activation(np.ones(n), np.zeros(n), whole.period / len(whole.time))
         with clock("cycle"):
             self._beat = solve(self._heart, _first(whole, frames), everywhere, stiffness)
-        course = {name: getattr(self._beat, name).tolist() for name in ("tension", "pressure", "volume")}
+        names = {"tension": "active_tension", "pressure": "pressure", "volume": "volume"}
+        course = {name: getattr(self._beat, array).tolist() for name, array in names.items()}
         course |= {"stiffness": float(self._beat.stiffness), "newton_steps": int(self._beat.newton_steps.sum())}
         return course | {"steps_of_frame": self._beat.newton_steps.tolist()} | clock.seconds["cycle"]
 

@@ -58,7 +58,7 @@ def measure(quick: bool = False) -> Results:
         meshes,
         tuple(len(case.wall.mesh.cells) for case in solved),
         tuple(case.beat.stiffness for case in solved),
-        tuple(float(case.beat.tension[case.es]) for case in solved),
+        tuple(float(case.beat.active_tension[case.es]) for case in solved),
         np.array([mean for mean, _ in strains]),
         np.array([sd for _, sd in strains]),
         tuple(float(volume_ratios(case.wall.mesh, case.beat.displacement)[0].min()) for case in solved),

@@ -87,7 +87,7 @@ class _VirtualWork:
         f = np.swapaxes(self.frames, -1, -2) + self.gradient(u) + step * self.gradient(change)
         parts = (
             beat.stiffness * self._passive(f),
-            beat.tension[frame] * self._active(f),
+            beat.active_tension[frame] * self._active(f),
             self._volumetric(f),
             self._viscous(f, frame),
         )

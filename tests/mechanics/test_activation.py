@@ -22,7 +22,7 @@ def test_tension_is_that_of_the_time_less_the_delay(activation):
 
 
 def test_tension_of_this_frame_and_of_earlier_ones_adds_up_to_the_tension(activation):
-    present = T_CA[-1] * activation.tension_fraction() + activation.delayed_tension(T_CA[:-1])
+    present = T_CA[-1] * activation.tension_fraction() + activation.tension([*T_CA[:-1], 0.0])
     np.testing.assert_allclose(present, activation.tension(T_CA))
 
 

@@ -5,7 +5,13 @@ import pytest
 from scipy.special import ellipe
 
 from echotruth.config import Geometry
-from echotruth.mechanics.contours import cut_triangles, global_longitudinal_strain, mid_wall_surface, wall_thickness
+from echotruth.mechanics.contours import (
+    MID_WALL,
+    cut_triangles,
+    depth_surface,
+    global_longitudinal_strain,
+    wall_thickness,
+)
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 
@@ -23,7 +29,7 @@ def tube():
 
 
 def test_mid_wall_of_a_hemisphere_has_the_mean_radius(hemisphere):
-    corners = mid_wall_surface(wall_depth(hemisphere), hemisphere.cells).values(hemisphere.nodes)
+    corners = depth_surface(wall_depth(hemisphere), hemisphere.cells, MID_WALL).values(hemisphere.nodes)
     np.testing.assert_allclose(np.linalg.norm(corners, axis=-1), 2.5e-3, rtol=0.01)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert np.linalg.norm(normal, axis=-1).sum() / 2 == pytest.approx(2 * np.pi * 2.5e-3**2, rel=0.01)

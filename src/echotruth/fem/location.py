@@ -72,10 +72,7 @@ def _bezier_points(positions: Floats, cells: Integers) -> Floats:
 def _grid(low: Floats, high: Floats, points: Floats) -> Floats:
     """Boxes over the region common to the points and to the cells, whose bounds are `low` and `high`.
 
-    Returns
-    -------
-    ndarray of shape (4, 3)
-        Lower and upper corner, m; boxes per metre; number of boxes.
+    Rows of shape (4, 3): lower and upper corner, m; boxes per metre; number of boxes.
     """
     # Numpy is slow to reduce along the first axis where the other is short: column by column.
     first = np.array([max(bound.min(), x.min()) for bound, x in zip(low.T, points.T, strict=True)])
@@ -105,21 +102,11 @@ def _candidates(low: Floats, high: Floats, grid: Floats) -> tuple[NDArray[np.int
 
 
 def _shapes(bezier: Floats) -> tuple[Floats, Floats, Floats]:
-    """Coefficients of the tests whether a point is in a cell.
+    """Coefficients of the tests whether a point is in a cell, from Bezier points (n_cells, 10, 3), m.
 
-    Parameters
-    ----------
-    bezier : ndarray of shape (n_cells, 10, 3), m
-
-    Returns
-    -------
-    straight : ndarray of shape (n_cells, 4, 3)
-        The first corner, m, and the inverse of the edges from it, 1/m.
-    least : ndarray of shape (n_cells, 4)
-        Least barycentric coordinates, those of the straight tetrahedron with the same corners, in the cell.
-    derivatives : ndarray of shape (n_cells, 4, 3, 3), m
-        dx/dxi_k at the first corner, and d2x/dxi_m dxi_k: all of x(xi), which is of second degree. The last axis is
-        that of position.
+    The first corner, m, and the inverse of the edges from it, 1/m, (n_cells, 4, 3); the least barycentric coordinates,
+    those of the straight tetrahedron with the same corners, in the cell, (n_cells, 4); dx/dxi_k at the first corner and
+    d2x/dxi_m dxi_k, m, (n_cells, 4, 3, 3), all of x(xi), which is of second degree. The last axis is that of position.
     """
     edges = bezier[:, 1:4] - bezier[:, :1]
     inverse = np.linalg.inv(np.swapaxes(edges, 1, 2))

@@ -1,4 +1,4 @@
-"""Direct solution of symmetric sparse systems, behind one small interface.
+"""Direct solution of symmetric sparse systems, by two classes of the same methods.
 
 MKL Pardiso factors A = L D L^T without regard to the signs of D (the tangent of an
 active wall is indefinite); where it is missing, SuperLU takes its place, several times slower.
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from importlib.metadata import PackageNotFoundError, files
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,20 +44,7 @@ class SingularMatrix(ArithmeticError):
     """Raised if a matrix cannot be factored."""
 
 
-class Factorization(Protocol):
-    """Factors of symmetric matrices that share one pattern."""
-
-    def factor(self, upper: csr_matrix) -> None:
-        """Factor the matrix whose upper triangle is given, every diagonal entry present."""
-
-    def solve(self, right: Floats) -> Floats:
-        """Solutions, shape (n, n_right), for right-hand sides of that shape."""
-
-    def close(self) -> None:
-        """Free the memory."""
-
-
-def factorization(single: bool = False) -> Factorization:
+def factorization(single: bool = False) -> Pardiso | SuperLU:
     """The fastest direct solver available.
 
     Parameters

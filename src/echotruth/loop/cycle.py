@@ -91,10 +91,8 @@ def read_loop(loop: Loop) -> Cycle:
     time = curves.pop("time")
     assert time is not None
     period, phase = _period(recording, loop), np.arange(loop.frames) / loop.frames
-    given = {name: values for name, values in curves.items() if values is not None}
-    samples = _resample(time / time[-1], np.stack(list(given.values()), axis=1), phase).T
-    sampled: dict[str, Floats | None] = dict.fromkeys(curves) | {
-        name: np.ascontiguousarray(values) for name, values in zip(given, samples, strict=True)
+    sampled = {
+        name: None if values is None else _resample(time / time[-1], values, phase) for name, values in curves.items()
     }
     if loop.prescribed == "volume" and sampled["tension"] is None:
         sampled["tension"] = np.zeros(loop.frames)
@@ -246,7 +244,7 @@ def _map_pressure(path: Path, pressure: Floats, volume: Floats | None, si: Simpl
 
 
 def _resample(phase: Floats, values: Floats, at: Floats) -> Floats:
-    """Periodic monotone cubic interpolation (Fritsch & Butland 1984) of curves (row, curve)."""
+    """Periodic monotone cubic interpolation (Fritsch & Butland 1984) of a curve (row,)."""
     from scipy.interpolate import PchipInterpolator
 
     values = np.concatenate([values[:-1], values[:1]])

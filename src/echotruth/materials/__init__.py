@@ -15,7 +15,6 @@ from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
-from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
 from pydantic import Discriminator, Tag
@@ -26,12 +25,8 @@ DEFAULT = "fung"
 """Name of the default law."""
 
 
-def _laws() -> dict[str, ModuleType]:
-    names = sorted(module.name for module in iter_modules(__path__) if module.name != "material")
-    return {name: import_module(f"{__name__}.{name}") for name in names}
-
-
-LAWS = _laws()
+_NAMES = sorted(module.name for module in iter_modules(__path__) if module.name != "material")
+LAWS = {name: import_module(f"{__name__}.{name}") for name in _NAMES}
 """Name to module of each law."""
 
 

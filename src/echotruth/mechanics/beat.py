@@ -50,7 +50,14 @@ def beat(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
     cycle = read_loop(config.loop)
     unloaded = unloaded_wall(config, cycle)
     solved = _solve(config, unloaded, cycle, scratch)
-    return collect_outputs(config, unloaded, _mechanics_arrays(solved, cycle, _held(config, unloaded, solved)))
+    mechanics = vars(solved) | {
+        "time": cycle.time,
+        "displacement": _held(config, unloaded, solved),
+        "stiffness": np.array(solved.stiffness),
+        "es_frame": np.array(phases.es_frame(solved.pressure, solved.volume)),
+        "phase": phases.phases(solved.pressure, solved.volume),
+    }
+    return collect_outputs(config, unloaded, mechanics)
 
 
 def simulate(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
@@ -98,20 +105,3 @@ def _held(config: Config, unloaded: Wall, solved: SolvedCycle) -> Floats:
         return solved.displacement
     axial = solved.displacement[:, epicardial_apex(unloaded.mesh), 2]
     return solved.displacement - (axial - axial[0])[:, None, None] * [0.0, 0.0, 1.0]
-
-
-def _mechanics_arrays(solved: SolvedCycle, cycle: Cycle, displacement: Floats) -> Arrays:
-    return {
-        "time": cycle.time,
-        "pressure": solved.pressure,
-        "volume": solved.volume,
-        "pressure_target": solved.pressure_target,
-        "volume_target": solved.volume_target,
-        "active_tension": solved.tension,
-        "displacement": displacement,
-        "stiffness": np.array(solved.stiffness),
-        "es_frame": np.array(phases.es_frame(solved.pressure, solved.volume)),
-        "phase": phases.phases(solved.pressure, solved.volume),
-        "newton_steps": solved.newton_steps,
-        "residual": solved.residual,
-    }

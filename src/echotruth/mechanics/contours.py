@@ -68,7 +68,7 @@ def global_longitudinal_strain(depth: Floats, cells: Integers, ed: Floats, es: F
     float
         Mean over the planes; negative where the heart shortens.
     """
-    points = mid_wall_surface(depth, cells).values(np.concatenate([ed, es], axis=1)).reshape(-1, 6)
+    points = depth_surface(depth, cells, MID_WALL).values(np.concatenate([ed, es], axis=1)).reshape(-1, 6)
     surface = np.arange(len(points)).reshape(-1, 3)
     strains = []
     for angle in np.pi * np.arange(LONG_AXIS_PLANES) / LONG_AXIS_PLANES:
@@ -101,11 +101,6 @@ def wall_thickness(endo: Integers, epi: Integers, positions: Floats, height: flo
     """
     outer, inner = (np.sqrt(_area_inside(facets, positions, height) / np.pi) for facets in (epi, endo))
     return float(outer - inner)
-
-
-def mid_wall_surface(depth: Floats, cells: Integers) -> Cut:
-    """Triangles (n_triangles, 3) of the surface at the depth `MID_WALL`, as :func:`depth_surface` gives them."""
-    return depth_surface(depth, cells, MID_WALL)
 
 
 def depth_surface(depth: Floats, cells: Integers, level: float) -> Cut:

@@ -97,7 +97,7 @@ def strain(gradient: Floats, axes: Floats, components: tuple[tuple[int, int], ..
     return np.stack([(sum(f_a[i][k] * f_a[j][k] for k in dims) - (i == j)) / 2 for i, j in components], axis=-1)
 
 
-def wall_strain(mesh: Mesh, displacement: Floats, axes: Floats, at_ed: Floats | None = None) -> Floats:
+def wall_strain(mesh: Mesh, displacement: Floats, axes: Floats, at_ed: Floats) -> Floats:
     """Strain since ED at the quadrature points.
 
     Parameters
@@ -114,10 +114,9 @@ def wall_strain(mesh: Mesh, displacement: Floats, axes: Floats, at_ed: Floats | 
     ndarray of shape (n_frames, n_cells, n_points, 6)
         RR, CC, LL, RC, RL, CL.
     """
-    u_ed = displacement[0] if at_ed is None else at_ed
-    deformed = deformed_wall_axes(axes, deformation_gradient(mesh, u_ed, tetrahedron()[0]))
+    deformed = deformed_wall_axes(axes, deformation_gradient(mesh, at_ed, tetrahedron()[0]))
     # With the wall at ED in place of the unloaded one, the gradient by its positions is F F_ED^-1.
-    wall = element.build_elements(replace(mesh, nodes=mesh.nodes + u_ed), deformed)
+    wall = element.build_elements(replace(mesh, nodes=mesh.nodes + at_ed), deformed)
     c = np.empty((len(displacement), *wall.weight.shape, 6))
     for u, c_of_frame in zip(displacement, c, strict=True):
         element.right_cauchy_green(mesh.nodes + u, wall, c_of_frame)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from operator import itemgetter
+from operator import ge, itemgetter, le
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from echotruth.loop.phases import CONTRACTION, FILLING
 from echotruth.mechanics.contours import MID_SLICE, global_longitudinal_strain, wall_thickness
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import epicardial_apex
+from echotruth.mechanics.geometry.boundary import area_vectors
 from echotruth.mechanics.history import Arrays
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation
 
@@ -166,8 +167,7 @@ def _at_end_of_ivc(values: Floats, phase: NDArray[np.uint8]) -> Floats:
 def _axial_motion(mesh: Mesh, displacement: Floats) -> Arrays:
     """Motion of the epicardial apex, and of the base (area mean), along the long axis since ED."""
     axial = displacement[..., 2] - displacement[0, :, 2]
-    corners = mesh.nodes[mesh.base[:, :3]]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
+    area = np.linalg.norm(area_vectors(mesh.nodes, mesh.base), axis=-1)
     # The mean of a quadratic over a triangle is that of its mid-edge nodes.
     base = np.average(axial[:, mesh.base[:, 3:]].mean(axis=-1), axis=1, weights=area)
     return {"apex_motion": axial[:, epicardial_apex(mesh)], "base_motion": base}
@@ -237,13 +237,9 @@ def violated_bound(measured: dict[str, ArrayLike], bounds: Physiology, healthy: 
             values = values[np.isfinite(values)]
             if not values.size:
                 continue
-        if "_max" in bound.key:
-            value = np.max(values)
-            violated, rule = not value <= limit, "at most"
-        else:
-            value = np.min(values)
-            violated, rule = not value >= limit, "at least"
-        if violated:
+        extreme, holds, rule = (np.max, le, "at most") if "_max" in bound.key else (np.min, ge, "at least")
+        value = extreme(values)
+        if not holds(value, limit):
             return f"{bound.description} is {value:.3g} and must be {rule} {limit:g} (physiology.{bound.key})."
     return ""
 

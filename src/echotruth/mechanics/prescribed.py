@@ -12,7 +12,7 @@ from echotruth.heart import SHORT_AXIS
 from echotruth.loop.cycle import read_loop
 from echotruth.loop.phases import FILLING
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.geometry.tube import Tube, tube_dimensions
+from echotruth.mechanics.geometry.lattice import Tube, tube_dimensions
 from echotruth.mechanics.history import Arrays, collect_outputs
 from echotruth.mechanics.solver.wall import wall
 

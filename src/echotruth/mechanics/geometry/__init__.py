@@ -7,8 +7,8 @@ import numpy as np
 from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.mechanics.geometry.ellipsoid import ellipsoid
+from echotruth.mechanics.geometry.lattice import tube
 from echotruth.mechanics.geometry.mesh_quality import GeometryError
-from echotruth.mechanics.geometry.tube import tube
 
 __all__ = ["GeometryError", "epicardial_apex", "left_ventricle"]
 

@@ -137,14 +137,21 @@ def largest_component(selected: np.ndarray, pairs: Integers) -> np.ndarray:
     return selected & (label == np.argmax(np.bincount(label[selected])))
 
 
-def add_edge_nodes(vertices: Integers, n_nodes: int) -> tuple[Integers, Integers]:
-    """Add a node, from number `n_nodes` on, to every edge of linear tetrahedra (n_cells, 4): edges and quadratic cells.
+def add_edge_nodes(cells: Integers, n_nodes: int) -> tuple[Integers, Integers]:
+    """Add a node, from number `n_nodes` on, to every edge of linear tetrahedra (n_cells, 4); quadratic ones stay.
 
-    The edges, shape (n_edges, 2), are the vertices beside each new node; the cells have the shape (n_cells, 10).
+    Returns the vertices beside each new node, shape (n_edges, 2), and the quadratic cells, shape (n_cells, 10).
     """
-    ends = np.sort(vertices[:, EDGES].reshape(-1, 2), axis=1)
+    if cells.shape[1] == 10:
+        return np.empty((0, 2), np.int32), cells
+    ends = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
     edges, number = np.unique(ends, axis=0, return_inverse=True)
-    return edges, np.hstack([vertices, n_nodes + number.reshape(-1, 6)]).astype(np.int32)
+    return edges, np.hstack([cells, n_nodes + number.reshape(-1, 6)]).astype(np.int32)
+
+
+def with_edge_nodes(positions: Floats, edges: Integers) -> Floats:
+    """Positions (..., n, 3) of vertices, then those of the middles of edges (n_edges, 2)."""
+    return np.concatenate([positions, positions[..., edges, :].mean(axis=-2)], axis=-2)
 
 
 def area_vectors(nodes: Floats, triangles: Integers) -> Floats:

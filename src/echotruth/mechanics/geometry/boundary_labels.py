@@ -46,7 +46,7 @@ _REMEDY = "give a wall around a cavity that is open at the base, or name its sid
 
 @dataclass(frozen=True)
 class BoundarySurface:
-    """The closed boundary of a wall with the label of each facet.
+    """The closed boundary of a wall with the label of each facet, `ENDO`, `EPI` or `BASE`.
 
     Attributes
     ----------
@@ -54,7 +54,6 @@ class BoundarySurface:
     facets : ndarray of shape (n_facets, 3 or 6)
         Normals point out of the wall.
     labels : ndarray of shape (n_facets,)
-        `ENDO`, `EPI` or `BASE`.
     """
 
     nodes: Floats

@@ -15,6 +15,7 @@ from echotruth.mechanics.geometry.boundary import (
     boundary,
     component_labels,
     count_nonmanifold_faces,
+    largest_component,
     triangle_edges,
 )
 from echotruth.mechanics.geometry.imported_mesh import ImportedMesh
@@ -128,8 +129,7 @@ def _trim_cut(mesh: ImportedMesh, selected: NDArray[np.bool_]) -> NDArray[np.boo
         cells = np.flatnonzero(selected)
         loose = cells[_on_one_face(mesh.cells[cells]) | _at_nonmanifold_edge(mesh.cells[cells])]
         loose = loose[at_cut[mesh.cells[loose, :4]].any(axis=1)]
-        component = component_labels(len(selected), pairs[selected[pairs].all(axis=1)])
-        splinters = selected & (component != np.argmax(np.bincount(component[selected])))
+        splinters = selected & ~largest_component(selected, pairs)
         if splinters.sum() > MAX_SPLINTERS * total:
             splinters[:] = False
         if not len(loose) and not splinters.any():

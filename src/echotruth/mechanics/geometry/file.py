@@ -1,10 +1,12 @@
-"""The left ventricle from a file, as a mesh in the heart frame."""
+"""The left ventricle from a file, as a mesh in the heart frame, with the fibre and sheet directions of the file."""
 
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Floats, Integers, Mesh
@@ -15,16 +17,19 @@ from echotruth.mechanics.geometry.boundary import (
     boundary,
     component_labels,
     triangle_edges,
+    with_edge_nodes,
 )
 from echotruth.mechanics.geometry.boundary_labels import NAMES, BoundarySurface, label_boundary
-from echotruth.mechanics.geometry.cut import extract_wall, select_cells
-from echotruth.mechanics.geometry.file_fibres import map_fibres
+from echotruth.mechanics.geometry.cut import extract_wall, named_array, select_cells
 from echotruth.mechanics.geometry.frame import HeartFrame, heart_frame
 from echotruth.mechanics.geometry.imported_mesh import METRES, ImportedMesh
 from echotruth.mechanics.geometry.mesh_quality import GeometryError, check_cavity, check_flat, check_inverted
 from echotruth.mechanics.geometry.remeshing import remesh
 
 logger = logging.getLogger("echotruth.mechanics")
+
+MAX_ALIGNMENT = 0.999
+"""Mean squared cosine of fibres to their common direction above which they are no heart's: 1 for a constant."""
 
 
 def ventricle_from_file(geometry: Geometry) -> Mesh:
@@ -68,7 +73,8 @@ def ventricle_from_file(geometry: Geometry) -> Mesh:
 def _keep_cells(imported: ImportedMesh, surface: BoundarySurface, septum: Floats | None) -> tuple[Mesh, HeartFrame]:
     """The tetrahedra of the file, made quadratic."""
     frame = heart_frame(surface, septum)
-    mesh = labelled_mesh(*quadratic(frame.transform_points(imported.nodes), imported.cells), surface)
+    edges, cells = add_edge_nodes(imported.cells, len(imported.nodes))
+    mesh = labelled_mesh(with_edge_nodes(frame.transform_points(imported.nodes), edges), cells, surface)
     base = np.unique(mesh.base)
     if np.ptp(mesh.nodes[base, 2]) < 1e-4 * np.ptp(mesh.nodes[:, 2]):
         mesh.nodes[base, 2] = 0.0
@@ -88,25 +94,6 @@ def labelled_mesh(nodes: Floats, cells: Integers, surface: BoundarySurface) -> M
     # The boundary comes in the same order from quadratic tetrahedra as from linear ones.
     facets, _ = boundary(cells)
     return Mesh(nodes, cells, **{name: facets[surface.labels == number] for number, name in enumerate(NAMES)})
-
-
-def quadratic(nodes: Floats, cells: Integers) -> tuple[Floats, Integers]:
-    """Add nodes in the middle of the edges of linear tetrahedra; quadratic ones stay.
-
-    Parameters
-    ----------
-    nodes : ndarray of shape (n_nodes, 3), m
-    cells : ndarray of shape (n_cells, 4 or 10)
-
-    Returns
-    -------
-    nodes : ndarray of shape (n_more_nodes, 3), m
-    cells : ndarray of shape (n_cells, 10)
-    """
-    if cells.shape[1] == 10:
-        return nodes, cells
-    edges, cells = add_edge_nodes(cells, len(nodes))
-    return np.vstack([nodes, nodes[edges].mean(axis=1)]), cells
 
 
 def _check_surface_keys(geometry: Geometry) -> None:
@@ -169,3 +156,52 @@ def septum_point(imported: ImportedMesh, geometry: Geometry) -> Floats | None:
             f"{imported.source}: geometry.septum.values names no cell of the wall: choose others of its values"
         )
     return imported.nodes[cells[:, :4]].mean(axis=(0, 1))
+
+
+def map_fibres(mesh: Mesh, imported: ImportedMesh, frame: HeartFrame, geometry: Geometry) -> Mesh:
+    """Add the directions of the file to the mesh, where the configuration names them.
+
+    New elements take the directions of the tetrahedron of the file whose centroid is nearest to theirs. `imported` is
+    the wall as read, and the mesh stands in `frame`.
+    """
+    if geometry.fibre is None:
+        return mesh
+    fibre = _unit_vectors(imported, geometry.fibre, "geometry.fibre")
+    alignment = np.linalg.eigvalsh(fibre.T @ fibre / len(fibre))[-1]
+    if alignment > MAX_ALIGNMENT:
+        raise GeometryError(
+            f"{imported.source}: geometry.fibre = {geometry.fibre!r} has one direction in all of the wall, a "
+            "placeholder: leave it out to use the rule of the section fibres"
+        )
+    nearest = np.arange(len(imported.cells))
+    if len(mesh.cells) != len(imported.cells) or geometry.remesh:
+        centroid = frame.transform_points(imported.nodes)[imported.cells[:, :4]].mean(axis=1)
+        nearest = cKDTree(centroid).query(mesh.nodes[mesh.cells[:, :4]].mean(axis=1))[1]
+    fibre = frame.transform_vectors(fibre)[nearest]
+    if geometry.sheet is None:
+        return replace(mesh, fibre=fibre)
+    sheet = frame.transform_vectors(_unit_vectors(imported, geometry.sheet, "geometry.sheet"))[nearest]
+    orthogonal = sheet - np.einsum("ci,ci->c", sheet, fibre)[:, None] * fibre
+    length = np.linalg.norm(orthogonal, axis=1, keepdims=True)
+    if length.min() < 1e-3:
+        raise GeometryError(
+            f"{imported.source}: geometry.sheet = {geometry.sheet!r} lies along the fibres in "
+            f"{np.sum(length < 1e-3)} cells: leave it out"
+        )
+    return replace(mesh, fibre=fibre, sheet=orthogonal / length)
+
+
+def _unit_vectors(imported: ImportedMesh, name: str, key: str) -> Floats:
+    """Array of vectors over the cells, divided by their lengths, (n_cells, 3)."""
+    vectors = named_array(imported.cell_arrays, name, imported.source, key, "cells").astype(float)
+    if vectors.shape != (len(imported.cells), 3):
+        raise GeometryError(
+            f"{imported.source}: {key} = {name!r} is not an array of three components: choose one that is"
+        )
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    if not (length > 1e-6).all() or not np.isfinite(vectors).all():
+        raise GeometryError(
+            f"{imported.source}: {key} = {name!r} is zero in {np.sum(~(length > 1e-6))} cells of the wall: leave it "
+            "out to use the rule of the section fibres"
+        )
+    return vectors / length

@@ -1,18 +1,32 @@
-"""Lattices of boxes, each cut into six quadratic tetrahedra, mapped to bodies such as a tube."""
+"""Lattices of boxes, each cut into six quadratic tetrahedra, mapped to bodies such as the tube.
+
+The tube is a wall of uniform thickness about the long axis, open at both ends.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import permutations
+from typing import NamedTuple
 
 import numpy as np
 
+from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import EDGES, Floats, Integers, Mesh
 from echotruth.mechanics.geometry.boundary import boundary
+from echotruth.mechanics.geometry.ellipsoid import semi_axes
 
 Counts = tuple[int, int, int]
 LatticeMap = Callable[[Floats], Floats]
 """Map of parameters (n_nodes, 3), from 0 to 1, to positions (n_nodes, 3), m; right-handed."""
+
+
+class Tube(NamedTuple):
+    """Inner and outer radius and length, m, of a tube below its base at z = 0."""
+
+    inner: float
+    outer: float
+    length: float
 
 
 def lattice(counts: Counts, position: LatticeMap, periodic: bool = False) -> tuple[Mesh, Floats]:
@@ -52,6 +66,18 @@ def tube_map(inner: float, outer: float, length: float) -> LatticeMap:
         return np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), length * (parameters[:, 2] - 1)])
 
     return position
+
+
+def tube_dimensions(geometry: Geometry) -> Tube:
+    """The tube as wide as the ellipsoids are at the equator and as long as the inner one is below the base."""
+    (inner, length, base), (outer, _, _) = semi_axes(geometry)
+    return Tube(inner, outer, length + base)
+
+
+def tube(geometry: Geometry) -> Mesh:
+    """Mesh of the tube, in boxes of six tetrahedra each; its lower end is neither endocardium, epicardium nor base."""
+    counts = geometry.transmural_elements, geometry.circumferential_elements, geometry.longitudinal_elements
+    return lattice(counts, tube_map(*tube_dimensions(geometry)), periodic=True)[0]
 
 
 def _kuhn(counts: Counts, periodic: bool) -> tuple[Integers, Floats]:

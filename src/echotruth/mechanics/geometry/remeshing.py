@@ -91,7 +91,9 @@ def remesh(surface: BoundarySurface, septum: Floats | None, geometry: Geometry, 
     frame = _frame_at_cut(surface, septum, geometry, source)
     local = BoundarySurface(frame.transform_points(surface.nodes), surface.facets, surface.labels)
     caster, lines = Rays(local.nodes, local.facets), _fit_lines(local)
-    r, azimuth = _disc_grid(2 * geometry.longitudinal_elements, 3 * geometry.circumferential_elements)
+    rings, around = 2 * geometry.longitudinal_elements, 3 * geometry.circumferential_elements
+    grid = np.meshgrid(np.arange(1, rings + 1) / rings, 2 * np.pi * np.arange(around) / around)
+    r, azimuth = (coordinate.ravel() for coordinate in grid)
     hits = caster.intersections(*lines.rays(r, azimuth))
     through = np.array([len(distances) > 1 for distances in hits])
     if np.mean(~through) > MAX_MISSES:
@@ -177,12 +179,6 @@ def _fit_lines(surface: BoundarySurface) -> TransmuralLines:
     radius = np.mean([np.mean(np.linalg.norm(points[:, :2] - points[:, 2:] * shear, axis=1)) for points in basal])
     length = np.mean(depth)
     return TransmuralLines(min(radius, length), length, 0.9 * depth[0], shear)
-
-
-def _disc_grid(rings: int, around: int) -> tuple[Floats, Floats]:
-    """Distances from the apex and azimuths of the lines, both (n,)."""
-    r, azimuth = np.meshgrid(np.arange(1, rings + 1) / rings, 2 * np.pi * np.arange(around) / around)
-    return r.ravel(), azimuth.ravel()
 
 
 def _zernike(r: Floats, azimuth: Floats, degree: int) -> Floats:

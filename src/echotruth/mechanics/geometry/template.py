@@ -115,8 +115,8 @@ def _growing_rings(k: int) -> list[list[tuple[int, int]]]:
 def _extrude(triangles: Integers, n_points: int, layers: int) -> Integers:
     """Tetrahedra of the prisms over the triangles.
 
-    The diagonal of each quadrilateral starts at its smallest vertex, so that
-    neighbours agree (Dompierre et al., How to subdivide pyramids, prisms and hexahedra, 1999).
+    The diagonal of each quadrilateral starts at its smallest vertex, so that neighbours agree (Dompierre et al., How to
+    subdivide pyramids, prisms and hexahedra, 1999).
     """
     order = np.array([np.roll(t, -int(np.argmin(t))) for t in triangles])
     prisms = np.vstack([np.hstack([order, order + n_points]) + k * n_points for k in range(layers)])

@@ -128,13 +128,7 @@ def _times(series: MeshSeries, section: FileMotion) -> Floats:
 
 
 def _repeats_first(positions: Floats, section: FileMotion, source: str) -> bool:
-    """Whether the last frame is the first one again.
-
-    Raises
-    ------
-    MotionError
-        If the last frame is neither that nor one step before it.
-    """
+    """Whether the last frame is the first one again; refused if it is neither that nor one step before it."""
     distance = np.array([_rms(frame - positions[0]) for frame in positions])
     steps = np.array([_rms(step) for step in np.diff(positions, axis=0)])
     if not distance.max() > 0:

@@ -14,6 +14,7 @@ from echotruth.arrays import Floats
 from echotruth.config.defaults import ARRAY_SUFFIXES
 from echotruth.config.motion import FileMotion
 from echotruth.mechanics.geometry.imported_mesh import ImportedMesh, read_file
+from echotruth.mechanics.geometry.mesh_quality import GeometryError
 from echotruth.mechanics.motion_file.files import series_files
 from echotruth.mechanics.motion_file.xdmf import read_xdmf
 from echotruth.mechanics.prescribed import MotionError
@@ -81,9 +82,9 @@ def read_series(section: FileMotion, points: Floats | None = None) -> MeshSeries
         if suffix in ARRAY_SUFFIXES:
             return _array_series(source, section.displacement, points)
         frames, times = _mesh_frames(files, suffix, section.displacement)
-    except (MotionError, OSError, KeyError, ValueError, EOFError, ElementTree.ParseError) as error:
-        if isinstance(error, MotionError) or type(error).__name__ == "GeometryError":
-            raise
+    except (MotionError, GeometryError):
+        raise
+    except (OSError, KeyError, ValueError, EOFError, ElementTree.ParseError) as error:
         reason = (str(error).splitlines() or ["it does not begin as one"])[0].rstrip(".")
         raise MotionError(f"{source}: cannot be read as {suffix} ({reason}): write the file again.") from None
     return _stack(source, frames, np.array(times, float) if times else None, section.displacement)

@@ -12,11 +12,10 @@ from echotruth.arrays import Floats
 from echotruth.config import Config, Geometry
 from echotruth.fem.tetrahedra import Integers, Mesh
 from echotruth.fem.volume import jacobians
-from echotruth.mechanics.geometry.boundary import add_edge_nodes, boundary
+from echotruth.mechanics.geometry.boundary import add_edge_nodes, boundary, with_edge_nodes
 from echotruth.mechanics.geometry.boundary_labels import BoundarySurface, label_boundary
 from echotruth.mechanics.geometry.cut import extract_wall
-from echotruth.mechanics.geometry.file import labelled_mesh, septum_point
-from echotruth.mechanics.geometry.file_fibres import map_fibres
+from echotruth.mechanics.geometry.file import labelled_mesh, map_fibres, septum_point
 from echotruth.mechanics.geometry.frame import heart_frame, rim_centroid
 from echotruth.mechanics.geometry.imported_mesh import METRES, ImportedMesh, merge_points, read_file
 from echotruth.mechanics.geometry.mesh_quality import (
@@ -93,12 +92,12 @@ def moving_wall(config: Config) -> MovingWall:
     unit = METRES[geometry.unit] * geometry.scale
     cycle = replace(recorded, positions=recorded.positions[:, point] * unit)
     _check_size(wall, cycle, geometry)
-    edges, cells = _quadratic_cells(wall)
+    edges, cells = add_edge_nodes(wall.cells, len(wall.nodes))
     _check_inverted(cycle, wall, edges, cells)
     cycle = cycle.beginning_at(_end_diastole(config, wall, cycle, edges, cells))
     wall, surface = _at_frame(wall, cycle, geometry)
     frame = heart_frame(surface, septum_point(wall, geometry))
-    positions = _with_edges((cycle.positions - frame.origin) @ frame.axes.T, edges)
+    positions = with_edge_nodes((cycle.positions - frame.origin) @ frame.axes.T, edges)
     rest = labelled_mesh(positions[0], cells, surface)
     check_flat(rest, cycle.names[0], "mesh the wall again where its motion is solved")
     check_cavity(rest, cycle.names[0], f"set geometry.unit, now {geometry.unit}, to one of {', '.join(METRES)}")
@@ -150,18 +149,6 @@ def _check_size(wall: ImportedMesh, cycle: RecordedCycle, geometry: Geometry) ->
     )
 
 
-def _quadratic_cells(wall: ImportedMesh) -> tuple[Integers, Integers]:
-    """Edges (n_edges, 2) that receive a node, none if the tetrahedra are quadratic, and the quadratic cells."""
-    if wall.cells.shape[1] == 10:
-        return np.empty((0, 2), np.int32), wall.cells
-    return add_edge_nodes(wall.cells, len(wall.nodes))
-
-
-def _with_edges(positions: Floats, edges: Integers) -> Floats:
-    """Positions (n_frames, n, 3) of vertices, then those of the middles of edges."""
-    return np.concatenate([positions, positions[:, edges].mean(axis=2)], axis=1) if len(edges) else positions
-
-
 def _check_inverted(cycle: RecordedCycle, wall: ImportedMesh, edges: Integers, cells: Integers) -> None:
     for number, (positions, name) in enumerate(zip(cycle.positions, cycle.names, strict=True)):
         # Straight tetrahedra have one Jacobian each.
@@ -187,7 +174,7 @@ def _end_diastole(config: Config, wall: ImportedMesh, cycle: RecordedCycle, edge
         # The last frame is the first one again where it is left out.
         return (named - cycle.first) % len(cycle.positions)
     wall, surface = _at_frame(wall, cycle, config.geometry)
-    positions = _with_edges(cycle.positions, edges)
+    positions = with_edge_nodes(cycle.positions, edges)
     return first_of_largest(_cavity_volumes(positions, labelled_mesh(positions[0], cells, surface), surface))
 
 

@@ -62,13 +62,7 @@ def _has_attribute(grid: Element, name: str) -> bool:
 
 
 class _Reader:
-    """Reader of the grids of a file, which reads what they share once.
-
-    Parameters
-    ----------
-    path : Path
-    root : Element
-    """
+    """Reader of the grids of a file, which reads what they share once."""
 
     def __init__(self, path: Path, root: Element) -> None:
         self._path, self._root = path, root

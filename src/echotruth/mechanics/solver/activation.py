@@ -32,10 +32,6 @@ class Activation:
         """dT/dT_Ca of each cell within one frame, shape (n_cells,)."""
         return self.scale * np.clip(1 - self.delay / self.step, 0, 1)
 
-    def delayed_tension(self, earlier: Sequence[float]) -> Floats:
-        """Tension of each cell, shape (n_cells,), Pa, from T_Ca (Pa) of the frames before this one."""
-        return self.tension([*earlier, 0.0])
-
     def tension(self, t_ca: Sequence[float] | Floats) -> Floats:
         """Tension of each cell, shape (n_cells,), Pa, in the last of the frames whose T_Ca (Pa) is given."""
         frame = np.arange(-1, len(t_ca))

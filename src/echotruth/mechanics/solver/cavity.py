@@ -9,7 +9,6 @@ is work-conjugate to V: its nodal forces, which follow the wall, are P dV/dx, an
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from echotruth.arrays import Floats
 from echotruth.fem.quadrature import triangle
@@ -43,6 +42,13 @@ _XI, _WEIGHT = triangle()
 _N, _DN_DXI = triangle_shape(_XI)
 _OPERATORS = np.stack([_N, _DN_DXI[..., 0], _DN_DXI[..., 1]])
 """Nodes to x, x,1 and x,2 at the quadrature points, (3, n_points, 6)."""
+_TURNED, _BACK = np.roll(_OPERATORS, -1, axis=0), np.roll(_OPERATORS, -2, axis=0)
+_MINORS = (
+    -_WEIGHT[:, None, None] / 3 * (_TURNED[..., None] * _BACK[..., None, :] - _BACK[..., None] * _TURNED[..., None, :])
+)
+"""-weight / 3 (A_p B_q - A_q B_p) of operators s, p, q in turn, by point and nodes a and b, (3, n_points, 6, 6)."""
+_PERMUTATION = np.cross(np.eye(3)[:, None], np.eye(3))
+"""Levi-Civita symbol, (3, 3, 3)."""
 
 
 def cavity_volume(nodes: Floats, endo: Integers) -> float:
@@ -82,55 +88,15 @@ def volume_gradient(nodes: Floats, endo: Integers) -> Floats:
     return (-_WEIGHT[:, None] / 3 * _OPERATORS).reshape(-1, 6).T @ cofactors
 
 
-@njit(cache=True, error_model="numpy")
-def volume_hessian(nodes: Floats, endo: Integers, hessian: Floats) -> None:
-    """d2V/dx2, facet by facet.
+def volume_hessian(nodes: Floats, endo: Integers) -> Floats:
+    """d2V/dx2 (n_facets, 18, 18), m, facet by facet, at nodes (n_nodes, 3), m; rows and columns run over node and axis.
 
-    Parameters
-    ----------
-    nodes : ndarray of shape (n_nodes, 3), m
-    endo : ndarray of shape (n_facets, 6)
-    hessian : ndarray of shape (n_facets, 18, 18), m
-        Filled. Rows and columns run over node and axis.
+    The second derivative by two nodes a and b, moved by u and v, is det(u, v, axis_ab), with the sum over the points
+    axis_ab = -weight / 3 sum_s (A_p B_q - A_q B_p) column_s; s, p, q are the operators to x, x,1 and x,2 in turn.
     """
-    for f in range(endo.shape[0]):
-        _facet_hessian(nodes, endo[f], hessian[f])
-
-
-@njit(cache=True, error_model="numpy")
-def _facet_hessian(nodes: Floats, facet: Integers, hessian: Floats) -> None:
-    """Sum over the points of the second derivatives of -weight / 3 det(x, x,1, x,2)."""
-    hessian[:] = 0.0
-    columns, axis = np.empty((3, 3)), np.empty(3)
-    for q in range(_WEIGHT.shape[0]):
-        operators = _OPERATORS[:, q]
-        columns[:] = 0.0
-        for a in range(6):
-            for s in range(3):
-                for i in range(3):
-                    columns[s, i] += operators[s, a] * nodes[facet[a], i]
-        for a in range(6):
-            for b in range(6):
-                _hessian_axis(operators[:, a], operators[:, b], columns, -_WEIGHT[q] / 3, axis)
-                _add_cross(axis, hessian[3 * a : 3 * a + 3, 3 * b : 3 * b + 3])
-
-
-@njit(cache=True, error_model="numpy")
-def _hessian_axis(a: Floats, b: Floats, columns: Floats, weight: float, axis: Floats) -> None:
-    """Fill the vector (3,) such that the second derivative by two nodes, moved by u and v, is det(u, v, axis)."""
-    axis[:] = 0.0
-    for s in range(3):
-        p, q = (s + 1) % 3, (s + 2) % 3
-        factor = weight * (a[p] * b[q] - a[q] * b[p])
-        for i in range(3):
-            axis[i] += factor * columns[s, i]
-
-
-@njit(cache=True, error_model="numpy")
-def _add_cross(axis: Floats, block: Floats) -> None:
-    block[0, 1] += axis[2]
-    block[1, 0] -= axis[2]
-    block[1, 2] += axis[0]
-    block[2, 1] -= axis[0]
-    block[2, 0] += axis[1]
-    block[0, 2] -= axis[1]
+    x = np.ascontiguousarray(nodes[endo].transpose(1, 2, 0))
+    # Sums term by term: those of a matrix product depend on its library.
+    columns = sum(_OPERATORS[:, :, a, None, None] * x[a] for a in range(6))
+    terms = (_MINORS[:, q, ..., None, None] * columns[:, q, None, None] for q in range(len(_WEIGHT)))
+    axes = sum(first + second + third for first, second, third in terms)
+    return np.einsum("ijk,abkf->faibj", _PERMUTATION, axes).reshape(len(endo), 18, 18)

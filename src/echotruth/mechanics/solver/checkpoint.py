@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,4 +64,4 @@ class Checkpoints:
         path = self.folder / f"{len(list(self.folder.glob('*.frame'))):05d}.frame"
         part = path.with_suffix(".part")
         part.write_bytes(pickle.dumps(frame))
-        os.replace(part, path)
+        part.replace(path)

@@ -40,7 +40,7 @@ class SolvedCycle:
         Solved pressure and volume of the cavity.
     pressure_target, volume_target : ndarray of shape (n_frames,), Pa and m^3
         Prescribed by the cycle; not a number where it prescribes none.
-    tension : ndarray of shape (n_frames,), Pa
+    active_tension : ndarray of shape (n_frames,), Pa
         T_Ca of the healthy, undelayed wall.
     newton_steps : ndarray of shape (n_frames,)
         Factorizations.
@@ -54,7 +54,7 @@ class SolvedCycle:
     volume: Floats
     pressure_target: Floats
     volume_target: Floats
-    tension: Floats
+    active_tension: Floats
     newton_steps: NDArray[np.int64]
     residual: Floats
     stiffness: float
@@ -148,7 +148,7 @@ def _solve_next(stepper: LoadStepper, cycle: Cycle, activation: Activation, stat
     fraction: Floats | float
     if unknown == "tension":
         fraction = activation.tension_fraction()
-        tension = activation.delayed_tension([state.tension for state in states])
+        tension = activation.tension([*(state.tension for state in states), 0.0])
     else:
         assert cycle.tension is not None
         fraction, tension = 0.0, activation.tension(cycle.tension[: frame + 1])
@@ -187,7 +187,7 @@ def _solved_cycle(equations: Equilibrium, cycle: Cycle, frames: list[SolvedFrame
         volume=np.array([frame.load.volume for frame in frames]),
         pressure_target=none if cycle.pressure is None else cycle.pressure,
         volume_target=none if cycle.volume is None else cycle.volume,
-        tension=np.array([frame.state.tension for frame in frames]),
+        active_tension=np.array([frame.state.tension for frame in frames]),
         newton_steps=np.diff([frame.factorizations for frame in frames], prepend=0),
         residual=np.array([frame.max_error for frame in frames]),
         stiffness=frames[0].state.stiffness,

@@ -193,7 +193,6 @@ class Equilibrium:
         self.unloaded_volume = np.sum(self.elements.weight, axis=1)
         self.stiffness_scale = np.ones(len(mesh.cells)) if stiffness_scale is None else stiffness_scale
         self._response = element.allocate_response(len(mesh.cells), with_tangent=True)
-        self._facets = np.empty((len(mesh.endo), 18, 18))
         self._solver = factorization(single=True)
         self.previous: PreviousState | None = None
         self._end_diastole: Floats | None = None
@@ -232,10 +231,6 @@ class Equilibrium:
         """Volume of the cavity, m^3."""
         return cavity.cavity_volume(self.positions(state), self.mesh.endo)
 
-    def cell_tension(self, state: State, load: Load) -> Floats:
-        """T_Ca of each cell, shape (n_cells,), Pa."""
-        return np.zeros(len(self.mesh.cells)) + state.tension * load.tension_fraction + load.tension
-
     def residual(self, state: State, load: Load, unknown: Unknown) -> Residual:
         """Residuals of a state under a load."""
         return self._residual(state, load, unknown, self._response._replace(tangent=np.empty((0, element.PACKED))))
@@ -244,7 +239,8 @@ class Equilibrium:
     @np.errstate(over="ignore", invalid="ignore")
     def _residual(self, state: State, load: Load, unknown: Unknown, response: element.Response) -> Residual:
         nodes = self.positions(state, load.prescribed_fraction)
-        stiffness, tension = state.stiffness * self.stiffness_scale, self.cell_tension(state, load)
+        stiffness = state.stiffness * self.stiffness_scale
+        tension = np.zeros(len(self.mesh.cells)) + state.tension * load.tension_fraction + load.tension
         cell_state = element.CellState(stiffness, tension, state.cell_pressure, self._viscous_modulus, self._previous_c)
         element.evaluate(nodes, self.elements, self.law, cell_state, response)
         gradient = cavity.volume_gradient(nodes, self.mesh.endo)
@@ -277,8 +273,8 @@ class Equilibrium:
         """Factor the tangent at a state."""
         self._residual(state, load, unknown, self._response)
         pressure = state.cavity_pressure if unknown == "cavity_pressure" else load.pressure
-        cavity.volume_hessian(self.positions(state, load.prescribed_fraction), self.mesh.endo, self._facets)
-        blocks = [self.assembly.pack(self.mesh.endo, -pressure * self._facets)]
+        hessian = cavity.volume_hessian(self.positions(state, load.prescribed_fraction), self.mesh.endo)
+        blocks = [self.assembly.pack(self.mesh.endo, -pressure * hessian)]
         for surface in self.springs:
             matrix = surface.spring + self._rate * surface.dashpot
             # Those that do not act yet keep their place in the pattern.
