@@ -66,12 +66,12 @@ def draw_figures(folder: Path, hearts: Hearts, printed: str, mended: str) -> Non
     """Figures 2B, 3 and 4 of every heart, as the report draws them, for two trackers."""
     for name, heart in hearts.items():
         clips = [heart.group(f"bmode/{size}").image.sel(view="mid").isel(frame=0).values for size in heart.sizes[:2]]
-        resolutions.draw(folder / f"paper_bmode_{name}.png", clips, heart.field_of_view)
+        style.save(resolutions.draw(clips, heart.field_of_view), folder / f"paper_bmode_{name}.png")
         for tracker in (printed, mended):
             true, tracked = (1e6 * values for values in heart.segments(tracker))
             labels = "Circumferential displacement at ES (µm)", "Difference (µm)"
             segments = bullseye.Segments("Circumferential displacement", true, tracked, *labels)
-            bullseye.draw(folder / f"paper_bullseye_{name}_{tracker}.png", [segments], tracker)
+            style.save(bullseye.draw([segments], tracker), folder / f"paper_bullseye_{name}_{tracker}.png")
         errors = {
             view: {
                 tracker: {size: heart.layer_errors(view, tracker, size) for size in heart.sizes}
@@ -79,4 +79,4 @@ def draw_figures(folder: Path, hearts: Hearts, printed: str, mended: str) -> Non
             }
             for view in SLICES
         }
-        error.draw(folder / f"paper_error_{name}.png", errors)
+        style.save(error.draw(errors), folder / f"paper_error_{name}.png")

@@ -152,13 +152,13 @@ def test_failure_half_way_leaves_nothing_new_and_what_was_there(known, monkeypat
     work = Export(source(known.folder, Selection(views=["mid"])), "png", output=tmp_path / "out")
     (folder,) = work.write(work.clips()[0])
     before = sorted(path.name for path in folder.iterdir())
-    monkeypatch.setattr(png, "note", fail)
+    monkeypatch.setattr(png, "pictures", fail)
     with pytest.raises(OSError, match="No space left"):
         list(work.write(work.clips()[0]))
     assert (tmp_path / "reached").exists() and [path.name for path in folder.parent.iterdir()] == [folder.name]
     assert sorted(path.name for path in folder.iterdir()) == before
     monkeypatch.undo()
-    monkeypatch.setattr(png, "note", fail)
+    monkeypatch.setattr(png, "pictures", fail)
     assert call(monkeypatch, known.folder, "--format", "png", "-o", tmp_path / "out") == 2
 
 
@@ -239,7 +239,7 @@ def test_interruption_says_so_and_leaves_whole_files(known, monkeypatch, tmp_pat
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(png, "note", interrupt)
+    monkeypatch.setattr(png, "pictures", interrupt)
     assert call(monkeypatch, known.folder, "--format", "png", "-o", tmp_path) == 2
     assert capsys.readouterr().err == "echotruth: interrupted; the files that were named are whole\n"
     assert not list(tmp_path.iterdir())

@@ -4,7 +4,7 @@ from PIL import Image
 
 from echotruth.config import Geometry
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.report import heart
+from echotruth.report import heart, style
 from echotruth.report.raster import Camera, Surface, render
 
 
@@ -45,6 +45,6 @@ def test_heart_with_filling_is_drawn(tmp_path):
     nodes = np.concatenate([mesh.nodes, np.full((2, 3), np.nan)])
     fibre = np.tile([1.0, 0.2, 0.1], (count + 3, 1))
     states = [heart.State(name, nodes, fibre, np.linspace(-0.2, 0.1, count + 3)) for name in ("ED", "ES")]
-    path = heart.draw(tmp_path / "heart.png", cells, np.zeros(count + 3), states)
+    path = style.save(heart.draw(cells, np.zeros(count + 3), states), tmp_path / "heart.png")
     picture = np.asarray(Image.open(path).convert("RGB"))
     assert 0.1 < (picture.min(-1) < 240).mean() < 0.9

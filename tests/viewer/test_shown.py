@@ -6,6 +6,7 @@ from known_repository import FRAMES, SIZES
 from known_repository import SHIFT as MOTION
 from shown_repository import PIXEL, SHIFT
 
+from echotruth.evaluation.curves import strain_curves
 from echotruth.viewer import arrows, curves
 from echotruth.viewer.clip import Clip
 from echotruth.viewer.points import Points
@@ -20,6 +21,12 @@ def clip(catalogue):
 @pytest.fixture
 def points(clip):
     return Points(clip)
+
+
+def value(colours, index):
+    """Value that an entry of the palette stands for: the middle of its step; NaN where it is transparent."""
+    step = (colours.high - colours.low) / len(colours.palette)
+    return np.where(index > 0, colours.low + (index - 0.5) * step, np.nan)
 
 
 def test_point_covers_the_pixel_where_it_is(points, shown):
@@ -54,14 +61,14 @@ def test_colour_of_the_error_is_the_distance_of_tracked_from_true(clip, points, 
     half_step = (colours.high - colours.low) / 255 / 2
     for frame, share in enumerate(np.arange(FRAMES) / (FRAMES - 1)):
         error = 1e6 * np.hypot(*(found - share * SHIFT[:2]))
-        shown = colours.value(colours.index[frame][covered[frame]])
+        shown = value(colours, colours.index[frame][covered[frame]])
         np.testing.assert_allclose(shown, min(error, colours.high), atol=1.1 * half_step)
 
 
 def test_no_strain_of_a_rigid_motion(clip, points):
     colours = tint(clip, points, "tracked_strain", "TT", "one")
     step = (colours.high - colours.low) / 255
-    shown = colours.value(colours.index[-1])
+    shown = value(colours, colours.index[-1])
     assert np.abs(shown[np.isfinite(shown)]).max() <= step
 
 
@@ -84,7 +91,7 @@ def test_speed_is_the_motion_to_the_next_frame_over_its_time(clip, points):
     colours = tint(clip, points, "flow", "", None)
     step_time = clip.time[1] - clip.time[0]
     speed = 1e3 * np.hypot(*MOTION[:2]) / (FRAMES - 1) / step_time
-    shown = colours.value(colours.index[0])
+    shown = value(colours, colours.index[0])
     np.testing.assert_allclose(shown[np.isfinite(shown)], speed, rtol=0.02)
     assert (colours.index[-1] == 0).all()
 
@@ -127,7 +134,7 @@ def test_arrows_of_the_flow_say_how_long_they_are_drawn(clip):
 
 
 def test_curves_are_those_of_the_evaluation(clip):
-    found = {name: curves.strain_of(clip, name) for name in ("one", "two")}
+    found = {name: strain_curves(clip.job, name, clip.size) for name in ("one", "two")}
     line = curves.strain(clip, found, curves.LINE, "engineering", "middle").curves
     assert {name: round(float(values[1]), 3) for name, values in line.items()} == {"true": -14, "one": -12, "two": -22}
     segment = curves.strain(clip, found, "TT", "engineering", f"segment {curves.segments(found['one'])[0]}").curves

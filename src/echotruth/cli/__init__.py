@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from difflib import get_close_matches
 
 import echotruth
 from echotruth.cli import (
@@ -24,7 +23,7 @@ from echotruth.cli import (
     upload,
     validate,
 )
-from echotruth.cli.command import Parser, fail
+from echotruth.cli.command import Parser, did_you_mean, fail
 
 COMMANDS = (
     new,
@@ -93,6 +92,5 @@ def _unknown(option: str, command: str, whole: Parser) -> str:
     if not option.startswith("-"):
         return f"{option}: is one argument too many: see echotruth {command} --help"
     name = option.partition("=")[0]
-    close = get_close_matches(name, whole.options_of(command), n=1)
-    remedy = f"did you mean {close[0]}?" if close else f"see echotruth {command} --help"
+    remedy = did_you_mean(name, whole.options_of(command), f"see echotruth {command} --help")
     return f"{name}: is not an option of echotruth {command}: {remedy}"

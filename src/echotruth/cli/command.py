@@ -27,9 +27,8 @@ class Parser(argparse.ArgumentParser):
         """Tell an error and end the process with status 2."""
         if match := re.search(r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message):
             argument, given, listed = match.groups()
-            close = get_close_matches(given, re.findall(r"[\w.-]+", listed), n=1)
-            remedy = f"did you mean {close[0]}?" if close else f"use one of {listed.replace(chr(39), '')}"
-            message = f"{argument} = {given}: {remedy}"
+            known, otherwise = re.findall(r"[\w.-]+", listed), f"use one of {listed.replace(chr(39), '')}"
+            message = f"{argument} = {given}: {did_you_mean(given, known, otherwise)}"
         elif match := re.search(r"argument (\S+): invalid (int|float) value: '(.*)'", message):
             argument, kind, given = match.groups()
             message = f"{argument.partition('/')[0]} = {given}: give a {'whole ' * (kind == 'int')}number"
@@ -41,8 +40,8 @@ class Parser(argparse.ArgumentParser):
         """What an option that a command does not take may mean; "" if there is none, or nothing is like it."""
         known = list(self._option_string_actions)
         for name in (word.partition("=")[0] for word in sys.argv[1:] if word.startswith("--") and " " in self.prog):
-            if name not in known and (close := get_close_matches(name, known, n=1)):
-                return f"{name} is not an option: did you mean {close[0]}?"
+            if name not in known and (remedy := did_you_mean(name, known)):
+                return f"{name} is not an option: {remedy}"
         return ""
 
     def options_of(self, command: str) -> list[str]:
@@ -50,6 +49,12 @@ class Parser(argparse.ArgumentParser):
         (commands,) = (action for action in self._actions if isinstance(action, argparse._SubParsersAction))
         parser: argparse.ArgumentParser = commands.choices[command]
         return [text for action in parser._actions for text in action.option_strings if text.startswith("--")]
+
+
+def did_you_mean(given: str, known: Sequence[str], otherwise: str = "", cutoff: float = 0.6) -> str:
+    """Ask for the word that is most like a wrong one, or say something else if none is."""
+    close = get_close_matches(given, known, n=1, cutoff=cutoff)
+    return f"did you mean {close[0]}?" if close else otherwise
 
 
 def add_command(

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from shlex import quote
 
-from echotruth.cli.command import Commands, add_command, fail
+from echotruth.cli.command import Commands, add_command, did_you_mean, fail
 
 STANDARD_OUTPUT = "-"
 """What `--output` is called to print the configuration."""
@@ -42,7 +42,8 @@ def new(arguments: argparse.Namespace) -> int:
         print("\n".join(f"{name:{width}}  {shipped.summary(name)}" for name in names))
         return 0
     if arguments.preset not in names:
-        return fail(f"{arguments.preset} is not a preset: {_closest(arguments.preset, names)}")
+        remedy = did_you_mean(arguments.preset, names, f"use one of {', '.join(names)}", cutoff=0.5)
+        return fail(f"{arguments.preset} is not a preset: {remedy}")
     output = arguments.output or f"{arguments.preset}.yaml"
     if output == STANDARD_OUTPUT:
         sys.stdout.write(_texts(arguments.preset, Path(f"{arguments.preset}.yaml"), arguments.all)[0])
@@ -53,7 +54,10 @@ def new(arguments: argparse.Namespace) -> int:
 def _write(preset: str, path: Path, everything: bool) -> int:
     """Write a configuration and the table that it reads, if there is one; return the exit status."""
     text, tables = _texts(preset, path, everything)
-    files = {file: table for file, table in tables.items() if not _holds(file, table)} | {path: text}
+    files = tables | {path: text}
+    for file, table in tables.items():
+        if file.is_file() and file.read_bytes() == table.encode():
+            del files[file]  # the same table is there already
     for file in files:
         if file.exists() or file.is_symlink():
             return fail(f"{file}: is there already: give a file in another folder with --output, or remove it")
@@ -67,11 +71,6 @@ def _write(preset: str, path: Path, everything: bool) -> int:
         print(file)
     print(f"Edit it, then: echotruth check {quote(str(path))}; echotruth run {quote(str(path))}")
     return 0
-
-
-def _holds(file: Path, text: str) -> bool:
-    """Whether there is a file with this text."""
-    return file.is_file() and file.read_bytes() == text.encode()
 
 
 def _texts(preset: str, path: Path, everything: bool) -> tuple[str, dict[Path, str]]:
@@ -92,11 +91,3 @@ def _texts(preset: str, path: Path, everything: bool) -> tuple[str, dict[Path, s
     for file in tables:
         written = written.replace(str(shipped.folder() / file.name), file.as_posix())
     return written, tables
-
-
-def _closest(name: str, names: list[str]) -> str:
-    """What may have been meant, and all that there is."""
-    from difflib import get_close_matches
-
-    close = get_close_matches(name, names, n=1, cutoff=0.5)
-    return f"did you mean {close[0]}?" if close else f"use one of {', '.join(names)}"

@@ -108,8 +108,8 @@ def make_repository(
     path: str,
     config: Config,
     options: list[str],
-    url: str | None = None,
-    expected: dict[str, float] | None = None,
+    url: str | None,
+    expected: dict[str, float],
 ) -> int:
     """Run the workflow of a configuration and write its report; return the exit status of Snakemake.
 
@@ -124,9 +124,9 @@ def make_repository(
         The configuration in that file.
     options : list of str
         Options for Snakemake, such as `--cores 4` or `-n`.
-    url : str, optional
+    url : str or None
         Address in object storage to which everything is uploaded when it is committed.
-    expected : dict, optional
+    expected : dict
         Rule -> expected duration of one of its jobs, s.
     """
     from echotruth.workflow import lease
@@ -134,14 +134,13 @@ def make_repository(
     folder = Path("out") / config.name
     # Snakemake's own lock is that of the working folder, where other names may run; a repository has its lease.
     # Not at the end: --configfile takes all that follows, files to make too.
-    snakemake = [sys.executable, "-m", "snakemake", "--snakefile", str(WORKFLOW / "Snakefile")]
-    snakemake += ["--configfile", path, "--nolock"]
-    options = with_profiles(options)
+    command = [sys.executable, "-m", "snakemake", "--snakefile", str(WORKFLOW / "Snakefile")]
+    command += ["--configfile", path, "--nolock", *with_profiles(options)]
     if any(map(is_query, options)):
-        return subprocess.call([*snakemake, *options])
+        return subprocess.call(command)
     if url is None:
         with lease.held(folder) as name:
-            return _make(folder, config, snakemake, options, os.environ | {lease.VARIABLE: name}, expected or {})
+            return _make(folder, config, command, os.environ | {lease.VARIABLE: name}, expected)
     from echotruth.repository.remote import Remote, RemoteError
     from echotruth.workflow.uploading import uploading
 
@@ -150,18 +149,13 @@ def make_repository(
     except RemoteError as error:
         return fail(str(error))
     with lease.held(folder) as name, uploading(folder, remote) as upload:
-        status = _make(folder, config, snakemake, options, os.environ | {lease.VARIABLE: name}, expected or {})
+        status = _make(folder, config, command, os.environ | {lease.VARIABLE: name}, expected)
         not_uploaded = upload.finish()
     return status or not_uploaded
 
 
 def _make(
-    folder: Path,
-    config: Config,
-    snakemake: list[str],
-    options: list[str],
-    environment: dict[str, str],
-    expected: dict[str, float],
+    folder: Path, config: Config, command: list[str], environment: dict[str, str], expected: dict[str, float]
 ) -> int:
     """Make a repository and its report; return the exit status."""
     from echotruth.workflow.execution import execute
@@ -169,7 +163,6 @@ def _make(
     from echotruth.workflow.summary import Spent, finished, unfinished
 
     spent = Spent()
-    command = [*snakemake, *options]
     log = folder / "logs/snakemake.log"
     write_expected(folder / "logs", expected)
     if status := _remake(folder, config, command, environment):

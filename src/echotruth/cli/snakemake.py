@@ -69,12 +69,10 @@ def option_errors(options: list[str]) -> list[str]:
             remedy = f"is not a profile: give {' or '.join(PROFILES)}, or a folder that holds a config.yaml"
         else:
             continue
-        is_file = value.endswith((".yaml", ".yml"))
-        found.append(f"{flag} {value}: {remedy}{_ORDER if is_file else ''}")
+        if value.endswith((".yaml", ".yml")):
+            remedy += "; the file of the configuration comes before the options"
+        found.append(f"{flag} {value}: {remedy}")
     return found
-
-
-_ORDER = "; the file of the configuration comes before the options"
 
 
 def _is_profile(name: str) -> bool:

@@ -1,13 +1,17 @@
-"""Export of a repository to files that other programs read (docs/export.md): one module a format."""
+"""Export of a repository to files that other programs read (docs/export.md): one module a format.
+
+Its function `write` takes a clip, view or heart, the path of its file or folder, and the options of the format:
+`overlay` (what is drawn over the images), `rate` (frames per second) and `trackers` (their names).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Literal
 
 from echotruth.export.clip import Clip
@@ -62,14 +66,10 @@ class Format:
                 return missing_rf(clip)
         return unfinished(clip, "mechanics", *self.stages)
 
-    def writer(self) -> Callable[..., None]:
-        """Function that writes a clip, view or heart to a path."""
-        module = import_module(f"echotruth.export.{self.module}")
-        if self.holds == "view":
-            from echotruth.export.rf import write_hdf5
-
-            return partial(write_hdf5, module.write)
-        return module.write
+    @property
+    def writer(self) -> ModuleType:
+        """The module with its functions, which may need packages that others do not."""
+        return import_module(f"echotruth.export.{self.module}")
 
 
 FORMATS = {
@@ -101,7 +101,6 @@ class Export:
 
     Attributes
     ----------
-    source : Source
     format : str
         One of :data:`FORMATS`.
     overlay : sequence of {"wall", "segments", "displacement"}
@@ -158,44 +157,43 @@ class Export:
         if form.together:
             yield from self._write_together(clips)
             return
-        write = form.writer()
         options = {"overlay": self.overlay, "rate": self.rate or FRAME_RATE, "trackers": self.source.trackers}
         chosen = {name: options[name] for name in form.options}
         for clip, target in zip(clips, self._targets(clips), strict=True):
             with draft(target) as path, _told(clip):
-                write(replace(clip), path, **chosen)  # a copy, with which goes what was read
+                form.writer.write(replace(clip), path, **chosen)  # a copy, with which goes what was read
             yield target
-        folder = self._folder
-        if form.table and folder is not None and clips:
-            with draft(folder / form.table) as path, _told(clips[0]):
-                import_module(f"echotruth.export.{form.module}").write_summary(clips, path, self.source.trackers)
+        if form.table and clips and not self._is_file:
+            with draft(self._output / form.table) as path, _told(clips[0]):
+                form.writer.write_summary(clips, path, self.source.trackers)
 
     def _write_together(self, clips: Sequence[Clip]) -> Iterator[Path]:
         """Write one file of all clips, which has the name of the repository if it has no other, and give its path."""
-        form, folder = FORMATS[self.format], self._folder
+        form = FORMATS[self.format]
         name = f"{self.source.folder.resolve().name}{form.suffix}"
-        target = self.output if folder is None and self.output is not None else (folder or Path()) / name
+        target = self._output if self._is_file else self._output / name
         with draft(target) as path, _told(clips[0]):
-            import_module(f"echotruth.export.{form.module}").write_together(clips, path)
+            form.writer.write_together(clips, path)
         yield target
 
     @property
-    def _folder(self) -> Path | None:
-        """Folder of the files; None if `output` is the path of a single file."""
-        suffix = FORMATS[self.format].suffix
-        if self.output is not None and suffix and self.output.name.endswith(suffix) and not self.output.is_dir():
-            return None
+    def _output(self) -> Path:
+        """Folder of the files, or path of a single file."""
         return self.output or self.source.folder / "export" / self.format
 
+    @property
+    def _is_file(self) -> bool:
+        """Whether `output` is the path of a single file."""
+        suffix = FORMATS[self.format].suffix
+        return bool(suffix) and self._output.name.endswith(suffix) and not self._output.is_dir()
+
     def _targets(self, clips: Sequence[Clip]) -> list[Path]:
-        suffix, folder = FORMATS[self.format].suffix, self._folder
-        if folder is None and self.output is not None:
+        if self._is_file:
             if len(clips) > 1:
                 remedy = "give a folder, or choose one with --case, --view and --size"
                 raise ExportError(f"{self.output} is one file, but there are {len(clips)} to write: {remedy}")
-            return [self.output]
-        assert folder is not None
-        return [folder / f"{clip.name}{suffix}" for clip in clips]
+            return [self._output]
+        return [self._output / f"{clip.name}{FORMATS[self.format].suffix}" for clip in clips]
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -95,3 +96,19 @@ class Clip:
     def lateral(self) -> Floats:
         """Lateral coordinate of the pixel centres, (size,), m."""
         return pixel_centres(self.case.config.bmode, self.size)[1]
+
+    @property
+    def note(self) -> str:
+        """Scale, orientation and frame time as JSON, for the comment of a file whose format has no place for them."""
+        return json.dumps(
+            {
+                "case": self.case.id,
+                "view": self.view,
+                "spacing_m": self.spacing,
+                "frame_time_s": self.frame_time,
+                "first_pixel_lateral_m": float(self.lateral[0]),
+                "first_pixel_axial_m": float(self.axial[0]),
+                "synthetic": True,
+                "source": "echotruth",
+            }
+        )

@@ -110,7 +110,7 @@ def _pixels(image: Any, clip: Clip) -> None:
     image.HighBit, image.PixelRepresentation = 7, 0
     image.Rows, image.Columns, image.NumberOfFrames = rows, columns, frames
     image.FrameIncrementPointer = 0x00181063
-    image.FrameTime = _decimal(MS * clip.frame_time)
+    image.FrameTime = f"{MS * clip.frame_time:.10g}"  # at most 16 characters, as the format has it
     image.HeartRate = round(60 / (frames * clip.frame_time))
     image.add_new(0x7FE00010, "OB", clip.image.tobytes() + b"\0" * (clip.image.size % 2))
 
@@ -142,8 +142,3 @@ def _uid(*parts: bytes | str) -> str:
     number = bytearray(digest.digest()[:16])
     number[6], number[8] = 0x80 | number[6] & 0x0F, 0x80 | number[8] & 0x3F
     return f"2.25.{UUID(bytes=bytes(number)).int}"
-
-
-def _decimal(value: float) -> str:
-    """Decimal of at most 16 characters, as the format has it."""
-    return f"{value:.10g}"

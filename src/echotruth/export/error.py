@@ -13,22 +13,10 @@ class ExportError(ValueError):
     """Raised if something cannot be exported; the message says why, and what to do."""
 
 
-def optional(package: str, module: str = "") -> Any:
-    """Import an optional package.
-
-    Parameters
-    ----------
-    package : str
-    module : str, optional
-        Module of the package to return. Default: the package itself.
-
-    Raises
-    ------
-    ExportError
-        If it is not installed.
-    """
+def optional(package: str) -> Any:
+    """Import an optional package, or raise an :class:`ExportError` that says how to install it."""
     try:
-        return import_module(module or package)
+        return import_module(package)
     except ImportError:
         extra = "clinical" if package in CLINICAL else "export"
         raise ExportError(f"needs the package {package}: pip install 'echotruth[{extra}]'") from None

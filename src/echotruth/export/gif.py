@@ -11,7 +11,6 @@ from PIL import Image
 
 from echotruth.export.clip import Clip
 from echotruth.export.error import ExportError
-from echotruth.export.note import note
 from echotruth.export.overlay import pictures
 
 MAX_RATE = 50
@@ -46,7 +45,7 @@ def write(clip: Clip, path: Path, overlay: Sequence[str], rate: float) -> None:
         duration=duration,
         loop=0,
         optimize=False,
-        comment=note(clip).encode(),
+        comment=clip.note.encode(),
     )
 
 

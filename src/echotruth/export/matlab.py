@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from echotruth.evaluation import kept
 from echotruth.export.clip import Clip
 from echotruth.export.error import ExportError
-from echotruth.export.tracked import tracked
 
 HEADER = b"MATLAB 5.0 MAT-file, written by echotruth".ljust(116)
 """In place of the one that holds the date, so that the bytes are the same twice."""
@@ -52,17 +54,14 @@ def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
     values["vectors"] = np.array(["lateral", "axial", "elevation"], object)
     values["strain_components"] = np.array(["RR", "CC", "LL", "RC", "RL", "CL"], object)
     grid = {f"{name}_m": truth[f"grid_{name}"].values for name in ("axial", "lateral")}
-    values["tracked"] = grid | _tracked(clip, trackers)
+    values["tracked"] = grid | {tracker: {"displacement": _displacement(clip, tracker)} for tracker in trackers}
     with path.open("wb") as file:
         savemat(file, {"clip": values}, long_field_names=True, do_compression=True, oned_as="column")
         file.seek(0)
         file.write(HEADER)
 
 
-def _tracked(clip: Clip, trackers: Sequence[str]) -> dict[str, object]:
-    """Displacement since end-diastole by each tracker, (axial, lateral, 2, frame), m."""
-    found: dict[str, object] = {}
-    for tracker in trackers:
-        displacement = tracked(clip, "tracking", "displacement", tracker)
-        found[tracker] = {"displacement": np.moveaxis(displacement, 0, -1)}
-    return found
+def _displacement(clip: Clip, tracker: str) -> NDArray[Any]:
+    """Displacement since end-diastole by a tracker, (axial, lateral, 2, frame), m."""
+    found = kept.read(clip.job, "tracking", "displacement", tracker=tracker, size=clip.size)["displacement"]
+    return np.moveaxis(found, 0, -1)

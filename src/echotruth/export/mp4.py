@@ -11,7 +11,6 @@ import numpy as np
 
 from echotruth.export.clip import Clip
 from echotruth.export.error import ExportError
-from echotruth.export.note import note
 from echotruth.export.overlay import pictures
 
 QUALITY = "12"
@@ -53,7 +52,7 @@ def write(clip: Clip, path: Path, overlay: Sequence[str], rate: float) -> None:
         macro_block_size=2,
         ffmpeg_log_level="quiet",
         # One thread and no version of the program: the same bytes twice.
-        output_params=["-crf", QUALITY, "-threads", "1", "-fflags", "+bitexact", "-metadata", f"comment={note(clip)}"],
+        output_params=["-crf", QUALITY, "-threads", "1", "-fflags", "+bitexact", "-metadata", f"comment={clip.note}"],
     )
     video.send(None)
     with suppress(OSError):  # of a pipe to a process that has ended, in many lines

@@ -9,7 +9,6 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from echotruth.export.clip import Clip
-from echotruth.export.note import note
 from echotruth.export.overlay import pictures
 
 INCH = 0.0254
@@ -31,6 +30,6 @@ def write(clip: Clip, path: Path, overlay: Sequence[str]) -> None:
     """
     path.mkdir()
     about, dpi = PngInfo(), INCH / clip.spacing
-    about.add_text("Comment", note(clip))
+    about.add_text("Comment", clip.note)
     for number, frame in enumerate(pictures(clip, overlay)):
         Image.fromarray(frame).save(path / f"frame_{number:03d}.png", pnginfo=about, dpi=(dpi, dpi))

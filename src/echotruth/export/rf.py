@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 import zarr
 from numpy.typing import NDArray
 
 from echotruth.export.clip import Clip
-from echotruth.export.error import optional
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,23 +50,3 @@ def missing_rf(clip: Clip) -> str:
             f"{clip.case.id} has no RF of {clip.view} in {store.path}: see cases/reason for why, or run it to its end"
         )
     return ""
-
-
-def write_hdf5(layout: Callable[[Any, xr.Dataset], None], clip: Clip, path: Path) -> None:
-    """Write an HDF5 file in one of the layouts.
-
-    Parameters
-    ----------
-    layout : callable
-        Writes the RF (a Dataset) to an open file.
-    clip : Clip
-        The view.
-    path : Path
-
-    Raises
-    ------
-    ExportError
-        If h5py is not installed.
-    """
-    with optional("h5py").File(path, "w") as hdf5:
-        layout(hdf5, open_rf(clip))

@@ -9,13 +9,15 @@ Rodriguez-Molares et al., The UltraSound ToolBox, IEEE Int Ultrason Symp 2017.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from echotruth.export.clip import Clip
 from echotruth.export.error import optional
-from echotruth.export.rf import sample_positions, scaled_channels
+from echotruth.export.rf import open_rf, sample_positions, scaled_channels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,20 +29,16 @@ SPHERICAL = 1
 """`uff.wavefront.spherical`"""
 
 
-def write(file: Any, rf: xr.Dataset) -> None:
-    """Write `channel_data` and `beamformed_data`, whichever is stored.
-
-    Parameters
-    ----------
-    file : h5py.File
-    rf : Dataset
-        The group `rf` of one case and view.
-    """
-    file.attrs["version"] = np.array([VERSION], optional("h5py").string_dtype())
-    if "channels" in rf:
-        _channel_data(_object(file, "channel_data", "uff.channel_data"), rf)
-    if "lines" in rf:
-        _beamformed_data(_object(file, "beamformed_data", "uff.beamformed_data"), rf)
+def write(clip: Clip, path: Path) -> None:
+    """Write `channel_data` and `beamformed_data` of a view, whichever is stored."""
+    h5py = optional("h5py")
+    with h5py.File(path, "w") as file:
+        rf = open_rf(clip)
+        file.attrs["version"] = np.array([VERSION], h5py.string_dtype())
+        if "channels" in rf:
+            _channel_data(_object(file, "channel_data", "uff.channel_data"), rf)
+        if "lines" in rf:
+            _beamformed_data(_object(file, "beamformed_data", "uff.beamformed_data"), rf)
 
 
 def _channel_data(group: Any, rf: xr.Dataset) -> None:

@@ -5,12 +5,15 @@ A track holds the data (frames first) and the scan (the transmits), all in 32 bi
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from echotruth.export.rf import sample_positions, scaled_channels
+from echotruth.export.clip import Clip
+from echotruth.export.error import optional
+from echotruth.export.rf import open_rf, sample_positions, scaled_channels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,24 +25,20 @@ SOURCE_DISTANCE = 1e-6
 """Distance of the virtual source of a wave behind its element, m: 0 would mean a plane wave."""
 
 
-def write(file: Any, rf: xr.Dataset) -> None:
-    """Write channels as `raw_data` and lines as `beamformed_data`, whichever is stored.
-
-    Parameters
-    ----------
-    file : h5py.File
-    rf : Dataset
-        The group `rf` of one case and view.
-    """
-    file.attrs.update({"zea_version": VERSION, "us_machine": "echotruth", "description": "Simulated echocardiogram"})
-    _probe(file.create_group("probe"), rf)
-    track = file.create_group("tracks/track_0")
-    data = track.create_group("data")
-    if "channels" in rf:
-        _raw(data, rf)
-        _scan(track.create_group("scan"), rf)
-    if "lines" in rf:
-        _beamformed(data.create_group("beamformed_data"), rf)
+def write(clip: Clip, path: Path) -> None:
+    """Write channels as `raw_data` and lines as `beamformed_data` of a view, whichever is stored."""
+    with optional("h5py").File(path, "w") as file:
+        rf = open_rf(clip)
+        about = {"zea_version": VERSION, "us_machine": "echotruth", "description": "Simulated echocardiogram"}
+        file.attrs.update(about)
+        _probe(file.create_group("probe"), rf)
+        track = file.create_group("tracks/track_0")
+        data = track.create_group("data")
+        if "channels" in rf:
+            _raw(data, rf)
+            _scan(track.create_group("scan"), rf)
+        if "lines" in rf:
+            _beamformed(data.create_group("beamformed_data"), rf)
 
 
 def _probe(group: Any, rf: xr.Dataset) -> None:

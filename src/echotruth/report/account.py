@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -42,7 +41,7 @@ def lead(config: Config) -> str:
     species = config.geometry.file or config.geometry.preset
     return (
         f"B-mode clips with the true motion of every pixel of the wall ({species}; {motion}), "
-        f"and {_counted(len(config.tracking.trackers), 'tracker', 'trackers')} scored against it."
+        f"and {counted(len(config.tracking.trackers), 'tracker', 'trackers')} scored against it."
     )
 
 
@@ -54,11 +53,11 @@ def numbers(tree: xr.DataTree, folder: Path, config: Config) -> list[tuple[str, 
     count, frames, sizes = int(imaged.sum()), config.loop.frames, config.bmode.sizes
     clips = count * len(config.views) * len(sizes)
     found = [
-        (_imaged(count, present), _spaced(count)),
-        ("view a heart" if len(config.views) == 1 else "views a heart", _spaced(len(config.views))),
-        ("clips", _spaced(clips)),
-        ("frames", _spaced(clips * frames)),
-        ("trackers", _spaced(len(config.tracking.trackers))),
+        (_imaged(count, present), spaced(count)),
+        ("view a heart" if len(config.views) == 1 else "views a heart", spaced(len(config.views))),
+        ("clips", spaced(clips)),
+        ("frames", spaced(clips * frames)),
+        ("trackers", spaced(len(config.tracking.trackers))),
     ]
     size = _size_on_disk(folder / f"{config.name}.zarr")
     return [*found, *([("in the store", _bytes(size))] if size else [])]
@@ -67,7 +66,7 @@ def numbers(tree: xr.DataTree, folder: Path, config: Config) -> list[tuple[str, 
 def _imaged(count: int, present: int) -> str:
     """What the number of hearts that were imaged is called."""
     if count < present:
-        return f"of {_spaced(present)} hearts imaged"
+        return f"of {spaced(present)} hearts imaged"
     return "heart" if count == 1 else "hearts"
 
 
@@ -82,7 +81,7 @@ def facts(config: Config) -> list[tuple[str, str]]:
         ("Views", views),
         ("Images", f"{sizes} px, {config.bmode.field_of_view_mm:g} mm, {config.loop.frames} frames a cycle"),
         ("Array", f"{probe.elements} elements, {probe.frequency_MHz:g} MHz, pitch {probe.pitch_um:g} µm"),
-        ("Wall", f"{_counted(config.fibres.layers, 'layer', 'layers')}, 17 AHA segments"),
+        ("Wall", f"{counted(config.fibres.layers, 'layer', 'layers')}, 17 AHA segments"),
         ("Trackers", ", ".join(config.tracking.trackers)),
         ("Diagnosis", diagnosis(config).replace("_", " ").replace("+", " + ") + " (of the configuration itself)"),
     ]
@@ -124,18 +123,8 @@ def provenance(tree: xr.DataTree, config: Config) -> list[tuple[str, str]]:
     ]
 
 
-@dataclass(frozen=True)
-class Stage:
-    """Jobs of a stage: their number, CPU time in words, and version of the code."""
-
-    name: str
-    jobs: str
-    cpu: str
-    code: str
-
-
-def stages(folder: Path) -> list[Stage]:
-    """What every stage took, from the ledger."""
+def stages(folder: Path) -> list[dict[str, str]]:
+    """What every stage took, from the ledger: its name, number of jobs, CPU time in words and version of the code."""
     found = []
     for name in (*GATES, *VIEW_STAGES):
         paths = sorted((folder / "ledger" / name).glob("**/[!.]*.json"))
@@ -143,7 +132,8 @@ def stages(folder: Path) -> list[Stage]:
             sample = [_record(path) for path in paths[:: -(-len(paths) // SAMPLE)]]
             seconds = sum(float(record.get("cpu_seconds", 0)) for record in sample) / len(sample) * len(paths)
             codes = sorted({str(record.get("code", "")) for record in sample})
-            found.append(Stage(name, _spaced(len(paths)), _duration(seconds), ", ".join(codes)))
+            took = {"jobs": spaced(len(paths)), "cpu": _duration(seconds), "code": ", ".join(codes)}
+            found.append({"name": name} | took)
     return found
 
 
@@ -189,9 +179,11 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
-def _spaced(number: int) -> str:
+def spaced(number: int) -> str:
+    """A whole number with spaces between its thousands."""
     return f"{number:,}".replace(",", " ")
 
 
-def _counted(number: int, one: str, many: str) -> str:
-    return f"{_spaced(number)} {one if number == 1 else many}"
+def counted(number: int, one: str, many: str) -> str:
+    """A number with the word for one thing, or for many."""
+    return f"{spaced(number)} {one if number == 1 else many}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,49 +23,7 @@ COLUMNS = {
 """Metric -> heading and decimals; a metric that no tracker has is left out."""
 
 
-@dataclass(frozen=True)
-class Column:
-    """Column of the table: name of the metric, and heading."""
-
-    name: str
-    label: str
-
-
-@dataclass(frozen=True)
-class Row:
-    """One tracker: its rank, its metrics in words, and the number of clips on which it failed."""
-
-    rank: str
-    tracker: str
-    cells: list[str]
-    failures: int
-
-
-@dataclass(frozen=True)
-class Board:
-    """The table.
-
-    Attributes
-    ----------
-    size : int
-        Of the images, px.
-    columns : list of Column
-    rows : list of Row
-        The best tracker first.
-    sentence : str
-        Who is first.
-    interval : str
-        What the intervals in the figure are.
-    """
-
-    size: int
-    columns: list[Column]
-    rows: list[Row]
-    sentence: str
-    interval: str
-
-
-def of(standings: pd.DataFrame, size: int, cases: int) -> Board:
+def of(standings: pd.DataFrame, size: int, cases: int) -> dict[str, Any]:
     """The table at one image size, over all views.
 
     Parameters
@@ -79,28 +37,29 @@ def of(standings: pd.DataFrame, size: int, cases: int) -> Board:
 
     Returns
     -------
-    Board
+    dict
+        `size`; `columns`, name and heading of each metric; `rows`, the best tracker first; `sentence`, who is first;
+        `interval`, what the intervals in the figure are.
     """
     table = standings[(standings["view"] == ALL_VIEWS) & (standings["size_px"] == size)]
     table = table.sort_values("rank", kind="stable", na_position="last")
     metrics = [name for name in COLUMNS if name in table and table[name].notna().any()]
-    rows = [
-        Row(
-            _rank(entry),
-            str(entry["tracker"]),
-            [_cell(entry, name) for name in metrics],
-            int(entry["failures"]),
-        )
-        for entry in table.to_dict("records")
-    ]
     hearts = int(table["hearts"].max())
     of_cases = f" (label.heart) of the {cases} cases" if hearts < cases else ""
-    interval = (
-        "With a single heart there are no intervals."
-        if hearts < 2
-        else f"Bars are 95 % intervals of a bootstrap over the {hearts} hearts{of_cases}."
-    )
-    return Board(size, [Column(name, COLUMNS[name][0]) for name in metrics], rows, _sentence(table, hearts), interval)
+    bootstrap = f"Bars are 95 % intervals of a bootstrap over the {hearts} hearts{of_cases}."
+    return {
+        "size": size,
+        "columns": [{"name": name, "label": COLUMNS[name][0]} for name in metrics],
+        "rows": [_row(entry, metrics) for entry in table.to_dict("records")],
+        "sentence": _sentence(table, hearts),
+        "interval": "With a single heart there are no intervals." if hearts < 2 else bootstrap,
+    }
+
+
+def _row(entry: dict, metrics: list[str]) -> dict[str, Any]:
+    """One tracker: its rank, its metrics in words, and the number of clips on which it failed."""
+    cells = [_cell(entry, name) for name in metrics]
+    return {"rank": _rank(entry), "tracker": entry["tracker"], "cells": cells, "failures": int(entry["failures"])}
 
 
 def _rank(entry: dict) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import TwoSlopeNorm
-from matplotlib.figure import SubFigure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Patch, Wedge
 
 from echotruth.aha import BULLSEYE
@@ -52,29 +51,15 @@ class Segments:
 
 
 @style.styled
-def draw(path: str | Path, quantities: Sequence[Segments], tracker: str) -> Path:
-    """Draw a row of three bullseyes for each quantity: true, tracked, and their difference.
-
-    Parameters
-    ----------
-    path : str or Path
-        File to write.
-    quantities : sequence of Segments
-    tracker : str
-        Name of the tracker.
-
-    Returns
-    -------
-    Path
-        The file.
-    """
+def draw(quantities: Sequence[Segments], tracker: str) -> Figure:
+    """Draw a row of three bullseyes for each quantity: true, tracked by the tracker named, and their difference."""
     figure = style.figure(9.6, 0.35 + 3.45 * len(quantities))
     rows = figure.subfigures(len(quantities) + 1, 1, squeeze=False, height_ratios=[*[3.45] * len(quantities), 0.35])
     for row, segments in zip(rows[:, 0], quantities, strict=False):
         _row(row, segments, tracker)
     hatched = Patch(linewidth=0.6, label="no view of this kind shows the segment", **UNSEEN)
     rows[-1, 0].legend(handles=[hatched], loc="center", fontsize=8.5, labelcolor=style.MUTED)
-    return style.save(figure, path)
+    return figure
 
 
 def _row(figure: SubFigure, segments: Segments, tracker: str) -> None:
@@ -121,18 +106,13 @@ def disc(axes: Axes, values: np.ndarray, scale: TwoSlopeNorm, decimals: int = 0)
             axes.text(
                 radius * np.cos(angle),
                 radius * np.sin(angle),
-                _number(float(value), decimals),
+                f"{float(value):z.{decimals}f}".replace("-", "−"),
                 ha="center",
                 va="center",
                 fontsize=7,
                 color=style.ON_IMAGE if is_dark else ON_LIGHT,
             )
     _names(axes)
-
-
-def _number(value: float, decimals: int) -> str:
-    rounded = round(value, decimals) + 0.0  # not -0
-    return f"{rounded:.{decimals}f}".replace("-", "−")
 
 
 def _names(axes: Axes) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
@@ -29,36 +28,25 @@ COLUMNS = 8
 """Frames in a row of the picture."""
 
 
-@dataclass(frozen=True)
-class Truth:
-    """What is drawn over a clip.
-
-    Attributes
-    ----------
-    path : ndarray of shape (frame, point, 2)
-        True positions of points of the wall: lateral, axial, px of the clip.
-    strain : ndarray of shape (frame, point)
-        True strain of the tissue at these points.
-    chosen : ndarray of int
-        The points whose motion is drawn.
-    tracked : ndarray of shape (frame, chosen point, 2) or None
-        Where a tracker finds the chosen points, px of the clip; NaN where it lost them.
-    """
-
-    path: NDArray[np.float64]
-    strain: NDArray[np.float64]
-    chosen: NDArray[np.int_]
-    tracked: NDArray[np.float64] | None
-
-
-def cine(clip: ClipWithMotion, truth: Truth, clips: int) -> dict[str, Any]:
+def cine(
+    clip: ClipWithMotion,
+    strain: NDArray[np.float64],
+    chosen: NDArray[np.int_],
+    tracked: NDArray[np.float64],
+    clips: int,
+) -> dict[str, Any]:
     """One clip for the player of the page.
 
     Parameters
     ----------
     clip : ClipWithMotion
         It determines the part of the image that is shown.
-    truth : Truth
+    strain : ndarray of shape (frame, point)
+        True strain of the tissue at its points.
+    chosen : ndarray of int
+        The points whose motion is drawn.
+    tracked : ndarray of shape (frame, chosen point, 2)
+        Where a tracker finds the chosen points: lateral, axial, px of the clip; NaN where it lost them.
     clips : int
         Number of clips on the page, which share its size.
 
@@ -85,24 +73,24 @@ def cine(clip: ClipWithMotion, truth: Truth, clips: int) -> dict[str, Any]:
     pixel = clip.spacing / factor
     bar = round_length(side * pixel)
     return {
-        "sheet": "data:image/jpeg;base64," + b64encode(_sheet(tissue, size)).decode(),
+        "sheet": jpeg_address(_sheet(tissue, size)),
         "width": size[0],
         "height": size[1],
         "columns": COLUMNS,
         "frames": count,
         "time_ms": [round(1e3 * float(time), 3) for time in clip.time],
-        "points": truth.path.shape[1],
-        "radius": round(0.62 * factor * _spacing(truth.path[0]), 2),
-        "path": placed(truth.path),
-        "strain": _integers(100 * truth.strain, np.int8),
-        "chosen": [int(index) for index in truth.chosen],
-        "tracked": None if truth.tracked is None else placed(truth.tracked),
+        "points": clip.path.shape[1],
+        "radius": round(0.62 * factor * _spacing(clip.path[0]), 2),
+        "path": placed(clip.path),
+        "strain": _integers(100 * strain, np.int8),
+        "chosen": [int(index) for index in chosen],
+        "tracked": placed(tracked),
         "bar_px": round(bar / pixel, 2),
         "bar": f"{1e3 * bar:g} mm",
     }
 
 
-def _sheet(frames: NDArray[np.uint8], size: tuple[int, int]) -> bytes:
+def _sheet(frames: NDArray[np.uint8], size: tuple[int, int]) -> Image.Image:
     """All frames in one picture, row by row."""
     width, height = size
     rows = -(-len(frames) // COLUMNS)
@@ -110,14 +98,14 @@ def _sheet(frames: NDArray[np.uint8], size: tuple[int, int]) -> bytes:
     for number, frame in enumerate(frames):
         picture = Image.fromarray(frame).resize(size, Image.Resampling.LANCZOS)
         sheet.paste(picture, (number % COLUMNS * width, number // COLUMNS * height))
-    return jpeg(sheet)
+    return sheet
 
 
-def jpeg(picture: Image.Image) -> bytes:
-    """A grey picture as JPEG."""
+def jpeg_address(picture: Image.Image) -> str:
+    """A grey picture as JPEG, as an address that holds its data."""
     file = BytesIO()
     picture.save(file, "JPEG", quality=QUALITY, optimize=True)
-    return file.getvalue()
+    return "data:image/jpeg;base64," + b64encode(file.getvalue()).decode()
 
 
 def _integers(values: NDArray[np.float64], kind: type[np.signedinteger[Any]]) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from echotruth.evaluation import kept
 from echotruth.report import style
-from echotruth.report.cine import STEPS_PER_PIXEL, Truth, cine
+from echotruth.report.cine import STEPS_PER_PIXEL, cine
 from echotruth.report.clip import ClipWithMotion, thin
 from echotruth.report.comparison import LINE, Comparison
 from echotruth.workflow.job import Job
@@ -80,10 +80,10 @@ def _clip(tree: xr.DataTree, comparison: Comparison, view: str, count: int) -> d
     spacing = ARROW_SPACING * job.case.config.bmode.si().field_of_view
     chosen = thin(clip.position, spacing / clip.spacing)
     tracked = _tracked(job, best, size, inside, clip)[:, chosen]
-    truth = Truth(clip.path, _strain(tree, case, view, inside), chosen, tracked)
+    shown = cine(clip, _strain(tree, case, view, inside), chosen, tracked, count)
     es = int(tree["mechanics"].to_dataset().es_frame.sel(case=case))
     further = {"es": es, "steps": STEPS_PER_PIXEL, "strain_limit": STRAIN_LIMIT}
-    return cine(clip, truth, count) | further | {"course": _course(comparison.curves[view][best])}
+    return shown | further | {"course": _course(comparison.curves[view][best])}
 
 
 def _tracked(job: Job, tracker: str, size: int, inside: NDArray[np.bool_], clip: ClipWithMotion) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from echotruth.cases import Case
@@ -160,10 +161,7 @@ class Comparison:
             data = self.curves[view][tracker]
             strain = data[f"{name}_segment_strain"].sel(measure="engineering", wall_component=component)
             columns.append(PERCENT * strain.isel(frame=int(data.attrs["es_frame"])).values)
-        values = np.array(columns, float)
-        known = np.isfinite(values)
-        total = np.where(known, values, 0.0).sum(0)
-        return np.where(known.any(0), total / np.maximum(known.sum(0), 1), np.nan)
+        return pd.DataFrame(np.array(columns, float)).mean().to_numpy()  # of those that are known
 
     def _time(self, view: str) -> tuple[NDArray[np.float64], float]:
         """Time since end-diastole and that of end-systole, ms."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,13 +27,8 @@ class Panel:
 
     Attributes
     ----------
-    title : str
-    unit : str
-        As "%".
-    time : ndarray of shape (frame,)
+    time, end_systole : ndarray of shape (frame,), and float
         Since end-diastole, ms.
-    end_systole : float
-        ms.
     true : ndarray of shape (frame,)
     tracked : dict of ndarray of shape (frame,)
         Tracker -> its curve, the best tracker first; NaN where it has none.
@@ -49,21 +43,8 @@ class Panel:
 
 
 @style.styled
-def draw(path: str | Path, rows: Sequence[Sequence[Panel | None]]) -> Path:
-    """Draw panels in rows.
-
-    Parameters
-    ----------
-    path : str or Path
-        File to write.
-    rows : sequence of sequence of Panel or None
-        All of one length; None leaves a place empty.
-
-    Returns
-    -------
-    Path
-        The file.
-    """
+def draw(rows: Sequence[Sequence[Panel | None]]) -> Figure:
+    """Draw panels in rows, all of one length; None leaves a place empty."""
     columns = max(map(len, rows))
     figure = style.figure(max(2.45 * columns + 0.3, 5.2), 2.15 * len(rows) + 0.5)
     grid = figure.subplots(len(rows), columns, squeeze=False, sharex=False)
@@ -76,7 +57,7 @@ def draw(path: str | Path, rows: Sequence[Sequence[Panel | None]]) -> Path:
         axes.set_xlabel("Time since ED (ms)")
     trackers = list(dict.fromkeys(name for row in rows for panel in row if panel for name in panel.tracked))
     _legend(figure, trackers)
-    return style.save(figure, path)
+    return figure
 
 
 def _panel(axes: Axes, panel: Panel) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -20,23 +19,16 @@ Errors = Mapping[str, Mapping[str, Mapping[int, np.ndarray]]]
 
 
 @style.styled
-def draw(path: str | Path, errors: Errors, longitudinal: Collection[str] = ()) -> Path:
+def draw(errors: Errors, longitudinal: Collection[str] = ()) -> Figure:
     """Draw the error by layer, one panel per view, on a logarithmic axis, on which good and bad trackers can be told.
 
     Parameters
     ----------
-    path : str or Path
-        File to write.
     errors : mapping of view to mapping of tracker to mapping of image size to ndarray of shape (layer,)
         RMS error of circumferential (long axis: longitudinal) displacement at end-systole of one or two trackers, m,
         the endocardium first; NaN where unknown.
     longitudinal : collection of str
         Long-axis views, for which the component is longitudinal.
-
-    Returns
-    -------
-    Path
-        The file.
     """
     figure = style.figure(2.5 * len(errors) + 0.9, 3.9)
     panels = figure.subplots(1, len(errors), sharey=True, squeeze=False)[0]
@@ -52,7 +44,7 @@ def draw(path: str | Path, errors: Errors, longitudinal: Collection[str] = ()) -
     drawn = [np.asarray(values) for trackers in errors.values() for of in trackers.values() for values in of.values()]
     style.plain_logarithmic(panels[0], "y", 1e6 * np.concatenate(drawn))
     _legend(figure, next(iter(errors.values())))
-    return style.save(figure, path)
+    return figure
 
 
 def _curve(axes: Axes, values: np.ndarray, appearance: dict[str, Any]) -> None:
@@ -63,13 +55,8 @@ def _curve(axes: Axes, values: np.ndarray, appearance: dict[str, Any]) -> None:
 
 
 def _legend(figure: Figure, trackers: Mapping[str, Mapping[int, np.ndarray]]) -> None:
-    sizes = next(iter(trackers.values()))
-    marks = [
-        Line2D([], [], color=colour, marker=marker, ls="none", label=f"{size} × {size} px")
-        for (colour, marker), size in zip(style.SIZES, sizes, strict=False)
-    ]
     lines = [
         Line2D([], [], color=style.MUTED, ls=line, marker="D", markersize=5, fillstyle=fill, linewidth=1.2, label=name)
         for (line, fill), name in zip(TRACKERS, trackers, strict=False)
     ]
-    style.legend_below(figure, [*marks, *lines])
+    style.legend_below(figure, [*style.size_handles(next(iter(trackers.values()))), *lines])

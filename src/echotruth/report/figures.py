@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -34,6 +36,7 @@ from echotruth.report import (
     style,
     views,
 )
+from echotruth.report.clips import with_motion
 from echotruth.report.comparison import Comparison
 from echotruth.report.hearts import diagnoses, measures
 from echotruth.repository.unpacking import unpack
@@ -86,6 +89,11 @@ def shown_hearts(tree: xr.DataTree, config: Config) -> NDArray[np.int_]:
     return complete
 
 
+def main_view(config: Config) -> str:
+    """The view that is shown where only one can be: the mid one, or the first."""
+    return "mid" if "mid" in config.views else next(iter(config.views))
+
+
 class Figures:
     """Figures of one repository; the first complete heart is shown where only one can be.
 
@@ -104,7 +112,7 @@ class Figures:
         self.config, self.folder = config, folder
         self.complete = shown_hearts(self.tree, config)
         self.sizes = config.bmode.sizes
-        self.view = next((name for name, view in config.views.items() if name == "mid"), next(iter(config.views)))
+        self.view = main_view(config)
 
     def draw(self, part: str) -> None:
         """Draw the figures of a part of `PARTS`; `motion` also writes the leaderboard as a table.
@@ -113,10 +121,9 @@ class Figures:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         for name in PARTS[part]:
-            if len(self.complete):
-                getattr(self, name)()
-            else:
-                style.sentence(self.folder / name, NONE_COMPLETE)
+            figure = getattr(self, name)() if len(self.complete) else style.sentence(NONE_COMPLETE)
+            if figure is not None:
+                style.save(figure, self.folder / name)
         if not len(self.complete):
             self._without_hearts(part)
 
@@ -139,7 +146,7 @@ class Figures:
         """Frame of end-systole."""
         return int(self.group("mechanics").es_frame)
 
-    def heart(self) -> None:
+    def heart(self) -> Figure:
         """The heart in space, unloaded, at end-diastole and end-systole."""
         groups = ("geometry", "fibres", "pathology", "mechanics")
         arrays = {name: {str(key): array.values for key, array in self.group(name).items()} for name in groups}
@@ -150,22 +157,22 @@ class Figures:
             carried = np.einsum("cij,cj->ci", kinematics["deformation_gradient"][number], fibre)  # F f
             circumferential = kinematics["strain_unloaded"][number, :, CC]
             states.append(heart.State(name, solved.positions(frames[number]), carried, circumferential))
-        heart.draw(self.folder / "heart", solved.cells, fibre_angles(solved)["helix_angle"], states)
+        return heart.draw(solved.cells, fibre_angles(solved)["helix_angle"], states)
 
-    def loop(self) -> None:
+    def loop(self) -> Figure:
         """The target and the solved loop, and the active tension."""
         data = self.group("mechanics")
         solved = np.stack([data.pressure, data.volume])
         target = np.stack([data.pressure_target, data.volume_target])
-        loop.draw(self.folder / "loop", data.time.values, self.es, data.active_tension.values, solved, target)
+        return loop.draw(data.time.values, self.es, data.active_tension.values, solved, target)
 
-    def strain(self) -> None:
+    def strain(self) -> Figure:
         """Strain over the cycle."""
         data = self.group("kinematics")
         arrays = (data[name].values for name in ("strain_mean", "strain_sd", "layer_strain"))
-        strain.draw(self.folder / "strain", data.time.values, self.es, *arrays)
+        return strain.draw(data.time.values, self.es, *arrays)
 
-    def physiology(self) -> None:
+    def physiology(self) -> Figure:
         """Rotation, strain, axial motion, pressure and volume over the cycle."""
         mechanics, kinematics = map(self.group, ("mechanics", "kinematics"))
         measures = unpack(self.group("physiology"))
@@ -182,35 +189,28 @@ class Figures:
         )
         geometry, loop = self.config.geometry, self.config.loop
         species = loop.file if geometry.file else geometry.preset
-        physiology.draw(self.folder / "physiology", cycle, physiology.PUBLISHED.get(species, {}))
+        return physiology.draw(cycle, physiology.PUBLISHED.get(species, {}))
 
-    def population(self) -> None:
+    def population(self) -> Figure:
         """Measures of all hearts by their diagnosis."""
         found = measures(self.tree, self.complete)
-        population.draw(self.folder / "population", found, diagnoses(self.tree)[self.complete])
+        return population.draw(found, diagnoses(self.tree)[self.complete])
 
     def clip(self) -> None:
         """The clip with its true motion, as a GIF and as a video."""
-        size = self.sizes[0]
-        images = self.group(f"bmode/{size}").sel(view=self.view)
-        truth = self.group("evaluation").true_displacement.sel(view=self.view, vector=["lateral", "axial"])
-        motion = truth.stack(point=("axial", "lateral")).transpose("frame", "point", "vector")
-        motion = motion.isel(point=np.isfinite(motion.isel(frame=0, vector=0).values))
-        spacing = float(images.lateral[1] - images.lateral[0])
-        points = np.column_stack([motion.lateral - images.lateral[0], motion.axial - images.axial[0]]) / spacing
-        chosen = clip.thin(points, ARROW_SPACING / spacing)
-        overlaid = clip.ClipWithMotion(
-            images.image.values, spacing, images.time.values, points[chosen], motion.isel(point=chosen).values
-        )
+        case = str(self.tree["cases"].case.values[self.complete[0]])
+        moving, _ = with_motion(self.tree, case, self.view, self.sizes[0])
+        chosen = clip.thin(moving.position, ARROW_SPACING / moving.spacing)
+        overlaid = replace(moving, position=moving.position[chosen], displacement=moving.displacement[:, chosen])
         clip.gif(self.folder / "clip.gif", clip.render(overlaid, 400))
         clip.mp4(self.folder / "clip.mp4", clip.render(overlaid, 720))
 
-    def resolutions(self) -> None:
+    def resolutions(self) -> Figure:
         """One frame at every image size."""
         frames = [self.group(f"bmode/{size}").image.sel(view=self.view).isel(frame=0).values for size in self.sizes]
-        resolutions.draw(self.folder / "resolutions", frames, self.config.bmode.si().field_of_view)
+        return resolutions.draw(frames, self.config.bmode.si().field_of_view)
 
-    def views(self) -> None:
+    def views(self) -> Figure:
         """Every view at end-diastole and end-systole."""
         images, truth = (self.group(f"{stage}/{self.sizes[0]}") for stage in ("bmode", "truth"))
         layer = truth["labels"].sel(label="layer")
@@ -221,7 +221,7 @@ class Figures:
             ]
             for view in self.config.views
         }
-        views.draw(self.folder / "views", pictures, self.config.bmode.si().field_of_view)
+        return views.draw(pictures, self.config.bmode.si().field_of_view)
 
     @cached_property
     def standings(self) -> pd.DataFrame:
@@ -243,25 +243,25 @@ class Figures:
         case = find_case(self.config, str(self.tree["cases"].case.values[self.complete[0]]))
         return Comparison(self.folder.parent, case, tuple(self.order))
 
-    def curves(self) -> None:
+    def curves(self) -> Figure:
         """Tracked against true curves of strain, rotation and twist."""
-        curves.draw(self.folder / "curves", self.comparison.rows)
+        return curves.draw(self.comparison.rows)
 
-    def segments(self) -> None:
+    def segments(self) -> Figure:
         """Tracked against true strain of the segments of a view, by the best tracker."""
-        curves.draw(self.folder / "segments", self.comparison.segments(self.view, self.comparison.trackers[0]))
+        return curves.draw(self.comparison.segments(self.view, self.comparison.trackers[0]))
 
-    def leaderboard(self) -> None:
+    def leaderboard(self) -> Figure:
         """The leaderboard as a table and as a figure."""
         self.standings.round(4).to_csv(self.folder / "leaderboard.csv", index=False)
-        leaderboard.draw(self.folder / "leaderboard", self.standings, best(self.standings))
+        return leaderboard.draw(self.standings, best(self.standings))
 
-    def bullseye(self) -> None:
+    def bullseye(self) -> Figure:
         """Strain of the segments at end-systole, true and of the best tracker."""
         tracker = self.comparison.trackers[0]
-        bullseye.draw(self.folder / "bullseye", self.comparison.bullseyes(tracker), tracker)
+        return bullseye.draw(self.comparison.bullseyes(tracker), tracker)
 
-    def error(self) -> None:
+    def error(self) -> Figure:
         """Error of the tangential displacement by layer, view and image size, mean over the hearts.
 
         It shows the first tracker of the configuration and the best one.
@@ -280,4 +280,4 @@ class Figures:
             for view in self.config.views
         }
         long_axis = [name for name, view in self.config.views.items() if view.plane == "long_axis"]
-        error.draw(self.folder / "error", errors, long_axis)
+        return error.draw(errors, long_axis)

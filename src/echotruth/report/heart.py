@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pyvista
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
 from echotruth.report import style
 from echotruth.report.raster import Camera, Surface, render
@@ -39,7 +39,6 @@ class State:
 
     Attributes
     ----------
-    name : str
     nodes : ndarray of shape (node, 3)
         Positions of the nodes, m.
     fibre : ndarray of shape (cell, 3)
@@ -55,24 +54,17 @@ class State:
 
 
 @style.styled
-def draw(path: str | Path, cells: np.ndarray, helix: np.ndarray, states: Sequence[State]) -> Path:
+def draw(cells: np.ndarray, helix: np.ndarray, states: Sequence[State]) -> Figure:
     """Draw the states side by side, fibres above and strain below, a quarter of the wall cut away.
 
     Parameters
     ----------
-    path : str or Path
-        File to write.
     cells : ndarray of shape (cell, 10)
         Nodes of the quadratic tetrahedra, in VTK's order.
     helix : ndarray of shape (cell,)
         Helix angle of the fibres, unloaded, rad.
     states : sequence of State
         From left to right.
-
-    Returns
-    -------
-    Path
-        The file.
     """
     # In a sweep, hearts with fewer elements are padded with cells of one repeated node and NaN nodes.
     real = cells.min(1) < cells.max(1)
@@ -87,14 +79,14 @@ def draw(path: str | Path, cells: np.ndarray, helix: np.ndarray, states: Sequenc
         wall = _cut(_grid(state.nodes, cells, {"strain": 100 * state.strain, "helix": np.degrees(helix)}))
         rods = _coloured(_rods(state, cells, helix), scales[0], "helix")
         column[0].imshow(_on_wall(rods, _coloured(wall, scales[0], "helix"), camera))
-        column[1].imshow(_picture(_coloured(wall, scales[1], "strain"), camera))
+        column[1].imshow(_rgba(*render(_coloured(wall, scales[1], "strain"), camera)))
         column[0].set_title(state.name)
     for panel in panels.flat:
         panel.axis("off")
     labels = "Helix angle (°)", "Circumferential strain $E_{CC}$\nfrom unloaded (%)"
     for row, scale, label in zip(panels, scales, labels, strict=True):
         figure.colorbar(scale, ax=row, shrink=0.75, aspect=25).set_label(label)
-    return style.save(figure, path)
+    return figure
 
 
 def centroids(nodes: np.ndarray, cells: np.ndarray) -> np.ndarray:
@@ -158,11 +150,6 @@ def _camera(states: Sequence[State]) -> Camera:
     # A wide heart would be cut off at the sides.
     half_width = MARGIN * float(np.abs((nodes - camera.centre) @ camera.axes[0]).max())
     return replace(camera, half_height=max(half_height, half_width * PIXELS[1] / PIXELS[0]))
-
-
-def _picture(surface: Surface, camera: Camera) -> np.ndarray:
-    """Surface without a background: RGBA."""
-    return _rgba(*render(surface, camera))
 
 
 def _on_wall(rods: Surface, wall: Surface, camera: Camera) -> np.ndarray:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from PIL import Image
 
-from echotruth.report.cine import jpeg
+from echotruth.report.cine import jpeg_address
 from echotruth.repository.unpacking import unpack
 
 MEASURES = {
@@ -33,29 +31,6 @@ THUMBNAIL = 96
 
 STATUSES = ("complete", "implausible", "failed", "retired", "unfinished")
 """What may become of a heart, in the order of the page."""
-
-
-@dataclass(frozen=True)
-class Subject:
-    """One heart.
-
-    Attributes
-    ----------
-    case, status, diagnosis : str
-    volume : float
-        End-diastolic, uL; NaN where the heart has none.
-    measures : tuple of float
-        As `MEASURES`; NaN where the heart has none.
-    picture : str
-        Image at end-diastole as an address that holds its data; empty if there is none.
-    """
-
-    case: str
-    status: str
-    diagnosis: str
-    volume: float
-    measures: tuple[float, ...]
-    picture: str
 
 
 def diagnoses(tree: xr.DataTree) -> NDArray[np.str_]:
@@ -104,7 +79,7 @@ def measures(tree: xr.DataTree, rows: NDArray[np.int_]) -> dict[str, NDArray[np.
     return {label: factor * np.asarray(found[name].values, float) for label, (name, factor) in MEASURES.items()}
 
 
-def subjects(tree: xr.DataTree, rows: NDArray[np.int_], view: str, size: int) -> list[Subject]:
+def subjects(tree: xr.DataTree, rows: NDArray[np.int_], view: str, size: int) -> list[dict[str, Any]]:
     """The hearts that the page shows, evenly chosen if there are many.
 
     Parameters
@@ -120,8 +95,9 @@ def subjects(tree: xr.DataTree, rows: NDArray[np.int_], view: str, size: int) ->
 
     Returns
     -------
-    list of Subject
-        At most `SHOWN`.
+    list of dict
+        At most `SHOWN`, each with `case`, `status`, `diagnosis`, `volume` (end-diastolic, uL), `measures` (as
+        `MEASURES`) and `picture` (as :func:`picture` returns it); numbers are NaN where the heart has none.
     """
     chosen = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), SHOWN)).round().astype(int))]
     found = measures(tree, chosen)
@@ -129,14 +105,14 @@ def subjects(tree: xr.DataTree, rows: NDArray[np.int_], view: str, size: int) ->
     images = tree[f"bmode/{size}"].to_dataset().image.sel(view=view).isel(frame=0)
     cases, status, diagnosis = tree["cases"].to_dataset()["case"].values, statuses(tree), diagnoses(tree)
     return [
-        Subject(
-            str(cases[row]),
-            str(status[row]),
-            str(diagnosis[row]),
-            float(volume[k]),
-            tuple(float(values[k]) for values in found.values()),
-            picture(images.isel(case=row).values),
-        )
+        {
+            "case": str(cases[row]),
+            "status": str(status[row]),
+            "diagnosis": str(diagnosis[row]),
+            "volume": float(volume[k]),
+            "measures": [float(values[k]) for values in found.values()],
+            "picture": picture(images.isel(case=row).values),
+        }
         for k, row in enumerate(chosen)
     ]
 
@@ -159,4 +135,4 @@ def picture(image: NDArray[np.uint8]) -> str:
     # Pillow pads with black what lies beyond the image.
     box = int(column) - half, int(row) - half, int(column) + half, int(row) + half
     small = Image.fromarray(image).crop(box).resize((THUMBNAIL, THUMBNAIL), Image.Resampling.LANCZOS)
-    return "data:image/jpeg;base64," + b64encode(jpeg(small)).decode()
+    return jpeg_address(small)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -24,22 +22,10 @@ PANELS = (
 
 
 @style.styled
-def draw(path: str | Path, standings: pd.DataFrame, order: list[str]) -> Path:
-    """Draw one row per tracker, the best at the top.
+def draw(standings: pd.DataFrame, order: list[str]) -> Figure:
+    """Draw one row per tracker, in the order given from top to bottom.
 
-    Parameters
-    ----------
-    path : str or Path
-        File to write.
-    standings : DataFrame
-        As :func:`echotruth.evaluation.leaderboard.standings` returns it.
-    order : list of str
-        Trackers from top to bottom.
-
-    Returns
-    -------
-    Path
-        The file.
+    The standings are what :func:`echotruth.evaluation.leaderboard.standings` returns.
     """
     # With a grid too coarse for strain, or no short-axis view, a metric has no values.
     shown = [panel for panel in PANELS if standings[panel[0]].notna().any()] or PANELS[:1]
@@ -59,7 +45,7 @@ def draw(path: str | Path, standings: pd.DataFrame, order: list[str]) -> Path:
     panels[0].set_yticks(range(len(order)), [_label(standings, tracker) for tracker in order])
     panels[0].set_ylim(len(order) - 0.5, -0.5)
     _legend(figure, standings, columns=max(2, 2 * len(shown) - 2))
-    return style.save(figure, path)
+    return figure
 
 
 def _draw_size(
@@ -86,11 +72,7 @@ def _label(standings: pd.DataFrame, tracker: str) -> str:
 
 
 def _legend(figure: Figure, standings: pd.DataFrame, columns: int) -> None:
-    sizes = sorted(standings["size_px"].unique(), reverse=True)
-    marks = [
-        Line2D([], [], color=colour, marker=marker, ls="none", label=f"{size} × {size} px")
-        for (colour, marker), size in zip(SIZES, sizes, strict=False)
-    ]
+    marks = style.size_handles(sorted(standings["size_px"].unique(), reverse=True))
     ring = Line2D([], [], color=style.MUTED, marker="o", ls="none", markersize=3, fillstyle="none", label="one view")
     hearts = int(np.nanmax(standings["hearts"]))
     text = "mean over the views" if hearts < 2 else f"mean of {hearts} hearts and its 95 % interval"

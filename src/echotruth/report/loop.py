@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from echotruth.report import style
 
@@ -14,15 +13,11 @@ UL = 1e-9
 
 
 @style.styled
-def draw(
-    path: str | Path, time: np.ndarray, es: int, tension: np.ndarray, solved: np.ndarray, target: np.ndarray
-) -> Path:
+def draw(time: np.ndarray, es: int, tension: np.ndarray, solved: np.ndarray, target: np.ndarray) -> Figure:
     """Draw the loop and its time courses, or a sentence if the heart has none.
 
     Parameters
     ----------
-    path : str or Path
-        File to write.
     time : ndarray of shape (frame,)
         Since end-diastole, s.
     es : int
@@ -31,17 +26,11 @@ def draw(
         Active tension T_Ca, Pa.
     solved, target : ndarray of shape (2, frame)
         Cavity pressure, Pa, and volume, m^3; NaN if the heart moves by a formula.
-
-    Returns
-    -------
-    Path
-        The file.
     """
-    figure = style.figure(8.4, 4.2)
     if not np.isfinite(solved).any():
         text = "No pressure-volume loop: the motion of this heart is prescribed (motion.kind), and nothing drives it."
-        figure.text(0.5, 0.5, text, ha="center", va="center", color=style.MUTED)
-        return style.save(figure, path)
+        return style.sentence(text, height=4.2)
+    figure = style.figure(8.4, 4.2)
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.1, 1))[0]
     _loop(left.subplots(), es, solved, target)
     axes = right.subplots(3, 1, sharex=True)
@@ -57,7 +46,7 @@ def draw(
     axes[0].text(time[es] * 1e3, 1.02, "ES", color=style.RADIAL, ha="center", transform=axes[0].get_xaxis_transform())
     axes[2].set_xlabel("Time since end-diastole (ms)")
     right.align_ylabels()
-    return style.save(figure, path)
+    return figure
 
 
 def _loop(axes: Axes, es: int, solved: np.ndarray, target: np.ndarray) -> None:

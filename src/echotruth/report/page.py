@@ -19,8 +19,8 @@ from echotruth.evaluation.leaderboard import best
 from echotruth.report import account, board, style, vector
 from echotruth.report.clips import STRAIN_LIMIT, clips
 from echotruth.report.comparison import Comparison
-from echotruth.report.figures import shown_hearts
-from echotruth.report.hearts import MEASURES, SHOWN, Subject, diagnoses, statuses, subjects
+from echotruth.report.figures import main_view, shown_hearts
+from echotruth.report.hearts import MEASURES, SHOWN, diagnoses, statuses, subjects
 from echotruth.repository import durable
 from echotruth.repository.description.citation import PAPER
 
@@ -61,17 +61,13 @@ def write(folder: Path, config: Config) -> Path:
     """
     tree = xr.open_datatree(folder / f"{config.name}.zarr", engine="zarr")
     shown = shown_hearts(tree, config)
-    text = _template().render(_context(tree, folder, config, shown))
-    path = folder / "report.html"
-    durable.write(path, text.encode())
-    return path
-
-
-def _template() -> Any:
     environment = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
     )
-    return environment.get_template("page.html.jinja")
+    text = environment.get_template("page.html.jinja").render(_context(tree, folder, config, shown))
+    path = folder / "report.html"
+    durable.write(path, text.encode())
+    return path
 
 
 def _context(tree: xr.DataTree, folder: Path, config: Config, shown: np.ndarray) -> dict[str, Any]:
@@ -112,29 +108,26 @@ def _context(tree: xr.DataTree, folder: Path, config: Config, shown: np.ndarray)
     }
 
 
-def main_view(config: Config) -> str:
-    """The view that is shown where only one can be: the mid one, or the first."""
-    return next((name for name in config.views if name == "mid"), next(iter(config.views)))
-
-
 def _json(values: dict[str, Any]) -> Markup:
     """JSON that may stand in a page: no text in it ends the element that holds it."""
     return Markup(json.dumps(values, separators=(",", ":"), sort_keys=True, allow_nan=False).replace("<", "\\u003c"))
 
 
 def _hearts(tree: xr.DataTree, config: Config, shown: np.ndarray) -> dict[str, Any]:
-    rows: list[Subject] = subjects(tree, shown, main_view(config), config.bmode.sizes[-1]) if len(shown) else []
+    rows = subjects(tree, shown, main_view(config), config.bmode.sizes[-1]) if len(shown) else []
     count = int(tree["cases"].sizes["case"])
-    status, counts = np.unique(statuses(tree), return_counts=True)
-    became = ", ".join(f"{number:,} {name}".replace(",", " ") for name, number in zip(status, counts, strict=True))
-    kinds, numbers = np.unique(diagnoses(tree), return_counts=True)
-    found = ", ".join(f"{number:,} {kind}".replace(",", " ") for kind, number in zip(kinds, numbers, strict=True))
-    sentence = f"{count:,} {'heart' if count == 1 else 'hearts'}".replace(",", " ") + f": {became}."
+    sentence = f"{account.counted(count, 'heart', 'hearts')}: {_tally(statuses(tree))}."
     if count > 1:
-        sentence += f" Diagnoses: {found}.".replace("_", " ")
+        sentence += f" Diagnoses: {_tally(diagnoses(tree))}.".replace("_", " ")
     if len(shown) > len(rows):
         sentence += f" {SHOWN} of those that were imaged are listed, evenly chosen; cases.csv has all."
     return {"sentence": sentence, "rows": rows, "measures": list(MEASURES), "many": len(shown) > 1}
+
+
+def _tally(words: np.ndarray) -> str:
+    """Different words, each after the number of times that it occurs."""
+    found = zip(*np.unique(words, return_counts=True), strict=True)
+    return ", ".join(f"{account.spaced(number)} {word}" for word, number in found)
 
 
 def _reference() -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from echotruth.report import style
 
@@ -43,7 +43,6 @@ SHEAR = {"RC": "#8a4f9e", "RL": "#c98a1b", "CL": "#2f9aa0"}
 
 HEADROOM = 0.06
 """Room above the curves for the word ES, over the height of the others."""
-_GREY = style.MUTED
 _UL, _MM = 1e-9, 1e-3
 
 
@@ -80,21 +79,10 @@ class Cycle:
 
 
 @style.styled
-def draw(path: str | Path, cycle: Cycle, published: Published) -> Path:
+def draw(cycle: Cycle, published: Published) -> Figure:
     """Draw rotation, strain, axial motion, pressure and volume over one cycle.
 
-    Parameters
-    ----------
-    path : str or Path
-        File to write.
-    cycle : Cycle
-    published : dict
-        Entry of `PUBLISHED`, or empty.
-
-    Returns
-    -------
-    Path
-        The file.
+    `published` is an entry of `PUBLISHED`, or empty.
     """
     figure = style.figure(8.6, 6.0)
     panels = figure.subplots(2, 3, sharex=True)
@@ -110,7 +98,7 @@ def draw(path: str | Path, cycle: Cycle, published: Published) -> Path:
         _phases(panel, cycle)
     for panel in panels[1]:
         panel.set_xlabel("Time since end-diastole (ms)")
-    return style.save(figure, path)
+    return figure
 
 
 _TITLES = ("Rotation", "Normal strain", "Shear strain", "Axial motion", "Pressure", "Volume")
@@ -119,8 +107,7 @@ _TITLES = ("Rotation", "Normal strain", "Shear strain", "Axial motion", "Pressur
 def _rotations(axes: Axes, cycle: Cycle, published: Published) -> None:
     colours = {"base": style.CIRCUMFERENTIAL, "apex": style.RADIAL, "twist": style.SOLVED}
     for name, colour in colours.items():
-        values = np.degrees(cycle.rotation[name])
-        axes.plot(cycle.time * 1e3, values, color=colour, label=_at_es(name, values[cycle.es]))
+        _line(axes, cycle, name, np.degrees(cycle.rotation[name]), colour)
     _measured(axes, cycle, {"twist": style.SOLVED}, published)
     axes.set_ylabel("Counter-clockwise from apex (deg)")
     _finish(axes, 0.1)
@@ -128,8 +115,7 @@ def _rotations(axes: Axes, cycle: Cycle, published: Published) -> None:
 
 def _strains(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Published) -> None:
     for name, colour in colours.items():
-        values = 100 * cycle.strain[:, COMPONENTS.index(name)]
-        axes.plot(cycle.time * 1e3, values, color=colour, label=_at_es(f"$E_{{{name}}}$", values[cycle.es]))
+        _line(axes, cycle, f"$E_{{{name}}}$", 100 * cycle.strain[:, COMPONENTS.index(name)], colour)
     _measured(axes, cycle, colours, published)
     axes.set_ylabel("Wall mean since ED (%)")
     _finish(axes, 0.1)
@@ -137,16 +123,21 @@ def _strains(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Publi
 
 def _axial_motion(axes: Axes, cycle: Cycle) -> None:
     for name, colour in (("base", style.CIRCUMFERENTIAL), ("apex", style.RADIAL)):
-        values = cycle.axial[name] / _MM
-        axes.plot(cycle.time * 1e3, values, color=colour, label=_at_es(name, values[cycle.es], 2))
+        _line(axes, cycle, name, cycle.axial[name] / _MM, colour, decimals=2)
     axes.set_ylabel("Towards the base (mm)")
     _finish(axes, 0.01, 0.2)
+
+
+def _line(axes: Axes, cycle: Cycle, name: str, values: np.ndarray, colour: str, decimals: int = 1) -> None:
+    """Draw a curve, whose label has its value at end-systole."""
+    label = f"{name} {float(values[cycle.es]):+z.{decimals}f}".replace("-", "−")  # z: not -0
+    axes.plot(cycle.time * 1e3, values, color=colour, label=label)
 
 
 def _curve(axes: Axes, cycle: Cycle, values: np.ndarray, label: str) -> None:
     axes.set_ylabel(label)
     if not np.isfinite(values).any():
-        axes.text(0.5, 0.5, "none: the motion is prescribed", color=_GREY, ha="center", transform=axes.transAxes)
+        axes.text(0.5, 0.5, "none: the motion is prescribed", color=style.MUTED, ha="center", transform=axes.transAxes)
         axes.set_yticks([])
         return
     axes.plot(cycle.time * 1e3, values, color=style.SOLVED)
@@ -163,28 +154,25 @@ def _measured(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Publ
         axes.plot([at, at], [mean - sd, mean + sd], color=colours[name], linewidth=5, alpha=0.35, solid_capstyle="butt")
         axes.plot(at, mean, "_", color=colours[name], markersize=7, markeredgewidth=1.6)
     if shown and np.isfinite(cycle.intervals[0]):
-        axes.plot(1e3 * cycle.intervals[0], 0, "o", color=_GREY, markersize=6, markerfacecolor="none", zorder=5)
+        axes.plot(1e3 * cycle.intervals[0], 0, "o", color=style.MUTED, markersize=6, markerfacecolor="none", zorder=5)
 
 
 def _phases(axes: Axes, cycle: Cycle) -> None:
     """Shade the isovolumic phases and mark end-systole."""
-    axes.axhline(0, color=_GREY, linewidth=0.6)
+    axes.axhline(0, color=style.MUTED, linewidth=0.6)
     axes.margins(x=0.01)
     top = axes.get_xaxis_transform()
     end = 1e3 * cycle.time[cycle.es]
-    axes.axvline(end, color=_GREY, linewidth=0.9, linestyle=":")
-    axes.text(end, 0.985, "ES ", color=_GREY, fontsize=7, ha="right", va="top", transform=top)
+    axes.axvline(end, color=style.MUTED, linewidth=0.9, linestyle=":")
+    axes.text(end, 0.985, "ES ", color=style.MUTED, fontsize=7, ha="right", va="top", transform=top)
     if not np.isfinite(cycle.intervals).all():
         return
     opening, closing, mitral = 1e3 * np.cumsum(cycle.intervals)
     for name, start, stop in (("IVC", 0, opening), ("IVR", closing, mitral)):
         axes.axvspan(start, stop, color=style.SHADE, zorder=0, linewidth=0)
-        axes.text((start + stop) / 2, 0.015, name, color=_GREY, fontsize=6.5, ha="center", va="bottom", transform=top)
-
-
-def _at_es(name: str, value: float, decimals: int = 1) -> str:
-    rounded = round(float(value), decimals) + 0.0  # not -0
-    return f"{name} {rounded:+.{decimals}f}".replace("-", "−")
+        axes.text(
+            (start + stop) / 2, 0.015, name, color=style.MUTED, fontsize=6.5, ha="center", va="bottom", transform=top
+        )
 
 
 def _finish(axes: Axes, smallest: float, below: float = 0.02) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from echotruth.report import style
 
@@ -18,21 +18,14 @@ SPREAD = 0.28
 
 
 @style.styled
-def draw(path: str | Path, measures: Mapping[str, np.ndarray], diagnoses: np.ndarray) -> Path:
+def draw(measures: Mapping[str, np.ndarray], diagnoses: np.ndarray) -> Figure:
     """Draw a panel for each measure: a dot for every heart, and median and quartiles of each diagnosis.
 
     Parameters
     ----------
-    path : str or Path
-        File to write.
     measures : mapping of str to ndarray of shape (heart,)
         Label with the unit -> values; NaN where a heart has none.
     diagnoses : ndarray of shape (heart,), str
-
-    Returns
-    -------
-    Path
-        The file.
     """
     names = sorted(dict.fromkeys(map(str, diagnoses)), key=lambda name: (name != "healthy", name))
     figure = style.figure(9.6, 1.3 + 0.42 * len(names))
@@ -47,7 +40,7 @@ def draw(path: str | Path, measures: Mapping[str, np.ndarray], diagnoses: np.nda
     labels = [f"{name.replace('_', ' ').replace('+', ' + ')} ({n})" for name, n in zip(names, counts, strict=True)]
     panels[0].set_yticks(range(len(names)), labels)
     panels[0].set_ylim(len(names) - 0.5, -0.5)
-    return style.save(figure, path)
+    return figure
 
 
 def _diagnosis(axes: Axes, values: np.ndarray, place: int) -> None:

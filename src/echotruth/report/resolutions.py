@@ -3,30 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from echotruth.report import style
 
 
 @style.styled
-def draw(path: str | Path, images: Sequence[np.ndarray], field_of_view: float) -> Path:
+def draw(images: Sequence[np.ndarray], field_of_view: float) -> Figure:
     """Draw one frame at every image size.
 
     Parameters
     ----------
-    path : str or Path
-        File to write.
     images : sequence of ndarray of shape (axial, lateral)
         8-bit grey levels, the largest first.
     field_of_view : float
         Side of the images, m; the array stands in the middle of the upper edge.
-
-    Returns
-    -------
-    Path
-        The file.
     """
     figure = style.figure(3.1 * len(images) + 0.4, 3.75)
     panels = figure.subplots(1, len(images), sharey=True, squeeze=False)[0]
@@ -41,7 +34,7 @@ def draw(path: str | Path, images: Sequence[np.ndarray], field_of_view: float) -
         panel.grid(False)
         panel.set(xlim=(left, right), ylim=(bottom, top))
     panels[0].set_ylabel("Axial (mm)")
-    return style.save(figure, path)
+    return figure
 
 
 def _bright(image: np.ndarray, side: float) -> tuple[float, float, float, float]:

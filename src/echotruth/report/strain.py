@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
+from matplotlib.figure import Figure
 
 from echotruth.report import style
 
@@ -16,13 +15,11 @@ MIN_AXIS_LIMIT = 0.1
 
 
 @style.styled
-def draw(path: str | Path, time: np.ndarray, es: int, mean: np.ndarray, sd: np.ndarray, layers: np.ndarray) -> Path:
+def draw(time: np.ndarray, es: int, mean: np.ndarray, sd: np.ndarray, layers: np.ndarray) -> Figure:
     """Draw strain since end-diastole.
 
     Parameters
     ----------
-    path : str or Path
-        File to write.
     time : ndarray of shape (frame,)
         Since end-diastole, s.
     es : int
@@ -31,11 +28,6 @@ def draw(path: str | Path, time: np.ndarray, es: int, mean: np.ndarray, sd: np.n
         Mean and standard deviation over the wall, components RR, CC, LL first.
     layers : ndarray of shape (frame, layer, strain component)
         Mean over every layer, the endocardium first.
-
-    Returns
-    -------
-    Path
-        The file.
     """
     figure = style.figure(8.6, 4.2)
     left, right = figure.subplots(1, 2)
@@ -67,4 +59,4 @@ def draw(path: str | Path, time: np.ndarray, es: int, mean: np.ndarray, sd: np.n
         panel.margins(x=0.01)
         low, high = panel.get_ylim()  # without strain the axis would show rounding errors
         panel.set_ylim(min(low, -MIN_AXIS_LIMIT), max(high, MIN_AXIS_LIMIT))
-    return style.save(figure, path)
+    return figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 RADIAL, CIRCUMFERENTIAL, LONGITUDINAL = "#b5382a", "#1f5fa8", "#2f8550"
@@ -38,6 +39,9 @@ SIZES = (("#173f73", "o"), ("#3f83cc", "s"), ("#8fb7e3", "v"))
 
 MMHG = 133.322387415
 """Pa."""
+
+NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
+"""Metadata of an SVG: none, so that nothing but the figure is in it."""
 
 styled = matplotlib.rc_context(
     {
@@ -85,6 +89,7 @@ def figure(width: float, height: float) -> Figure:
     return empty
 
 
+@styled
 def save(figure: Figure, path: str | Path, dpi: int = 160) -> Path:
     """Write a figure to a file, without dates, so that the same figure gives the same bytes.
 
@@ -105,7 +110,7 @@ def save(figure: Figure, path: str | Path, dpi: int = 160) -> Path:
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     if not path.suffix:
-        figure.savefig(path.with_suffix(".svg"), dpi=dpi, facecolor="none", edgecolor="none", metadata=_NOTHING)
+        figure.savefig(path.with_suffix(".svg"), dpi=dpi, facecolor="none", edgecolor="none", metadata=NO_METADATA)
         figure.set_layout_engine("none")  # what is laid out stays where it is
         path = path.with_suffix(".png")
     undated = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
@@ -113,28 +118,12 @@ def save(figure: Figure, path: str | Path, dpi: int = 160) -> Path:
     return path
 
 
-_NOTHING = {"Date": None, "Creator": None, "Format": None, "Type": None}
-"""Metadata of an SVG: none, so that nothing but the figure is in it."""
-
-
 @styled
-def sentence(path: str | Path, text: str) -> Path:
-    """Write a sentence in place of a figure that there is not.
-
-    Parameters
-    ----------
-    path : str or Path
-        File to write, as :func:`save` takes it.
-    text : str
-
-    Returns
-    -------
-    Path
-        The file.
-    """
-    empty = figure(8.4, 1.2)
+def sentence(text: str, height: float = 1.2) -> Figure:
+    """Sentence in place of a figure that there is not; the height is in inch."""
+    empty = figure(8.4, height)
     empty.text(0.5, 0.5, text, ha="center", va="center", color=MUTED)
-    return save(empty, path)
+    return empty
 
 
 def plain_logarithmic(axes: Axes, which: Literal["x", "y"], values: np.ndarray) -> None:
@@ -177,6 +166,14 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> Legend:
             break
         legend.remove()
     return legend
+
+
+def size_handles(sizes: Iterable[int]) -> list[Line2D]:
+    """Handles of a legend for image sizes (px), the largest first."""
+    return [
+        Line2D([], [], color=colour, marker=marker, ls="none", label=f"{size} × {size} px")
+        for (colour, marker), size in zip(SIZES, sizes, strict=False)
+    ]
 
 
 def series_colour(number: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from html import escape
 from pathlib import Path
 
 from echotruth.report import style
@@ -48,13 +49,7 @@ def inline(path: Path, title: str) -> str:
         text = text.replace(colour, f"var(--{name})")
     opening, rest = text.split(">", 1)
     width, height = re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', opening)[0]
-    label = title.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
-    return f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{label}">{rest.strip()}'
-
-
-def width(path: Path) -> float:
-    """Width of a figure, points."""
-    return float(re.findall(r'viewBox="0 0 ([\d.]+) ', path.read_text(encoding="utf-8"))[0])
+    return f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{escape(title)}">{rest.strip()}'
 
 
 def _renamed(text: str, prefix: str) -> str:

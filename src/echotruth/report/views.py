@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from echotruth.report import style
 
@@ -35,22 +35,15 @@ class Picture:
 
 
 @style.styled
-def draw(path: str | Path, pictures: Mapping[str, Sequence[Picture]], field_of_view: float) -> Path:
+def draw(pictures: Mapping[str, Sequence[Picture]], field_of_view: float) -> Figure:
     """Draw one column per view, end-diastole above end-systole.
 
     Parameters
     ----------
-    path : str or Path
-        File to write.
     pictures : mapping of view to sequence of two Picture
         At ED and ES.
     field_of_view : float
         Side of the images, m; the array stands in the middle of the upper edge.
-
-    Returns
-    -------
-    Path
-        The file.
     """
     side = 1e3 * field_of_view
     left, right, bottom, top = _shown([picture.layer for pair in pictures.values() for picture in pair], side)
@@ -66,7 +59,7 @@ def draw(path: str | Path, pictures: Mapping[str, Sequence[Picture]], field_of_v
     for panel, name in zip(panels[:, 0], ("ED", "ES"), strict=True):
         panel.set_ylabel("Axial (mm)")
         panel.text(0.04, 0.96, name, color=style.ON_IMAGE, va="top", fontweight="bold", transform=panel.transAxes)
-    return style.save(figure, path)
+    return figure
 
 
 def _image(axes: Axes, picture: Picture, side: float) -> None:

@@ -1,4 +1,4 @@
-"""What a viewer has chosen to see, and the address that says so."""
+"""What a viewer has chosen to see, the inputs for it, and the address that says so."""
 
 from __future__ import annotations
 
@@ -6,12 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from urllib.parse import urlencode
 
+from bokeh.models import AutocompleteInput, InputWidget, Select
+
 from echotruth.viewer.catalogue import FINISHED, Catalogue
 from echotruth.viewer.curves import CONTOURS, LINE, MEASURES, MIDDLE, WALL
 from echotruth.viewer.tint import COLOURS, WALL_COMPONENTS
 
 NOTHING, TRUTH = "", "truth"
 """In place of a second tracker: none, and the truth at the points of the first."""
+MANY = 30
+"""Cases of which a list is offered; of more, those whose names contain what is typed."""
 
 
 @dataclass(frozen=True)
@@ -20,10 +24,8 @@ class Choice:
 
     Attributes
     ----------
-    case, view : str
     size : int
         Pixels along a side.
-    tracker : str
     other : str
         Second tracker, `TRUTH` or `NOTHING`.
     colour : str
@@ -35,7 +37,6 @@ class Choice:
     measure : {"engineering", "green_lagrange"}
     part : str
         Part of the wall of the curves, as "middle" (a contour), "wall", "layer 1" or "segment 7".
-    frame : int
     """
 
     case: str
@@ -112,3 +113,35 @@ def _is_known(catalogue: Catalogue, name: str, value: str) -> bool:
         "frame": list(map(str, range(catalogue.config.loop.frames))),
     }
     return value in known.get(name, ())
+
+
+def inputs(catalogue: Catalogue, choice: Choice) -> dict[str, InputWidget]:
+    """Inputs for all but the frame, by name; the page fills in the options that depend on what is chosen."""
+    others = [(NOTHING, "–"), (TRUTH, "the truth"), *((name, name) for name in catalogue.trackers)]
+    return {
+        "case": _case_input(catalogue.cases, choice.case),
+        "view": Select(title="View", value=choice.view, options=catalogue.views, width=110),
+        "size": Select(title="Size (px)", value=str(choice.size), options=list(map(str, catalogue.sizes)), width=80),
+        "tracker": Select(title="Tracker", value=choice.tracker, options=catalogue.trackers, width=150),
+        "other": Select(title="Beside it", value=choice.other, options=others, width=150),
+        "colour": Select(title="Colour", value=choice.colour, options=list(COLOURS.items()), width=190),
+        "component": Select(title="Component", value=choice.component, options=[], width=220, visible=False),
+        "curve": Select(title="Curve", value=choice.curve, options=[], width=230),
+        "measure": Select(title="Measure", value=choice.measure, options=list(MEASURES.items()), width=220),
+        "part": Select(title="Part of the wall", value=choice.part, options=[], width=120),
+    }
+
+
+def _case_input(cases: list[str], case: str) -> InputWidget:
+    if len(cases) <= MANY:
+        return Select(title="Case", value=case, options=cases, width=230)
+    return AutocompleteInput(
+        title=f"Case (of {len(cases)}: type a part of its name)",
+        value=case,
+        completions=cases,
+        search_strategy="includes",
+        case_sensitive=False,
+        min_characters=1,
+        max_completions=20,
+        width=330,
+    )

@@ -25,6 +25,13 @@ PARTS = {
     "evaluation": "evaluation/true_displacement",
 }
 """Part of a clip to the array by which it is known to be written."""
+MISSING = {
+    "images": "images",
+    "truth": "truth at the pixels",
+    "tracking": "tracked motion",
+    "evaluation": "scores and strain",
+}
+"""Part of a clip to what is said to be missing without it."""
 
 
 @dataclass(frozen=True)

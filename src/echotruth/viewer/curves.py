@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.evaluation.curves import strain_curves
 from echotruth.viewer.clip import Clip
 
 if TYPE_CHECKING:
@@ -40,11 +39,6 @@ class Plot:
 
     title: str
     curves: dict[str, Floats]
-
-
-def strain_of(clip: Clip, tracker: str) -> xr.Dataset:
-    """Curves of strain and rotation of a tracker and of the truth, as :func:`echotruth.strain_curves` gives them."""
-    return strain_curves(clip.job, tracker, clip.size)
 
 
 def strain(clip: Clip, found: dict[str, xr.Dataset], component: str, measure: str, part: str) -> Plot:

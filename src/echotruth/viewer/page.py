@@ -13,42 +13,31 @@ import numpy as np
 from bokeh.document import Document
 from bokeh.layouts import column, row
 from bokeh.models import (
-    AutocompleteInput,
     CheckboxButtonGroup,
     ColumnDataSource,
     Div,
-    InputWidget,
     Range1d,
     Select,
     Slider,
     Toggle,
 )
 
+from echotruth.evaluation.curves import strain_curves
 from echotruth.viewer import arrows, curves, facts, script
-from echotruth.viewer.arrows import Arrows
 from echotruth.viewer.catalogue import Catalogue
-from echotruth.viewer.choice import NOTHING, TRUTH, Choice
-from echotruth.viewer.clip import Clip
+from echotruth.viewer.choice import NOTHING, TRUTH, Choice, inputs
+from echotruth.viewer.clip import MISSING, Clip
 from echotruth.viewer.graph import Graph
 from echotruth.viewer.panel import ARROWS, Panel
 from echotruth.viewer.points import Points
-from echotruth.viewer.tint import COLOURS, component_name, components, tint
+from echotruth.viewer.tint import component_name, components, tint
 
-MANY = 30
-"""Cases of which a list is offered; of more, those whose names contain what is typed."""
 KEPT_CLIPS = 3
 """Clips that stay in memory."""
 RATES = ("5", "10", "20", "40")
 """Frames per second."""
-KINDS = list(ARROWS)
 MARGIN = 1.3
 """Half of the side of what is shown of a picture, over half of that of the wall in it."""
-MISSING = {
-    "images": "images",
-    "truth": "truth at the pixels",
-    "tracking": "tracked motion",
-    "evaluation": "scores and strain",
-}
 
 
 class Page:
@@ -89,49 +78,17 @@ class Page:
 
     def _widgets(self) -> None:
         """What can be chosen."""
-        catalogue, choice = self.catalogue, self.choice
-        self.inputs: dict[str, InputWidget] = {
-            "case": self._case_input(),
-            "view": Select(title="View", value=choice.view, options=catalogue.views, width=110),
-            "size": Select(
-                title="Size (px)", value=str(choice.size), options=list(map(str, catalogue.sizes)), width=80
-            ),
-            "tracker": Select(title="Tracker", value=choice.tracker, options=catalogue.trackers, width=150),
-            "other": Select(title="Beside it", value=choice.other, options=self._others(), width=150),
-            "colour": Select(title="Colour", value=choice.colour, options=list(COLOURS.items()), width=190),
-            "component": Select(title="Component", value=choice.component, options=[], width=220, visible=False),
-            "curve": Select(title="Curve", value=choice.curve, options=[], width=230),
-            "measure": Select(title="Measure", value=choice.measure, options=list(curves.MEASURES.items()), width=220),
-            "part": Select(title="Part of the wall", value=choice.part, options=[], width=120),
-        }
+        self.inputs = inputs(self.catalogue, self.choice)
         for name, widget in self.inputs.items():
             widget.name = name
             widget.on_change("value", lambda _attribute, _old, value, name=name: self._choose(name, value))
-        labels = [f"{kind} motion" if kind != "flow" else "flow" for kind in KINDS]
+        labels = [f"{kind} motion" if kind != "flow" else "flow" for kind in ARROWS]
         self.arrows = CheckboxButtonGroup(labels=labels, active=[], name="arrows")
         self.arrows.on_change("active", lambda _attribute, _old, _active: self.show())
         self.play = Toggle(label="▶ Play", width=90, name="play", button_type="primary")
         self.rate = Select(title="", value="20", options=[(rate, f"{rate} frames/s") for rate in RATES], width=105)
         self.message = Div(name="message", visible=False, styles={"color": "#a33", "font-weight": "bold"})
         self.facts = Div(name="facts", width=520)
-
-    def _case_input(self) -> InputWidget:
-        cases, case = self.catalogue.cases, self.choice.case
-        if len(cases) <= MANY:
-            return Select(title="Case", value=case, options=cases, width=230)
-        return AutocompleteInput(
-            title=f"Case (of {len(cases)}: type a part of its name)",
-            value=case,
-            completions=cases,
-            search_strategy="includes",
-            case_sensitive=False,
-            min_characters=1,
-            max_completions=20,
-            width=330,
-        )
-
-    def _others(self) -> list[tuple[str, str]]:
-        return [(NOTHING, "–"), (TRUTH, "the truth"), *((name, name) for name in self.catalogue.trackers)]
 
     def _scripts(self) -> None:
         """What happens in the browser alone."""
@@ -154,8 +111,7 @@ class Page:
         )
         for slider in (self.frame, self.opacity):
             slider.js_on_change("value", draw)
-        sources = [self.clip, self.times, *(panel.colour for panel in self.panels), *movements]
-        for source in sources:
+        for source in (self.clip, self.times, *(panel.colour for panel in self.panels), *movements):
             source.js_on_change("data", draw)
         for panel in self.panels:
             panel.figure.js_on_change("visible", draw)
@@ -275,13 +231,14 @@ class Page:
             self._once(
                 f"colour {number}", (*place, *colour), lambda: panel.tint(tint(points.clip, points, *colour, followed))
             )
-            for kind, make in _moved(points, followed).items():
-                wanted = KINDS.index(kind) in self.arrows.active
-                self._once(f"{kind} {number}", (*place, wanted), partial(_move, panel, kind, make if wanted else None))
+            for index, kind in enumerate(ARROWS):
+                wanted = index in self.arrows.active
+                move = partial(_move, panel, kind, points, followed, wanted)
+                self._once(f"{kind} {number}", (*place, wanted), move)
         except ValueError as error:  # a tracker from outside that was not evaluated on this clip
             self._problems[str(error)] = None
             panel.clear()
-            for part in ("colour", *KINDS):
+            for part in ("colour", *ARROWS):
                 self._shown.pop(f"{part} {number}", None)
 
     def _curves(self, clip: Clip) -> dict[str, Any]:
@@ -290,7 +247,7 @@ class Page:
         for tracker in (self.choice.tracker, self.choice.other) if clip.has_curves else ():
             with suppress(ValueError):  # not evaluated on this clip, which the picture says
                 if tracker not in (TRUTH, NOTHING):
-                    found[tracker] = curves.strain_of(clip, tracker)
+                    found[tracker] = strain_curves(clip.job, tracker, clip.size)
         return found
 
     def _show_graphs(self, clip: Clip, found: dict[str, Any]) -> None:
@@ -337,15 +294,13 @@ class Page:
         self.message.visible = bool(text)
 
 
-def _moved(points: Points, tracker: str | None) -> dict[str, Callable[[], Arrows | None]]:
-    """Kind of arrows to what makes those of a picture; without a tracker there are none of its own."""
-    clip = points.clip
-    return {
-        "true": lambda: arrows.true_motion(points) if clip.has("evaluation") else None,
-        "tracked": lambda: arrows.tracked_motion(points, tracker) if tracker and clip.has("tracking") else None,
-        "flow": lambda: arrows.flow(clip) if clip.has("truth") else None,
-    }
-
-
-def _move(panel: Panel, kind: str, make: Callable[[], Arrows | None] | None) -> None:
-    panel.move(kind, make() if make else None)
+def _move(panel: Panel, kind: str, points: Points, tracker: str | None, wanted: bool) -> None:
+    """Show arrows of a kind if they are wanted, and if what they are made of is written."""
+    clip, found = points.clip, None
+    if wanted and kind == "true" and clip.has("evaluation"):
+        found = arrows.true_motion(points)
+    elif wanted and kind == "tracked" and tracker and clip.has("tracking"):
+        found = arrows.tracked_motion(points, tracker)
+    elif wanted and kind == "flow" and clip.has("truth"):
+        found = arrows.flow(clip)
+    panel.move(kind, found)

@@ -121,12 +121,11 @@ class Points:
         A point covers the tile of the grid around it, which moves and deforms with the true motion.
         """
         parts = ceil(SUBDIVISION * self.spacing / self.clip.side * self.clip.size) + 1
-        rows, columns = self.inside.shape
         number = np.zeros(self.inside.shape, np.int32)
         number[self.inside] = np.arange(1, len(self.position) + 1)
         tiles = np.repeat(np.repeat(number, parts, axis=0), parts, axis=1)
         wanted = tiles > 0
-        at_ed = self._refined(self.grid, parts, (rows, columns))[wanted]
+        at_ed = self._refined(parts)[wanted]
         nearest = distance_transform_edt(~self.inside, return_distances=False, return_indices=True)
         found = np.zeros((self.clip.frames, self.clip.size, self.clip.size), np.int32)
         for frame, moved in zip(found, self._true_displacement, strict=True):
@@ -137,9 +136,9 @@ class Points:
             frame[pixel[shown, 1], pixel[shown, 0]] = tiles[wanted][shown]
         return found
 
-    def _refined(self, grid: Floats, parts: int, shape: tuple[int, int]) -> Floats:
+    def _refined(self, parts: int) -> Floats:
         """Positions of the parts of all tiles, (rows * parts, columns * parts, 2), m."""
         offset = ((np.arange(parts) + 0.5) / parts - 0.5) * self.spacing
-        axial = (grid[:, 0, 1, None] + offset).ravel()
-        lateral = (grid[0, :, 0, None] + offset).ravel()
-        return np.stack(np.meshgrid(lateral, axial), axis=-1).reshape(shape[0] * parts, shape[1] * parts, 2)
+        axial = (self.grid[:, 0, 1, None] + offset).ravel()
+        lateral = (self.grid[0, :, 0, None] + offset).ravel()
+        return np.stack(np.meshgrid(lateral, axial), axis=-1)

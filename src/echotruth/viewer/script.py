@@ -18,8 +18,5 @@ def callback(name: str, **arguments: Any) -> CustomJS:
     **arguments
         Models, or lists of them, by the names that they have in the script.
     """
-    return CustomJS(args=arguments, code=_text(name))
-
-
-def _text(name: str) -> str:
-    return (files("echotruth.viewer") / f"{name}.js").read_text(encoding="utf-8")
+    text = (files("echotruth.viewer") / f"{name}.js").read_text(encoding="utf-8")
+    return CustomJS(args=arguments, code=text)

@@ -59,7 +59,6 @@ class Tint:
         Colours as #rrggbb.
     low, high : float
         Values at the ends of the palette, in the unit of the title.
-    title : str
     names : dict
         Value -> name, for what is not a quantity.
     """
@@ -70,11 +69,6 @@ class Tint:
     high: float
     title: str
     names: dict[int, str] = field(default_factory=dict)
-
-    def value(self, index: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Value that an entry stands for: the middle of its step; NaN where it is transparent."""
-        step = (self.high - self.low) / len(self.palette)
-        return np.where(index > 0, self.low + (index - 0.5) * step, np.nan)
 
 
 def tint(clip: Clip, points: Points, colour: str, component: str, tracker: str | None) -> Tint | None:
