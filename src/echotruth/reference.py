@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from math import log2
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -18,7 +18,7 @@ from pydantic_core import PydanticUndefined
 
 from echotruth.config import Config
 from echotruth.repository import schema
-from echotruth.section import Section, discriminator, unit_of, variants
+from echotruth.section import discriminator, meaning, section_in, shown_unit, variants
 
 _CONFIG_HEAD = """# Configuration
 
@@ -107,14 +107,10 @@ def schema_page() -> str:
     return "\n".join([*parts, "## Computed on reading\n", _DERIVED, *_arrays(schema.DERIVED)])
 
 
-def json_schema() -> str:
-    """JSON schema of a configuration."""
-    return json.dumps(Config.model_json_schema(), indent=1) + "\n"
-
-
 def files() -> dict[str, str]:
     """Path of each generated file -> its text."""
-    return {"config/schema.json": json_schema(), "config/README.md": config_page(), "docs/schema.md": schema_page()}
+    schema_text = json.dumps(Config.model_json_schema(), indent=1) + "\n"
+    return {"config/schema.json": schema_text, "config/README.md": config_page(), "docs/schema.md": schema_page()}
 
 
 def _arrays(arrays: tuple[schema.Array, ...]) -> list[str]:
@@ -133,10 +129,10 @@ def _step(array: schema.Array) -> str:
     return array.quantum or ""
 
 
-def _section(model: type[BaseModel], prefix: str, title: str, meaning: str = "") -> list[str]:
+def _section(model: type[BaseModel], prefix: str, title: str, about: str = "") -> list[str]:
     lines = [f"## {title}\n"]
     if prefix:
-        lines += [f"{meaning or ' '.join((model.__doc__ or '').split())}\n"]
+        lines += [f"{about or ' '.join((model.__doc__ or '').split())}\n"]
     rows: list[str] = []
     subsections: list[str] = []
     for key, field in model.model_fields.items():
@@ -147,25 +143,14 @@ def _section(model: type[BaseModel], prefix: str, title: str, meaning: str = "")
             subsections += _section(variant, path, f"{path.removesuffix('.')}, {discriminator(sections)} {name}")
         if sections and not mapping:
             continue
-        subsection = None if sections else _subsection(field)
+        subsection = None if sections else section_in(field.annotation)
         if subsection is None or mapping:
-            rows.append(f"| `{prefix}{key}` | {_unit(key)} | {_default(field)} | {_meaning(field)} |")
+            rows.append(f"| `{prefix}{key}` | {shown_unit(key)} | {_default(field)} | {meaning(field)} |")
         if subsection is not None:
-            subsections += _section(subsection, path, path.removesuffix("."), "" if mapping else _meaning(field))
+            subsections += _section(subsection, path, path.removesuffix("."), "" if mapping else meaning(field))
     if rows:
         lines += ["| key | unit | default | meaning |", "|---|---|---|---|", *rows, ""]
     return [*lines, *subsections]
-
-
-def _subsection(field: FieldInfo) -> type[Section] | None:
-    for annotation in (field.annotation, *get_args(field.annotation)):
-        if isinstance(annotation, type) and issubclass(annotation, Section):
-            return annotation
-    return None
-
-
-def _unit(key: str) -> str:
-    return unit_of(key).replace("_per_", "/").replace("per_", "1/")
 
 
 def _default(field: FieldInfo) -> str:
@@ -175,10 +160,6 @@ def _default(field: FieldInfo) -> str:
     if isinstance(default, dict):
         return ", ".join(f"`{name}`" for name in default) or "none"
     return "`null`" if default is None else f"`{json.dumps(default)}`"
-
-
-def _meaning(field: FieldInfo) -> str:
-    return " ".join((field.description or "").split())
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from math import log, pi
 from types import SimpleNamespace
@@ -18,6 +18,7 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 UNITS: dict[str, float] = {
@@ -75,6 +76,42 @@ def _checks(section: type[Section]) -> list[Callable[[Section], object]]:
 def unit_of(key: str) -> str:
     """Unit suffix of a configuration key; empty if it has none."""
     return max((unit for unit in UNITS if key.endswith(f"_{unit}")), key=len, default="")
+
+
+def shown_unit(key: str) -> str:
+    """Unit of a configuration key as people write it; empty if it has none."""
+    return unit_of(key).replace("_per_", "/").replace("per_", "1/")
+
+
+def meaning(field: FieldInfo) -> str:
+    """What a key means, in one line."""
+    return " ".join((field.description or "").split())
+
+
+def section_in(annotation: Any) -> Any:
+    """Section in an annotation such as `dict[str, View]`; None if there is none."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    sections = [section_in(inner) for inner in get_args(annotation)]
+    return next((section for section in sections if section is not None), None)
+
+
+def dotted_values(section: Section, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted key and value of every key of a section and of the sections in it."""
+    for key in type(section).model_fields:
+        value = getattr(section, key)
+        if isinstance(value, Section):
+            yield from dotted_values(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def value_of(section: Any, dotted_key: str) -> Any:
+    """Value of a dotted key of a section, in which names of views or trackers may be parts of the key."""
+    value = section
+    for part in dotted_key.split("."):
+        value = value[part] if isinstance(value, dict) else getattr(value, part)
+    return value
 
 
 def variants(annotation: Any) -> dict[str, type[Section]]:

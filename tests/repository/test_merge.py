@@ -145,6 +145,13 @@ def test_sweep_of_all_cases_spans_keys_that_one_repository_does_not_sweep():
     assert {case.id for config in (FIRST, other) for case in finished.expand(config)} <= ids
 
 
+def test_sweep_of_all_cases_spans_keys_of_views():
+    position = FIRST.views["mid"].position
+    other = finished.configured("other", cases={"views.mid.position": [0.4, 0.6]})
+    joint = spanning("both", {Path("a"): FIRST, Path("b"): other})
+    assert joint.cases.grid == {"seed": [1, 2], "views.mid.position": [position, 0.4, 0.6]}
+
+
 def test_hearts_of_the_joint_sweep_that_neither_has_are_left_to_a_run(out, capsys):
     finished.finish(out / "third", finished.configured("third", cases={"fibres.endo_deg": [60]}))
     assert merge_repositories(out / "first", [out / "third"]) == 0

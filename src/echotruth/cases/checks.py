@@ -15,6 +15,7 @@ from echotruth.config import Config, Section
 from echotruth.config.loading import ConfigError
 from echotruth.config.reading import Errors
 from echotruth.config.table import LABEL
+from echotruth.section import dotted_values
 
 NOT_SWEPT = (
     *("name", "cases", "views", "tracking", "geometry.shape", "fibres.layers", "loop.frames", "rf.keep"),
@@ -121,7 +122,7 @@ def check_condition_key(config: Config, key: str, table_labels: list[str], place
         return
     if key.startswith(LABEL):
         raise ConfigError(f"{place}: {key} is not a column of the table: name one, or leave it out")
-    value = _section_of(config, key, place)
+    value = _value_of(config, key, place)
     if isinstance(value, Section | dict):
         raise ConfigError(f"{place}: {key} is a section: name one of its keys")
 
@@ -143,7 +144,7 @@ def _check_distinct(key: str, values: list[Any], source: str) -> None:
 
 
 def _check_swept_key(config: Config, key: str, place: str) -> None:
-    value = _section_of(config, key, place)
+    value = _value_of(config, key, place)
     holds_sections = isinstance(value, dict) and any(isinstance(inner, Section) for inner in value.values())
     if isinstance(value, Section) or holds_sections:
         raise ConfigError(f"{place}: {key} is a section: sweep one of its keys")
@@ -153,7 +154,7 @@ def _check_swept_key(config: Config, key: str, place: str) -> None:
         raise ConfigError(f"{place}: {key} cannot be swept if RF is kept: leave rf.keep empty")
 
 
-def _section_of(config: Config, key: str, place: str) -> Any:
+def _value_of(config: Config, key: str, place: str) -> Any:
     """Value of a dotted key without the sweep."""
     value: Any = config
     for part in key.split("."):
@@ -167,22 +168,18 @@ def _section_of(config: Config, key: str, place: str) -> Any:
 
 
 def _suggestion(config: Config, key: str) -> str:
-    close = get_close_matches(key[:200], list(_all_keys(config, "")), n=1, cutoff=0.8)
+    close = get_close_matches(key[:200], list(_all_keys(config)), n=1, cutoff=0.8)
     if close:
         return f"did you mean {close[0]}?"
     return "write it in full, such as fibres.endo_deg" if "." in key else f"write {LABEL}{key[:40]} if it is a label"
 
 
-def _all_keys(section: Section, prefix: str) -> Iterator[str]:
-    for name in type(section).model_fields:
-        value = getattr(section, name)
-        if isinstance(value, Section):
-            yield from _all_keys(value, f"{prefix}{name}.")
-        elif f"{prefix}{name}" == "views":
-            for view, inner in value.items():
-                yield from _all_keys(inner, f"views.{view}.")
+def _all_keys(config: Config) -> Iterator[str]:
+    for key, value in dotted_values(config):
+        if key == "views":
+            yield from (key for view, section in value.items() for key, _ in dotted_values(section, f"views.{view}."))
         else:
-            yield f"{prefix}{name}"
+            yield key
 
 
 def _distinct(hearts: Iterable[tuple[Combination, Case]], name: str) -> list[tuple[Any, Combination]]:

@@ -68,12 +68,13 @@ class Condition:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.keys: set[str] = set()
         if len(text) > MAX_CONDITION:
             raise ConditionError(f"has {len(text)} characters: write at most {MAX_CONDITION}, or several conditions")
         try:
             tree = ast.parse(text.strip(), mode="eval").body
-            self._holds = self._compile(tree)
+            compiler = _Compiler()
+            self._holds: Evaluation = compiler.visit(tree)
+            self.keys = compiler.keys
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             if isinstance(error, ConditionError):
                 raise
@@ -105,19 +106,23 @@ class Condition:
             raise ConditionError(f"is {found!r:.80} and neither true nor false: compare it with a value")
         return found
 
-    def _compile(self, node: ast.AST) -> Evaluation:
-        for kind, compile_node in _NODES.items():
-            if isinstance(node, kind):
-                return compile_node(self, node)
+
+class _Compiler(ast.NodeVisitor):
+    """Turns a syntax tree into an evaluation, if it has nothing that a condition may not contain."""
+
+    def __init__(self) -> None:
+        self.keys: set[str] = set()
+
+    def generic_visit(self, node: ast.AST) -> Evaluation:
         raise ConditionError(f"has {_name(node)}: {WHOLE}")
 
-    def _constant(self, node: ast.Constant) -> Evaluation:
+    def visit_Constant(self, node: ast.Constant) -> Evaluation:
         value = node.value
         if value is not None and not isinstance(value, bool | int | float | str):
             raise ConditionError(f"has {value!r:.40}: {WHOLE}")
         return lambda lookup: value
 
-    def _key(self, node: ast.AST) -> Evaluation:
+    def visit_Name(self, node: ast.Name | ast.Attribute) -> Evaluation:
         key = _dotted(node)
         if key in _CONSTANTS:
             constant = _CONSTANTS[key]
@@ -125,12 +130,16 @@ class Condition:
         self.keys.add(key)
         return lambda lookup: lookup(key)
 
-    def _list(self, node: ast.List | ast.Tuple) -> Evaluation:
-        items = [self._compile(item) for item in node.elts]
+    visit_Attribute = visit_Name
+
+    def visit_List(self, node: ast.List | ast.Tuple) -> Evaluation:
+        items = [self.visit(item) for item in node.elts]
         return lambda lookup: [item(lookup) for item in items]
 
-    def _unary(self, node: ast.UnaryOp) -> Evaluation:
-        operand = self._compile(node.operand)
+    visit_Tuple = visit_List
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> Evaluation:
+        operand = self.visit(node.operand)
         if isinstance(node.op, ast.Not):
             return lambda lookup: not _truth(operand(lookup))
         if isinstance(node.op, ast.Invert):
@@ -138,34 +147,22 @@ class Condition:
         sign = -1 if isinstance(node.op, ast.USub) else 1
         return lambda lookup: sign * _number(operand(lookup))
 
-    def _binary(self, node: ast.BinOp) -> Evaluation:
+    def visit_BinOp(self, node: ast.BinOp) -> Evaluation:
         operation = _ARITHMETIC.get(type(node.op))
         if operation is None:
             raise ConditionError(f"has {_name(node.op)}: {WHOLE}")
-        left, right = self._compile(node.left), self._compile(node.right)
+        left, right = self.visit(node.left), self.visit(node.right)
         return lambda lookup: _real(operation(_number(left(lookup)), _number(right(lookup))))
 
-    def _boolean(self, node: ast.BoolOp) -> Evaluation:
-        parts, joined = [self._compile(value) for value in node.values], all if isinstance(node.op, ast.And) else any
+    def visit_BoolOp(self, node: ast.BoolOp) -> Evaluation:
+        parts, joined = [self.visit(value) for value in node.values], all if isinstance(node.op, ast.And) else any
         return lambda lookup: joined(_truth(part(lookup)) for part in parts)
 
-    def _comparison(self, node: ast.Compare) -> Evaluation:
-        values = [self._compile(value) for value in (node.left, *node.comparators)]
+    def visit_Compare(self, node: ast.Compare) -> Evaluation:
+        values = [self.visit(value) for value in (node.left, *node.comparators)]
         tests = [_test(kind) for kind in node.ops]
         steps = list(zip(tests, values, values[1:], strict=False))
         return lambda lookup: all(test(left(lookup), right(lookup)) for test, left, right in steps)
-
-
-_NODES: dict[type | tuple[type, ...], Callable[[Condition, Any], Evaluation]] = {
-    ast.Constant: Condition._constant,
-    (ast.Name, ast.Attribute): Condition._key,
-    (ast.List, ast.Tuple): Condition._list,
-    ast.UnaryOp: Condition._unary,
-    ast.BinOp: Condition._binary,
-    ast.BoolOp: Condition._boolean,
-    ast.Compare: Condition._comparison,
-}
-"""All that a condition may contain."""
 
 
 def _dotted(node: ast.AST) -> str:

@@ -9,8 +9,6 @@ from echotruth.cases.case import Case
 from echotruth.config import Config
 from echotruth.config.table import LABEL
 
-HEALTHY, UNKNOWN = "healthy", "unknown"
-
 
 def diagnosis(config: Config) -> str:
     """What the configuration of a heart makes of it, as words joined by +.
@@ -27,7 +25,7 @@ def diagnosis(config: Config) -> str:
         "dilation": geometry.dilation > 1,
     }
     found = "+".join(word for word, applies in words.items() if applies)
-    return found or (HEALTHY if geometry.file is None else UNKNOWN)
+    return found or ("healthy" if geometry.file is None else "unknown")
 
 
 def columns(cases: list[Case]) -> dict[str, list[Any]]:

@@ -14,6 +14,7 @@ from echotruth.config import Config
 from echotruth.config.loading import ConfigError
 from echotruth.config.reading import Errors
 from echotruth.config.table import CASE, LABEL, NOTE, Table
+from echotruth.section import value_of
 
 _LABEL = re.compile(r"label\.[A-Za-z][A-Za-z0-9_]{0,39}")
 
@@ -100,11 +101,8 @@ def _cell(text: str, allowed: frozenset[type], place: str) -> Any:
 
 
 def _types(config: Config, dotted_key: str) -> frozenset[type]:
-    *parents, key = dotted_key.split(".")
-    section: Any = config
-    for parent in parents:
-        section = section[parent] if isinstance(section, dict) else getattr(section, parent)
-    return cells.types(section, key)
+    section, _, key = dotted_key.rpartition(".")
+    return cells.types(value_of(config, section) if section else config, key)
 
 
 def _ids(table: Table, source: str, longest: int) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from pydantic import ValidationError
@@ -37,25 +39,28 @@ class Sweep:
         ConfigError
             If they are not valid together.
         """
-        try:
+        with self._explained(heart):
             sections = {name: self._section(name, keys) for name, keys in _by_section(heart.parameters).items()}
             config = Config.model_validate(self._values | sections)
-            return Case(self._id(heart), heart.parameters, config, heart.labels, heart.note)
-        except ValidationError:
-            raise self._error(heart) from None
+            return Case(self.id(heart), heart.parameters, config, heart.labels, heart.note)
 
     def id(self, heart: Combination) -> str:
-        """Id of the case with some values of the swept keys.
+        """Id of the case with some values of the swept keys: given by its row, or a hash of the others that differ.
 
         Raises
         ------
         ConfigError
             If they are not valid.
         """
-        try:
-            return self._id(heart)
-        except ValidationError:
-            raise self._error(heart) from None
+        if heart.given_id and heart.parameters.keys() <= heart.own:
+            return heart.given_id
+        sections = _by_section(heart.parameters).items()
+        with self._explained(heart):
+            differing = frozenset[str]().union(*(self._differing_keys(name, changes) for name, changes in sections))
+        if heart.given_id:
+            differing -= heart.own
+        parameters = {key: value for key, value in heart.parameters.items() if key in differing}
+        return extended_id(heart.given_id, parameters) if heart.given_id else case_id(parameters)
 
     def value(self, key: str, heart: Combination) -> Any:
         """Value of a dotted key in a case, with what follows from a preset; None if its law has no such key.
@@ -71,34 +76,22 @@ class Sweep:
             return heart.parameters[key]
         name, _, rest = key.partition(".")
         changes = _by_section(heart.parameters).get(name)
-        try:
+        with self._explained(heart):
             section = self._section(name, changes) if changes else self._values[name]
-        except ValidationError:
-            raise self._error(heart) from None
         try:
             return _value(section, rest) if rest else section
         except AttributeError:
             return None  # a parameter of another law
 
-    def _error(self, heart: Combination) -> ConfigError:
-        """The error of a combination that is not valid, which names the key as the user writes it."""
-        where = f"{self.source}: {heart.origin or 'cases'}"
+    @contextmanager
+    def _explained(self, heart: Combination) -> Iterator[None]:
+        """Raise the error of a combination that is not valid in terms of the keys as the user writes them."""
         try:
+            yield
+        except ValidationError:
+            where = f"{self.source}: {heart.origin or 'cases'}"
             override(self._config, heart.parameters, where)
-        except ConfigError as error:
-            return error
-        return ConfigError(f"{where}: {heart.parameters} are not valid together: leave them out")
-
-    def _id(self, heart: Combination) -> str:
-        """Given id of a row, and hash of the other keys that differ."""
-        if heart.given_id and heart.parameters.keys() <= heart.own:
-            return heart.given_id
-        sections = _by_section(heart.parameters).items()
-        differing = frozenset[str]().union(*(self._differing_keys(name, changes) for name, changes in sections))
-        if heart.given_id:
-            differing -= heart.own
-        parameters = {key: value for key, value in heart.parameters.items() if key in differing}
-        return extended_id(heart.given_id, parameters) if heart.given_id else case_id(parameters)
+            raise ConfigError(f"{where}: {heart.parameters} are not valid together: leave them out") from None
 
     def _section(self, name: str, changes: dict[str, Any]) -> Any:
         """A section, or a key outside of sections, with some keys replaced."""

@@ -19,7 +19,7 @@ from pydantic import (
 from echotruth.config.limits import MAX_CASES, MAX_CONDITIONS, MAX_DRAWN_KEYS, MAX_TABLE_BYTES
 from echotruth.config.reading import ConfigError, read_text
 from echotruth.config.table import Table, TableError, parse
-from echotruth.section import Section, invalid
+from echotruth.section import Section, check, invalid
 
 Pair = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
 
@@ -54,8 +54,8 @@ class Distribution(Section):
     def _given(self, handler: Any) -> dict[str, Any]:
         return {key: value for key, value in handler(self).items() if value is not None}
 
-    @model_validator(mode="after")
-    def _check_kind(self) -> Distribution:
+    @check
+    def _check_kind(self) -> None:
         given = [kind for kind in KINDS if getattr(self, kind) is not None]
         if len(given) != 1:
             remedy = f"give one of {', '.join(KINDS)}"
@@ -63,10 +63,9 @@ class Distribution(Section):
         for key, needs in (("limits", "normal"), ("weights", "choice")):
             if getattr(self, key) is not None and given != [needs]:
                 raise invalid(key, getattr(self, key), f"applies to {needs}: leave it out")
-        return self
 
-    @model_validator(mode="after")
-    def _check_bounds(self) -> Distribution:
+    @check
+    def _check_bounds(self) -> None:
         for key in ("uniform", "log_uniform", "integers", "limits"):
             bounds = getattr(self, key)
             if bounds is not None and bounds[0] >= bounds[1]:
@@ -75,17 +74,15 @@ class Distribution(Section):
             raise invalid("log_uniform", self.log_uniform, "must have positive bounds")
         if self.normal is not None and self.normal[1] <= 0:
             raise invalid("normal", self.normal, "must be the mean and a positive standard deviation")
-        return self
 
-    @model_validator(mode="after")
-    def _check_weights(self) -> Distribution:
+    @check
+    def _check_weights(self) -> None:
         if self.weights is None or self.choice is None:
-            return self
+            return
         if len(self.weights) != len(self.choice):
             raise invalid("weights", self.weights, f"must have one entry for each of the {len(self.choice)} of choice")
         if not 0 < sum(self.weights) < 1e300:
             raise invalid("weights", self.weights, "must have a positive entry and a finite sum")
-        return self
 
 
 class Draw(Section):
@@ -175,18 +172,17 @@ class Cases(Section):
         except ConfigError as error:
             raise invalid("file", path, str(error).partition(": ")[2] or "cannot be read") from None
 
-    @model_validator(mode="after")
-    def _check_table(self) -> Cases:
+    @check
+    def _check_table(self) -> None:
         key, shown = ("table", self.table) if self.file is None else ("file", self.file)
         if self.table is None:
-            return self
+            return
         if len(self.table.encode()) > MAX_TABLE_BYTES:
             raise invalid(key, shown, f"must have at most {MAX_TABLE_BYTES // 2**20} MiB: give fewer rows or columns")
         try:
             parse(self.table)
         except TableError as error:
             raise invalid(key, shown, str(error)) from None
-        return self
 
     @model_serializer(mode="wrap")
     def _given(self, handler: Any) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +14,7 @@ from pydantic_core import PydanticUndefined
 from echotruth.config.allowed import allowed
 from echotruth.config.anatomy import HEART_PRESETS
 from echotruth.config.loading import validate
-from echotruth.section import Section, unit_of
+from echotruth.section import Section, dotted_values, meaning, shown_unit
 
 WIDTH = 110
 """Longest line of a comment."""
@@ -34,27 +33,18 @@ FIRST = (
 
 @dataclass(frozen=True)
 class Given:
-    """A key that a text gives.
-
-    Attributes
-    ----------
-    node : yaml.Node
-        Its value.
-    begin : int
-        Index of the end of the key in the text.
-    text : str
-        Its value as it is written, without the comment after it.
-    above : list of str
-        Lines of comment above it.
-    beside : str
-        Comment after it; "" if there is none.
-    """
+    """A key that a text gives."""
 
     node: yaml.Node
+    """Its value."""
     begin: int
+    """Index of the end of the key in the text."""
     text: str
+    """Its value as it is written, without the comment after it."""
     above: list[str]
+    """Lines of comment above it."""
     beside: str
+    """Comment after it; "" if there is none."""
 
 
 def commented(text: str, everything: bool = False) -> str:
@@ -82,14 +72,7 @@ def commented(text: str, everything: bool = False) -> str:
 
 
 class _Writer:
-    """Writes the keys of a text, and those that it does not give.
-
-    Parameters
-    ----------
-    text : str
-    everything : bool
-        Of :func:`commented`.
-    """
+    """Writes the keys of a text, and of those that it does not give all or the ones that most people want to see."""
 
     def __init__(self, text: str, everything: bool) -> None:
         self._text = text
@@ -97,19 +80,7 @@ class _Writer:
         self._following = _following()
 
     def section(self, section: Section, given: dict[str, Given], prefix: str, depth: int) -> list[str]:
-        """Lines of the keys of a section.
-
-        Parameters
-        ----------
-        section : Section
-            Its values.
-        given : dict
-            Key -> what the text gives of it.
-        prefix : str
-            Dotted key of the section, with a dot at its end.
-        depth : int
-            Number of sections that it lies in.
-        """
+        """Lines of the keys of a section at a depth, given what the text gives of each; `prefix` ends with a dot."""
         lines: list[str] = []
         for key in type(section).model_fields:
             block = self._key(section, key, given.get(key), f"{prefix}{key}", depth)
@@ -120,15 +91,7 @@ class _Writer:
         return lines
 
     def given(self, node: yaml.Node | None, begin: int) -> dict[str, Given]:
-        """Key -> what the text gives of it, with the comments around it.
-
-        Parameters
-        ----------
-        node : yaml.Node or None
-            A mapping.
-        begin : int
-            Index of the text from which on comments belong to its first key.
-        """
+        """Key -> what the text gives of it, with the comments around it; those of the first key start at `begin`."""
         if not isinstance(node, yaml.MappingNode):
             return {}
         found, last = {}, begin
@@ -173,10 +136,10 @@ class _Writer:
         inner = self.section(value, given, f"{dotted}.", depth + 1)
         if not inner:
             return []
-        meaning = " ".join((info.description or type(value).__doc__ or "").split())
+        about = meaning(info) or " ".join((type(value).__doc__ or "").split())
         beside = f"    {entry.beside}" if entry and entry.beside else ""
         head = f"{'  ' * depth}{dotted.rpartition('.')[2]}:{beside}"
-        return [*_above(entry, depth), *_indented(_wrapped(meaning), depth), head, *inner]
+        return [*_above(entry, depth), *_indented(_wrapped(about), depth), head, *inner]
 
 
 def _above(entry: Given | None, depth: int) -> list[str]:
@@ -202,27 +165,16 @@ def _end(node: yaml.Node) -> int:
 
 def _following() -> set[str]:
     """Dotted keys whose default differs between the presets of the heart."""
-    dumps = [dict(_flat(validate({"geometry": {"preset": name}}, name), "")) for name in HEART_PRESETS]
+    dumps = [dict(dotted_values(validate({"geometry": {"preset": name}}, name))) for name in HEART_PRESETS]
     return {key for key in dumps[0] if any(dump[key] != dumps[0][key] for dump in dumps)} - {"geometry.preset"}
-
-
-def _flat(section: Section, prefix: str) -> Iterator[tuple[str, Any]]:
-    for key in type(section).model_fields:
-        value = getattr(section, key)
-        if isinstance(value, Section):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
 
 
 def _explained(section: Section, key: str, is_default: bool) -> list[str]:
     """What a key means, its unit, what it may be, and its default."""
     info = type(section).model_fields[key]
-    unit = unit_of(key).replace("_per_", "/").replace("per_", "1/")
-    facts = [unit, allowed(type(section), key), _default(section, key, info, is_default)]
+    facts = [shown_unit(key), allowed(type(section), key), _default(section, key, info, is_default)]
     text = "; ".join(fact for fact in facts if fact)
-    meaning = " ".join((info.description or "").split())
-    return [*_wrapped(meaning), *_wrapped(f"[{text}]" if text else "")]
+    return [*_wrapped(meaning(info)), *_wrapped(f"[{text}]" if text else "")]
 
 
 def _default(section: Section, key: str, info: FieldInfo, is_default: bool) -> str:

@@ -62,19 +62,21 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
 
 def _mesh_of_motion(motion: Any) -> dict[str, Any]:
     """`geometry.file` of a motion from files that hold meshes too."""
-    if isinstance(motion, dict):
-        kind, file = motion.get("kind"), motion.get("file")
-        path = file.get("path") if isinstance(file, dict) else getattr(file, "path", None)
-    else:
-        kind, path = getattr(motion, "kind", None), getattr(getattr(motion, "file", None), "path", None)
-    holds_mesh = kind == "file" and isinstance(path, str) and not path.lower().endswith(ARRAY_SUFFIXES)
+    path = _value(_value(motion, "file"), "path")
+    holds_mesh = (
+        _value(motion, "kind") == "file" and isinstance(path, str) and not path.lower().endswith(ARRAY_SUFFIXES)
+    )
     return {"geometry.file": path} if holds_mesh else {}
 
 
 def _preset(values: dict[str, Any], name: str) -> str:
     """Preset of a section as text, even if invalid: the models refuse it later."""
-    section = values.get(name, {})
-    return str(section.get("preset") if isinstance(section, dict) else getattr(section, "preset", None))
+    return str(_value(values.get(name, {}), "preset"))
+
+
+def _value(section: Any, key: str) -> Any:
+    """Value of a key of a mapping or a model; None if it has none."""
+    return section.get(key) if isinstance(section, dict) else getattr(section, key, None)
 
 
 def _fill(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
@@ -95,11 +97,8 @@ def _with_default(section: Any, keys: list[str], default: Any) -> Any:
 
 def _length_scale(values: dict[str, Any]) -> float:
     """Field of view over the reference one; 1 if it is invalid, because the models refuse it later."""
-    bmode = values.get("bmode", {})
-    default = REFERENCE_FIELD_OF_VIEW_MM
-    side = bmode.get("field_of_view_mm") if isinstance(bmode, dict) else getattr(bmode, "field_of_view_mm", None)
-    side = default if side is None else side
-    return side / default if isinstance(side, int | float) and side > 0 else 1.0
+    side = _value(values.get("bmode", {}), "field_of_view_mm")
+    return side / REFERENCE_FIELD_OF_VIEW_MM if isinstance(side, int | float) and side > 0 else 1.0
 
 
 def _scale_trackers(values: dict[str, Any], scale: float) -> dict[str, Any]:

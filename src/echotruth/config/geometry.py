@@ -120,26 +120,24 @@ class Geometry(Section):
         return self if self.file else self.model_copy(update=self.lengths())
 
     @check
-    def _check_base_plane(self) -> Geometry:
+    def _check_base_plane(self) -> None:
         lengths = self.lengths()
         if abs(lengths["base_mm"]) >= lengths["endo_length_mm"]:
             remedy = f"must lie within +-endo_length_mm = {lengths['endo_length_mm']:g}"
             raise invalid("base_mm", lengths["base_mm"], remedy)
-        return self
 
     @check
-    def _check_keys_of_source(self) -> Geometry:
+    def _check_keys_of_source(self) -> None:
         if self.file is None:
             self._refuse(_FILE_KEYS, "applies to a wall read from a file: give geometry.file, or leave it out")
             if self.shape == "tube":
                 self._refuse(("apex_wall_mm",), "applies to the ellipsoid, because a tube has no apex: leave it out")
-            return self
+            return
         self._refuse(_ELLIPSOID_KEYS, "applies to the ellipsoid: leave it out, because geometry.file is given")
         if not self.remesh:
             self._refuse(_REMESH_KEYS, "needs remesh: true if the wall is read from a file")
         if self.sheet is not None and self.fibre is None:
             raise invalid("sheet", self.sheet, "needs the fibre directions too: give geometry.fibre")
-        return self
 
     def _refuse(self, keys: tuple[str, ...], remedy: str) -> None:
         fields = type(self).model_fields

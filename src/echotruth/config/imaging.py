@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, FiniteFloat
+from pydantic import BeforeValidator, Field, FiniteFloat
 
 from echotruth.section import Fraction, Positive, Section, check, invalid
 
@@ -105,18 +105,24 @@ class Rf(Section):
         return (self.focal_zones - 1) / 2 * self.focal_spacing_mm if self.transmit == "focused" else 0.0
 
     @check
-    def _check_foci(self) -> Rf:
+    def _check_foci(self) -> None:
         if self.focus_mm <= self.focal_half_span_mm:
             foci = f"its focal_zones = {self.focal_zones} foci, focal_spacing_mm = {self.focal_spacing_mm:g} apart"
             remedy = f"must exceed {self.focal_half_span_mm:g}, so that {foci}, lie in front of the array"
             raise invalid("focus_mm", self.focus_mm, remedy)
-        return self
 
     @check
-    def _check_keep(self) -> Rf:
+    def _check_keep(self) -> None:
         if len(set(self.keep)) < len(self.keep):
             raise invalid("keep", self.keep, "list each entry once")
-        return self
+
+
+Divisor = Annotated[int, Field(ge=1, le=64)]
+
+
+def _as_tuple(value: Any) -> Any:
+    """Convert a list, which YAML has, to the tuple that the strict model requires."""
+    return tuple(value) if isinstance(value, list) else value
 
 
 class Bmode(Section):
@@ -126,7 +132,7 @@ class Bmode(Section):
     """Side of the square image; the array is in the middle of its upper edge. Default: from `probe.preset`."""
     size_px: Annotated[int, Field(ge=32, le=4096)] = 512
     """Pixels along a side of the full image."""
-    downsampling: Annotated[tuple[Annotated[int, Field(ge=1, le=64)], ...], Field(min_length=1)] = (1, 2, 4)
+    downsampling: Annotated[tuple[Divisor, ...], Field(min_length=1), BeforeValidator(_as_tuple)] = (1, 2, 4)
     """Image sizes, as divisors of the full size."""
     dynamic_range_dB: Annotated[FiniteFloat, Field(gt=10, le=120)] = 55.0
     """Range of the log compression below the brightest echo of the clip."""
@@ -140,14 +146,13 @@ class Bmode(Section):
         return tuple(self.size_px // divisor for divisor in sorted(self.downsampling))
 
     @check
-    def _check_sizes(self) -> Bmode:
+    def _check_sizes(self) -> None:
         for divisor in self.downsampling:
             if self.size_px % divisor or self.size_px // divisor < 16:
                 remedy = f"every entry must divide size_px = {self.size_px} and leave 16 px or more"
                 raise invalid("downsampling", list(self.downsampling), remedy)
         if len(set(self.downsampling)) < len(self.downsampling):
             raise invalid("downsampling", list(self.downsampling), "entries must differ")
-        return self
 
 
 def standard_views() -> dict[str, View]:

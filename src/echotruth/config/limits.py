@@ -76,14 +76,12 @@ def _check_samples(config: Config) -> None:
     # Both ways, in samples per mm; the corners of the image are 1.12 times as deep.
     per_mm = 2 * 1.12 * probe.sampling_MHz * 1e3 / probe.sound_speed_m_per_s
     pairs = probe.elements * (probe.elements + 1) // 2
-    for number, most, what in (
+    frames, lines = config.loop.frames, config.rf.lines
+    amounts = (
         (pairs, MAX_ECHO_SAMPLES, f"{probe.elements} elements"),
-        (
-            config.loop.frames * config.rf.lines,
-            MAX_LINE_SAMPLES,
-            f"{config.loop.frames} frames of {config.rf.lines} lines",
-        ),
-    ):
+        (frames * lines, MAX_LINE_SAMPLES, f"{frames} frames of {lines} lines"),
+    )
+    for number, most, what in amounts:
         if number * side * per_mm > most:
             remedy = f"must be at most {most / number / per_mm:.3g} with {what} sampled at {probe.sampling_MHz:g} MHz"
             raise invalid("bmode.field_of_view_mm", side, remedy)
@@ -102,12 +100,10 @@ def _check_scatterers(config: Config) -> None:
 
 def _tissue_mm3(config: Config) -> float:
     """Estimate of the volume that is filled with scatterers, each part times its density relative to muscle, mm^3."""
-    blood, surroundings, volume = config.realism.blood, config.realism.surroundings, 0.0
-    if config.geometry.file is None:
-        cavity, whole = ventricle_mm3(
-            config.geometry.lengths(), config.geometry.scale * max(config.geometry.dilation, 1)
-        )
-        volume = (whole - cavity) * max(config.geometry.hypertrophy, 1)
+    blood, surroundings, geometry, volume = config.realism.blood, config.realism.surroundings, config.geometry, 0.0
+    if geometry.file is None:
+        cavity, whole = ventricle_mm3(geometry.lengths(), geometry.scale * max(geometry.dilation, 1))
+        volume = (whole - cavity) * max(geometry.hypertrophy, 1)
         volume += cavity * blood.density if blood.level_dB is not None else 0
     if surroundings.level_dB is not None:
         volume += surroundings.density * _imaged_mm3(config)

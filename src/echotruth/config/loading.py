@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from reprlib import Repr
-from typing import Any, get_args, get_origin
+from typing import Any, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 from echotruth.config.reading import ConfigError, Errors, check_size, read_yaml, shown_key
 from echotruth.config.sections import Config
 from echotruth.materials import Material
-from echotruth.section import Section, discriminator, variants
+from echotruth.section import Section, discriminator, section_in, variants
 
 __all__ = ["ConfigError", "load", "override", "read_yaml", "replace_values", "validate"]
 
@@ -43,7 +43,7 @@ def validate(values: dict[str, Any], source: str) -> Config:
     if isinstance(values, dict):
         check_size(values, source)
     try:
-        return Config.model_validate(_with_tuples(_without_empty(values, Config)))
+        return Config.model_validate(_without_empty(values, Config))
     except ValidationError as error:
         errors = Errors()
         for each in _distinct(error.errors()):
@@ -87,15 +87,6 @@ def _without_empty(values: Any, model: type[BaseModel]) -> Any:
     return found
 
 
-def _with_tuples(values: Any) -> Any:
-    """Convert `bmode.downsampling` to the tuple that the strict model requires; YAML has only lists."""
-    if isinstance(values, dict) and isinstance(values.get("bmode"), dict):
-        bmode = values["bmode"]
-        if isinstance(bmode.get("downsampling"), list):
-            return values | {"bmode": bmode | {"downsampling": tuple(bmode["downsampling"])}}
-    return values
-
-
 def _distinct(errors: list[ErrorDetails]) -> list[ErrorDetails]:
     """One error of each value: pydantic tells one for each type that it may have."""
     found: dict[tuple[Any, ...], ErrorDetails] = {}
@@ -120,7 +111,7 @@ def _message(error: ErrorDetails) -> str:
     if error["type"] in _UNKNOWN_VARIANT:
         selector = discriminator(sections)
         value = _shown_value(error["input"][selector])
-        return f"{shown_key(keys)}.{selector} = {value}: should be {_alternatives(sections)}"
+        return f"{shown_key(keys)}.{selector} = {value}: should be {_joined([repr(name) for name in sections])}"
     dotted_key = shown_key(keys)
     if error["type"] == "extra_forbidden":
         return f"{dotted_key} is not a key{_variant(model, sections)}{_suggestion(keys, model, bool(sections))}"
@@ -240,13 +231,9 @@ def _dotted_keys(model: type[BaseModel], prefix: str) -> Iterator[str]:
     for key, field in model.model_fields.items():
         yield f"{prefix}{key}"
         name = "NAME." if get_origin(field.annotation) is dict else ""
-        section = _section_of(field.annotation)
+        section = section_in(field.annotation)
         for inner in variants(field.annotation).values() or ([section] if section else []):
             yield from _dotted_keys(inner, f"{prefix}{key}.{name}")
-
-
-def _alternatives(names: Iterable[str]) -> str:
-    return _joined([repr(name) for name in names])
 
 
 def _joined(names: list[str]) -> str:
@@ -268,18 +255,10 @@ def _locate(location: list[Any]) -> tuple[list[Any], type[BaseModel], dict[str, 
         if part not in model.model_fields:
             continue
         annotation = model.model_fields[part].annotation
-        sections, model = variants(annotation), _section_of(annotation) or model
+        sections, model = variants(annotation), section_in(annotation) or model
         # Views and trackers have names that the user chose; their section is that of the mapping.
         if get_origin(annotation) is dict and (name := next(parts, None)) is not None:
             keys.append(name)
         if sections and (variant := next(parts, None)) is not None:
             model = sections[variant]
     return keys, model, sections
-
-
-def _section_of(annotation: Any) -> Any:
-    """Section in an annotation such as `dict[str, View]`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    sections = [_section_of(inner) for inner in get_args(annotation)]
-    return next((section for section in sections if section is not None), None)

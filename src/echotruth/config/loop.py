@@ -38,18 +38,16 @@ class Loop(Section):
     """Frames of one cycle; frame 0 is end-diastole."""
 
     @check
-    def _ejects(self) -> Loop:
+    def _ejects(self) -> None:
         if self.edv_uL is not None and self.esv_uL is not None and self.esv_uL >= self.edv_uL:
             raise invalid("esv_uL", self.esv_uL, f"must be smaller than edv_uL = {self.edv_uL}")
         if self.edp_mmHg is not None and self.esp_mmHg is not None and self.esp_mmHg <= self.edp_mmHg:
             raise invalid("esp_mmHg", self.esp_mmHg, f"must be greater than edp_mmHg = {self.edp_mmHg}")
-        return self
 
     @check
-    def _maps_what_it_prescribes(self) -> Loop:
+    def _maps_what_it_prescribes(self) -> None:
         for key in ("edv_uL", "esv_uL", "edp_mmHg", "esp_mmHg"):
             missing = "volume" if key.endswith("uL") else "pressure"
             value, given = getattr(self, key), {"volume": "pressure", "pressure": "volume"}[missing]
             if self.prescribed == given and value is not None:
                 raise invalid(key, value, f"must be left out, because loop.prescribed = {given} gives no {missing}")
-        return self

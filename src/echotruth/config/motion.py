@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat
 
-from echotruth.section import Fraction, Section, invalid
+from echotruth.section import Fraction, Section, check, invalid
 
 Kind = Literal["beat", "rigid", "affine", "tube", "file"]
 TimeCourse = Literal["cosine", "triangle", "ramp"]
@@ -43,8 +43,8 @@ class Affine(Section):
     position: Fraction = 0.5
     """Fixed point on the long axis: 0 at the base, 1 at the endocardial apex, as `position` of a view."""
 
-    @model_validator(mode="after")
-    def _check_eigenvalues(self) -> Affine:
+    @check
+    def _check_eigenvalues(self) -> None:
         # F = I + a (A - I) becomes singular at some fraction a of the motion if A has a real eigenvalue <= 0.
         values = np.linalg.eigvals(self.gradient)
         smallest = min((value.real for value in values if abs(value.imag) < _IMAGINARY_TOLERANCE), default=1.0)
@@ -54,7 +54,6 @@ class Affine(Section):
                 "must be positive (for a rotation by 180 degrees use rigid)"
             )
             raise invalid("gradient", self.gradient, remedy)
-        return self
 
 
 class TubeMotion(Section):
@@ -94,16 +93,15 @@ class FileMotion(Section):
     """Frame of end-diastole, counted from 0 in the series. Default: that with the largest cavity, the first
     of them while the valves are closed."""
 
-    @model_validator(mode="after")
-    def _check_frames(self) -> FileMotion:
+    @check
+    def _check_frames(self) -> None:
         if self.frames is None:
-            return self
+            return
         first, last = self.frames
         if last <= first:
             raise invalid("frames", self.frames, "must be the first and, after it, the last frame of the cycle")
         if self.ed_frame is not None and not first <= self.ed_frame <= last:
             raise invalid("ed_frame", self.ed_frame, f"must be one of the frames {first} to {last}")
-        return self
 
 
 class Motion(Section):

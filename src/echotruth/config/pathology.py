@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, FiniteFloat, model_validator
+from pydantic import BeforeValidator, Field, FiniteFloat
 
-from echotruth.section import Fraction, Positive, Section, invalid
+from echotruth.section import Fraction, Positive, Section, check, invalid
 
 
 def _integer(key: Any) -> Any:
@@ -38,13 +38,12 @@ class Infarct(Section):
     border_mm: Annotated[FiniteFloat, Field(ge=0)] = 0.0
     """Width of the border zone, in which both factors return linearly to 1 (Lee 2011)."""
 
-    @model_validator(mode="after")
-    def _check_region(self) -> Infarct:
+    @check
+    def _check_region(self) -> None:
         if self.segments is not None and self.radius_mm is not None:
             raise invalid("radius_mm", self.radius_mm, "give either segments or radius_mm and set the other to null")
         if self.segments is not None and len(set(self.segments)) < len(self.segments):
             raise invalid("segments", self.segments, "list each segment once")
-        return self
 
 
 class LateActivation(Section):
@@ -59,11 +58,10 @@ class LateActivation(Section):
     scale: Annotated[FiniteFloat, Field(ge=0, le=100)] = 1.0
     """Factor on all delays; about 9 for the preset in a human heart."""
 
-    @model_validator(mode="after")
-    def _check_delays(self) -> LateActivation:
+    @check
+    def _check_delays(self) -> None:
         if self.preset is not None and self.delay_ms:
             raise invalid("delay_ms", self.delay_ms, "give either preset or delay_ms and leave the other out")
-        return self
 
 
 class Pathology(Section):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, FiniteFloat
 
-from echotruth.section import Angle, Fraction, Section, invalid
+from echotruth.section import Angle, Fraction, Section, check, invalid
 
 
 class Physiology(Section):
@@ -93,11 +93,10 @@ class Physiology(Section):
     tei_index_max: Annotated[FiniteFloat, Field(ge=0)] | None = 0.8
     """Largest Tei index; 0.7 in mice and rats after an infarction (the same studies)."""
 
-    @model_validator(mode="after")
-    def _check_order(self) -> Physiology:
+    @check
+    def _check_order(self) -> None:
         for lower_key in type(self).model_fields:
             upper_key = lower_key.replace("_min", "_max")
             lower, upper = getattr(self, lower_key), getattr(self, upper_key, None)
             if lower_key != upper_key and lower is not None and upper is not None and lower >= upper:
                 raise invalid(lower_key, lower, f"must be smaller than {upper_key} = {upper:g}")
-        return self

@@ -60,7 +60,7 @@ class Config(Section):
         return apply_presets(values) if isinstance(values, dict) else values
 
     @check
-    def _check_lengths(self) -> Config:
+    def _check_lengths(self) -> None:
         side, rf = self.bmode.field_of_view_mm, self.rf
         for name, tracker in self.tracking.trackers.items():
             self._check_tracker(f"tracking.trackers.{name}", tracker)
@@ -76,7 +76,6 @@ class Config(Section):
             foci = f"its focal_zones = {rf.focal_zones} foci, focal_spacing_mm = {rf.focal_spacing_mm:g} apart"
             remedy = f"must be smaller than {side - rf.focal_half_span_mm:g}, so that {foci}, lie in the field of view"
             raise invalid("rf.focus_mm", rf.focus_mm, remedy)
-        return self
 
     def _check_tracker(self, path: str, tracker: Section) -> None:
         smallest, side = self.bmode.sizes[-1], self.bmode.field_of_view_mm
@@ -89,34 +88,31 @@ class Config(Section):
                 raise invalid(f"{path}.{key}", length, f"must not exceed bmode.field_of_view_mm = {side:g}")
 
     @check
-    def _check_view_names(self) -> Config:
+    def _check_view_names(self) -> None:
         if ALL_VIEWS in self.views:
             remedy = "is the name of the mean over all views in the leaderboard: give the view another name"
             raise invalid("views", ALL_VIEWS, remedy)
-        return self
 
     @check
-    def _check_focus(self) -> Config:
+    def _check_focus(self) -> None:
         radius = 0.0 if self.geometry.file else self.geometry.outer_radius_mm()
         if self.rf.focus_mm <= radius:
             remedy = f"must exceed {radius:g}, the radius of the heart, whose axis is at the focus"
             raise invalid("rf.focus_mm", self.rf.focus_mm, remedy)
-        return self
 
     @check
-    def _check_shape(self) -> Config:
+    def _check_shape(self) -> None:
         kind, shape = self.motion.kind, self.geometry.shape
         if kind == "tube" and shape != "tube":
             raise invalid("motion.kind", kind, "needs geometry.shape = tube")
         if shape == "tube" and kind == "beat":
             remedy = "has no closed cavity and cannot beat: set motion.kind to rigid, affine or tube"
             raise invalid("geometry.shape", shape, remedy)
-        return self
 
     @check
-    def _check_motion_file(self) -> Config:
+    def _check_motion_file(self) -> None:
         if self.motion.kind != "file":
-            return self
+            return
         path, rate = self.motion.file.path, self.loop.heart_rate_per_min
         if path is None:
             remedy = "must be given with motion.kind = file: the files of the series, such as heart_*.vtu or heart.pvd"
@@ -129,10 +125,9 @@ class Config(Section):
         if rate is None:
             remedy = "must be given with motion.kind = file: 60000 over the period in ms, which the series is scaled to"
             raise invalid("loop.heart_rate_per_min", None, remedy)
-        return self
 
     @check
-    def _check_tissues(self) -> Config:
+    def _check_tissues(self) -> None:
         for name, tissue in {"blood": self.realism.blood, "surroundings": self.realism.surroundings}.items():
             key, level = f"realism.{name}.level_dB", tissue.level_dB
             if self.phantom.in_plane_only and level is not None:
@@ -141,28 +136,25 @@ class Config(Section):
             if self.geometry.shape == "tube" and level is not None:
                 remedy = "must be null if geometry.shape is tube, because an open tube has no closed cavity"
                 raise invalid(key, level, remedy)
-        return self
 
     @check
-    def _check_width(self) -> Config:
+    def _check_width(self) -> None:
         length, width = self.probe.elements * self.probe.pitch_um / 1e3, self.rf.width_mm
         if self.rf.scan == "linear" and width is not None and width > length:
             raise invalid("rf.width_mm", width, f"must not exceed {length:g}, the length of the array")
-        return self
 
     @check
-    def _check_fibres(self) -> Config:
+    def _check_fibres(self) -> None:
         if self.fibres.source == "file" and self.geometry.fibre is None:
             remedy = "give the name of the array in the mesh file as geometry.fibre, or set this key to rule"
             raise invalid("fibres.source", self.fibres.source, remedy)
-        return self
 
     @check
-    def _check_stiffness(self) -> Config:
+    def _check_stiffness(self) -> None:
         key, stiffness = "mechanics.material.stiffness_kPa", self.mechanics.material.stiffness_kPa
         prescribed, end_diastolic = self.loop.prescribed, self.geometry.given_state == "end_diastole"
         if self.motion.kind != "beat":
-            return self
+            return
         if prescribed != "pressure_volume" and stiffness is None:
             raise invalid(
                 key, None, f"must be given, because it cannot be solved for with loop.prescribed = {prescribed}"
@@ -173,9 +165,7 @@ class Config(Section):
         if end_diastolic and prescribed == "volume":
             remedy = "needs geometry.given_state = unloaded, because there is no pressure to unload from"
             raise invalid("loop.prescribed", prescribed, remedy)
-        return self
 
     @check
-    def _check_amounts(self) -> Config:
+    def _check_amounts(self) -> None:
         check_amounts(self)
-        return self

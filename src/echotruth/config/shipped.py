@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from difflib import get_close_matches
+from itertools import takewhile
 from pathlib import Path
 
 FOLDERS = (Path(__file__).parents[1] / "examples", Path(__file__).parents[3] / "config")
@@ -44,10 +45,5 @@ def meant(path: Path) -> str:
 def summary(name: str) -> str:
     """First sentence of the comment at the head of a shipped configuration."""
     lines = path_of(name).read_text(encoding="utf-8").splitlines()
-    head = " ".join(line.removeprefix("#").strip() for line in lines[: _height(lines)])
+    head = " ".join(line.removeprefix("#").strip() for line in takewhile(lambda line: line.startswith("#"), lines))
     return textwrap.shorten(re.split(r"(?<=\.)\s", head, maxsplit=1)[0].rstrip("."), 110, placeholder=" ...")
-
-
-def _height(lines: list[str]) -> int:
-    """Number of lines of the comment at the head."""
-    return next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))

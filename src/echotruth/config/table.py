@@ -19,21 +19,14 @@ class TableError(ValueError):
 
 @dataclass(frozen=True)
 class Table:
-    """Cells of a table.
-
-    Attributes
-    ----------
-    columns : tuple of str
-        Their names.
-    cells : list of tuple of str
-        Cells of each row, without blanks around them; rows without any are left out.
-    numbers : list of int
-        Number of each row in the file: 1 is the first below the names of the columns.
-    """
+    """Cells of a table."""
 
     columns: tuple[str, ...]
+    """Their names."""
     cells: list[tuple[str, ...]]
+    """Cells of each row, without blanks around them; rows without any are left out."""
     numbers: list[int]
+    """Number of each row in the file: 1 is the first below the names of the columns."""
 
     @property
     def keys(self) -> list[str]:

@@ -6,10 +6,10 @@ import re
 from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
-from pydantic import BeforeValidator, Discriminator, Field, FiniteFloat, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, FiniteFloat, Tag
 
 from echotruth.config.limits import MAX_TRACKERS
-from echotruth.section import Name, Positive, Section, invalid
+from echotruth.section import Name, Positive, Section, check, invalid
 
 Reference = Annotated[
     Literal["ED", "previous", "bidirectional"],
@@ -52,11 +52,10 @@ class PhaseCorrelation(Section):
     dynamic_range_dB: DynamicRange = 0.0
     reference: Reference = "ED"
 
-    @model_validator(mode="after")
-    def _one_window(self) -> PhaseCorrelation:
+    @check
+    def _one_window(self) -> None:
         if (self.window_px is None) == (self.window_mm is None):
             raise invalid("window_mm", self.window_mm, "give either window_px or window_mm and set the other to null")
-        return self
 
 
 class WindowDeformation(Section):
@@ -174,8 +173,8 @@ class External(Section):
     options: Annotated[dict[str, Any], BeforeValidator(parse_numbers)] = Field(default={})
     """Keyword arguments of the callable, or entries of the program's .npz; text such as 1e-3 is a number."""
 
-    @model_validator(mode="after")
-    def _track_or_command(self) -> External:
+    @check
+    def _track_or_command(self) -> None:
         if (self.track is None) == (self.command is None):
             raise invalid("track", self.track, "give either track or command")
         if self.track is not None and not _is_callable_name(self.track):
@@ -183,10 +182,9 @@ class External(Section):
         for file in ("{input}", "{output}") if self.command else ():
             if not any(file in word for word in self.command or ()):
                 raise invalid("command", self.command, f"must contain {file} where the path of that file belongs")
-        return self
 
-    @model_validator(mode="after")
-    def _valid_options(self) -> External:
+    @check
+    def _valid_options(self) -> None:
         for key, value in self.options.items():
             remedy = ""
             if key in TRACKER_ARGUMENTS:
@@ -199,7 +197,6 @@ class External(Section):
                 )
             if remedy:
                 raise invalid(f"options.{key}", value, remedy)
-        return self
 
 
 def _is_callable_name(track: str) -> bool:

@@ -7,30 +7,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Array:
-    """Description of one array of the repository.
-
-    Attributes
-    ----------
-    name : str
-        In its group.
-    dims : tuple of str
-        Names of the dimensions, in order.
-    dtype : str
-    units : str
-        SI, as UDUNITS writes them; "1" for dimensionless numbers, "mixed" where a coordinate has the unit of each.
-    long_name : str
-        Content, for readers and plots.
-    quantum : float or "pixel/256", optional
-        Stored values are multiples of it, a power of two in the unit of the array, or the power of two that
-        :func:`echotruth.repository.rounding.length_quantum` gives; None if they are stored as they are computed.
-    """
+    """Description of one array of the repository."""
 
     name: str
+    """In its group."""
     dims: tuple[str, ...]
+    """Names of the dimensions, in order."""
     dtype: str
     units: str
+    """SI, as UDUNITS writes them; "1" for dimensionless numbers, "mixed" where a coordinate has the unit of each."""
     long_name: str
+    """Content, for readers and plots."""
     quantum: float | str | None = None
+    """Stored values are multiples of it, a power of two in the unit of the array, or the power of two that
+    :func:`echotruth.repository.rounding.length_quantum` gives; None if they are stored as they are computed."""
 
     @property
     def leading(self) -> int:
@@ -48,13 +38,6 @@ class Array:
         return fills.get(self.dtype[0], 0)
 
 
-def array(
-    name: str,
-    dims: str,
-    dtype: str,
-    units: str,
-    long_name: str,
-    quantum: float | str | None = None,
-) -> Array:
+def array(name: str, dims: str, dtype: str, units: str, long_name: str, quantum: float | str | None = None) -> Array:
     """Description of an array whose dimensions are given as one string."""
     return Array(name, tuple(dims.split()), dtype, units, long_name, quantum)

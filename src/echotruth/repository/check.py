@@ -19,7 +19,7 @@ from echotruth.repository.check_structure import (
     check_others,
     check_registries,
     check_structure,
-    strangers,
+    unrecorded_files,
 )
 from echotruth.repository.inventory import Fault, JobRecord, Repository
 from echotruth.repository.ledger import GATES
@@ -27,37 +27,24 @@ from echotruth.repository.ledger import GATES
 
 @dataclass
 class Report:
-    """Result of a check.
-
-    Attributes
-    ----------
-    faults : list of Fault
-    notes : list of str
-        What is to be known and is no damage, such as jobs that were not run yet.
-    files, jobs : int
-        Number of checked files, and of records.
-    """
+    """Result of a check."""
 
     faults: list[Fault] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    """What is to be known and is no damage, such as jobs that were not run yet."""
     files: int = 0
+    """Number of checked files."""
     jobs: int = 0
+    """Number of records."""
 
 
-def check(
-    folder: Path,
-    threads: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
-    quick: bool = False,
-) -> Report:
-    """Check a repository to the end.
+def check(folder: Path, progress: Callable[[int, int], None] | None = None, quick: bool = False) -> Report:
+    """Check a repository to the end, by as many threads as there are cores.
 
     Parameters
     ----------
     folder : Path
         Folder of the repository, `out/NAME`.
-    threads : int, optional
-        Default: as many as cores.
     progress : callable, optional
         Called with the number of records that are done, and of all.
     quick : bool, optional
@@ -69,7 +56,7 @@ def check(
         If the folder is not a repository.
     """
     repository, report = Repository(folder), Report()
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         structure, report.faults = check_structure(repository, pool)
         is_whole = not report.faults
         report.faults += check_others(repository)
@@ -95,7 +82,7 @@ def check(
         report.faults += [
             fault for faults in pool.map(lambda one: check_loop(repository, one), solved) for fault in faults
         ]
-    report.faults += strangers(repository, listed, structure)
+    report.faults += unrecorded_files(repository, listed, structure)
     report.faults.sort(key=lambda fault: fault.path)
     report.notes = _notes(repository, records)
     report.files += len(structure or ())

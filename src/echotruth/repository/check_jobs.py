@@ -80,12 +80,9 @@ def _fault_of_value(repository: Repository, job: JobRecord, group: str, name: st
     packs = {member: pack.array.name for pack in packs_of(group) for member in pack.names}
     text = f"{name} {problem}" if name in packs else problem
     path = f"{repository.name(repository.store)}/{group}/{packs.get(name, name)}"
-    return Fault(path, f"{text} ({job.job})", _not_healed(repository.name(job.path)))
-
-
-def _not_healed(record: str) -> str:
-    """Remedy for values that are as their job wrote them."""
-    return f"look at the configuration, or delete {record} and run again if it was made by other code"
+    record = repository.name(job.path)
+    remedy = f"look at the configuration, or delete {record} and run again if it was made by other code"
+    return Fault(path, f"{text} ({job.job})", remedy)
 
 
 def _read_record(job: JobRecord) -> tuple[dict[str, Any] | None, str]:
@@ -143,20 +140,13 @@ def _check_values(
         }
         if any(array is None for array in opened.values()):
             continue  # its metadata are damaged
-        found: dict[tuple[str, str], None] = {}
+        found: dict[str, str] = {}  # the first problem of each array: that of the first part of its frames
         labels = repository.pack_labels(group)
         for first, part in _blocks(group, {name: array for name, array in opened.items() if array is not None}, row):
             named = packing.unpack(packs_of(group), part, labels)
-            found |= dict.fromkeys(values.faults(group, named, first, config))
-        yield from ((group, name, problem) for name, problem in _first_of_each(found))
-
-
-def _first_of_each(found: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """The first problem of each array: that of the first part of its frames."""
-    first: dict[str, str] = {}
-    for name, problem in found:
-        first.setdefault(name, problem)
-    yield from first.items()
+            for name, problem in values.faults(group, named, first, config):
+                found.setdefault(name, problem)
+        yield from ((group, name, problem) for name, problem in found.items())
 
 
 def _blocks(

@@ -101,23 +101,15 @@ def check_metadata(repository: Repository) -> Iterator[Fault]:
 
 def _metadata_problem(opened: zarr.Array[Any], array: Array, repository: Repository) -> str:
     """How the metadata of an array differ from the schema; empty if they do not."""
-    found = {
-        "dimensions": tuple(getattr(opened.metadata, "dimension_names", None) or ()),
-        "type": str(opened.dtype),
-        "units": opened.attrs.get("units"),
-        "long_name": opened.attrs.get("long_name"),
-        "quantum": opened.attrs.get("quantum"),
-        "rows": opened.shape[0] >= len(repository.cases),
+    pairs = {
+        "dimensions": (tuple(getattr(opened.metadata, "dimension_names", None) or ()), array.dims),
+        "type": (str(opened.dtype), array.dtype),
+        "units": (opened.attrs.get("units"), array.units),
+        "long_name": (opened.attrs.get("long_name"), array.long_name),
+        "quantum": (opened.attrs.get("quantum"), array.quantum),
+        "rows": (opened.shape[0] >= len(repository.cases), True),
     }
-    right = {
-        "dimensions": array.dims,
-        "type": array.dtype,
-        "units": array.units,
-        "long_name": array.long_name,
-        "quantum": array.quantum,
-        "rows": True,
-    }
-    return next((f"has {key} {found[key]!r}, not {right[key]!r}" for key in right if found[key] != right[key]), "")
+    return next((f"has {key} {found!r}, not {right!r}" for key, (found, right) in pairs.items() if found != right), "")
 
 
 def _check_times(repository: Repository) -> Iterator[Fault]:
@@ -136,7 +128,7 @@ Listed = dict[tuple[str, tuple[int, ...]], frozenset[str]]
 """Stage and row of a job -> arrays of which its record lists the shard."""
 
 
-def strangers(repository: Repository, listed: Listed, structure: set[str] | None) -> Iterator[Fault]:
+def unrecorded_files(repository: Repository, listed: Listed, structure: set[str] | None) -> Iterator[Fault]:
     """Files that belong to no record; those of jobs that have none yet are left out."""
     for path in files_below(repository.store):
         file = repository.store / path

@@ -50,11 +50,7 @@ def verify(root: Path, path: Path, record: dict[str, Any]) -> int:
     ChecksumError
         If a file is missing or differs.
     """
-    for name, expected in record.get("sha256", {}).items():
-        file = root / name
-        if not is_whole(file, expected):
-            raise ChecksumError(f"{file}: is missing or differs from what was written: delete {path} and run again")
-    return len(record.get("sha256", {}))
+    return _compare(root, record.get("sha256", {}), f"written: delete {path} and run again")
 
 
 def verify_structure(root: Path, path: Path) -> int:
@@ -77,13 +73,18 @@ def verify_structure(root: Path, path: Path) -> int:
     ChecksumError
         If the record is missing or damaged, or a file is missing or differs.
     """
+    remedy = "run again, which lays the repository out anew"
     try:
         expected = dict(ledger.read(path)["sha256"])
     except (OSError, ValueError, KeyError, TypeError):
-        raise ChecksumError(f"{path}: is missing or damaged: run again, which lays the repository out anew") from None
+        raise ChecksumError(f"{path}: is missing or damaged: {remedy}") from None
+    return _compare(root, expected, f"laid out: {remedy}")
+
+
+def _compare(root: Path, expected: dict[str, str], origin: str) -> int:
+    """Number of files that have their checksum, as all must; `origin` ends the error of one that has not."""
     for name, checksum in expected.items():
         file = root / name
         if not is_whole(file, checksum):
-            remedy = "run again, which lays the repository out anew"
-            raise ChecksumError(f"{file}: is missing or differs from what was laid out: {remedy}")
+            raise ChecksumError(f"{file}: is missing or differs from what was {origin}")
     return len(expected)

@@ -79,8 +79,7 @@ def _make_folder(folder: Path) -> set[Path]:
 
 def link(source: Path, target: Path) -> None:
     """Give a file a second name, or copy it where the file system has no links; the target is replaced as a whole."""
-    new = [folder for folder in target.parents if not folder.exists()]
-    target.parent.mkdir(parents=True, exist_ok=True)
+    folders = _make_folder(target.parent)
     draft = target.with_name(f"{target.name}.{uuid4().hex}.partial")
     try:
         os.link(source, draft)
@@ -89,7 +88,7 @@ def link(source: Path, target: Path) -> None:
         sync(draft)
     draft.replace(target)
     draft.unlink(missing_ok=True)  # a link is not moved onto another link to the same data
-    sync(target.parent, *(folder.parent for folder in new))  # a folder holds the names of those in it
+    sync(*folders)
 
 
 @contextmanager

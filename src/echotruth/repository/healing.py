@@ -83,8 +83,8 @@ def remake(folder: Path, config: Config, make: Callable[[list[str]], int]) -> in
         return 0
     cases = [case.id for case in expand(config)]
     wanted = {*wanted_records(folder, cases, list(config.views)), folder / PUBLICATION}
-    for stages in (*RULES, (PUBLICATION,)):
-        known = {path: entry for path, entry in _known(folder).items() if _stage(path) in stages}
+    for stages in (*RULES, (Path(PUBLICATION).name,)):
+        known = {path: entry for path, entry in _known(folder).items() if Path(path).parts[1] in stages}
         missing = sorted(
             str(folder / path) for path in known if folder / path in wanted and not (folder / path).is_file()
         )
@@ -141,10 +141,6 @@ def _entry_of_files(repository: Repository, record: JobRecord) -> Entry:
 
 def _hash(content: dict[str, Any]) -> str:
     return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _stage(path: str) -> str:
-    return PUBLICATION if path == PUBLICATION else Path(path).parts[1]
 
 
 def _known(folder: Path) -> Known:

@@ -26,27 +26,18 @@ class CheckError(ValueError):
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that is not as it should be.
-
-    Attributes
-    ----------
-    path : str
-        Of the file, below the folder of the repository.
-    problem : str
-        What is wrong with it.
-    remedy : str
-        What heals it.
-    records : tuple of Path
-        Records to drop, so that their jobs run again.
-    files : tuple of Path
-        Files to delete.
-    """
+    """Something that is not as it should be."""
 
     path: str
+    """Of the file, below the folder of the repository."""
     problem: str
+    """What is wrong with it."""
     remedy: str
+    """What heals it."""
     records: tuple[Path, ...] = ()
+    """Records to drop, so that their jobs run again."""
     files: tuple[Path, ...] = ()
+    """Files to delete."""
 
     def __str__(self) -> str:
         return f"{self.path}: {self.problem}: {self.remedy}"
@@ -102,7 +93,7 @@ class Repository:
         self.publication_record = folder / "ledger/repository.json"
         self.groups = schema.groups(self.config)
 
-        self.rows, self.views = _registered(folder / "registry.txt"), _registered(folder / "views.txt")
+        self.rows, self.views = ledger.rows(folder / "registry.txt"), ledger.rows(folder / "views.txt")
         if self.is_older:
             self.views = {view: index for index, view in enumerate(self.config.views)}
 
@@ -178,7 +169,7 @@ class Repository:
 
 
 def wanted_records(folder: Path, cases: list[str], views: list[str]) -> list[Path]:
-    """Paths of the records of all jobs of some cases and views."""
+    """Paths of the records of all jobs of some cases and views, those of the gates first."""
     gates = [record_path(folder, stage, case) for stage in GATES for case in cases]
     return gates + [record_path(folder, stage, case, view) for stage in VIEW_STAGES for case in cases for view in views]
 
@@ -189,14 +180,6 @@ def files_below(folder: Path) -> Iterator[str]:
     for parent, _, names in os.walk(folder):
         below = parent[length:].replace(os.sep, "/")
         yield from (f"{below}/{name}" if below else name for name in names)
-
-
-def _registered(registry: Path) -> dict[str, int]:
-    """Rows of a registry; none if it cannot be read."""
-    try:
-        return ledger.rows(registry)
-    except ValueError:
-        return {}
 
 
 def reason(error: BaseException) -> str:

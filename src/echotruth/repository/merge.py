@@ -18,7 +18,7 @@ from echotruth.repository import durable, ledger
 from echotruth.repository.checksums import ChecksumError, verify
 from echotruth.repository.equivalence import first_difference
 from echotruth.repository.inventory import JobRecord, Repository
-from echotruth.section import Section
+from echotruth.section import Section, value_of
 
 OWN = ("name", "cases")
 """Keys in which repositories that are merged may differ."""
@@ -64,7 +64,7 @@ def _joint_grid(configs: list[Config]) -> dict[str, list[Any]]:
     for key in keys:
         cases[key] = []
         for config in configs:
-            values = config.cases.grid.get(key, [_value(config, key)])
+            values = config.cases.grid.get(key, [value_of(config, key)])
             cases[key] += [value for value in values if value not in cases[key]]
     return cases
 
@@ -182,14 +182,6 @@ def _difference(first: Section, second: Section, prefix: str = "") -> str:
     return ""
 
 
-def _value(config: Config, key: str) -> Any:
-    """Value of a dotted key without the sweep."""
-    value: Any = config
-    for part in key.split("."):
-        value = getattr(value, part)
-    return value
-
-
 def _records(repository: Repository) -> list[JobRecord]:
     """Records of the cases and views of the configuration."""
     views = (None, *repository.config.views)
@@ -237,13 +229,9 @@ def _copy(record: JobRecord, giving: Repository, receiving: Repository) -> None:
     paths = list(_renamed(record, giving, receiving))
     for old, new, _ in paths:
         durable.link(giving.store / old, receiving.store / new)
-    target = _in(record, giving, receiving)
-    ledger.commit(target, ledger.read(record.path) | _checksums(record, paths))
+    target, entries = _in(record, giving, receiving), ledger.read(record.path)
+    if "sha256" in entries:
+        entries["sha256"] = {new: hash for _, new, hash in paths}
+    ledger.commit(target, entries)
     time = record.path.stat().st_mtime_ns
     os.utime(target, ns=(time, time))
-
-
-def _checksums(record: JobRecord, paths: list[tuple[str, str, str]]) -> dict[str, dict[str, str]]:
-    """Checksums by the new paths, if the record has any."""
-    has_files = "sha256" in ledger.read(record.path)
-    return {"sha256": {new: hash for _, new, hash in paths}} if has_files else {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import zarr
 
 from echotruth.config import Config
 from echotruth.config.loading import load
+from echotruth.repository.inventory import files_below
 from echotruth.repository.ledger import repository_folder, rows
 
 UNFINISHED = "unfinished"
@@ -21,34 +23,23 @@ UNFINISHED = "unfinished"
 
 @dataclass(frozen=True)
 class Overview:
-    """A repository at a glance.
-
-    Attributes
-    ----------
-    folder : Path
-        `out/NAME`.
-    config : Config
-    statuses : dict
-        Status -> number of cases that have it, those of earlier configurations (`retired`) included.
-    example : str
-        First complete case; "" if there is none.
-    external : list of str
-        Trackers from outside that were evaluated on it.
-    packages : dict
-        Versions of the packages that made it; empty if it is not published yet.
-    files : int
-    bytes : int
-        Number and size of all its files.
-    """
+    """A repository at a glance."""
 
     folder: Path
+    """`out/NAME`."""
     config: Config
     statuses: dict[str, int]
+    """Status -> number of cases that have it, those of earlier configurations (`retired`) included."""
     example: str
+    """First complete case; "" if there is none."""
     external: list[str]
+    """Trackers from outside that were evaluated on it."""
     packages: dict[str, str]
+    """Versions of the packages that made it; empty if it is not published yet."""
     files: int
+    """Number of all its files."""
     bytes: int
+    """Size of all its files."""
 
 
 def overview(repository: str | Path) -> Overview:
@@ -97,15 +88,8 @@ def _packages(store: Path) -> dict[str, str]:
 def _size(folder: Path) -> tuple[int, int]:
     """Number and size of the files below a folder; those that vanish meanwhile are left out."""
     number = size = 0
-    folders = [os.fspath(folder)]
-    while folders:
-        try:
-            with os.scandir(folders.pop()) as entries:
-                for entry in entries:
-                    if entry.is_dir(follow_symlinks=False):
-                        folders.append(entry.path)
-                    else:
-                        number, size = number + 1, size + entry.stat(follow_symlinks=False).st_size
-        except FileNotFoundError:
-            continue
+    for path in files_below(folder):
+        with suppress(FileNotFoundError):
+            size += os.lstat(f"{folder}/{path}").st_size
+            number += 1
     return number, size

@@ -22,18 +22,12 @@ Values = Mapping[str, ArrayLike]
 
 @dataclass(frozen=True)
 class Pack:
-    """Small arrays that are stored as one.
-
-    Attributes
-    ----------
-    array : Array
-        As it is stored; its last dimension is that of the labels.
-    members : tuple of Array
-        Each has the other dimensions of the pack and any of its own.
-    """
+    """Small arrays that are stored as one."""
 
     array: Array
+    """As it is stored; its last dimension is that of the labels."""
     members: tuple[Array, ...]
+    """Each has the other dimensions of the pack and any of its own."""
 
     @property
     def dimension(self) -> str:

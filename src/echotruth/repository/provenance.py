@@ -133,18 +133,12 @@ def _path(name: str) -> Path | None:
 
 
 class _Source(NamedTuple):
-    """What is to be known of a source file.
-
-    Attributes
-    ----------
-    digest : str
-        Hash of its statements, without docstrings.
-    imports : list of str
-        Modules of echotruth that it imports, and pkgutil.
-    """
+    """What is to be known of a source file."""
 
     digest: str
+    """Hash of its statements, without docstrings."""
     imports: list[str]
+    """Modules of echotruth that it imports, and pkgutil."""
 
 
 _PARSED = PACKAGE / "__pycache__" / f"provenance.{sys.implementation.cache_tag}.json"

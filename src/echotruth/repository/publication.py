@@ -10,7 +10,8 @@ from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.repository import ledger
 from echotruth.repository.checksums import verify, verify_structure
-from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
+from echotruth.repository.inventory import wanted_records
+from echotruth.repository.ledger import GATES
 from echotruth.repository.provenance import packages
 from echotruth.repository.store import Store
 
@@ -36,7 +37,8 @@ def publish(folder: Path) -> dict[str, Any]:
     config = load(folder / "config.yaml")
     store = Store(folder / f"{config.name}.zarr")
     rows = ledger.rows(folder / "registry.txt")
-    records = {case.id: _records(folder, config, case.id) for case in expand(config)}
+    views = list(config.views)
+    records = {case.id: wanted_records(folder, [case.id], views) for case in expand(config)}
     files = verify_structure(store.path, store.record)
     files += sum(verify(store.path, path, ledger.read(path)) for paths in records.values() for path in paths)
     verdicts = {case: _verdict(paths) for case, paths in records.items()}
@@ -52,12 +54,6 @@ def _verdict(paths: list[Path]) -> dict[str, Any]:
     """Record of the first gate that the heart did not pass, or of the last gate."""
     gates = [ledger.read(path) for path in paths[: len(GATES)]]
     return next((record for record in gates if record["status"] != "complete"), gates[-1])
-
-
-def _records(folder: Path, config: Config, case: str) -> list[Path]:
-    """Paths of the records of a case: those of the gates, then those of the views."""
-    gates = [record_path(folder, stage, case) for stage in GATES]
-    return gates + [record_path(folder, stage, case, view) for stage in VIEW_STAGES for view in config.views]
 
 
 def _attributes(config: Config, records: dict[str, list[Path]]) -> dict[str, Any]:

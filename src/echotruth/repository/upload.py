@@ -24,24 +24,16 @@ FIGURES = "figures"
 
 @dataclass
 class Sent:
-    """What an upload found and sent.
-
-    Attributes
-    ----------
-    sent : int
-        Number of files sent.
-    size : int
-        Their size, bytes.
-    names : set of str
-        All files that are there now, by their path below the folder of the repository.
-    faults : list of str
-        A sentence for every file here that is not what its record says; its record did not go up.
-    """
+    """What an upload found and sent."""
 
     sent: int = 0
+    """Number of files sent."""
     size: int = 0
+    """Their size, bytes."""
     names: set[str] = field(default_factory=set)
+    """All files that are there now, by their path below the folder of the repository."""
     faults: list[str] = field(default_factory=list)
+    """A sentence for every file here that is not what its record says; its record did not go up."""
 
 
 class Upload:

@@ -23,19 +23,12 @@ Arrays = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Range:
-    """What the values of an array may be; never infinite.
-
-    Attributes
-    ----------
-    low, high : float
-        In the unit of the array.
-    finite : bool
-        Whether every value must be a number.
-    """
+    """What the values of an array may be, in its unit; never infinite."""
 
     low: float = -inf
     high: float = inf
     finite: bool = False
+    """Whether every value must be a number."""
 
 
 NUMBER = Range(finite=True)

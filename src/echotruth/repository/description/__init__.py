@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hashlib import sha256
+from itertools import starmap
 from pathlib import Path
 
 from echotruth.repository import durable
@@ -13,7 +13,7 @@ from echotruth.repository.description.citation import MARK as CITATION_MARK
 from echotruth.repository.description.citation import citation
 from echotruth.repository.description.croissant import croissant
 from echotruth.repository.description.facts import Facts, read_facts
-from echotruth.repository.description.files import StoredFile
+from echotruth.repository.description.files import stored
 from echotruth.repository.description.ro_crate import NAME as CRATE
 from echotruth.repository.description.ro_crate import ro_crate, workflow_files
 from echotruth.repository.description.tables import CHECKSUMS, CLIPS, checksums, clips
@@ -50,7 +50,7 @@ def describe(repository: Path, output: Path | None = None, given: Attribution | 
     """
     given, output = given or Attribution(), output or repository
     try:
-        _spare_others(output)
+        _refuse_foreign_files(output)
         documents = _documents(read_facts(repository), given)
     except OSError as error:
         remedy = "make it readable"
@@ -69,16 +69,12 @@ def _documents(facts: Facts, given: Attribution) -> dict[str, bytes]:
     tables = {CLIPS: clips(facts), CHECKSUMS: checksums(facts)}
     texts = {"README.md": card(facts, given, tables), "CITATION.cff": citation(facts, given)}
     made = tables | texts
-    made["croissant.json"] = croissant(facts, given, _stored(made), tables)
+    made["croissant.json"] = croissant(facts, given, [*starmap(stored, made.items())], tables)
     made |= workflow_files()
-    return made | {CRATE: ro_crate(facts, given, _stored(made))}
+    return made | {CRATE: ro_crate(facts, given, [*starmap(stored, made.items())])}
 
 
-def _stored(contents: dict[str, bytes]) -> list[StoredFile]:
-    return [StoredFile(path, len(content), sha256(content).hexdigest()) for path, content in contents.items()]
-
-
-def _spare_others(folder: Path) -> None:
+def _refuse_foreign_files(folder: Path) -> None:
     for name, mark in MARKS.items():
         path = folder / name
         if path.is_file() and not path.read_bytes().startswith(mark.encode()):

@@ -16,25 +16,18 @@ class DescriptionError(ValueError):
 
 @dataclass(frozen=True)
 class Author:
-    """An author: a person, or a group under one name.
-
-    Attributes
-    ----------
-    family, given : str
-        Names of a person; `given` is empty for a group, whose name is in `family`.
-    orcid : str
-        Sixteen digits in four groups; empty if not given.
-    affiliation : str
-        Of a person.
-    url : str
-        Of the group, or of the affiliation of a person.
-    """
+    """An author: a person, or a group under one name."""
 
     family: str
+    """Family name of a person, or the name of a group."""
     given: str = ""
+    """Given name of a person; empty for a group."""
     orcid: str = ""
+    """Sixteen digits in four groups; empty if not given."""
     affiliation: str = ""
+    """Of a person."""
     url: str = ""
+    """Of the group, or of the affiliation of a person."""
 
     @property
     def name(self) -> str:
@@ -56,45 +49,29 @@ class Author:
 
 @dataclass(frozen=True)
 class Licence:
-    """Terms of use.
-
-    Attributes
-    ----------
-    name : str
-        Identifier of SPDX, an address, or the sentence that there is none.
-    url : str
-        Empty if there is none.
-    is_spdx : bool
-        Whether `name` is an identifier of SPDX.
-    """
+    """Terms of use."""
 
     name: str = NO_LICENCE
+    """Identifier of SPDX, an address, or the sentence that there is none."""
     url: str = ""
+    """Empty if there is none."""
     is_spdx: bool = False
+    """Whether `name` is an identifier of SPDX."""
 
 
 @dataclass(frozen=True)
 class Attribution:
-    """What is to be said of a repository beyond its content.
-
-    Attributes
-    ----------
-    authors : tuple of Author
-        Empty if none is given.
-    licence : Licence
-    url : str
-        Where the repository is published; empty if nowhere yet.
-    release : str
-        Version of the data, as 1.0.0.
-    published : date or None
-        None for the date on which the repository was finished.
-    """
+    """What is to be said of a repository beyond its content."""
 
     authors: tuple[Author, ...] = ()
+    """Empty if none is given."""
     licence: Licence = Licence()
     url: str = ""
+    """Where the repository is published; empty if nowhere yet."""
     release: str = "1.0.0"
+    """Version of the data, as 1.0.0."""
     published: date | None = None
+    """None for the date on which the repository was finished."""
 
 
 def attribution(authors: list[str], licence: str | None, url: str | None, release: str, day: str | None) -> Attribution:

@@ -47,9 +47,9 @@ def card(facts: Facts, attribution: Attribution, tables: dict[str, bytes]) -> by
         *_section("Sources with terms of their own", _sources(facts)),
         *_section("Known limits", [_list(statements.limits(facts))]),
         *_section("Biases", [_list(statements.biases(facts))]),
-        *_section("What it is for", [_list(statements.uses())]),
-        *_section("What it must not be used for", [_list(statements.misuses())]),
-        *_section("Personal and sensitive information", [statements.privacy()]),
+        *_section("What it is for", [_list(statements.USES)]),
+        *_section("What it must not be used for", [_list(statements.MISUSES)]),
+        *_section("Personal and sensitive information", [statements.PRIVACY]),
         *_section("Upkeep", [statements.maintenance(facts)]),
         *_section("How to cite", _citing(facts, attribution)),
     ]

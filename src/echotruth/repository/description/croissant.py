@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterable
 from io import BytesIO
 from mimetypes import guess_type
 from typing import TYPE_CHECKING
@@ -28,11 +29,16 @@ if TYPE_CHECKING:
 Node = dict[str, object]
 """An object of JSON-LD."""
 
+
+def _terms(names: str) -> Node:
+    """Terms of Croissant that have their name there."""
+    return {name: f"cr:{name}" for name in names.split()}
+
+
 CONTEXT: Node = {
     "@language": "en",
     "@vocab": "https://schema.org/",
-    "citeAs": "cr:citeAs",
-    "column": "cr:column",
+    **_terms("citeAs column"),
     "conformsTo": "dct:conformsTo",
     "cr": "http://mlcommons.org/croissant/",
     "rai": "http://mlcommons.org/croissant/RAI/",
@@ -40,32 +46,12 @@ CONTEXT: Node = {
     "data": {"@id": "cr:data", "@type": "@json"},
     "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
     "dct": "http://purl.org/dc/terms/",
-    "equivalentProperty": "cr:equivalentProperty",
+    **_terms("equivalentProperty"),
     "examples": {"@id": "cr:examples", "@type": "@json"},
-    "extract": "cr:extract",
-    "field": "cr:field",
-    "fileProperty": "cr:fileProperty",
-    "fileObject": "cr:fileObject",
-    "fileSet": "cr:fileSet",
-    "format": "cr:format",
-    "includes": "cr:includes",
-    "isLiveDataset": "cr:isLiveDataset",
-    "jsonPath": "cr:jsonPath",
-    "key": "cr:key",
-    "md5": "cr:md5",
-    "parentField": "cr:parentField",
-    "path": "cr:path",
-    "recordSet": "cr:recordSet",
-    "references": "cr:references",
-    "regex": "cr:regex",
-    "repeated": "cr:repeated",
-    "replace": "cr:replace",
-    "samplingRate": "cr:samplingRate",
+    **_terms("extract field fileProperty fileObject fileSet format includes isLiveDataset jsonPath key md5"),
+    **_terms("parentField path recordSet references regex repeated replace samplingRate"),
     "sc": "https://schema.org/",
-    "separator": "cr:separator",
-    "source": "cr:source",
-    "subField": "cr:subField",
-    "transform": "cr:transform",
+    **_terms("separator source subField transform"),
 }
 
 LEADERBOARD = "figures/leaderboard.csv"
@@ -89,7 +75,8 @@ def croissant(facts: Facts, attribution: Attribution, made: list[StoredFile], co
     contents : dict
         Content of the tables among them, by path.
     """
-    tables = {path: content for path, content in _tables(facts, contents).items() if content.count(b"\n") > 1}
+    read = {file.path: (facts.folder / file.path).read_bytes() for file in facts.tables if file.path.endswith(".csv")}
+    tables = {path: content for path, content in (read | contents).items() if content.count(b"\n") > 1}
     licence = attribution.licence
     document: Node = {
         "@context": CONTEXT,
@@ -103,25 +90,16 @@ def croissant(facts: Facts, attribution: Attribution, made: list[StoredFile], co
         "version": attribution.release,
         "datePublished": published(facts, attribution).isoformat(),
         "dateCreated": facts.run.ended.date().isoformat(),
-        "creator": _one_or_many([_creator(author) for author in authors(facts, attribution)]),
+        "creator": one_or_many(map(_creator, authors(facts, attribution))),
         "citeAs": bibtex(facts, attribution),
         "keywords": KEYWORDS,
         "inLanguage": "en",
         "isLiveDataset": False,
         **_responsibility(facts),
-        "distribution": [*map(_file_object, _described(facts, made)), *_file_sets(facts)],
+        "distribution": [*map(_file_object, [*facts.tables, *made]), *_file_sets(facts)],
         "recordSet": _record_sets(facts, tables),
     }
     return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()
-
-
-def _tables(facts: Facts, contents: dict[str, bytes]) -> dict[str, bytes]:
-    read = {file.path: (facts.folder / file.path).read_bytes() for file in facts.tables if file.path.endswith(".csv")}
-    return read | contents
-
-
-def _described(facts: Facts, made: list[StoredFile]) -> list[StoredFile]:
-    return [*facts.tables, *made]
 
 
 def _responsibility(facts: Facts) -> Node:
@@ -154,10 +132,10 @@ def _responsibility(facts: Facts) -> Node:
         "rai:annotatorDemographics": "None: there were no annotators.",
         "rai:machineAnnotationTools": [f"echotruth {run.packages.get('echotruth', '')}".strip()],
         "rai:dataBiases": statements.biases(facts),
-        "rai:dataLimitations": [*statements.limits(facts), *(f"Not for: {text}" for text in statements.misuses())],
-        "rai:dataUseCases": statements.uses(),
-        "rai:dataSocialImpact": statements.social_impact(),
-        "rai:personalSensitiveInformation": statements.privacy(),
+        "rai:dataLimitations": [*statements.limits(facts), *(f"Not for: {text}" for text in statements.MISUSES)],
+        "rai:dataUseCases": statements.USES,
+        "rai:dataSocialImpact": statements.SOCIAL_IMPACT,
+        "rai:personalSensitiveInformation": statements.PRIVACY,
         "rai:dataReleaseMaintenancePlan": statements.maintenance(facts),
         "rai:hasSyntheticData": True,
         "prov:wasDerivedFrom": [*origins, statements.PAPER] if origins else statements.PAPER,
@@ -247,18 +225,21 @@ def _record_sets(facts: Facts, tables: dict[str, bytes]) -> list[Node]:
 
 def _table(name: str, path: str, content: bytes, about: dict[str, str]) -> Node:
     """Record set of a table: a field for each column."""
-    fields = [
-        {
-            "@type": "cr:Field",
-            "@id": f"{name}/{column}",
-            "name": column,
-            "description": about[str(column)],
-            "dataType": _data_type(values),
-            "source": {"fileObject": {"@id": path}, "extract": {"column": column}},
-        }
-        for column, values in _frame(content).items()
-    ]
-    return {"@type": "cr:RecordSet", "@id": name, "name": name, "description": _ABOUT[path], "field": fields}
+    fields = []
+    for column, values in _frame(content).items():
+        source: Node = {"fileObject": {"@id": path}, "extract": {"column": column}}
+        fields.append(_field(name, str(column), about[str(column)], _data_type(values), source))
+    return _record_set(name, _ABOUT[path], fields)
+
+
+def _record_set(name: str, description: str, fields: list[Node]) -> Node:
+    return {"@type": "cr:RecordSet", "@id": name, "name": name, "description": description, "field": fields}
+
+
+def _field(record_set: str, name: str, description: str, kind: str, source: Node | None = None) -> Node:
+    path = f"{record_set}/{name}"
+    field: Node = {"@type": "cr:Field", "@id": path, "name": name, "description": description, "dataType": kind}
+    return field | {"source": source} if source else field
 
 
 def _frame(content: bytes) -> pd.DataFrame:
@@ -284,36 +265,19 @@ def _arrays(facts: Facts) -> Node:
         "unit": "SI unit, as UDUNITS writes it; 1 for dimensionless numbers",
         "meaning": "what it holds",
     }
-    names = {column: f"{ARRAYS_ID}/{column}" for column in about}
+    fields = [_field(ARRAYS_ID, column, text, "sc:Text") for column, text in about.items()]
     rows = [(one.group, one.name, " ".join(one.dims), one.dtype, one.units, one.long_name) for one in facts.arrays]
-    return {
-        "@type": "cr:RecordSet",
-        "@id": ARRAYS_ID,
-        "name": ARRAYS_ID,
-        "description": "The arrays of the store, with units.",
-        "field": [
-            {"@type": "cr:Field", "@id": names[column], "name": column, "description": text, "dataType": "sc:Text"}
-            for column, text in about.items()
-        ],
-        "data": [dict(zip(names.values(), row, strict=True)) for row in rows],
-    }
+    data = [{f"{ARRAYS_ID}/{column}": value for column, value in zip(about, row, strict=True)} for row in rows]
+    return _record_set(ARRAYS_ID, "The arrays of the store, with units.", fields) | {"data": data}
 
 
 def _pictures() -> Node:
-    sources = {"name": ("filename", "sc:Text"), "picture": ("content", "sc:ImageObject")}
-    fields = [
-        {
-            "@type": "cr:Field",
-            "@id": f"{FIGURES_ID}/{name}",
-            "name": name,
-            "description": f"{name} of the figure",
-            "dataType": kind,
-            "source": {"fileSet": {"@id": "pictures"}, "extract": {"fileProperty": part}},
-        }
-        for name, (part, kind) in sources.items()
-    ]
+    fields = []
+    for name, part, kind in (("name", "filename", "sc:Text"), ("picture", "content", "sc:ImageObject")):
+        source: Node = {"fileSet": {"@id": "pictures"}, "extract": {"fileProperty": part}}
+        fields.append(_field(FIGURES_ID, name, f"{name} of the figure", kind, source))
     text = "Figures of the report: the heart, its loop and strain, clips, errors and ranking of the trackers."
-    return {"@type": "cr:RecordSet", "@id": FIGURES_ID, "name": FIGURES_ID, "description": text, "field": fields}
+    return _record_set(FIGURES_ID, text, fields)
 
 
 def _score_unit(column: str) -> str:
@@ -325,5 +289,7 @@ def _in_unit(unit: str) -> str:
     return f", {unit}" if unit else ""
 
 
-def _one_or_many(nodes: list[Node]) -> Node | list[Node]:
-    return nodes[0] if len(nodes) == 1 else nodes
+def one_or_many(nodes: Iterable[Node]) -> Node | list[Node]:
+    """The only node alone, as RO-Crate 1.1 recommends, or a list of several."""
+    every = list(nodes)
+    return every[0] if len(every) == 1 else every

@@ -35,29 +35,20 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Run:
-    """The runs that made a repository.
-
-    Attributes
-    ----------
-    started, ended : datetime
-        Start of the first job and end of the last, by the times of their records.
-    jobs : int
-    cpu_seconds : float
-    instructions : tuple of str
-        Instructions of the processors that were used.
-    code : dict
-        Stage -> versions of its code.
-    packages : dict
-        Name -> version.
-    """
+    """The runs that made a repository."""
 
     started: datetime
+    """Start of the first job, by the time of its record."""
     ended: datetime
+    """End of the last job, by the time of its record."""
     jobs: int
     cpu_seconds: float
     instructions: tuple[str, ...]
+    """Instructions of the processors that were used."""
     code: dict[str, tuple[str, ...]]
+    """Stage -> versions of its code."""
     packages: dict[str, str]
+    """Name -> version."""
 
 
 UNCHANGED = "that of config.yaml"
@@ -66,44 +57,28 @@ UNCHANGED = "that of config.yaml"
 
 @dataclass(frozen=True)
 class Facts:
-    """What is to be known of a repository.
-
-    Attributes
-    ----------
-    folder : Path
-    config : Config
-    cases : dict
-        The cases by id.
-    outcomes : tuple of Outcome
-        One for every case.
-    missing_jobs, wanted_jobs : int
-    is_published : bool
-        Whether its files were verified after the last job.
-    failures : tuple of str
-        Jobs and trackers that found no result, in words.
-    quantities : tuple of Quantity
-    files : tuple of StoredFile
-        All of the store.
-    tables : tuple of StoredFile
-        Files beside the store that are made for readers: tables, figures, the report.
-    run : Run
-    records : tuple of (JobRecord, dict)
-        Records of the present cases and views, sorted; the checksums are left out but for those of images.
-    """
+    """What is to be known of a repository."""
 
     folder: Path
     config: Config
     cases: dict[str, Case]
+    """The cases by id."""
     outcomes: tuple[Outcome, ...]
+    """One for every case."""
     missing_jobs: int
     wanted_jobs: int
     is_published: bool
+    """Whether its files were verified after the last job."""
     failures: tuple[str, ...]
+    """Jobs and trackers that found no result, in words."""
     quantities: tuple[Quantity, ...]
     files: tuple[StoredFile, ...]
+    """All of the store."""
     tables: tuple[StoredFile, ...]
+    """Files beside the store that are made for readers: tables, figures, the report."""
     run: Run
     records: tuple[tuple[JobRecord, Record], ...]
+    """Records of the present cases and views, sorted; the checksums are left out but for those of images."""
 
     @property
     def name(self) -> str:

@@ -6,31 +6,24 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+from echotruth.repository.checksums import checksums
 from echotruth.repository.description.attribution import DescriptionError
 from echotruth.repository.inventory import Repository, files_below
 
 
 @dataclass(frozen=True, slots=True)  # there may be a million
 class StoredFile:
-    """A file of the store or beside it.
-
-    Attributes
-    ----------
-    path : str
-        Below the folder of the repository.
-    size : int
-        Bytes.
-    sha256 : str
-    """
+    """A file of the store or beside it."""
 
     path: str
+    """Below the folder of the repository."""
     size: int
+    """Bytes."""
     sha256: str
 
 
-def stored(folder: Path, path: str) -> StoredFile:
-    """Size and checksum of a file below a folder."""
-    content = (folder / path).read_bytes()
+def stored(path: str, content: bytes) -> StoredFile:
+    """A file, given its content."""
     return StoredFile(path, len(content), sha256(content).hexdigest())
 
 
@@ -56,7 +49,7 @@ def store_files(repository: Repository, known: dict[str, str]) -> tuple[StoredFi
     """
     if repository.is_older:
         others = (path for path in files_below(repository.store) if path not in known)
-        known = known | {path: stored(repository.store, path).sha256 for path in others}
+        known = known | checksums([repository.store / path for path in others], repository.store)
     return tuple(_listed(repository, path, checksum) for path, checksum in sorted(known.items()))
 
 
@@ -72,4 +65,4 @@ def files_beside(folder: Path) -> tuple[StoredFile, ...]:
     names = ("cases.csv", "config.yaml", "registry.txt", "views.txt", "report.html")
     figures = sorted(path for path in folder.glob("figures/*") if path.is_file() and not path.name.startswith("."))
     paths = [name for name in names if (folder / name).is_file()] + [f"figures/{path.name}" for path in figures]
-    return tuple(stored(folder, path) for path in paths)
+    return tuple(stored(path, (folder / path).read_bytes()) for path in paths)

@@ -14,29 +14,18 @@ Metadata = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class Quantity:
-    """An array, or arrays that differ in the size of the image only.
-
-    Attributes
-    ----------
-    group : str
-        Path of its group; of sized groups with SIZE in place of the size.
-    name : str
-    dims : tuple of str
-    dtype : str
-    units : str
-        SI, as UDUNITS writes them.
-    long_name : str
-    is_coordinate : bool
-        Whether it belongs to the dimensions of others.
-    """
+    """An array, or arrays that differ in the size of the image only."""
 
     group: str
+    """Path of its group; of sized groups with SIZE in place of the size."""
     name: str
     dims: tuple[str, ...]
     dtype: str
     units: str
+    """SI, as UDUNITS writes them."""
     long_name: str
     is_coordinate: bool
+    """Whether it belongs to the dimensions of others."""
 
 
 def read_quantities(nodes: Metadata) -> tuple[Quantity, ...]:

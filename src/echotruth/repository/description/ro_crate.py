@@ -14,13 +14,10 @@ from pathlib import Path
 from echotruth.repository.description import statements
 from echotruth.repository.description.attribution import Attribution, Author, slug
 from echotruth.repository.description.citation import KEYWORDS, authors, published, title
-from echotruth.repository.description.croissant import media_type
+from echotruth.repository.description.croissant import Node, media_type, one_or_many
 from echotruth.repository.description.facts import Facts
 from echotruth.repository.description.files import StoredFile
 from echotruth.repository.provenance import PACKAGE
-
-Node = dict[str, object]
-"""An entity of the crate."""
 
 NAME = "ro-crate-metadata.json"
 
@@ -80,7 +77,7 @@ def ro_crate(facts: Facts, attribution: Attribution, made: list[StoredFile]) -> 
         *makers,
         *_affiliations(authors(facts, attribution)),
         *_software(facts),
-        *_profiles(),
+        *_works(PROFILES),
         *_terms(attribution),
     ]
     context = ["https://w3id.org/ro/crate/1.1/context", {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}]
@@ -109,7 +106,7 @@ def _root(facts: Facts, attribution: Attribution, parts: list[Node], makers: lis
         "datePublished": day.isoformat(),
         "version": attribution.release,
         "license": {"@id": licence.url} if licence.url else licence.name,
-        "author": _unpacked(_reference(maker) for maker in makers),
+        "author": one_or_many(_reference(maker) for maker in makers),
         **_publisher(makers[0]),
         "keywords": ", ".join(KEYWORDS),
         "conformsTo": _references(PROFILES),
@@ -171,7 +168,7 @@ def _main(facts: Facts, made: list[StoredFile]) -> Node:
         "url": HOMES["snakemake"],
         "input": {"@id": "#input-configuration"},
         "output": {"@id": "#output-repository"},
-        "softwareRequirements": _unpacked(map(_reference, _packages(facts))),
+        "softwareRequirements": one_or_many(map(_reference, _packages(facts))),
     }
 
 
@@ -203,8 +200,8 @@ def _parameters(facts: Facts) -> list[Node]:
         "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE": ("ComputationalWorkflow", "1.0-RELEASE"),
         "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE": ("FormalParameter", "1.0-RELEASE"),
     }
-    described = [_work(address, *about) for address, about in profiles.items()]
-    return [{"@id": "#input-configuration"} | kind | taken, {"@id": "#output-repository"} | kind | given, *described]
+    parameters = [{"@id": "#input-configuration"} | kind | taken, {"@id": "#output-repository"} | kind | given]
+    return [*parameters, *_works(profiles)]
 
 
 def _maker(author: Author) -> Node:
@@ -247,12 +244,12 @@ def _package(name: str, number: str) -> Node:
     return about | {"@id": f"{HOMES[name]}#{number}", "url": HOMES[name]}
 
 
-def _profiles() -> list[Node]:
-    return [_work(address, *about) for address, about in PROFILES.items()]
-
-
-def _work(address: str, name: str, number: str) -> Node:
-    return {"@id": address, "@type": "CreativeWork", "name": name, "version": number}
+def _works(profiles: dict[str, tuple[str, str]]) -> list[Node]:
+    """Profiles, given their names and versions by address."""
+    return [
+        {"@id": address, "@type": "CreativeWork", "name": name, "version": number}
+        for address, (name, number) in profiles.items()
+    ]
 
 
 def _terms(attribution: Attribution) -> list[Node]:
@@ -267,10 +264,4 @@ def _reference(node: Node) -> Node:
 
 
 def _references(ids: Iterable[str]) -> Node | list[Node]:
-    return _unpacked({"@id": id} for id in ids)
-
-
-def _unpacked(nodes: Iterable[Node]) -> Node | list[Node]:
-    """A list, or the only entry of one, as RO-Crate 1.1 recommends."""
-    every = list(nodes)
-    return every[0] if len(every) == 1 else every
+    return one_or_many({"@id": id} for id in ids)

@@ -11,6 +11,26 @@ from echotruth.repository.description.facts import Facts
 
 PAPER = "Mukherjee et al., Synthetic ultrasound images to benchmark echocardiography-based biomechanics"
 
+USES = [
+    "Benchmarking of speckle tracking and strain estimation against the true motion.",
+    "Training and validation of networks for motion, segmentation and strain, with a test on real data.",
+    "Study of how array, scan, resolution, noise and through-plane motion affect estimated motion.",
+]
+MISUSES = [
+    "Diagnosis, or any decision on a patient or an animal.",
+    "Proof that a method is safe or accurate in practice: images are simulated, and real ones must be tested too.",
+    "Reference values of a species: hearts are models within published values, not measurements.",
+    "Passing images off as recordings of a person or an animal.",
+]
+SOCIAL_IMPACT = (
+    "Methods can be compared without recordings of people, and with fewer experiments on animals. A method that was "
+    "developed on these data alone may fail on real images; results should be said to be of synthetic data."
+)
+PRIVACY = (
+    "None: all data are computed, no person or animal was recorded. Hearts read from files are as private as these."
+)
+"""Personal and sensitive information."""
+
 SHIPPED_LOOPS = ("mouse", "rat", "human", "twitch")
 """Loops that are part of echotruth; others are files of the user."""
 
@@ -120,41 +140,6 @@ def biases(facts: Facts) -> list[str]:
     if sum(facts.count(status) for status in ("implausible", "failed")):
         texts.append("Hearts that could not be solved or moved implausibly are left out of the images, not at random.")
     return texts
-
-
-def uses() -> list[str]:
-    """What the data are meant for."""
-    return [
-        "Benchmarking of speckle tracking and strain estimation against the true motion.",
-        "Training and validation of networks for motion, segmentation and strain, with a test on real data.",
-        "Study of how array, scan, resolution, noise and through-plane motion affect estimated motion.",
-    ]
-
-
-def misuses() -> list[str]:
-    """What the data must not be used for."""
-    return [
-        "Diagnosis, or any decision on a patient or an animal.",
-        "Proof that a method is safe or accurate in practice: images are simulated, and real ones must be tested too.",
-        "Reference values of a species: hearts are models within published values, not measurements.",
-        "Passing images off as recordings of a person or an animal.",
-    ]
-
-
-def social_impact() -> str:
-    """Benefit and harm that are to be expected."""
-    return (
-        "Methods can be compared without recordings of people, and with fewer experiments on animals. A method "
-        "that was developed on these data alone may fail on real images; results should be said to be of "
-        "synthetic data."
-    )
-
-
-def privacy() -> str:
-    """Personal and sensitive information."""
-    return (
-        "None: all data are computed, no person or animal was recorded. Hearts read from files are as private as these."
-    )
 
 
 def maintenance(facts: Facts) -> str:

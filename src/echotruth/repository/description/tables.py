@@ -52,7 +52,7 @@ def clips(facts: Facts) -> bytes:
 
 def _rows(facts: Facts) -> Iterator[list[object]]:
     sizes = {file.path: file.size for file in facts.files}
-    cases, views = (_indices(facts.folder / name) for name in ("registry.txt", "views.txt"))
+    cases, views = (ledger.rows(facts.folder / name) for name in ("registry.txt", "views.txt"))
     views = views or {view: index for index, view in enumerate(facts.config.views)}
     grids: dict[str, tuple[NDArray[np.float64], float, float]] = {}
     for record, entries in facts.records:
@@ -67,18 +67,9 @@ def _rows(facts: Facts) -> Iterator[list[object]]:
             row, view = cases[record.case], views[str(record.view)]
             step = (times[row, -1] - times[row, 0]) / (times.shape[1] - 1) if times.shape[1] > 1 else 0.0
             file = f"{facts.store}/{path}"
-            clip = [
-                record.case,
-                record.view,
-                _size(path),
-                times.shape[1],
-                *(f"{x:.9g}" for x in (step, axial, lateral)),
-            ]
+            steps = (f"{x:.9g}" for x in (step, axial, lateral))
+            clip = [record.case, record.view, _size(path), times.shape[1], *steps]
             yield [*clip, array, row, view, file, sizes[file], checksum]
-
-
-def _indices(registry: Path) -> dict[str, int]:
-    return ledger.rows(registry) if registry.is_file() else {}
 
 
 def _size(path: str) -> int:
