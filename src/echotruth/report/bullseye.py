@@ -97,9 +97,10 @@ def disc(axes: Axes, values: np.ndarray, scale: TwoSlopeNorm, decimals: int = 0)
     for value, (inner, outer, start, stop) in zip(values, BULLSEYE, strict=True):
         known = bool(np.isfinite(value))
         colour = COLOURMAP(scale(value))
-        look = {"facecolor": colour, "edgecolor": style.PAPER} if known else UNSEEN
-        angles = np.degrees(start), np.degrees(stop)
-        axes.add_patch(Wedge((0, 0), outer, *angles, width=outer - inner, linewidth=1.2 if known else 0.6, **look))
+        look = {"facecolor": colour, "edgecolor": style.PAPER} if known else dict(UNSEEN)
+        # Unclipped: names of clip paths in an SVG follow from the last bits of the layout.
+        look |= {"linewidth": 1.2 if known else 0.6, "clip_on": False}
+        axes.add_patch(Wedge((0, 0), outer, np.degrees(start), np.degrees(stop), width=outer - inner, **look))
         if known:
             angle, radius = (start + stop) / 2, (inner + outer) / 2 if inner else 0
             is_dark = np.dot(colour[:3], (0.299, 0.587, 0.114)) < 0.55

@@ -77,8 +77,7 @@ def _clip(tree: xr.DataTree, comparison: Comparison, view: str, count: int) -> d
     job, size = comparison.job(view), comparison.size
     case, best = job.case.id, comparison.trackers[0]
     clip, inside = with_motion(tree, case, view, size)
-    spacing = ARROW_SPACING * job.case.config.bmode.si().field_of_view
-    chosen = thin(clip.position, spacing / clip.spacing)
+    chosen = thin(clip.position, ARROW_SPACING * size)
     tracked = _tracked(job, best, size, inside, clip)[:, chosen]
     shown = cine(clip, _strain(tree, case, view, inside), chosen, tracked, count)
     es = int(tree["mechanics"].to_dataset().es_frame.sel(case=case))

@@ -36,16 +36,13 @@ from echotruth.report import (
     style,
     views,
 )
-from echotruth.report.clips import with_motion
+from echotruth.report.clips import ARROW_SPACING, with_motion
 from echotruth.report.comparison import Comparison
 from echotruth.report.hearts import diagnoses, measures
 from echotruth.repository.unpacking import unpack
 
 if TYPE_CHECKING:
     import pandas as pd
-
-ARROW_SPACING = 0.45e-3
-"""Smallest distance between the points whose motion is drawn on a clip, m."""
 
 PARTS = {
     "motion": (
@@ -200,7 +197,7 @@ class Figures:
         """The clip with its true motion, as a GIF and as a video."""
         case = str(self.tree["cases"].case.values[self.complete[0]])
         moving, _ = with_motion(self.tree, case, self.view, self.sizes[0])
-        chosen = clip.thin(moving.position, ARROW_SPACING / moving.spacing)
+        chosen = clip.thin(moving.position, ARROW_SPACING * self.sizes[0])
         overlaid = replace(moving, position=moving.position[chosen], displacement=moving.displacement[:, chosen])
         clip.gif(self.folder / "clip.gif", clip.render(overlaid, 400))
         clip.mp4(self.folder / "clip.mp4", clip.render(overlaid, 720))
