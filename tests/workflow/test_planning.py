@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 from snakemake.common import get_function_params, get_input_function_aux_params
+from snakemake.iocontainers import AttributeGuard, Namedlist
 from snakemake.resources import Resource
 from snakemake.settings.types import Batch
 
@@ -42,6 +43,16 @@ def test_parameters_are_those_of_the_function():
     hasten([SimpleNamespace(input=[], params=[function], group=None, resources={})])
     assert get_function_params(function) == signature(function).parameters
     assert gc.get_threshold()[0] == planning.OBJECTS_BETWEEN_COLLECTIONS
+
+
+def test_lists_of_jobs_share_guards_and_still_take_them_for_what_they_are():
+    hasten([])
+    one, other = Namedlist(fromdict={"a": 1}), Namedlist()
+    assert one.index is other.index and one.index is not one.sort
+    assert isinstance(one.index, AttributeGuard)
+    assert one.get("index") is None and one.get("a") == 1
+    with pytest.raises(AttributeError, match=r"index\(\) cannot be used"):
+        one.index(1)
 
 
 FILES = [Path(f"ledger/evaluation/{name}.json") for name in "gbdface"]

@@ -37,7 +37,7 @@ def hasten(rules: Iterable[Rule]) -> None:
         from snakemake.io import IOCache
 
         # Each list of files, params or wildcards has two of these, which do nothing but refuse to be called.
-        iocontainers.AttributeGuard = cache(iocontainers.AttributeGuard)
+        iocontainers.AttributeGuard.__new__ = cache(lambda guard, name: object.__new__(guard))
         # A dry run saves what it knows of all files, which later runs do not trust: an empty copy will do.
         IOCache._simple_copy = lambda self: type(self)(self.max_wait_time)
     with suppress(ImportError, AttributeError):
