@@ -77,15 +77,15 @@ class Measurement:
     ----------
     name : str
     hearts : int
-    cpu_s : float
-        User and system time, of its children too, s.
+    seconds : float
+        User and system time, of its children too, s; of reading the time of the clock.
     memory_MiB : float
         Largest resident set of the process or one of its children, MiB.
     """
 
     name: str
     hearts: int
-    cpu_s: float
+    seconds: float
     memory_MiB: float
 
 
@@ -129,7 +129,7 @@ def measure(name: str, hearts: int, folder: Path, command: tuple[str, ...], says
         if process.returncode or says not in said:
             sys.exit(f"{name}: {' '.join(command)} failed:\n{said[-3000:]}")
     measured = Measurement(name, hearts, round(used.ru_utime + used.ru_stime, 1), round(used.ru_maxrss / 1024))
-    print(f"{name}, {hearts} hearts: {measured.cpu_s:.1f} CPU s, {measured.memory_MiB:.0f} MiB", flush=True)
+    print(f"{name}, {hearts} hearts: {measured.seconds:.1f} CPU s, {measured.memory_MiB:.0f} MiB", flush=True)
     return measured
 
 
@@ -239,9 +239,9 @@ def write(measured: list[Measurement]) -> None:
         "Made by `python benchmarks/scale.py`. Hearts x 4 views; CPU seconds of a process and its children, and the",
         f"memory of the largest of them. Python {sys.version.split()[0]}, {machine} while it was measured.",
         "",
-        "| | hearts | CPU s | MiB |",
+        "| | hearts | s | MiB |",
         "|---|---|---|---|",
-        *(f"| {item.name} | {item.hearts} | {item.cpu_s:.3g} | {item.memory_MiB:.0f} |" for item in rows),
+        *(f"| {item.name} | {item.hearts} | {_digits(item.seconds)} | {item.memory_MiB:.0f} |" for item in rows),
         "",
         "*plan*: the graph of all jobs of a sweep of which nothing is made; *plan 1/10*: of its first batch alone",
         "(`--batch repository=1/10`); *check* and *plan of a table*: of hearts that all differ in motion and loop;",
@@ -249,6 +249,10 @@ def write(measured: list[Measurement]) -> None:
         "*open*, *read the table*, *read a frame by its labels*: seconds of the clock, in this order in a new process.",
     ]
     (RESULTS / "scale.md").write_text("\n".join(lines) + "\n")
+
+
+def _digits(seconds: float) -> str:
+    return f"{seconds:.1f}" if seconds >= 1 else f"{seconds:.2g}"
 
 
 def _order(item: Measurement) -> tuple[str, int]:

@@ -266,7 +266,7 @@ def detection(table: pd.DataFrame, order: list[str]) -> str:
     """Areas under the curve of the detection of infarcted segments."""
     columns = _imaged(table)
     found = table.set_index(["tracker", "acoustics", "size_px"])
-    rows = [[f"`{one}`", *_cells(found, [(one, *column) for column in columns], _area)] for one in order]
+    rows = [[f"`{one}`", *_cells(found, [(one, *column) for column in columns], _auc)] for one in order]
     perfect = []
     for column in columns:
         of = found.xs(column, level=(1, 2)).iloc[0]
@@ -288,7 +288,7 @@ def _limits(row: pd.Series) -> str:
     return number(row["bias"], 2) + limits + (f", {hearts} of {of} hearts" if hearts < of else "")
 
 
-def _area(row: pd.Series) -> str:
+def _auc(row: pd.Series) -> str:
     """Area under the curve with its interval, and that of subendocardial infarcts."""
     inner = f"; {number(row['subendocardial_auc'], 2)}" if np.isfinite(row["subendocardial_auc"]) else ""
     return interval(row["auc"], row["auc_low"], row["auc_high"], 2) + inner

@@ -56,7 +56,7 @@ def chosen(
     return [name for name in known if not names or name in names]
 
 
-def known_name(what: str, name: Item, known: Collection[Item]) -> Item:
+def require_known(what: str, name: Item, known: Collection[Item]) -> Item:
     """A name that has to be known; ValueError says what else there is."""
     if name not in known:
         raise ValueError(f"{what} = {name!r}: use one of {', '.join(map(str, list(known)[:20]))}.")
@@ -134,7 +134,7 @@ def job_of(repository: str | Path, case: str, view: str | None = None) -> Job:
     FileNotFoundError or ValueError if there is no such repository, case or view.
     """
     folder = ledger.repository_folder(repository)
-    job = Job(folder, "tracking", known_name("case", case, ledger.rows(folder / "registry.txt")), view)
+    job = Job(folder, "tracking", require_known("case", case, ledger.rows(folder / "registry.txt")), view)
     if view is not None:
-        known_name("view", view, job.case.config.views)
+        require_known("view", view, job.case.config.views)
     return job

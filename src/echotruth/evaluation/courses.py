@@ -131,7 +131,7 @@ def peak(values: Floats, time: Floats, sign: ArrayLike | None = None) -> tuple[F
         NaN where unknown.
     time : ndarray of shape (frame,), s
     sign : array_like, optional
-        Direction, 1 or -1, in which the values along the last axis are to be large.
+        1 for the largest, -1 for the smallest value, along the last axis.
 
     Returns
     -------
@@ -141,8 +141,8 @@ def peak(values: Floats, time: Floats, sign: ArrayLike | None = None) -> tuple[F
     """
     values = np.asarray(values)
     known = np.isfinite(values).all(axis=0)
-    sizes = np.abs(values) if sign is None else values * np.asarray(sign, float)
-    frame = np.argmax(np.where(known, sizes, 0), axis=0)
+    magnitude = np.abs(values) if sign is None else values * np.asarray(sign, float)
+    frame = np.argmax(np.where(known, magnitude, 0), axis=0)
     found = np.where(known, np.take_along_axis(values, frame[None], axis=0)[0], np.nan)
     return found, np.where(np.abs(found) > CURVE, np.asarray(time)[frame], np.nan)
 

@@ -9,7 +9,7 @@ import numpy as np
 from echotruth.config import Config
 from echotruth.evaluation import kept
 from echotruth.evaluation.agreement import REFERENCES
-from echotruth.evaluation.choice import image_size, known_name
+from echotruth.evaluation.choice import image_size, require_known
 from echotruth.evaluation.courses import peak, rate, systolic_rate
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import schema
@@ -52,7 +52,7 @@ def strain_curves(job: Job, tracker: str, size: int | None = None, reference: st
     """
     config, es = job.case.config, int(job.store.read("mechanics", job.row, names=("es_frame",))["es_frame"])
     size = image_size(config, size)
-    known_name("reference", reference, REFERENCES)
+    require_known("reference", reference, REFERENCES)
     names = [f"{what}_{name}" for name in NAMES for what in ("tracked", "true")]
     values = kept.read(job, "evaluation", *names, tracker=tracker, size=size)
     for name in ("true_region_strain", "true_segment_strain"):
@@ -77,7 +77,7 @@ def strain_peaks(strain: xr.Dataset) -> xr.Dataset:
     Parameters
     ----------
     strain : Dataset
-        As :func:`strain_curves` or :func:`twist_curves` returns it.
+        As :func:`strain_curves` or :func:`echotruth.twist_curves` returns it.
 
     Returns
     -------

@@ -18,7 +18,7 @@ import zarr
 from numpy.typing import ArrayLike, NDArray
 
 from echotruth.config import Config
-from echotruth.evaluation.choice import known_name
+from echotruth.evaluation.choice import require_known
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.imaging.bmode import pixel_centres
@@ -133,7 +133,7 @@ def read(job: Job, group: str, *names: str, tracker: str, size: int) -> dict[str
         If it was not evaluated on this clip as it is now.
     """
     config = job.case.config
-    known_name("tracker", tracker, trackers(job.folder, config))
+    require_known("tracker", tracker, trackers(job.folder, config))
     own = list(config.tracking.trackers)
     of_tracker = [array.name for array in schema.named(group) if "tracker" in array.dims and array.name in names]
     others = [name for name in names if name not in of_tracker]

@@ -107,7 +107,8 @@ def segment_rows(tracked: Floats, true: Floats, tissue: Tissue, plane: str, time
     -------
     list of dict
         One for every segment with points and component: `aha`, `component`, what :meth:`Tissue.rows` tells, and of
-        `tracked_` and `true_` each `es_percent`, `peak_percent` and `time_to_peak_ms` (of the :data:`CONTRACTION`), and
+        `tracked_` and `true_` each `es_percent`, `peak_percent` and `time_to_peak_ms` (of the largest thickening or
+        shortening), and
         `systolic_rate_per_s` (:func:`.courses.systolic_rate`), both in the direction of the true end-systolic strain.
     """
     read = {what: _readings(curves, time, es, true[es]) for what, curves in zip(WHAT, (tracked, true), strict=True)}

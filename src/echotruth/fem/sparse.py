@@ -54,7 +54,7 @@ def factorization(single: bool = False) -> Pardiso | SuperLU:
 
     Returns
     -------
-    Factorization
+    Pardiso or SuperLU
         Pardiso if `pypardiso` and MKL can be loaded, otherwise SuperLU.
     """
     try:

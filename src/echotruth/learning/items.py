@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.evaluation.choice import known_name
+from echotruth.evaluation.choice import require_known
 from echotruth.learning.reading import Reader
 
 Item = dict[str, Any]
@@ -77,17 +77,17 @@ class Items(Sequence[Item]):
     ) -> None:
         self.reader = Reader(repository)
         config = self.reader.config
-        self.size = known_name("size", config.bmode.sizes[0] if size is None else size, config.bmode.sizes)
+        self.size = require_known("size", config.bmode.sizes[0] if size is None else size, config.bmode.sizes)
         self.frames = config.loop.frames
         self.spacing = config.bmode.si().field_of_view / self.size
         """Distance of pixel centres, m."""
         ids = _complete(self.reader) if cases is None else _listed(cases.index if hasattr(cases, "columns") else cases)
         names = list(config.views) if views is None else _listed(views)
-        self.places = self._places(ids, [known_name("view", name, list(config.views)) for name in names])
+        self.places = self._places(ids, [require_known("view", name, list(config.views)) for name in names])
 
     def _places(self, cases: list[str], views: list[str]) -> list[Place]:
         rows, indices = self.reader.cases, self.reader.views
-        pairs = [(known_name("case", case, rows), view) for case in cases for view in views]
+        pairs = [(require_known("case", case, rows), view) for case in cases for view in views]
         places = [Place(case, view, rows[case], indices[view]) for case, view in pairs]
         for place in places:
             for path in self.arrays:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echotruth.evaluation.choice import known_name
+from echotruth.evaluation.choice import require_known
 from echotruth.imaging.labels import LABELS
 from echotruth.learning.items import Item, Items, Place
 
@@ -44,7 +44,7 @@ class Segmentation(Items):
         size: int | None = None,
         target: str = "wall",
     ) -> None:
-        self.target = known_name("target", target, TARGETS)
+        self.target = require_known("target", target, TARGETS)
         super().__init__(repository, cases, views, size)
 
     @property

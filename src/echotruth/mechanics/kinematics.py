@@ -106,8 +106,8 @@ def wall_strain(mesh: Mesh, displacement: Floats, axes: Floats, at_ed: Floats) -
     displacement : ndarray of shape (n_frames, n_nodes, 3), m
     axes : ndarray of shape (n_cells, n_points, 3, 3)
         Rows R, C, L of the unloaded wall; the strain is along these, deformed to ED.
-    at_ed : ndarray of shape (n_nodes, 3), m, optional
-        Displacement at ED. Default: that of the first frame.
+    at_ed : ndarray of shape (n_nodes, 3), m
+        Displacement at ED.
 
     Returns
     -------

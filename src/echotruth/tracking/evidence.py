@@ -78,15 +78,15 @@ class Match:
         return NOISE_AREA * self.noise * area * pixel_density
 
 
-def energy_weight(variance: float, effective: float, energy: float, square: float) -> float:
+def energy_weight(variance: float, parameters: float, energy: float, mean_square: float) -> float:
     """Weight beta = v (gamma + a) / (E + a E_0) of the bending energy; infinite without motion and energy.
 
-    The variance v is that of :meth:`Match.variance`, gamma the number of :func:`effective_parameters`, and E the
+    The variance v is that of :meth:`Match.variance`, gamma the `parameters` of :func:`effective_parameters`, and E the
     bending energy of the step. The prior counts for a = `PRIOR_UNKNOWNS` unknowns, of which each has the energy E_0 =
-    `UNEVENNESS` times `square`, the mean square of the displacement of the step less its mean, px^2.
+    `UNEVENNESS` times `mean_square`, the mean square of the displacement of the step less its mean, px^2.
     """
-    total = energy + PRIOR_UNKNOWNS * UNEVENNESS * square
-    return variance * (max(effective, 0.0) + PRIOR_UNKNOWNS) / total if total > 0 else np.inf
+    total = energy + PRIOR_UNKNOWNS * UNEVENNESS * mean_square
+    return variance * (max(parameters, 0.0) + PRIOR_UNKNOWNS) / total if total > 0 else np.inf
 
 
 def effective_parameters(

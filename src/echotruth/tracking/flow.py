@@ -12,13 +12,13 @@ from echotruth.tracking.accumulation import Path, follow
 from echotruth.tracking.grey import grey_levels, local_ncc
 from echotruth.tracking.tracker_input import TrackerInput
 
-Flow = Callable[[np.ndarray, np.ndarray], np.ndarray]
+FlowMethod = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Two images with grey values from 0 to 1 to the motion (axial, lateral, 2) of all pixels between them, px."""
 NCC_SIDE = 0.75e-3
 """Side of the square in which the quality of a dense flow is measured, m: half the paper's window."""
 
 
-def track_by_flow(flow: Flow, clip: TrackerInput, reference: str) -> Path:
+def track_by_flow(flow: FlowMethod, clip: TrackerInput, reference: str) -> Path:
     """Path of the points of a clip; the correlation is that of the images in a square around each point."""
     side = max(9, 2 * round(NCC_SIDE / clip.spacing / 2) + 1)
     return follow(FlowTracker(flow, side), grey_levels(clip.frames), clip.points, reference)
@@ -30,12 +30,12 @@ class FlowTracker:
 
     Attributes
     ----------
-    flow : Flow
+    flow : FlowMethod
     side : int
         Side of the square in which the quality is measured, px, odd.
     """
 
-    flow: Flow
+    flow: FlowMethod
     side: int
 
     def prepare(self, image: np.ndarray) -> np.ndarray:

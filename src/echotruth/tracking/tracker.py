@@ -117,4 +117,6 @@ def _method(name: str) -> Callable[[TrackerInput, Any], Path]:
             from echotruth.tracking.trackers.dis import track as function
         case "ilk":
             from echotruth.tracking.trackers.ilk import track as function
+        case _:
+            raise ValueError(f"{name} is not a method of ours.")
     return function

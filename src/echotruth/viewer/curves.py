@@ -48,7 +48,7 @@ def strain(clip: Clip, found: dict[str, xr.Dataset], component: str, measure: st
     ----------
     clip : Clip
     found : dict
-        Tracker -> its curves, as :func:`strain_of` gives them.
+        Tracker -> its curves, as :func:`echotruth.strain_curves` gives them.
     component : {"line", "RR", "TT", "RT"}
     measure : {"engineering", "green_lagrange"}
         Ignored for the strain of a contour, which is an engineering strain.

@@ -33,7 +33,7 @@ NO_COLOUR = np.zeros((0, 0, 0), np.uint8)
 
 
 class Panel:
-    """One picture, of the truth or of a tracker, which is found in the document under a name.
+    """One picture, of the truth or of a tracker.
 
     Parameters
     ----------
@@ -45,6 +45,8 @@ class Panel:
         Lateral and axial: both panels share them.
     said : Div
         Where it is written what is under the pointer.
+    name : str
+        Under which the picture is found in the document.
     """
 
     def __init__(

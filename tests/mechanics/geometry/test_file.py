@@ -12,7 +12,7 @@ from echotruth.config.geometry import CellLabels
 from echotruth.config.loading import load
 from echotruth.fem.volume import cell_volumes
 from echotruth.mechanics.geometry import GeometryError, left_ventricle, mesh_quality
-from echotruth.mechanics.geometry.boundary import add_edge_nodes, boundary, with_edge_nodes
+from echotruth.mechanics.geometry.boundary import boundary, quadratic_cells, with_midpoints
 from echotruth.mechanics.geometry.boundary_labels import BASE, ENDO, EPI, label_boundary
 from echotruth.mechanics.geometry.cut import extract_wall
 from echotruth.mechanics.geometry.imported_mesh import read
@@ -31,8 +31,8 @@ def test_linear_tetrahedra_get_straight_middles(file_heart, write_mesh):
     linear = file_heart.mesh.cells[:, :4]
     mesh = left_ventricle(Geometry(file=write_mesh(file_heart.nodes, linear)))
     assert mesh.cells.shape == file_heart.mesh.cells.shape and len(mesh.nodes) == len(file_heart.mesh.nodes)
-    edges, cells = add_edge_nodes(linear, len(file_heart.nodes))
-    nodes = with_edge_nodes(file_heart.nodes, edges)
+    edges, cells = quadratic_cells(linear, len(file_heart.nodes))
+    nodes = with_midpoints(file_heart.nodes, edges)
     np.testing.assert_allclose(nodes[cells[:, 4]], nodes[cells[:, :2]].mean(axis=1))
     assert [len(mesh.endo), len(mesh.epi), len(mesh.base)] == [
         len(side) for side in (file_heart.mesh.endo, file_heart.mesh.epi, file_heart.mesh.base)

@@ -114,9 +114,10 @@ class _Scene:
 class _Way:
     """One way through a clip.
 
-    It has the displacement (given frame, point, 2), m, of a perfect tracker of the plane at the points of the grid; the
-    images in the order of the visits; the least covariance `variance` of the displacement, mean over the wall, (given
-    frame, 2, 2), m^2; and the least variance `step_variance` of a step, sum of both components, (visits - 1,), m^2.
+    It has the displacement (frame, point, 2), m, of a perfect tracker of the plane at the points of the grid, in the
+    frames that a tracker gets; the images in the order of the visits; the least covariance `variance` of the
+    displacement, mean over the wall, (frame, 2, 2), m^2; and the least variance `step_variance` of a step, sum of both
+    components, (visits - 1,), m^2.
     """
 
     displacement: Floats

@@ -81,9 +81,11 @@ def seed_surroundings(config: Config, heart: Heart, plane: Plane, random: np.ran
 
     Returns
     -------
-    Surroundings
-        In the scan from `start_mm` to the imaging depth, and in the beam in elevation. Their amplitudes are normally
-        distributed; the variance in a volume is that of muscle times the level.
+    position : ndarray of shape (n, 3), m
+        At end-diastole, in the heart frame: in the scan from `start_mm` to the imaging depth, and in the beam in
+        elevation. Those inside the heart are hidden until it moves away.
+    amplitude : ndarray of shape (n,)
+        Normally distributed; the variance in a volume is that of muscle times the level.
     """
     settings, depth = config.realism.surroundings, imaging_depth(config.rf, config.bmode)
     scan, start = scan_lines(config.probe, config.rf), settings.si().start

@@ -297,7 +297,7 @@ class _LensKernels:
     """Tables of echoes under the lens, made for every scatterer.
 
     The positions (n, 3) are in m; `angle` (n,) is the index of the angle of each from the centre of the array, and
-    `subapertures` the number of those with a separate table lookup per scatterer.
+    `subapertures` the number of subapertures, each with a table lookup of its own for every scatterer.
     """
 
     def __init__(self, full: FullMatrix, position: np.ndarray, angle: np.ndarray, subapertures: int) -> None:

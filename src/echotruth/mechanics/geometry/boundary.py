@@ -137,10 +137,10 @@ def largest_component(selected: np.ndarray, pairs: Integers) -> np.ndarray:
     return selected & (label == np.argmax(np.bincount(label[selected])))
 
 
-def add_edge_nodes(cells: Integers, n_nodes: int) -> tuple[Integers, Integers]:
-    """Add a node, from number `n_nodes` on, to every edge of linear tetrahedra (n_cells, 4); quadratic ones stay.
+def quadratic_cells(cells: Integers, n_nodes: int) -> tuple[Integers, Integers]:
+    """Quadratic tetrahedra of linear ones (n_cells, 4), with a node, from `n_nodes` on, in the middle of each edge.
 
-    Returns the vertices beside each new node, shape (n_edges, 2), and the quadratic cells, shape (n_cells, 10).
+    Returns the ends of each edge, shape (n_edges, 2), and the cells, shape (n_cells, 10); quadratic ones stay.
     """
     if cells.shape[1] == 10:
         return np.empty((0, 2), np.int32), cells
@@ -149,7 +149,7 @@ def add_edge_nodes(cells: Integers, n_nodes: int) -> tuple[Integers, Integers]:
     return edges, np.hstack([cells, n_nodes + number.reshape(-1, 6)]).astype(np.int32)
 
 
-def with_edge_nodes(positions: Floats, edges: Integers) -> Floats:
+def with_midpoints(positions: Floats, edges: Integers) -> Floats:
     """Positions (..., n, 3) of vertices, then those of the middles of edges (n_edges, 2)."""
     return np.concatenate([positions, positions[..., edges, :].mean(axis=-2)], axis=-2)
 

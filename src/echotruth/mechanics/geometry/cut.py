@@ -34,8 +34,8 @@ def extract_wall(mesh: ImportedMesh, wall_cells: CellLabels | None) -> ImportedM
     ----------
     mesh : ImportedMesh
         With tetrahedra.
-    keep : CellLabels or None
-        Cells to keep.
+    wall_cells : CellLabels or None
+        Cells to keep; all if None.
 
     Raises
     ------

@@ -12,12 +12,12 @@ from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Floats, Integers, Mesh
 from echotruth.mechanics.geometry import imported_mesh
 from echotruth.mechanics.geometry.boundary import (
-    add_edge_nodes,
     adjacent_triangles,
     boundary,
     component_labels,
+    quadratic_cells,
     triangle_edges,
-    with_edge_nodes,
+    with_midpoints,
 )
 from echotruth.mechanics.geometry.boundary_labels import NAMES, BoundarySurface, label_boundary
 from echotruth.mechanics.geometry.cut import extract_wall, named_array, select_cells
@@ -73,8 +73,8 @@ def ventricle_from_file(geometry: Geometry) -> Mesh:
 def _keep_cells(imported: ImportedMesh, surface: BoundarySurface, septum: Floats | None) -> tuple[Mesh, HeartFrame]:
     """The tetrahedra of the file, made quadratic."""
     frame = heart_frame(surface, septum)
-    edges, cells = add_edge_nodes(imported.cells, len(imported.nodes))
-    mesh = labelled_mesh(with_edge_nodes(frame.transform_points(imported.nodes), edges), cells, surface)
+    edges, cells = quadratic_cells(imported.cells, len(imported.nodes))
+    mesh = labelled_mesh(with_midpoints(frame.transform_points(imported.nodes), edges), cells, surface)
     base = np.unique(mesh.base)
     if np.ptp(mesh.nodes[base, 2]) < 1e-4 * np.ptp(mesh.nodes[:, 2]):
         mesh.nodes[base, 2] = 0.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Floats, Integers, Mesh
-from echotruth.mechanics.geometry.boundary import add_edge_nodes, boundary
+from echotruth.mechanics.geometry.boundary import boundary, quadratic_cells
 from echotruth.mechanics.geometry.mesh_quality import right_handed
 
 WallMap = Callable[[Floats, Floats, Floats], Floats]
@@ -128,7 +128,7 @@ def _extrude(triangles: Integers, n_points: int, layers: int) -> Integers:
 
 def _quadratic(tetrahedra: Integers, vertices: Floats) -> tuple[Integers, Floats]:
     """Cells (n_cells, 10) and parameters (n_nodes, 3) with a node in the middle of every edge, in parameters."""
-    edges, cells = add_edge_nodes(tetrahedra, len(vertices))
+    edges, cells = quadratic_cells(tetrahedra, len(vertices))
     a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]
     turn = (b[:, 2] - a[:, 2] + np.pi) % (2 * np.pi) - np.pi
     azimuth = a[:, 2] + turn / 2

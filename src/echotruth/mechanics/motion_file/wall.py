@@ -12,7 +12,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Config, Geometry
 from echotruth.fem.tetrahedra import Integers, Mesh
 from echotruth.fem.volume import jacobians
-from echotruth.mechanics.geometry.boundary import add_edge_nodes, boundary, with_edge_nodes
+from echotruth.mechanics.geometry.boundary import boundary, quadratic_cells, with_midpoints
 from echotruth.mechanics.geometry.boundary_labels import BoundarySurface, label_boundary
 from echotruth.mechanics.geometry.cut import extract_wall
 from echotruth.mechanics.geometry.file import labelled_mesh, map_fibres, septum_point
@@ -92,12 +92,12 @@ def moving_wall(config: Config) -> MovingWall:
     unit = METRES[geometry.unit] * geometry.scale
     cycle = replace(recorded, positions=recorded.positions[:, point] * unit)
     _check_size(wall, cycle, geometry)
-    edges, cells = add_edge_nodes(wall.cells, len(wall.nodes))
+    edges, cells = quadratic_cells(wall.cells, len(wall.nodes))
     _check_inverted(cycle, wall, edges, cells)
     cycle = cycle.beginning_at(_end_diastole(config, wall, cycle, edges, cells))
     wall, surface = _at_frame(wall, cycle, geometry)
     frame = heart_frame(surface, septum_point(wall, geometry))
-    positions = with_edge_nodes((cycle.positions - frame.origin) @ frame.axes.T, edges)
+    positions = with_midpoints((cycle.positions - frame.origin) @ frame.axes.T, edges)
     rest = labelled_mesh(positions[0], cells, surface)
     check_flat(rest, cycle.names[0], "mesh the wall again where its motion is solved")
     check_cavity(rest, cycle.names[0], f"set geometry.unit, now {geometry.unit}, to one of {', '.join(METRES)}")
@@ -174,7 +174,7 @@ def _end_diastole(config: Config, wall: ImportedMesh, cycle: RecordedCycle, edge
         # The last frame is the first one again where it is left out.
         return (named - cycle.first) % len(cycle.positions)
     wall, surface = _at_frame(wall, cycle, config.geometry)
-    positions = with_edge_nodes(cycle.positions, edges)
+    positions = with_midpoints(cycle.positions, edges)
     return first_of_largest(_cavity_volumes(positions, labelled_mesh(positions[0], cells, surface), surface))
 
 

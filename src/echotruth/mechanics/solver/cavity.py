@@ -42,11 +42,12 @@ _XI, _WEIGHT = triangle()
 _N, _DN_DXI = triangle_shape(_XI)
 _OPERATORS = np.stack([_N, _DN_DXI[..., 0], _DN_DXI[..., 1]])
 """Nodes to x, x,1 and x,2 at the quadrature points, (3, n_points, 6)."""
-_TURNED, _BACK = np.roll(_OPERATORS, -1, axis=0), np.roll(_OPERATORS, -2, axis=0)
+_NEXT, _LAST = np.roll(_OPERATORS, -1, axis=0), np.roll(_OPERATORS, -2, axis=0)
 _MINORS = (
-    -_WEIGHT[:, None, None] / 3 * (_TURNED[..., None] * _BACK[..., None, :] - _BACK[..., None] * _TURNED[..., None, :])
+    -_WEIGHT[:, None, None] / 3 * (_NEXT[..., None] * _LAST[..., None, :] - _LAST[..., None] * _NEXT[..., None, :])
 )
-"""-weight / 3 (A_p B_q - A_q B_p) of operators s, p, q in turn, by point and nodes a and b, (3, n_points, 6, 6)."""
+"""M_s = -weight / 3 (O_pa O_qb - O_qa O_pb) of the operators O, with s, p, q in turn, by point and nodes a and b, (3,
+n_points, 6, 6)."""
 _PERMUTATION = np.cross(np.eye(3)[:, None], np.eye(3))
 """Levi-Civita symbol, (3, 3, 3)."""
 

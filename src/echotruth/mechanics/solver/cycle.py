@@ -148,6 +148,7 @@ def _solve_next(stepper: LoadStepper, cycle: Cycle, activation: Activation, stat
     fraction: Floats | float
     if unknown == "tension":
         fraction = activation.tension_fraction()
+        # That of this frame is unknown: late tissue has the part of it that is known, and its fraction of the rest.
         tension = activation.tension([*(state.tension for state in states), 0.0])
     else:
         assert cycle.tension is not None

@@ -25,7 +25,7 @@ FINE_PATCH, FINE_STRIDE = 16, 6
 
 
 def track(clip: TrackerInput, settings: Dis) -> Path:
-    """Path of the points of a clip by the flow of the library."""
+    """Path of the points of a clip by the flow of the library, which has no quality: it follows from the images."""
     return track_by_flow(partial(optical_flow, preset=settings.preset), clip, settings.reference)
 
 

@@ -14,7 +14,7 @@ from echotruth.tracking.tracker_input import TrackerInput
 
 
 def track(clip: TrackerInput, settings: Ilk) -> Path:
-    """Path of the points of a clip by the flow of the library."""
+    """Path of the points of a clip by the flow of the library, which has no quality: it follows from the images."""
     return track_by_flow(partial(optical_flow, radius=settings.radius_px), clip, settings.reference)
 
 

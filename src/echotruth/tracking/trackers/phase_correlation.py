@@ -23,7 +23,10 @@ ROUNDING = 1e-9
 
 
 def track(clip: TrackerInput, settings: PhaseCorrelation) -> Path:
-    """Path of the points of a clip, with the height of the correlation peaks; windows cover the whole image."""
+    """Path of the points of a clip, with the height of the correlation peaks.
+
+    Windows cover the whole image; the mask is not used.
+    """
     windows = arrange(clip.shape, window_side(settings, clip.spacing), settings.stride)
     images = amplitudes(clip.frames, settings.dynamic_range_dB) if settings.dynamic_range_dB else clip.frames
     finite = images[np.isfinite(images)] if images.dtype.kind == "f" else images
@@ -73,7 +76,10 @@ class PhaseCorrelationTracker:
     spectral_threshold: float = ROUNDING
 
     def prepare(self, image: np.ndarray) -> PhaseSpectra:
-        """Fourier transforms of the windows of an image (axial, lateral), tapered after subtraction of their means."""
+        """Fourier transforms of the windows of an image (axial, lateral), normalised to unit magnitude.
+
+        Their means are subtracted before the taper; frequencies below the spectral threshold are 0.
+        """
         side = self.windows.side
         values = self.windows.extract(image)
         values -= values.mean((-2, -1), keepdims=True)

@@ -28,7 +28,10 @@ MAX_SHIFT = 0.25
 
 
 def track(clip: TrackerInput, settings: WindowDeformation) -> Path:
-    """Path of the points of a clip, with the correlation of the last windows, which cover the whole image."""
+    """Path of the points of a clip, with the correlation of the last windows.
+
+    Windows cover the whole image; the mask is not used. ValueError as :func:`window_passes` raises it.
+    """
     tracker = WindowDeformationTracker(window_passes(settings, clip.shape, clip.spacing))
     return follow(tracker, amplitudes(clip.frames, settings.dynamic_range_dB), clip.points, settings.reference)
 
