@@ -7,6 +7,7 @@ import finished_repository as finished
 import numpy as np
 import pytest
 import xarray as xr
+import zarr
 
 from echotruth.config import Probe
 from echotruth.config.loading import load
@@ -81,32 +82,40 @@ def test_records_keep_their_times_so_that_nothing_is_run_again(out):
         assert paths[0].stat().st_mtime_ns == paths[1].stat().st_mtime_ns
 
 
-def rewrite(out, stage, group, index, instructions, **values):
-    """Write arrays of a job of the first repository's second heart anew, as a machine of some kind would."""
-    case, store = finished.expand(FIRST)[1], Store(out / "first/first.zarr")
+HERE = "that of this machine"
+
+
+def rewrite(folder, stage, group, index, instructions, **values):
+    """Write arrays of a job of the common heart anew, as a machine of some kind would; give the name of the heart."""
+    case, store = finished.expand(FIRST)[1].id, Store(folder / f"{folder.name}.zarr")
     store.write(group, values, *index)
-    path = record_path(out / "first", stage, case.id, "mid" if len(index) > 1 else None)
+    path = record_path(folder, stage, case, "mid" if len(index) > 1 else None)
     record = ledger.read(path)
-    new = checksums(store.files(group, *index), store.path)
-    ledger.commit(path, record | {"sha256": record["sha256"] | new, "instructions": instructions})
-    return case.id
+    kind = {} if instructions == HERE else {"instructions": instructions}
+    ledger.commit(
+        path, record | kind | {"sha256": record["sha256"] | checksums(store.files(group, *index), store.path)}
+    )
+    return case
+
+
+def solve(out, change):
+    """Give both repositories a displacement of the heart that both have, the first's made elsewhere and changed."""
+    shape = np.shape(Store(out / "first/first.zarr").read("mechanics", 1)["displacement"])
+    displacement = 1e-4 * np.random.default_rng(1).standard_normal(shape)
+    rewrite(out / "second", "mechanics", "mechanics", (0,), HERE, displacement=displacement)
+    return rewrite(out / "first", "mechanics", "mechanics", (1,), "native older", displacement=change(displacement))
 
 
 def test_same_heart_with_other_bytes_is_refused_by_name_before_anything_changes(out, capsys):
-    images = np.zeros((finished.FRAMES, 64, 64))
-    kind = ledger.read(record_path(out / "first", "bmode", finished.expand(FIRST)[1].id, "mid"))["instructions"]
-    case = rewrite(out, "bmode", "bmode/64", (1, 0), kind, image=images)
+    case = rewrite(out / "first", "bmode", "bmode/64", (1, 0), HERE, image=np.zeros((finished.FRAMES, 64, 64)))
     assert merge_repositories(out / "both", [out / "first", out / "second"]) == 2
     assert f"bmode of {case}, mid has other bytes than in" in capsys.readouterr().err
     assert not (out / "both").exists()
 
 
-@pytest.mark.parametrize("first", [True, False])
-def test_heart_of_two_kinds_of_machines_that_differs_by_rounding_is_merged_and_stays_as_it_was(out, first):
-    displacement = Store(out / "first/first.zarr").read("mechanics", 1)["displacement"]
-    rewrite(out, "mechanics", "mechanics", (1,), "native older", displacement=displacement * (1 + 1e-8))
-    into, other = ("first", "second") if first else ("second", "first")
-    row = 1 if first else 0
+@pytest.mark.parametrize("into, other, row", [("first", "second", 1), ("second", "first", 0)])
+def test_heart_of_two_kinds_of_machines_that_differs_by_rounding_is_merged_and_stays_as_it_was(out, into, other, row):
+    solve(out, lambda displacement: displacement * (1 + 1e-8))
     before = Store(out / f"{into}/{into}.zarr").read("mechanics", row)["displacement"]
     assert merge_repositories(out / into, [out / other]) == 0
     assert check(out / into).faults == []
@@ -114,12 +123,53 @@ def test_heart_of_two_kinds_of_machines_that_differs_by_rounding_is_merged_and_s
 
 
 def test_heart_of_two_kinds_of_machines_that_differs_by_more_is_refused_with_the_array(out, capsys):
-    displacement = Store(out / "first/first.zarr").read("mechanics", 1)["displacement"]
-    case = rewrite(out, "mechanics", "mechanics", (1,), "native older", displacement=displacement + 1e-8)
+    case = solve(out, lambda displacement: displacement * (1 + 1e-4))
     assert merge_repositories(out / "both", [out / "first", out / "second"]) == 2
     told = capsys.readouterr().err
     assert f"mechanics of {case} was made with other instructions (" in told and "native older" in told
     assert "and mechanics/displacement differs by more than rounding from" in told and told.count("\n") == 1
+
+
+def one_wrong(displacement):
+    changed = displacement.copy()
+    changed[-1, 7, 2] += 1e-5
+    return changed
+
+
+def test_one_wrong_number_of_a_solution_is_not_rounding(out):
+    solve(out, one_wrong)
+    assert merge_repositories(out / "first", [out / "second"]) == 2
+
+
+def test_results_of_other_code_are_refused_though_they_differ_by_rounding(out):
+    path = record_path(out / "first", "mechanics", solve(out, lambda displacement: displacement * (1 + 1e-8)))
+    ledger.commit(path, ledger.read(path) | {"code": "other"})
+    assert merge_repositories(out / "first", [out / "second"]) == 2
+
+
+def test_damage_of_a_heart_of_another_kind_is_told_as_damage(out, capsys):
+    solve(out, lambda displacement: displacement * (1 + 1e-8))
+    shard = next(path for path in (out / "first/first.zarr/mechanics/displacement/c/1").rglob("*") if path.is_file())
+    shard.write_bytes(shard.read_bytes()[:-1] + b"!")
+    assert merge_repositories(out / "first", [out / "second"]) == 2
+    assert "heal" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("change, is_merged", [(1, True), (2, False)])
+def test_images_of_two_kinds_of_machines_may_differ_by_a_grey_level(out, change, is_merged):
+    images = Store(out / "first/first.zarr").read("bmode/64", 1, 0)["image"].astype(int)
+    inwards = np.where(images < 128, change, -change)
+    rewrite(out / "first", "bmode", "bmode/64", (1, 0), "native older", image=images + inwards)
+    assert (merge_repositories(out / "first", [out / "second"]) == 0) == is_merged
+
+
+@pytest.mark.parametrize("factor, is_merged", [(1 + 1e-7, True), (np.nan, False), (1.01, False)])
+def test_measures_of_two_kinds_of_machines_may_differ_by_rounding_in_their_unit(out, factor, is_merged, capsys):
+    scalars = np.asarray(zarr.open_array(out / "first/first.zarr", path="physiology/scalars")[1])
+    assert np.abs(scalars).max() > 0
+    rewrite(out / "first", "physiology", "physiology", (1,), "native older", scalars=scalars * factor)
+    assert (merge_repositories(out / "first", [out / "second"]) == 0) == is_merged
+    assert is_merged or "physiology/scalars differs by more than rounding" in capsys.readouterr().err
 
 
 def test_damaged_repository_is_not_merged(out, capsys):

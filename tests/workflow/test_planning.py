@@ -1,12 +1,15 @@
 """Planning in less time and memory plans what Snakemake does without."""
 
+import copy
 import gc
+import pickle
 from inspect import signature
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from snakemake.common import get_function_params, get_input_function_aux_params
+from snakemake.exceptions import WorkflowError
 from snakemake.iocontainers import AttributeGuard, Namedlist
 from snakemake.resources import Resource
 from snakemake.settings.types import Batch
@@ -53,6 +56,7 @@ def test_lists_of_jobs_share_guards_and_still_take_them_for_what_they_are():
     assert one.get("index") is None and one.get("a") == 1
     with pytest.raises(AttributeError, match=r"index\(\) cannot be used"):
         one.index(1)
+    assert copy.deepcopy(one).a == pickle.loads(pickle.dumps(one)).a == 1
 
 
 FILES = [Path(f"ledger/evaluation/{name}.json") for name in "gbdface"]
@@ -74,3 +78,9 @@ def test_last_batch_and_other_rules_keep_all_files():
     assert in_batch(FILES, "repository", last) == paths
     assert last.get_batch(paths) == sorted(paths)[5:]
     assert in_batch(FILES, "repository", Batch("report", 1, 3)) == in_batch(FILES, "repository", None) == paths
+
+
+def test_more_batches_than_files_are_left_to_snakemake_to_refuse():
+    batch = Batch("repository", 1, 8)
+    with pytest.raises(WorkflowError, match="less input files than batches"):
+        batch.get_batch(in_batch(FILES, "repository", batch))

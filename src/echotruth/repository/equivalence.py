@@ -30,8 +30,11 @@ ten times and more what was measured."""
 STEPPED = ("rf", "bmode")
 """Stages whose whole numbers are measured, in steps, and may be off by one; those of others are labels."""
 
-EXCEPTIONS = 1e-3
-"""Share of the numbers of an array that may differ by more: labels of pixels at an edge, points that a tracker lost."""
+EXCEPTIONS = {"truth": 1e-3, "bmode": 1e-3, "tracking": 1e-3, "evaluation": 1e-3}
+"""Stage -> share of the numbers of an array that may differ by more: pixels at an edge, points that a tracker lost."""
+
+SMALLEST_SCALE = {"m": 1e-4, "s": 1e-2, "rad": 0.1, "1": 1.0, "percent": 100.0}
+"""Unit -> least of the numbers to which those of a pack in this unit are compared: errors may all be near 0."""
 
 NOISE = ("mechanics/residual", "mechanics/newton_steps")
 """Arrays that hold how the solution was found."""
@@ -49,36 +52,40 @@ def first_difference(record: JobRecord, giving: Repository, receiving: Repositor
     Returns
     -------
     str or None
-        None if all arrays are the same within :data:`TOLERANCE`.
+        None if all arrays are the same within :data:`TOLERANCE`, but for :data:`EXCEPTIONS`.
     """
     for path, array in giving.shard_paths.items():
         group = path.rpartition("/")[0]
         if giving.stages[group] != record.stage or path in NOISE or path not in receiving.shard_paths:
             continue
         one, other = (np.asarray(kept.opened[path][kept.row(record) or ()]) for kept in (giving, receiving))
-        allowed = TOLERANCE[record.stage] * _scale(giving, group, path, one) + (array.quantum or 0)
+        if one.shape != other.shape:
+            return path
+        allowed = TOLERANCE[record.stage] * _scale(giving, path, one, other) + (array.quantum or 0)
         if one.dtype.kind in "iu":
             allowed = float(record.stage in STEPPED)
-        if one.shape != other.shape or not _are_close(one, other, allowed):
+        if _count_beyond(one, other, allowed) > EXCEPTIONS.get(record.stage, 0) * one.size:
             return path
     return None
 
 
-def _scale(repository: Repository, group: str, path: str, values: NDArray[Any]) -> Any:
-    """Largest magnitude of an array; of a pack that of the numbers in the same unit, (n_numbers,)."""
-    magnitude = np.nan_to_num(np.abs(values.astype(complex if values.dtype.kind == "c" else float)))
+def _scale(repository: Repository, path: str, *arrays: NDArray[Any]) -> Any:
+    """Largest magnitude in two arrays; of a pack that of the numbers in the same unit, (n_numbers,)."""
+    magnitude = np.max([np.nan_to_num(np.abs(values), posinf=0) for values in arrays], axis=0)
+    group = path.rpartition("/")[0]
     for pack in schema.PACKS.get(group, ()):
         if path == f"{group}/{pack.array.name}":
             largest = magnitude.reshape(-1, magnitude.shape[-1]).max(0)
-            units = zarr.open_array(repository.store, path=f"{group}/{pack.dimension}_units", mode="r")[...]
-            return np.array([largest[units == unit].max() for unit in np.asarray(units)])
+            units = np.asarray(zarr.open_array(repository.store, path=f"{group}/{pack.dimension}_units", mode="r")[...])
+            scale = {unit: max(largest[units == unit].max(), SMALLEST_SCALE.get(unit, 0)) for unit in units.tolist()}
+            return np.array([scale[unit] for unit in units.tolist()])
     return magnitude.max(initial=0)
 
 
-def _are_close(one: NDArray[Any], other: NDArray[Any], allowed: Any) -> bool:
-    """Whether all but a few exceptions differ by no more than is allowed; what is not a number is so in both."""
+def _count_beyond(one: NDArray[Any], other: NDArray[Any], allowed: Any) -> int:
+    """How many numbers differ by more than is allowed; what is not a number must be so in both."""
     if one.dtype.kind in "iu":
         one, other = one.astype(np.int64), other.astype(np.int64)
     with np.errstate(invalid="ignore"):
-        same = (np.abs(one - other) <= allowed) | (np.isnan(one) & np.isnan(other))
-    return bool(same.size - np.count_nonzero(same) <= EXCEPTIONS * same.size)
+        same = (one == other) | (np.abs(one - other) <= allowed) | (np.isnan(one) & np.isnan(other))
+    return int(same.size - np.count_nonzero(same))

@@ -82,7 +82,9 @@ def _joint_table(configs: dict[Path, Config]) -> dict[str, str]:
 
 
 def compare(source: Path, target: Path) -> None:
-    """Make sure that jobs which two repositories have both made have the same bytes in them.
+    """Make sure that jobs which two repositories have both made have the same results in them.
+
+    The bytes must be the same, or, if machines of two kinds made them, the numbers but for rounding.
 
     Parameters
     ----------
@@ -92,7 +94,7 @@ def compare(source: Path, target: Path) -> None:
     Raises
     ------
     MergeError
-        If a job has other bytes.
+        If a job has other results, or is damaged.
     """
     giving, receiving = Repository(source), Repository(target)
     for record in _records(giving):
@@ -110,10 +112,7 @@ def verify_files(source: Path) -> None:
     """
     giving = Repository(source)
     for record in _records(giving):
-        try:
-            verify(giving.store, record.path, ledger.read(record.path))
-        except (ChecksumError, ValueError) as error:
-            raise MergeError(f"{error}: heal {source} before it is merged") from None
+        _verify(giving, record.path)
 
 
 def take_over(source: Path, target: Path) -> tuple[list[JobRecord], int]:
@@ -206,22 +205,31 @@ def _renamed(record: JobRecord, giving: Repository, receiving: Repository) -> It
 
 def _compare(record: JobRecord, giving: Repository, receiving: Repository) -> None:
     """Both must have the same bytes of a job that both have, or but for rounding if machines of two kinds made them."""
-    mine = ledger.read(_in(record, giving, receiving))
-    theirs = ledger.read(record.path)
-    same = {path: hash for _, path, hash in _renamed(record, giving, receiving)} == mine.get("sha256", {})
-    verdicts_are_same = all(mine.get(key) == theirs.get(key) for key in ("status", "reason"))
-    if same and verdicts_are_same:
+    mine, theirs = ledger.read(_in(record, giving, receiving)), ledger.read(record.path)
+    have_same_verdict = all(mine.get(key) == theirs.get(key) for key in ("status", "reason"))
+    hashes = {path: hash for _, path, hash in _renamed(record, giving, receiving)}
+    if have_same_verdict and hashes == mine.get("sha256", {}):
         return
-    kinds = [str(found.get("instructions")) for found in (theirs, mine)]
     what = "has other bytes than in"
-    remedy = "make both by the same code, or delete the case in one of them"
-    if kinds[0] != kinds[1]:
-        different = first_difference(record, giving, receiving) if verdicts_are_same else "its status"
+    kinds = [str(found.get("instructions")) for found in (theirs, mine)]
+    if kinds[0] != kinds[1] and have_same_verdict and mine.get("code") == theirs.get("code"):
+        _verify(giving, record.path)
+        _verify(receiving, _in(record, giving, receiving))
+        different = first_difference(record, giving, receiving)
         if different is None:
             return
         made = f"was made with other instructions ({' and '.join(kinds)})"
         what = f"{made}, and {different} differs by more than rounding from"
+    remedy = "make both by the same code, or delete the case in one of them"
     raise MergeError(f"{record.path}: {record.job} {what} {receiving.folder}: {remedy}")
+
+
+def _verify(repository: Repository, path: Path) -> None:
+    """Compare the files of a job with the checksums in its record."""
+    try:
+        verify(repository.store, path, ledger.read(path))
+    except (ChecksumError, ValueError) as error:
+        raise MergeError(f"{error}: heal {repository.folder} before it is merged") from None
 
 
 def _copy(record: JobRecord, giving: Repository, receiving: Repository) -> None:

@@ -6,6 +6,7 @@ Nothing of this is part of Snakemake's interface: a version that has changed it 
 from __future__ import annotations
 
 import gc
+import logging
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
     from snakemake.rules import Rule
     from snakemake.settings.types import Batch
+
+logger = logging.getLogger("echotruth")
 
 OBJECTS_BETWEEN_COLLECTIONS = 200_000
 """Objects made before Python looks for garbage. A plan only grows, and each search goes over all of it."""
@@ -38,6 +41,7 @@ def hasten(rules: Iterable[Rule]) -> None:
 
         # Each list of files, params or wildcards has two of these, which do nothing but refuse to be called.
         iocontainers.AttributeGuard.__new__ = cache(lambda guard, name: object.__new__(guard))
+        iocontainers.AttributeGuard.__reduce__ = lambda self: (type(self), (self.name,))
         # A dry run saves what it knows of all files, which later runs do not trust: an empty copy will do.
         IOCache._simple_copy = lambda self: type(self)(self.max_wait_time)
     with suppress(ImportError, AttributeError):
@@ -64,10 +68,11 @@ def in_batch(files: Sequence[Path], rule: str, batch: Batch | None) -> list[str]
         What the option `--batch` chooses.
     """
     paths = [path.as_posix() for path in files]
-    if batch is None or batch.rulename != rule or batch.is_final:
+    if batch is None or batch.rulename != rule or batch.is_final or len(paths) < batch.batches:
         return paths
     chosen: list[str] = type(batch).get_batch(batch, paths)
     batch.get_batch = list  # type: ignore[method-assign]  # they are chosen already
+    logger.info("Only batch %s is planned: run the others too, the last one last.", batch)
     return chosen
 
 
