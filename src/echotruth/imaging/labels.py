@@ -1,4 +1,7 @@
-"""Labels of the tissue at a pixel: layer, segment and region of disease, packed into one array."""
+"""Labels of the tissue at a pixel: layer, segment and region of disease, packed into one array.
+
+:mod:`echotruth.imaging.truth` finds them, the segment by :func:`echotruth.aha.segment`.
+"""
 
 from __future__ import annotations
 

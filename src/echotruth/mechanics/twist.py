@@ -1,4 +1,8 @@
-"""Twist of the ventricle: the rotation of its apex less that of its base."""
+"""Twist of the ventricle: rotation of slices, of which :mod:`.physiology` takes the base from the apex.
+
+The rotation of a clip, with the same sign, is in :mod:`echotruth.evaluation.courses`; that of a motion by a formula in
+:mod:`.prescribed`.
+"""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 The record of a job holds those of its shards, and `ledger/structure.json` those of all other files of the store.
 
-Beside these, every chunk in a shard carries a crc32c (see :mod:`.store`), which raises when damaged data are read.
+Beside these, every chunk in a shard carries a crc32c (see :mod:`.hierarchy`), which raises when damaged data are read.
 """
 
 from __future__ import annotations

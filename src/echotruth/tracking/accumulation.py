@@ -1,4 +1,7 @@
-"""Displacement of points through a clip, from a tracker that compares two images at a time."""
+"""Displacement of points through a clip, from a tracker that compares two images at a time: which is the reference.
+
+Of `bspline_dic`, which follows its own template, :mod:`.trackers.bspline_dic` says when the template is updated.
+"""
 
 from __future__ import annotations
 
