@@ -74,3 +74,13 @@ def test_bullseye_is_that_seen_from_the_apex():
             page = np.radians(180 - angle)
             _, _, start, stop = BULLSEYE[number - 1]
             assert number in ring and (page - start) % (2 * np.pi) < stop - start
+
+
+def test_points_on_a_border_belong_to_the_next_segment_whatever_their_last_bits():
+    azimuths = np.pi / 2 - np.radians(30 + 60 * np.arange(6))
+    on_border = np.stack([np.cos(azimuths), np.sin(azimuths), np.full(6, -0.5)], -1)
+    for scale in (1, 1 - 1e-15, 1 + 1e-15):
+        for turn in (-1e-15, 0, 1e-15):
+            turned = on_border @ np.array([[1, turn, 0], [-turn, 1, 0], [0, 0, scale]])
+            assert segment(turned, -3.0).tolist() == [2, 3, 4, 5, 6, 1]
+    assert segment(np.array([[0, 1, -1 + 1e-15], [0, 1, -1 - 1e-15], [0, 1, -1.0]]), -3.0).tolist() == [7, 7, 7]

@@ -29,6 +29,10 @@ SEGMENT_NAMES = (
 
 APEX_SEGMENT = 17
 
+TIE = 1e-9
+"""Sectors and thirds by which points are moved: those on a border, as many centroids of a regular mesh are, belong to the
+next segment whatever the last bits of their coordinates."""
+
 
 def segment(position: np.ndarray, apex_z: float) -> np.ndarray:
     """AHA segment of points of the wall.
@@ -53,12 +57,12 @@ def segment(position: np.ndarray, apex_z: float) -> np.ndarray:
     if not apex_z < 0:
         raise ValueError(f"The endocardial apex must lie below the base plane (z < 0), not at z = {apex_z} m.")
     x, y, z = np.moveaxis(np.asarray(position, float), -1, 0)
-    third = 3 * z / apex_z
+    third = 3 * z / apex_z + TIE
     # From anterior through the septum, as the numbers run.
     azimuth = pi / 2 - np.arctan2(y, x)
     number = np.full(z.shape, APEX_SEGMENT, float)
     for ring, count, first in ((2, 4, 13), (1, 6, 7), (0, 6, 1)):
-        sector = np.floor(azimuth / (2 * pi / count) + 0.5) % count
+        sector = np.floor(azimuth / (2 * pi / count) + 0.5 + TIE) % count
         # The base plane itself moves within rounding, so the basal ring has no upper end.
         number = np.where(third < ring + 1, first + sector, number)
     return np.where(np.isfinite(azimuth + third), number, 0).astype(np.uint8)
