@@ -30,8 +30,8 @@ SEGMENT_NAMES = (
 APEX_SEGMENT = 17
 
 TIE = 1e-9
-"""Sectors and thirds by which points are moved: those on a border, as many centroids of a regular mesh are, belong to the
-next segment whatever the last bits of their coordinates."""
+"""Sectors and thirds by which points are moved: those on a border, as many centroids of a regular mesh are, belong to
+the next segment whatever the last bits of their coordinates."""
 
 
 def segment(position: np.ndarray, apex_z: float) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Planning in less time and memory plans what Snakemake does without."""
 
+import asyncio
 import copy
 import gc
 import pickle
@@ -15,7 +16,7 @@ from snakemake.resources import Resource
 from snakemake.settings.types import Batch
 
 from echotruth.workflow import planning
-from echotruth.workflow.planning import hasten, in_batch
+from echotruth.workflow.planning import SmallTaskGroup, hasten, in_batch
 
 
 @pytest.fixture(autouse=True)
@@ -57,6 +58,34 @@ def test_lists_of_jobs_share_guards_and_still_take_them_for_what_they_are():
     with pytest.raises(AttributeError, match=r"index\(\) cannot be used"):
         one.index(1)
     assert copy.deepcopy(one).a == pickle.loads(pickle.dumps(one)).a == 1
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_small_task_group_runs_all_in_few_tasks_and_raises_what_one_raises(monkeypatch, fails):
+    monkeypatch.setattr(SmallTaskGroup, "SIZE", 3)
+    done, most = [], []
+
+    async def work(number):
+        most.append(len(asyncio.all_tasks()))
+        await asyncio.sleep(0)
+        if fails and number == 5:
+            raise ValueError("five")
+        done.append(number)
+
+    async def run():
+        async with SmallTaskGroup() as group:
+            for number in range(10):
+                group.create_task(work(number))
+
+    if fails:
+        with pytest.raises(ExceptionGroup) as raised:
+            asyncio.run(run())
+        assert [str(error) for error in raised.value.exceptions] == ["five"]
+        assert max(done) < 6
+    else:
+        asyncio.run(run())
+        assert done == list(range(10))
+    assert max(most) <= 4  # with that of the group
 
 
 FILES = [Path(f"ledger/evaluation/{name}.json") for name in "gbdface"]

@@ -5,12 +5,14 @@ Nothing of this is part of Snakemake's interface: a version that has changed it 
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import logging
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Coroutine, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache
 from inspect import signature
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -45,12 +47,46 @@ def hasten(rules: Iterable[Rule]) -> None:
         # A dry run saves what it knows of all files, which later runs do not trust: an empty copy will do.
         IOCache._simple_copy = lambda self: type(self)(self.max_wait_time)
     with suppress(ImportError, AttributeError):
+        from snakemake import dag
+
+        # It would make a task for every job at once, to ask for the times of its files.
+        dag.asyncio = SimpleNamespace(**vars(asyncio) | {"TaskGroup": SmallTaskGroup})
+    with suppress(ImportError, AttributeError):
         from snakemake.common import overwrite_function_params
         from snakemake.resources import Resource
 
         functions = [Resource.evaluate, *(function for rule in rules for function in _functions(rule))]
         for function in functions:
             overwrite_function_params(function, signature(function).parameters)
+
+
+class SmallTaskGroup:
+    """Task group as that of asyncio, which makes its tasks when it ends, not more than some at a time.
+
+    What :meth:`create_task` returns cannot be waited for: the end of the group waits for all.
+    """
+
+    SIZE = 1000
+    """Largest number of tasks at a time."""
+
+    async def __aenter__(self) -> SmallTaskGroup:
+        self._waiting: list[Coroutine[Any, Any, Any]] = []
+        return self
+
+    def create_task(self, coroutine: Coroutine[Any, Any, Any]) -> None:
+        """Run a coroutine before the group ends."""
+        self._waiting.append(coroutine)
+
+    async def __aexit__(self, kind: type[BaseException] | None, *rest: object) -> None:
+        try:
+            while self._waiting and kind is None:
+                some, self._waiting = self._waiting[: self.SIZE], self._waiting[self.SIZE :]
+                async with asyncio.TaskGroup() as group:
+                    for coroutine in some:
+                        group.create_task(coroutine)
+        finally:
+            for coroutine in self._waiting:
+                coroutine.close()
 
 
 def in_batch(files: Sequence[Path], rule: str, batch: Batch | None) -> list[str]:
