@@ -10,7 +10,6 @@ from echotruth.cases import Case, expand
 from echotruth.cases.case import Label
 from echotruth.cases.ids import integer_if_whole
 from echotruth.config import Config
-from echotruth.config.loading import load
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import ledger
 from echotruth.repository.ledger import record_path
@@ -115,13 +114,18 @@ def label_text(label: Label) -> str:
 
 
 def jobs_of(
-    folder: Path, known: Mapping[str, Case], cases: Sequence[str] | None, views: Sequence[str] | None, *stages: str
+    folder: Path,
+    config: Config,
+    known: Mapping[str, Case],
+    cases: Sequence[str] | None,
+    views: Sequence[str] | None,
+    *stages: str,
 ) -> Iterator[Job]:
     """Jobs that track views of known cases, those asked for, of which these stages are complete.
 
     ValueError if there is no such case or view.
     """
-    chosen_views = chosen("view", views, list(load(folder / "config.yaml").views))
+    chosen_views = chosen("view", views, list(config.views))
     for case in chosen("case", cases, list(known)):
         for view in chosen_views:
             if is_complete(folder, case, view, *stages):

@@ -152,7 +152,7 @@ def clip_metrics(
     by_id = cases_of(folder, config)
     hearts = hearts_of(by_id)
     found: tuple[list[Row], list[Row], list[Row]] = ([], [], [])
-    for job in jobs_of(folder, by_id, cases, views, "evaluation"):
+    for job in jobs_of(folder, config, by_id, cases, views, "evaluation"):
         keys: Row = {"case": job.case.id, "view": str(job.view_name), "plane": job.view.plane}
         keys |= _sorts(job.case, hearts[job.case.id])
         for rows in _of_view(job, chosen_sizes, chosen_trackers, guests):

@@ -116,7 +116,7 @@ def strain_summary(
     config = load(folder / "config.yaml")
     chosen_sizes = [image_size(config, size) for size in sizes or config.bmode.sizes[:1]]
     chosen_trackers = chosen("tracker", trackers, kept.trackers(folder, config))
-    jobs = jobs_of(folder, cases_of(folder, config), cases, views, "evaluation")
+    jobs = jobs_of(folder, config, cases_of(folder, config), cases, views, "evaluation")
     by_heart = (list(of_heart) for _, of_heart in groupby(jobs, lambda job: job.case.id))
     rows = [row for of_heart in by_heart for row in _rows(of_heart, chosen_sizes, chosen_trackers)]
     return pd.DataFrame(rows, columns=list(COLUMNS))

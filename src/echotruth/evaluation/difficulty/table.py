@@ -50,8 +50,9 @@ def difficulties(folder: Path, cases: Sequence[str] | None = None, views: Sequen
     """
     import pandas as pd
 
-    known = cases_of(folder, load(folder / "config.yaml"))
-    rows = [row for job in jobs_of(folder, known, cases, views, "truth", "bmode") for row in _kept(job)]
+    config = load(folder / "config.yaml")
+    known = cases_of(folder, config)
+    rows = [row for job in jobs_of(folder, config, known, cases, views, "truth", "bmode") for row in _kept(job)]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 

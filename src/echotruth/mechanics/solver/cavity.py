@@ -92,12 +92,12 @@ def volume_gradient(nodes: Floats, endo: Integers) -> Floats:
 def volume_hessian(nodes: Floats, endo: Integers) -> Floats:
     """d2V/dx2 (n_facets, 18, 18), m, facet by facet, at nodes (n_nodes, 3), m; rows and columns run over node and axis.
 
-    The second derivative by two nodes a and b, moved by u and v, is det(u, v, axis_ab), with the sum over the points
-    axis_ab = -weight / 3 sum_s (A_p B_q - A_q B_p) column_s; s, p, q are the operators to x, x,1 and x,2 in turn.
+    The second derivative by two nodes a and b, moved by u and v, is det(u, v, c_ab), c_ab = sum_s M_s,ab x_s summed
+    over the points: x_s is x, x,1 and x,2, and M_s stands with `_MINORS`.
     """
     x = np.ascontiguousarray(nodes[endo].transpose(1, 2, 0))
     # Sums term by term: those of a matrix product depend on its library.
     columns = sum(_OPERATORS[:, :, a, None, None] * x[a] for a in range(6))
     terms = (_MINORS[:, q, ..., None, None] * columns[:, q, None, None] for q in range(len(_WEIGHT)))
-    axes = sum(first + second + third for first, second, third in terms)
-    return np.einsum("ijk,abkf->faibj", _PERMUTATION, axes).reshape(len(endo), 18, 18)
+    c = sum(first + second + third for first, second, third in terms)
+    return np.einsum("ijk,abkf->faibj", _PERMUTATION, c).reshape(len(endo), 18, 18)
