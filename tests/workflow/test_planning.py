@@ -4,6 +4,7 @@ import asyncio
 import copy
 import gc
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 from inspect import signature
 from pathlib import Path
 from types import SimpleNamespace
@@ -77,13 +78,13 @@ def test_small_task_group_runs_all_in_few_tasks_and_raises_what_one_raises(monke
             for number in range(10):
                 group.create_task(work(number))
 
+    with ThreadPoolExecutor(1) as thread:  # the loop of a browser may run in this one
+        result = thread.submit(asyncio.run, run())
     if fails:
-        with pytest.raises(ExceptionGroup) as raised:
-            asyncio.run(run())
-        assert [str(error) for error in raised.value.exceptions] == ["five"]
+        assert [str(error) for error in result.exception().exceptions] == ["five"]
         assert max(done) < 6
     else:
-        asyncio.run(run())
+        assert result.exception() is None
         assert done == list(range(10))
     assert max(most) <= 4  # with that of the group
 
