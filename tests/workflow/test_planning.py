@@ -5,14 +5,18 @@ import copy
 import gc
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from inspect import signature
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import snakemake.api  # noqa: F401 - first, as its modules import one another
 from snakemake.common import get_function_params, get_input_function_aux_params
-from snakemake.exceptions import WorkflowError
-from snakemake.iocontainers import AttributeGuard, Namedlist
+from snakemake.dag import DAG
+from snakemake.exceptions import ChildIOException, WorkflowError
+from snakemake.io import directory
+from snakemake.iocontainers import AttributeGuard, Namedlist, Wildcards
 from snakemake.resources import Resource
 from snakemake.settings.types import Batch
 
@@ -50,7 +54,7 @@ def test_parameters_are_those_of_the_function():
     assert gc.get_threshold()[0] == planning.OBJECTS_BETWEEN_COLLECTIONS
 
 
-def test_lists_of_jobs_share_guards_and_still_take_them_for_what_they_are():
+def test_lists_of_jobs_share_guards_and_refused_names_and_still_act_on_them():
     hasten([])
     one, other = Namedlist(fromdict={"a": 1}), Namedlist()
     assert one.index is other.index and one.index is not one.sort
@@ -58,6 +62,11 @@ def test_lists_of_jobs_share_guards_and_still_take_them_for_what_they_are():
     assert one.get("index") is None and one.get("a") == 1
     with pytest.raises(AttributeError, match=r"index\(\) cannot be used"):
         one.index(1)
+    named = Namedlist(fromdict={"index": 2})
+    assert named.index == 2 and isinstance(other.index, AttributeGuard)
+    assert "_allowed_overrides" not in vars(one)
+    with pytest.raises(AttributeError, match="keys is reserved"):
+        Namedlist(fromdict={"keys": 3})
     assert copy.deepcopy(one).a == pickle.loads(pickle.dumps(one)).a == 1
 
 
@@ -87,6 +96,24 @@ def test_small_task_group_runs_all_in_few_tasks_and_raises_what_one_raises(monke
         assert result.exception() is None
         assert done == list(range(10))
     assert max(most) <= 4  # with that of the group
+
+
+@pytest.mark.parametrize("has_directory", [False, True])
+def test_paths_are_sorted_to_look_inside_directories_only_if_an_output_is_one(
+    monkeypatch, has_directory, check=DAG.check_directory_outputs
+):
+    monkeypatch.setattr(DAG, "check_directory_outputs", check)
+    output = [directory("out/folder")] if has_directory else ["out/folder"]
+    hasten([SimpleNamespace(input=[], output=output, params=[], group=None, resources={})])
+    jobs = [Wildcards(["out/folder"]), Wildcards(["out/folder/file"])]  # can be hashed and sorted, as jobs are
+    for job in jobs:
+        job.output = list(job)
+    look = partial(DAG.check_directory_outputs, SimpleNamespace(jobs=jobs))
+    if has_directory:
+        with pytest.raises(ChildIOException):
+            look()
+    else:
+        look()
 
 
 FILES = [Path(f"ledger/evaluation/{name}.json") for name in "gbdface"]

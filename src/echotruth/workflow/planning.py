@@ -28,7 +28,7 @@ OBJECTS_BETWEEN_COLLECTIONS = 200_000
 
 
 def hasten(rules: Iterable[Rule]) -> None:
-    """Remember the parameters of all functions in rules, for which Snakemake asks several times a job, and save memory.
+    """Save time and memory: the parameters of a function, for which Snakemake asks several times a job, are kept.
 
     Parameters
     ----------
@@ -37,27 +37,60 @@ def hasten(rules: Iterable[Rule]) -> None:
     """
     gc.freeze()
     gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS, 20, 100)
+    rules = list(rules)
     with suppress(ImportError, AttributeError):
-        from snakemake import iocontainers
-        from snakemake.io import IOCache
-
-        # Each list of files, params or wildcards has two of these, which do nothing but refuse to be called.
-        iocontainers.AttributeGuard.__new__ = cache(lambda guard, name: object.__new__(guard))
-        iocontainers.AttributeGuard.__reduce__ = lambda self: (type(self), (self.name,))
-        # A dry run saves what it knows of all files, which later runs do not trust: an empty copy will do.
-        IOCache._simple_copy = lambda self: type(self)(self.max_wait_time)
+        _share_guards()
     with suppress(ImportError, AttributeError):
-        from snakemake import dag
-
-        # It would make a task for every job at once, to ask for the times of its files.
-        dag.asyncio = SimpleNamespace(**vars(asyncio) | {"TaskGroup": SmallTaskGroup})
+        _save_no_file_cache()
     with suppress(ImportError, AttributeError):
-        from snakemake.common import overwrite_function_params
-        from snakemake.resources import Resource
+        _run_tasks_in_small_groups()
+    with suppress(ImportError, AttributeError):
+        _keep_parameters(rules)
+    with suppress(ImportError, AttributeError):
+        _compare_no_files(rules)
 
-        functions = [Resource.evaluate, *(function for rule in rules for function in _functions(rule))]
-        for function in functions:
-            overwrite_function_params(function, signature(function).parameters)
+
+def _share_guards() -> None:
+    """Let all lists share what each list of files, params or wildcards holds of its own: who may not be called."""
+    from snakemake.iocontainers import AttributeGuard, Namedlist
+
+    AttributeGuard.__new__ = cache(lambda guard, name: object.__new__(guard))
+    AttributeGuard.__reduce__ = lambda self: (type(self), (self.name,))
+    allowed = list(Namedlist()._allowed_overrides)
+    Namedlist._allowed_overrides = property(lambda self: allowed, lambda self, names: None)
+
+
+def _save_no_file_cache() -> None:
+    """Let a dry run save an empty copy of what it knows of all files, which later runs do not trust."""
+    from snakemake.io import IOCache
+
+    IOCache._simple_copy = lambda self: type(self)(self.max_wait_time)
+
+
+def _run_tasks_in_small_groups() -> None:
+    """Let Snakemake not make a task for every job at once, to ask for the times of its files."""
+    from snakemake import dag
+
+    dag.asyncio = SimpleNamespace(**vars(asyncio) | {"TaskGroup": SmallTaskGroup})
+
+
+def _keep_parameters(rules: Iterable[Rule]) -> None:
+    """Remember the parameters of all functions in rules."""
+    from snakemake.common import overwrite_function_params
+    from snakemake.resources import Resource
+
+    functions = [Resource.evaluate, *(function for rule in rules for function in _functions(rule))]
+    for function in functions:
+        overwrite_function_params(function, signature(function).parameters)
+
+
+def _compare_no_files(rules: Sequence[Rule]) -> None:
+    """Do not look for files inside an output that is a directory, for which all paths are sorted, if there is none."""
+    from snakemake.dag import DAG
+    from snakemake.io import is_flagged
+
+    if not any(is_flagged(path, "directory") for rule in rules for path in rule.output):
+        DAG.check_directory_outputs = lambda self: None
 
 
 class SmallTaskGroup:

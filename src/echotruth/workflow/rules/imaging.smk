@@ -19,13 +19,13 @@ rule imaging:
     input:
         record("physiology"),
     output:
-        phantom=record("phantom", view="{view}"),
-        truth=record("truth", view="{view}"),
-        rf=record("rf", view="{view}"),
-        bmode=record("bmode", view="{view}"),
+        record("phantom", view="{view}"),
+        record("truth", view="{view}"),
+        record("rf", view="{view}"),
+        record("bmode", view="{view}"),
     params:
-        code=code("phantom", "truth", "rf", "bmode"),
-        settings=lambda wildcards: imaging_settings(CASES[wildcards.case].config, wildcards.view),
+        code("phantom", "truth", "rf", "bmode"),
+        lambda wildcards: imaging_settings(CASES[wildcards.case].config, wildcards.view),
     group:
         "view"
     # A core that has nothing left to do waits for the longest view, of one heart; of many, hearts are finished in turn.

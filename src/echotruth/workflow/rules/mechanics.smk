@@ -22,8 +22,8 @@ rule mechanics:
     output:
         record("mechanics"),
     params:
-        code=code("mechanics"),
-        settings=lambda wildcards: MOTIONS[wildcards.case],
+        code("mechanics"),
+        lambda wildcards: MOTIONS[wildcards.case],
     group:
         heart_group
     log:

@@ -12,8 +12,8 @@ rule physiology:
     output:
         record("physiology"),
     params:
-        code=code("physiology"),
-        settings=lambda wildcards: physiology_settings(wildcards.case),
+        code("physiology"),
+        lambda wildcards: physiology_settings(wildcards.case),
     group:
         heart_group
     log:

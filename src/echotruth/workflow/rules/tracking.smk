@@ -15,8 +15,8 @@ rule tracking:
         tracking=record("tracking", view="{view}"),
         evaluation=record("evaluation", view="{view}"),
     params:
-        code=code("tracking", "evaluation"),
-        settings=lambda wildcards: tracking_settings(wildcards.case),
+        code("tracking", "evaluation"),
+        lambda wildcards: tracking_settings(wildcards.case),
     group:
         "view"
     priority: 1
