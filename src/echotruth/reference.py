@@ -145,9 +145,9 @@ def _section(model: type[BaseModel], prefix: str, title: str, about: str = "") -
             continue
         subsection = None if sections else section_in(field.annotation)
         if subsection is None or mapping:
-            rows.append(f"| `{prefix}{key}` | {shown_unit(key)} | {_default(field)} | {meaning(field)} |")
+            rows.append(f"| `{prefix}{key}` | {shown_unit(key)} | {_default(field)} | {meaning(model, key)} |")
         if subsection is not None:
-            subsections += _section(subsection, path, path.removesuffix("."), "" if mapping else meaning(field))
+            subsections += _section(subsection, path, path.removesuffix("."), "" if mapping else meaning(model, key))
     if rows:
         lines += ["| key | unit | default | meaning |", "|---|---|---|---|", *rows, ""]
     return [*lines, *subsections]

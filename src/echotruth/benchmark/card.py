@@ -16,7 +16,7 @@ from echotruth.config.reading import ConfigError, read_yaml, shown_key
 from echotruth.evaluation.choice import folder_of
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import durable
-from echotruth.section import Name, Section, check, invalid
+from echotruth.section import Name, Section, check, invalid, meaning
 
 Text = Annotated[str, StringConstraints(min_length=1, max_length=300, pattern=r"^[^\n\r]*\S[^\n\r]*$")]
 """One line of text."""
@@ -166,7 +166,7 @@ def _message(error: ErrorDetails) -> str:
         close = get_close_matches(key, known, n=1)
         return f"{key} is not a key: " + (f"did you mean {close[0]}?" if close else f"use {', '.join(known)}")
     if error["type"] == "missing":
-        return f"{key} {_REMEDIES['missing']}: {Card.model_fields[keys[0]].description}"
+        return f"{key} {_REMEDIES['missing']}: {meaning(Card, str(keys[0]))}"
     if error["type"] == "list_type":
         remedy = f"must be a list, such as {_LISTS[key]}"
     elif key == "tracker" and error["type"] != "string_type":
@@ -174,7 +174,7 @@ def _message(error: ErrorDetails) -> str:
     elif error["type"] == "literal_error":
         remedy = f"use any of {context['expected'].replace(chr(39), '').replace(' or ', ' and ')}"
     elif error["type"] == "string_pattern_mismatch":
-        described = Card.model_fields[keys[0]].description or ""
+        described = meaning(Card, str(keys[0]))
         remedy = "must be one line of text" if context["pattern"].startswith("^[^") else f"write it so: {described}"
     else:
         remedy = _REMEDIES.get(error["type"], error["msg"])

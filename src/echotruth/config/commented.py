@@ -114,7 +114,7 @@ class _Writer:
         """Lines of one key with what is said of it; none if it is left out."""
         value, info = getattr(section, key), type(section).model_fields[key]
         if isinstance(value, Section) and key != "cases":
-            return self._subsection(value, info, entry, dotted, depth)
+            return self._subsection(value, meaning(type(section), key), entry, dotted, depth)
         if entry is None and not (self._everything or dotted in FIRST):
             return []
         above = _above(entry, depth)
@@ -130,13 +130,13 @@ class _Writer:
         follows = dotted in self._following or value is None or value != default
         return [*above, *_written(key, value, depth, dotted in FIRST and not follows)]
 
-    def _subsection(self, value: Section, info: FieldInfo, entry: Given | None, dotted: str, depth: int) -> list[str]:
+    def _subsection(self, value: Section, about: str, entry: Given | None, dotted: str, depth: int) -> list[str]:
         """Lines of a section within a section; none if none of its keys is written."""
         given = self.given(entry.node, entry.begin) if entry else {}
         inner = self.section(value, given, f"{dotted}.", depth + 1)
         if not inner:
             return []
-        about = meaning(info) or " ".join((type(value).__doc__ or "").split())
+        about = about or " ".join((type(value).__doc__ or "").split())
         beside = f"    {entry.beside}" if entry and entry.beside else ""
         head = f"{'  ' * depth}{dotted.rpartition('.')[2]}:{beside}"
         return [*_above(entry, depth), *_indented(_wrapped(about), depth), head, *inner]
@@ -174,7 +174,7 @@ def _explained(section: Section, key: str, is_default: bool) -> list[str]:
     info = type(section).model_fields[key]
     facts = [shown_unit(key), allowed(type(section), key), _default(section, key, info, is_default)]
     text = "; ".join(fact for fact in facts if fact)
-    return [*_wrapped(meaning(info)), *_wrapped(f"[{text}]" if text else "")]
+    return [*_wrapped(meaning(type(section), key)), *_wrapped(f"[{text}]" if text else "")]
 
 
 def _default(section: Section, key: str, info: FieldInfo, is_default: bool) -> str:
