@@ -1,5 +1,9 @@
 """Run several stages of one heart, or of one of its views, in one process, so that modules are loaded only once."""
 
+import gc
+
+gc.disable()  # Modules stay: to look for garbage among them would take a sixth of the start.
+
 import os
 
 from echotruth.workflow.cost import Cost
