@@ -21,7 +21,7 @@ COLOURMAP = colormaps["RdBu_r"]
 """Blue below zero, red above."""
 
 UNSEEN: dict[str, Any] = {"facecolor": "none", "edgecolor": style.TARGET, "hatch": "////"}
-"""Look of a segment that no view shows."""
+"""Look of a segment that no view shows, or in which nothing is tracked."""
 
 ON_LIGHT = "#222222"
 """Colour of numbers on light segments."""
@@ -36,7 +36,7 @@ class Segments:
     title : str
         As "Circumferential strain, short-axis views".
     true, tracked : ndarray of shape (17,)
-        Its values in segments 1..17; NaN where no view shows the segment.
+        Its values in segments 1..17; NaN where no view shows the segment, or nothing in it is tracked.
     label : str
         What the colour bar says, with the unit.
     difference_label : str
@@ -57,7 +57,8 @@ def draw(quantities: Sequence[Segments], tracker: str) -> Figure:
     rows = figure.subfigures(len(quantities) + 1, 1, squeeze=False, height_ratios=[*[3.45] * len(quantities), 0.35])
     for row, segments in zip(rows[:, 0], quantities, strict=False):
         _row(row, segments, tracker)
-    hatched = Patch(linewidth=0.6, label="no view of this kind shows the segment", **UNSEEN)
+    reason = "no view of this kind shows the segment, or nothing in it is tracked"
+    hatched = Patch(linewidth=0.6, label=reason, **UNSEEN)
     rows[-1, 0].legend(handles=[hatched], loc="center", fontsize=8.5, labelcolor=style.MUTED)
     return figure
 
