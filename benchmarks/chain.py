@@ -230,11 +230,19 @@ def beside(folder: Path, found: list[Record]) -> list[list[Any]]:
     return rows
 
 
+def starting(folder: Path, found: list[Record]) -> str:
+    """What it takes to start the processes, for each image and of all, in a sentence."""
+    sizes = len(load(folder / "config.yaml").bmode.sizes)
+    images = sizes * sum(record["frames"] for record in found if record["stage"] == "bmode")
+    seconds, total = (sum(record[key] for record in found) for key in ("start_seconds", "cpu_seconds"))
+    return f"Starting takes {1e3 * seconds / images:.1f} ms of CPU an image, {seconds / total:.1%} of all CPU seconds."
+
+
 def section(folder: Path) -> list[str]:
     """Markdown of one repository."""
     found = records(folder)
     head = ["stage", "jobs", "CPU s a heart", "CPU s a frame", "compiling", "starting", "wall s", "memory, MB", "MB"]
-    text = [f"## {folder.name}", "", *report.table(head, costs(folder, found)), ""]
+    text = [f"## {folder.name}", "", *report.table(head, costs(folder, found)), "", starting(folder, found), ""]
     if rows := beside(folder, found):
         text += [*report.table(["stage, one view", "CPU s", "CPU s of its parts", "ratio"], rows), ""]
     return text
