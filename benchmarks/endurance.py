@@ -5,9 +5,9 @@
 
 `kills` makes a repository of small beating hearts in one go. Then it makes it again and again, and kills with SIGKILL,
 at random moments and in turn, all processes of the run, its runner alone, its Snakemake alone, or one job. After each
-kill the run is started again. `hearts` makes a hundred hearts on two cores, on a SLURM of this machine
-(tests/cluster/slurm.sh), on two cores with a bucket of an S3 server on this machine, and on one core. Both compare all
-files of the hierarchy, of the bucket its objects, and add to results/endurance.json.
+kill the run is started again. `hearts` makes a hundred hearts on two cores, on one, on a SLURM of this machine
+(tests/cluster/slurm.sh), and on two cores with a bucket of an S3 server on this machine. Both compare all files of the
+hierarchy, of the bucket its objects, and add to results/endurance.json.
 """
 
 from __future__ import annotations
@@ -209,11 +209,11 @@ def unattended(folder: Path, hearts: int) -> Iterator[dict]:
         return content(folder / way)
 
     yield compared("two_cores", made("two_cores", *TWO_CORES))
+    yield compared("one_core", made("one_core", "--cores", "1"))
     yield compared("slurm", made("slurm", *SLURM, prefix=[str(CLUSTER)]))
     with bucket() as objects:
         made("s3", *TWO_CORES, "--upload", "s3://bucket/hearts")
         yield compared("s3", objects())
-    yield compared("one_core", made("one_core", "--cores", "1"))
 
 
 def save(what: str, row: dict) -> None:

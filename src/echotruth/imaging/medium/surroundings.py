@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from echotruth.config import Config
 from echotruth.fem.location import locate
@@ -36,6 +35,8 @@ class SurroundingsMotion:
         self._heart, self._position, self._at_rest = heart, position, decay_length == 0
         if self._at_rest:
             return
+        from scipy.spatial import cKDTree  # takes 50 ms, and few views have surroundings
+
         self._epi = epicardial_nodes(heart)
         distance, self._nearest = cKDTree(heart.positions(0)[self._epi]).query(position, NEIGHBOURS)
         weight = 1 / np.maximum(distance, 1e-9) ** 2
