@@ -4,6 +4,8 @@ import asyncio
 import copy
 import gc
 import pickle
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from inspect import signature
@@ -18,6 +20,7 @@ from snakemake.exceptions import ChildIOException, WorkflowError
 from snakemake.io import directory
 from snakemake.iocontainers import AttributeGuard, Namedlist, Wildcards
 from snakemake.resources import Resource
+from snakemake.scheduling.job_scheduler import JobScheduler
 from snakemake.settings.types import Batch
 
 from echotruth.workflow import planning
@@ -114,6 +117,23 @@ def test_paths_are_sorted_to_look_inside_directories_only_if_an_output_is_one(
             look()
     else:
         look()
+
+
+def test_scheduler_looks_for_jobs_with_one_timer_at_a_time_and_again_after_each():
+    hasten([])
+    looks = []
+    scheduler = SimpleNamespace(_open_jobs=SimpleNamespace(release=lambda: looks.append(threading.current_thread())))
+    wait = partial(JobScheduler._schedule_reevalutation, scheduler, 0.2)
+    for rounds in (1, 2):
+        timers = threading.active_count()
+        for _ in range(5):  # jobs that end
+            wait()
+        assert threading.active_count() == timers + 1
+        deadline = time.monotonic() + 10
+        while len(looks) < rounds and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert len(looks) == rounds
+        looks[-1].join()
 
 
 FILES = [Path(f"ledger/evaluation/{name}.json") for name in "gbdface"]

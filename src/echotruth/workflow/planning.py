@@ -1,4 +1,4 @@
-"""Plan a large sweep in less time and memory: what Snakemake makes for every job anew is made once, or not at all.
+"""Plan a large sweep, and schedule its jobs, in less time and memory: what Snakemake makes for every job is made once.
 
 Nothing of this is part of Snakemake's interface: a version that has changed it plans as it does without.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
+import threading
 from collections.abc import Coroutine, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache
@@ -45,6 +46,8 @@ def hasten(rules: Iterable[Rule]) -> None:
     with suppress(ImportError, AttributeError):
         _run_tasks_in_small_groups()
     with suppress(ImportError, AttributeError):
+        _wait_with_one_timer()
+    with suppress(ImportError, AttributeError):
         _keep_parameters(rules)
     with suppress(ImportError, AttributeError):
         _compare_no_files(rules)
@@ -72,6 +75,24 @@ def _run_tasks_in_small_groups() -> None:
     from snakemake import dag
 
     dag.asyncio = SimpleNamespace(**vars(asyncio) | {"TaskGroup": SmallTaskGroup})
+
+
+def _wait_with_one_timer() -> None:
+    """Let the scheduler look for jobs once a second; it would do so once more a second for every job that has ended."""
+    from snakemake.scheduling.job_scheduler import JobScheduler
+
+    def look_again(scheduler: Any, delay: float) -> None:
+        if vars(scheduler).get("is_waiting"):
+            return
+
+        def look() -> None:
+            scheduler.is_waiting = False
+            scheduler._open_jobs.release()
+
+        scheduler.is_waiting = True
+        threading.Timer(delay, look).start()
+
+    JobScheduler._schedule_reevalutation = look_again
 
 
 def _keep_parameters(rules: Iterable[Rule]) -> None:
