@@ -29,7 +29,7 @@ OBJECTS_BETWEEN_COLLECTIONS = 200_000
 
 
 def hasten(rules: Iterable[Rule]) -> None:
-    """Save time and memory: the parameters of a function, for which Snakemake asks several times a job, are kept.
+    """Let Snakemake plan and schedule in less time and memory; what this version of it does not have stays as it is.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _wait_with_one_timer() -> None:
 
 
 def _keep_parameters(rules: Iterable[Rule]) -> None:
-    """Remember the parameters of all functions in rules."""
+    """Remember the parameters of all functions in rules, for which Snakemake asks several times a job."""
     from snakemake.common import overwrite_function_params
     from snakemake.resources import Resource
 
