@@ -122,5 +122,7 @@ def _share(job: Job, case: str, cost: Cost) -> None:
 def _work(stage: str) -> Work:
     """Work of a stage; its script is imported when it is needed, and garbage collected from then on."""
     work: Work = import_module(f"echotruth.workflow.scripts.{stage}").work
-    gc.enable()
+    if not gc.isenabled():
+        gc.freeze()  # nor is garbage looked for among modules later
+        gc.enable()
     return work
