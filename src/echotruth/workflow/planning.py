@@ -9,9 +9,9 @@ import asyncio
 import gc
 import logging
 import threading
-from collections.abc import Coroutine, Iterable, Iterator, Sequence
+from collections.abc import Collection, Coroutine, Iterator, Sequence
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from inspect import signature
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -28,29 +28,27 @@ OBJECTS_BETWEEN_COLLECTIONS = 200_000
 """Objects made before Python looks for garbage. A plan only grows, and each search goes over all of it."""
 
 
-def hasten(rules: Iterable[Rule]) -> None:
+def hasten(rules: Collection[Rule]) -> None:
     """Let Snakemake plan and schedule in less time and memory; what this version of it does not have stays as it is.
 
     Parameters
     ----------
-    rules : iterable of Rule
+    rules : collection of Rule
         All rules of a workflow, once they are defined.
     """
     gc.freeze()
     gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS, 20, 100)
-    rules = list(rules)
-    with suppress(ImportError, AttributeError):
-        _share_guards()
-    with suppress(ImportError, AttributeError):
-        _save_no_file_cache()
-    with suppress(ImportError, AttributeError):
-        _run_tasks_in_small_groups()
-    with suppress(ImportError, AttributeError):
-        _wait_with_one_timer()
-    with suppress(ImportError, AttributeError):
-        _keep_parameters(rules)
-    with suppress(ImportError, AttributeError):
-        _compare_no_files(rules)
+    changes = (
+        _share_guards,
+        _save_no_file_cache,
+        _run_tasks_in_small_groups,
+        _wait_with_one_timer,
+        partial(_keep_parameters, rules),
+        partial(_compare_no_files, rules),
+    )
+    for change in changes:
+        with suppress(ImportError, AttributeError):
+            change()
 
 
 def _share_guards() -> None:
@@ -95,7 +93,7 @@ def _wait_with_one_timer() -> None:
     JobScheduler._schedule_reevalutation = look_again
 
 
-def _keep_parameters(rules: Iterable[Rule]) -> None:
+def _keep_parameters(rules: Collection[Rule]) -> None:
     """Remember the parameters of all functions in rules, for which Snakemake asks several times a job."""
     from snakemake.common import overwrite_function_params
     from snakemake.resources import Resource
@@ -105,7 +103,7 @@ def _keep_parameters(rules: Iterable[Rule]) -> None:
         overwrite_function_params(function, signature(function).parameters)
 
 
-def _compare_no_files(rules: Sequence[Rule]) -> None:
+def _compare_no_files(rules: Collection[Rule]) -> None:
     """Do not look for files inside an output that is a directory, for which all paths are sorted, if there is none."""
     from snakemake.dag import DAG
     from snakemake.io import is_flagged

@@ -6,7 +6,6 @@ A process takes longer to start than a short stage takes, and passes arrays on t
 from __future__ import annotations
 
 import argparse
-import gc
 import logging
 import shutil
 from importlib import import_module
@@ -120,9 +119,5 @@ def _share(job: Job, case: str, cost: Cost) -> None:
 
 
 def _work(stage: str) -> Work:
-    """Work of a stage; its script is imported when it is needed, and garbage collected from then on."""
-    work: Work = import_module(f"echotruth.workflow.scripts.{stage}").work
-    if not gc.isenabled():
-        gc.freeze()  # nor is garbage looked for among modules later
-        gc.enable()
-    return work
+    """Work of a stage; its script is imported when it is needed."""
+    return import_module(f"echotruth.workflow.scripts.{stage}").work
