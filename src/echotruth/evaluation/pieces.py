@@ -58,7 +58,9 @@ class Pieces:
         entry = job.checkpoints.entry(job.stage)
         self._job, self._sha256 = job, entry.get("record", {}).get("sha256", {})
         # A piece is read at the place of this job, which must be that at which it was written.
-        self._known = entry.get("pieces", {}) if entry.get("index") == list(job.index) else {}
+        is_here = entry.get("index") == list(job.index) and "order" in entry
+        self._known = entry.get("pieces", {}) if is_here else {}
+        self._order = entry.get("order", {})
 
     def find(self, size: int, name: str, fingerprint: str) -> Piece | None:
         """Find the piece of a tracker at an image size, if it was made from the same and its files are whole."""
@@ -68,7 +70,7 @@ class Pieces:
             return None
         if self._arrays is None:
             return None
-        place = list(self._known).index(str(size)), list(pieces).index(name)
+        place = self._order["size"].index(size), self._order["tracker"].index(name)
         displacement, quality = (array[place] for array in self._arrays)
         return Piece(displacement, quality, fingerprint)
 
@@ -116,13 +118,18 @@ def digest(clip: Clip) -> str:
 
 
 def known(pieces: dict[int, dict[str, Piece]]) -> dict[str, dict[str, dict[str, str]]]:
-    """What the checkpoint keeps of pieces, by image size and tracker, in the order of the arrays."""
+    """What the checkpoint keeps of pieces, by image size and tracker; :func:`order` says where they are in the arrays."""
     return {
         str(size): {
             name: {"fingerprint": piece.fingerprint, "failure": piece.failure} for name, piece in trackers.items()
         }
         for size, trackers in pieces.items()
     }
+
+
+def order(pieces: dict[int, dict[str, Piece]]) -> dict[str, list[Any]]:
+    """Image sizes and trackers in the order of the arrays, which a mapping loses when it is written with sorted keys."""
+    return {"size": list(pieces), "tracker": list(next(iter(pieces.values())))}
 
 
 def _whole(root: Path, files: dict[str, str]) -> bool:

@@ -24,7 +24,7 @@ rule repository:
     output:
         FOLDER / "ledger/repository.json",
     params:
-        config=CONFIG.model_dump_json(),
+        config=settings_version(CONFIG),  # not its text, in which Snakemake would look for wildcards between braces
         code=code("cases", "repository"),
     log:
         FOLDER / "logs/repository.log",

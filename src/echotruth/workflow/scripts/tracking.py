@@ -5,7 +5,7 @@ import logging
 import numpy as np
 
 from echotruth.evaluation.clip import Clip, clips
-from echotruth.evaluation.pieces import ARRAYS, Piece, Pieces, fingerprint, known
+from echotruth.evaluation.pieces import ARRAYS, Piece, Pieces, fingerprint, known, order
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job, Result, main
@@ -17,7 +17,7 @@ def work(job: Job) -> Result:
     for size, clip in clips(job).items():
         pieces[size] = {name: _piece(job, name, clip, earlier) for name in trackers}
         logging.getLogger("echotruth").info("%d px", size)
-    job.remember(pieces=known(pieces), index=list(job.index))
+    job.remember(pieces=known(pieces), order=order(pieces), index=list(job.index))
     return {"tracking": {name: _stacked(pieces, name) for name in ARRAYS}}
 
 
