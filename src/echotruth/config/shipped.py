@@ -1,4 +1,4 @@
-"""The configurations that come with the package: those of the folder config, which travel in the wheel too."""
+"""What comes with the package: the workflow, and the configurations of the folder config; both travel in the wheel."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from difflib import get_close_matches
 from itertools import takewhile
 from pathlib import Path
 
-FOLDERS = (Path(__file__).parents[1] / "examples", Path(__file__).parents[3] / "config")
-"""Where they are in an installed package (pyproject.toml puts them there), and in a checkout."""
+_PLACES = (Path(__file__).parents[1] / "shipped", Path(__file__).parents[3])
+ROOT = next((place for place in _PLACES if (place / "Snakefile").is_file()), _PLACES[0])
+"""Folder of Snakefile, rules, workflow and config: in an installed package (pyproject.toml puts them there), or a checkout."""
 
 
 def folder() -> Path:
     """Folder of the shipped configurations."""
-    return next((place for place in FOLDERS if (place / "mouse.yaml").is_file()), FOLDERS[0])
+    return ROOT / "config"
 
 
 def names() -> list[str]:

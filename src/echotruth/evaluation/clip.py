@@ -144,6 +144,21 @@ def grid_positions(config: Config) -> np.ndarray:
     return np.stack([lateral[points[..., 0]], axial[points[..., 1]]], axis=-1)
 
 
+def clip_at(job: Job, inside: np.ndarray) -> Clip:
+    """Clip of the heart, view and image size of a job, given the points of the grid that are in the wall."""
+    config, size = job.config, job.size
+    return Clip(
+        frames=job.read(f"bmode/{size}", "image")["image"],
+        mask=unpack(job.read(f"truth/{size}", "labels")["labels"][0])["mask"],
+        inside=inside,
+        points=grid_points(config, size)[inside],
+        spacing=config.bmode.si().field_of_view / size,
+        frame_time=read_loop(config.loop).time,
+        seed=int(job.random_of("tracking").integers(2**31)),
+        frame_step=config.tracking.frame_step,
+    )
+
+
 def clips(job: Job) -> dict[int, Clip]:
     """Clips of the heart and view of a job, by image size."""
     config, largest = job.case.config, job.case.config.bmode.sizes[0]

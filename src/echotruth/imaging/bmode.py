@@ -150,5 +150,10 @@ def bmode_clip(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, 
     -------
     Size in pixels to clip, shape (frames, size, size), uint8.
     """
-    largest = log_compress(envelope_images(lines, scan, range_, bmode, gain), bmode.dynamic_range_dB)
+    largest = largest_clip(lines, scan, range_, bmode, gain)
     return {size: downsample(largest, bmode.size_px // size) for size in bmode.sizes}
+
+
+def largest_clip(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, gain=1.0) -> np.ndarray:
+    """B-mode clip of the largest image size (frames, size, size), uint8; parameters as of :func:`envelope_images`."""
+    return log_compress(envelope_images(lines, scan, range_, bmode, gain), bmode.dynamic_range_dB)

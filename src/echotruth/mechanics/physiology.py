@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from echotruth.arrays import Floats
+from echotruth.config import Config
 from echotruth.config.physiology import Physiology
 from echotruth.fem.tetrahedra import Mesh
+from echotruth.loop.cycle import read_loop
 from echotruth.loop.haemodynamics import intervals, pressure_rates
 from echotruth.loop.phases import CONTRACTION, FILLING
 from echotruth.mechanics.contours import MID_SLICE, global_longitudinal_strain, wall_thickness
@@ -128,6 +130,30 @@ def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays, depth: Flo
     }
 
 
+def measured_heart(groups: dict[str, Arrays], config: Config) -> tuple[Arrays, dict[str, float]]:
+    """Measure a heart that was simulated.
+
+    Parameters
+    ----------
+    groups : dict of dict of ndarray
+        As :func:`echotruth.mechanics.beat.simulate` returns them.
+    config : Config
+
+    Returns
+    -------
+    measures : dict of ndarray
+        The group `physiology`.
+    bounded : dict
+        As :func:`bounded` returns it; empty for prescribed motions, to which the bounds do not apply.
+    """
+    mechanics = groups["mechanics"] | {"time": read_loop(config.loop).time}
+    found = measures(groups["geometry"], mechanics, groups["kinematics"], groups["fibres"]["wall_depth"])
+    if config.motion.kind != "beat":
+        return found, {}
+    healthy = not groups["pathology"]["region"].any()
+    return found, bounded(found | {"active_tension": mechanics["active_tension"]}, healthy)
+
+
 def _rotations(mesh: Mesh, positions: Floats, mechanics: Arrays) -> Arrays:
     base, apex = (rotation(mesh.nodes, mesh.endo, positions, centre) for centre in (BASAL_SLICE, APICAL_SLICE))
     twist, es, time = apex - base, int(mechanics["es_frame"]), mechanics["time"]
@@ -217,29 +243,53 @@ def tension_variation(tension: Floats) -> float:
     return 1.0 if height == 0 else float(steps.sum() / (2 * height))
 
 
-def violated_bound(measured: dict[str, ArrayLike], bounds: Physiology, healthy: bool = True) -> str:
-    """The first bound that a heart violates, in one sentence; empty where there is none.
+def bounded(measured: dict[str, ArrayLike], healthy: bool = True) -> dict[str, float]:
+    """The values of a heart that have bounds, in the unit of their keys.
 
     Parameters
     ----------
     measured : dict of ndarray
         As :func:`measures` returns it, and `active_tension` (frame,), Pa, of the group `mechanics`.
-    bounds : Physiology
     healthy : bool, optional
-        Whether to check the bounds of healthy hearts too; not those of a heart with an infarct or late activation.
+        Whether the bounds of healthy hearts apply too; not to a heart with an infarct or late activation.
+
+    Returns
+    -------
+    dict
+        Key of the section `physiology` -> the most extreme value; none of what could not be measured, and not a number
+        where there is no healthy bound to violate.
+    """
+    values = {}
+    for bound in BOUNDS:
+        found = np.atleast_1d(bound.value(measured)).astype(float)
+        if bound.healthy:
+            found = found[np.isfinite(found)]
+        if found.size and (healthy or not bound.healthy):
+            values[bound.key] = float(np.max(found) if "_max" in bound.key else np.min(found))
+    return values
+
+
+def violated_bound(measured: dict[str, ArrayLike], bounds: Physiology, healthy: bool = True) -> str:
+    """The first bound that a heart violates, in one sentence; empty where there is none; parameters as of `bounded`."""
+    return violation(bounded(measured, healthy), bounds)
+
+
+def violation(values: dict[str, float], bounds: Physiology) -> str:
+    """The first bound that values violate, in one sentence; empty where there is none.
+
+    Parameters
+    ----------
+    values : dict
+        As :func:`bounded` returns them.
+    bounds : Physiology
     """
     for bound in BOUNDS:
         limit = getattr(bounds, bound.key)
-        if limit is None or (bound.healthy and not healthy):
+        if limit is None or bound.key not in values:
             continue
-        values = np.atleast_1d(bound.value(measured))
-        if bound.healthy:
-            values = values[np.isfinite(values)]
-            if not values.size:
-                continue
-        extreme, holds, rule = (np.max, le, "at most") if "_max" in bound.key else (np.min, ge, "at least")
-        value = extreme(values)
-        if not holds(value, limit):
+        holds, rule = (le, "at most") if "_max" in bound.key else (ge, "at least")
+        if not holds(values[bound.key], limit):
+            value = values[bound.key]
             return f"{bound.description} is {value:.3g} and must be {rule} {limit:g} (physiology.{bound.key})."
     return ""
 

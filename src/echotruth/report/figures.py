@@ -44,22 +44,11 @@ from echotruth.repository.unpacking import unpack
 if TYPE_CHECKING:
     import pandas as pd
 
-PARTS = {
-    "motion": (
-        "loop",
-        "strain",
-        "physiology",
-        "population",
-        "curves",
-        "segments",
-        "bullseye",
-        "error",
-        "leaderboard",
-    ),
-    "images": ("heart", "clip", "resolutions", "views"),
-}
-"""Figures that one job draws together, by the name of the part."""
-
+NAMES = (
+    *("loop", "strain", "physiology", "population", "curves", "segments", "bullseye", "error", "leaderboard"),
+    *("heart", "clip", "resolutions", "views"),
+)
+"""Figures, in the order in which they are drawn."""
 
 NONE_COMPLETE = "No heart is complete, so that there is nothing to show. The reasons are in the report."
 """In place of figures."""
@@ -111,25 +100,23 @@ class Figures:
         self.sizes = config.bmode.sizes
         self.view = main_view(config)
 
-    def draw(self, part: str) -> None:
-        """Draw the figures of a part of `PARTS`; `motion` also writes the leaderboard as a table.
+    def draw(self) -> None:
+        """Draw all figures, and write the leaderboard as a table.
 
         If no heart is complete, a sentence stands in place of every figure.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        for name in PARTS[part]:
+        for name in NAMES:
             figure = getattr(self, name)() if len(self.complete) else style.sentence(NONE_COMPLETE)
             if figure is not None:
                 style.save(figure, self.folder / name)
         if not len(self.complete):
-            self._without_hearts(part)
+            self._without_hearts()
 
-    def _without_hearts(self, part: str) -> None:
-        """What else a part writes, without a heart: an empty table, or clips of the sentence."""
-        if part == "motion":
-            table = "size_px,view,tracker,hearts,failures,rank\n"
-            (self.folder / "leaderboard.csv").write_text(table, encoding="utf-8")
-            return
+    def _without_hearts(self) -> None:
+        """What else is written, without a heart: an empty table, and clips of the sentence."""
+        table = "size_px,view,tracker,hearts,failures,rank\n"
+        (self.folder / "leaderboard.csv").write_text(table, encoding="utf-8")
         picture = np.asarray(Image.open(self.folder / "clip.png").convert("RGB").resize((720, 102)))
         clip.gif(self.folder / "clip.gif", picture[None])
         clip.mp4(self.folder / "clip.mp4", picture[None])

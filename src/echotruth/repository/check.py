@@ -22,7 +22,6 @@ from echotruth.repository.check_structure import (
     unrecorded_files,
 )
 from echotruth.repository.inventory import Fault, JobRecord, Repository
-from echotruth.repository.ledger import GATES
 
 
 @dataclass
@@ -72,12 +71,13 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
             report.files += found.files
             row = repository.row(record)
             if found.arrays is not None and row is not None:
-                listed[record.stage, row] = alike.setdefault(found.arrays, found.arrays)
+                arrays = listed.get((record.stage, row), frozenset()) | found.arrays
+                listed[record.stage, row] = alike.setdefault(arrays, arrays)
             if progress:
                 progress(done, len(records))
         damaged = {path for fault in report.faults for path in fault.records}
         solved = [
-            record for record in records if record.stage == GATES[-1] and not damaged & set(repository.gates(record))
+            record for record in records if record.stage == "mechanics" and record.path not in damaged
         ]
         report.faults += [
             fault for faults in pool.map(lambda one: check_loop(repository, one), solved) for fault in faults

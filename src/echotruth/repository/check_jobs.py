@@ -14,10 +14,11 @@ import zarr
 
 from echotruth.repository import ledger, packing, schema, values
 from echotruth.repository.inventory import Fault, JobRecord, Repository, reason
-from echotruth.repository.ledger import GATES, record_path
-from echotruth.repository.store import packs_of, schema_of
+from echotruth.repository.ledger import record_path
+from echotruth.repository.schema import packs_of
+from echotruth.repository.verdict import verdict
 
-STATUSES = ("complete", "implausible", "failed", "skipped")
+STATUSES = ("complete", "failed", "skipped")
 """What a record can say; the jobs of the last two have no files."""
 
 BLOCK_BYTES = 64_000_000
@@ -45,7 +46,7 @@ def check_job(repository: Repository, job: JobRecord, quick: bool) -> JobFaults:
         return JobFaults(
             [Fault(name, "is of a case or view that registry.txt or views.txt does not have", remedy, (job.path,))]
         )
-    expected = repository.shards(job) if record["status"] in ("complete", "implausible") else set()
+    expected = repository.shards(job) if record["status"] == "complete" else set()
     listed = {path: hash for path, hash in record.get("sha256", {}).items() if _is_current(repository, path)}
     found = JobFaults([], len(listed), frozenset(path.partition("/c/")[0] for path in listed if path in expected))
     if set(listed) != expected and job.case in repository.cases:
@@ -71,8 +72,9 @@ COMPRESSED = ("kinematics/volume_ratio_min", "physiology/volume_ratio_min")
 
 def _is_complete(repository: Repository, case: str) -> bool:
     """Whether a heart is within its bounds, as far as it is known."""
-    record, _ = _read_record(JobRecord(record_path(repository.folder, GATES[-1], case), GATES[-1], case))
-    return record is None or record["status"] == "complete"
+    job = JobRecord(record_path(repository.folder, "mechanics", case), "mechanics", case)
+    record, _ = _read_record(job)
+    return record is None or verdict(record, repository.cases[case].config.physiology).status == "complete"
 
 
 def _fault_of_value(repository: Repository, job: JobRecord, group: str, name: str, problem: str) -> Fault:
@@ -91,13 +93,13 @@ def _read_record(job: JobRecord) -> tuple[dict[str, Any] | None, str]:
         record = ledger.read(job.path)
     except (OSError, ValueError) as error:
         return None, f"cannot be read ({reason(error)})"
-    identity = {"stage": job.stage, "case": job.case, "view": job.view}
+    identity = {"stage": job.stage, "case": job.case, "view": job.view, "size": job.size}
     if not isinstance(record, dict) or any(record.get(key, "") != value for key, value in identity.items()):
         return None, f"is not the record of {job.job}"
     if record.get("status") not in STATUSES:
         return None, f"has the status {record.get('status')!r}, not one of {', '.join(STATUSES)}"
     hashes = record.get("sha256", {})
-    has_files = record["status"] in ("complete", "implausible")
+    has_files = record["status"] == "complete"
     if (has_files and "sha256" not in record) or not are_checksums(hashes):
         return None, "has no checksums of the files of its job"
     return record, ""
@@ -113,7 +115,7 @@ def _is_current(repository: Repository, path: str) -> bool:
     A case that left the configuration keeps its record, which may name groups that left it later.
     """
     group = path.partition("/c/")[0].rpartition("/")[0]
-    return group in repository.groups or group.partition("/")[0] not in schema.ALL
+    return group in repository.groups or schema.kind(group) not in schema.KINDS
 
 
 def damage(file: Path, hash: str) -> str:
@@ -153,7 +155,7 @@ def _blocks(
     group: str, opened: dict[str, zarr.Array[Any]], row: tuple[int, ...]
 ) -> Iterator[tuple[int, values.Arrays]]:
     """First frame and arrays of parts of the frames, which fit into memory."""
-    by_name = {array.name: array for array in schema_of(group)}
+    by_name = {array.name: array for array in schema.arrays_of(group)}
     with_frames = [name for name in opened if "frame" in by_name[name].dims]
     whole = {name: np.asarray(opened[name][row[: by_name[name].leading]]) for name in opened if name not in with_frames}
     if not with_frames:
@@ -180,7 +182,7 @@ def check_loop(repository: Repository, job: JobRecord) -> list[Fault]:
     """Loop and det F of a heart whose record says that it is complete."""
     record, _ = _read_record(job)
     row = repository.row(job)
-    if record is None or record["status"] != "complete" or row is None or job.case not in repository.cases:
+    if record is None or row is None or job.case not in repository.cases or not _is_complete(repository, job.case):
         return []
     curves = {f"mechanics/{name}": name for name in ("pressure", "volume", "pressure_target", "volume_target")}
     curves |= {"kinematics/volume_ratio_min": "volume_ratio_min"}

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +13,6 @@ from echotruth.repository import ledger
 from echotruth.repository.array import Array
 from echotruth.repository.check_jobs import are_checksums, damage
 from echotruth.repository.inventory import Fault, Repository, files_below, reason
-from echotruth.repository.provenance import settings_version
 from echotruth.repository.store import Store
 
 _REWRITTEN = "echotruth run writes it again"
@@ -67,23 +64,13 @@ def check_registries(repository: Repository) -> Iterator[Fault]:
 
 
 def check_others(repository: Repository) -> Iterator[Fault]:
-    """Record of the publication, and the configurations that jobs were handed."""
+    """Record of the publication."""
     if repository.publication_record.is_file():
         try:
             ledger.read(repository.publication_record)
         except ValueError as error:
             path, problem = repository.publication_record, f"cannot be read ({reason(error)})"
             yield Fault(repository.name(path), problem, _REWRITTEN, (path,))
-    for path in sorted(repository.folder.glob("configs/*.json")):
-        if _content_version(path) != path.stem:
-            yield Fault(repository.name(path), "differs from what was written", _REWRITTEN, files=(path,))
-
-
-def _content_version(path: Path) -> str:
-    try:
-        return settings_version(*[json.loads(path.read_text(encoding="utf-8"))])
-    except ValueError:
-        return ""
 
 
 def check_metadata(repository: Repository) -> Iterator[Fault]:

@@ -15,14 +15,12 @@ from echotruth.repository import schema
 from echotruth.repository.inventory import JobRecord, Repository
 
 TOLERANCE = {
-    "mechanics": 1e-6,
-    "physiology": 1e-5,
+    "mechanics": 1e-5,
     "phantom": 1e-6,
     "truth": 1e-6,
     "rf": 1e-4,
     "bmode": 1e-4,
     "tracking": 1e-3,
-    "evaluation": 1e-3,
 }
 """Stage -> largest difference over the largest number of an array, of a pack over the largest in the same unit; some
 ten times and more what was measured."""
@@ -30,7 +28,7 @@ ten times and more what was measured."""
 STEPPED = ("rf", "bmode")
 """Stages whose whole numbers are measured, in steps, and may be off by one; those of others are labels."""
 
-EXCEPTIONS = {"truth": 1e-3, "bmode": 1e-3, "tracking": 1e-3, "evaluation": 1e-3}
+EXCEPTIONS = {"truth": 1e-3, "bmode": 1e-3, "tracking": 1e-3}
 """Stage -> share of the numbers of an array that may differ by more: pixels at an edge, points that a tracker lost."""
 
 SMALLEST_SCALE = {"m": 1e-4, "s": 1e-2, "rad": 0.1, "1": 1.0, "percent": 100.0}
@@ -73,7 +71,7 @@ def _scale(repository: Repository, path: str, *arrays: NDArray[Any]) -> Any:
     """Largest magnitude in two arrays; of a pack that of the numbers in the same unit, (n_numbers,)."""
     magnitude = np.max([np.nan_to_num(np.abs(values), posinf=0) for values in arrays], axis=0)
     group = path.rpartition("/")[0]
-    for pack in schema.PACKS.get(group, ()):
+    for pack in schema.packs_of(group):
         if path == f"{group}/{pack.array.name}":
             largest = magnitude.reshape(-1, magnitude.shape[-1]).max(0)
             units = np.asarray(zarr.open_array(repository.store, path=f"{group}/{pack.dimension}_units", mode="r")[...])

@@ -34,10 +34,8 @@ ROOT = "zarr.json"
 """Path of the metadata of the root, which hold those of all groups and arrays once more."""
 
 COMPONENTS = ("vector", "strain_component", "plane", "wall_component", "label", "to")
-"""Dimensions along which a chunk of an array of the jobs holds one element; so it does along those of `IMAGED`, or of
-`TRACKED` if the array has them all."""
-IMAGED = ("frame",)
-TRACKED = ("size", "tracker")
+"""Dimensions along which a chunk of an array of the jobs holds one element; so it does along `frame`, but for what
+trackers found."""
 
 # A shard that holds only fill values is a result too and must exist on disk.
 zarr.config.set({"array.write_empty_chunks": True})
@@ -78,7 +76,8 @@ def structure(
             if f"{path}:{array.name}" in values:
                 _create(group, array, of_group[array.name].shape)[...] = of_group[array.name]
             else:
-                _create_sharded(group, array, tuple(lengths[dim] for dim in array.dims), coordinates)
+                alone = COMPONENTS if path.count("/") == 2 else (*COMPONENTS, "frame")
+                _create_sharded(group, array, tuple(lengths[dim] for dim in array.dims), coordinates, alone)
         for array in coordinates:
             _create(group, array, of_group[array.name].shape)[...] = of_group[array.name]
     return {path: buffer.to_bytes() for path, buffer in memory.items() if path != ROOT}
@@ -149,12 +148,17 @@ def _labels(path: str, coordinates: tuple[Array, ...], values: dict[str, NDArray
     return {name: [str(label) for label in values[name]] for name in strings}
 
 
-def _create_sharded(group: zarr.Group, array: Array, shape: tuple[int, ...], coordinates: tuple[Array, ...]) -> None:
-    """Create an array of the jobs: one shard a job, and chunks in it if it has frames."""
+def _create_sharded(
+    group: zarr.Group,
+    array: Array,
+    shape: tuple[int, ...],
+    coordinates: tuple[Array, ...],
+    alone: tuple[str, ...],
+) -> None:
+    """Create an array of the jobs: one shard a job, and in it, if it has frames, chunks of one element along `alone`."""
     dims = set(array.dims)
     auxiliary = [other.name for other in coordinates if other.dims != (other.name,) and set(other.dims) <= dims]
     attributes = {"coordinates": " ".join(auxiliary)} if auxiliary else {}
-    alone = (*COMPONENTS, *(TRACKED if dims >= set(TRACKED) else IMAGED))
     shard = tuple(1 if dim in ("case", "view") else size for dim, size in zip(array.dims, shape, strict=True))
     chunk = tuple(1 if dim in alone else size for dim, size in zip(array.dims, shard, strict=True))
     if "frame" not in dims or chunk == shard or np.prod(shard) < 4096:

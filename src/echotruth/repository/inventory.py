@@ -17,7 +17,7 @@ from echotruth.config import Config
 from echotruth.config.loading import ConfigError, load
 from echotruth.repository import layout, ledger, schema
 from echotruth.repository.array import Array
-from echotruth.repository.ledger import GATES, NOT_A_REPOSITORY, VIEW_STAGES, record_path
+from echotruth.repository.ledger import NOT_A_REPOSITORY, STAGES, record_path, record_paths
 
 
 class CheckError(ValueError):
@@ -52,17 +52,21 @@ class JobRecord:
     path : Path
     stage, case : str
     view : str or None
+    size : int or None
+        Image size, px.
     """
 
     path: Path
     stage: str
     case: str
     view: str | None = None
+    size: int | None = None
 
     @property
     def job(self) -> str:
         """The job in words."""
-        return f"{self.stage} of {self.case}" + (f", {self.view}" if self.view else "")
+        size = f"{self.size} px" if self.size else None
+        return f"{self.stage} of " + ", ".join(filter(None, [self.case, self.view, size]))
 
 
 class Repository:
@@ -105,8 +109,7 @@ class Repository:
     @cached_property
     def stages(self) -> dict[str, str]:
         """Group -> stage whose jobs write it."""
-        stages = (*GATES, *VIEW_STAGES)
-        return {group: stage for stage in stages for group in schema.written_by(stage, self.config)}
+        return {group: stage for stage in STAGES for group in schema.written_by(stage, self.config)}
 
     @cached_property
     def shard_paths(self) -> dict[str, Array]:
@@ -129,24 +132,28 @@ class Repository:
     def pack_labels(self, group: str) -> dict[str, list[str]]:
         """Labels along the dimension of each pack of a group."""
         coordinates = layout.labels(self.config, [], [])
-        dimensions = [pack.dimension for pack in schema.PACKS.get(group, ())]
+        dimensions = [pack.dimension for pack in schema.packs_of(group)]
         return {name: np.asarray(coordinates[f"{group}:{name}"]).tolist() for name in dimensions}
 
     def records(self) -> list[JobRecord]:
         """Records that exist, sorted."""
-        gates = (path for stage in GATES for path in self.folder.glob(f"ledger/{stage}/*.json"))
-        views = (path for stage in VIEW_STAGES for path in self.folder.glob(f"ledger/{stage}/*/*.json"))
-        found = [JobRecord(path, path.parent.name, path.stem) for path in gates]
-        found += [JobRecord(path, path.parents[1].name, path.parent.name, path.stem) for path in views]
-        return sorted((record for record in found if not record.path.name.startswith(".")), key=lambda one: one.path)
+        found = []
+        for stage, names in STAGES.items():
+            root = self.folder / "ledger" / stage
+            for path in root.glob("/".join(["*"] * len(names)) + ".json"):
+                case, view, size = (*path.relative_to(root).with_suffix("").parts, None, None)[:3]
+                if not path.name.startswith(".") and str(size or 0).isdecimal():
+                    found.append(JobRecord(path, stage, str(case), view, None if size is None else int(size)))
+        return sorted(found, key=lambda record: record.path)
 
     def wanted(self) -> list[Path]:
         """Paths of the records of all jobs of the configuration."""
-        return wanted_records(self.folder, list(self.cases), list(self.config.views))
+        places = list(self.config.views), self.config.bmode.sizes
+        return [path for case in self.cases for path in record_paths(self.folder, case, *places)]
 
-    def gates(self, record: JobRecord) -> tuple[Path, ...]:
-        """Paths of the records of the heart of a job."""
-        return tuple(record_path(self.folder, stage, record.case) for stage in GATES)
+    def heart(self, record: JobRecord) -> Path:
+        """Path of the record of the heart of a job."""
+        return record_path(self.folder, "mechanics", record.case)
 
     def row(self, record: JobRecord) -> tuple[int, ...] | None:
         """Row of the case, and index of the view if there is one; None if the registry does not have them."""
@@ -157,8 +164,8 @@ class Repository:
 
     def shards(self, record: JobRecord) -> set[str]:
         """Paths below the store of the shards that a job writes; none if its row is not known."""
-        row, groups = self.row(record), schema.written_by(record.stage, self.config)
-        if row is None:
+        row, groups = self.row(record), schema.written_by(record.stage, self.config, record.size)
+        if row is None or (record.size is not None and record.size not in self.config.bmode.sizes):
             return set()
         arrays = ((group, array) for group in groups for array in self.groups[group])
         return {f"{group}/{array.shard(row)}" for group, array in arrays if array.leading == len(row)}
@@ -166,12 +173,6 @@ class Repository:
     def name(self, path: Path) -> str:
         """Path below the folder."""
         return path.relative_to(self.folder).as_posix()
-
-
-def wanted_records(folder: Path, cases: list[str], views: list[str]) -> list[Path]:
-    """Paths of the records of all jobs of some cases and views, those of the gates first."""
-    gates = [record_path(folder, stage, case) for stage in GATES for case in cases]
-    return gates + [record_path(folder, stage, case, view) for stage in VIEW_STAGES for case in cases for view in views]
 
 
 def files_below(folder: Path) -> Iterator[str]:

@@ -1,19 +1,112 @@
-"""Lengths of the dimensions and values of the coordinates of a repository."""
+"""Layout of a repository before its first job: table and configurations of its hearts, and the empty arrays."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import yaml
 from numpy.typing import ArrayLike, NDArray
+from pydantic import ValidationError
 
+from echotruth.cases import RF_INDEPENDENT, Case, table
 from echotruth.config import Config
 from echotruth.fem.tetrahedra import Mesh
-from echotruth.repository import schema
+from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.recorder import metadata
+from echotruth.loop.cycle import frame_times
+from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.motion_file.wall import moving_wall
+from echotruth.repository import durable, ledger, schema
+from echotruth.repository.store import Store
+from echotruth.tracking import grid
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
+    """Write the table of the cases, a configuration for each, and the empty arrays of all jobs; existing values stay.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository.
+    config : Config
+    cases : list of Case
+        Cases of the configuration.
+    """
+    mesh = moving_wall(config).mesh if config.motion.kind == "file" else left_ventricle(config.geometry)
+    folder.mkdir(parents=True, exist_ok=True)
+    store = Store(folder / f"{config.name}.zarr")
+    rows = ledger.register(folder / "registry.txt", [case.id for case in cases], store.labels("case"))
+    views = ledger.register(folder / "views.txt", list(config.views), store.labels("view"))
+    times = np.full((len(rows), config.loop.frames), np.nan)
+    for case in cases:
+        times[rows[case.id]] = frame_times(case.config.loop)
+    case_table = table(cases)
+    case_columns = columns(case_table, list(rows))
+    values, lengths, settings = _rf_metadata(cases[0].config, constants(case_table))
+    coordinates = labels(config, list(rows), times, list(views)) | case_columns | positions(config)
+    coordinates |= {f"rf:{name}": value for name, value in values.items()}
+    arrays = schema.groups(config) | {"cases": schema.parameters(case_columns)}
+    attributes = {"rf": settings, "cases": {"constants": constants(case_table)}}
+    store.lay_out(arrays, sizes(mesh) | lengths, coordinates, attributes)
+    texts = {case_path(folder, case.id): case.config.model_dump_json() for case in cases}
+    texts |= {folder / "cases.csv": case_table.to_csv(index=False), folder / "config.yaml": _as_yaml(config)}
+    durable.update_all({path: text.encode() for path, text in texts.items()})
+
+
+def case_path(folder: Path, case: str) -> Path:
+    """File with the configuration of one heart, which its jobs read."""
+    return folder / "cases" / f"{case}.json"
+
+
+def read_case(folder: Path, case: str) -> Case:
+    """The heart of a job.
+
+    Raises
+    ------
+    FileNotFoundError
+        If it has no configuration, or one that is damaged.
+    """
+    path, remedy = case_path(folder, case), "the ids are in cases.csv; run the repository again, which writes the file"
+    try:
+        return Case(case, {}, Config.model_validate_json(path.read_bytes()))
+    except FileNotFoundError:
+        raise FileNotFoundError(f"{path}: is not there: {remedy}") from None
+    except ValidationError:
+        raise FileNotFoundError(f"{path}: is damaged: {remedy}") from None
+
+
+def _rf_metadata(
+    first: Config, constant: dict[str, Any]
+) -> tuple[dict[str, ArrayLike], dict[str, int], dict[str, Any]]:
+    """Values, lengths and attributes of the group `rf`; none if no RF is kept."""
+    if not first.rf.keep:
+        return {}, {}, {}
+    scanner = Scanner(first.probe, first.rf, imaging_depth(first.rf, first.bmode))
+    values, lengths, settings = metadata(first, scanner)
+    swept = {name for key, names in RF_INDEPENDENT.items() if key not in constant for name in names}
+    return values, lengths, {name: value for name, value in settings.items() if name not in swept}
+
+
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]  # which of them is not known
+    """Writer of YAML in which the table of hearts keeps its lines."""
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style="|" if "\n" in text else None)
+
+
+_Dumper.add_representer(str, _text)
+
+
+def _as_yaml(config: Config) -> str:
+    return yaml.dump(config.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False, allow_unicode=True)
 
 
 def sizes(mesh: Mesh) -> dict[str, int]:
@@ -35,18 +128,8 @@ def sizes(mesh: Mesh) -> dict[str, int]:
     }
 
 
-def positions(
-    config: Config, pixel_centres: Callable[..., tuple[ArrayLike, ArrayLike]], grid: Callable[..., ArrayLike]
-) -> dict[str, ArrayLike]:
+def positions(config: Config) -> dict[str, ArrayLike]:
     """Positions of the pixels of every image size, and of the tracked points.
-
-    Parameters
-    ----------
-    config : Config
-    pixel_centres : callable
-        From (bmode, size) to the axial and lateral pixel centres, m.
-    grid : callable
-        From (shape, step) to points (axial, lateral, 2): lateral, axial, px.
 
     Returns
     -------
@@ -60,9 +143,10 @@ def positions(
     for size, (axial, lateral) in centres.items():
         for stage in ("truth", "bmode"):
             coordinates |= {f"{stage}/{size}:axial": axial, f"{stage}/{size}:lateral": lateral}
-    for stage in ("tracking", "evaluation"):
-        coordinates[f"{stage}:axial"] = centres[largest][0][points[:, 0, 1]]
-        coordinates[f"{stage}:lateral"] = centres[largest][1][points[0, :, 0]]
+    tracked = [group for group in schema.groups(config) if group.partition("/")[0] in schema.TRACKED]
+    for group in tracked:
+        coordinates[f"{group}:axial"] = centres[largest][0][points[:, 0, 1]]
+        coordinates[f"{group}:lateral"] = centres[largest][1][points[0, :, 0]]
     return coordinates
 
 
@@ -84,27 +168,26 @@ def labels(config: Config, rows: list[str], times: ArrayLike, views: list[str] |
         "view": list(config.views) if views is None else views,
         "frame": np.arange(config.loop.frames),
         "time": times,
-        "size": list(config.bmode.sizes),
-        "tracker": list(config.tracking.trackers),
         "layer": layers,
         "region": [0, *layers],
         "aha": np.arange(1, 18),
     }
-    return schema.LABELS | common | pack_labels(schema.LABELS | common)
+    return schema.LABELS | common | pack_labels(config, schema.LABELS | common)
 
 
-def pack_labels(coordinates: Mapping[str, ArrayLike]) -> dict[str, ArrayLike]:
+def pack_labels(config: Config, coordinates: Mapping[str, ArrayLike]) -> dict[str, ArrayLike]:
     """Labels and units of the numbers of every pack, by `group:dimension`.
 
     Parameters
     ----------
+    config : Config
     coordinates : dict
         Values of the coordinates of their members.
     """
     return {
         f"{group}:{name}": labels
-        for group, packs in schema.PACKS.items()
-        for pack in packs
+        for group in schema.groups(config)
+        for pack in schema.packs_of(group)
         for name, labels in pack.labels(coordinates).items()
     }
 

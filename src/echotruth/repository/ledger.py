@@ -5,18 +5,24 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from hashlib import sha256
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from echotruth.repository import durable
 
-GATES = ("mechanics", "physiology")
-"""Stages that decide whether the later ones process a heart."""
+STAGES: dict[str, tuple[str, ...]] = {
+    "mechanics": ("case",),
+    "phantom": ("case", "view"),
+    "rf": ("case", "view"),
+    "truth": ("case", "view", "size"),
+    "bmode": ("case", "view", "size"),
+    "tracking": ("case", "view", "size"),
+}
+"""Stages in the order of their jobs -> what their jobs are for: a heart, a view of it, or an image size of a view."""
 
 NOT_A_REPOSITORY = "is not a repository: give the folder that a run made, such as out/demo"
 """What an error says of a folder, whose path stands before it."""
-VIEW_STAGES = ("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
-"""Stages with a record for every view of a case."""
 
 
 def imaged_statuses(exclude_implausible: bool) -> tuple[str, ...]:
@@ -24,10 +30,27 @@ def imaged_statuses(exclude_implausible: bool) -> tuple[str, ...]:
     return ("complete",) if exclude_implausible else ("complete", "implausible")
 
 
-def record_path(folder: Path, stage: str, case: str, view: str | None = None) -> Path:
-    """Path of the record of a job: ledger/STAGE/CASE.json or ledger/STAGE/CASE/VIEW.json."""
-    name = f"{case}.json" if view is None else f"{case}/{view}.json"
-    return folder / "ledger" / stage / name
+def record_path(folder: Path, stage: str, case: str, view: str | None = None, size: int | None = None) -> Path:
+    """Path of the record of a job: ledger/STAGE/CASE.json, ledger/STAGE/CASE/VIEW.json or .../VIEW/SIZE.json."""
+    place = "/".join(str(part) for part in (case, view, size) if part is not None)
+    return folder / "ledger" / stage / f"{place}.json"
+
+
+def record_paths(folder: Path, case: str, views: Sequence[str], sizes: Sequence[int]) -> list[Path]:
+    """Paths of the records of all jobs of a heart, in the order of the stages.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository, `out/NAME`.
+    case : str
+    views : sequence of str
+    sizes : sequence of int
+        Image sizes, px.
+    """
+    values = {"case": [case], "view": views, "size": sizes}
+    places = {stage: product(*(values[name] for name in names)) for stage, names in STAGES.items()}
+    return [record_path(folder, stage, *place) for stage, found in places.items() for place in found]
 
 
 def commit(path: Path, record: dict[str, Any]) -> None:

@@ -10,10 +10,10 @@ from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.repository import ledger
 from echotruth.repository.checksums import verify, verify_structure
-from echotruth.repository.inventory import wanted_records
-from echotruth.repository.ledger import GATES
+from echotruth.repository.ledger import record_paths
 from echotruth.repository.provenance import packages
 from echotruth.repository.store import Store
+from echotruth.repository.verdict import Verdict, verdict
 
 
 def publish(folder: Path) -> dict[str, Any]:
@@ -37,23 +37,17 @@ def publish(folder: Path) -> dict[str, Any]:
     config = load(folder / "config.yaml")
     store = Store(folder / f"{config.name}.zarr")
     rows = ledger.rows(folder / "registry.txt")
-    views = list(config.views)
-    records = {case.id: wanted_records(folder, [case.id], views) for case in expand(config)}
+    cases = expand(config)
+    records = {case.id: record_paths(folder, case.id, list(config.views), config.bmode.sizes) for case in cases}
     files = verify_structure(store.path, store.record)
     files += sum(verify(store.path, path, ledger.read(path)) for paths in records.values() for path in paths)
-    verdicts = {case: _verdict(paths) for case, paths in records.items()}
-    retired = {"status": "retired", "reason": "not a case of this configuration"}
+    verdicts = {case.id: verdict(ledger.read(records[case.id][0]), case.config.physiology) for case in cases}
+    retired = Verdict("retired", "not a case of this configuration")
     for column in ("status", "reason"):
-        store.write_column(column, [verdicts.get(case, retired).get(column, "") for case in rows])
+        store.write_column(column, [getattr(verdicts.get(case, retired), column) for case in rows])
     store.describe(_attributes(config, records))
-    statuses = [verdict["status"] for verdict in verdicts.values()]
+    statuses = [found.status for found in verdicts.values()]
     return {status: statuses.count(status) for status in ("complete", "implausible", "failed")} | {"files": files}
-
-
-def _verdict(paths: list[Path]) -> dict[str, Any]:
-    """Record of the first gate that the heart did not pass, or of the last gate."""
-    gates = [ledger.read(path) for path in paths[: len(GATES)]]
-    return next((record for record in gates if record["status"] != "complete"), gates[-1])
 
 
 def _attributes(config: Config, records: dict[str, list[Path]]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from echotruth.repository.array import array as _array
 from echotruth.repository.measured import PHYSIOLOGY, PHYSIOLOGY_PACKS
 from echotruth.repository.packing import Pack
 from echotruth.repository.rounding import STRAIN
-from echotruth.repository.tracked import EVALUATION, EVALUATION_PACKS, TRACKING
+from echotruth.repository.tracked import EVALUATION, EVALUATION_PACKS, REFERENCE, REFERENCE_PACKS, TRACKING
 from echotruth.section import unit_of
 
 GEOMETRY = (
@@ -129,8 +129,6 @@ COORDINATES = (
     _array("view", "view", "string", "1", "imaging plane"),
     _array("frame", "frame", "int32", "1", "frame of the cycle, 0 at end-diastole"),
     _array("time", "case frame", "float64", "s", "time since end-diastole"),
-    _array("size", "size", "int32", "1", "pixels along a side of the image"),
-    _array("tracker", "tracker", "string", "1", "tracker"),
     _array("axial", "axial", "float64", "m", "depth below the array"),
     _array("lateral", "lateral", "float64", "m", "lateral position"),
     _array("xyz", "xyz", "string", "1", "axis of the heart frame"),
@@ -195,19 +193,17 @@ STAGES = {
     "kinematics": KINEMATICS,
     "physiology": PHYSIOLOGY,
     "phantom": PHANTOM,
-    "tracking": TRACKING,
-    "evaluation": EVALUATION,
 }
-"""Stages whose arrays exist once."""
+"""Groups that exist once."""
 
-PACKS: dict[str, tuple[Pack, ...]] = {"physiology": PHYSIOLOGY_PACKS, "evaluation": EVALUATION_PACKS}
-"""Arrays of a stage that hold several others."""
+SIZED = {"truth": TRUTH, "bmode": BMODE, "evaluation": REFERENCE}
+"""Groups that exist once per image size, and are named after it: `truth/512`."""
 
-SIZED = {"truth": TRUTH, "bmode": BMODE}
-"""Stages whose arrays exist once per image size, in a group named after it."""
+TRACKED = {"tracking": TRACKING, "evaluation": EVALUATION}
+"""Groups that exist once per image size and tracker: `tracking/512/dis`."""
 
 OPTIONAL = {"rf": RF}
-"""Stages whose arrays exist only as `rf.keep` requests."""
+"""Groups whose arrays exist only as `rf.keep` requests."""
 
 DERIVED = (
     _array("deformation_gradient", "case frame cell row column", "float64", "1", "F at cell centroids, from unloaded"),
@@ -221,7 +217,32 @@ DERIVED = (
 )
 """Arrays that follow from those of a heart; :func:`echotruth.kinematics` computes them."""
 
-ALL = STAGES | OPTIONAL | SIZED
+KINDS = STAGES | OPTIONAL | {f"{name}/SIZE": arrays for name, arrays in SIZED.items()}
+KINDS |= {f"{name}/SIZE/TRACKER": arrays for name, arrays in TRACKED.items()}
+"""Arrays by the kind of their group, such as `truth/SIZE`."""
+
+PACKS: dict[str, tuple[Pack, ...]] = {
+    "physiology": PHYSIOLOGY_PACKS,
+    "evaluation/SIZE": REFERENCE_PACKS,
+    "evaluation/SIZE/TRACKER": EVALUATION_PACKS,
+}
+"""Arrays that hold several others, by the kind of their group."""
+
+
+def kind(group: str) -> str:
+    """Kind of a group: of `tracking/512/dis`, `tracking/SIZE/TRACKER`."""
+    stage, *rest = group.split("/")
+    return "/".join([stage, *("SIZE", "TRACKER")[: len(rest)]])
+
+
+def arrays_of(group: str) -> tuple[Array, ...]:
+    """Arrays of a group, as "bmode/512"."""
+    return KINDS[kind(group)]
+
+
+def packs_of(group: str) -> tuple[Pack, ...]:
+    """Packs of a group, as "evaluation/512/dis"."""
+    return PACKS.get(kind(group), ())
 
 CASES = (
     _array(
@@ -262,8 +283,11 @@ _UNITS = {
 
 def groups(config: Config) -> dict[str, tuple[Array, ...]]:
     """Arrays of every group, without coordinates, by the path of the group; each quantum is a number."""
-    sized = {f"{stage}/{size}": arrays for stage, arrays in SIZED.items() for size in config.bmode.sizes}
-    every = {"cases": CASES} | STAGES | sized | ({"rf": rf_arrays(config)} if config.rf.keep else {})
+    sizes, trackers = config.bmode.sizes, config.tracking.trackers
+    every = {"cases": CASES} | STAGES
+    every |= {f"{name}/{size}": arrays for name, arrays in SIZED.items() for size in sizes}
+    every |= {f"{name}/{size}/{one}": arrays for name, arrays in TRACKED.items() for size in sizes for one in trackers}
+    every |= {"rf": rf_arrays(config)} if config.rf.keep else {}
     return {path: rounding.of(arrays, config) for path, arrays in every.items()}
 
 
@@ -273,19 +297,31 @@ def rf_arrays(config: Config) -> tuple[Array, ...]:
     return (LINES if lines else ()) + (CHANNELS if channels else ()) + TRANSMITS
 
 
-def written_by(stage: str, config: Config) -> list[str]:
-    """Groups that the jobs of a stage write; mechanics writes all groups of a heart except `physiology`."""
+def written_by(stage: str, config: Config, size: int | None = None) -> list[str]:
+    """Groups that a job of a stage writes.
+
+    Parameters
+    ----------
+    stage : str
+    config : Config
+    size : int, optional
+        Image size of the job, px; without it, the groups of all sizes.
+    """
+    sizes = config.bmode.sizes if size is None else [size]
     if stage == "mechanics":
-        return [group for group, arrays in STAGES.items() if arrays[0].leading == 1 and group != "physiology"]
+        return [group for group, arrays in STAGES.items() if arrays[0].leading == 1]
+    if stage == "tracking":
+        of_trackers = [f"{name}/{px}/{one}" for name in TRACKED for px in sizes for one in config.tracking.trackers]
+        return [f"evaluation/{px}" for px in sizes] + of_trackers
     if stage in SIZED:
-        return [f"{stage}/{size}" for size in config.bmode.sizes]
+        return [f"{stage}/{px}" for px in sizes]
     return [stage] if stage in STAGES or (stage == "rf" and config.rf.keep) else []
 
 
-def named(stage: str) -> tuple[Array, ...]:
-    """Arrays of a stage by the names that jobs and readers use: the members of a pack in place of the pack."""
-    members = {pack.array.name: pack.members for pack in PACKS.get(stage, ())}
-    return tuple(one for array in ALL[stage] for one in members.get(array.name, (array,)))
+def named(group: str) -> tuple[Array, ...]:
+    """Arrays of a group by the names that jobs and readers use: the members of a pack in place of the pack."""
+    members = {pack.array.name: pack.members for pack in packs_of(group)}
+    return tuple(one for array in arrays_of(group) for one in members.get(array.name, (array,)))
 
 
 def coordinates(arrays: tuple[Array, ...]) -> tuple[Array, ...]:

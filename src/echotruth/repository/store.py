@@ -91,9 +91,9 @@ class Store:
             Row of the case, and index of the view.
         """
         arrays = self._open(group, "r+")
-        by_name = {array.name: array for array in schema_of(group)}
+        by_name = {array.name: array for array in schema.arrays_of(group)}
         written: dict[Path, None] = {}
-        for name, value in packing.pack(packs_of(group), values).items():
+        for name, value in packing.pack(schema.packs_of(group), values).items():
             array, shard = arrays[name], self._shard(group, by_name[name], row)
             _remove_drafts(shard)
             array[row] = rounded(np.asarray(value, dtype=array.dtype), cast("float | None", array.attrs.get("quantum")))
@@ -114,7 +114,7 @@ class Store:
             Names of arrays and of members of packs. Default: all.
         """
         opened = self._open(group, "r")
-        by_name, packs = {array.name: array for array in schema_of(group)}, packs_of(group)
+        by_name, packs = {array.name: array for array in schema.arrays_of(group)}, schema.packs_of(group)
         holder = {name: pack.array.name for pack in packs for name in pack.names}
         # Only a part of the RF may be stored.
         stored = [name for name in by_name if name in opened] if names is None else names
@@ -134,7 +134,7 @@ class Store:
 
     def files(self, group: str, *row: int) -> list[Path]:
         """Files that one job wrote in a group, sorted."""
-        shards = (self._shard(group, array, row) for array in schema_of(group) if array.leading == len(row))
+        shards = (self._shard(group, array, row) for array in schema.arrays_of(group) if array.leading == len(row))
         return sorted(shard for shard in shards if shard.is_file())
 
     def write_column(self, name: str, values: ArrayLike) -> None:
@@ -223,17 +223,6 @@ class Store:
 
     def _open(self, group: str, mode: Any) -> Mapping[str, zarr.Array[Any]]:
         return cast(Any, zarr.open_group(self.path, path=group, mode=mode, use_consolidated=False))
-
-
-def schema_of(group: str) -> tuple[Array, ...]:
-    """Arrays of a group, as "bmode/512"."""
-    stage = group.partition("/")[0]
-    return schema.ALL[stage]
-
-
-def packs_of(group: str) -> tuple[packing.Pack, ...]:
-    """Packs of a group, as "evaluation"."""
-    return schema.PACKS.get(group.partition("/")[0], ())
 
 
 def _nodes(folder: Path) -> list[Path]:

@@ -1,7 +1,7 @@
-"""Arrays of the tracked displacement and of its scores.
+"""Arrays of the tracked displacement, of its scores, and of the true motion to which it is compared.
 
-All image sizes are tracked at the same points, so that `size` is a dimension. What does not depend on the tracker does
-not depend on the size either.
+Every tracker has a group of its own at every image size, so that one that is added leaves the others as they are. All
+sizes are tracked at the same points.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from echotruth.repository.array import array
 from echotruth.repository.packing import Pack
 from echotruth.repository.rounding import LENGTH, QUALITY, STRAIN
 
-_TRACKED = "case view size tracker"
+_TRACKED = "case view"
 _CCW = "about its centroid since ED, counter-clockwise seen from the apex; of short-axis views"
 TRACKING = (
     array(
@@ -101,18 +101,18 @@ _TRUE_COURSES = (
     array("true_rotation", "case view frame", "float32", "rad", f"true rotation of the wall, {_CCW}"),
 )
 
-EVALUATION_PACKS = (
+REFERENCE_PACKS = (
     Pack(array("limits", "case view limit", "float64", "mixed", "what no tracker can do better than, at ES"), _LIMITS),
-    Pack(array("scores", f"{_TRACKED} score", "float64", "mixed", "scores of a tracker on a clip"), _SCORES),
-    Pack(
-        array("courses", f"{_TRACKED} frame course", "float32", "mixed", "its errors and strains over time"), _COURSES
-    ),
     Pack(
         array("true_courses", "case view frame true_course", "float32", "mixed", "true strains over time"),
         _TRUE_COURSES,
     ),
 )
-EVALUATION = (
+EVALUATION_PACKS = (
+    Pack(array("scores", "case view score", "float64", "mixed", "scores of a tracker on a clip"), _SCORES),
+    Pack(array("courses", "case view frame course", "float32", "mixed", "its errors and strains over time"), _COURSES),
+)
+REFERENCE = (
     array(
         *("true_displacement", "case view frame axial lateral vector", "float32", "m"),
         "true displacement from ED",
@@ -124,5 +124,8 @@ EVALUATION = (
         STRAIN,
     ),
     array("wall_axes", "case view axial lateral polar plane", "float32", "1", "the wall's axes in the image at ED"),
-    *(pack.array for pack in EVALUATION_PACKS),
+    *(pack.array for pack in REFERENCE_PACKS),
 )
+"""True motion at the points that are tracked."""
+EVALUATION = tuple(pack.array for pack in EVALUATION_PACKS)
+"""Scores of one tracker."""

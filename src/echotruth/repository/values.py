@@ -46,6 +46,8 @@ COMPLEMENT = 1e-6
 OVERSHOOT = 0.05
 """Largest excess over 0 to 1 of the wall depth, a Laplace solution, interpolated by quadratic functions."""
 
+EVALUATED = (*schema.named("evaluation/SIZE"), *schema.named("evaluation/SIZE/TRACKER"))
+
 RANGES: dict[str, dict[str, Range]] = {
     "geometry": {"cell_node": NOT_NEGATIVE, "endo": NOT_NEGATIVE, "epi": NOT_NEGATIVE, "base": NOT_NEGATIVE},
     "fibres": {"wall_depth": Range(-COMPLEMENT, 1 + COMPLEMENT, finite=True), "layer": Range(1), "segment": SEGMENT},
@@ -76,8 +78,8 @@ RANGES: dict[str, dict[str, Range]] = {
     },
     "rf": {"channels_step": POSITIVE},
     "tracking": {"displacement": ANY, "quality": Range(-COMPLEMENT, 1 + COMPLEMENT)},
-    "evaluation": {array.name: ANY for array in schema.named("evaluation")}
-    | {array.name: MAGNITUDE for array in schema.named("evaluation") if "rms" in array.name or "nrmse" in array.name}
+    "evaluation": {array.name: ANY for array in EVALUATED}
+    | {array.name: MAGNITUDE for array in EVALUATED if "rms" in array.name or "nrmse" in array.name}
     | {
         "coverage": Range(0, 1, finite=True),
         "strain_correlation": Range(-1 - COMPLEMENT, 1 + COMPLEMENT),

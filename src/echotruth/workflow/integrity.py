@@ -60,7 +60,7 @@ def _tell_of_run(folder: Path) -> None:
 def _heal(folder: Path, quick: bool) -> int:
     report = check(folder, progress=_progress, quick=quick)
     status = _print(folder, report)
-    records, files = heal(folder, report)
+    records, files = heal(report)
     if records or files:
         print(f"dropped: {records} records and {files} files: echotruth run makes them again")
     return status

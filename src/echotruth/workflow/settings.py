@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -9,11 +10,53 @@ from echotruth.config import Config, Geometry, Loop
 from echotruth.loop.cycle import frame_times, recorded_curves
 from echotruth.repository.provenance import settings_version
 
-APART = ("name", "cases", "views", "tracking", "physiology")
-"""Keys of a configuration that no image depends on, and `views`, of which an image depends on its own."""
+Settings = tuple[Any, ...]
 
-LINES = ("phantom", "rf")
-"""Stages up to the lines; of the section bmode they depend on the depth alone."""
+
+def mechanics(config: Config) -> str:
+    """Hash of what the motion of a heart depends on; hearts with the same one have the same motion."""
+    # Only fibre disarray depends on the seed.
+    seed = config.seed if config.fibres.disarray_deg else None
+    anatomy = (config.geometry.resolved(), _mesh_hash(config.geometry), config.fibres, seed, config.pathology)
+    if config.motion.kind == "beat":
+        return settings_version(*anatomy, config.loop, _curves(config.loop), config.mechanics)
+    formula = getattr(config.motion, config.motion.kind)
+    if config.motion.kind == "file":
+        formula = settings_version(formula, _series_hash(str(config.motion.file.path)))
+    amplitude = (_times(config.loop), config.motion.time_course)
+    return settings_version(*anatomy, *amplitude, formula, config.rf.focus_mm)
+
+
+def phantom(config: Config, view: str) -> Settings:
+    """What the scatterers of a view depend on, and their echoes."""
+    depth = config.bmode.field_of_view_mm
+    return config.seed, config.views[view], config.phantom, config.probe.resolved(), config.rf, config.realism, depth
+
+
+def truth(config: Config, view: str) -> Settings:
+    """What the truth of a view depends on."""
+    return config.views[view], config.rf.focus_mm, config.bmode.field_of_view_mm, config.bmode.size_px
+
+
+def bmode(config: Config, view: str) -> Settings:
+    """What the images of a view depend on."""
+    image = config.bmode.model_copy(update={"downsampling": (1,)})
+    return image, config.probe.resolved(), config.rf
+
+
+def tracking(config: Config, view: str) -> Settings:
+    """What trackers find in a view."""
+    return config.seed, config.tracking
+
+
+OF_VIEW: dict[str, Callable[[Config, str], Settings]] = {
+    "phantom": phantom,
+    "rf": phantom,
+    "truth": truth,
+    "bmode": bmode,
+    "tracking": tracking,
+}
+"""Stages of a view -> their settings, besides what the stages before them depend on."""
 
 
 @lru_cache(maxsize=1000)
@@ -26,26 +69,6 @@ def _curves(loop: Loop) -> dict[str, Any]:
 def _times(loop: Loop) -> list[float]:
     """Times of the frames, s."""
     return frame_times(loop).tolist()
-
-
-def mechanics_settings(config: Config) -> str:
-    """Hash of what the motion of a heart depends on; hearts with the same one have the same motion.
-
-    Parameters
-    ----------
-    config : Config
-        Configuration of one case.
-    """
-    # Only fibre disarray depends on the seed.
-    seed = config.seed if config.fibres.disarray_deg else None
-    anatomy = (config.geometry.resolved(), _mesh_hash(config.geometry), config.fibres, seed, config.pathology)
-    if config.motion.kind == "beat":
-        return settings_version(*anatomy, config.loop, _curves(config.loop), config.mechanics)
-    formula = getattr(config.motion, config.motion.kind)
-    if config.motion.kind == "file":
-        formula = settings_version(formula, _series_hash(str(config.motion.file.path)))
-    amplitude = (_times(config.loop), config.motion.time_course)
-    return settings_version(*anatomy, *amplitude, formula, config.rf.focus_mm)
 
 
 def _mesh_hash(geometry: Geometry) -> str:
@@ -79,44 +102,6 @@ def motions(configs: dict[str, Config]) -> dict[str, str]:
         seed = config.seed if config.fibres.disarray_deg else None
         shared = (*map(id, sections), seed, config.rf.focus_mm)
         if shared not in known:
-            known[shared] = mechanics_settings(config)
+            known[shared] = mechanics(config)
         hashes[case] = known[shared]
     return hashes
-
-
-def imaging_settings(config: Config, view: str) -> str:
-    """Hash of what the images of a view depend on, besides the motion of the heart.
-
-    Parameters
-    ----------
-    config : Config
-        Configuration of one case.
-    view : str
-        Name of the view.
-    """
-    stages = (config.phantom, config.probe.resolved(), config.rf, config.realism, config.bmode)
-    return settings_version(config.seed, config.views[view], *stages)
-
-
-def stage_settings(stage: str, config: Config, view: str, motion: dict[str, str]) -> str:
-    """Hash of all that one stage of the images of a view depends on, besides its code and the id of the case.
-
-    Parameters
-    ----------
-    stage : str
-    config : Config
-        Configuration of one case.
-    view : str
-        Name of the view.
-    motion : dict
-        Checksums of the shards of the heart, as its record of mechanics has them.
-    """
-    sections = {name: _values(getattr(config, name)) for name in type(config).model_fields if name not in APART}
-    if stage in LINES:
-        sections["bmode"] = config.bmode.field_of_view_mm
-    return settings_version(sections, config.views[view], _times(config.loop), motion)
-
-
-def _values(setting: Any) -> Any:
-    """A setting as plain values; of a section those that its presets stand for."""
-    return setting.resolved().model_dump(mode="json") if hasattr(setting, "resolved") else setting

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from echotruth.repository import durable, ledger, schema
 from echotruth.repository.checksums import verify
-from echotruth.repository.ledger import record_path
 from echotruth.workflow.failure import CaseFailed
 
 if TYPE_CHECKING:
@@ -36,8 +35,8 @@ def first_with_same(settings: dict[str, str], rows: dict[str, int]) -> dict[str,
     return {case: first[value] for case, value in settings.items() if first[value] != case}
 
 
-def take_over(job: Job, case: str) -> Result:
-    """Take over the files of a stage from another case.
+def take_over(job: Job) -> Result:
+    """Take over the files of the mechanics of another case, that of `job.same_as`.
 
     They become names of the same data on disk where the file system can do that (hard links), else copies. A file of
     the store is replaced as a whole and never changed in place, so that what is written for one case later leaves the
@@ -47,8 +46,6 @@ def take_over(job: Job, case: str) -> Result:
     ----------
     job : Job
         The job of the case that takes over.
-    case : str
-        Case id whose job is done.
 
     Returns
     -------
@@ -59,22 +56,17 @@ def take_over(job: Job, case: str) -> Result:
     ------
     CaseFailed
         If the other case has no result.
-    NotWritten
-        If the job of the other case is not done.
     ChecksumError
         If a file of the other case is missing or differs from what its job wrote.
     """
-    from echotruth.repository.store import NotWritten  # loads Zarr, which a plan does without
-
-    path, root = record_path(job.folder, job.stage, case), job.store.path
-    if not path.is_file():
-        raise NotWritten(f"{path}: file not found: run the stage {job.stage} of {case} first")
-    record = ledger.read(path)
+    assert job.same_as is not None
+    root, record = job.store.path, ledger.read(job.same_as)
     if record["status"] != "complete":
         raise CaseFailed(record["reason"])
-    verify(root, path, record)
+    verify(root, job.same_as, record)
     job.withdraw()
-    row, groups = ledger.rows(job.folder / "registry.txt")[case], schema.written_by(job.stage, job.case.config)
+    row = ledger.rows(job.folder / "registry.txt")[record["case"]]
+    groups = schema.written_by(job.stage, job.config)
     folders: set[Path] = set()
     for group in groups:
         for file in job.store.files(group, row):
@@ -83,4 +75,5 @@ def take_over(job: Job, case: str) -> Result:
             durable.link(file, target)
             folders |= set(target.parents[: len(rest) + 2])
     durable.sync(*folders)  # a folder holds the names of the files and folders in it
+    job.note(bounded=record["bounded"], shared_with=record["case"])
     return {group: {} for group in groups}

@@ -3,21 +3,18 @@
 import argparse
 import sys
 from pathlib import Path
-from shutil import rmtree
 
 from echotruth.repository import ledger
 from echotruth.repository.checksums import ChecksumError
 from echotruth.repository.publication import publish
-from echotruth.workflow import superseded
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
 folder = parser.parse_args().repository
 try:
     summary = publish(folder)
-except ChecksumError as error:
-    sys.exit(str(error))
+except (ChecksumError, FileNotFoundError) as error:
+    sys.exit(f"repository: {error}")
 ledger.commit(folder / "ledger/repository.json", summary)
-rmtree(folder / superseded.FOLDER, ignore_errors=True)
 files = summary.pop("files")
 print("repository:", ", ".join(f"{number} {status}" for status, number in summary.items()), f"({files} files verified)")

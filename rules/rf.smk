@@ -1,0 +1,26 @@
+"""The RF of every frame, focused to lines."""
+
+
+rule rf:
+    input:
+        rules.phantom.output,
+    output:
+        f"{OUT}/ledger/rf/{{case}}/{{view}}.json",
+        lines=temp(f"{OUT}/scratch/{{case}}/{{view}}/lines.npz"),
+    params:
+        code=PLAN.code("rf"),
+        settings=PLAN.settings("rf"),
+    log:
+        f"{OUT}/logs/rf/{{case}}/{{view}}.log",
+    benchmark:
+        f"{OUT}/benchmarks/rf/{{case}}/{{view}}.tsv"
+    group:
+        "view"
+    priority: 2
+    resources:
+        runtime=PLAN.runtime("rf"),
+        mem_mb=PLAN.mem_mb("rf"),
+    conda:
+        "../environment.yml"
+    shell:
+        "python $SCRIPTS/rf.py $REPOSITORY {wildcards.case} {wildcards.view} --code {params.code} --threads {threads} &> {log}"

@@ -1,0 +1,124 @@
+"""What the rules ask of a configuration: its hearts, and what the job of a rule depends on and needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from echotruth.cases import Case, expand
+from echotruth.config import Config
+from echotruth.config.loading import validate
+from echotruth.repository import ledger
+from echotruth.repository.ledger import record_path, record_paths
+from echotruth.repository.provenance import code_version, settings_version
+from echotruth.repository.verdict import excluded
+from echotruth.workflow import demand, lease, settings
+from echotruth.workflow.blocks import Block
+from echotruth.workflow.processes import script
+from echotruth.workflow.sharing import first_with_same
+
+Wildcards = Any
+"""Wildcards of a job: its `case`, and its `view` and `size` if there are."""
+
+
+class Plan:
+    """Plan of the jobs of a configuration.
+
+    Parameters
+    ----------
+    values : dict
+        The configuration, as Snakemake has it. Its key `block`, such as "3/40", takes one part of the hearts; "0/40"
+        takes none, and so leaves the repository and its report.
+    source : str, optional
+        Where it comes from, for errors.
+
+    Attributes
+    ----------
+    config : Config
+    folder : Path
+        Folder of the repository, `out/NAME`.
+    cases : dict
+        Hearts of this plan, by id.
+
+    Raises
+    ------
+    ConfigError
+        If the configuration is not valid.
+    """
+
+    def __init__(self, values: dict[str, Any], source: str = "configuration") -> None:
+        given = dict(values)
+        self._block = Block.parse(given.pop("block", None), source)
+        self.config: Config = validate(given, source)
+        self.folder = Path("out") / self.config.name
+        self._every = {case.id: case for case in expand(self.config, source)}
+        self._motions = settings.motions({id: case.config for id, case in self._every.items()})
+        self._same = first_with_same(self._motions, ledger.rows(self.folder / "registry.txt"))
+        self.cases: dict[str, Case] = {id: self._every[id] for id in self._block.of(self._motions)}
+
+    def begin(self) -> None:
+        """Hold the lease of the folder until this process ends, and lay the repository out.
+
+        Whoever starts the blocks of a sweep has done so already.
+        """
+        lease.hold(self.folder)
+        if self._block.is_whole:
+            from echotruth.repository.layout import lay_out
+
+            lay_out(self.folder, self.config, list(self._every.values()))
+
+    def code(self, stage: str) -> str:
+        """Version of the code of a stage; if it changes, the stage is run again."""
+        return code_version(script(stage))
+
+    def settings(self, stage: str) -> Callable[[Wildcards], str]:
+        """Hash of the settings of a stage, besides those of the stages before it; as a function of wildcards."""
+        if stage == "mechanics":
+            return lambda wildcards: self._motions[wildcards.case]
+        if stage == "repository":
+            return lambda wildcards: settings_version(self.config, list(self._every))
+        return lambda wildcards: self._settings(stage, wildcards.case, wildcards.view)
+
+    def _settings(self, stage: str, case: str, view: str) -> str:
+        return settings_version(*settings.OF_VIEW[stage](self._every[case].config, view))
+
+    def same_motion(self, wildcards: Wildcards) -> list[str]:
+        """Record of the heart from which a heart takes over its motion, if there is one."""
+        first = self._same.get(wildcards.case)
+        return [] if first is None else [str(record_path(self.folder, "mechanics", first))]
+
+    def excluded(self, wildcards: Wildcards) -> str:
+        """Why a heart is not imaged; empty if it is. Other bounds run again only what they decide otherwise."""
+        return excluded(self.folder, wildcards.case, self._every[wildcards.case].config)
+
+    def bmode_source(self, wildcards: Wildcards) -> list[str]:
+        """What a clip is made from: lines, kept or not, or the largest clip."""
+        case, view, largest = wildcards.case, wildcards.view, self.config.bmode.sizes[0]
+        if int(wildcards.size) != largest:
+            return [str(record_path(self.folder, "bmode", case, view, largest))]
+        rf = record_path(self.folder, "rf", case, view)
+        lines = self.folder / "scratch" / case / view / "lines.npz"
+        return [str(rf)] if "lines" in self.config.rf.keep else [str(rf), str(lines)]
+
+    def records(self, wildcards: Wildcards) -> list[str]:
+        """Records of all jobs, so that a lost one is made again."""
+        places = list(self.config.views), self.config.bmode.sizes
+        return [str(path) for case in self.cases for path in record_paths(self.folder, case, *places)]
+
+    def external_scores(self, wildcards: Wildcards) -> list[str]:
+        """Scores of trackers from outside."""
+        return [str(path) for path in sorted(self.folder.glob("external/*.csv"))]
+
+    def runtime(self, rule: str) -> Callable[..., int]:
+        """Time that a job asks for, min; one that failed asks for more."""
+        return lambda wildcards, attempt: attempt * self._demand(demand.minutes, rule, wildcards)
+
+    def mem_mb(self, rule: str) -> Callable[..., int]:
+        """Memory that a job asks for, MB; one that failed asks for more."""
+        return lambda wildcards, attempt: attempt * self._demand(demand.megabytes, rule, wildcards)
+
+    def _demand(self, of: Callable[..., int], rule: str, wildcards: Wildcards) -> int:
+        place = dict(wildcards.items())
+        config = self._every[place["case"]].config if "case" in place else self.config
+        return of(rule, config, place.get("view", ""), int(place.get("size", 0)))
