@@ -1,22 +1,27 @@
 """The page: its conditions, who is ahead, its bytes, and what a person wrote into it."""
 
+import os
 import shutil
+import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from echotruth.benchmark import tables
-from echotruth.benchmark.conditions import groups, main_conditions, variations, with_conditions
-from echotruth.benchmark.page import Page
-from echotruth.benchmark.records import Records
-from echotruth.benchmark.standings import METRICS, RANKED_BY, agreement, order, standings, varied
-from echotruth.cli import main
+from benchmarks.suite import tables
+from benchmarks.suite.__main__ import main
+from benchmarks.suite.conditions import groups, main_conditions, variations, with_conditions
+from benchmarks.suite.page import Page
+from benchmarks.suite.records import Records
+from benchmarks.suite.standings import METRICS, RANKED_BY, agreement, order, standings, varied
 from echotruth.evaluation.tracker_options import EvaluationError
 
 pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
 
 HEARTS = 12
 
@@ -135,9 +140,9 @@ def test_drift_quality_and_gap_are_of_the_main_species_and_the_page_says_so(page
     for what in (Page._failures, Page._reliability):
         assert what(both) == what(alone)
     assert both.verdict("dis").gap == alone.verdict("dis").gap
-    text = both.write(tmp_path / "page.md", "echotruth benchmark").read_text()
+    text = both.write(tmp_path / "page.md", "python -m benchmarks.suite").read_text()
     assert "### Human, ideal" in text and "Everything\nelse is of the species mouse alone" in text
-    assert "of the species" not in alone.write(tmp_path / "alone.md", "echotruth benchmark").read_text()
+    assert "of the species" not in alone.write(tmp_path / "alone.md", "python -m benchmarks.suite").read_text()
 
 
 def test_rank_is_at_the_largest_size_of_the_main_species(page):
@@ -171,10 +176,8 @@ def test_cells_of_a_table_cannot_end_it():
 
 def run(*arguments):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["echotruth", "benchmark", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-    return left.value.code
+        patch.setattr(sys, "argv", ["suite", *map(str, arguments)])
+        return main()
 
 
 @pytest.mark.slow
@@ -191,6 +194,14 @@ def test_command_writes_the_page_twice_alike_and_keeps_what_a_person_wrote(repos
     assert run(*arguments) == 0
     assert first == {file.name: file.read_bytes() for file in [page, *(tmp_path / "page").iterdir()]}
     assert "- Noted by hand." in page.read_text() and "dis" in capsys.readouterr().out
+
+
+def test_command_runs_from_the_checkout_in_several_processes(submitted, repository):
+    words = [sys.executable, "-m", "benchmarks.suite", repository, "--check", "honest", "--jobs", "2"]
+    path = os.pathsep.join(filter(None, [str(submitted.parent), os.environ.get("PYTHONPATH")]))
+    environment = os.environ | {"PYTHONPATH": path}
+    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "honest: nothing found (error on mirrored clips" in done.stdout, done.stderr
 
 
 @pytest.mark.parametrize(
@@ -235,7 +246,7 @@ def test_half_that_is_not_clear_is_refused(repository, capsys, before, after, se
 
 
 def test_what_is_not_true_of_the_hearts_is_not_printed(page, repository, tmp_path):
-    text = page.write(tmp_path / "page.md", "echotruth benchmark").read_text()
+    text = page.write(tmp_path / "page.md", "python -m benchmarks.suite").read_text()
     assert "each half has hearts of each group" not in text and "are in one half" in text  # dilation is in test only
     config = repository / "config.yaml"
     config.write_text(config.read_text().replace("develop", "test"))
@@ -247,7 +258,7 @@ def test_what_is_not_true_of_the_hearts_is_not_printed(page, repository, tmp_pat
 
 def test_page_of_a_half_without_results_says_so_and_has_none(page, tmp_path):
     empty = Page(page.whole, "validation")
-    text = empty.write(tmp_path / "page.md", "echotruth benchmark out/bench").read_text()
+    text = empty.write(tmp_path / "page.md", "python -m benchmarks.suite out/bench").read_text()
     assert "No clip" in empty.leaderboard() and not (tmp_path / "page").exists()
     assert "## What is in it" in text and "## Submit your own" in text and "## Leaderboard" not in text
 

@@ -8,12 +8,12 @@ import pandas as pd
 import pytest
 import yaml
 
-from echotruth.benchmark import checks, records, results
-from echotruth.benchmark.card import Card, attach, attach_card, card_of, read
-from echotruth.benchmark.page import EXAMPLE, Page
-from echotruth.benchmark.rerun import prepare_rerun, rerun
-from echotruth.benchmark.results import result_path
-from echotruth.benchmark.variants import VARIANTS, anonymous
+from benchmarks.suite import checks, records, results
+from benchmarks.suite.card import Card, attach, attach_card, card_of, read
+from benchmarks.suite.page import EXAMPLE, Page
+from benchmarks.suite.rerun import prepare_rerun, rerun
+from benchmarks.suite.results import result_path
+from benchmarks.suite.variants import VARIANTS, anonymous
 from echotruth.config.loading import load
 from echotruth.config.reading import ConfigError
 from echotruth.evaluation.clip import Clip, clips

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echotruth.benchmark.conditions import PLAIN
-from echotruth.benchmark.records import Suite
-from echotruth.benchmark.splits import DEVELOP, TEST, split_of
-from echotruth.benchmark.standings import main_errors, shown_size
 from echotruth.cases import Case, all_cases, diagnosis
 from echotruth.evaluation.choice import hearts_of, is_complete
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, LEAST_HEARTS
 from echotruth.workflow.job import Job
+
+from .conditions import PLAIN
+from .records import Suite
+from .splits import DEVELOP, TEST, split_of
+from .standings import main_errors, shown_size
 
 if TYPE_CHECKING:
     import pandas as pd

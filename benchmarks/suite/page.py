@@ -12,18 +12,19 @@ import numpy as np
 import yaml
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from echotruth.benchmark import card, charts, checks, examples, tables
-from echotruth.benchmark.card import Card
-from echotruth.benchmark.conditions import PLAIN, main_conditions
-from echotruth.benchmark.records import Records, Suite
-from echotruth.benchmark.splits import split_of
-from echotruth.benchmark.standings import agreement, detections, main_errors, order, shown_size, standings, varied
 from echotruth.cases import all_cases
 from echotruth.evaluation import kept, reliability
 from echotruth.evaluation.resampling import CLIP
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.repository import durable
 from echotruth.section import Section
+
+from . import card, charts, checks, examples, tables
+from .card import Card
+from .conditions import PLAIN, main_conditions
+from .records import Records, Suite
+from .splits import split_of
+from .standings import agreement, detections, main_errors, order, shown_size, standings, varied
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -312,6 +313,8 @@ class Page:
 
 def check_writable(path: Path) -> None:
     """Check that a page can be written; EvaluationError if not."""
+    if path.suffix != ".md":
+        raise EvaluationError(f"--page {path}: must be a Markdown file: give a name that ends in .md")
     if path.is_dir():
         raise EvaluationError(f"--page {path}: is a folder: give the name of a file")
     folders = [next(parent for parent in path.absolute().parents if parent.exists()), path.with_suffix("")]

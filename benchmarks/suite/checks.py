@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from echotruth.benchmark.records import Records, Suite
-from echotruth.benchmark.results import Result, result_of
-from echotruth.benchmark.splits import DEVELOP, TEST
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, by_heart, draws, interval
+
+from .records import Records, Suite
+from .results import Result, result_of
+from .splits import DEVELOP, TEST
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -212,7 +213,7 @@ def variants_of(suites: list[Suite], tracker: str, variant: str) -> Result:
     ----------
     suites : list of Suite
     tracker, variant : str
-        As :func:`echotruth.benchmark.results.result_of` takes them.
+        As `results.result_of` takes them.
 
     Returns
     -------

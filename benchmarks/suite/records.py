@@ -8,8 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echotruth.benchmark.conditions import MAIN_SPECIES, with_conditions
-from echotruth.benchmark.splits import check_halves, split_of_label
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
@@ -20,6 +18,9 @@ from echotruth.evaluation.leaderboard import scores_of_guests
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.resampling import CLIP
 from echotruth.evaluation.tracker_options import EvaluationError
+
+from .conditions import MAIN_SPECIES, with_conditions
+from .splits import check_halves, split_of_label
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,7 +69,7 @@ class Records:
     suites : list of Suite
     clips, segments, reliability : DataFrame
         As :func:`echotruth.evaluation.clip_metrics.clip_metrics` returns them, and columns of
-        :func:`echotruth.benchmark.conditions.with_conditions`.
+        `conditions.with_conditions`.
     difficulty : DataFrame
         Columns `CLIP` of :mod:`echotruth.evaluation.resampling`, and those of
         :func:`echotruth.evaluation.difficulty.floors.difficulty`.

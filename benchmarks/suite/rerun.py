@@ -1,6 +1,6 @@
 """A tracker run again on variants of the clips of a repository, with the settings with which it was scored.
 
-The tracker is given nothing but images by which a clip could be known (:func:`echotruth.benchmark.variants.anonymous`).
+The tracker is given nothing but images by which a clip could be known (`variants.anonymous`).
 The truth of a clip is read only after it has returned, so that it does not find it in its process.
 """
 
@@ -13,10 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from echotruth.benchmark import results
-from echotruth.benchmark.results import COLUMNS, Row
-from echotruth.benchmark.splits import split_of
-from echotruth.benchmark.variants import VARIANTS, anonymous
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
@@ -35,6 +31,11 @@ from echotruth.loop.cycle import read_loop
 from echotruth.section import Section
 from echotruth.workflow.job import Job
 
+from . import results
+from .results import COLUMNS, Row
+from .splits import split_of
+from .variants import VARIANTS, anonymous
+
 
 @dataclass(frozen=True)
 class Rerun:
@@ -51,7 +52,7 @@ class Rerun:
     settings : Section
         Settings with which it was scored.
     variant : str
-        One of :data:`echotruth.benchmark.variants.VARIANTS`.
+        One of `variants.VARIANTS`.
     split : str
         Half of the hearts on whose clips it is run.
     """

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echotruth.benchmark.conditions import PLAIN, groups, main_conditions, variations
 from echotruth.evaluation.agreement import bland_altman
 from echotruth.evaluation.detection import detection
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, by_heart, standing
+
+from .conditions import PLAIN, groups, main_conditions, variations
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +47,7 @@ def standings(clips: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     clips : DataFrame
-        Of one split, as :class:`echotruth.benchmark.records.Records` holds them.
+        Of one split, as `records.Records` holds them.
 
     Returns
     -------
@@ -175,7 +176,7 @@ def detections(segments: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     segments : DataFrame
-        As :class:`echotruth.benchmark.records.Records` holds them; those of a variation are left out.
+        As `records.Records` holds them; those of a variation are left out.
 
     Returns
     -------
