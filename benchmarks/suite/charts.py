@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -16,9 +16,6 @@ from echotruth.report import style
 from echotruth.report.style import SIZES
 
 from .standings import main_errors
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @style.styled

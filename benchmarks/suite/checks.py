@@ -5,9 +5,10 @@ None of them proves anything; each asks for an explanation.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, by_heart, draws, interval
@@ -15,9 +16,6 @@ from echotruth.evaluation.resampling import CLIP, by_heart, draws, interval
 from .records import Records, Suite
 from .results import Result, result_of
 from .splits import DEVELOP, TEST
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 WORSE = 1.25
 """Ratio of the errors on variants and on clips above which the lower end of its interval is not taken for chance.
@@ -220,8 +218,6 @@ def variants_of(suites: list[Suite], tracker: str, variant: str) -> Result:
     Result
         Of all repositories, with the column `repository`.
     """
-    import pandas as pd
-
     found = [result_of(suite.folder, suite.config, tracker, variant) for suite in suites]
     tables = [result.rows.assign(repository=suite.name) for suite, result in zip(suites, found, strict=True)]
     filled = [table for table in tables if len(table)] or tables[:1]

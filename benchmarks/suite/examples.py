@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
@@ -19,9 +19,6 @@ from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.report import style
 from echotruth.report.clip import round_length, thin
 from echotruth.workflow.job import Job
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 DISTANCE = 18
 """Least distance of the points that are drawn, px of the largest image."""

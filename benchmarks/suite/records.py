@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from echotruth.cases import all_cases
 from echotruth.config import Config
@@ -21,9 +22,6 @@ from echotruth.evaluation.tracker_options import EvaluationError
 
 from .conditions import MAIN_SPECIES, with_conditions
 from .splits import check_halves, split_of_label
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NEEDED = (*CLIP, "tracker", "split", "true_gls_percent", "true_gcs_percent")
 """Columns of the tables of repositories of which no clip is evaluated."""
@@ -137,8 +135,6 @@ def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
     EvaluationError
         As :func:`read_suites` does, and if a repository has no clips of these sizes.
     """
-    import pandas as pd
-
     suites = read_suites(repositories)
     parts: list[tuple[Suite, ClipMetrics]] = []
     floors = []

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
 
 from echotruth.evaluation.agreement import bland_altman
 from echotruth.evaluation.detection import detection
@@ -12,9 +11,6 @@ from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, by_heart, standing
 
 from .conditions import PLAIN, groups, main_conditions, variations
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 METRICS = {
     RANKED_BY: False,
@@ -55,8 +51,6 @@ def standings(clips: pd.DataFrame) -> pd.DataFrame:
         Columns condition, is_main (whether it is one of disease and acoustics), size_px, metric, tracker, and those of
         :func:`echotruth.evaluation.resampling.standing`; the best tracker of each first.
     """
-    import pandas as pd
-
     conditions = [(name, True, part) for name, part in main_conditions(clips).items()]
     conditions += [(name, False, part) for name, part in groups(clips).items()]
     tables = []
@@ -120,8 +114,6 @@ def varied(clips: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         Columns variation, size_px, tracker, hearts, `varied` and `plain` (medians over the hearts), %.
     """
-    import pandas as pd
-
     rows = []
     for name, parts in variations(clips).items():
         for size in sorted(parts[0]["size_px"].unique(), reverse=True):
@@ -148,8 +140,6 @@ def agreement(clips: pd.DataFrame) -> pd.DataFrame:
         :func:`echotruth.evaluation.agreement.bland_altman`, percentage points; and of_hearts, the number of hearts of
         which the true strain is known.
     """
-    import pandas as pd
-
     columns = ["acoustics", "size_px", "tracker", "strain", *bland_altman(np.empty(0), np.empty(0)), "of_hearts"]
     rows = []
     plain = clips[clips["variation"].isin(PLAIN)]
@@ -184,8 +174,6 @@ def detections(segments: pd.DataFrame) -> pd.DataFrame:
         Columns acoustics and those of :func:`echotruth.evaluation.detection.detection`, of both components together;
         empty if no segment is infarcted.
     """
-    import pandas as pd
-
     tables = []
     for acoustics, part in segments[segments["variation"].isin(PLAIN)].groupby("acoustics", sort=True):
         if (part["infarct_share"] > 0).any():

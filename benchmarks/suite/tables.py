@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from echotruth.cases import Case, all_cases, diagnosis
 from echotruth.evaluation.choice import hearts_of, is_complete
@@ -17,9 +17,6 @@ from .conditions import PLAIN
 from .records import Suite
 from .splits import DEVELOP, TEST, split_of
 from .standings import main_errors, shown_size
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NONE = "–"
 """What stands where there is no value."""
@@ -99,13 +96,13 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
     ----------
     suite : Suite
     clips : DataFrame
-        Of the repository, with the columns case, true_gls_percent and true_gcs_percent.
+        Columns repository, case, true_gls_percent and true_gcs_percent.
     """
     cases = all_cases(suite.config)
     names = hearts_of(cases)
     columns = ["true_gls_percent", "true_gcs_percent"]
     # That of a case which is not finished yet is that of another one with the same motion and planes.
-    strains = clips.groupby("case")[columns].first()
+    strains = clips[clips["repository"] == suite.name].groupby("case")[columns].first()
     rows = []
     for heart in dict.fromkeys(names.values()):
         own = [cases[case] for case, name in names.items() if name == heart]

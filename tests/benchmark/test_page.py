@@ -137,7 +137,7 @@ def beside(known, species, size=64, factor=1.0, name="other", preset="medium"):
 
 def test_drift_quality_and_gap_are_of_the_main_species_and_the_page_says_so(page, tmp_path):
     alone, both = page, Page(beside(page.whole, "human", factor=100), "test")
-    for what in (Page._failures, Page._reliability):
+    for what in (Page.failures, Page.reliability):
         assert what(both) == what(alone)
     assert both.verdict("dis").gap == alone.verdict("dis").gap
     text = both.write(tmp_path / "page.md", "python -m benchmarks.suite").read_text()
@@ -166,7 +166,7 @@ def test_settings_that_differ_are_told_of_each_repository(page):
 def test_strain_of_a_heart_is_that_of_a_case_that_is_finished(page, monkeypatch):
     monkeypatch.setattr(tables, "hearts_of", lambda cases: dict.fromkeys(cases, "one"))
     strains = {"true_gls_percent": -11.5, "true_gcs_percent": -14.5}
-    clips = pd.DataFrame([{"case": "b_ideal"} | strains])
+    clips = pd.DataFrame([{"repository": "bench", "case": "b_ideal"} | strains])
     assert "| −11.5 | −14.5 |" in tables.hearts(page.whole.suites[0], clips)
 
 
