@@ -91,8 +91,10 @@ class Page:
             size = shown_size(part, self.largest)
             rows = part[(part["size_px"] == size) & part["value"].notna()].set_index("tracker")
             heading = f"{name}" if size == self.largest else f"{name} ({size} px)"
-            columns[f" {heading}"] = rows.apply(lambda row: f"{row['value']:.1f} [{tables.rank(row)}]", axis=1)
-        table = pd.DataFrame(columns, index=self.order).rename_axis(columns="tracker").to_string(na_rep="-")
+            columns[heading] = rows.apply(lambda row: f"{row['value']:.1f} [{tables.rank(row)}]", axis=1)
+        widths = [len(heading) + 1 for heading in columns]
+        cells = pd.DataFrame(columns, index=self.order).rename_axis(columns="tracker")
+        table = cells.to_string(na_rep="-", col_space=widths)
         title = f"NRMSE at end-systole, % at {self.largest} px, median over the {self.split} hearts [rank]"
         return "\n".join([title, "", table, *([""] if withheld else []), *withheld])
 

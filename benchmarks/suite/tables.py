@@ -8,10 +8,9 @@ import numpy as np
 import pandas as pd
 
 from echotruth.cases import Case, all_cases, diagnosis
-from echotruth.evaluation.choice import hearts_of, is_complete
+from echotruth.evaluation.choice import hearts_of, is_complete, job_of
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, LEAST_HEARTS
-from echotruth.workflow.job import Job
 
 from .conditions import PLAIN
 from .records import Suite
@@ -122,7 +121,7 @@ def ejection_fraction(suite: Suite, case: str) -> float:
     """Ejection fraction of a heart; NaN if it was not solved."""
     if not is_complete(suite.folder, case, None, "physiology"):
         return np.nan
-    job = Job(suite.folder, "physiology", case, code="read")
+    job = job_of(suite.folder, case)
     return float(job.store.read("physiology", job.row, names=("ejection_fraction",))["ejection_fraction"])
 
 

@@ -1,6 +1,8 @@
 """The page: its conditions, who is ahead, its bytes, and what a person wrote into it."""
 
 import os
+import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -12,7 +14,7 @@ import pandas as pd
 import pytest
 
 from benchmarks.suite import tables
-from benchmarks.suite.__main__ import main
+from benchmarks.suite.__main__ import main, parser
 from benchmarks.suite.conditions import groups, main_conditions, variations, with_conditions
 from benchmarks.suite.page import Page
 from benchmarks.suite.records import Records
@@ -194,6 +196,40 @@ def test_command_writes_the_page_twice_alike_and_keeps_what_a_person_wrote(repos
     assert run(*arguments) == 0
     assert first == {file.name: file.read_bytes() for file in [page, *(tmp_path / "page").iterdir()]}
     assert "- Noted by hand." in page.read_text() and "dis" in capsys.readouterr().out
+
+
+def test_every_option_is_explained_and_every_command_that_is_printed_is_understood():
+    whole, published = parser(), (ROOT / "docs/benchmark.md").read_text()
+    assert all(action.help for action in whole._actions)
+    printed = re.findall(r"^ *python -m benchmarks\.suite (.*)$", f"{whole.description}\n{published}", re.MULTILINE)
+    assert len(printed) == 5 and all(whole.parse_args(shlex.split(words)).repository for words in printed)
+
+
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
+
+
+def is_alike(line, other):
+    """Whether two lines are the same but for a unit in the last decimal of their numbers."""
+    pairs = zip(*(NUMBER.findall(text) for text in (line, other)), strict=False)
+    units = ((one, another, 10.0 ** -len(one.partition(".")[2]) if "." in one else 0) for one, another in pairs)
+    near = all(abs(float(one) - float(another)) <= 1.001 * unit for one, another, unit in units)
+    return near and NUMBER.sub("", line) == NUMBER.sub("", other)
+
+
+def test_published_page_is_what_its_values_give(page, tmp_path):
+    published = (ROOT / "docs/benchmark.md").read_text()
+    values = pd.read_csv(ROOT / "docs/benchmark/leaderboard.csv")  # six digits of each
+    trackers = order(values, 512)
+    found = [tables.ahead(values), tables.by_group(values, trackers)]
+    for name in values[values["is_main"]]["condition"].unique():
+        found += [tables.condition(values, name, 512), tables.others(values, name, trackers, 512)]
+    lines = published.splitlines()
+    for table in map(str.splitlines, found):
+        starts = range(len(lines) - len(table) + 1)
+        assert any(all(map(is_alike, table, lines[start:])) for start in starts), table
+    text = page.write(tmp_path / "page.md", "").read_text()
+    submit = "## Submit your own"
+    assert text.partition(submit)[2] == published.partition(submit)[2] != ""
 
 
 def test_command_runs_from_the_checkout_in_several_processes(submitted, repository):
