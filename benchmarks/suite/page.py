@@ -228,20 +228,12 @@ class Page:
 
     def reliability(self) -> str:
         """Stated and observed share of right points, and the calibration error, by size."""
-        rows = []
-        for tracker in self.everyone:
-            cells = []
-            for size in self.sizes:
-                of = self.main.reliability
-                of = of[(of["tracker"] == tracker) & (of["size_px"] == size)]
-                count = of["count"].sum() if len(of) else 0
-                if not count:
-                    cells.append(tables.NONE)
-                    continue
-                stated, right = (100 * of[name].sum() / count for name in ("quality_sum", "within_count"))
-                error = reliability.calibration_error(of)
-                cells.append(tables.SLASH.join(map(tables.number, (stated, right, error))))
-            rows.append([f"`{tracker}`", *cells])
+        known = self.main.reliability.groupby(["tracker", "size_px"])
+        cells = {clips: _stated_and_right(of) for clips, of in known}
+        rows = [
+            [f"`{tracker}`", *(cells.get((tracker, size), tables.NONE) for size in self.sizes)]
+            for tracker in self.everyone
+        ]
         return tables.markdown(["stated / right / calibration error (%)", *(f"{size} px" for size in self.sizes)], rows)
 
     def failures(self) -> str:
@@ -314,6 +306,14 @@ def _written(path: Path) -> dict[str, str]:
     return found
 
 
+def _stated_and_right(of: pd.DataFrame) -> str:
+    """Stated and observed share of right points, and the calibration error, %, of rows of the reliability."""
+    if not (count := of["count"].sum()):
+        return tables.NONE
+    stated, right = (100 * of[name].sum() / count for name in ("quality_sum", "within_count"))
+    return tables.SLASH.join(map(tables.number, (stated, right, reliability.calibration_error(of))))
+
+
 def _shown(ratio: checks.Ratio | None) -> str:
     return tables.NONE if ratio is None else tables.interval(ratio.value, ratio.low, ratio.high, 2)
 
@@ -325,10 +325,7 @@ def _with_part(ratio: checks.Ratio | None) -> str:
 
 def _cards(records: Records) -> dict[str, Card]:
     """Cards of the trackers of all repositories."""
-    found: dict[str, Card] = {}
-    for suite in records.suites:
-        for tracker in dict.fromkeys(records.clips["tracker"]):
-            of = card.card_of(suite.folder, str(tracker))
-            if of is not None:
-                found.setdefault(str(tracker), of)
-    return found
+    trackers = records.clips["tracker"].unique()
+    # That of the first repository counts.
+    found = ((name, card.card_of(suite.folder, name)) for suite in reversed(records.suites) for name in trackers)
+    return {name: of for name, of in found if of is not None}
