@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 import report
 from scipy.optimize import minimize
+from suite.splits import DEVELOP, TEST, split_of, split_of_label
 
-from echotruth.benchmark.splits import DEVELOP, TEST, split_of, split_of_label
 from echotruth.cases import Case, expand
 from echotruth.config.loading import load
 from echotruth.evaluation import reliability

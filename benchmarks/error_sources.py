@@ -27,11 +27,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import report
+from suite.conditions import PLAIN, main_conditions
+from suite.records import read
+from suite.splits import TEST
 from tracking_split import TRACKER, blobs
 
-from echotruth.benchmark.conditions import PLAIN, main_conditions
-from echotruth.benchmark.records import read
-from echotruth.benchmark.splits import TEST
 from echotruth.evaluation.choice import job_of
 from echotruth.evaluation.clip import clips
 from echotruth.evaluation.difficulty.plane import both_ways, plane_path

@@ -7,9 +7,9 @@ from pathlib import Path
 import benchmark_repository
 import pytest
 
-from echotruth.benchmark import records
-from echotruth.benchmark.page import Page
-from echotruth.benchmark.rerun import rerun
+from benchmarks.suite import records
+from benchmarks.suite.page import Page
+from benchmarks.suite.rerun import rerun
 from echotruth.evaluation.run import prepare
 
 SUBMISSIONS = '''

@@ -1,22 +1,29 @@
 """The page: its conditions, who is ahead, its bytes, and what a person wrote into it."""
 
+import os
+import re
+import shlex
 import shutil
+import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from echotruth.benchmark import tables
-from echotruth.benchmark.conditions import groups, main_conditions, variations, with_conditions
-from echotruth.benchmark.page import Page
-from echotruth.benchmark.records import Records
-from echotruth.benchmark.standings import METRICS, RANKED_BY, agreement, order, standings, varied
-from echotruth.cli import main
+from benchmarks.suite import tables
+from benchmarks.suite.__main__ import main, parser
+from benchmarks.suite.conditions import groups, main_conditions, variations, with_conditions
+from benchmarks.suite.page import Page
+from benchmarks.suite.records import Records
+from benchmarks.suite.standings import METRICS, RANKED_BY, agreement, order, standings, varied
 from echotruth.evaluation.tracker_options import EvaluationError
 
 pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
 
 HEARTS = 12
 
@@ -132,12 +139,12 @@ def beside(known, species, size=64, factor=1.0, name="other", preset="medium"):
 
 def test_drift_quality_and_gap_are_of_the_main_species_and_the_page_says_so(page, tmp_path):
     alone, both = page, Page(beside(page.whole, "human", factor=100), "test")
-    for what in (Page._failures, Page._reliability):
+    for what in (Page.failures, Page.reliability):
         assert what(both) == what(alone)
     assert both.verdict("dis").gap == alone.verdict("dis").gap
-    text = both.write(tmp_path / "page.md", "echotruth benchmark").read_text()
+    text = both.write(tmp_path / "page.md", "python -m benchmarks.suite").read_text()
     assert "### Human, ideal" in text and "Everything\nelse is of the species mouse alone" in text
-    assert "of the species" not in alone.write(tmp_path / "alone.md", "echotruth benchmark").read_text()
+    assert "of the species" not in alone.write(tmp_path / "alone.md", "python -m benchmarks.suite").read_text()
 
 
 def test_rank_is_at_the_largest_size_of_the_main_species(page):
@@ -161,7 +168,7 @@ def test_settings_that_differ_are_told_of_each_repository(page):
 def test_strain_of_a_heart_is_that_of_a_case_that_is_finished(page, monkeypatch):
     monkeypatch.setattr(tables, "hearts_of", lambda cases: dict.fromkeys(cases, "one"))
     strains = {"true_gls_percent": -11.5, "true_gcs_percent": -14.5}
-    clips = pd.DataFrame([{"case": "b_ideal"} | strains])
+    clips = pd.DataFrame([{"repository": "bench", "case": "b_ideal"} | strains])
     assert "| −11.5 | −14.5 |" in tables.hearts(page.whole.suites[0], clips)
 
 
@@ -171,10 +178,8 @@ def test_cells_of_a_table_cannot_end_it():
 
 def run(*arguments):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["echotruth", "benchmark", *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
-            main()
-    return left.value.code
+        patch.setattr(sys, "argv", ["suite", *map(str, arguments)])
+        return main()
 
 
 @pytest.mark.slow
@@ -191,6 +196,48 @@ def test_command_writes_the_page_twice_alike_and_keeps_what_a_person_wrote(repos
     assert run(*arguments) == 0
     assert first == {file.name: file.read_bytes() for file in [page, *(tmp_path / "page").iterdir()]}
     assert "- Noted by hand." in page.read_text() and "dis" in capsys.readouterr().out
+
+
+def test_every_option_is_explained_and_every_command_that_is_printed_is_understood():
+    whole, published = parser(), (ROOT / "docs/benchmark.md").read_text()
+    assert all(action.help for action in whole._actions)
+    printed = re.findall(r"^ *python -m benchmarks\.suite (.*)$", f"{whole.description}\n{published}", re.MULTILINE)
+    assert len(printed) == 5 and all(whole.parse_args(shlex.split(words)).repository for words in printed)
+
+
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
+
+
+def is_alike(line, other):
+    """Whether two lines are the same but for a unit in the last decimal of their numbers."""
+    pairs = zip(*(NUMBER.findall(text) for text in (line, other)), strict=False)
+    units = ((one, another, 10.0 ** -len(one.partition(".")[2]) if "." in one else 0) for one, another in pairs)
+    near = all(abs(float(one) - float(another)) <= 1.001 * unit for one, another, unit in units)
+    return near and NUMBER.sub("", line) == NUMBER.sub("", other)
+
+
+def test_published_page_is_what_its_values_give(page, tmp_path):
+    published = (ROOT / "docs/benchmark.md").read_text()
+    values = pd.read_csv(ROOT / "docs/benchmark/leaderboard.csv")  # six digits of each
+    trackers = order(values, 512)
+    found = [tables.ahead(values), tables.by_group(values, trackers)]
+    for name in values[values["is_main"]]["condition"].unique():
+        found += [tables.condition(values, name, 512), tables.others(values, name, trackers, 512)]
+    lines = published.splitlines()
+    for table in map(str.splitlines, found):
+        starts = range(len(lines) - len(table) + 1)
+        assert any(all(map(is_alike, table, lines[start:])) for start in starts), table
+    text = page.write(tmp_path / "page.md", "").read_text()
+    submit = "## Submit your own"
+    assert text.partition(submit)[2] == published.partition(submit)[2] != ""
+
+
+def test_command_runs_from_the_checkout_in_several_processes(submitted, repository):
+    words = [sys.executable, "-m", "benchmarks.suite", repository, "--check", "honest", "--jobs", "2"]
+    path = os.pathsep.join(filter(None, [str(submitted.parent), os.environ.get("PYTHONPATH")]))
+    environment = os.environ | {"PYTHONPATH": path}
+    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "honest: nothing found (error on mirrored clips" in done.stdout, done.stderr
 
 
 @pytest.mark.parametrize(
@@ -235,7 +282,7 @@ def test_half_that_is_not_clear_is_refused(repository, capsys, before, after, se
 
 
 def test_what_is_not_true_of_the_hearts_is_not_printed(page, repository, tmp_path):
-    text = page.write(tmp_path / "page.md", "echotruth benchmark").read_text()
+    text = page.write(tmp_path / "page.md", "python -m benchmarks.suite").read_text()
     assert "each half has hearts of each group" not in text and "are in one half" in text  # dilation is in test only
     config = repository / "config.yaml"
     config.write_text(config.read_text().replace("develop", "test"))
@@ -247,7 +294,7 @@ def test_what_is_not_true_of_the_hearts_is_not_printed(page, repository, tmp_pat
 
 def test_page_of_a_half_without_results_says_so_and_has_none(page, tmp_path):
     empty = Page(page.whole, "validation")
-    text = empty.write(tmp_path / "page.md", "echotruth benchmark out/bench").read_text()
+    text = empty.write(tmp_path / "page.md", "python -m benchmarks.suite out/bench").read_text()
     assert "No clip" in empty.leaderboard() and not (tmp_path / "page").exists()
     assert "## What is in it" in text and "## Submit your own" in text and "## Leaderboard" not in text
 

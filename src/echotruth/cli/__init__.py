@@ -7,7 +7,6 @@ import sys
 
 import echotruth
 from echotruth.cli import (
-    benchmark,
     cases,
     check,
     completion,
@@ -34,7 +33,6 @@ COMMANDS = (
     info,
     show,
     evaluate,
-    benchmark,
     export,
     describe,
     merge,

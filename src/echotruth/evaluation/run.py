@@ -130,8 +130,8 @@ class EvaluationRun:
     def write(self, rows: list[Row]) -> pd.DataFrame:
         """Write the scores atomically, and give what is kept its name; they replace earlier ones of the same name.
 
-        What an earlier evaluation of this name kept is removed also if nothing is kept now, and so are its scores on
-        variants of the clips (:mod:`echotruth.benchmark.results`): they are not of what was scored.
+        What an earlier evaluation of this name kept is removed also if nothing is kept now, and so are its
+        scores on variants of the clips, NAME.*.json (benchmarks/suite/results.py): they are not of what was scored.
         """
         import pandas as pd
 

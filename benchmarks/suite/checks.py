@@ -5,18 +5,17 @@ None of them proves anything; each asks for an explanation.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from echotruth.benchmark.records import Records, Suite
-from echotruth.benchmark.results import Result, result_of
-from echotruth.benchmark.splits import DEVELOP, TEST
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, by_heart, draws, interval
 
-if TYPE_CHECKING:
-    import pandas as pd
+from .records import Records, Suite
+from .results import Result, result_of
+from .splits import DEVELOP, TEST
 
 WORSE = 1.25
 """Ratio of the errors on variants and on clips above which the lower end of its interval is not taken for chance.
@@ -212,15 +211,13 @@ def variants_of(suites: list[Suite], tracker: str, variant: str) -> Result:
     ----------
     suites : list of Suite
     tracker, variant : str
-        As :func:`echotruth.benchmark.results.result_of` takes them.
+        As `results.result_of` takes them.
 
     Returns
     -------
     Result
         Of all repositories, with the column `repository`.
     """
-    import pandas as pd
-
     found = [result_of(suite.folder, suite.config, tracker, variant) for suite in suites]
     tables = [result.rows.assign(repository=suite.name) for suite, result in zip(suites, found, strict=True)]
     filled = [table for table in tables if len(table)] or tables[:1]

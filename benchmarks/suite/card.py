@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import yaml
-from pydantic import Field, StringConstraints, ValidationError
+from pydantic import AfterValidator, Field, StringConstraints, ValidationError
 from pydantic_core import ErrorDetails
 
 from echotruth.config.loading import load
@@ -16,7 +16,7 @@ from echotruth.config.reading import ConfigError, read_yaml, shown_key
 from echotruth.evaluation.choice import folder_of
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import durable
-from echotruth.section import Name, Section, check, invalid, meaning
+from echotruth.section import Name, Section, meaning
 
 Text = Annotated[str, StringConstraints(min_length=1, max_length=300, pattern=r"^[^\n\r]*\S[^\n\r]*$")]
 """One line of text."""
@@ -25,41 +25,43 @@ Split = Literal["develop", "test"]
 """Half of the hearts."""
 
 
+def _each_once(splits: list[str]) -> list[str]:
+    if len(set(splits)) < len(splits):
+        raise ValueError("a half is named twice")
+    return splits
+
+
+def _day(text: str) -> str:
+    if date.fromisoformat(text).isoformat() != text:  # it takes other notations too, as 20261123
+        raise ValueError("is written otherwise")
+    return text
+
+
 class Card(Section):
     """What a reader of the leaderboard must know of a tracker."""
 
     tracker: Name
-    """Name under which it was scored, that of `external/NAME.csv`."""
+    """Name under which it was scored, that of `external/NAME.csv`: letters, digits and underscores, 40
+    at most and a letter first."""
     name: Text
-    """Name of the method, as it is to be printed."""
+    """Name of the method, as it is to be printed, in one line."""
     authors: Annotated[list[Text], Field(min_length=1, max_length=50)]
-    """Who made it."""
+    """Who made it, a list such as [A. Author, B. Author]."""
     code: Text
-    """Address of its code and the version that was scored, or the word closed."""
+    """Address of its code and the version that was scored, or the word closed, in one line."""
     trained_on: Text
-    """Data from which its weights were learned, or the word nothing."""
+    """Data from which its weights were learned, or the word nothing, in one line."""
     tuned_on: Text
-    """Data on which its settings were chosen, or the word nothing."""
-    splits_seen: Annotated[list[Split], Field(max_length=2)]
-    """Halves of the hearts of this benchmark of which images or truth were used for any of this; [] if neither was."""
-    date: Annotated[str, StringConstraints(pattern=r"^\d{4}-\d{2}-\d{2}$")]
+    """Data on which its settings were chosen, or the word nothing, in one line."""
+    splits_seen: Annotated[list[Split], AfterValidator(_each_once)]
+    """Halves of the hearts of this benchmark of which images or truth were used for any of this, a list of develop and
+    test, each once; [] if neither was."""
+    date: Annotated[str, AfterValidator(_day)]
     """Day on which it was scored, as 2026-11-23."""
     doi: Annotated[str, StringConstraints(pattern=r"^10\.\d{4,9}/\S+$", max_length=200)] | None = None
     """Of its publication, as 10.1000/182."""
     remark: Text | None = None
-    """One sentence more."""
-
-    @check
-    def _check_date(self) -> None:
-        try:
-            date.fromisoformat(self.date)
-        except ValueError:
-            raise invalid("date", self.date, "must be a day of the calendar, as 2026-11-23") from None
-
-    @check
-    def _check_splits(self) -> None:
-        if len(set(self.splits_seen)) < len(self.splits_seen):
-            raise invalid("splits_seen", f"[{', '.join(self.splits_seen)}]", "must name each half once")
+    """One sentence more, in one line."""
 
     @property
     def has_seen_test(self) -> bool:
@@ -143,40 +145,14 @@ def card_of(folder: Path, tracker: str) -> Card | None:
     return read(path) if path.is_file() else None
 
 
-_REMEDIES = {
-    "missing": "is missing: it must be given",
-    "string_type": "must be text",
-    "too_short": "must have at least one entry",
-    "string_too_short": "must not be empty",
-}
-
-_LISTS = {"authors": "[A. Author, B. Author]", "splits_seen": "[develop]"}
-"""Examples of values that are lists."""
-
-
 def _message(error: ErrorDetails) -> str:
-    """One error: key, value and remedy."""
-    keys = [str(part) for part in error["loc"]]
-    context = error.get("ctx", {})
-    if error["type"] == "invalid":
-        return f"{context['key']} = {context['value']}: {context['remedy']}"
-    key = shown_key(keys)
-    if error["type"] == "extra_forbidden":
-        known = list(Card.model_fields)
-        close = get_close_matches(key, known, n=1)
-        return f"{key} is not a key: " + (f"did you mean {close[0]}?" if close else f"use {', '.join(known)}")
+    """One error: key, value and what would be right."""
+    key, keys = str(error["loc"][0]), list(Card.model_fields)
+    if key not in keys:
+        close = get_close_matches(key, keys, n=1)
+        return f"{key} is not a key: " + (f"did you mean {close[0]}?" if close else f"use {', '.join(keys)}")
+    right = meaning(Card, key)
     if error["type"] == "missing":
-        return f"{key} {_REMEDIES['missing']}: {meaning(Card, str(keys[0]))}"
-    if error["type"] == "list_type":
-        remedy = f"must be a list, such as {_LISTS[key]}"
-    elif key == "tracker" and error["type"] != "string_type":
-        remedy = "use letters, digits and underscores, 40 at most and a letter first"
-    elif error["type"] == "literal_error":
-        remedy = f"use any of {context['expected'].replace(chr(39), '').replace(' or ', ' and ')}"
-    elif error["type"] == "string_pattern_mismatch":
-        described = meaning(Card, str(keys[0]))
-        remedy = "must be one line of text" if context["pattern"].startswith("^[^") else f"write it so: {described}"
-    else:
-        remedy = _REMEDIES.get(error["type"], error["msg"])
-    value = str(error["input"])
-    return f"{key} = {value if len(value) <= 80 else f'{value[:77]}...'}: {remedy}"
+        return f"{key} is missing: it must be given: {right}"
+    value = " ".join(str(error["input"]).split())
+    return f"{shown_key(list(error['loc']))} = {value if len(value) <= 80 else f'{value[:77]}...'}: must be so: {right}"

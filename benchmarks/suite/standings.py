@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
 
-from echotruth.benchmark.conditions import PLAIN, groups, main_conditions, variations
 from echotruth.evaluation.agreement import bland_altman
 from echotruth.evaluation.detection import detection
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, by_heart, standing
 
-if TYPE_CHECKING:
-    import pandas as pd
+from .conditions import PLAIN, groups, main_conditions, variations
 
 METRICS = {
     RANKED_BY: False,
@@ -46,7 +43,7 @@ def standings(clips: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     clips : DataFrame
-        Of one split, as :class:`echotruth.benchmark.records.Records` holds them.
+        Of one split, as `records.Records` holds them.
 
     Returns
     -------
@@ -54,8 +51,6 @@ def standings(clips: pd.DataFrame) -> pd.DataFrame:
         Columns condition, is_main (whether it is one of disease and acoustics), size_px, metric, tracker, and those of
         :func:`echotruth.evaluation.resampling.standing`; the best tracker of each first.
     """
-    import pandas as pd
-
     conditions = [(name, True, part) for name, part in main_conditions(clips).items()]
     conditions += [(name, False, part) for name, part in groups(clips).items()]
     tables = []
@@ -119,8 +114,6 @@ def varied(clips: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         Columns variation, size_px, tracker, hearts, `varied` and `plain` (medians over the hearts), %.
     """
-    import pandas as pd
-
     rows = []
     for name, parts in variations(clips).items():
         for size in sorted(parts[0]["size_px"].unique(), reverse=True):
@@ -147,8 +140,6 @@ def agreement(clips: pd.DataFrame) -> pd.DataFrame:
         :func:`echotruth.evaluation.agreement.bland_altman`, percentage points; and of_hearts, the number of hearts of
         which the true strain is known.
     """
-    import pandas as pd
-
     columns = ["acoustics", "size_px", "tracker", "strain", *bland_altman(np.empty(0), np.empty(0)), "of_hearts"]
     rows = []
     plain = clips[clips["variation"].isin(PLAIN)]
@@ -175,7 +166,7 @@ def detections(segments: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     segments : DataFrame
-        As :class:`echotruth.benchmark.records.Records` holds them; those of a variation are left out.
+        As `records.Records` holds them; those of a variation are left out.
 
     Returns
     -------
@@ -183,8 +174,6 @@ def detections(segments: pd.DataFrame) -> pd.DataFrame:
         Columns acoustics and those of :func:`echotruth.evaluation.detection.detection`, of both components together;
         empty if no segment is infarcted.
     """
-    import pandas as pd
-
     tables = []
     for acoustics, part in segments[segments["variation"].isin(PLAIN)].groupby("acoustics", sort=True):
         if (part["infarct_share"] > 0).any():

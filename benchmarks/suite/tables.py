@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
-from echotruth.benchmark.conditions import PLAIN
-from echotruth.benchmark.records import Suite
-from echotruth.benchmark.splits import DEVELOP, TEST, split_of
-from echotruth.benchmark.standings import main_errors, shown_size
 from echotruth.cases import Case, all_cases, diagnosis
-from echotruth.evaluation.choice import hearts_of, is_complete
+from echotruth.evaluation.choice import hearts_of, is_complete, job_of
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, LEAST_HEARTS
-from echotruth.workflow.job import Job
 
-if TYPE_CHECKING:
-    import pandas as pd
+from .conditions import PLAIN
+from .records import Suite
+from .splits import DEVELOP, TEST, split_of
+from .standings import main_errors, shown_size
 
 NONE = "–"
 """What stands where there is no value."""
@@ -98,13 +95,13 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
     ----------
     suite : Suite
     clips : DataFrame
-        Of the repository, with the columns case, true_gls_percent and true_gcs_percent.
+        Columns repository, case, true_gls_percent and true_gcs_percent.
     """
     cases = all_cases(suite.config)
     names = hearts_of(cases)
     columns = ["true_gls_percent", "true_gcs_percent"]
     # That of a case which is not finished yet is that of another one with the same motion and planes.
-    strains = clips.groupby("case")[columns].first()
+    strains = clips[clips["repository"] == suite.name].groupby("case")[columns].first()
     rows = []
     for heart in dict.fromkeys(names.values()):
         own = [cases[case] for case, name in names.items() if name == heart]
@@ -124,7 +121,7 @@ def ejection_fraction(suite: Suite, case: str) -> float:
     """Ejection fraction of a heart; NaN if it was not solved."""
     if not is_complete(suite.folder, case, None, "physiology"):
         return np.nan
-    job = Job(suite.folder, "physiology", case, code="read")
+    job = job_of(suite.folder, case)
     return float(job.store.read("physiology", job.row, names=("ejection_fraction",))["ejection_fraction"])
 
 

@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any
 
-import numpy as np
+import pandas as pd
 import yaml
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from echotruth.benchmark import card, charts, checks, examples, tables
-from echotruth.benchmark.card import Card
-from echotruth.benchmark.conditions import PLAIN, main_conditions
-from echotruth.benchmark.records import Records, Suite
-from echotruth.benchmark.splits import split_of
-from echotruth.benchmark.standings import agreement, detections, main_errors, order, shown_size, standings, varied
 from echotruth.cases import all_cases
 from echotruth.evaluation import kept, reliability
 from echotruth.evaluation.resampling import CLIP
@@ -25,10 +17,12 @@ from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.repository import durable
 from echotruth.section import Section
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-HERE = Path(__file__).parent
+from . import card, charts, checks, examples, tables
+from .card import Card
+from .conditions import PLAIN, main_conditions
+from .records import Records, Suite
+from .splits import split_of
+from .standings import agreement, detections, main_errors, order, shown_size, standings, varied
 
 DRAWN = 6
 """Largest number of trackers in a figure whose colours tell them apart."""
@@ -92,19 +86,17 @@ class Page:
         withheld = [f"{tracker} is not ranked: {reason}." for tracker, reason in self.withheld.items()]
         if self.is_empty:
             return "\n".join([self.nothing, *withheld])
-        columns = [["tracker", *self.order]]
+        columns = {}
         for name, part in main_errors(self.standings).groupby("condition", sort=False):
             size = shown_size(part, self.largest)
-            rows = part[part["size_px"] == size].set_index("tracker")
-            known = [tracker in rows.index and np.isfinite(rows["value"][tracker]) for tracker in self.order]
-            cells = [
-                f"{rows['value'][tracker]:.1f} [{tables.rank(rows.loc[tracker])}]" if is_known else "-"
-                for tracker, is_known in zip(self.order, known, strict=True)
-            ]
-            columns.append([str(name) if size == self.largest else f"{name} ({size} px)", *cells])
+            rows = part[(part["size_px"] == size) & part["value"].notna()].set_index("tracker")
+            heading = f"{name}" if size == self.largest else f"{name} ({size} px)"
+            columns[heading] = rows.apply(lambda row: f"{row['value']:.1f} [{tables.rank(row)}]", axis=1)
+        widths = [len(heading) + 1 for heading in columns]
+        cells = pd.DataFrame(columns, index=self.order).rename_axis(columns="tracker")
+        table = cells.to_string(na_rep="-", col_space=widths)
         title = f"NRMSE at end-systole, % at {self.largest} px, median over the {self.split} hearts [rank]"
-        lines = [title, "", _aligned(map(list, zip(*columns, strict=True))), *([""] if withheld else []), *withheld]
-        return "\n".join(lines)
+        return "\n".join([title, "", table, *([""] if withheld else []), *withheld])
 
     @property
     def nothing(self) -> str:
@@ -136,12 +128,24 @@ class Page:
             The file. The same repositories give the same bytes.
         """
         folder = path.with_suffix("")
-        values = self._introduction(command) | {"kept": _written(path), "nothing": self.nothing}
+        values = {"page": self, "tables": tables, "checks": checks, "command": command, "kept": _written(path)}
+        values |= {
+            "drawn": DRAWN,
+            "card": yaml.safe_dump(EXAMPLE.model_dump(exclude_none=True), sort_keys=False).rstrip(),
+        }
         if not self.is_empty:
             folder.mkdir(parents=True, exist_ok=True)
-            values |= self._results(self._draw(folder))
+            values |= {"agreement": agreement, "detections": detections, "varied": varied}
+            values["pictures"] = self._draw(folder)
             self.standings.to_csv(folder / "leaderboard.csv", index=False, float_format="%.6g")
-        text = _template().render(values)
+        environment = Environment(
+            loader=FileSystemLoader(Path(__file__).parent),
+            undefined=StrictUndefined,
+            keep_trailing_newline=True,
+            trim_blocks=True,
+            lstrip_blocks=True,
+        )
+        text = environment.get_template("page.md.jinja").render(values)
         durable.write(path, text.replace("BENCHMARK_FILES", folder.name).encode())
         return path
 
@@ -175,65 +179,28 @@ class Page:
         both = clips.merge(self.records.difficulty, on=list(CLIP))
         return both.groupby(["condition", "size_px"], sort=False)["floor_percent"].median().reset_index()
 
-    def _introduction(self, command: str) -> dict[str, Any]:
-        """What the page says before its results, and after them."""
-        suites, clips = self.records.suites, self.whole.clips
-        unfinished = [suite for suite in suites if len(suite.complete) < suite.expected]
-        return {
-            "command": command,
-            "names": ", ".join(f"`{suite.name}`" for suite in suites),
-            "split": self.split,
-            "is_balanced": all(all(parts.values()) for parts in _groups(suites)),
-            "halves": sorted({split_of(case) for suite in suites for case in all_cases(suite.config).values()}),
-            "withheld": list(self.withheld.items()),
-            "unfinished": " ".join("`{}` has {} of {} clips.".format(one.name, *one.clips) for one in unfinished),
-            "progress": tables.progress(suites),
-            "suites": [
-                {
-                    "name": suite.name,
-                    "halves": tables.halves(suite),
-                    "hearts": tables.hearts(suite, clips[clips["repository"] == suite.name]),
-                }
-                for suite in suites
-            ],
-            "card": yaml.safe_dump(EXAMPLE.model_dump(exclude_none=True), sort_keys=False).rstrip(),
-        }
+    @property
+    def unfinished(self) -> str:
+        """Which repositories are not whole; empty if all are."""
+        suites = [suite for suite in self.records.suites if len(suite.complete) < suite.expected]
+        return " ".join("`{}` has {} of {} clips.".format(suite.name, *suite.clips) for suite in suites)
 
-    def _results(self, pictures: list[tuple[str, str, str]]) -> dict[str, Any]:
-        """Tables of the results."""
-        clips, variations, found = self.records.clips, varied(self.records.clips), detections(self.main.segments)
-        conditions = dict.fromkeys(self.standings[self.standings["is_main"]]["condition"])
-        return {
-            "largest": self.largest,
-            "species": self.records.species,
-            "main_species": self.main.species,
-            "ranked": len(self.order),
-            "drawn": DRAWN,
-            "sizes": " / ".join(map(str, self.sizes)),
-            "conditions": [
-                (
-                    name,
-                    tables.condition(self.standings, name, self.largest),
-                    tables.others(self.standings, name, self.order, self.largest),
-                )
-                for name in conditions
-            ],
-            "ahead": tables.ahead(self.standings),
-            "groups": tables.by_group(self.standings, self.order) if (~self.standings["is_main"]).any() else "",
-            "variations": tables.by_variation(variations, self.everyone) if len(variations) else "",
-            "trackers": self._trackers(),
-            "agreement": tables.agreement(agreement(self.main.clips), self.everyone),
-            "detection": tables.detection(found, self.everyone) if len(found) else "",
-            "reliability": self._reliability(),
-            "difficulty": tables.difficulty(clips, self.records.difficulty, self.order[0]),
-            "examples": pictures,
-            "failures": self._failures(),
-            "worse": checks.WORSE,
-            "impossible": checks.IMPOSSIBLE,
-            "checks": self._checks(),
-        }
+    @property
+    def is_balanced(self) -> bool:
+        """Whether each half has hearts of each group."""
+        return all(all(parts.values()) for parts in _groups(self.records.suites))
 
-    def _trackers(self) -> str:
+    @property
+    def halves(self) -> list[str]:
+        """Halves of which there are hearts."""
+        return sorted({split_of(case) for suite in self.records.suites for case in all_cases(suite.config).values()})
+
+    @property
+    def conditions(self) -> list[str]:
+        """Main conditions."""
+        return list(dict.fromkeys(self.standings[self.standings["is_main"]]["condition"]))
+
+    def trackers(self) -> str:
         """Who made each tracker, and what it had seen; of those of a configuration, their settings."""
         rows = []
         for tracker in self.everyone:
@@ -259,25 +226,17 @@ class Page:
             return ". ".join(f"In {' and '.join(names)}: {words}" for words, names in found.items())
         return next(iter(found), "no card")
 
-    def _reliability(self) -> str:
+    def reliability(self) -> str:
         """Stated and observed share of right points, and the calibration error, by size."""
-        rows = []
-        for tracker in self.everyone:
-            cells = []
-            for size in self.sizes:
-                of = self.main.reliability
-                of = of[(of["tracker"] == tracker) & (of["size_px"] == size)]
-                count = of["count"].sum() if len(of) else 0
-                if not count:
-                    cells.append(tables.NONE)
-                    continue
-                stated, right = (100 * of[name].sum() / count for name in ("quality_sum", "within_count"))
-                error = reliability.calibration_error(of)
-                cells.append(tables.SLASH.join(map(tables.number, (stated, right, error))))
-            rows.append([f"`{tracker}`", *cells])
+        known = self.main.reliability.groupby(["tracker", "size_px"])
+        cells = {clips: _stated_and_right(of) for clips, of in known}
+        rows = [
+            [f"`{tracker}`", *(cells.get((tracker, size), tables.NONE) for size in self.sizes)]
+            for tracker in self.everyone
+        ]
         return tables.markdown(["stated / right / calibration error (%)", *(f"{size} px" for size in self.sizes)], rows)
 
-    def _failures(self) -> str:
+    def failures(self) -> str:
         """Drift, failures and coverage, and the error in open clips over that in closed ones."""
         clips, rows = self.main.clips, []
         for tracker in self.everyone:
@@ -299,7 +258,7 @@ class Page:
             self._verdicts[name] = checks.verdict(name, self.whole, self.split)
         return self._verdicts[name]
 
-    def _checks(self) -> str:
+    def verdicts(self) -> str:
         """Verdicts on all trackers."""
         rows = []
         for found in map(self.verdict, self.everyone):
@@ -312,16 +271,17 @@ class Page:
 
 def check_writable(path: Path) -> None:
     """Check that a page can be written; EvaluationError if not."""
+    if path.suffix != ".md":
+        raise EvaluationError(f"--page {path}: must be a Markdown file: give a name that ends in .md")
     if path.is_dir():
         raise EvaluationError(f"--page {path}: is a folder: give the name of a file")
-    folders = [next(parent for parent in path.absolute().parents if parent.exists()), path.with_suffix("")]
-    for folder in filter(Path.exists, folders):
-        try:
-            with TemporaryFile(dir=folder):
-                pass
-        except OSError as error:
-            remedy = f"it must be a folder that you may write to ({error.strerror})"
-            raise EvaluationError(f"--page {path}: cannot be written in {folder}: {remedy}") from error
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        remedy = f"it must be a folder that you may write to ({error.strerror})"
+        raise EvaluationError(f"--page {path}: cannot be written in {path.parent}: {remedy}") from error
 
 
 def _groups(suites: list[Suite]) -> list[dict[str, set[str]]]:
@@ -346,6 +306,14 @@ def _written(path: Path) -> dict[str, str]:
     return found
 
 
+def _stated_and_right(of: pd.DataFrame) -> str:
+    """Stated and observed share of right points, and the calibration error, %, of rows of the reliability."""
+    if not (count := of["count"].sum()):
+        return tables.NONE
+    stated, right = (100 * of[name].sum() / count for name in ("quality_sum", "within_count"))
+    return tables.SLASH.join(map(tables.number, (stated, right, reliability.calibration_error(of))))
+
+
 def _shown(ratio: checks.Ratio | None) -> str:
     return tables.NONE if ratio is None else tables.interval(ratio.value, ratio.low, ratio.high, 2)
 
@@ -357,33 +325,7 @@ def _with_part(ratio: checks.Ratio | None) -> str:
 
 def _cards(records: Records) -> dict[str, Card]:
     """Cards of the trackers of all repositories."""
-    found: dict[str, Card] = {}
-    for suite in records.suites:
-        for tracker in dict.fromkeys(records.clips["tracker"]):
-            of = card.card_of(suite.folder, str(tracker))
-            if of is not None:
-                found.setdefault(str(tracker), of)
-    return found
-
-
-def _aligned(rows: Iterable[list[str]]) -> str:
-    """Columns of text, the first to the left."""
-    rows = list(rows)
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    lines = [
-        [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
-        for row in rows
-    ]
-    return "\n".join("  ".join(line).rstrip() for line in lines)
-
-
-def _template() -> Any:
-    environment = Environment(
-        loader=FileSystemLoader(HERE),
-        autoescape=False,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("page.md.jinja")
+    trackers = records.clips["tracker"].unique()
+    # That of the first repository counts.
+    found = ((name, card.card_of(suite.folder, name)) for suite in reversed(records.suites) for name in trackers)
+    return {name: of for name, of in found if of is not None}

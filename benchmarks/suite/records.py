@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from echotruth.benchmark.conditions import MAIN_SPECIES, with_conditions
-from echotruth.benchmark.splits import check_halves, split_of_label
+import pandas as pd
+
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
@@ -21,8 +20,8 @@ from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.resampling import CLIP
 from echotruth.evaluation.tracker_options import EvaluationError
 
-if TYPE_CHECKING:
-    import pandas as pd
+from .conditions import MAIN_SPECIES, with_conditions
+from .splits import check_halves, split_of_label
 
 NEEDED = (*CLIP, "tracker", "split", "true_gls_percent", "true_gcs_percent")
 """Columns of the tables of repositories of which no clip is evaluated."""
@@ -68,7 +67,7 @@ class Records:
     suites : list of Suite
     clips, segments, reliability : DataFrame
         As :func:`echotruth.evaluation.clip_metrics.clip_metrics` returns them, and columns of
-        :func:`echotruth.benchmark.conditions.with_conditions`.
+        `conditions.with_conditions`.
     difficulty : DataFrame
         Columns `CLIP` of :mod:`echotruth.evaluation.resampling`, and those of
         :func:`echotruth.evaluation.difficulty.floors.difficulty`.
@@ -136,8 +135,6 @@ def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
     EvaluationError
         As :func:`read_suites` does, and if a repository has no clips of these sizes.
     """
-    import pandas as pd
-
     suites = read_suites(repositories)
     parts: list[tuple[Suite, ClipMetrics]] = []
     floors = []

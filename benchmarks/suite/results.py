@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from echotruth.config import Config
 from echotruth.evaluation import kept
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import durable
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 COLUMNS = ("case", "view", "size_px", "clip", "error_percent", "before_percent", "failure")
 """Columns of a row: error in the variant, and in the same frame of the clip as it was scored, as `nrmse_all` has them;
@@ -107,8 +105,6 @@ def result_of(folder: Path, config: Config, tracker: str, variant: str) -> Resul
     EvaluationError
         If the file is not what was written.
     """
-    import pandas as pd
-
     path = result_path(folder, tracker, variant)
     settings = settings_of(folder, config, tracker)
     try:

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from echotruth.benchmark.standings import main_errors
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP
 from echotruth.report import style
 from echotruth.report.style import SIZES
 
-if TYPE_CHECKING:
-    import pandas as pd
+from .standings import main_errors
 
 
 @style.styled
@@ -29,7 +27,7 @@ def draw_conditions(path: Path, standings: pd.DataFrame, floors: pd.DataFrame, o
     path : Path
         PNG to write.
     standings : DataFrame
-        As :func:`echotruth.benchmark.standings.standings` returns it.
+        As `standings.standings` returns it.
     floors : DataFrame
         Columns condition, size_px and floor_percent, the median over the clips.
     order : list of str
@@ -85,7 +83,7 @@ def draw_floors(path: Path, clips: pd.DataFrame, difficulty: pd.DataFrame, order
     path : Path
         PNG to write.
     clips : DataFrame
-        As :class:`echotruth.benchmark.records.Records` holds them.
+        As `records.Records` holds them.
     difficulty : DataFrame
         Its table of that name.
     order : list of str

@@ -1,6 +1,6 @@
 """A tracker run again on variants of the clips of a repository, with the settings with which it was scored.
 
-The tracker is given nothing but images by which a clip could be known (:func:`echotruth.benchmark.variants.anonymous`).
+The tracker is given nothing but images by which a clip could be known (`variants.anonymous`).
 The truth of a clip is read only after it has returned, so that it does not find it in its process.
 """
 
@@ -8,21 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from echotruth.benchmark import results
-from echotruth.benchmark.results import COLUMNS, Row
-from echotruth.benchmark.splits import split_of
-from echotruth.benchmark.variants import VARIANTS, anonymous
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.evaluation import kept
 from echotruth.evaluation.availability import check_runs
-from echotruth.evaluation.choice import folder_of, is_complete
+from echotruth.evaluation.choice import folder_of, is_complete, job_of
 from echotruth.evaluation.clip import clips
 from echotruth.evaluation.digest import digest
 from echotruth.evaluation.displacement_error import evaluate
@@ -33,7 +30,11 @@ from echotruth.evaluation.scoring import Truth, ground_truth
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.loop.cycle import read_loop
 from echotruth.section import Section
-from echotruth.workflow.job import Job
+
+from . import results
+from .results import COLUMNS, Row
+from .splits import split_of
+from .variants import VARIANTS, anonymous
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Rerun:
     settings : Section
         Settings with which it was scored.
     variant : str
-        One of :data:`echotruth.benchmark.variants.VARIANTS`.
+        One of `variants.VARIANTS`.
     split : str
         Half of the hearts on whose clips it is run.
     """
@@ -71,9 +72,14 @@ class Rerun:
         EvaluationError
             If there is none.
         """
-        cases = all_cases(self.config).values()
-        chosen = [case.id for case in cases if split_of(case) == self.split]
-        found = [(case, view) for case in chosen for view in self.config.views if self._is_tracked(case, view)]
+        is_own = self.tracker in self.config.tracking.trackers
+        stages = ("truth", "bmode", "tracking") if is_own else ("truth", "bmode")
+        kept_of = {} if is_own else kept.about(self.folder, self.tracker)["clips"]
+        cases = [case.id for case in all_cases(self.config).values() if split_of(case) == self.split]
+        wanted = [(case, view) for case in cases for view in self.config.views]
+        found = [clip for clip in wanted if is_complete(self.folder, *clip, *stages)]
+        if not is_own:  # what it found is that of the clip as it is now
+            found = [clip for clip in found if kept_of.get("/".join(clip)) == digest(self.folder, *clip)]
         if not found:
             remedy = "run the repository to its end, or evaluate the tracker again with --keep"
             raise EvaluationError(
@@ -101,23 +107,6 @@ class Rerun:
         """
         for rows in in_processes(partial(_view_rows, self, sizes), self.case_views(), jobs):
             yield from rows
-
-    def write(self, rows: list[Row]) -> Path:
-        """Write the scores beside those of other clips; the file."""
-        return results.write(self.folder, self.config, self.tracker, self.variant, rows)
-
-    def _is_tracked(self, case: str, view: str) -> bool:
-        """Whether what the tracker found in a clip is stored, and the clip is still the same."""
-        is_own = self.tracker in self.config.tracking.trackers
-        stages = ("truth", "bmode", *(("tracking",) if is_own else ()))
-        if not is_complete(self.folder, case, view, *stages):
-            return False
-        return is_own or self.kept_clips.get(f"{case}/{view}") == digest(self.folder, case, view)
-
-    @cached_property
-    def kept_clips(self) -> dict[str, str]:
-        """Digest of every clip of which a tracker from outside has left something, by "CASE/VIEW"."""
-        return dict(kept.about(self.folder, self.tracker)["clips"])
 
 
 def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun:
@@ -183,7 +172,7 @@ def rerun(
         for row in run.rows(chosen, jobs):
             rows.append(row)
             yield _line(row, variant)
-        run.write(rows)
+        results.write(run.folder, run.config, run.tracker, variant, rows)
 
 
 def _line(row: Row, variant: str) -> str:
@@ -193,10 +182,8 @@ def _line(row: Row, variant: str) -> str:
 
 def _view_rows(run: Rerun, sizes: list[int], case_view: tuple[str, str]) -> list[Row]:
     """Rows of the variants of the clips of one view of one heart."""
-    from threadpoolctl import threadpool_limits
-
     with threadpool_limits(1):
-        job = Job(run.folder, "tracking", *case_view)
+        job = job_of(run.folder, *case_view)
         time = read_loop(run.config.loop).time
         found: dict[int, tuple[np.ndarray, str, int]] = {}
         for size, clip in clips(job).items():

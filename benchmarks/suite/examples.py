@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 
 from echotruth.arrays import Floats
 from echotruth.evaluation import kept
+from echotruth.evaluation.choice import job_of
 from echotruth.evaluation.clip import grid_points
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.report import style
 from echotruth.report.clip import round_length, thin
-from echotruth.workflow.job import Job
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 DISTANCE = 18
 """Least distance of the points that are drawn, px of the largest image."""
@@ -93,7 +90,7 @@ def example(folder: Path, clip: pd.Series, what: str) -> Example:
     -------
     Example
     """
-    job = Job(folder, "tracking", str(clip["case"]), str(clip["view"]), code="read")
+    job = job_of(folder, str(clip["case"]), str(clip["view"]))
     config, size = job.case.config, int(clip["size_px"])
     es = int(job.store.read("mechanics", job.row, names=("es_frame",))["es_frame"])
     tracked = kept.read(job, "tracking", "displacement", tracker=str(clip["tracker"]), size=size)["displacement"][es]
