@@ -14,7 +14,7 @@ def add(commands: Commands) -> None:
         commands,
         describe,
         "write a data card, a citation, Croissant and RO-Crate metadata of a repository",
-        "They are written into its folder (docs/description.md).",
+        "They are written into its folder (docs/description.md). It needs the extra description of echotruth.",
         ["describe out/demo --license CC-BY-4.0 --author 'Doe, Jane; 0000-0002-1825-0097'"],
         {0: "all documents are written", 2: "it cannot be described"},
     )
