@@ -12,18 +12,7 @@ from echotruth.cli.command import Commands, add_command, add_repeated, fail
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth benchmark`."""
-    parser = add_command(
-        commands,
-        benchmark,
-        "rank the trackers of repositories by condition, write the page of the benchmark, check a submission",
-        "See docs/benchmark.md.",
-        [
-            "benchmark out/benchmark",
-            "benchmark out/benchmark out/benchmark_human --page benchmark.md",
-            "benchmark out/benchmark --card mine.yaml --check mine --page mine.md",
-        ],
-        {0: "it is done", 1: "a check has found something that asks for an explanation", 2: "it cannot be done"},
-    )
+    parser = add_command(commands, benchmark)
     parser.add_argument("repository", type=Path, nargs="+", help="folder of a repository, such as out/benchmark")
     parser.add_argument("--page", type=Path, help="write the page to this Markdown file, its figures beside it")
     parser.add_argument("--split", choices=("test", "develop"), default="test", help="hearts to report (default: test)")
@@ -39,7 +28,20 @@ def add(commands: Commands) -> None:
 
 
 def benchmark(arguments: argparse.Namespace) -> int:
-    """Rank trackers; return 0, 1 if a check fails, or 2 if it cannot be done."""
+    """Rank the trackers of repositories by condition, write the page of the benchmark, check a submission.
+
+    See docs/benchmark.md.
+
+    examples:
+      echotruth benchmark out/benchmark
+      echotruth benchmark out/benchmark out/benchmark_human --page benchmark.md
+      echotruth benchmark out/benchmark --card mine.yaml --check mine --page mine.md
+
+    exit status:
+      0  it is done
+      1  a check has found something that asks for an explanation
+      2  it cannot be done
+    """
     from echotruth.benchmark import records
     from echotruth.benchmark.page import Page, check_writable
     from echotruth.config.loading import ConfigError
