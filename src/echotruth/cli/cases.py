@@ -16,20 +16,25 @@ if TYPE_CHECKING:
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth cases`."""
-    parser = add_command(
-        commands,
-        cases,
-        "print the cases of a configuration as CSV",
-        "There is a row for each case, with its id and the columns in which cases differ: keys, labels and notes.",
-        ["cases config/sweep.yaml", "cases config/sweep.yaml --all > cases.csv"],
-        {0: "they are printed", 1: "the configuration is not valid"},
-    )
+    parser = add_command(commands, cases)
     add_configuration(parser)
     parser.add_argument("--all", action="store_true", help="also print the columns that are the same in all cases")
 
 
 def cases(arguments: argparse.Namespace) -> int:
-    """Print the cases of a configuration; return the exit status."""
+    """Print the cases of a configuration as CSV.
+
+    There is a row for each case, with its id and the columns in which cases differ: keys, labels and
+    notes.
+
+    examples:
+      echotruth cases config/sweep.yaml
+      echotruth cases config/sweep.yaml --all > cases.csv
+
+    exit status:
+      0  they are printed
+      1  the configuration is not valid
+    """
     from echotruth.cases import table
     from echotruth.cli.configuration import load_cases
 

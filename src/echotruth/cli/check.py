@@ -7,23 +7,10 @@ from pathlib import Path
 
 from echotruth.cli.command import Commands, add_command, add_configuration
 
-STATUSES = {
-    0: "nothing is wrong (jobs not run yet are no damage)",
-    1: "the configuration is not valid, a run would refuse it, or something is damaged",
-    2: "it cannot be checked",
-}
-
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth check`."""
-    parser = add_command(
-        commands,
-        check,
-        "check a configuration, or all files and values of a repository",
-        "A repository is checked to the end, with one line for each fault.",
-        ["check config/demo.yaml", "check out/demo", "check out/demo --heal"],
-        STATUSES,
-    )
+    parser = add_command(commands, check)
     text = "YAML file, a name of `echotruth new --list`, or folder of a repository, such as out/demo"
     add_configuration(parser, text, metavar="path")
     parser.add_argument(
@@ -37,7 +24,20 @@ def add(commands: Commands) -> None:
 
 
 def check(arguments: argparse.Namespace) -> int:
-    """Check a configuration or a repository; return the exit status."""
+    """Check a configuration, or all files and values of a repository.
+
+    A repository is checked to the end, with one line for each fault.
+
+    examples:
+      echotruth check config/demo.yaml
+      echotruth check out/demo
+      echotruth check out/demo --heal
+
+    exit status:
+      0  nothing is wrong (jobs not run yet are no damage)
+      1  the configuration is not valid, a run would refuse it, or something is damaged
+      2  it cannot be checked
+    """
     if arguments.heal or Path(arguments.config).is_dir():
         from echotruth.workflow.integrity import check_repository
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import re
 import sys
-import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from typing import NoReturn
 
@@ -15,9 +15,6 @@ Commands = argparse._SubParsersAction  # type: ignore[type-arg]
 
 Act = Callable[[argparse.Namespace], int]
 """Function that does a command and returns its exit status."""
-
-WIDTH = 100
-"""Longest line of a description."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -57,16 +54,11 @@ def did_you_mean(given: str, known: Sequence[str], otherwise: str = "", cutoff: 
     return f"did you mean {close[0]}?" if close else otherwise
 
 
-def add_command(
-    commands: Commands,
-    act: Act,
-    summary: str,
-    detail: str = "",
-    examples: Sequence[str] = (),
-    statuses: Mapping[int, str] | None = None,
-    notes: str = "",
-) -> argparse.ArgumentParser:
-    """Add the parser of a command, which has the name of the function that does it.
+def add_command(commands: Commands, act: Act) -> argparse.ArgumentParser:
+    """Add the parser of a command, which has the name of the function that does it, and its docstring as help.
+
+    The first line says what it does. Sections that begin with a line with a colon, as the examples and the meaning of
+    the exit statuses, are printed below the options.
 
     Parameters
     ----------
@@ -74,33 +66,20 @@ def add_command(
         What the parser is added to.
     act : callable
         Function of the parsed arguments that does the command and returns its exit status.
-    summary : str
-        What it does, in half a sentence.
-    detail : str, optional
-        More about it, in sentences.
-    examples : sequence of str, optional
-        Command lines, without the word echotruth.
-    statuses : mapping, optional
-        What the exit statuses mean.
-    notes : str, optional
-        Lines between the options and the examples, printed as they are.
 
     Returns
     -------
     argparse.ArgumentParser
         Parser to which the arguments are added.
     """
-    parts = [notes.rstrip()] if notes else []
-    if examples:
-        parts.append("\n".join(["examples:", *(f"  echotruth {example}" for example in examples)]))
-    if statuses:
-        parts.append("\n".join(["exit status:", *(f"  {status}  {text}" for status, text in statuses.items())]))
-    text = summary[0].upper() + summary[1:] + "." + (f" {detail}" if detail else "")
+    text = inspect.getdoc(act) or ""
+    description, *sections = re.split(r"\n\n(?=[^\n]+:\n)", text, maxsplit=1)
+    summary = text.partition("\n")[0].rstrip(".")
     parser: argparse.ArgumentParser = commands.add_parser(
         act.__name__,
-        help=summary,
-        description=textwrap.fill(text, WIDTH, break_on_hyphens=False),
-        epilog="\n\n".join(parts) or None,
+        help=summary[:1].lower() + summary[1:],
+        description=description,
+        epilog="".join(sections),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.set_defaults(act=act)

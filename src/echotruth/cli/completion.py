@@ -6,17 +6,9 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-from echotruth.cli.command import Commands, add_command, fail
+from echotruth.cli.command import Commands, add_command
 
 SHELLS = ("bash", "zsh")
-
-NOTES = """in this shell only (bash):
-         eval "$(echotruth completion bash)"
-in every new shell:
-  bash:  mkdir -p ~/.local/share/bash-completion/completions
-         echotruth completion bash > ~/.local/share/bash-completion/completions/echotruth
-  zsh:   mkdir -p ~/.zfunc; echotruth completion zsh > ~/.zfunc/_echotruth
-         and in ~/.zshrc: fpath+=~/.zfunc; autoload -Uz compinit; compinit"""
 
 PATHS = ("config", "output", "repository", "folder")
 """Arguments that are text and name a file or a folder."""
@@ -24,26 +16,32 @@ PATHS = ("config", "output", "repository", "folder")
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth completion`."""
-    parser = add_command(
-        commands,
-        completion,
-        "print a script that completes commands, options and paths in a shell",
-        "",
-        ["completion bash", "completion zsh"],
-        {0: "it is printed", 2: "the package shtab is missing"},
-        NOTES,
-    )
+    parser = add_command(commands, completion)
     parser.add_argument("shell", choices=SHELLS, help="shell for which it is")
 
 
 def completion(arguments: argparse.Namespace) -> int:
-    """Print the script for a shell; return the exit status."""
+    """Print a script that completes commands, options and paths in a shell.
+
+    in this shell only (bash):
+             eval "$(echotruth completion bash)"
+    in every new shell:
+      bash:  mkdir -p ~/.local/share/bash-completion/completions
+             echotruth completion bash > ~/.local/share/bash-completion/completions/echotruth
+      zsh:   mkdir -p ~/.zfunc; echotruth completion zsh > ~/.zfunc/_echotruth
+             and in ~/.zshrc: fpath+=~/.zfunc; autoload -Uz compinit; compinit
+
+    examples:
+      echotruth completion bash
+      echotruth completion zsh
+
+    exit status:
+      0  it is printed
+    """
+    import shtab
+
     from echotruth.cli import parser
 
-    try:
-        import shtab
-    except ImportError:
-        return fail("completion needs the package shtab: pip install shtab")
     whole = parser()
     for action in _actions(whole):
         if action.type is Path or action.dest in PATHS:

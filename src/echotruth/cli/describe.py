@@ -10,14 +10,7 @@ from echotruth.cli.command import Commands, add_command, fail
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth describe`."""
-    parser = add_command(
-        commands,
-        describe,
-        "write a data card, a citation, Croissant and RO-Crate metadata of a repository",
-        "They are written into its folder (docs/description.md).",
-        ["describe out/demo --license CC-BY-4.0 --author 'Doe, Jane; 0000-0002-1825-0097'"],
-        {0: "all documents are written", 2: "it cannot be described"},
-    )
+    parser = add_command(commands, describe)
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     parser.add_argument("-o", "--output", type=Path, help="folder for the documents (default: that of the repository)")
     parser.add_argument("--license", help="identifier of SPDX, such as CC-BY-4.0, or an address (default: none)")
@@ -29,7 +22,17 @@ def add(commands: Commands) -> None:
 
 
 def describe(arguments: argparse.Namespace) -> int:
-    """Write the documents that describe a repository; return 0, or 2 if it cannot be described."""
+    """Write a data card, a citation, Croissant and RO-Crate metadata of a repository.
+
+    They are written into its folder (docs/description.md). It needs the extra description of echotruth.
+
+    examples:
+      echotruth describe out/demo --license CC-BY-4.0 --author 'Doe, Jane; 0000-0002-1825-0097'
+
+    exit status:
+      0  all documents are written
+      2  it cannot be described
+    """
     from echotruth.repository.description import DescriptionError, attribution
     from echotruth.repository.description import describe as write
     from echotruth.workflow import lease

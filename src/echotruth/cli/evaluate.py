@@ -10,18 +10,7 @@ from echotruth.cli.command import Commands, add_command, add_repeated, fail
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth evaluate`."""
-    parser = add_command(
-        commands,
-        evaluate,
-        "run a tracker on every clip of a repository, score it like the repository's own trackers, write the scores",
-        "See docs/trackers.md.",
-        [
-            "evaluate out/demo --tracker mypackage.module:track",
-            "evaluate out/demo --tracker dis --option preset=fast",
-            'evaluate out/demo --command "track {input} {output}" --name mine',
-        ],
-        {0: "it tracked a clip", 1: "it failed on every clip", 2: "it cannot be evaluated"},
-    )
+    parser = add_command(commands, evaluate)
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     tracker = parser.add_mutually_exclusive_group(required=True)
     tracker.add_argument("--tracker", help="package.module:function, an entry point, or a method such as dis")
@@ -45,7 +34,20 @@ def add(commands: Commands) -> None:
 
 
 def evaluate(arguments: argparse.Namespace) -> int:
-    """Evaluate a tracker on a repository; return 0, 1 if it failed on every clip, or 2 if it cannot be evaluated."""
+    """Run a tracker on every clip of a repository, score it like the repository's own trackers, write the scores.
+
+    See docs/trackers.md.
+
+    examples:
+      echotruth evaluate out/demo --tracker mypackage.module:track
+      echotruth evaluate out/demo --tracker dis --option preset=fast
+      echotruth evaluate out/demo --command "track {input} {output}" --name mine
+
+    exit status:
+      0  it tracked a clip
+      1  it failed on every clip
+      2  it cannot be evaluated
+    """
     from echotruth.config.loading import ConfigError
     from echotruth.evaluation.availability import check_name, check_runs
     from echotruth.evaluation.run import format_row, prepare, summary

@@ -15,17 +15,7 @@ EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap"
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth export`."""
-    parser = add_command(
-        commands,
-        export,
-        "write clips, hearts or RF of a repository as files of other programs",
-        "There is one file for each clip, CASE_VIEW_SIZE (docs/export.md).",
-        [
-            "export out/demo --format mp4 --view mid --overlay wall",
-            "export out/demo --format csv --tracker dis",
-        ],
-        {0: "all files are written", 2: "they cannot be exported"},
-    )
+    parser = add_command(commands, export)
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     parser.add_argument("--format", choices=EXPORTED, required=True, help="format of the files")
     add_repeated(
@@ -43,7 +33,18 @@ def add(commands: Commands) -> None:
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write clips, hearts or RF as files of another format; return 0, or 2 if they cannot be exported."""
+    """Write clips, hearts or RF of a repository as files of other programs.
+
+    There is one file for each clip, CASE_VIEW_SIZE (docs/export.md).
+
+    examples:
+      echotruth export out/demo --format mp4 --view mid --overlay wall
+      echotruth export out/demo --format csv --tracker dis
+
+    exit status:
+      0  all files are written
+      2  they cannot be exported
+    """
     from echotruth.config.loading import ConfigError
     from echotruth.export import Export, ExportError, Selection, source
 

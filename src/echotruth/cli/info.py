@@ -26,20 +26,22 @@ DEVELOPMENT = ("build", "docs", "integration", "test")
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth info`."""
-    parser = add_command(
-        commands,
-        info,
-        "show what is installed, or what a repository holds and how to open it",
-        "",
-        ["info", "info out/demo"],
-        {0: "it is printed", 2: "there is no such repository"},
-    )
+    parser = add_command(commands, info)
     text = "folder of a repository, such as out/demo (default: show the installation and the machine)"
     parser.add_argument("repository", nargs="?", help=text)
 
 
 def info(arguments: argparse.Namespace) -> int:
-    """Print what is installed, or what a repository holds; return the exit status."""
+    """Show what is installed, or what a repository holds and how to open it.
+
+    examples:
+      echotruth info
+      echotruth info out/demo
+
+    exit status:
+      0  it is printed
+      2  there is no such repository
+    """
     if arguments.repository is None:
         _print(_installation())
         return 0

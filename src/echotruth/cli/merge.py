@@ -10,20 +10,23 @@ from echotruth.cli.command import Commands, add_command
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth merge`."""
-    parser = add_command(
-        commands,
-        merge,
-        "take over the hearts of other repositories of the same settings",
-        "Their configurations may differ in their cases and their name only.",
-        ["merge out/both out/first out/second"],
-        {0: "all hearts are taken over", 2: "they cannot be merged"},
-    )
+    parser = add_command(commands, merge)
     parser.add_argument("into", type=Path, help="folder of the repository that receives them; made if need be")
     parser.add_argument("sources", type=Path, nargs="+", help="folders of repositories, which stay as they are")
 
 
 def merge(arguments: argparse.Namespace) -> int:
-    """Take over the hearts of repositories into another; return 0, or 2 if they cannot be merged."""
+    """Take over the hearts of other repositories of the same settings.
+
+    Their configurations may differ in their cases and their name only.
+
+    examples:
+      echotruth merge out/both out/first out/second
+
+    exit status:
+      0  all hearts are taken over
+      2  they cannot be merged
+    """
     from echotruth.workflow.merging import merge_repositories
 
     return merge_repositories(arguments.into, arguments.sources)

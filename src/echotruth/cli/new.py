@@ -16,15 +16,7 @@ STANDARD_OUTPUT = "-"
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth new`."""
-    parser = add_command(
-        commands,
-        new,
-        "write a commented configuration to begin with",
-        "It has the keys that most people want to see first, with their meaning, unit, limits and default; what is "
-        "commented out has its default. A file that is there already is never replaced.",
-        ["new", "new human -o patient.yaml", "new sweep --all", "new --list"],
-        {0: "the file is written", 2: "it cannot be written"},
-    )
+    parser = add_command(commands, new)
     text = "mouse, rat, human or another of --list (default: mouse)"
     parser.add_argument("preset", nargs="?", default="mouse", help=text)
     parser.add_argument("-o", "--output", metavar="FILE", help="file to write (default: PRESET.yaml; - prints it)")
@@ -33,7 +25,21 @@ def add(commands: Commands) -> None:
 
 
 def new(arguments: argparse.Namespace) -> int:
-    """Write a commented configuration; return the exit status."""
+    """Write a commented configuration to begin with.
+
+    It has the keys that most people want to see first, with their meaning, unit, limits and default;
+    what is commented out has its default. A file that is there already is never replaced.
+
+    examples:
+      echotruth new
+      echotruth new human -o patient.yaml
+      echotruth new sweep --all
+      echotruth new --list
+
+    exit status:
+      0  the file is written
+      2  it cannot be written
+    """
     from echotruth.config import shipped
 
     names = shipped.names()

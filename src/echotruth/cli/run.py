@@ -10,26 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echotruth.cli.command import Commands, add_command, add_configuration, fail
-from echotruth.cli.snakemake import PROFILES, WORKFLOW, executor_error, is_query, option_errors, with_profiles
+from echotruth.cli.snakemake import WORKFLOW, executor_error, is_query, option_errors, with_profiles
 
 if TYPE_CHECKING:
     from echotruth.config import Config
-
-NOTES = f"""options of Snakemake that are useful here:
-  --cores N             number of processor cores (default: all)
-  -n                    only list the jobs
-  --profile NAME        where jobs run: {", ".join(PROFILES)}, or a folder with a profile (docs/cluster.md)
-  --batch repository=1/10  only the first tenth of the hearts, then 2/10 and so on: plans a large sweep in pieces
-  --rerun-triggers mtime  do not make again what other settings or code would change
-"""
-
-STATUSES = {
-    0: "everything is made",
-    1: "the configuration is not valid, or jobs failed",
-    2: "an option is wrong, or it does not fit this machine or makes no sense; --yes runs the latter nevertheless",
-    3: "everything is made, but not everything is uploaded",
-    4: "everything is made, but no heart is complete: each failed or is implausible, and none is imaged",
-}
 
 WRONG_OPTION = 2
 """Exit status of Snakemake, and of the command, if it does not take an option."""
@@ -39,20 +23,7 @@ WRITABLE = "the working folder must be writable and have space"
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth run`."""
-    parser = add_command(
-        commands,
-        run,
-        "make the repository and the report of a configuration",
-        "Run it again to continue what was interrupted. Options that are not listed here are passed to Snakemake.",
-        [
-            "run config/demo.yaml",
-            "run config/sweep.yaml --estimate",
-            "run config/sweep.yaml --cores 8",
-            "run config/demo.yaml --upload s3://bucket/demo",
-        ],
-        STATUSES,
-        NOTES,
-    )
+    parser = add_command(commands, run)
     add_configuration(parser)
     parser.allow_abbrev = False  # what looks like the beginning of an option may be one of Snakemake
     text = "upload each result when it is finished (docs/storage.md); exit status 3 if all is made but not uploaded"
@@ -66,7 +37,31 @@ def add(commands: Commands) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the workflow of a configuration; return the exit status."""
+    """Make the repository and the report of a configuration.
+
+    Run it again to continue what was interrupted. Options that are not listed here are passed to
+    Snakemake.
+
+    options of Snakemake that are useful here:
+      --cores N             number of processor cores (default: all)
+      -n                    only list the jobs
+      --profile NAME        where jobs run: default, slurm, or a folder with a profile (docs/cluster.md)
+      --batch repository=1/10  only the first tenth of the hearts, then 2/10 and so on: plans a large sweep in pieces
+      --rerun-triggers mtime  do not make again what other settings or code would change
+
+    examples:
+      echotruth run config/demo.yaml
+      echotruth run config/sweep.yaml --estimate
+      echotruth run config/sweep.yaml --cores 8
+      echotruth run config/demo.yaml --upload s3://bucket/demo
+
+    exit status:
+      0  everything is made
+      1  the configuration is not valid, or jobs failed
+      2  an option is wrong, or it does not fit this machine or makes no sense; --yes runs the latter nevertheless
+      3  everything is made, but not everything is uploaded
+      4  everything is made, but no heart is complete: each failed or is implausible, and none is imaged
+    """
     from echotruth.cli.configuration import load_cases
 
     if errors := option_errors(arguments.options):

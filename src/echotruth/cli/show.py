@@ -10,22 +10,26 @@ from echotruth.cli.command import Commands, add_command, fail
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth show`."""
-    parser = add_command(
-        commands,
-        show,
-        "show a repository in the browser",
-        "Clips play with true and tracked motion, strain and errors over them, and curves follow the frame "
-        "(docs/viewer.md). Only this machine can open the page; Ctrl-C ends it.",
-        ["show out/demo", "show out/demo --port 5006 --no-browser"],
-        {0: "the viewer was closed", 2: "it cannot be shown"},
-    )
+    parser = add_command(commands, show)
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     parser.add_argument("--port", type=int, default=0, help="port of the page (default: any that is free)")
     parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
 
 
 def show(arguments: argparse.Namespace) -> int:
-    """Show a repository until the command is interrupted; return 0, or 2 if it cannot be shown."""
+    """Show a repository in the browser.
+
+    Clips play with true and tracked motion, strain and errors over them, and curves follow the frame
+    (docs/viewer.md). Only this machine can open the page; Ctrl-C ends it.
+
+    examples:
+      echotruth show out/demo
+      echotruth show out/demo --port 5006 --no-browser
+
+    exit status:
+      0  the viewer was closed
+      2  it cannot be shown
+    """
     import webbrowser
 
     from echotruth.config.loading import ConfigError

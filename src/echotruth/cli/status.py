@@ -13,34 +13,36 @@ from echotruth.cli.command import Commands, add_command, fail
 if TYPE_CHECKING:
     from echotruth.workflow.status import Status
 
-STATUSES = {
-    0: "the repository is finished",
-    1: "it is not finished, and no run works on it",
-    2: "it is not a repository",
-    3: "a run works on it",
-}
-"""Meaning of the exit statuses."""
 WATCH_SECONDS = 5.0
 """Interval of `--watch`."""
 
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth status`."""
-    parser = add_command(
-        commands,
-        status,
-        "show what of a repository is finished, running or failed, with reasons, and the time left",
-        "It only reads the folder, so it works on every machine that sees the folder, also for a run on a cluster.",
-        ["status out/demo", "status out/demo --watch", "status config/sweep.yaml", "status out/demo --json"],
-        STATUSES,
-    )
+    parser = add_command(commands, status)
     parser.add_argument("path", type=Path, help="folder of the repository, such as out/demo, or its YAML file")
     parser.add_argument("--watch", action="store_true", help="show it again every 5 s, until the run has ended")
     parser.add_argument("--json", action="store_true", help="print it as JSON")
 
 
 def status(arguments: argparse.Namespace) -> int:
-    """Print the status of a repository; return 0, 1, 2 or 3 (see `STATUSES`)."""
+    """Show what of a repository is finished, running or failed, with reasons, and the time left.
+
+    It only reads the folder, so it works on every machine that sees the folder, also for a run on a
+    cluster.
+
+    examples:
+      echotruth status out/demo
+      echotruth status out/demo --watch
+      echotruth status config/sweep.yaml
+      echotruth status out/demo --json
+
+    exit status:
+      0  the repository is finished
+      1  it is not finished, and no run works on it
+      2  it is not a repository
+      3  a run works on it
+    """
     from echotruth.workflow.status import StatusError, dumped
     from echotruth.workflow.status_text import text
 

@@ -10,14 +10,7 @@ from echotruth.cli.command import Commands, add_command
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth upload`."""
-    parser = add_command(
-        commands,
-        upload,
-        "upload a repository to object storage, and compare what is there by its checksums",
-        "What is there already is not sent again (docs/storage.md).",
-        ["upload out/demo s3://bucket/demo", "upload out/demo s3://bucket/demo --verify"],
-        {0: "everything is there", 1: "something is damaged", 2: "it cannot be uploaded"},
-    )
+    parser = add_command(commands, upload)
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     text = "folder in object storage, empty or with an earlier upload of this repository"
     parser.add_argument("url", metavar="s3://BUCKET/FOLDER", help=text)
@@ -25,7 +18,19 @@ def add(commands: Commands) -> None:
 
 
 def upload(arguments: argparse.Namespace) -> int:
-    """Upload a repository; return 0, 1 if something is damaged, or 2 if it cannot be uploaded."""
+    """Upload a repository to object storage, and compare what is there by its checksums.
+
+    What is there already is not sent again (docs/storage.md).
+
+    examples:
+      echotruth upload out/demo s3://bucket/demo
+      echotruth upload out/demo s3://bucket/demo --verify
+
+    exit status:
+      0  everything is there
+      1  something is damaged
+      2  it cannot be uploaded
+    """
     from echotruth.workflow.uploading import upload_repository
 
     return upload_repository(arguments.repository, arguments.url, arguments.verify)

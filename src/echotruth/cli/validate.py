@@ -11,20 +11,24 @@ from echotruth.cli.command import Commands, add_command, fail
 
 def add(commands: Commands) -> None:
     """Add the parser of `echotruth validate`."""
-    parser = add_command(
-        commands,
-        validate,
-        "compare the heart with exact solutions, published problems and conservation laws, and write the page",
-        "It needs a checkout of echotruth.",
-        ["validate --quick --folder /tmp"],
-        {0: "all checks pass", 1: "a check fails", 2: "this folder is not a checkout"},
-    )
+    parser = add_command(commands, validate)
     parser.add_argument("--quick", action="store_true", help="use coarse meshes; takes a few minutes")
     parser.add_argument("--folder", default="docs", help="folder for validation.md (default: docs)")
 
 
 def validate(arguments: argparse.Namespace) -> int:
-    """Validate the mechanics and write the page of results; return 1 if a check fails, otherwise 0."""
+    """Compare the heart with exact solutions, published problems and conservation laws, and write the page.
+
+    It needs a checkout of echotruth.
+
+    examples:
+      echotruth validate --quick --folder /tmp
+
+    exit status:
+      0  all checks pass
+      1  a check fails
+      2  this folder is not a checkout
+    """
     if not Path("validation/page.py").is_file():
         return fail("no folder validation in this folder: run this in a checkout of echotruth")
     sys.path.insert(0, str(Path.cwd()))

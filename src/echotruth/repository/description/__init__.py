@@ -11,11 +11,9 @@ from echotruth.repository.description.card import MARK as CARD_MARK
 from echotruth.repository.description.card import card
 from echotruth.repository.description.citation import MARK as CITATION_MARK
 from echotruth.repository.description.citation import citation
-from echotruth.repository.description.croissant import croissant
-from echotruth.repository.description.facts import Facts, read_facts
+from echotruth.repository.description.facts import read_facts
 from echotruth.repository.description.files import stored
-from echotruth.repository.description.ro_crate import NAME as CRATE
-from echotruth.repository.description.ro_crate import ro_crate, workflow_files
+from echotruth.repository.description.statements import statements
 from echotruth.repository.description.tables import CHECKSUMS, CLIPS, checksums, clips
 
 __all__ = ["Attribution", "DescriptionError", "attribution", "describe"]
@@ -46,32 +44,32 @@ def describe(repository: Path, output: Path | None = None, given: Attribution | 
     Raises
     ------
     DescriptionError
-        If the folder is no repository, is damaged or empty, or holds a README.md or CITATION.cff of somebody else.
+        If the folder is no repository, is damaged or empty, or holds a README.md or CITATION.cff of somebody else, or
+        if a package is missing.
     """
-    given, output = given or Attribution(), output or repository
-    try:
-        _refuse_foreign_files(output)
-        documents = _documents(read_facts(repository), given)
-    except OSError as error:
-        remedy = "make it readable"
-        raise DescriptionError(f"{error.filename or repository}: cannot be read ({error.strerror}): {remedy}") from None
-    try:
-        durable.update_all({output / path: content for path, content in documents.items()})
-    except OSError as error:
-        raise DescriptionError(
-            f"{output}: cannot be written ({error.strerror or error}): choose another --output"
-        ) from None
+    output = output or repository
+    _refuse_foreign_files(output)
+    documents = _documents(repository, given or Attribution())
+    durable.update_all({output / path: content for path, content in documents.items()})
     return [output / path for path in documents]
 
 
-def _documents(facts: Facts, given: Attribution) -> dict[str, bytes]:
+def _documents(repository: Path, given: Attribution) -> dict[str, bytes]:
     """Content of all documents by their path; the later ones hold checksums of the earlier."""
-    tables = {CLIPS: clips(facts), CHECKSUMS: checksums(facts)}
-    texts = {"README.md": card(facts, given, tables), "CITATION.cff": citation(facts, given)}
-    made = tables | texts
-    made["croissant.json"] = croissant(facts, given, [*starmap(stored, made.items())], tables)
+    try:
+        from echotruth.repository.description.croissant import croissant
+        from echotruth.repository.description.ro_crate import NAME, ro_crate, workflow_files
+    except ModuleNotFoundError as error:
+        raise DescriptionError(
+            f"describe needs the package {error.name}: pip install 'echotruth[description]'"
+        ) from None
+    facts = read_facts(repository, given)
+    said = statements(facts)
+    made = {CLIPS: clips(facts, said["columns"]), CHECKSUMS: checksums(facts)}
+    made |= {"README.md": card(facts, said, [*starmap(stored, made.items())]), "CITATION.cff": citation(facts, said)}
+    made["croissant.json"] = croissant(facts, said, [*starmap(stored, made.items())], made[CLIPS])
     made |= workflow_files()
-    return made | {CRATE: ro_crate(facts, given, [*starmap(stored, made.items())])}
+    return made | {NAME: ro_crate(facts, said, [*starmap(stored, made.items())])}
 
 
 def _refuse_foreign_files(folder: Path) -> None:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from datetime import UTC, datetime
-from itertools import groupby
+from dataclasses import dataclass, replace
+from datetime import UTC, date, datetime
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from echotruth.cases import Case
-from echotruth.config import Config
-from echotruth.repository import ledger
-from echotruth.repository.description.attribution import DescriptionError
+from echotruth.repository import ledger, schema
+from echotruth.repository.array import Array
+from echotruth.repository.description.attribution import Attribution, Author, DescriptionError
 from echotruth.repository.description.files import StoredFile, damaged, files_beside, store_files
-from echotruth.repository.description.quantities import Quantity, read_quantities
 from echotruth.repository.hierarchy import ROOT
 from echotruth.repository.inventory import CheckError, JobRecord, Repository
 from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
@@ -23,14 +21,11 @@ from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
 Record = dict[str, Any]
 """A record of the ledger."""
 
+STATUSES = ("complete", "implausible", "failed", "unfinished")
+"""What can become of a case."""
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a case: complete, implausible, failed or unfinished, and why it is not complete."""
-
-    case: str
-    status: str
-    reason: str = ""
+UNCHANGED = "that of config.yaml"
+"""Stands for the value of a key that a case leaves as it is in the configuration."""
 
 
 @dataclass(frozen=True)
@@ -42,67 +37,56 @@ class Run:
     ended: datetime
     """End of the last job, by the time of its record."""
     jobs: int
-    cpu_seconds: float
-    instructions: tuple[str, ...]
+    hours: float
+    """Time of one core, h."""
+    instructions: list[str]
     """Instructions of the processors that were used."""
-    code: dict[str, tuple[str, ...]]
-    """Stage -> versions of its code."""
     packages: dict[str, str]
     """Name -> version."""
-
-
-UNCHANGED = "that of config.yaml"
-"""Stands for the value of a key that a case leaves as it is in the configuration."""
 
 
 @dataclass(frozen=True)
 class Facts:
     """What is to be known of a repository."""
 
-    folder: Path
-    config: Config
-    cases: dict[str, Case]
-    """The cases by id."""
-    outcomes: tuple[Outcome, ...]
-    """One for every case."""
+    repository: Repository
+    attribution: Attribution
+    """With authors, an unnamed group if need be."""
+    published: date
+    """Day of publication: as given, or that of the last job."""
+    outcomes: dict[str, tuple[str, str]]
+    """Case -> what became of it, one of `STATUSES`, and why it is not complete."""
     missing_jobs: int
     wanted_jobs: int
     is_published: bool
     """Whether its files were verified after the last job."""
-    failures: tuple[str, ...]
+    failures: list[str]
     """Jobs and trackers that found no result, in words."""
-    quantities: tuple[Quantity, ...]
-    files: tuple[StoredFile, ...]
+    arrays: dict[str, list[Array]]
+    """Group -> its arrays, after a pack what it holds. Groups that differ in the size of the image are one."""
+    files: list[StoredFile]
     """All of the store."""
-    tables: tuple[StoredFile, ...]
+    tables: list[StoredFile]
     """Files beside the store that are made for readers: tables, figures, the report."""
     run: Run
-    records: tuple[tuple[JobRecord, Record], ...]
-    """Records of the present cases and views, sorted; the checksums are left out but for those of images."""
+    images: dict[JobRecord, dict[str, str]]
+    """Job -> path below the store of each file of images that it wrote -> SHA-256."""
 
     @property
     def name(self) -> str:
         """Name of the repository."""
-        return self.config.name
+        return self.repository.config.name
 
     @property
     def store(self) -> str:
         """Name of the folder of the store."""
-        return f"{self.name}.zarr"
+        return self.repository.store.name
 
     @property
-    def is_finished(self) -> bool:
-        """Whether all jobs are done and verified."""
-        return not self.missing_jobs and self.is_published
-
-    def count(self, status: str) -> int:
-        """Number of cases with a status."""
-        return sum(outcome.status == status for outcome in self.outcomes)
-
-    @property
-    def arrays(self) -> list[Quantity]:
-        """Quantities without coordinates, and without the keys of the cases, which `cases.csv` has."""
-        return [one for one in self.quantities if not one.is_coordinate and "." not in one.name and one.name != "seed"]
+    def counts(self) -> dict[str, int]:
+        """Status -> number of cases with it, if there are any."""
+        found = [status for status, _ in self.outcomes.values()]
+        return {status: found.count(status) for status in STATUSES if status in found}
 
     @property
     def swept(self) -> dict[str, list[object]]:
@@ -110,19 +94,21 @@ class Facts:
 
         A case that gives a key no value, as an empty cell of a table, has that of the configuration.
         """
-        keys = dict.fromkeys(key for case in self.cases.values() for key in case.parameters)
-        values = {key: [case.parameters.get(key, UNCHANGED) for case in self.cases.values()] for key in keys}
+        given = [case.parameters for case in self.repository.cases.values()]
+        values = {key: [each.get(key, UNCHANGED) for each in given] for key in dict.fromkeys(chain(*given))}
         distinct = {key: list({repr(value): value for value in each}.values()) for key, each in values.items()}
         return {key: each for key, each in distinct.items() if len(each) > 1}
 
 
-def read_facts(folder: Path) -> Facts:
+def read_facts(folder: Path, given: Attribution) -> Facts:
     """Read what is to be known of a repository.
 
     Parameters
     ----------
     folder : Path
         `out/NAME`.
+    given : Attribution
+        Authors, licence, address.
 
     Raises
     ------
@@ -137,94 +123,102 @@ def read_facts(folder: Path) -> Facts:
     if not records:
         raise DescriptionError(f"{folder}: has no result yet: run its configuration first")
     wanted = repository.wanted()
-    missing = set(wanted) - {record.path for record, _ in records}
-    document = _root(folder, repository.store)
+    missing = set(wanted) - {record.path for record in records}
+    run = _run(repository, records)
+    authors = given.authors or (Author(f"The authors of the repository {repository.config.name}"),)
     return Facts(
-        folder,
-        repository.config,
-        repository.cases,
-        outcomes=tuple(_outcomes(repository, dict((record.path, entries) for record, entries in records), missing)),
+        repository,
+        replace(given, authors=authors),
+        given.published or run.ended.date(),
+        outcomes=dict(_outcomes(repository, records, missing)),
         missing_jobs=len(missing),
         wanted_jobs=len(wanted),
         is_published=repository.publication_record.is_file() and not missing,
-        failures=tuple(_failures(records)),
-        quantities=read_quantities(document["consolidated_metadata"]["metadata"]),
+        failures=list(_failures(records)),
+        arrays=_arrays(repository),
         files=store_files(repository, checksums),
         tables=files_beside(folder),
-        run=_run(repository, records, document.get("attributes", {}).get("packages", {})),
-        records=records,
+        run=run,
+        images={record: entries.get("sha256", {}) for record, entries in records.items() if record.stage == "bmode"},
     )
 
 
 def _read(folder: Path, path: Path) -> Record:
+    """A record of the ledger, or the metadata of a group of the store."""
     try:
-        return dict(ledger.read(path))
-    except (OSError, ValueError, TypeError):
-        raise damaged(folder, path) from None
+        record = ledger.read(path)
+    except (OSError, ValueError):
+        record = None
+    if not isinstance(record, dict):
+        raise damaged(folder, path)
+    return record
 
 
-def _root(folder: Path, store: Path) -> Record:
-    try:
-        document = json.loads((store / ROOT).read_bytes())
-        document["consolidated_metadata"]["metadata"].items()
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        raise damaged(folder, store / ROOT) from None
-    return dict(document)
+def _arrays(repository: Repository) -> dict[str, list[Array]]:
+    found = {}
+    for path, arrays in sorted(repository.groups.items()):
+        members = {pack.array.name: pack.members for pack in schema.PACKS.get(path, ())}
+        listed = ((array, *_named(members.get(array.name, ()), array.name)) for array in arrays)
+        found[re.sub(r"/\d+$", "/SIZE", path)] = list(chain(*listed))
+    return found
 
 
-def _outcomes(repository: Repository, records: dict[Path, Record], missing: set[Path]) -> Iterator[Outcome]:
-    folder, views = repository.folder, list(repository.config.views)
+def _named(members: tuple[Array, ...], pack: str) -> list[Array]:
+    return [replace(one, long_name=f"{one.long_name} (in {pack})") for one in members]
+
+
+def _records(repository: Repository) -> tuple[dict[JobRecord, Record], dict[str, str]]:
+    """Records of the present cases and views, and the checksums in all records, by path below the store.
+
+    Of the checksums the records keep those of the images alone: there may be a million.
+    """
+    present = {(case, view) for case in repository.cases for view in (None, *repository.config.views)}
+    found: dict[JobRecord, Record] = {}
+    checksums: dict[str, str] = {}
+    for record in repository.records():
+        entries = _read(repository.folder, record.path)
+        checksums |= entries.get("sha256", {}) if record.stage == "bmode" else entries.pop("sha256", {})
+        if (record.case, record.view) in present:
+            found[record] = entries
+    if repository.structure_record.is_file():
+        checksums |= _read(repository.folder, repository.structure_record).get("sha256", {})
+    return found, checksums
+
+
+def _outcomes(
+    repository: Repository, records: dict[JobRecord, Record], missing: set[Path]
+) -> Iterator[tuple[str, tuple[str, str]]]:
+    entries = {record.path: each for record, each in records.items()}
     for case in repository.cases:
-        gates = [records.get(record_path(folder, stage, case)) for stage in GATES]
+        gates = [entries.get(record_path(repository.folder, stage, case)) for stage in GATES]
         stopped = next((gate for gate in gates if gate is None or gate["status"] != "complete"), gates[-1])
-        later = (record_path(folder, stage, case, view) for stage in VIEW_STAGES for view in views)
-        if stopped is None or (stopped["status"] != "failed" and any(path in missing for path in later)):
-            yield Outcome(case, "unfinished", "not all of its jobs have been run")
+        views = [(stage, view) for stage in VIEW_STAGES for view in repository.config.views]
+        left = any(record_path(repository.folder, stage, case, view) in missing for stage, view in views)
+        if stopped is None or (stopped["status"] != "failed" and left):
+            yield case, ("unfinished", "not all of its jobs have been run")
         else:
-            yield Outcome(case, stopped["status"], stopped.get("reason", ""))
+            yield case, (stopped["status"], stopped.get("reason", ""))
 
 
-def _failures(records: tuple[tuple[JobRecord, Record], ...]) -> Iterator[str]:
-    for record, entries in records:
+def _failures(records: dict[JobRecord, Record]) -> Iterator[str]:
+    for record, entries in records.items():
         if record.view and entries["status"] == "failed":
             yield f"{record.job}: {entries.get('reason', '')}"
         for tracker, reason in sorted(entries.get("failures", {}).items()):
             yield f"{tracker} on {record.case}, {record.view}: {reason}"
 
 
-def _records(repository: Repository) -> tuple[tuple[tuple[JobRecord, Record], ...], dict[str, str]]:
-    """Records of the present cases and views, and the checksums in all records, by path below the store.
-
-    Of the checksums the records keep those of the images alone: there may be a million.
-    """
-    present = {(case, view) for case in repository.cases for view in (None, *repository.config.views)}
-    found: list[tuple[JobRecord, Record]] = []
-    checksums: dict[str, str] = {}
-    for record in repository.records():
-        entries = _read(repository.folder, record.path)
-        checksums |= entries.get("sha256", {}) if record.stage == "bmode" else entries.pop("sha256", {})
-        if (record.case, record.view) in present:
-            found.append((record, entries))
-    if repository.structure_record.is_file():
-        checksums |= _read(repository.folder, repository.structure_record).get("sha256", {})
-    return tuple(found), checksums
-
-
-def _run(repository: Repository, records: tuple[tuple[JobRecord, Record], ...], packages: dict[str, str]) -> Run:
-    paths = [record.path for record, _ in records]
-    ends = {path: path.stat().st_mtime for path in paths}
-    starts = [ends[record.path] - entries.get("seconds", 0.0) for record, entries in records]
+def _run(repository: Repository, records: dict[JobRecord, Record]) -> Run:
+    ends = {record: record.path.stat().st_mtime for record in records}
     published = repository.publication_record
-    last = [*ends.values(), *([published.stat().st_mtime] if published.is_file() else [])]
-    versions = sorted({(record.stage, entries["code"]) for record, entries in records})
+    attributes = _read(repository.folder, repository.store / ROOT).get("attributes", {})
     return Run(
-        _moment(min(starts)),
-        _moment(max(last)),
-        len(records),
-        round(sum(entries.get("cpu_seconds", 0.0) for _, entries in records), 3),
-        tuple(sorted({str(entries["instructions"]) for _, entries in records if "instructions" in entries})),
-        {stage: tuple(code for _, code in group) for stage, group in groupby(versions, key=lambda version: version[0])},
-        dict(sorted(packages.items())),
+        started=_moment(min(ends[record] - entries.get("seconds", 0.0) for record, entries in records.items())),
+        ended=_moment(max([*ends.values(), *([published.stat().st_mtime] if published.is_file() else [])])),
+        jobs=len(records),
+        hours=round(sum(entries.get("cpu_seconds", 0.0) for entries in records.values()) / 3600, 2),
+        instructions=sorted({entries["instructions"] for entries in records.values() if "instructions" in entries}),
+        packages=dict(sorted(attributes.get("packages", {}).items())),
     )
 
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from hashlib import sha256
+from mimetypes import guess_type
 from pathlib import Path
 
 from echotruth.repository.checksums import checksums
 from echotruth.repository.description.attribution import DescriptionError
 from echotruth.repository.inventory import Repository, files_below
+
+MEDIA_TYPES = {"yaml": "application/yaml", "cff": "application/yaml", "md": "text/markdown"}
+"""Ending of a name -> media type, of those that Python does not know everywhere."""
 
 
 @dataclass(frozen=True, slots=True)  # there may be a million
@@ -20,6 +24,16 @@ class StoredFile:
     size: int
     """Bytes."""
     sha256: str
+
+    @property
+    def name(self) -> str:
+        """Name without the folder."""
+        return self.path.rpartition("/")[2]
+
+    @property
+    def media_type(self) -> str:
+        """Media type of a file beside the store."""
+        return MEDIA_TYPES.get(self.path.rpartition(".")[2]) or guess_type(self.path)[0] or "text/plain"
 
 
 def stored(path: str, content: bytes) -> StoredFile:
@@ -33,7 +47,7 @@ def damaged(folder: Path, path: Path) -> DescriptionError:
     return DescriptionError(f"{path}: is missing or damaged: {remedy}")
 
 
-def store_files(repository: Repository, known: dict[str, str]) -> tuple[StoredFile, ...]:
+def store_files(repository: Repository, known: dict[str, str]) -> list[StoredFile]:
     """All files of the store.
 
     Parameters
@@ -47,22 +61,21 @@ def store_files(repository: Repository, known: dict[str, str]) -> tuple[StoredFi
     DescriptionError
         If a file of the ledger is missing.
     """
+    store = repository.store
     if repository.is_older:
-        others = (path for path in files_below(repository.store) if path not in known)
-        known = known | checksums([repository.store / path for path in others], repository.store)
-    return tuple(_listed(repository, path, checksum) for path, checksum in sorted(known.items()))
+        others = (path for path in files_below(store) if path not in known)
+        known = known | checksums([store / path for path in others], store)
+    if lost := next((path for path in known if not (store / path).is_file()), None):
+        raise damaged(repository.folder, store / lost)
+    return [
+        StoredFile(f"{store.name}/{path}", (store / path).stat().st_size, checksum)
+        for path, checksum in sorted(known.items())
+    ]
 
 
-def _listed(repository: Repository, path: str, checksum: str) -> StoredFile:
-    file = repository.store / path
-    if not file.is_file():
-        raise damaged(repository.folder, file)
-    return StoredFile(f"{repository.store.name}/{path}", file.stat().st_size, checksum)
-
-
-def files_beside(folder: Path) -> tuple[StoredFile, ...]:
+def files_beside(folder: Path) -> list[StoredFile]:
     """Files for readers beside the store: tables, figures, the report."""
     names = ("cases.csv", "config.yaml", "registry.txt", "views.txt", "report.html")
-    figures = sorted(path for path in folder.glob("figures/*") if path.is_file() and not path.name.startswith("."))
-    paths = [name for name in names if (folder / name).is_file()] + [f"figures/{path.name}" for path in figures]
-    return tuple(stored(path, (folder / path).read_bytes()) for path in paths)
+    figures = sorted(folder.glob("figures/[!.]*"))
+    paths = [path for path in (*(folder / name for name in names), *figures) if path.is_file()]
+    return [stored(path.relative_to(folder).as_posix(), path.read_bytes()) for path in paths]

@@ -7,14 +7,13 @@ rules are written to the folder `workflow`, so that the crate holds all it names
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from datetime import date
-from pathlib import Path
+from typing import Any
 
-from echotruth.repository.description import statements
-from echotruth.repository.description.attribution import Attribution, Author, slug
-from echotruth.repository.description.citation import KEYWORDS, authors, published, title
-from echotruth.repository.description.croissant import Node, media_type, one_or_many
+from rocrate.model.contextentity import ContextEntity
+from rocrate.rocrate import ROCrate
+
+from echotruth.repository.description.attribution import Author, slug
+from echotruth.repository.description.citation import filled
 from echotruth.repository.description.facts import Facts
 from echotruth.repository.description.files import StoredFile
 from echotruth.repository.provenance import PACKAGE
@@ -31,237 +30,139 @@ PROFILES = {
     "https://w3id.org/ro/wfrun/workflow/0.5": ("Workflow Run Crate", "0.5"),
     "https://w3id.org/workflowhub/workflow-ro-crate/1.0": ("Workflow RO-Crate", "1.0"),
 }
+"""Profiles to which a crate conforms -> name and version."""
 
-HOMES = {
-    "mkl": "https://www.intel.com/content/www/us/en/developer/tools/oneapi/onemkl.html",
-    "numba": "https://numba.pydata.org",
-    "numpy": "https://numpy.org",
-    "opencv": "https://opencv.org",
-    "meshio": "https://github.com/nschloe/meshio",
-    "pypardiso": "https://github.com/haasad/PyPardiso",
-    "scikit-image": "https://scikit-image.org",
-    "scipy": "https://scipy.org",
-    "snakemake": "https://snakemake.github.io",
-    "vtk": "https://vtk.org",
-    "xarray": "https://xarray.dev",
-    "zarr": "https://zarr.dev",
+WORKFLOW_PROFILE = "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
+
+OTHERS = {
+    WORKFLOW_PROFILE: ("ComputationalWorkflow", "1.0-RELEASE"),
+    "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE": ("FormalParameter", "1.0-RELEASE"),
 }
-"""Addresses of the packages whose versions are recorded."""
+"""Profiles to which the workflow, its input and its output conform -> name and version."""
 
 
 def workflow_files() -> dict[str, bytes]:
     """The Snakefile and its rules, by their path in the crate."""
-    files: list[Path] = [WORKFLOW / "Snakefile", *sorted((WORKFLOW / "rules").glob("*.smk"))]
+    files = [WORKFLOW / "Snakefile", *sorted((WORKFLOW / "rules").glob("*.smk"))]
     return {f"workflow/{path.relative_to(WORKFLOW).as_posix()}": path.read_bytes() for path in files}
 
 
-def ro_crate(facts: Facts, attribution: Attribution, made: list[StoredFile]) -> bytes:
+def ro_crate(facts: Facts, said: dict[str, Any], made: list[StoredFile]) -> bytes:
     """ro-crate-metadata.json of a repository.
 
     Parameters
     ----------
     facts : Facts
-    attribution : Attribution
+    said : dict
+        Statements on the repository.
     made : list of StoredFile
         Files that are written with it.
     """
-    files = [_file(file) for file in (*facts.tables, *made) if file.path != MAIN]
-    makers = [_maker(author) for author in authors(facts, attribution)]
-    data = [*files, _store(facts), _ledger(), _main(facts, made)]
-    graph = [
-        _descriptor(),
-        _root(facts, attribution, [*data], makers),
-        *data,
-        _action(facts, makers),
-        *_parameters(facts),
-        *makers,
-        *_affiliations(authors(facts, attribution)),
-        *_software(facts),
-        *_works(PROFILES),
-        *_terms(attribution),
-    ]
-    context = ["https://w3id.org/ro/crate/1.1/context", {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}]
-    return (json.dumps({"@context": context, "@graph": graph}, indent=1, ensure_ascii=False) + "\n").encode()
+    crate = ROCrate(version="1.1")
+    for id, (name, version) in (PROFILES | OTHERS).items():
+        _add(crate, id, "CreativeWork", name=name, version=version)
+    crate.metadata.extra_terms["sha256"] = "https://w3id.org/ro/terms/workflow-run#sha256"
+    for file in (*facts.tables, *made):
+        if file.path != MAIN:
+            crate.add_file(dest_path=file.path, properties=_about(file))
+    crate.get("README.md")["about"] = crate.root_dataset
+    text = "A record of every finished job: checksums, seed, version of the code, time taken."
+    crate.add_dataset(dest_path="ledger/", properties={"name": "ledger", "description": text})
+    text = "All arrays of the repository, as a Zarr hierarchy (format 3)."
+    crate.add_dataset(dest_path=f"{facts.store}/", properties={"name": facts.store, "description": text})
+    makers = [_maker(crate, author) for author in facts.attribution.authors]
+    _add_workflow(crate, facts, said, next(file for file in made if file.path == MAIN))
+    _add_run(crate, facts, said, makers[0])
+    _describe_root(crate, facts, said, makers)
+    return (json.dumps(crate.metadata.generate(), indent=1, ensure_ascii=False) + "\n").encode()
 
 
-def _descriptor() -> Node:
+def _about(file: StoredFile) -> dict[str, Any]:
     return {
-        "@id": NAME,
-        "@type": "CreativeWork",
-        "about": {"@id": "./"},
-        "conformsTo": _references(
-            ["https://w3id.org/ro/crate/1.1", "https://w3id.org/workflowhub/workflow-ro-crate/1.0"]
-        ),
-    }
-
-
-def _root(facts: Facts, attribution: Attribution, parts: list[Node], makers: list[Node]) -> Node:
-    licence = attribution.licence
-    day: date = published(facts, attribution)
-    return {
-        "@id": "./",
-        "@type": "Dataset",
-        "name": title(facts),
-        "description": statements.summary(facts),
-        "datePublished": day.isoformat(),
-        "version": attribution.release,
-        "license": {"@id": licence.url} if licence.url else licence.name,
-        "author": one_or_many(_reference(maker) for maker in makers),
-        **_publisher(makers[0]),
-        "keywords": ", ".join(KEYWORDS),
-        "conformsTo": _references(PROFILES),
-        "hasPart": [_reference(part) for part in parts],
-        "mainEntity": {"@id": MAIN},
-        "mentions": {"@id": "#run"},
-        **({"url": attribution.url} if attribution.url else {}),
-    }
-
-
-def _publisher(maker: Node) -> Node:
-    """The first author if that is a group, or the affiliation of that person."""
-    publisher = maker.get("affiliation") if maker["@type"] == "Person" else _reference(maker)
-    return {"publisher": publisher} if publisher else {}
-
-
-def _file(file: StoredFile) -> Node:
-    readme = {"about": {"@id": "./"}} if file.path == "README.md" else {}
-    example = {"exampleOfWork": {"@id": "#input-configuration"}} if file.path == "config.yaml" else {}
-    return {
-        "@id": file.path,
-        "@type": "File",
-        "name": file.path.rpartition("/")[2],
-        "encodingFormat": media_type(file.path),
+        "name": file.name,
+        "encodingFormat": file.media_type,
         "contentSize": str(file.size),
         "sha256": file.sha256,
-        **readme,
-        **example,
     }
 
 
-def _store(facts: Facts) -> Node:
-    return {
-        "@id": f"{facts.store}/",
-        "@type": "Dataset",
-        "name": facts.store,
-        "description": "All arrays of the repository, as a Zarr hierarchy (format 3).",
-        "exampleOfWork": {"@id": "#output-repository"},
-    }
+def _add(crate: ROCrate, id: str, kind: str, **properties: Any) -> ContextEntity:
+    """Add what is no part of the crate; of two with one address the latter stays."""
+    return crate.add(ContextEntity(crate, id, properties={"@type": kind} | filled(**properties)))
 
 
-def _ledger() -> Node:
-    text = "A record of every finished job: checksums, seed, version of the code, time taken."
-    return {"@id": "ledger/", "@type": "Dataset", "name": "ledger", "description": text}
+def _describe_root(crate: ROCrate, facts: Facts, said: dict[str, Any], makers: list[ContextEntity]) -> None:
+    attribution, first = facts.attribution, makers[0]
+    licence = attribution.licence
+    terms = licence.url and _add(crate, licence.url, "CreativeWork", name=licence.name, identifier=licence.name)
+    properties = filled(
+        name=said["title"],
+        description=said["summary"],
+        datePublished=facts.published.isoformat(),
+        version=attribution.release,
+        license=terms or licence.name,
+        author=makers,
+        publisher=first.get("affiliation") if first.type == "Person" else first,
+        keywords=", ".join(said["keywords"]),
+        conformsTo=[crate.get(id) for id in PROFILES],
+        mentions=crate.get("#run"),
+        url=attribution.url,
+    )
+    for name, value in properties.items():
+        crate.root_dataset[name] = value
 
 
-def _main(facts: Facts, made: list[StoredFile]) -> Node:
-    file = next(file for file in made if file.path == MAIN)
-    return {
-        **_file(file),
-        "@type": ["File", "SoftwareSourceCode", "ComputationalWorkflow"],
+def _add_workflow(crate: ROCrate, facts: Facts, said: dict[str, Any], file: StoredFile) -> None:
+    """The Snakefile, what it takes and gives, and the packages that it needs; echotruth is the workflow itself."""
+    packages = {name: version for name, version in facts.run.packages.items() if name != "echotruth"}
+    properties = _about(file) | {
         "name": "echotruth run",
         "description": "From the geometry to scored trackers, for every heart and view; a job is a stage of echotruth.",
-        "encodingFormat": "text/plain",
-        "programmingLanguage": {"@id": "https://w3id.org/workflowhub/workflow-ro-crate#snakemake"},
-        "conformsTo": {"@id": "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"},
+        "conformsTo": crate.get(WORKFLOW_PROFILE),
         "version": facts.run.packages.get("echotruth", "not recorded"),
         "license": "BSD-3-Clause",
-        "url": HOMES["snakemake"],
-        "input": {"@id": "#input-configuration"},
-        "output": {"@id": "#output-repository"},
-        "softwareRequirements": one_or_many(map(_reference, _packages(facts))),
+        "url": "https://snakemake.github.io",
+        "softwareRequirements": [_package(crate, name, version, said["homes"]) for name, version in packages.items()],
     }
+    workflow = crate.add_workflow(dest_path=MAIN, properties=properties, main=True, lang="snakemake")
+    for role, name, kind, example in (
+        ("input", "configuration", "File", crate.get("config.yaml")),
+        ("output", "repository", "Dataset", crate.get(f"{facts.store}/")),
+    ):
+        workflow[role] = crate.add_formal_parameter(name, kind, f"#{role}-{name}", properties={"workExample": example})
+        example["exampleOfWork"] = workflow[role]
 
 
-def _action(facts: Facts, makers: list[Node]) -> Node:
+def _package(crate: ROCrate, name: str, version: str, homes: dict[str, str]) -> ContextEntity:
+    home = homes.get(name)
+    id = f"{home}#{version}" if home else f"#package-{name}"
+    return _add(crate, id, "SoftwareApplication", name=name, softwareVersion=version, url=home)
+
+
+def _add_run(crate: ROCrate, facts: Facts, said: dict[str, Any], agent: ContextEntity) -> None:
     run = facts.run
-    return {
-        "@id": "#run",
-        "@type": "CreateAction",
-        "name": f"Runs of echotruth that made {facts.name}",
-        "description": f"{run.jobs} jobs, {run.cpu_seconds / 3600:.2f} hours of one core. {statements.state(facts)} "
-        "Times are those of the records of the first and last job; there may have been pauses.",
-        "instrument": {"@id": MAIN},
-        "agent": _reference(makers[0]),
-        "startTime": run.started.isoformat(),
-        "endTime": run.ended.isoformat(),
-        "object": {"@id": "config.yaml"},
-        "result": {"@id": f"{facts.store}/"},
-        **({"actionStatus": "http://schema.org/CompletedActionStatus"} if facts.is_finished else {}),
-    }
+    is_finished = facts.is_published and not facts.missing_jobs
+    text = (
+        f"{run.jobs} jobs, {run.hours:.2f} hours of one core. {said['state']} "
+        "Times are those of the records of the first and last job; there may have been pauses."
+    )
+    properties = filled(
+        name=f"Runs of echotruth that made {facts.name}",
+        description=text,
+        agent=agent,
+        startTime=run.started.isoformat(),
+        endTime=run.ended.isoformat(),
+        actionStatus="http://schema.org/CompletedActionStatus" if is_finished else "",
+    )
+    workflow, taken, made = (crate.get(name) for name in (MAIN, "config.yaml", f"{facts.store}/"))
+    crate.add_action(workflow, "#run", object=taken, result=made, properties=properties)
 
 
-def _parameters(facts: Facts) -> list[Node]:
-    """What the workflow takes and gives."""
-    conforms = {"@id": "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE"}
-    taken: Node = {"name": "configuration", "additionalType": "File", "workExample": {"@id": "config.yaml"}}
-    given: Node = {"name": "repository", "additionalType": "Dataset", "workExample": {"@id": f"{facts.store}/"}}
-    kind: Node = {"@type": "FormalParameter", "conformsTo": conforms}
-    profiles = {
-        "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE": ("ComputationalWorkflow", "1.0-RELEASE"),
-        "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE": ("FormalParameter", "1.0-RELEASE"),
-    }
-    parameters = [{"@id": "#input-configuration"} | kind | taken, {"@id": "#output-repository"} | kind | given]
-    return [*parameters, *_works(profiles)]
-
-
-def _maker(author: Author) -> Node:
-    node: Node = {"@id": author.id, "@type": "Person" if author.is_person else "Organization", "name": author.name}
-    if author.affiliation:
-        return node | {"affiliation": {"@id": _affiliation(author)}}
-    return node | ({"url": author.url} if author.url and not author.is_person else {})
-
-
-def _affiliation(author: Author) -> str:
-    return author.url or f"#{slug(author.affiliation)}"
-
-
-def _affiliations(people: Iterable[Author]) -> list[Node]:
-    named = {_affiliation(one): one for one in people if one.affiliation}
-    nodes: dict[str, Node] = {id: {"@id": id, "@type": "Organization"} for id in named}
-    return [nodes[id] | {"name": one.affiliation} | ({"url": one.url} if one.url else {}) for id, one in named.items()]
-
-
-def _software(facts: Facts) -> list[Node]:
-    language: Node = {
-        "@id": "https://w3id.org/workflowhub/workflow-ro-crate#snakemake",
-        "@type": "ComputerLanguage",
-        "name": "Snakemake",
-        "identifier": {"@id": "https://doi.org/10.12688/f1000research.29032.2"},
-        "url": {"@id": HOMES["snakemake"]},
-    }
-    return [language, *_packages(facts)]
-
-
-def _packages(facts: Facts) -> list[Node]:
-    """The packages that the workflow needs; echotruth is the workflow itself."""
-    return [_package(name, number) for name, number in facts.run.packages.items() if name != "echotruth"]
-
-
-def _package(name: str, number: str) -> Node:
-    about: Node = {"@type": "SoftwareApplication", "name": name, "softwareVersion": number}
-    if name not in HOMES:
-        return about | {"@id": f"#package-{name}"}
-    return about | {"@id": f"{HOMES[name]}#{number}", "url": HOMES[name]}
-
-
-def _works(profiles: dict[str, tuple[str, str]]) -> list[Node]:
-    """Profiles, given their names and versions by address."""
-    return [
-        {"@id": address, "@type": "CreativeWork", "name": name, "version": number}
-        for address, (name, number) in profiles.items()
-    ]
-
-
-def _terms(attribution: Attribution) -> list[Node]:
-    licence = attribution.licence
-    if not licence.url:
-        return []
-    return [{"@id": licence.url, "@type": "CreativeWork", "name": licence.name, "identifier": licence.name}]
-
-
-def _reference(node: Node) -> Node:
-    return {"@id": node["@id"]}
-
-
-def _references(ids: Iterable[str]) -> Node | list[Node]:
-    return one_or_many({"@id": id} for id in ids)
+def _maker(crate: ROCrate, author: Author) -> ContextEntity:
+    """An author, with the affiliation if there is one."""
+    if not author.is_person:
+        return _add(crate, author.id, "Organization", name=author.name, url=author.url)
+    home = author.affiliation and _add(
+        crate, author.url or f"#{slug(author.affiliation)}", "Organization", name=author.affiliation, url=author.url
+    )
+    return _add(crate, author.id, "Person", name=author.name, affiliation=home)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import cache
 from io import StringIO
 from pathlib import Path
 
@@ -11,29 +12,11 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 
-from echotruth.repository import ledger
 from echotruth.repository.description.facts import Facts
 from echotruth.repository.description.files import damaged
 
 CLIPS, CHECKSUMS = "clips.csv", "checksums.sha256"
 """Names of the tables."""
-
-CLIP_COLUMNS = {
-    "case": "id of the heart, as in cases.csv",
-    "view": "name of the view",
-    "size_px": "pixels along a side",
-    "frames": "number of frames, the first at end-diastole",
-    "frame_time_s": "time from one frame to the next, s",
-    "pixel_axial_m": "height of a pixel, m",
-    "pixel_lateral_m": "width of a pixel, m",
-    "array": "path of the array in the store",
-    "case_row": "index of the heart along the dimension case",
-    "view_index": "index of the view along the dimension view",
-    "path": "file with the whole clip, a shard of the array",
-    "bytes": "size of that file",
-    "sha256": "SHA-256 of that file",
-}
-"""Columns of the table of clips -> what they hold."""
 
 
 def checksums(facts: Facts) -> bytes:
@@ -41,47 +24,51 @@ def checksums(facts: Facts) -> bytes:
     return "".join(f"{file.sha256}  {file.path}\n" for file in facts.files).encode()
 
 
-def clips(facts: Facts) -> bytes:
-    """Table of the clips: one row for each heart, view and size that has B-mode images."""
+def clips(facts: Facts, columns: Iterable[str]) -> bytes:
+    """Table of the clips: one row for each heart, view and size that has B-mode images.
+
+    Parameters
+    ----------
+    facts : Facts
+    columns : iterable of str
+        Names of the columns, in order.
+    """
     text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(CLIP_COLUMNS)
+    writer = csv.DictWriter(text, list(columns), lineterminator="\n")
+    writer.writeheader()
     writer.writerows(_rows(facts))
     return text.getvalue().encode()
 
 
-def _rows(facts: Facts) -> Iterator[list[object]]:
+def _rows(facts: Facts) -> Iterator[dict[str, object]]:
+    repository = facts.repository
     sizes = {file.path: file.size for file in facts.files}
-    cases, views = (ledger.rows(facts.folder / name) for name in ("registry.txt", "views.txt"))
-    views = views or {view: index for index, view in enumerate(facts.config.views)}
-    grids: dict[str, tuple[NDArray[np.float64], float, float]] = {}
-    for record, entries in facts.records:
-        if record.stage != "bmode":
-            continue
-        for path, checksum in sorted(entries.get("sha256", {}).items(), key=lambda item: _size(item[0])):
-            array = path.partition("/c/")[0]
-            group = array.rpartition("/")[0]
-            if group not in grids:
-                grids[group] = _grid(facts, group)
-            times, axial, lateral = grids[group]
-            row, view = cases[record.case], views[str(record.view)]
-            step = (times[row, -1] - times[row, 0]) / (times.shape[1] - 1) if times.shape[1] > 1 else 0.0
-            file = f"{facts.store}/{path}"
-            steps = (f"{x:.9g}" for x in (step, axial, lateral))
-            clip = [record.case, record.view, _size(path), times.shape[1], *steps]
-            yield [*clip, array, row, view, file, sizes[file], checksum]
+    read = cache(lambda path: _read(repository.folder, path))
+    images = [(job, *item) for job, written in facts.images.items() for item in written.items()]
+    for record, path, checksum in sorted(images, key=lambda image: (image[0].path, _size(image[1]))):
+        array, row = path.partition("/c/")[0], repository.rows[record.case]
+        group = (repository.store / array).parent
+        file = f"{facts.store}/{path}"
+        yield {
+            "case": record.case,
+            "view": record.view,
+            "size_px": _size(path),
+            "frames": read(group / "time").shape[1],
+            "frame_time_s": _step(read(group / "time")[row]),
+            "pixel_axial_m": _step(read(group / "axial")),
+            "pixel_lateral_m": _step(read(group / "lateral")),
+            "array": array,
+            "case_row": row,
+            "view_index": repository.views[str(record.view)],
+            "path": file,
+            "bytes": sizes[file],
+            "sha256": checksum,
+        }
 
 
 def _size(path: str) -> int:
     """Size of the images in a group, as 512 in bmode/512/image."""
     return next(int(part) for part in path.split("/") if part.isdigit())
-
-
-def _grid(facts: Facts, group: str) -> tuple[NDArray[np.float64], float, float]:
-    """Times of the frames (case, frame), s, and height and width of a pixel, m."""
-    store = facts.folder / facts.store
-    times, axial, lateral = (_read(facts.folder, store / group / name) for name in ("time", "axial", "lateral"))
-    return times, _step(axial), _step(lateral)
 
 
 def _read(folder: Path, path: Path) -> NDArray[np.float64]:
@@ -91,5 +78,6 @@ def _read(folder: Path, path: Path) -> NDArray[np.float64]:
         raise damaged(folder, path) from None
 
 
-def _step(values: NDArray[np.float64]) -> float:
-    return float((values[-1] - values[0]) / max(len(values) - 1, 1))
+def _step(values: NDArray[np.float64]) -> str:
+    """From one of evenly spaced values to the next."""
+    return f"{(values[-1] - values[0]) / max(len(values) - 1, 1):.9g}"
