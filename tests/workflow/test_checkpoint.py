@@ -18,10 +18,10 @@ from echotruth.evaluation.scoring import ground_truth, score
 from echotruth.notebook.points import load_points
 from echotruth.repository import ledger
 from echotruth.repository.rounding import CURVE
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job
 from echotruth.workflow.scripts.cases import lay_out
 from echotruth.workflow.series import BEGUN, command, run_ahead, run_series
+from echotruth.workflow.stage_cost import Cost
 
 pytestmark = pytest.mark.slow
 
@@ -155,7 +155,7 @@ import os, signal, sys
 from echotruth.workflow import job
 from echotruth.workflow.scripts import bmode
 bmode.work = lambda job: os.kill(os.getpid(), signal.SIGKILL)
-from echotruth.workflow.cost import Cost
+from echotruth.workflow.stage_cost import Cost
 from echotruth.workflow.series import command, run_series
 run_series(command().parse_args(), Cost())
 """

@@ -6,6 +6,7 @@ import argparse
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,11 +79,12 @@ def run(arguments: argparse.Namespace) -> int:
             from echotruth.cli.estimation import estimated, print_concerns
 
             found, concerns = estimated(config, cases, arguments.options)
-            expected, is_absurd = found.expected, any(concern.is_absurd for concern in concerns)
+            expected = {rule: part.seconds for rule, part in found.parts.items()}
+            is_absurd = any(concern.is_absurd for concern in concerns)
             if arguments.estimate:
-                from echotruth.workflow.estimate_text import heading, table
+                from echotruth.workflow.estimate import table
 
-                print(f"{heading(arguments.config, found)}\n\n{table(found, Path('out') / config.name)}")
+                print(f"{arguments.config}: {len(cases)} hearts\n\n{table(found, Path('out') / config.name)}")
             print_concerns(concerns, arguments.yes)
             if is_absurd and not arguments.yes:
                 return 2
@@ -158,22 +160,20 @@ def _make(
     folder: Path, config: Config, command: list[str], environment: dict[str, str], expected: dict[str, float]
 ) -> int:
     """Make a repository and its report; return the exit status."""
-    from echotruth.workflow.execution import execute
-    from echotruth.workflow.progress import write_expected
-    from echotruth.workflow.summary import Spent, finished, unfinished
+    from echotruth.workflow.execution import Snakemake, execute
+    from echotruth.workflow.progress import Progress
+    from echotruth.workflow.summary import finished, unfinished
 
-    spent = Spent()
-    log = folder / "logs/snakemake.log"
-    write_expected(folder / "logs", expected)
+    start, log = time.time(), folder / "logs/snakemake.log"
     if status := _remake(folder, config, command, environment):
         return status
-    status = execute(command, log, config.name, expected, environment)
+    status = execute([Snakemake(command, log)], config.name, Progress(expected), environment)
     if status == WRONG_OPTION:
         print("\nechotruth: Snakemake does not take these options: see echotruth run --help", file=sys.stderr)
     elif status:
         print(f"\nechotruth: {unfinished(folder)}", file=sys.stderr)
     elif (folder / "report.html").is_file():
-        lines, status = finished(folder, spent, config.physiology.exclude_implausible)
+        lines, status = finished(folder, start, config.physiology.exclude_implausible)
         print(lines)
     return status
 
@@ -183,12 +183,13 @@ def _remake(folder: Path, config: Config, command: list[str], environment: dict[
     if not (folder / "healing.json").is_file():
         return 0
     from echotruth.repository.healing import remake
-    from echotruth.workflow.execution import execute
+    from echotruth.workflow.execution import Snakemake, execute
+    from echotruth.workflow.progress import Progress
     from echotruth.workflow.series import ALONE
 
     def make(paths: list[str]) -> int:
         stage = Path(paths[0]).relative_to(folder / "ledger").parts[0].removesuffix(".json")
-        log = folder / f"logs/healing_{stage}.log"
-        return execute([*command, *paths], log, config.name, {}, environment | {ALONE: "1"})
+        run = Snakemake([*command, *paths], folder / f"logs/healing_{stage}.log")
+        return execute([run], config.name, Progress({}), environment | {ALONE: "1"})
 
     return remake(folder, config, make)

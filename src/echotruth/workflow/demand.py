@@ -1,4 +1,4 @@
-"""Time and memory that a job asks a cluster for, from what its work is expected to take.
+"""Time and memory that a job asks a cluster for, from the size of its work.
 
 Asked is three times the time and one and a half times the memory, because nodes differ.
 """
@@ -6,11 +6,10 @@ Asked is three times the time and one and a half times the memory, because nodes
 from __future__ import annotations
 
 from math import ceil
-from typing import NamedTuple
 
 from echotruth.config import Config
-from echotruth.workflow import expected_cost
-from echotruth.workflow.imaged_tissue import rough_ellipsoid
+from echotruth.workflow.cost import CELLS, PIXELS, cells, lens_size, seconds
+from echotruth.workflow.imaged_tissue import scatterers, wall_scatterers
 
 TIME_MARGIN = 3.0
 """Time asked for over the time expected."""
@@ -18,60 +17,37 @@ MEMORY_MARGIN = 1.5
 """Memory asked for over the memory expected."""
 START_SECONDS = 120.0
 """Time to start a process and, once, to compile its functions, s."""
+BASE_MB = 400.0
+"""Memory of a process with its modules."""
+SCATTERERS, FRAMES = 196_000, 40
+"""Scatterers and frames of the default heart, over which memory is fitted."""
 
 
-class Demand(NamedTuple):
-    """Time, min, and memory, MB, that a job asks for."""
-
-    minutes: int
-    megabytes: int
+def minutes(rule: str, config: Config, view: str = "", size: int = 0) -> int:
+    """Time that a job asks for, min; the arguments are those of :func:`.cost.units`."""
+    return ceil(TIME_MARGIN * (START_SECONDS + seconds(rule, config, view, size)) / 60)
 
 
-def mechanics(config: Config) -> Demand:
-    """Demand of the mechanics and the measures of a heart."""
-    return _demand(expected_cost.mechanics_seconds(config), expected_cost.mechanics_megabytes(config))
+def megabytes(rule: str, config: Config, view: str = "", size: int = 0) -> int:
+    """Memory that a job asks for, MB; the arguments are those of :func:`.cost.units`."""
+    return 100 * ceil(MEMORY_MARGIN * expected_megabytes(rule, config, view, size) / 100)
 
 
-def images(config: Config) -> Demand:
-    """Demand of the phantom, the truth, RF, B-mode, tracking and scores of a view, of the one that takes longest."""
-    return _demand(_seconds(config)[0], expected_cost.images_megabytes(config))
-
-
-def tracking(config: Config) -> Demand:
-    """Demand of the tracking and the scores of a view, of the one that takes longest."""
-    return _demand(_seconds(config)[1], expected_cost.tracking_megabytes(config))
-
-
-def publication(cases: int, views: int) -> Demand:
-    """Demand of the verification of a repository, and of its report."""
-    return _demand(60 + 0.5 * cases * views, 1100 + 0.1 * cases * views)
-
-
-_known: dict[tuple[object, ...], tuple[float, float, tuple[object, ...]]] = {}
-"""Expected times by wall and sections, which most hearts of a sweep share; the sections stay, so that no other gets the
-place of one of them in memory."""
-
-
-def _seconds(config: Config) -> tuple[float, float]:
-    """Expected CPU time of the longest view, s: of all its stages, and of tracking and scores alone."""
-    loop = config.loop.frames, config.motion.kind, config.geometry.file
-    sections: tuple[object, ...] = (
-        config.phantom,
-        config.probe,
-        config.rf,
-        config.realism,
-        config.bmode,
-        config.tracking,
-    )
-    sections += tuple(config.views.values())
-    key = (rough_ellipsoid(config), *loop, *map(id, sections))
-    if key not in _known:
-        views = [expected_cost.view_seconds(config, view, is_rough=True) for view in config.views]
-        whole = max(sum(view.values()) for view in views)
-        _known[key] = whole, max(view["tracking"] + view["evaluation"] for view in views), sections
-    return _known[key][:2]
-
-
-def _demand(seconds: float, megabytes: float) -> Demand:
-    minutes = ceil(TIME_MARGIN * (START_SECONDS + seconds) / 60)
-    return Demand(minutes, 100 * ceil(MEMORY_MARGIN * megabytes / 100))
+def expected_megabytes(rule: str, config: Config, view: str = "", size: int = 0) -> float:
+    """Peak memory of a job, MB; the arguments are those of :func:`.cost.units`."""
+    frames = config.loop.frames / FRAMES
+    match rule:
+        case "mechanics" if config.motion.kind == "file":
+            return BASE_MB + 180 * frames * cells(config) / CELLS
+        case "mechanics":
+            mesh = cells(config) / CELLS
+            return BASE_MB + 400 * mesh ** (4 / 3) + 50 * frames * mesh
+        case "phantom" | "rf":
+            # The tables of the lens are gone when echoes are made.
+            tables = 300 + 130 * lens_size(config) ** 4 if config.rf.elevation_beam else 0.0
+            lines = 450 * max(sum(scatterers(config, view)), wall_scatterers(config)) / SCATTERERS
+            return max(500.0, tables, BASE_MB + frames * (lines + (2000 if "channels" in config.rf.keep else 0)))
+        case "truth" | "bmode" | "tracking":
+            return BASE_MB + 720 * frames * size**2 / PIXELS
+        case _:
+            return 1100 + 0.1 * config.cases.number * len(config.views)

@@ -31,9 +31,9 @@ from echotruth.workflow import instructions, lease
 from echotruth.workflow.assignment import add_options, handed_case
 from echotruth.workflow.checkpoint import Checkpoints
 from echotruth.workflow.compiled import lock_cache_writes
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.failure import CaseFailed
 from echotruth.workflow.settings import mechanics_settings, stage_settings
+from echotruth.workflow.stage_cost import Cost
 
 Result = Mapping[str, Mapping[str, ArrayLike]]
 """Arrays by group."""

@@ -11,9 +11,9 @@ import shutil
 from importlib import import_module
 from pathlib import Path
 
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job, Work, carry_out, open_job, parser, prepare, skipped
 from echotruth.workflow.sharing import take_over
+from echotruth.workflow.stage_cost import Cost
 
 SCRIPTS = Path(__file__).parent / "scripts"
 BEGUN = "begun"

@@ -11,7 +11,7 @@ IMAGING = handed("phantom", "truth", "rf", "bmode", "tracking", "evaluation")
 def longest_first(wildcards):
     """Priority of a view, from 0 to 1: its expected time over that of the longest."""
     config = CASES[wildcards.case].config
-    seconds = {view: sum(expected_cost.view_seconds(config, view, is_rough=True).values()) for view in config.views}
+    seconds = {view: cost.seconds("rf", config, view) for view in config.views}
     return seconds[wildcards.view] / max(seconds.values())
 
 
@@ -33,8 +33,8 @@ rule imaging:
     log:
         FOLDER / "logs/imaging/{case}/{view}.log",
     resources:
-        runtime=minutes(demand.images),
-        mem_mb=megabytes(demand.images),
+        runtime=minutes("rf"),
+        mem_mb=megabytes("rf"),
     shell:
         """
         {{

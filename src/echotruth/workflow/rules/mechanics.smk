@@ -32,8 +32,8 @@ rule mechanics:
     threads: max(1, ((workflow.cores or 1) - (not Path(MARK).exists())) // len(CASES))
     priority: 3
     resources:
-        runtime=minutes(demand.mechanics),
-        mem_mb=megabytes(demand.mechanics),
+        runtime=minutes("mechanics"),
+        mem_mb=megabytes("mechanics"),
     shell:
         """
         {{

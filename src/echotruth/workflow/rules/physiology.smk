@@ -19,8 +19,8 @@ rule physiology:
     log:
         FOLDER / "logs/physiology/{case}.log",
     resources:
-        runtime=minutes(demand.mechanics),
-        mem_mb=megabytes(demand.mechanics),
+        runtime=minutes("mechanics"),
+        mem_mb=megabytes("mechanics"),
     shell:
         """
         {{

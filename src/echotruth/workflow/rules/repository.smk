@@ -31,7 +31,7 @@ rule repository:
     group:
         "report"
     resources:
-        runtime=lambda wildcards, attempt: attempt * demand.publication(len(CASES), len(CONFIG.views)).minutes,
-        mem_mb=lambda wildcards, attempt: attempt * demand.publication(len(CASES), len(CONFIG.views)).megabytes,
+        runtime=lambda wildcards, attempt: attempt * demand.minutes("repository", CONFIG),
+        mem_mb=lambda wildcards, attempt: attempt * demand.megabytes("repository", CONFIG),
     shell:
         "{RUN}/repository.py {FOLDER} &> {log}"

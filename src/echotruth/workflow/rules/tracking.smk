@@ -23,8 +23,8 @@ rule tracking:
     log:
         FOLDER / "logs/tracking/{case}/{view}.log",
     resources:
-        runtime=minutes(demand.tracking),
-        mem_mb=megabytes(demand.tracking),
+        runtime=minutes("tracking"),
+        mem_mb=megabytes("tracking"),
     shell:
         """
         {{

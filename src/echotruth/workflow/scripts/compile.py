@@ -19,9 +19,9 @@ from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.workflow import lease
 from echotruth.workflow.assignment import single
 from echotruth.workflow.compiled import CACHE_GROUPS
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import parser, run
 from echotruth.workflow.miniature import miniature
+from echotruth.workflow.stage_cost import Cost
 
 STAGES = CACHE_GROUPS["view"]
 

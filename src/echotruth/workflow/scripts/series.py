@@ -6,8 +6,8 @@ gc.disable()  # Modules stay: garbage is not looked for among them while they ar
 
 import os
 
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.series import ALONE, command, run_ahead, run_series
+from echotruth.workflow.stage_cost import Cost
 
 gc.freeze()
 gc.enable()
