@@ -84,7 +84,8 @@ def run(arguments: argparse.Namespace) -> int:
             if arguments.estimate:
                 from echotruth.workflow.estimate import table
 
-                print(f"{arguments.config}: {len(cases)} hearts\n\n{table(found, Path('out') / config.name)}")
+                print(f"{arguments.config}: hearts: {len(cases)}, views of each: {len(config.views)}\n")
+                print(table(found, Path("out") / config.name))
             print_concerns(concerns, arguments.yes)
             if is_absurd and not arguments.yes:
                 return 2

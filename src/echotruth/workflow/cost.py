@@ -6,7 +6,7 @@ one is, by the files that Snakemake's `benchmark` writes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from csv import DictReader
 from itertools import islice
 from math import sqrt
@@ -63,25 +63,7 @@ def units(rule: str, config: Config, view: str = "", size: int = 0) -> float:
     size : int
         Image size, px, likewise.
     """
-    frames, work = config.loop.frames, 1.0
-    match rule:
-        case "mechanics":
-            work = _mechanics(config)
-        case "phantom":
-            # The tables of the lens take as long as some million scatterers.
-            seeded = max(sum(scatterers(config, view)), wall_scatterers(config))
-            work = 4.9 * lens_size(config) ** 1.5 + frames * seeded / 1e6
-        case "rf":
-            work = _rf(config, view) / 1e6
-        case "truth":
-            work = frames * wall_pixels(config, view, size) / 1e6
-        case "bmode":
-            work = frames * size**2 / 1e6
-        case "tracking":
-            work = _tracking(config, view, size)
-        case "repository":
-            work = 30 + config.cases.number * len(config.views)
-    return work
+    return UNITS[kind(rule)](config, view, size)
 
 
 def cells(config: Config) -> float:
@@ -114,6 +96,12 @@ def _mechanics(config: Config) -> float:
     # The steps that inflate the heart and carry it through the cycle depend little on the number of frames.
     step = size**1.3
     return (88 * step + frames * (0.6 + step)) * (2 if config.geometry.given_state == "end_diastole" else 1)
+
+
+def _phantom(config: Config, view: str) -> float:
+    """Scatterers that are seeded and moved; the tables of the lens take as long as some million."""
+    seeded = max(sum(scatterers(config, view)), wall_scatterers(config))
+    return 4.9e6 * lens_size(config) ** 1.5 + config.loop.frames * seeded
 
 
 def _rf(config: Config, view: str) -> float:
@@ -161,6 +149,19 @@ def _tracker(tracker: Any, pixels: float, points: float, scale: float) -> float:
         case "bspline_dic":
             amount = ways * sqrt(pixels * points) * 0.4 / (tracker.knots_mm * scale)
     return amount * TRACKERS[tracker.method]
+
+
+UNITS: dict[str, Callable[[Config, str, int], float]] = {
+    "mechanics": lambda config, *_: _mechanics(config),
+    "phantom": lambda config, view, _: _phantom(config, view) / 1e6,
+    "rf": lambda config, view, _: _rf(config, view) / 1e6,
+    "truth": lambda config, view, size: config.loop.frames * wall_pixels(config, view, size) / 1e6,
+    "bmode": lambda config, _, size: config.loop.frames * size**2 / 1e6,
+    "tracking": _tracking,
+    "repository": lambda config, *_: 30 + config.cases.number * len(config.views),
+    "report": lambda *_: 1.0,
+}
+"""Rule -> work of one of its jobs."""
 
 
 def speed(folder: Path, configs: Mapping[str, Config]) -> dict[str, float]:
