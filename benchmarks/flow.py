@@ -35,9 +35,9 @@ from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
 from echotruth.learning import FlowPairs
 from echotruth.repository.rounding import length_quantum, rounded
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job
 from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.stage_cost import Cost
 
 RESULTS = Path(__file__).parent / "results"
 SMALL = {"circumferential_elements": 12, "longitudinal_elements": 8, "transmural_elements": 2}

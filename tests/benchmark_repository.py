@@ -15,10 +15,10 @@ from echotruth.imaging.truth import pixel_truth
 from echotruth.repository import ledger
 from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.repository.publication import publish
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job
 from echotruth.workflow.scripts import evaluation, tracking
 from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.stage_cost import Cost
 
 TABLE = """case,seed,loop.heart_rate_per_min,label.heart,label.split,label.group,label.acoustics,label.variation
 a_ideal,1,500,a,test,healthy,ideal,none

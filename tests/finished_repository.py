@@ -14,9 +14,9 @@ from echotruth.repository import ledger, packing, schema
 from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.repository.publication import publish
 from echotruth.repository.store import Store, packs_of, schema_of
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job
 from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.stage_cost import Cost
 
 SIZE, FRAMES = 64, 3
 

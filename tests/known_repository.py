@@ -18,9 +18,9 @@ from echotruth.imaging.view import imaging_plane
 from echotruth.repository import ledger
 from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.repository.publication import publish
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job
 from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.stage_cost import Cost
 
 SIZES = (128, 64)
 FRAMES = finished_repository.FRAMES

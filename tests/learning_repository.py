@@ -14,9 +14,9 @@ from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
 from echotruth.repository import ledger
 from echotruth.repository.publication import publish
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job
 from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.stage_cost import Cost
 
 GRADIENT = [[0.9, 0.05, 0.0], [0.0, 1.1, 0.0], [0.2, 0.0, 1.0]]
 """Rows lateral, axial, elevation: part of the tissue leaves the plane of a short-axis view."""

@@ -9,15 +9,12 @@ from cli.test_cli import run_cli
 from echotruth.cases import expand
 from echotruth.cli.estimation import estimated
 from echotruth.config import Config
-from echotruth.workflow.machine_speed import Speed
 
 ABSURD = """
 name: absurd
 geometry: {preset: human}
-probe: {preset: mouse_25MHz}
-rf: {focus_mm: 70}
-bmode: {field_of_view_mm: 150}
-phantom: {density_per_mm3: 5}
+rf: {focus_mm: 40, focal_zones: 1}
+bmode: {field_of_view_mm: 45}
 """
 
 
@@ -32,7 +29,7 @@ def test_estimate_runs_nothing_and_writes_nothing(folder):
     before = set(folder.rglob("*"))
     status, output, errors = run_cli("run", "small.yaml", "--estimate", "--cores", "4", cwd=folder)
     assert status == 0 and not errors
-    for word in ("2 hearts", "mechanics", "tracking", "on 4 cores", "GB for the largest job", "files"):
+    for word in ("hearts: 2, views of each: 4", "mechanics", "tracking", "on 4 cores", "GB for the largest job", "files"):
         assert word in output
     assert set(folder.rglob("*")) == before
 
@@ -40,14 +37,14 @@ def test_estimate_runs_nothing_and_writes_nothing(folder):
 @pytest.mark.parametrize("options", [[], ["--estimate"], ["--cores", "2"]])
 def test_absurd_is_refused_in_one_sentence_that_names_the_key(folder, options):
     status, _, errors = run_cli("run", "absurd.yaml", *options, cwd=folder)
-    assert status == 2 and "echotruth: probe.frequency_MHz = 25:" in errors
+    assert status == 2 and "echotruth: bmode.field_of_view_mm = 45:" in errors
     assert not (folder / "out").exists()
 
 
 def test_absurd_is_run_if_it_is_asked_for_all_the_same(folder):
     with patch("echotruth.cli.run.make_repository", return_value=0) as make:
         status, _, errors = run_cli("run", "absurd.yaml", "--yes", cwd=folder)
-    assert status == 0 and make.called and "echotruth: probe" not in errors
+    assert status == 0 and make.called and "echotruth: bmode" not in errors
 
 
 def test_check_tells_what_a_run_takes(folder):
@@ -57,7 +54,7 @@ def test_check_tells_what_a_run_takes(folder):
 
 def test_check_fails_where_a_run_would_be_refused(folder):
     status, output, errors = run_cli("check", "absurd.yaml", cwd=folder)
-    assert status == 1 and "absurd.yaml: valid" in output and "echotruth: probe.frequency_MHz = 25:" in errors
+    assert status == 1 and "absurd.yaml: valid" in output and "echotruth: bmode.field_of_view_mm = 45:" in errors
 
 
 @pytest.mark.parametrize("options, cores", [
@@ -67,4 +64,4 @@ def test_check_fails_where_a_run_would_be_refused(folder):
 def test_cores_are_those_that_the_options_give(tmp_path, options, cores):
     with chdir(tmp_path):
         found, _ = estimated(Config(), expand(Config()), options)
-    assert found.cores == cores and found.speed == Speed({})
+    assert found.cores == cores

@@ -20,8 +20,8 @@ from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.repository.publication import publish
 from echotruth.repository.store import Store, schema_of
 from echotruth.tracking import grid
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job
+from echotruth.workflow.stage_cost import Cost
 
 CONFIG = Config(
     name="small",

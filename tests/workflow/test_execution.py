@@ -10,16 +10,24 @@ import psutil
 import pytest
 
 from echotruth.workflow import lease
-from echotruth.workflow.execution import LOG_LINES, execute
+from echotruth.workflow.execution import LOG_LINES, Snakemake, execute
+from echotruth.workflow.progress import Progress
 
 
 def python(code):
     return [sys.executable, "-c", code]
 
 
+def run(*codes, log, at_once=1):
+    """Run programs that stand for Snakemakes, the first with this log and each other with one beside it."""
+    logs = [log, *(log.with_stem(f"{log.stem}_{number}") for number in range(1, len(codes)))]
+    runs = [Snakemake(python(code), path) for code, path in zip(codes, logs, strict=True)]
+    return execute(runs, "demo", Progress({}), at_once=at_once)
+
+
 def test_words_of_snakemake_are_in_the_log_and_not_on_the_terminal(tmp_path, capfd):
     log = tmp_path / "logs/snakemake.log"
-    assert execute(python("print('Building DAG of jobs...')"), log, "demo", {}) == 0
+    assert run("print('Building DAG of jobs...')", log=log) == 0
     assert "Building DAG" in log.read_text()
     assert capfd.readouterr() == ("", "")
 
@@ -27,8 +35,8 @@ def test_words_of_snakemake_are_in_the_log_and_not_on_the_terminal(tmp_path, cap
 def test_failed_job_is_reported_by_the_end_of_its_log_and_the_status(tmp_path, capfd):
     job = tmp_path / "mid.log"
     job.write_text("\n".join(f"line {number}" for number in range(100)))
-    output = f"Error in rule imaging:\n    jobid: 3\n    log: {job} (check log file(s) for error details)\n"
-    assert execute(python(f"print({output!r}); exit(1)"), tmp_path / "snakemake.log", "demo", {}) == 1
+    output = f"Error in rule rf:\n    jobid: 3\n    log: {job} (check log file(s) for error details)\n"
+    assert run(f"print({output!r}); exit(1)", log=tmp_path / "snakemake.log") == 1
     message = capfd.readouterr().err
     assert f"The last lines of {job}" in message and "line 99" in message
     assert f"line {100 - LOG_LINES}\n" in message and f"line {99 - LOG_LINES}\n" not in message
@@ -36,9 +44,28 @@ def test_failed_job_is_reported_by_the_end_of_its_log_and_the_status(tmp_path, c
 
 def test_failure_before_any_job_is_reported_by_snakemakes_own_log(tmp_path, capfd):
     log = tmp_path / "snakemake.log"
-    assert execute(python("print('no such rule'); exit(2)"), log, "demo", {}) == 2
+    assert run("print('no such rule'); exit(2)", log=log) == 2
     message = capfd.readouterr().err
     assert str(log) in message and "no such rule" in message
+
+
+def test_failed_jobs_of_one_snakemake_do_not_keep_the_next_from_running(tmp_path, capfd):
+    log = tmp_path / "snakemake.log"
+    assert run("exit(1)", "print('second')", log=log) == 1
+    assert "second" in (tmp_path / "snakemake_1.log").read_text()
+    assert run("exit(2)", "print('third')", log=tmp_path / "wrong.log") == 2
+    assert not (tmp_path / "wrong_1.log").exists(), "an option that is wrong is wrong for all"
+
+
+def test_snakemakes_run_one_after_another_or_side_by_side(tmp_path):
+    """Each waits for the file of the other: alone, it ends without it."""
+    code = "import sys, time; from pathlib import Path; Path({0!r}).touch(); end = time.monotonic() + {2}\n"
+    code += "while not Path({1!r}).exists():\n    time.monotonic() < end or sys.exit(1)\n    time.sleep(0.05)"
+    one, other = str(tmp_path / "one"), str(tmp_path / "other")
+    assert run(code.format(one, other, 0.5), log=tmp_path / "alone.log") == 1
+    (tmp_path / "one").unlink()
+    pair = code.format(one, other, 60), code.format(other, one, 60)
+    assert run(*pair, log=tmp_path / "pair.log", at_once=2) == 0
 
 
 def is_running(number):
@@ -60,7 +87,8 @@ from echotruth.workflow import execution
 # A shell may start background processes with SIGINT ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 execution.TERMINATION_SECONDS = 0.5
-execution.execute([sys.executable, "-c", sys.argv[1]], Path(sys.argv[2]), "demo", {})
+run = execution.Snakemake([sys.executable, "-c", sys.argv[1]], Path(sys.argv[2]))
+execution.execute([run], "demo", execution.Progress({}))
 """
 
 
@@ -106,7 +134,8 @@ folder = Path(sys.argv[2])
 with lease.held(folder) as run:
     environment = os.environ | {lease.VARIABLE: run}
     command = [sys.executable, "-c", sys.argv[1], *sys.argv[2:]]
-    sys.exit(execution.execute(command, folder / "snakemake.log", "demo", {}, environment))
+    run = execution.Snakemake(command, folder / "snakemake.log")
+    sys.exit(execution.execute([run], "demo", execution.Progress({}), environment))
 """
 
 

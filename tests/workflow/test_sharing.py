@@ -10,12 +10,12 @@ from echotruth.config.loading import validate
 from echotruth.repository import ledger
 from echotruth.repository.checksums import verify
 from echotruth.repository.store import Store
-from echotruth.workflow.cost import Cost
 from echotruth.workflow.job import Job
 from echotruth.workflow.scripts.cases import lay_out
 from echotruth.workflow.series import command, run_series
 from echotruth.workflow.settings import mechanics_settings, motions
 from echotruth.workflow.sharing import first_with_same
+from echotruth.workflow.stage_cost import Cost
 
 SETTINGS = {
     "name": "small",

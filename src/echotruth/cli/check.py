@@ -47,7 +47,7 @@ def check(arguments: argparse.Namespace) -> int:
     config, cases = load_cases(arguments.config, f"a YAML file, {LISTED}, or the folder of a repository")
     print(f"{arguments.config}: valid; cases: {len(cases)}, views per case: {len(config.views)}")
     from echotruth.cli.estimation import estimated, print_concerns
-    from echotruth.workflow.estimate_text import short
+    from echotruth.workflow.estimate import short
 
     found, concerns = estimated(config, cases, [])
     print(f"A run takes {short(found)}.")

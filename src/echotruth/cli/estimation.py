@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 from collections.abc import Sequence
@@ -15,9 +16,6 @@ from echotruth.cli.snakemake import PROFILE_OPTIONS, WORKFLOW, with_profiles
 from echotruth.config import Config
 from echotruth.workflow.concerns import Concern, concerns
 from echotruth.workflow.estimate import Estimate, estimate
-from echotruth.workflow.machine_speed import Speed, measured_speed
-
-CORES = ("--cores", "-c", "--jobs", "-j")
 
 
 def estimated(config: Config, cases: Sequence[Case], options: list[str]) -> tuple[Estimate, list[Concern]]:
@@ -32,12 +30,9 @@ def estimated(config: Config, cases: Sequence[Case], options: list[str]) -> tupl
         Options for Snakemake.
     """
     folder = Path("out") / config.name
-    profile = profile_content(options)
-    is_local = profile is None or profile.get("executor", "local") == "local"
-    # What other machines take is not known from the repositories that were made on this one.
-    speed = measured_speed(folder.parent) if is_local else Speed({})
-    found = estimate(config, cases, _cores(options, profile), speed, folder)
-    return found, concerns(config, found, folder, is_local)
+    profile = profile_content(options) or {}
+    found = estimate(config, cases, _cores(options, profile), folder)
+    return found, concerns(config, found, folder, profile.get("executor", "local") == "local")
 
 
 def print_concerns(found: Sequence[Concern], is_accepted: bool = False) -> None:
@@ -56,16 +51,13 @@ def print_concerns(found: Sequence[Concern], is_accepted: bool = False) -> None:
             print(f"echotruth: {concern.text} (`echotruth run --yes` runs it all the same)", file=sys.stderr)
 
 
-def _cores(options: list[str], profile: dict[str, object] | None) -> int:
+def _cores(options: list[str], profile: dict[str, object]) -> int:
     """Jobs at the same time: as the options say, else the profile, else the cores of this machine."""
-    joined = [part for option in options for part in option.split("=", 1)]
-    for flag, value in pairwise([*joined, ""]):
-        if flag in CORES and value.isdigit():
-            return max(1, int(value))
-        if flag[:2] in CORES and flag[2:].isdigit():
-            return max(1, int(flag[2:]))
-    jobs = (profile or {}).get("jobs")
-    return jobs if isinstance(jobs, int) and jobs > 0 else _available_cores()
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    parser.add_argument("--cores", "-c", "--jobs", "-j", dest="cores", nargs="?")
+    given = parser.parse_known_args(options)[0].cores or str(profile.get("jobs"))
+    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return int(given) if given.isdigit() else available
 
 
 def profile_content(options: list[str]) -> dict[str, object] | None:
@@ -77,8 +69,3 @@ def profile_content(options: list[str]) -> dict[str, object] | None:
                     content = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
                     return content if isinstance(content, dict) else None
     return None
-
-
-def _available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

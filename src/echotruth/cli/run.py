@@ -6,13 +6,16 @@ import argparse
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echotruth.cli.command import Commands, add_command, add_configuration, fail
-from echotruth.cli.snakemake import WORKFLOW, executor_error, is_query, option_errors, with_profiles
+from echotruth.cli.snakemake import executor_error, is_query, option_errors, with_profiles
+from echotruth.config import shipped
 
 if TYPE_CHECKING:
+    from echotruth.cases import Case
     from echotruth.config import Config
 
 WRONG_OPTION = 2
@@ -33,7 +36,18 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--yes", action="store_true", help="run it even if the estimate says that it does not fit or makes no sense"
     )
+    text_of_block = "a larger sweep is planned by Snakemake in blocks of so many hearts (default: %(default)s)"
+    parser.add_argument("--hearts-per-block", type=count, default=50, metavar="N", help=text_of_block)
+    text_of_number = "blocks that are made side by side, each with --cores or --jobs of its own (default: %(default)s)"
+    parser.add_argument("--blocks-at-once", type=count, default=1, metavar="N", help=text_of_number)
     parser.add_argument("--upload", metavar="s3://BUCKET/FOLDER", help=text)
+
+
+def count(text: str) -> int:
+    """Whole number above 0, as an option gives it."""
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number above 0")
+    return int(text)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -46,7 +60,6 @@ def run(arguments: argparse.Namespace) -> int:
       --cores N             number of processor cores (default: all)
       -n                    only list the jobs
       --profile NAME        where jobs run: default, slurm, or a folder with a profile (docs/cluster.md)
-      --batch repository=1/10  only the first tenth of the hearts, then 2/10 and so on: plans a large sweep in pieces
       --rerun-triggers mtime  do not make again what other settings or code would change
 
     examples:
@@ -73,38 +86,50 @@ def run(arguments: argparse.Namespace) -> int:
             from echotruth.cli.estimation import estimated, print_concerns
 
             found, concerns = estimated(config, cases, arguments.options)
-            expected, is_absurd = found.expected, any(concern.is_absurd for concern in concerns)
+            expected = {rule: part.seconds for rule, part in found.parts.items()}
+            is_absurd = any(concern.is_absurd for concern in concerns)
             if arguments.estimate:
-                from echotruth.workflow.estimate_text import heading, table
+                from echotruth.workflow.estimate import table
 
-                print(f"{heading(arguments.config, found)}\n\n{table(found, Path('out') / config.name)}")
+                print(f"{arguments.config}: hearts: {len(cases)}, views of each: {len(config.views)}\n")
+                print(table(found, Path("out") / config.name))
             print_concerns(concerns, arguments.yes)
             if is_absurd and not arguments.yes:
                 return 2
             if arguments.estimate:
                 return 0
-        return _started(arguments, config, expected)
+        return _started(arguments, config, cases, expected)
     except KeyboardInterrupt:
         sys.exit("echotruth: interrupted; run the same command again to continue")
     except OSError as error:
         sys.exit(f"echotruth: {error.filename or arguments.config}: {error.strerror or error}: {WRITABLE}")
 
 
-def _started(arguments: argparse.Namespace, config: Config, expected: dict[str, float]) -> int:
+def _started(
+    arguments: argparse.Namespace, config: Config, cases: list[Case], expected: dict[str, float]
+) -> int:
     """Make a repository, unless the package that starts jobs elsewhere is missing; return the exit status."""
     from echotruth.cli.estimation import profile_content
 
     if error := executor_error((profile_content(arguments.options) or {}).get("executor")):
         return fail(error)
-    return make_repository(arguments.config, config, arguments.options, arguments.upload, expected)
+    if any(map(is_query, arguments.options)):
+        return subprocess.call(snakemake(arguments.config, arguments.options))
+    return make_repository(arguments, config, cases, expected)
+
+
+def snakemake(path: Path | str, options: list[str]) -> list[str]:
+    """Command that runs the workflow of a configuration file.
+
+    Snakemake's own lock is that of the working folder, where other names may run; a repository has its lease.
+    """
+    command = [sys.executable, "-m", "snakemake", "--snakefile", str(shipped.ROOT / "Snakefile")]
+    # Not at the end: --configfile takes all that follows, files to make too.
+    return [*command, "--configfile", str(path), "--nolock", *with_profiles(options)]
 
 
 def make_repository(
-    path: str,
-    config: Config,
-    options: list[str],
-    url: str | None,
-    expected: dict[str, float],
+    arguments: argparse.Namespace, config: Config, cases: list[Case], expected: dict[str, float]
 ) -> int:
     """Run the workflow of a configuration and write its report; return the exit status of Snakemake.
 
@@ -113,29 +138,21 @@ def make_repository(
 
     Parameters
     ----------
-    path : str
-        Path of the configuration file.
+    arguments : Namespace
+        Options for Snakemake, such as `--cores 4`; the address in object storage to which everything is uploaded, or
+        None; hearts in a block, and blocks at once.
     config : Config
-        The configuration in that file.
-    options : list of str
-        Options for Snakemake, such as `--cores 4` or `-n`.
-    url : str or None
-        Address in object storage to which everything is uploaded when it is committed.
+    cases : list of Case
+        Its hearts.
     expected : dict
         Rule -> expected duration of one of its jobs, s.
     """
     from echotruth.workflow import lease
 
-    folder = Path("out") / config.name
-    # Snakemake's own lock is that of the working folder, where other names may run; a repository has its lease.
-    # Not at the end: --configfile takes all that follows, files to make too.
-    command = [sys.executable, "-m", "snakemake", "--snakefile", str(WORKFLOW / "Snakefile")]
-    command += ["--configfile", path, "--nolock", *with_profiles(options)]
-    if any(map(is_query, options)):
-        return subprocess.call(command)
+    folder, url = Path("out") / config.name, arguments.upload
     if url is None:
         with lease.held(folder) as name:
-            return _make(folder, config, command, os.environ | {lease.VARIABLE: name}, expected)
+            return _make(arguments, config, cases, os.environ | {lease.VARIABLE: name}, expected)
     from echotruth.repository.remote import Remote, RemoteError
     from echotruth.workflow.uploading import uploading
 
@@ -144,46 +161,43 @@ def make_repository(
     except RemoteError as error:
         return fail(str(error))
     with lease.held(folder) as name, uploading(folder, remote) as upload:
-        status = _make(folder, config, command, os.environ | {lease.VARIABLE: name}, expected)
+        status = _make(arguments, config, cases, os.environ | {lease.VARIABLE: name}, expected)
         not_uploaded = upload.finish()
     return status or not_uploaded
 
 
 def _make(
-    folder: Path, config: Config, command: list[str], environment: dict[str, str], expected: dict[str, float]
+    arguments: argparse.Namespace,
+    config: Config,
+    cases: list[Case],
+    environment: dict[str, str],
+    expected: dict[str, float],
 ) -> int:
     """Make a repository and its report; return the exit status."""
+    from echotruth.mechanics.geometry import GeometryError
+    from echotruth.mechanics.prescribed import MotionError
+    from echotruth.repository.layout import lay_out
     from echotruth.workflow.execution import execute
-    from echotruth.workflow.progress import write_expected
-    from echotruth.workflow.summary import Spent, finished, unfinished
+    from echotruth.workflow.progress import Progress
+    from echotruth.workflow.running import Running
+    from echotruth.workflow.summary import finished, unfinished
 
-    spent = Spent()
-    log = folder / "logs/snakemake.log"
-    write_expected(folder / "logs", expected)
-    if status := _remake(folder, config, command, environment):
-        return status
-    status = execute(command, log, config.name, expected, environment)
+    start, folder = time.time(), Path("out") / config.name
+    try:
+        lay_out(folder, config, cases)
+    except (GeometryError, MotionError) as error:
+        return fail(f"{arguments.config}: {error}")
+    # The copy in the repository: the file may change while jobs wait in a queue.
+    command = snakemake(folder / "config.yaml", arguments.options)
+    running = Running(folder, config, command, arguments.hearts_per_block)
+    status = execute(running.hearts(), config.name, Progress(expected), environment, arguments.blocks_at_once)
+    if not status:
+        status = execute(running.end(), config.name, Progress(expected), environment)
     if status == WRONG_OPTION:
         print("\nechotruth: Snakemake does not take these options: see echotruth run --help", file=sys.stderr)
     elif status:
         print(f"\nechotruth: {unfinished(folder)}", file=sys.stderr)
     elif (folder / "report.html").is_file():
-        lines, status = finished(folder, spent, config.physiology.exclude_implausible)
+        lines, status = finished(folder, start, config.physiology.exclude_implausible)
         print(lines)
     return status
-
-
-def _remake(folder: Path, config: Config, command: list[str], environment: dict[str, str]) -> int:
-    """Make what `echotruth check --heal` dropped, and nothing that depends on it; return the exit status."""
-    if not (folder / "healing.json").is_file():
-        return 0
-    from echotruth.repository.healing import remake
-    from echotruth.workflow.execution import execute
-    from echotruth.workflow.series import ALONE
-
-    def make(paths: list[str]) -> int:
-        stage = Path(paths[0]).relative_to(folder / "ledger").parts[0].removesuffix(".json")
-        log = folder / f"logs/healing_{stage}.log"
-        return execute([*command, *paths], log, config.name, {}, environment | {ALONE: "1"})
-
-    return remake(folder, config, make)

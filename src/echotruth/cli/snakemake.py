@@ -7,12 +7,10 @@ from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 
-import echotruth
+from echotruth.config import shipped
 
-WORKFLOW = Path(echotruth.__file__).parent / "workflow"
-"""Folder of the Snakefile, which travels with the package."""
-
-PROFILES = sorted(path.name for path in (WORKFLOW / "profiles").iterdir())
+FOLDER = shipped.ROOT / "workflow/profiles"
+PROFILES = sorted(path.name for path in FOLDER.iterdir())
 """Profiles of the package, which `--profile` takes by their name."""
 
 PROFILE_OPTIONS = ("--profile", "--workflow-profile")
@@ -39,7 +37,7 @@ def with_profiles(options: list[str]) -> list[str]:
     options = [part for option in options for part in (option.split("=", 1) if option.startswith(joined) else [option])]
     for place, (flag, name) in enumerate(pairwise(tuple(options))):
         if flag in PROFILE_OPTIONS and name in PROFILES and not Path(name).is_dir():
-            options[place : place + 2] = ["--workflow-profile", str(WORKFLOW / "profiles" / name)]
+            options[place : place + 2] = ["--workflow-profile", str(FOLDER / name)]
     return options
 
 

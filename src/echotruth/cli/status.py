@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from pathlib import Path
@@ -43,21 +44,19 @@ def status(arguments: argparse.Namespace) -> int:
       2  it is not a repository
       3  a run works on it
     """
-    from echotruth.workflow.status import StatusError, dumped
-    from echotruth.workflow.status_text import text
+    from echotruth.workflow.status import StatusError, text
 
-    is_drawn = sys.stdout.isatty() and not arguments.json
-    last = ""
+    is_drawn, last = sys.stdout.isatty() and not arguments.json and arguments.watch, ""
     try:
         while True:
             found = _found(arguments.path)
-            shown = dumped(found) if arguments.json else text(found)
+            shown = json.dumps(found, indent=2) if arguments.json else text(found)
             if shown != last:
                 # On a terminal the earlier text is replaced, elsewhere another follows it.
-                print(f"\033[H\033[2J{shown}" if is_drawn and arguments.watch else shown, flush=True)
+                print(f"\033[H\033[2J{shown}" if is_drawn else shown, flush=True)
             last = shown
-            if not arguments.watch or found.state != "running":
-                return {"finished": 0, "running": 3}.get(found.state, 1)
+            if not arguments.watch or found["state"] != "running":
+                return {"finished": 0, "running": 3}.get(found["state"], 1)
             time.sleep(WATCH_SECONDS)
     except StatusError as error:
         return fail(str(error))
@@ -68,10 +67,9 @@ def status(arguments: argparse.Namespace) -> int:
 def _found(path: Path) -> Status:
     from echotruth.workflow.status import status_before, status_of
 
-    if not path.is_file() or path.suffix not in (".yaml", ".yml"):
+    if path.suffix not in (".yaml", ".yml") or not path.is_file():
         return status_of(path.parent if path.suffix == ".zarr" else path)
     from echotruth.cli.configuration import load_cases
 
     config, cases = load_cases(str(path))
-    folder = Path("out") / config.name
-    return status_before(config, [case.id for case in cases], folder)
+    return status_before(config, [case.id for case in cases], Path("out") / config.name)

@@ -40,11 +40,6 @@ class Block(NamedTuple):
             raise ConfigError(f"{source}: block = {text}: give a number and that of all blocks, such as 3/40")
         return block
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether it is the whole sweep."""
-        return self.count == 1 and self.number == 1
-
     def of(self, motions: Mapping[str, str]) -> list[str]:
         """Cases of this block; those with the same motion, which is solved once, are in the same one.
 

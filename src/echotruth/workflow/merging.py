@@ -9,17 +9,16 @@ from itertools import combinations
 from pathlib import Path
 from uuid import uuid4
 
-from echotruth.config import Config
+from echotruth.cases import expand
+from echotruth.config import Config, shipped
 from echotruth.repository import ledger
 from echotruth.repository.checksums import ChecksumError
 from echotruth.repository.inventory import CheckError, JobRecord, Repository
-from echotruth.repository.ledger import VIEW_STAGES
+from echotruth.repository.layout import lay_out
 from echotruth.repository.merge import MergeError, check_sources, compare, spanning, take_over, verify_files
 from echotruth.repository.publication import publish
 from echotruth.workflow import lease
 
-WORKFLOW = Path(__file__).parent
-SCRIPT, SNAKEFILE = WORKFLOW / "scripts/cases.py", WORKFLOW / "Snakefile"
 BATCH = 5000
 """Largest number of records on one command line."""
 
@@ -60,9 +59,7 @@ def merge_repositories(into: Path, sources: list[Path]) -> int:
 
 
 def _merge(into: Path, sources: list[Path], config: Config, run: str) -> None:
-    command = [sys.executable, str(SCRIPT), str(into), "-"]
-    if subprocess.run(command, input=config.model_dump_json(), text=True, check=False).returncode:
-        raise MergeError(f"{into}: could not be laid out: see the error above")
+    lay_out(into, config, expand(config, into.name))
     all_taken: list[JobRecord] = []
     for source in sources:
         taken, known = take_over(source, into)
@@ -84,12 +81,9 @@ def _introduce(into: Path, taken: list[JobRecord], run: str) -> None:
     """
     if into.resolve() != (Path("out") / into.resolve().name).resolve():
         return
-    last: dict[tuple[str, str | None], Path] = {}
-    for record in sorted(taken, key=lambda record: VIEW_STAGES.index(record.stage) if record.view else -1):
-        last[record.case, record.view] = Path("out", into.resolve().name, record.path.relative_to(into))
-    paths = [str(path) for path in last.values()]
+    paths = [str(Path("out", into.resolve().name, record.path.relative_to(into))) for record in taken]
     # Times stay in order: what a job depends on is touched before it.
-    snakemake = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), "--nolock", "--cores", "1"]
+    snakemake = [sys.executable, "-m", "snakemake", "--snakefile", str(shipped.ROOT / "Snakefile"), "--nolock", "--cores", "1"]
     command = [*snakemake, "--configfile", str(into / "config.yaml"), "--touch", "--forceall"]
     for first in range(0, len(paths), BATCH):
         environment = os.environ | {lease.VARIABLE: run}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -49,21 +50,46 @@ class Plan:
 
     def __init__(self, values: dict[str, Any], source: str = "configuration") -> None:
         given = dict(values)
-        self._block = Block.parse(given.pop("block", None), source)
+        block = given.pop("block", None)
+        self._is_laid_out, self._block = block is not None, Block.parse(block, source)
         self.config: Config = validate(given, source)
         self.folder = Path("out") / self.config.name
         self._every = {case.id: case for case in expand(self.config, source)}
         self._motions = settings.motions({id: case.config for id, case in self._every.items()})
         self._same = first_with_same(self._motions, ledger.rows(self.folder / "registry.txt"))
-        self.cases: dict[str, Case] = {id: self._every[id] for id in self._block.of(self._motions)}
+        self._choose(self._block)
 
+    def _choose(self, block: Block) -> None:
+        self.cases: dict[str, Case] = {id: self._every[id] for id in block.of(self._motions)}
+
+    def block(self, number: int, count: int) -> Plan:
+        """The plan of a block of the hearts, which numbers from 1 to `count`."""
+        plan = copy(self)
+        plan._choose(Block(number, count))
+        return plan
+
+    @property
+    def mark(self) -> Path:
+        """File that says that the hearts of this plan were made, with these settings and this code."""
+        code = [self.code(stage) for stage in ledger.STAGES]
+        settings = [self._settings(stage, case, view) for case in self.cases for stage, view in self._places(case)]
+        hearts = [[case, self._motions[case]] for case in self.cases]
+        version = settings_version(self.config.physiology, self.config.tracking, code, hearts, settings)
+        return self.folder / "blocks" / f"{version}.made"
+
+    def _places(self, case: str) -> list[tuple[str, str]]:
+        return [(stage, view) for stage in settings.OF_VIEW for view in self._every[case].config.views]
+
+    def stands(self) -> bool:
+        """Whether the hearts of this plan were made, and all their records are there."""
+        return self.mark.is_file() and all(path.is_file() for path in self._record_paths())
     def begin(self) -> None:
         """Hold the lease of the folder until this process ends, and lay the repository out.
 
         Whoever starts the blocks of a sweep has done so already.
         """
         lease.hold(self.folder)
-        if self._block.is_whole:
+        if not self._is_laid_out:
             from echotruth.repository.layout import lay_out
 
             lay_out(self.folder, self.config, list(self._every.values()))
@@ -103,8 +129,11 @@ class Plan:
 
     def records(self, wildcards: Wildcards) -> list[str]:
         """Records of all jobs, so that a lost one is made again."""
+        return [str(path) for path in self._record_paths()]
+
+    def _record_paths(self) -> list[Path]:
         places = list(self.config.views), self.config.bmode.sizes
-        return [str(path) for case in self.cases for path in record_paths(self.folder, case, *places)]
+        return [path for case in self.cases for path in record_paths(self.folder, case, *places)]
 
     def external_scores(self, wildcards: Wildcards) -> list[str]:
         """Scores of trackers from outside."""

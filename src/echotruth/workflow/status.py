@@ -6,121 +6,53 @@ Everything is read from its folder, so that it does not matter on which machine 
 from __future__ import annotations
 
 import csv
-import json
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from echotruth.config import Config
+from echotruth.config.physiology import Physiology
+from echotruth.config.loading import ConfigError, load
 from echotruth.repository import ledger
-from echotruth.repository.ledger import GATES, NOT_A_REPOSITORY, record_path
-from echotruth.workflow import lease
-from echotruth.workflow.progress import Progress, expected_durations, replay
-from echotruth.workflow.requests import existing_records
+from echotruth.repository.ledger import NOT_A_REPOSITORY, record_path
+from echotruth.repository.verdict import Verdict, verdict
+from echotruth.workflow import cost, lease
+from echotruth.workflow.jobs import RULES, ended, jobs
+from echotruth.workflow.progress import Progress, RunLog, format_duration
 
-PARTS = {
-    "mechanics": ("mechanics", "mechanics"),
-    "measures": ("physiology", "physiology"),
-    "images": ("imaging", "bmode"),
-    "tracking": ("tracking", "evaluation"),
-}
-"""Part -> rule of its jobs, and the last stage that such a job records."""
-FINAL_RULES = ("repository", "report", "report_images", "report_page")
-"""Rules of the last part, which is the report."""
+Status = dict[str, Any]
+"""What JSON can hold:
+
+repository : str
+state : str, a key of :data:`STATES`
+hearts : int
+verdicts : dict, number of hearts that are complete, implausible or failed; the others are not known yet
+parts : dict, rule -> number of its jobs, and of those that are done, running, failed and waiting; `failed` are those
+    that ended with an error in the last run, not hearts without a solution, which are results
+reasons : dict, heart that is not complete -> its status and the reason
+run : str, process that works on it or did last; None if none did
+activity : str, what runs, such as `rf (2 of 4)`; None if nothing does
+share, seconds_left : float, share of the work of this run that is done, and the time it will still take, s; or None
+failed_logs : list of str, logs of the jobs that ended with an error in the last run
+"""
 VERDICTS = ("complete", "implausible", "failed")
-_COMPLETE = b'"status": "complete"'
+COLUMNS = ("jobs", "done", "running", "failed", "waiting")
+MAX_SHOWN = 10
+"""Largest number of hearts that are named with their reasons, and of logs."""
+STATES = {
+    "never begun": "has not been begun",
+    "running": "running ({run})",
+    "killed": "is not finished; its run ended without finishing ({run}): run the configuration again",
+    "stopped": "is not finished, and no run works on it: run the configuration again",
+    "finished": "is finished",
+}
+"""State of a repository -> what is said of it."""
 
 
 class StatusError(ValueError):
     """Raised if a folder is no repository."""
-
-
-@dataclass(frozen=True)
-class PartStatus:
-    """Jobs of one part of a repository.
-
-    Attributes
-    ----------
-    jobs, done, running, failed, waiting : int
-        Number of all, and of those in each state; `failed` are those that ended with an error in the last run, not
-        hearts without a solution, which are results.
-    """
-
-    jobs: int
-    done: int
-    running: int
-    failed: int
-
-    @property
-    def waiting(self) -> int:
-        """Jobs that have not begun."""
-        return max(0, self.jobs - self.done - self.running - self.failed)
-
-
-@dataclass(frozen=True)
-class Status:
-    """How a repository is getting on.
-
-    Attributes
-    ----------
-    folder : Path
-    state : str
-        `never begun`, `running`, `killed` (its run did not end by itself), `stopped` (its run ended before all was
-        made) or `finished`.
-    parts : dict
-        Jobs by part, in the order in which they are done.
-    hearts : int
-    verdicts : dict
-        Number of hearts that are complete, implausible or failed; the others are not known yet.
-    reasons : dict
-        Heart that is not complete -> its status and the reason.
-    holder : str
-        Process that works on it or did last; empty if none did.
-    activity : str
-        What runs, such as `imaging (2 of 4)`.
-    share, seconds_left : float or None
-        Share of the work of this run that is done, and the time it will still take, s; None unless it runs.
-    logs : tuple of Path
-        Logs of the jobs that ended with an error in the last run.
-    """
-
-    folder: Path
-    state: str
-    parts: dict[str, PartStatus]
-    hearts: int
-    verdicts: dict[str, int]
-    reasons: dict[str, tuple[str, str]]
-    holder: str = ""
-    activity: str = ""
-    share: float | None = None
-    seconds_left: float | None = None
-    logs: tuple[Path, ...] = ()
-
-    def as_json(self) -> dict[str, Any]:
-        """Values that JSON can hold."""
-        parts = {
-            name: {key: getattr(part, key) for key in ("jobs", "done", "running", "failed", "waiting")}
-            for name, part in self.parts.items()
-        }
-        reasons = {case: {"status": status, "reason": reason} for case, (status, reason) in self.reasons.items()}
-        return {
-            "repository": str(self.folder),
-            "state": self.state,
-            "hearts": self.hearts,
-            "verdicts": self.verdicts,
-            "parts": parts,
-            "reasons": reasons,
-            "run": self.holder or None,
-            "activity": self.activity or None,
-            "share": None if self.share is None else round(self.share, 4),
-            "seconds_left": None if self.seconds_left is None else round(self.seconds_left),
-            "failed_logs": list(map(str, self.logs)),
-        }
 
 
 def status_of(folder: Path) -> Status:
@@ -136,14 +68,15 @@ def status_of(folder: Path) -> Status:
     StatusError
         If the folder does not exist, or holds neither a repository nor the beginning of one.
     """
-    holder, lives = lease.current(folder)
-    if not (folder / "config.yaml").is_file():
-        if holder is None:
-            raise StatusError(f"{folder}: {NOT_A_REPOSITORY}")
-        state = "running" if lives else "stopped" if holder.released else "killed"
-        return Status(folder, state, {}, 0, {}, {}, str(holder), "planning" if lives else "")
-    cases, views = _cases(folder), _views(folder)
-    return _status(folder, cases, views, holder, lives)
+    configuration, table = folder / "config.yaml", folder / "cases.csv"
+    if not configuration.is_file() and lease.current(folder)[0] is None:
+        raise StatusError(f"{folder}: {NOT_A_REPOSITORY}")
+    try:
+        rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines())) if table.is_file() else []
+        config = load(configuration) if configuration.is_file() else Config()
+        return status_before(config, [row["case"] for row in rows], folder)
+    except (ConfigError, OSError, UnicodeDecodeError, KeyError) as error:
+        raise StatusError(f"{folder}: config.yaml or cases.csv cannot be read: run the configuration again") from error
 
 
 def status_before(config: Config, cases: Iterable[str], folder: Path) -> Status:
@@ -153,121 +86,121 @@ def status_before(config: Config, cases: Iterable[str], folder: Path) -> Status:
     ----------
     config : Config
     cases : iterable of str
-        Its hearts.
+        Its hearts; none if they are not known yet.
     folder : Path
         Folder of the repository, `out/NAME`; it need not exist.
     """
+    cases = list(cases)
     holder, lives = lease.current(folder)
-    return _status(folder, list(cases), list(config.views), holder, lives)
-
-
-def _status(folder: Path, cases: list[str], views: list[str], holder: lease.Holder | None, lives: bool) -> Status:
-    log = folder / "logs/snakemake.log"
-    is_current = holder is not None and _is_of(log, holder)
-    progress = replay(log, expected_durations(folder / "logs"), lives) if is_current else Progress({})
-    parts = _parts(folder, cases, views, progress, lives)
-    reasons = dict(_reasons(folder, cases))
-    known = existing_records(folder / "ledger/physiology") & set(cases)
-    number = Counter(status for case, (status, _) in reasons.items() if case in known)
-    number["complete"] = len(known) - number.total()
+    progress = _progress(folder, config, cases, holder)
+    known = {case: found for case in cases if (found := verdict_of(folder, case, config.physiology))}
+    numbers = Counter(status for status, _ in known.values())
+    parts = _parts(folder, config, cases, progress, lives)
     runs = lives and progress.is_planned
-    return Status(
-        folder,
-        _state(parts, holder, lives),
-        parts,
-        len(cases),
-        {verdict: number[verdict] for verdict in VERDICTS},
-        reasons,
-        "" if holder is None else str(holder),
-        (progress.running if progress.is_planned else "planning") if lives else "",
-        progress.fraction_done if runs else None,
-        progress.seconds_left if runs else None,
-        tuple(progress.logs),
-    )
+    return {
+        "repository": str(folder),
+        "state": _state(parts, holder, lives),
+        "hearts": len(cases),
+        "verdicts": {status: numbers[status] for status in VERDICTS},
+        "parts": parts,
+        "reasons": {
+            case: {"status": status, "reason": reason}
+            for case, (status, reason) in known.items()
+            if status != "complete"
+        },
+        "run": None if holder is None else str(holder),
+        "activity": (progress.activity if runs else "planning") if lives else None,
+        "share": round(progress.share, 4) if runs else None,
+        "seconds_left": round(progress.seconds_left) if runs else None,
+        "failed_logs": [str(job.log) for job in progress.failed if job.log],
+    }
 
 
-def _state(parts: dict[str, PartStatus], holder: lease.Holder | None, lives: bool) -> str:
-    if lives:
-        return "running"
-    if all(part.done == part.jobs for part in parts.values()):
-        return "finished"
-    if holder is None:
-        return "stopped" if any(part.done for part in parts.values()) else "never begun"
-    return "stopped" if holder.released else "killed"
+def verdict_of(folder: Path, case: str, bounds: Physiology) -> Verdict | None:
+    """Status of a heart and its reason, empty if it is complete; None while it is not known.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository, `out/NAME`.
+    case : str
+    bounds : Physiology
+    """
+    path = record_path(folder, "mechanics", case)
+    if not path.is_file():
+        return None
+    try:
+        return verdict(ledger.read(path), bounds)
+    except (OSError, ValueError, KeyError):
+        return Verdict("failed", "its record cannot be read")
 
 
-def _parts(folder: Path, cases: list[str], views: list[str], progress: Progress, lives: bool) -> dict[str, PartStatus]:
-    running = Counter(job.rule for job in progress.running_jobs if _is_at_work(folder, job.log)) if lives else Counter()
-    failed, parts = progress.failed_jobs, {}
-    clips = {f"{case}/{view}" for case in cases for view in views}
-    for part, (rule, stage) in PARTS.items():
-        wanted = set(cases) if stage in GATES else clips
-        done = len(wanted & existing_records(folder / "ledger" / stage))
-        parts[part] = PartStatus(len(wanted), done, running[rule], failed[rule])
-    made = [bool(_read(folder / "ledger/repository.json")), (folder / "report.html").is_file()]
-    at_work, ended = (sum(jobs[rule] for rule in FINAL_RULES) for jobs in (running, failed))
-    parts["report"] = PartStatus(
-        len(made), sum(made), min(at_work, len(made) - sum(made)), min(ended, len(made) - sum(made))
-    )
+def _progress(folder: Path, config: Config, cases: list[str], holder: lease.Holder | None) -> Progress:
+    """Progress of the run that holds the lease, or held it last, as far as its logs tell."""
+    speed = cost.speed(folder, dict.fromkeys(cases, config))
+    progress = Progress({rule: cost.mean_seconds(rule, [config]) * speed.get(rule, 1.0) for rule in RULES})
+    for log in sorted((folder / "logs").glob("snakemake*.log")):
+        # One that was not written since the lease was taken is of an earlier run.
+        if holder and log.stat().st_mtime >= time.mktime(time.strptime(holder.since, "%Y-%m-%d %H:%M:%S")):
+            progress.logs.append(RunLog())
+            for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
+                progress.logs[-1].read_line(line)
+    return progress
+
+
+def _parts(
+    folder: Path, config: Config, cases: list[str], progress: Progress, lives: bool
+) -> dict[str, dict[str, int]]:
+    running = Counter(job.rule for job in progress.running if lives)
+    failed = Counter(job.rule for job in progress.failed)
+    parts = {}
+    for rule in RULES if cases else ():
+        wanted = jobs(rule, config, cases)
+        numbers = len(wanted), len(wanted & ended(folder, rule, config)), running[rule], failed[rule]
+        parts[rule] = dict(zip(COLUMNS, (*numbers, max(0, numbers[0] - sum(numbers[1:]))), strict=True))
     return parts
 
 
-def _is_at_work(folder: Path, log: Path | None) -> bool:
-    """Whether a job that was started has begun: on a cluster it may wait in the queue, and then has no log yet."""
-    if log is None:
-        return True
-    # Snakemake names the log below the working folder of the run, which need not be that of this process.
-    place = folder.joinpath(*log.parts[log.parts.index("logs") :]) if "logs" in log.parts else log
-    return place.is_file()
+def _state(parts: dict[str, dict[str, int]], holder: lease.Holder | None, lives: bool) -> str:
+    if lives:
+        return "running"
+    if parts and all(part["done"] == part["jobs"] for part in parts.values()):
+        return "finished"
+    if holder is None:
+        return "stopped" if any(part["done"] for part in parts.values()) else "never begun"
+    return "stopped" if holder.released else "killed"
 
 
-def _is_of(log: Path, holder: lease.Holder) -> bool:
-    """Whether Snakemake's log is of the run that holds the lease, or held it last: it began after that was taken."""
-    try:
-        return log.stat().st_mtime >= time.mktime(time.strptime(holder.since, "%Y-%m-%d %H:%M:%S"))
-    except (OSError, ValueError):
-        return False
+def text(status: Status) -> str:
+    """The status, a line for each rule, then the hearts, then what failed."""
+    words = [STATES[status["state"]].format(**status)]
+    words += [f"{100 * status['share']:.0f} % of this run done"] if status["share"] is not None else []
+    words += [status["activity"]] if status["activity"] else []
+    words += [f"about {format_duration(status['seconds_left'])} left"] if status["seconds_left"] else []
+    lines = [f"{status['repository']}: {', '.join(words)}"]
+    if status["parts"]:
+        lines += ["", f"{'':13}" + "".join(f"{column:>10}" for column in COLUMNS[1:])]
+    for rule, part in status["parts"].items():
+        numbers = "".join(f"{part[column] or '-':>10}" for column in COLUMNS[2:])
+        done = f"{part['done']}/{part['jobs']}"
+        lines.append(f"{rule:13}{done:>10}{numbers}")
+    lines += verdicts(status)
+    if status["failed_logs"]:
+        lines += ["", "Logs of jobs that ended with an error:", *_first(status["failed_logs"])]
+    return "\n".join(lines)
 
 
-def _reasons(folder: Path, cases: list[str]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Hearts that are not complete, with the status and the reason of the first gate that they did not pass."""
-    for case in cases:
-        for gate in GATES:
-            try:
-                content = record_path(folder, gate, case).read_bytes()
-            except OSError:
-                break
-            if _COMPLETE not in content:
-                record = _read(record_path(folder, gate, case))
-                yield case, (record.get("status", "failed"), record.get("reason", "its record cannot be read"))
-                break
+def verdicts(status: Status) -> list[str]:
+    """Number of hearts by verdict, and the reasons of those that are not complete."""
+    if not status["hearts"]:
+        return []
+    numbers = status["verdicts"] | {"not known yet": status["hearts"] - sum(status["verdicts"].values())}
+    counts = [f"{number} {verdict}" for verdict, number in numbers.items() if number or verdict in VERDICTS]
+    reasons = [f"{case}: {found['status']}: {found['reason']}" for case, found in status["reasons"].items()]
+    return ["", f"Hearts by their motion: {', '.join(counts)}", *_first(reasons)]
 
 
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return ledger.read(path)
-    except (OSError, ValueError):
-        return {}
-
-
-def _cases(folder: Path) -> list[str]:
-    """Hearts of the configuration of a repository."""
-    try:
-        with (folder / "cases.csv").open(encoding="utf-8", newline="") as table:
-            return [row["case"] for row in csv.DictReader(table)]
-    except (OSError, KeyError) as error:
-        raise StatusError(f"{folder / 'cases.csv'}: cannot be read: run the configuration again") from error
-
-
-def _views(folder: Path) -> list[str]:
-    """Views of the configuration of a repository, without what its other keys name, such as files."""
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-    try:
-        return list(yaml.load((folder / "config.yaml").read_text(encoding="utf-8"), Loader=loader)["views"])
-    except (OSError, yaml.YAMLError, KeyError, TypeError) as error:
-        raise StatusError(f"{folder / 'config.yaml'}: cannot be read: run the configuration again") from error
-
-
-def dumped(status: Status) -> str:
-    """The status as JSON."""
-    return json.dumps(status.as_json(), indent=2)
+def _first(texts: list[str]) -> list[str]:
+    """The first lines, and how many more there are."""
+    more = [f"  and {len(texts) - MAX_SHOWN} more"] if len(texts) > MAX_SHOWN else []
+    return [*(f"  {text}" for text in texts[:MAX_SHOWN]), *more]

@@ -1,0 +1,50 @@
+"""Jobs of a repository: which each rule has, and which have ended, by the ledger."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from echotruth.config import Config
+
+VIEW_RULES = ("phantom", "rf")
+"""Rules with a job for each view of a heart."""
+CLIP_RULES = ("truth", "bmode", "tracking")
+"""Rules with a job for each view and image size."""
+FINAL_RULES = ("repository", "report")
+"""What is made once, after all hearts."""
+RULES = ("mechanics", "phantom", "truth", "rf", "bmode", "tracking", *FINAL_RULES)
+"""Rules in the order of their jobs."""
+
+
+def places(rule: str, config: Config) -> list[tuple[str, int]]:
+    """View and image size, px, of each job of a rule for one heart; an empty text and 0 where it has none."""
+    views, sizes = config.views if rule in VIEW_RULES + CLIP_RULES else [""], config.bmode.sizes
+    return [(view, size) for view in views for size in (sizes if rule in CLIP_RULES else (0,))]
+
+
+def jobs(rule: str, config: Config, cases: Iterable[str]) -> set[str]:
+    """Jobs of a rule: CASE, CASE/VIEW or CASE/VIEW/SIZE, as its records are named."""
+    if rule in FINAL_RULES:
+        return {rule}
+    ends = ["".join(f"/{part}" for part in place if part) for place in places(rule, config)]
+    return {f"{case}{end}" for case in cases for end in ends}
+
+
+def ended(folder: Path, rule: str, config: Config) -> set[str]:
+    """Jobs of a rule that have a record, with the names of :func:`jobs`.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository, `out/NAME`; it need not exist.
+    rule : str
+    config : Config
+    """
+    if rule in FINAL_RULES:
+        made = folder / ("report.html" if rule == "report" else "ledger/repository.json")
+        return jobs(rule, config, ()) if made.is_file() else set()
+    top = folder / "ledger" / rule
+    files = (os.path.relpath(os.path.join(at, name), top) for at, _, names in os.walk(top) for name in names)
+    return {file.removesuffix(".json") for file in files}
