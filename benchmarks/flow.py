@@ -21,6 +21,8 @@ from pathlib import Path
 
 import numpy as np
 import zarr
+from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.stage_cost import Cost
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 import echotruth as et
@@ -36,8 +38,6 @@ from echotruth.imaging.view import imaging_plane
 from echotruth.learning import FlowPairs
 from echotruth.repository.rounding import length_quantum, rounded
 from echotruth.workflow.job import Job
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.stage_cost import Cost
 
 RESULTS = Path(__file__).parent / "results"
 SMALL = {"circumferential_elements": 12, "longitudinal_elements": 8, "transmural_elements": 2}

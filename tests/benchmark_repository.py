@@ -4,6 +4,9 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from echotruth.workflow.scripts import evaluation, tracking
+from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.stage_cost import Cost
 from known_repository import FRAMES, SETTINGS, SHIFT, Known
 from known_repository import _commit as commit
 from scipy.ndimage import gaussian_filter, map_coordinates
@@ -16,9 +19,6 @@ from echotruth.repository import ledger
 from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.repository.publication import publish
 from echotruth.workflow.job import Job
-from echotruth.workflow.scripts import evaluation, tracking
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.stage_cost import Cost
 
 TABLE = """case,seed,loop.heart_rate_per_min,label.heart,label.split,label.group,label.acoustics,label.variation
 a_ideal,1,500,a,test,healthy,ideal,none

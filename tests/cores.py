@@ -9,13 +9,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from echotruth.repository.provenance import code_version
-from echotruth.workflow.compiled import CACHE_GROUPS, cache_folder, lock_cache_writes
+from echotruth.workflow.processes import cache_name, lock_cache_writes
 
 ROOT = Path(__file__).parents[1]
-SCRIPTS = ROOT / "src/echotruth/workflow/scripts"
-# A compiled function is cached by the file it stands in, not by those it calls from: one cache a version of the code.
-CACHE = ROOT / ".snakemake/numba" / code_version(*map(str, SCRIPTS.glob("*.py")))
+# The cache of jobs that run in the checkout.
+CACHE = ROOT / ".snakemake/numba" / cache_name()
 os.environ["NUMBA_CACHE_DIR"] = str(CACHE)
 # Threads of BLAS that wait for a core that is taken spin: a decomposition of a matrix then costs twenty times its work.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
@@ -28,8 +26,7 @@ def lend(caches):
     """Let jobs that look for their caches in a folder find, and fill, that of the tests."""
     CACHE.mkdir(parents=True, exist_ok=True)
     caches.mkdir(parents=True)
-    for group in CACHE_GROUPS:
-        (caches / cache_folder(group, SCRIPTS)).symlink_to(CACHE)
+    (caches / cache_name()).symlink_to(CACHE)
 
 
 lock_cache_writes()

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import zarr
+from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.stage_cost import Cost
 
 from echotruth.cases import expand
 from echotruth.config import Bmode, Config, Geometry, Loop, Motion, PhaseCorrelation, Tracking, View
@@ -15,8 +17,6 @@ from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.repository.publication import publish
 from echotruth.repository.store import Store, packs_of, schema_of
 from echotruth.workflow.job import Job
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.stage_cost import Cost
 
 SIZE, FRAMES = 64, 3
 

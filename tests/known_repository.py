@@ -6,6 +6,8 @@ from pathlib import Path
 
 import finished_repository
 import numpy as np
+from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.stage_cost import Cost
 
 import echotruth as et
 from echotruth.cases import Case, expand
@@ -19,8 +21,6 @@ from echotruth.repository import ledger
 from echotruth.repository.ledger import GATES, VIEW_STAGES
 from echotruth.repository.publication import publish
 from echotruth.workflow.job import Job
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.stage_cost import Cost
 
 SIZES = (128, 64)
 FRAMES = finished_repository.FRAMES

@@ -3,6 +3,8 @@
 from pathlib import Path
 
 import numpy as np
+from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.stage_cost import Cost
 from finished_repository import configured, work
 
 import echotruth as et
@@ -15,8 +17,6 @@ from echotruth.imaging.view import imaging_plane
 from echotruth.repository import ledger
 from echotruth.repository.publication import publish
 from echotruth.workflow.job import Job
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.stage_cost import Cost
 
 GRADIENT = [[0.9, 0.05, 0.0], [0.0, 1.1, 0.0], [0.2, 0.0, 1.0]]
 """Rows lateral, axial, elevation: part of the tissue leaves the plane of a short-axis view."""

@@ -8,6 +8,7 @@ import learning_repository
 import matplotlib.pyplot as plt
 import numpy as np
 import yaml
+from echotruth.workflow.scripts.cases import lay_out
 from finished_repository import configured
 
 from echotruth.cases import expand
@@ -15,7 +16,6 @@ from echotruth.cli import parser
 from echotruth.config.loading import load
 from echotruth.loop.cycle import SHIPPED
 from echotruth.repository.publication import publish
-from echotruth.workflow.scripts.cases import lay_out
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()

@@ -29,7 +29,14 @@ def test_estimate_runs_nothing_and_writes_nothing(folder):
     before = set(folder.rglob("*"))
     status, output, errors = run_cli("run", "small.yaml", "--estimate", "--cores", "4", cwd=folder)
     assert status == 0 and not errors
-    for word in ("hearts: 2, views of each: 4", "mechanics", "tracking", "on 4 cores", "GB for the largest job", "files"):
+    for word in (
+        "hearts: 2, views of each: 4",
+        "mechanics",
+        "tracking",
+        "on 4 cores",
+        "GB for the largest job",
+        "files",
+    ):
         assert word in output
     assert set(folder.rglob("*")) == before
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import learning_repository
 import pytest
+from echotruth.workflow.scripts.cases import lay_out
 from finished_repository import configured
 
 import echotruth as et
@@ -13,7 +14,6 @@ from echotruth.cases import expand
 from echotruth.config import Bmode, Geometry, Rf, Tracking, View
 from echotruth.repository import ledger
 from echotruth.repository.publication import publish
-from echotruth.workflow.scripts.cases import lay_out
 
 PAGES = Path(__file__).parents[2] / "docs/library"
 CONFIGURATIONS = {"Config", "Probe", "Rf", "View"}

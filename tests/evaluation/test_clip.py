@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from echotruth.evaluation.pieces import digest
 
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, validate
 from echotruth.evaluation.clip import Clip, between_frames
-from echotruth.evaluation.pieces import digest
 
 FRAMES, PERIOD = 8, 0.12
 

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 import yaml
 import zarr
+from echotruth.workflow.stage_cost import Cost
 
 import echotruth as et
 from echotruth.cases import expand, table
@@ -21,7 +22,6 @@ from echotruth.repository.publication import publish
 from echotruth.repository.store import Store, schema_of
 from echotruth.tracking import grid
 from echotruth.workflow.job import Job
-from echotruth.workflow.stage_cost import Cost
 
 CONFIG = Config(
     name="small",

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 import yaml
 import zarr
+from echotruth.workflow.scripts.cases import lay_out
 
 from echotruth.cases import expand
 from echotruth.config import Config, Probe, Rf
@@ -13,7 +14,6 @@ from echotruth.imaging.recorder import channels, decimated_samples, quantise
 from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.repository import schema
 from echotruth.repository.store import Store
-from echotruth.workflow.scripts.cases import lay_out
 
 WAVES = ("focused", "plane", "diverging", "synthetic_aperture")
 

@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from echotruth.workflow.assignment import handed_case, write_configuration, write_sweep
 
 import echotruth as et
 from echotruth.cases import all_cases, expand
 from echotruth.config import Config
 from echotruth.config.loading import load, validate
 from echotruth.repository.check import check
-from echotruth.workflow.assignment import handed_case, write_configuration, write_sweep
 from echotruth.workflow.merging import merge_repositories
 
 pytestmark = pytest.mark.slow

@@ -9,6 +9,7 @@ from urllib.parse import parse_qs
 import numpy as np
 import pytest
 from bokeh.document import Document
+from echotruth.workflow.scripts.cases import lay_out
 from finished_repository import configured
 from known_repository import SIZES
 
@@ -18,7 +19,6 @@ from echotruth.viewer.catalogue import Catalogue
 from echotruth.viewer.choice import TRUTH, Choice, asked, first, refused
 from echotruth.viewer.page import Page
 from echotruth.viewer.server import ShowError, opened, serve
-from echotruth.workflow.scripts.cases import lay_out
 
 pytestmark = pytest.mark.slow
 

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from echotruth.workflow.compiled import CACHE_GROUPS, cache_folder
 
 SCRIPTS = Path(__file__).parents[2] / "src/echotruth/workflow/scripts"

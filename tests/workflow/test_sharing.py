@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from echotruth.workflow.scripts.cases import lay_out
+from echotruth.workflow.series import command, run_series
+from echotruth.workflow.stage_cost import Cost
 
 from echotruth.cases import expand
 from echotruth.config.loading import validate
@@ -11,11 +14,8 @@ from echotruth.repository import ledger
 from echotruth.repository.checksums import verify
 from echotruth.repository.store import Store
 from echotruth.workflow.job import Job
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.series import command, run_series
 from echotruth.workflow.settings import mechanics_settings, motions
 from echotruth.workflow.sharing import first_with_same
-from echotruth.workflow.stage_cost import Cost
 
 SETTINGS = {
     "name": "small",

@@ -1,7 +1,6 @@
 """Track one clip with every tracker, and score what they find against the truth."""
 
-from echotruth.evaluation.clip import clip_at
-from echotruth.evaluation.clip import grid_positions
+from echotruth.evaluation.clip import clip_at, grid_positions
 from echotruth.evaluation.scoring import score, truth_at
 from echotruth.workflow.job import Job, Result, main
 from echotruth.workflow.tracks import Tracks

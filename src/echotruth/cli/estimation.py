@@ -12,7 +12,7 @@ from pathlib import Path
 import yaml
 
 from echotruth.cases import Case
-from echotruth.cli.snakemake import PROFILE_OPTIONS, WORKFLOW, with_profiles
+from echotruth.cli.snakemake import FOLDER, PROFILE_OPTIONS, with_profiles
 from echotruth.config import Config
 from echotruth.workflow.concerns import Concern, concerns
 from echotruth.workflow.estimate import Estimate, estimate
@@ -64,7 +64,7 @@ def profile_content(options: list[str]) -> dict[str, object] | None:
     """Content of the profile that the options name; None without one, or if it cannot be read."""
     for flag, name in pairwise([*with_profiles(options), ""]):
         if flag in PROFILE_OPTIONS:
-            for folder in (Path(name), WORKFLOW / "profiles" / name):
+            for folder in (Path(name), FOLDER / name):
                 if (folder / "config.yaml").is_file():
                     content = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
                     return content if isinstance(content, dict) else None

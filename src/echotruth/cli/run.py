@@ -105,9 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
         sys.exit(f"echotruth: {error.filename or arguments.config}: {error.strerror or error}: {WRITABLE}")
 
 
-def _started(
-    arguments: argparse.Namespace, config: Config, cases: list[Case], expected: dict[str, float]
-) -> int:
+def _started(arguments: argparse.Namespace, config: Config, cases: list[Case], expected: dict[str, float]) -> int:
     """Make a repository, unless the package that starts jobs elsewhere is missing; return the exit status."""
     from echotruth.cli.estimation import profile_content
 

@@ -151,7 +151,7 @@ def measured_heart(groups: dict[str, Arrays], config: Config) -> tuple[Arrays, d
     if config.motion.kind != "beat":
         return found, {}
     healthy = not groups["pathology"]["region"].any()
-    return found, bounded(found | {"active_tension": mechanics["active_tension"]}, healthy)
+    return found, bounded({**found, "active_tension": mechanics["active_tension"]}, healthy)
 
 
 def _rotations(mesh: Mesh, positions: Floats, mechanics: Arrays) -> Arrays:

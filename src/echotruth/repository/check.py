@@ -76,9 +76,7 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
             if progress:
                 progress(done, len(records))
         damaged = {path for fault in report.faults for path in fault.records}
-        solved = [
-            record for record in records if record.stage == "mechanics" and record.path not in damaged
-        ]
+        solved = [record for record in records if record.stage == "mechanics" and record.path not in damaged]
         report.faults += [
             fault for faults in pool.map(lambda one: check_loop(repository, one), solved) for fault in faults
         ]

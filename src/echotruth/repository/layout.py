@@ -91,7 +91,7 @@ def _rf_metadata(
     scanner = Scanner(first.probe, first.rf, imaging_depth(first.rf, first.bmode))
     values, lengths, settings = metadata(first, scanner)
     swept = {name for key, names in RF_INDEPENDENT.items() if key not in constant for name in names}
-    return values, lengths, {name: value for name, value in settings.items() if name not in swept}
+    return {**values}, lengths, {name: value for name, value in settings.items() if name not in swept}
 
 
 class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]  # which of them is not known

@@ -48,7 +48,7 @@ def record_paths(folder: Path, case: str, views: Sequence[str], sizes: Sequence[
     sizes : sequence of int
         Image sizes, px.
     """
-    values = {"case": [case], "view": views, "size": sizes}
+    values: dict[str, Sequence[Any]] = {"case": [case], "view": views, "size": sizes}
     places = {stage: product(*(values[name] for name in names)) for stage, names in STAGES.items()}
     return [record_path(folder, stage, *place) for stage, found in places.items() for place in found]
 

@@ -244,6 +244,7 @@ def packs_of(group: str) -> tuple[Pack, ...]:
     """Packs of a group, as "evaluation/512/dis"."""
     return PACKS.get(kind(group), ())
 
+
 CASES = (
     _array(
         *("status", "case", "string", "1"),

@@ -15,13 +15,13 @@ class Block(NamedTuple):
     Attributes
     ----------
     number : int
-        From 1 to `count`; 0 is the repository and its report without any heart.
-    count : int
+        From 1 to `blocks`; 0 is the repository and its report without any heart.
+    blocks : int
         Number of blocks.
     """
 
     number: int = 1
-    count: int = 1
+    blocks: int = 1
 
     @classmethod
     def parse(cls, text: object, source: str) -> Block:
@@ -36,7 +36,7 @@ class Block(NamedTuple):
             return cls()
         found = re.fullmatch(r"(\d+)/(\d+)", str(text))
         block = cls(*map(int, found.groups())) if found else cls(1, 0)
-        if not block.number <= block.count:
+        if not block.number <= block.blocks:
             raise ConfigError(f"{source}: block = {text}: give a number and that of all blocks, such as 3/40")
         return block
 
@@ -55,7 +55,7 @@ class Block(NamedTuple):
             groups.setdefault(motion, []).append(case)
         cases, before = [], 0
         for group in groups.values():
-            if before * self.count // len(motions) + 1 == self.number:
+            if before * self.blocks // len(motions) + 1 == self.number:
                 cases += group
             before += len(group)
         return cases

@@ -83,7 +83,16 @@ def _introduce(into: Path, taken: list[JobRecord], run: str) -> None:
         return
     paths = [str(Path("out", into.resolve().name, record.path.relative_to(into))) for record in taken]
     # Times stay in order: what a job depends on is touched before it.
-    snakemake = [sys.executable, "-m", "snakemake", "--snakefile", str(shipped.ROOT / "Snakefile"), "--nolock", "--cores", "1"]
+    snakemake = [
+        sys.executable,
+        "-m",
+        "snakemake",
+        "--snakefile",
+        str(shipped.ROOT / "Snakefile"),
+        "--nolock",
+        "--cores",
+        "1",
+    ]
     command = [*snakemake, "--configfile", str(into / "config.yaml"), "--touch", "--forceall"]
     for first in range(0, len(paths), BATCH):
         environment = os.environ | {lease.VARIABLE: run}

@@ -83,6 +83,7 @@ class Plan:
     def stands(self) -> bool:
         """Whether the hearts of this plan were made, and all their records are there."""
         return self.mark.is_file() and all(path.is_file() for path in self._record_paths())
+
     def begin(self) -> None:
         """Hold the lease of the folder until this process ends, and lay the repository out.
 

@@ -18,19 +18,24 @@ STAGES = ("mechanics", "phantom", "rf", "truth", "bmode", "tracking", "report")
 
 
 def prefix(folder: Path) -> str:
-    """Beginning of the shell commands of all rules, given the folder of the repository, `out/NAME`.
-
-    Numba checks only the file of a cached function for changes, not those of the functions that it calls. Therefore
-    each version of the code has a cache of its own.
-    """
+    """Beginning of the shell commands of all rules, given the folder of the repository, `out/NAME`."""
     variables = {
         "SCRIPTS": str(shipped.ROOT / "workflow/scripts"),
         "REPOSITORY": str(folder),
         "PATH": f"{Path(sys.executable).parent}:{os.environ.get('PATH', '')}",  # the Python of this process comes first
-        "NUMBA_CACHE_DIR": str(Path(f".snakemake/numba/{code_version(*map(script, STAGES))}").absolute()),
+        "NUMBA_CACHE_DIR": str(Path(".snakemake/numba", cache_name()).absolute()),
     }
     exports = " ".join(f"{name}={quote(value)}" for name, value in variables.items())
     return f"set -euo pipefail; {instructions.exports()}export {exports}; "
+
+
+def cache_name() -> str:
+    """Name of the folder of compiled functions.
+
+    Numba checks only the file of a cached function for changes, not those of the functions that it calls. Therefore
+    each version of the code has a cache of its own.
+    """
+    return code_version(*map(script, STAGES))
 
 
 def script(stage: str) -> str:

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-
 _COUNT = re.compile(r"^(\w+) +(\d+)$")
 _RULE = re.compile(r"^ *(?:local|(Error in ))?rule (\w+):$")  # indented in a group of jobs on a cluster
 _JOB = re.compile(r"^ +jobid: (\d+)$")

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from echotruth.config import Config
-from echotruth.config.physiology import Physiology
 from echotruth.config.loading import ConfigError, load
+from echotruth.config.physiology import Physiology
 from echotruth.repository import ledger
 from echotruth.repository.ledger import NOT_A_REPOSITORY, record_path
 from echotruth.repository.verdict import Verdict, verdict
