@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.fem.quadrature import tetrahedron, triangle
-from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape
+from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape, shape_gradient
 from echotruth.mechanics.fibres import material_gradients, unit
 from echotruth.mechanics.geometry.lattice import Counts, lattice, tube_map
-from echotruth.mechanics.solver.cavity import triangle_shape
 from echotruth.mechanics.solver.support import Support
 
 
@@ -60,7 +59,7 @@ def nodal_area_vectors(nodes: Floats, facets: Integers) -> Floats:
     Shape (n_facets, 6, 3), m^2; with normals out of the body, minus the nodal forces of a unit pressure.
     """
     xi, weight = triangle()
-    value, slope = triangle_shape(xi)
+    value, slope = shape(xi), shape_gradient(xi)
     first, second = (np.einsum("qa,fai->fqi", slope[..., k], nodes[facets]) for k in (0, 1))
     return np.einsum("q,qa,fqi->fai", weight, value, np.cross(first, second))
 

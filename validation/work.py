@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from echotruth.fem.quadrature import tetrahedron, triangle
-from echotruth.fem.tetrahedra import Floats, Integers, Mesh
+from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape, shape_gradient
 from echotruth.mechanics.fibres import fibre_frames, material_gradients
-from echotruth.mechanics.solver.cavity import cavity_volume, triangle_shape
+from echotruth.mechanics.solver.cavity import cavity_volume
 from echotruth.report import style
 from validation import energies, heart
 from validation.report import Report, Row
@@ -153,7 +153,7 @@ def _surface_work(mesh: Mesh, facets: Integers, traction: Floats, change: Floats
     """
     work = 0.0
     for xi, weight in zip(*triangle(), strict=True):
-        value, slope = (part[0] for part in triangle_shape(xi[None]))
+        value, slope = shape(xi[None])[0], shape_gradient(xi[None])[0]
         at, moved, changed = (np.einsum("a,fai->fi", value, nodal[facets]) for nodal in (mesh.nodes, traction, change))
         first, second = (np.einsum("a,fai->fi", slope[:, k], mesh.nodes[facets]) for k in (0, 1))
         area = np.cross(first, second)

@@ -14,10 +14,11 @@ def points(coarse_mesh):
     return MaterialPoints(random.integers(0, len(coarse_mesh.cells), n).astype(np.int32), xi)
 
 
-def test_shape_functions_are_one_at_their_node_and_zero_at_the_others():
-    corners = np.vstack([np.zeros(3), np.eye(3)])
-    nodes = np.vstack([corners, corners[EDGES].mean(axis=1)])
-    assert np.allclose(shape(nodes), np.eye(10), atol=1e-14)
+@pytest.mark.parametrize("dimensions, edges", [(3, EDGES), (2, EDGES[:3])])
+def test_shape_functions_are_one_at_their_node_and_zero_at_the_others(dimensions, edges):
+    corners = np.vstack([np.zeros(dimensions), np.eye(dimensions)])
+    nodes = np.vstack([corners, corners[edges].mean(axis=1)])
+    assert np.allclose(shape(nodes), np.eye(len(nodes)), atol=1e-14)
 
 
 def test_shape_functions_add_up_to_one_and_their_gradients_to_zero(points):
@@ -25,11 +26,12 @@ def test_shape_functions_add_up_to_one_and_their_gradients_to_zero(points):
     assert np.allclose(shape_gradient(points.xi).sum(axis=1), 0, atol=1e-13)
 
 
-def test_gradients_are_those_of_the_shape_functions(points):
-    step = 1e-6
-    for axis, unit in enumerate(np.eye(3)):
-        slope = (shape(points.xi + step * unit) - shape(points.xi - step * unit)) / (2 * step)
-        assert np.allclose(slope, shape_gradient(points.xi)[..., axis], atol=1e-8)
+@pytest.mark.parametrize("dimensions", [3, 2])
+def test_gradients_are_those_of_the_shape_functions(points, dimensions):
+    step, xi = 1e-6, points.xi[:, :dimensions]
+    for axis, unit in enumerate(np.eye(dimensions)):
+        slope = (shape(xi + step * unit) - shape(xi - step * unit)) / (2 * step)
+        assert np.allclose(slope, shape_gradient(xi)[..., axis], atol=1e-8)
 
 
 def test_a_linear_field_is_interpolated_exactly_though_the_cells_are_curved(coarse_mesh, points):

@@ -28,15 +28,6 @@ def test_nearest_surface_is_seen():
     assert alpha.sum() == pytest.approx(40 * 60, rel=0.02)
 
 
-def test_centroid_of_straight_cells_is_the_mean_of_the_vertices():
-    mesh = left_ventricle(Geometry(circumferential_elements=6, longitudinal_elements=4, transmural_elements=1))
-    straight = mesh.nodes.copy()
-    for k, (i, j) in enumerate([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)], 4):
-        straight[mesh.cells[:, k]] = (straight[mesh.cells[:, i]] + straight[mesh.cells[:, j]]) / 2
-    found = heart.centroids(straight, mesh.cells)
-    np.testing.assert_allclose(found, straight[mesh.cells[:, :4]].mean(1), atol=1e-12)
-
-
 @pytest.mark.slow
 def test_heart_with_filling_is_drawn(tmp_path):
     mesh = left_ventricle(Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1))

@@ -245,11 +245,10 @@ def _signed_rank(difference: Floats) -> float:
     return float(wilcoxon(difference).pvalue)
 
 
-def _holm(p_values: Sequence[float]) -> list[float]:
+def _holm(p_values: Sequence[float]) -> Floats:
     """P-values adjusted for their number by Holm's method; NaN stays and does not count."""
-    adjusted, largest = [np.nan] * len(p_values), 0.0
-    ascending = sorted((value, place) for place, value in enumerate(p_values) if np.isfinite(value))
-    for tested, (value, place) in enumerate(ascending):
-        largest = max(largest, min(1.0, (len(ascending) - tested) * value))
-        adjusted[place] = largest
+    adjusted = np.array(p_values, float)
+    rising = np.argsort(adjusted)[: np.isfinite(adjusted).sum()]  # NaN is sorted last
+    tests_left = np.arange(len(rising), 0, -1)
+    adjusted[rising] = np.maximum.accumulate(np.minimum(1.0, tests_left * adjusted[rising]))
     return adjusted

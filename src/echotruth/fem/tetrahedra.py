@@ -66,22 +66,22 @@ class MaterialPoints:
 
 
 def shape(xi: Floats) -> Floats:
-    """Quadratic shape functions at local coordinates.
+    """Quadratic shape functions of a tetrahedron, or of a triangle.
 
     With barycentric coordinates L: N_a = L_a (2 L_a - 1) of a vertex, 4 L_a L_b of the node between a and b.
 
     Parameters
     ----------
-    xi : ndarray of shape (n, 3)
+    xi : ndarray of shape (n, 3), or (n, 2) in a triangle
+        Local coordinates.
 
     Returns
     -------
-    ndarray of shape (n, 10)
+    ndarray of shape (n, 10), or (n, 6)
         Zienkiewicz & Taylor, The Finite Element Method, vol. 1, section 6.
     """
-    corner = _barycentric(xi)
-    middle = 4 * corner[:, EDGES[:, 0]] * corner[:, EDGES[:, 1]]
-    return np.hstack([corner * (2 * corner - 1), middle])
+    corner, (a, b) = _barycentric(xi), _edges(xi)
+    return np.hstack([corner * (2 * corner - 1), 4 * corner[:, a] * corner[:, b]])
 
 
 def shape_gradient(xi: Floats) -> Floats:
@@ -89,21 +89,25 @@ def shape_gradient(xi: Floats) -> Floats:
 
     Parameters
     ----------
-    xi : ndarray of shape (n, 3)
+    xi : ndarray of shape (n, 3), or (n, 2) in a triangle
 
     Returns
     -------
-    ndarray of shape (n, 10, 3)
+    ndarray of shape (n, 10, 3), or (n, 6, 2)
     """
-    corner = _barycentric(xi)[..., None]
-    dcorner_dxi = np.vstack([-np.ones(3), np.eye(3)])
-    a, b = EDGES.T
+    corner, (a, b) = _barycentric(xi)[..., None], _edges(xi)
+    dcorner_dxi = np.vstack([-np.ones(xi.shape[1]), np.eye(xi.shape[1])])
     middle = 4 * (corner[:, a] * dcorner_dxi[b] + corner[:, b] * dcorner_dxi[a])
     return np.concatenate([(4 * corner - 1) * dcorner_dxi, middle], axis=1)
 
 
 def _barycentric(xi: Floats) -> Floats:
     return np.column_stack([1 - xi.sum(axis=1), xi])
+
+
+def _edges(xi: Floats) -> NDArray[np.int_]:
+    """Vertices (2, n) of the edges of a tetrahedron, or of a triangle, which has the first three of them."""
+    return EDGES[: 3 * (xi.shape[1] - 1)].T
 
 
 def interpolate(values: Floats, cells: Integers, points: MaterialPoints) -> Floats:

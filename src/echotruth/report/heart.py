@@ -11,6 +11,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from echotruth.fem.tetrahedra import shape
+from echotruth.mechanics.fibres import CENTROID
 from echotruth.report import style
 from echotruth.report.raster import Camera, Surface, render
 
@@ -89,24 +91,6 @@ def draw(cells: np.ndarray, helix: np.ndarray, states: Sequence[State]) -> Figur
     return figure
 
 
-def centroids(nodes: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Positions of the cell centroids.
-
-    Parameters
-    ----------
-    nodes : ndarray of shape (node, 3)
-        m.
-    cells : ndarray of shape (cell, 10)
-
-    Returns
-    -------
-    ndarray of shape (cell, 3)
-        m.
-    """
-    # Quadratic shape functions at the centroid: -1/8 at a vertex, 1/4 at the middle of an edge.
-    return np.einsum("k,ckx->cx", np.repeat([-1 / 8, 1 / 4], [4, 6]), nodes[cells])
-
-
 def _grid(nodes: np.ndarray, cells: np.ndarray, values: dict[str, np.ndarray]) -> pyvista.UnstructuredGrid:
     grid = pyvista.UnstructuredGrid({pyvista.CellType.QUADRATIC_TETRA: cells.astype(np.int64)}, nodes)
     for name, of_cells in values.items():
@@ -124,7 +108,7 @@ def _cut(grid: pyvista.UnstructuredGrid) -> pyvista.PolyData:
 
 def _rods(state: State, cells: np.ndarray, helix: np.ndarray) -> pyvista.PolyData:
     """Short rods along the fibres, outside the quarter that is cut away."""
-    position = centroids(state.nodes, cells)
+    position = shape(CENTROID)[0] @ state.nodes[cells]
     shown = (position[:, 1] <= 0) | (position[:, 0] >= 0)
     points = pyvista.PolyData(position[shown])
     points["direction"] = state.fibre[shown]

@@ -1,5 +1,7 @@
 """Software rasterizer of shaded triangulated surfaces, which needs neither a display nor OpenGL.
 
+VTK renders only with EGL or OSMesa of the operating system, and ends the process where there is neither.
+
 A z-buffer and Gouraud shading under parallel projection: Foley, van Dam, Feiner and Hughes,
 Computer Graphics: Principles and Practice, chapters 15 and 16.
 """

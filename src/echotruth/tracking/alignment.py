@@ -1,4 +1,4 @@
-"""Kernels of Gauss-Newton image alignment with a B-spline field: image gradients and banded normal equations.
+"""Kernels of Gauss-Newton image alignment with a B-spline field: image gradients and banded normal matrices.
 
 All run in one thread, release the GIL, and take their sums in one order.
 """
@@ -51,7 +51,7 @@ def add_normal_matrix(knots, offsets, weight_x, weight_y, gradient, weight, stri
     """Add the normal matrix sum w (N grad I)(N grad I)^T of every `stride`-th point to a banded matrix.
 
     Unknown 2 k + c is component c of knot k; band[a, b - a + width - 1] is the entry in row a and column b of the
-    lower triangle.
+    lower triangle. Its transpose is what LAPACK and BLAS take as the upper triangle of a banded matrix.
 
     Parameters
     ----------
@@ -103,62 +103,3 @@ def add_cell_matrices(knots, cell_matrices, band):
             band[2 * a + 1, d - 1] += cell_matrices[1, m, k]
             if b < a:
                 band[2 * a, d + 1] += cell_matrices[1, k, m]
-
-
-@numba.njit(cache=True, nogil=True)
-def cholesky_banded(band):
-    """Cholesky factor of a symmetric positive definite banded matrix (see :func:`add_normal_matrix`), in place.
-
-    Returns its columns, shape (unknowns, width): entry d of row j is the factor in row j + d and column j.
-    """
-    n, width = band.shape
-    last = width - 1
-    columns, column = np.zeros((n, width)), np.empty(width)
-    for j in range(n):
-        height = min(width, n - j)
-        pivot = np.sqrt(band[j, last])
-        for d in range(height):
-            column[d] = band[j + d, last - d] / pivot
-            band[j + d, last - d] = columns[j, d] = column[d]
-        # Row by row, so that the compiler need not reorder a sum to be fast.
-        for d in range(1, height):
-            row = band[j + d]
-            for e in range(1, d + 1):
-                row[last - d + e] -= column[d] * column[e]
-    return columns
-
-
-@numba.njit(cache=True, nogil=True)
-def solve_banded(factor, columns, rhs):
-    """Solve for a right-hand side (unknowns,), in place, with factor and columns of :func:`cholesky_banded`."""
-    n, width = factor.shape
-    last = width - 1
-    for j in range(n):
-        rhs[j] /= factor[j, last]
-        subtract_multiple(columns[j, 1 : n - j], rhs[j], rhs[j + 1 : j + width])
-    for j in range(n - 1, -1, -1):
-        rhs[j] /= factor[j, last]
-        before = max(0, j - last)
-        subtract_multiple(factor[j, before - j + last : last], rhs[j], rhs[before:j])
-
-
-@numba.njit(cache=True, nogil=True)
-def subtract_multiple(values, factor, result):
-    """Subtract values (n,) times a number from a result (n,), in place."""
-    for k in range(len(result)):
-        result[k] -= values[k] * factor
-
-
-@numba.njit(cache=True, nogil=True)
-def multiply_banded(band, x):
-    """Product of a symmetric banded matrix (see :func:`add_normal_matrix`) and a vector (unknowns,)."""
-    n, width = band.shape
-    last = width - 1
-    result = np.zeros(n)
-    for a in range(n):
-        result[a] += band[a, last] * x[a]
-        for b in range(max(0, a - last), a):
-            entry = band[a, b - a + last]
-            result[a] += entry * x[b]
-            result[b] += entry * x[a]
-    return result

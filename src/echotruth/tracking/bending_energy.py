@@ -18,9 +18,10 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 from scipy import ndimage
+from scipy.linalg import blas
 
 from echotruth.tracking import cubic
-from echotruth.tracking.alignment import add_cell_matrices, multiply_banded
+from echotruth.tracking.alignment import add_cell_matrices
 from echotruth.tracking.bspline import Cells
 
 MIN_ENERGY = 1e-9
@@ -53,7 +54,7 @@ class BendingEnergy:
     @classmethod
     def without(cls, band: np.ndarray, free: np.ndarray) -> BendingEnergy:
         """The energy of a matrix K, with the columns of `free` (unknowns, free) free of it."""
-        gradients = np.stack([multiply_banded(band, np.ascontiguousarray(field)) for field in free.T], -1)
+        gradients = np.stack([_product(band, field) for field in free.T], -1)
         return cls._projected(band, free, gradients)
 
     @classmethod
@@ -69,12 +70,17 @@ class BendingEnergy:
             return self
         unit = field / size
         free = np.column_stack([self.free, unit])
-        return self._projected(self.band, free, np.column_stack([self.gradients, multiply_banded(self.band, unit)]))
+        return self._projected(self.band, free, np.column_stack([self.gradients, _product(self.band, unit)]))
 
     def gradient(self, field: np.ndarray) -> np.ndarray:
         """Half the gradient of the energy of a field, both of shape (unknowns,)."""
         products = np.sum(self.gradients * field[:, None], 0)
-        return multiply_banded(self.band, field) - np.sum(self.projection * products, 1)
+        return _product(self.band, field) - np.sum(self.projection * products, 1)
+
+
+def _product(band: np.ndarray, field: np.ndarray) -> np.ndarray:
+    """Product of a symmetric banded matrix (unknowns, width) and a field (unknowns,)."""
+    return blas.dsbmv(band.shape[1] - 1, 1.0, band.T, field)
 
 
 def bending_matrix(cells: Cells, metrics: np.ndarray, angle_derivatives: np.ndarray, size: int) -> np.ndarray:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import ndimage
+from scipy import linalg, ndimage
 
 from echotruth.tracking import alignment
 from echotruth.tracking.bending_energy import BendingEnergy, bending_matrix, wall_frame
@@ -50,25 +50,20 @@ class NormalMatrix:
 
     Attributes
     ----------
-    factor : ndarray of shape (unknowns, width)
-        Of F, see :func:`echotruth.tracking.alignment.cholesky_banded`.
-    columns : ndarray of shape (unknowns, width)
-        Of the factor.
+    factor : ndarray of shape (width, unknowns)
+        Cholesky factor of F, see :func:`scipy.linalg.cholesky_banded`.
     energy_weight : float
         Weight beta of the bending energy.
     energy : BendingEnergy
     """
 
     factor: np.ndarray
-    columns: np.ndarray
     energy_weight: float
     energy: BendingEnergy
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """F^-1 rhs; both of shape (unknowns,)."""
-        solution = rhs.copy()
-        alignment.solve_banded(self.factor, self.columns, solution)
-        return solution
+        return linalg.cho_solve_banded((self.factor, False), rhs)
 
     def newton_step(self, rhs: np.ndarray) -> np.ndarray:
         """S^-1 rhs, both of shape (unknowns,), by the Woodbury formula."""
@@ -261,8 +256,7 @@ def _factor(band: np.ndarray, scale: float, energy_weight: float, energy: Bendin
     """N + beta K, regularised, from N; in place."""
     band += energy_weight * energy.band
     band[:, -1] += scale * REGULARISATION
-    columns = alignment.cholesky_banded(band)
-    return NormalMatrix(band, columns, energy_weight, energy)
+    return NormalMatrix(linalg.cholesky_banded(band.T), energy_weight, energy)
 
 
 def geman_mcclure(residual: np.ndarray, tolerance: float) -> np.ndarray:

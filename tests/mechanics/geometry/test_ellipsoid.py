@@ -5,10 +5,11 @@ import pytest
 
 from echotruth.config import Geometry
 from echotruth.fem.quadrature import triangle
+from echotruth.fem.tetrahedra import shape, shape_gradient
 from echotruth.fem.volume import cell_volumes
 from echotruth.mechanics.geometry.ellipsoid import ellipsoid, semi_axes
 from echotruth.mechanics.geometry.mesh_quality import GeometryError
-from echotruth.mechanics.solver.cavity import cavity_volume, triangle_shape
+from echotruth.mechanics.solver.cavity import cavity_volume
 
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
 
@@ -21,7 +22,7 @@ def cap(radius, length, base):
 def flux(nodes, facets):
     """Flux of the position through quadratic triangles."""
     xi, weight = triangle()
-    value, slope = triangle_shape(xi)
+    value, slope = shape(xi), shape_gradient(xi)
     x = nodes[facets]
     tangents = np.einsum("qak,fai->kfqi", slope, x)
     return np.einsum("qa,fai,fqi,q->", value, x, np.cross(*tangents), weight)

@@ -12,34 +12,10 @@ import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.fem.quadrature import triangle
-from echotruth.fem.tetrahedra import Integers
-
-_EDGES = np.array([(0, 1), (1, 2), (2, 0)])
-
-
-def triangle_shape(xi: Floats) -> tuple[Floats, Floats]:
-    """Quadratic shape functions of a triangle.
-
-    Parameters
-    ----------
-    xi : ndarray of shape (n, 2)
-
-    Returns
-    -------
-    value : ndarray of shape (n, 6)
-    dN_dxi : ndarray of shape (n, 6, 2)
-        Zienkiewicz & Taylor, The Finite Element Method, vol. 1, section 6.
-    """
-    corner = np.column_stack([1 - xi.sum(axis=1), xi])
-    dcorner_dxi = np.vstack([-np.ones(2), np.eye(2)])
-    a, b = _EDGES.T
-    value = np.hstack([corner * (2 * corner - 1), 4 * corner[:, a] * corner[:, b]])
-    middle = 4 * (corner[:, a, None] * dcorner_dxi[b] + corner[:, b, None] * dcorner_dxi[a])
-    return value, np.concatenate([(4 * corner[..., None] - 1) * dcorner_dxi, middle], axis=1)
-
+from echotruth.fem.tetrahedra import Integers, shape, shape_gradient
 
 _XI, _WEIGHT = triangle()
-_N, _DN_DXI = triangle_shape(_XI)
+_N, _DN_DXI = shape(_XI), shape_gradient(_XI)
 _OPERATORS = np.stack([_N, _DN_DXI[..., 0], _DN_DXI[..., 1]])
 """Nodes to x, x,1 and x,2 at the quadrature points, (3, n_points, 6)."""
 _NEXT, _LAST = np.roll(_OPERATORS, -1, axis=0), np.roll(_OPERATORS, -2, axis=0)

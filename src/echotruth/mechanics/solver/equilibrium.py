@@ -1,12 +1,36 @@
 """Equilibrium of the heart under a cavity pressure, and its Newton corrections.
 
-Unknowns are the free displacements u, the pressure p_c of each cell (positive in tension) and, if asked for, one scalar
-s: the active tension, the stiffness or the cavity pressure P. With v_c and V_c the deformed and unloaded volume of a
-cell and V(u) that of the cavity, the residuals are
+Unknowns are the displacement u, the pressure p_c of each cell (positive in tension) and, if asked for, one scalar s:
+the active tension T, the stiffness C or the cavity pressure P. The weak form, virtual work for every displacement v
+that the support leaves free (:func:`.support.base_support`), is
+
+      sum_c int_c F S : grad v dV                        element.evaluate, stress_point.add_force
+    + int_epi  [k n.(u - u_ED) + d n.u'] n.v dA          surroundings.surface_matrix, Equilibrium._spring_force
+    + int_base [k_z u_z v_z + k_t u_t v_t] dA            the same; only if the base is elastic
+    + P int_endo v.n da                                  cavity.volume_gradient; n points into the cavity
+    = 0,
+
+    int_c (J - 1 - p_c / kappa) dV = 0 for each cell c,  element.evaluate (Response.volume)
+    V(u) = V_target, if there is an s,                   cavity.cavity_volume
+
+with the second Piola-Kirchhoff stress S of the wall, term by term (:func:`.stress_point.evaluate`),
+
+    S = C S_passive                                      a law of materials/, stress.isochoric_stress
+      + T sum_a share_a S_active(lambda_a) a (x) a       active_stress.py; the T of each cell: activation.py
+      + [p_c + C b (J - 1)] J C_G^-1                     stress_point.evaluate; b is the pointwise bulk ratio
+      + eta dE/dt                                        the same, over the step since the previous state.
+
+Here x = X + u, F = dx/dX, J = det F, C_G = F^T F, E = (C_G - I) / 2, and a is fibre, sheet and normal, along which the
+stretch is lambda_a and the share of the tension 1 and those of the configuration. Springs act on the unloaded surface
+of normal n, per area: k and d are those of the pericardium, at rest at end-diastole (ED), k_z and k_t those of the base
+along and around the long axis; u' is the velocity. Stresses are in Pa, lengths in m.
+
+Discretised by quadratic tetrahedra (:mod:`.element`) and summed by :class:`.assembly.Assembly`, the residuals are
 
     r = f(u, p, s) + K_e (u - u_rest) + D_e (u - u_previous) / dt - P dV/du,
-    r_c = v_c(u) / V_c - 1 - p_c / kappa,    r_V = V(u) - V_target.
+    r_c = v_c(u) / V_c - 1 - p_c / kappa,    r_V = V(u) - V_target,
 
+with v_c and V_c the deformed and unloaded volume of a cell and V(u) that of the cavity (:meth:`Equilibrium.residual`).
 K_e and D_e are the springs and dashpots of the surroundings (:mod:`.surroundings`), dt the time since the previous
 state. P is work-conjugate to V: its load P dV/du does the work P dV. Newton's method eliminates p_c in its cell and
 borders the tangent with s, so that one factorization of K serves both right-hand sides. With G_c = dv_c/du and

@@ -1,4 +1,4 @@
-"""Stress of the wall from its passive law, its active tension and its pressure.
+"""Stress of the wall from its passive law and its pressure; the active one stands in :mod:`.active_stress`.
 
 All tensors are in the axes of the fibre and in the order ff, ss, nn, fs, fn, sn; strains (and C)
 have their tensor components, tangents act on strains with doubled shear. The numba
@@ -104,20 +104,3 @@ def add_volumetric(inverse: Floats, j: float, pressure: float, bulk: float, tang
         for k in range(i, 6):
             outer = inverse[i] * inverse[k]
             tangent[i, k] += pressure * j * (outer - 2 * square_product(inverse, i, k)) + bulk * j * j * outer
-
-
-@njit(cache=True, error_model="numpy")
-def active(c_ff: float, beta: float, power: float) -> tuple[float, float]:
-    """Active stress along an axis for T_Ca = 1: S_ff = [1 + beta (lambda - 1)] / lambda^power with lambda^2 = C_ff.
-
-    Power 2 is the tension per deformed area of the paper's equations 2 and 3; power 0 the tension as second
-    Piola-Kirchhoff stress, as in Land et al. 2015.
-
-    Returns
-    -------
-    stress, tangent : float
-        S_ff and its derivative by E_f.
-    """
-    stretch = sqrt(c_ff)
-    stress = (1 + beta * (stretch - 1)) * stretch**-power
-    return stress, (beta * stretch ** (-power) - power * stress / stretch) / stretch

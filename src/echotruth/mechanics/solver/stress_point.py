@@ -13,6 +13,7 @@ from numba import njit
 
 from echotruth.arrays import Floats
 from echotruth.mechanics.solver import stress as laws
+from echotruth.mechanics.solver.active_stress import active_stress
 
 PASSIVE, ACTIVE, VOLUMETRIC, TOTAL = range(4)
 """Parts: for a stiffness, an active tension and a pressure of one, and the total."""
@@ -113,7 +114,7 @@ def evaluate(j, law, scale, previous_c, work, with_tangent):
         stress[TOTAL, k] = stiffness * passive[k] + hydrostatic * j * inverse[k] + viscous
     for k in range(3):
         share = 1.0 if k == 0 else law.cross_fibre[k - 1]
-        active, active_tangent = laws.active(c[k], law.active[0], law.active[1])
+        active, active_tangent = active_stress(c[k], law.active[0], law.active[1])
         stress[TOTAL, k] += tension * share * active
         stress[ACTIVE, k], stress[ACTIVE, k + 3] = share * active, 0.0
         active_stiffness[k] = share * active_tangent

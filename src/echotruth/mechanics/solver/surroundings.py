@@ -15,9 +15,8 @@ import numpy as np
 from echotruth.arrays import Floats
 from echotruth.config import Mechanics
 from echotruth.fem.quadrature import triangle
-from echotruth.fem.tetrahedra import Integers, Mesh
+from echotruth.fem.tetrahedra import Integers, Mesh, shape, shape_gradient
 from echotruth.mechanics.solver.assembly import BASE, EPI
-from echotruth.mechanics.solver.cavity import triangle_shape
 
 Direction = Callable[[Floats, Floats], Floats]
 
@@ -75,7 +74,7 @@ def surface_matrix(mesh: Mesh, facets: Integers, direction: Direction) -> Floats
         Rows and columns run over node and axis.
     """
     xi, weight = triangle()
-    value, dN_dxi = triangle_shape(xi)
+    value, dN_dxi = shape(xi), shape_gradient(xi)
     nodes = mesh.nodes[facets]
     first, second = (np.einsum("qa,fai->fqi", dN_dxi[..., k], nodes) for k in (0, 1))
     area = np.cross(first, second)

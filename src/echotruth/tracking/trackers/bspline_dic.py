@@ -1,12 +1,32 @@
 """Digital image correlation of the whole wall at once; the motion is a cubic B-spline.
 
-The displacement since end-diastole is a cubic B-spline over the wall at end-diastole. Frame by frame, it is fitted so
-that the image at the displaced positions matches a template, an earlier frame at its own displaced positions
-(Gauss-Newton with robust weights, Baker and Matthews 2004, Int J Comput Vis 56:221; B-splines as Rueckert et al. 1999,
-IEEE Trans Med Imaging 18:712). Both are blurred at first, so that a motion beyond the size of a speckle is found. Their
-gain is made even, so that tissue in a shadow counts like the rest. A template is kept until its correlation with the
-tissue falls too low. If the cycle closes, the clip is tracked from end-diastole both forwards and backwards, and the
-two are averaged with weights from their variances.
+In every frame the displacement U since end-diastole, a cubic B-spline of coefficients c, minimises
+
+    J(c) = sum_p rho(r_p) + beta E(U - U_before),    r_p = I(X_p + U(X_p)) - T_p,    U(X) = sum_k c_k B_k(X)
+
+    X_p       pixels of the wall and its surroundings at end-diastole, px        region.wall_region
+    B_k, c_k  cubic B-spline of a knot, and its coefficient (2,), px         bspline.KnotLattice, bspline.Cells
+    I         image: amplitude of even gain, a little blurred, in grey values    track (grey.decompress, grey.even_gain)
+    T_p       template: an earlier image at its own displaced positions          Template, WallTracker.track
+    rho       r^2 / (1 + (r / (tolerance sigma))^2), sigma from the median |r|   region.geman_mcclure: w = rho'(r) / 2 r
+    U_before  displacement in the frame before, px                               WallTracker.track
+    E         bending energy, px^2: of the field less the best affine field      bending_energy.bending_matrix,
+              and multiple of U_before, which have none                          bending_energy.BendingEnergy
+    beta      weight of E, grey^2 / px^2: from `smoothness`, or by the evidence  WallRegion._normal_matrix, evidence
+
+J is minimised by Gauss-Newton with the weights w (:meth:`.region.WallRegion.align`; Baker and Matthews 2004, Int J
+Comput Vis 56:221; B-splines as Rueckert et al. 1999, IEEE Trans Med Imaging 18:712): with g = grad I at X + U and the
+row B g of all products B_k g,
+
+    (sum_p w (B g)^T (B g) + beta K) dc = -sum_p w r (B g)^T - beta K (c - c_before),    E(U) = c^T K c,
+
+whose first sum is :func:`.alignment.add_normal_matrix`, and whose solution is :meth:`.region.NormalMatrix.newton_step`.
+
+Image and template are blurred at first, so that a motion beyond the size of a speckle is found; the start is
+`WallTracker._predict`, by a dense flow. The gain is made even, so that tissue in a shadow counts like the rest. A
+template is kept until its correlation with the tissue falls below `template_update_ncc`. That the cycle closes is no
+term of J: if it does (:mod:`.closure`), the clip is tracked from end-diastole both forwards and backwards, and
+:func:`combine` takes the mean of the two with weights from their variances.
 """
 
 from __future__ import annotations
