@@ -27,12 +27,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import report
+from echotruth.evaluation.choice import job_of
 from tracking_split import TRACKER, blobs
 
 from echotruth.benchmark.conditions import PLAIN, main_conditions
 from echotruth.benchmark.records import read
 from echotruth.benchmark.splits import TEST
-from echotruth.evaluation.choice import job_of
 from echotruth.evaluation.clip import clips
 from echotruth.evaluation.difficulty.plane import both_ways, plane_path
 from echotruth.evaluation.parallel import in_processes

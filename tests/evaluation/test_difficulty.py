@@ -290,7 +290,7 @@ def test_table_of_a_repository_is_kept_until_its_images_change(known, monkeypatc
     monkeypatch.undo()
     kept = known.folder / "scratch" / known.case.id / "mid" / "difficulty.json"
     kept.write_text(json.dumps({"key": []}))
-    again = et.difficulty(known.folder, known.case.id, "mid")
+    again = et.Repository(known.folder).difficulty(known.case.id, "mid")
     assert list(again["size_px"]) == list(SIZES) and (again["floor_plane_percent"] < 0.2).all()
 
 
@@ -305,7 +305,7 @@ def test_table_is_made_again_for_the_points_of_another_grid(known, monkeypatch):
 
 def test_unknown_case_or_view_is_named(known):
     with pytest.raises(ValueError, match="view = 'apex': use one of mid, long"):
-        et.difficulty(known.folder, known.case.id, "apex")
+        et.Repository(known.folder).difficulty(known.case.id, "apex")
     for names in (["nobody"], "nobody"):
         with pytest.raises(ValueError, match="case = 'nobody': use one of"):
             table.difficulties(known.folder, cases=names)

@@ -10,13 +10,13 @@ import pandas as pd
 import pytest
 import yaml
 import zarr
+from echotruth.evaluation.digest import digest
 
 from echotruth.cases import expand
 from echotruth.cli import main
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tracking, View
 from echotruth.config.tracking import External
 from echotruth.evaluation import scoring
-from echotruth.evaluation.digest import digest
 from echotruth.evaluation.tracker_options import parse_tracker
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres

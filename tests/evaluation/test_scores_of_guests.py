@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import xarray as xr
+from echotruth.evaluation.digest import digest
 
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking, View
-from echotruth.evaluation.digest import digest
 from echotruth.evaluation.leaderboard import rows
 from echotruth.repository import layout, ledger
 from echotruth.repository.ledger import record_path

@@ -136,7 +136,7 @@ def test_points_move_with_the_tissue_and_are_seen_within_the_slice(repository, s
 def test_clip_is_that_of_the_notebook_with_channels_first(repository):
     clips = learning.Clips(repository, views=["long_axis"], size=32, truth=["displacement", "strain", "flow"])
     item = clips[0]
-    clip = et.load_clip(repository, item["case"], "long_axis", 32)
+    clip = et.Repository(repository).clip(item["case"], "long_axis", 32)
     np.testing.assert_array_equal(np.round(item["image"] * 255), clip["image"])
     np.testing.assert_allclose(item["time"], clip["time"], rtol=1e-6)
     for name, last in (("displacement", "vector"), ("strain", "strain_component"), ("flow", "vector")):
@@ -147,18 +147,18 @@ def test_clip_is_that_of_the_notebook_with_channels_first(repository):
 def test_labels_are_those_of_the_notebook(repository, target):
     items = learning.Segmentation(repository, target=target)
     number = len(items) - 2  # of the last heart, which has an infarct
-    clip = et.load_clip(repository, items[number]["case"], items[number]["view"])
+    clip = et.Repository(repository).clip(items[number]["case"], items[number]["view"])
     expected = clip["mask" if target == "wall" else target].values[items[number]["frame"]]
     np.testing.assert_array_equal(items[number]["label"], expected)
     assert items[number]["image"].shape == (1, SIZE, SIZE)
 
 
 def test_strain_and_diagnosis_are_those_of_the_heart(repository):
-    means, part = et.open(repository)["kinematics"]["strain_mean"], {"views": ["mid"], "size": 32}
+    means, part = et.Repository(repository).tree["kinematics"]["strain_mean"], {"views": ["mid"], "size": 32}
     for strain, diagnosis in zip(
         learning.Strain(repository, **part), learning.Diagnosis(repository, **part), strict=True
     ):
-        heart, mean = et.load_heart(repository, strain["case"]), means.sel(case=strain["case"])
+        heart, mean = et.Repository(repository).heart(strain["case"]), means.sel(case=strain["case"])
         np.testing.assert_allclose(strain["strain"], mean, atol=1e-7)
         assert strain["es_frame"] == heart.es
         assert diagnosis["label"] == (heart.region == 1).any() == (diagnosis["scar_size"] > 0)

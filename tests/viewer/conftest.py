@@ -4,9 +4,8 @@ import subprocess
 import sys
 
 import pytest
-from shown_repository import Shown, shown_repository
-
 from echotruth.viewer.catalogue import Catalogue
+from shown_repository import Shown, shown_repository
 
 
 @pytest.fixture(scope="session")

@@ -9,12 +9,12 @@ from urllib.parse import parse_qs
 import numpy as np
 import pytest
 from bokeh.document import Document
+from echotruth.viewer.catalogue import Catalogue
 from finished_repository import configured
 from known_repository import SIZES
 
 from echotruth.cases import expand
 from echotruth.evaluation.run import prepare
-from echotruth.viewer.catalogue import Catalogue
 from echotruth.viewer.choice import TRUTH, Choice, asked, first, refused
 from echotruth.viewer.page import Page
 from echotruth.viewer.server import ShowError, opened, serve

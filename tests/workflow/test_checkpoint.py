@@ -11,11 +11,11 @@ from itertools import product
 
 import numpy as np
 import pytest
+from echotruth.notebook.points import load_points
 
 from echotruth.cases import expand
 from echotruth.config.loading import validate
 from echotruth.evaluation.scoring import ground_truth, score
-from echotruth.notebook.points import load_points
 from echotruth.repository import ledger
 from echotruth.repository.rounding import CURVE
 from echotruth.workflow.cost import Cost

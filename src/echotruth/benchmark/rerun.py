@@ -14,26 +14,26 @@ from pathlib import Path
 import numpy as np
 
 from echotruth.benchmark import results
+from echotruth.benchmark.repositories import opened
 from echotruth.benchmark.results import COLUMNS, Row
 from echotruth.benchmark.splits import split_of
 from echotruth.benchmark.variants import VARIANTS, anonymous
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
-from echotruth.evaluation import kept
 from echotruth.evaluation.availability import check_runs
-from echotruth.evaluation.choice import folder_of, is_complete
-from echotruth.evaluation.clip import clips
-from echotruth.evaluation.digest import digest
+from echotruth.evaluation.clip import read_clips
 from echotruth.evaluation.displacement_error import evaluate
 from echotruth.evaluation.leaderboard import scores_of_guests
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.run import prepare, track_clip
-from echotruth.evaluation.scoring import Truth, ground_truth
+from echotruth.evaluation.scoring import Truth, read_truth
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.loop.cycle import read_loop
+from echotruth.repository import estimates, kept
+from echotruth.repository.digest import digest
+from echotruth.repository.reader import Repository
 from echotruth.section import Section
-from echotruth.workflow.job import Job
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Rerun:
     def sizes(self) -> list[int]:
         """Image sizes at which the tracker was scored, px."""
         own, known = self.config.tracking.trackers, self.config.bmode.sizes
-        table = scores_of_guests(self.folder, own)
+        table = scores_of_guests(Repository(self.folder))
         scored = set(table[table["tracker"] == self.tracker]["size_px"])
         return [size for size in known if self.tracker in own or size in scored] or list(known)
 
@@ -110,7 +110,7 @@ class Rerun:
         """Whether what the tracker found in a clip is stored, and the clip is still the same."""
         is_own = self.tracker in self.config.tracking.trackers
         stages = ("truth", "bmode", *(("tracking",) if is_own else ()))
-        if not is_complete(self.folder, case, view, *stages):
+        if Repository(self.folder).problem(case, view, *stages):
             return False
         return is_own or self.kept_clips.get(f"{case}/{view}") == digest(self.folder, case, view)
 
@@ -141,12 +141,12 @@ def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun
     name = parse_tracker(tracker, None, [])[0] if ":" in tracker else tracker
     if name in config.tracking.trackers:
         return Rerun(folder, config, name, config.tracking.trackers[name], variant, split)
-    known = kept.trackers(folder, config)
+    known = Repository(folder).trackers
     if name not in known:
         remedy = f"evaluate it with --keep first, or use one of {', '.join(known)}"
         raise EvaluationError(f"{tracker}: the motion that it tracked is not kept in {folder}: {remedy}")
     about = kept.about(folder, name)
-    settings = prepare(folder, name, about["settings"]).settings
+    settings = prepare(Repository(folder), name, about["settings"]).settings
     check_runs(settings)
     return Rerun(folder, config, name, settings, variant, split)
 
@@ -161,7 +161,7 @@ def rerun(
     or an image size is that of none.
     """
     runs, reasons = [], []
-    for folder in map(folder_of, repositories):
+    for folder in (opened(repository).folder for repository in repositories):
         known = load(folder / "config.yaml").bmode.sizes
         if missing := [size for size in sizes if size not in known]:
             choices = ", ".join(map(str, known))
@@ -196,18 +196,19 @@ def _view_rows(run: Rerun, sizes: list[int], case_view: tuple[str, str]) -> list
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
-        job = Job(run.folder, "tracking", *case_view)
+        repository = Repository(run.folder)
         time = read_loop(run.config.loop).time
         found: dict[int, tuple[np.ndarray, str, int]] = {}
-        for size, clip in clips(job).items():
+        for size, clip in read_clips(repository, *case_view).items():
             if size in sizes:
                 variant = VARIANTS[run.variant](clip)
                 estimate, failure = track_clip(anonymous(variant.clip, time), run.settings)
                 found[size] = clip.on_grid(*variant.restored(*estimate))[0], failure, variant.last
-        truth, of_clip = ground_truth(job), digest(run.folder, *case_view)
+        truth, of_clip = read_truth(repository, *case_view), digest(run.folder, *case_view)
         rows = []
         for size, (displacement, failure, last) in found.items():
-            before = kept.read(job, "tracking", "displacement", tracker=run.tracker, size=size)["displacement"]
+            found_before = estimates.tracked(repository, *case_view, run.tracker, size, "displacement")
+            before = found_before["displacement"]
             frame = min(truth.es, last)
             errors = (_error(values, truth, frame) for values in (displacement, before))
             rows.append(dict(zip(COLUMNS, (*case_view, size, of_clip, *errors, failure), strict=True)))

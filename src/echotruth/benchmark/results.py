@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from echotruth.config import Config
-from echotruth.evaluation import kept
-from echotruth.evaluation.digest import digest
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.repository import durable
+from echotruth.repository import durable, kept
+from echotruth.repository.digest import digest
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,7 +61,7 @@ def settings_of(folder: Path, config: Config, tracker: str) -> dict[str, Any]:
     """
     if tracker in config.tracking.trackers:
         return config.tracking.trackers[tracker].model_dump(mode="json")
-    if tracker not in kept.trackers(folder, config):
+    if tracker not in kept.names(folder):
         return {}
     return dict(kept.about(folder, tracker)["settings"])
 

@@ -12,10 +12,10 @@ from echotruth.benchmark.records import Suite
 from echotruth.benchmark.splits import DEVELOP, TEST, split_of
 from echotruth.benchmark.standings import main_errors, shown_size
 from echotruth.cases import Case, all_cases, diagnosis
-from echotruth.evaluation.choice import hearts_of, is_complete
+from echotruth.evaluation.hearts import hearts_of
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, LEAST_HEARTS
-from echotruth.workflow.job import Job
+from echotruth.repository.reader import Repository
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -122,10 +122,10 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
 
 def ejection_fraction(suite: Suite, case: str) -> float:
     """Ejection fraction of a heart; NaN if it was not solved."""
-    if not is_complete(suite.folder, case, None, "physiology"):
+    repository = Repository(suite.folder)
+    if repository.record("physiology", case).get("status") != "complete":
         return np.nan
-    job = Job(suite.folder, "physiology", case, code="read")
-    return float(job.store.read("physiology", job.row, names=("ejection_fraction",))["ejection_fraction"])
+    return float(repository.arrays("physiology", case, None, "ejection_fraction")["ejection_fraction"])
 
 
 def _group(case: Case) -> str:

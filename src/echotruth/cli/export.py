@@ -44,18 +44,20 @@ def add(commands: Commands) -> None:
 
 def export(arguments: argparse.Namespace) -> int:
     """Write clips, hearts or RF as files of another format; return 0, or 2 if they cannot be exported."""
-    from echotruth.config.loading import ConfigError
-    from echotruth.export import Export, ExportError, Selection, source
+    from echotruth.export import Export, Selection, Source
+    from echotruth.repository.reader import Repository
 
     chosen = Selection(arguments.case, arguments.view, arguments.size, arguments.tracker)
     try:
-        opened = source(arguments.repository, chosen)
+        opened = Source(Repository(arguments.repository), chosen)
         work = Export(opened, arguments.format, arguments.overlay, arguments.rate, arguments.output)
         clips, left_out = work.clips()
         _print_counted(work.write(clips), len(clips))
-    except (ExportError, ConfigError) as error:
+    except ValueError as error:
         return fail(str(error))
     except OSError as error:
+        if error.errno is None:  # there is no such repository
+            return fail(str(error))
         place, said = error.filename or arguments.output or arguments.repository, error.strerror or str(error)
         if isinstance(error, FileExistsError | NotADirectoryError):
             return fail(f"{place}: is a file and not a folder: give another folder with --output")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
@@ -15,11 +16,9 @@ from echotruth.evaluation.clip import Clip
 from echotruth.repository.checksums import is_whole
 from echotruth.repository.provenance import code_version, settings_version
 from echotruth.tracking import trackers
-from echotruth.workflow import superseded
 
 if TYPE_CHECKING:
     from echotruth.section import Section
-    from echotruth.workflow.job import Job
 
 ARRAYS = ("displacement", "quality")
 
@@ -50,15 +49,19 @@ class Pieces:
 
     Parameters
     ----------
-    job : Job
-        Job of the stage tracking.
+    entry : dict
+        What the last job remembered in its checkpoint.
+    index : tuple of int
+        Row of the case and index of the view.
+    roots : iterable of Path
+        Folders below which its arrays may stand.
     """
 
-    def __init__(self, job: Job) -> None:
-        entry = job.checkpoints.entry(job.stage)
-        self._job, self._sha256 = job, entry.get("record", {}).get("sha256", {})
-        # A piece is read at the place of this job, which must be that at which it was written.
-        self._known = entry.get("pieces", {}) if entry.get("index") == list(job.index) else {}
+    def __init__(self, entry: dict[str, Any], index: tuple[int, ...], roots: Iterable[Path]) -> None:
+        self._index, self._roots = index, list(roots)
+        self._sha256 = entry.get("record", {}).get("sha256", {})
+        # A piece is read at the place of this view, which must be that at which it was written.
+        self._known = entry.get("pieces", {}) if entry.get("index") == list(index) else {}
 
     def find(self, size: int, name: str, fingerprint: str) -> Piece | None:
         """Find the piece of a tracker at an image size, if it was made from the same and its files are whole."""
@@ -79,12 +82,11 @@ class Pieces:
         for array in ARRAYS:
             group = f"tracking/{array}"
             files = {name: value for name, value in self._sha256.items() if name.startswith(f"{group}/")}
-            roots = superseded.roots(self._job.folder, self._job.store.path)
-            root = next((root for root in roots if files and _whole(root, files)), None)
+            root = next((root for root in self._roots if files and _whole(root, files)), None)
             if root is None:
                 return None
             opened = cast(Any, zarr.open_array(root / group, mode="r"))
-            found.append(np.asarray(opened[self._job.index]))
+            found.append(np.asarray(opened[self._index]))
         return tuple(found)
 
 

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from functools import partial
-from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from echotruth.arrays import Floats
+from echotruth.cases import Case
 from echotruth.config import Config
 from echotruth.config.imaging import ALL_VIEWS
-from echotruth.config.loading import load
-from echotruth.evaluation import kept
 from echotruth.evaluation.agreement import REFERENCES
-from echotruth.evaluation.choice import cases_of, chosen, image_size, jobs_of
 from echotruth.evaluation.courses import peak, rate, systolic_rate
 from echotruth.evaluation.curves import REFERENCE, twist_views
 from echotruth.evaluation.segment_strain import Row
 from echotruth.loop.cycle import read_loop
-from echotruth.repository.ledger import repository_folder
+from echotruth.repository import estimates
+from echotruth.repository.choice import chosen, image_size
 from echotruth.repository.schema import LABELS
-from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from echotruth.repository.reader import Repository
 
 
 class Quantity(NamedTuple):
@@ -74,51 +72,19 @@ WHAT = ("tracked", "true")
 
 
 def strain_summary(
-    repository: str | Path,
-    cases: Sequence[str] | None = None,
-    views: Sequence[str] | None = None,
-    sizes: Sequence[int] | None = None,
-    trackers: Sequence[str] | None = None,
+    repository: Repository,
+    cases: Iterable[str] | None = None,
+    views: Iterable[str] | None = None,
+    sizes: Iterable[int] | None = None,
+    trackers: Iterable[str] | None = None,
 ) -> pd.DataFrame:
-    """Read GLS, GCS, radial strain, rotation and twist of clips into a table, tracked and true.
-
-    Parameters
-    ----------
-    repository : str or Path
-    cases, views, sizes, trackers : sequence, optional
-        Those to include. Default: all that was evaluated, at the largest size.
-
-    Returns
-    -------
-    DataFrame
-        One row per case, view, size_px, tracker and `quantity`: gls and gls_endocardial (long axis), gcs and
-        gcs_endocardial (short axis), radial (engineering, mean of the wall, in the plane), all in %, and rotation
-        (short axis), in degrees. Rows of the view "all" are those of the heart: gls as the mean over its long-axis
-        views, gcs and radial over its short-axis views, if all of these are included, and twist. Columns `tracked_`
-        and `true_` each: `es` and `peak`, in the `unit`; `time_to_peak_ms`; and `systolic_rate`, in the `rate_unit`.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        If there is no such repository, case, view, size or tracker.
-
-    Examples
-    --------
-    >>> import echotruth as et
-    >>> table = et.strain_summary("out/demo", trackers=["bspline_dic"])
-    >>> gls = table.query("quantity == 'gls' and view == 'long_axis'")[["tracked_es", "true_es", "unit"]]
-    >>> list(gls["unit"])
-    ['percent']
-    """
+    """Read GLS, GCS, radial strain, rotation and twist of clips into a table; see :meth:`.Repository.summary`."""
     import pandas as pd
 
-    folder = repository_folder(repository)
-    config = load(folder / "config.yaml")
-    chosen_sizes = [image_size(config, size) for size in sizes or config.bmode.sizes[:1]]
-    chosen_trackers = chosen("tracker", trackers, kept.trackers(folder, config))
-    jobs = jobs_of(folder, config, cases_of(folder, config), cases, views, "evaluation")
-    by_heart = (list(of_heart) for _, of_heart in groupby(jobs, lambda job: job.case.id))
-    rows = [row for of_heart in by_heart for row in _rows(of_heart, chosen_sizes, chosen_trackers)]
+    chosen_sizes = [image_size(repository.config, size) for size in sizes or repository.sizes[:1]]
+    chosen_trackers = chosen("tracker", trackers, repository.trackers)
+    clips = repository.finished(cases, views, "evaluation")
+    rows = [row for clip in clips for row in _rows(repository, *clip, chosen_sizes, chosen_trackers)]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -130,17 +96,18 @@ COLUMNS = (
 """Columns of the table."""
 
 
-def _rows(jobs: list[Job], sizes: list[int], trackers: list[str]) -> Iterator[Row]:
+def _rows(repository: Repository, case: Case, views: list[str], sizes: list[int], trackers: list[str]) -> Iterator[Row]:
     """Rows of one heart: of each view, and of the heart as a whole."""
-    heart, config = jobs[0], jobs[0].case.config
-    es = int(heart.store.read("mechanics", heart.row, names=("es_frame",))["es_frame"])
+    if not views:
+        return
+    config, es = case.config, int(repository.arrays("mechanics", case.id, None, "es_frame")["es_frame"])
     read = partial(_row, time=read_loop(config.loop).time, es=es)
-    every = {str(job.view_name): _curves(job, sizes, trackers) for job in jobs}
+    every = {view: _curves(repository, case.id, view, sizes, trackers) for view in views}
     ends = twist_views(config)
     for size in sizes:
         for tracker in trackers:
             curves = {view: of_view[size, tracker] for view, of_view in every.items() if (size, tracker) in of_view}
-            keys: Row = {"case": heart.case.id, "size_px": size, "tracker": tracker}
+            keys: Row = {"case": case.id, "size_px": size, "tracker": tracker}
             rows: list[Row] = []
             for view, of_view in curves.items():
                 shown = [quantity for quantity in QUANTITIES if config.views[view].plane in quantity.planes]
@@ -155,12 +122,14 @@ def _rows(jobs: list[Job], sizes: list[int], trackers: list[str]) -> Iterator[Ro
                 yield keys | {"view": ALL_VIEWS} | read("twist", *pair)
 
 
-def _curves(job: Job, sizes: list[int], trackers: list[str]) -> dict[tuple[int, str], dict[str, Floats]]:
+def _curves(
+    repository: Repository, case: str, view: str, sizes: list[int], trackers: list[str]
+) -> dict[tuple[int, str], dict[str, Floats]]:
     """Curves of one view, tracked and true, by size and tracker; without those that were not evaluated on it."""
     names = list(dict.fromkeys(quantity.curve for quantity in QUANTITIES))
-    true = job.read("evaluation", *(f"true_{name}" for name in names))
+    true = estimates.true(repository, case, view, *(f"true_{name}" for name in names))
     true["true_region_strain"] = true["true_region_strain"][REFERENCES.index(REFERENCE)]
-    read = kept.read_each(job, sizes, trackers, {"evaluation": [f"tracked_{name}" for name in names]})
+    read = estimates.each(repository, case, view, sizes, trackers, *(f"tracked_{name}" for name in names))
     return {
         (size, tracker): {name: np.asarray(values, float) for name, values in (true | tracked).items()}
         for size, tracker, tracked in read

@@ -17,7 +17,7 @@ from typing import Literal
 from echotruth.export.clip import Clip
 from echotruth.export.destination import draft
 from echotruth.export.error import ExportError
-from echotruth.export.selection import Selection, Source, source, unfinished
+from echotruth.export.selection import Selection, Source
 
 FRAME_RATE = 20.0
 """Frames per second of a video, slow motion for a mouse."""
@@ -64,7 +64,7 @@ class Format:
 
             with _told(clip):
                 return missing_rf(clip)
-        return unfinished(clip, "mechanics", *self.stages)
+        return clip.repository.problem(clip.case.id, clip.view, "mechanics", *self.stages)
 
     @property
     def writer(self) -> ModuleType:
@@ -170,7 +170,7 @@ class Export:
     def _write_together(self, clips: Sequence[Clip]) -> Iterator[Path]:
         """Write one file of all clips, which has the name of the repository if it has no other, and give its path."""
         form = FORMATS[self.format]
-        name = f"{self.source.folder.resolve().name}{form.suffix}"
+        name = f"{self.source.repository.config.name}{form.suffix}"
         target = self._output if self._is_file else self._output / name
         with draft(target) as path, _told(clips[0]):
             form.writer.write_together(clips, path)
@@ -179,7 +179,7 @@ class Export:
     @property
     def _output(self) -> Path:
         """Folder of the files, or path of a single file."""
-        return self.output or self.source.folder / "export" / self.format
+        return self.output or self.source.repository.folder / "export" / self.format
 
     @property
     def _is_file(self) -> bool:
@@ -205,8 +205,8 @@ def _told(clip: Clip) -> Iterator[None]:
         raise
     except (ValueError, KeyError, RuntimeError, FileNotFoundError) as error:
         said = " ".join(str(error).split())
-        remedy = f"see what echotruth check {clip.folder} says"
-        raise ExportError(f"{clip.folder} cannot be read at {clip.name}: {remedy} ({said})") from error
+        remedy = f"see what echotruth check {clip.repository.folder} says"
+        raise ExportError(f"{clip.repository.folder} cannot be read at {clip.name}: {remedy} ({said})") from error
 
 
-__all__ = ["FORMATS", "OVERLAYS", "Export", "ExportError", "Selection", "source"]
+__all__ = ["FORMATS", "OVERLAYS", "Export", "ExportError", "Selection", "Source"]

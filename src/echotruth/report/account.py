@@ -7,14 +7,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import xarray as xr
-
 from echotruth.cases.labels import diagnosis
 from echotruth.config import Config
 from echotruth.report import style
-from echotruth.report.hearts import statuses
 from echotruth.repository.ledger import GATES, VIEW_STAGES, imaged_statuses, read
+from echotruth.repository.reader import Repository
 
 LISTED = 20
 """Largest number of failures of a kind that are listed."""
@@ -45,11 +42,10 @@ def lead(config: Config) -> str:
     )
 
 
-def numbers(tree: xr.DataTree, folder: Path, config: Config) -> list[tuple[str, str]]:
+def numbers(repository: Repository) -> list[tuple[str, str]]:
     """The largest facts: label and number."""
-    status = statuses(tree)
-    present = int(np.count_nonzero(status != "retired"))
-    imaged = np.isin(status, imaged_statuses(config.physiology.exclude_implausible))
+    config, present = repository.config, len(repository.present)
+    imaged = repository.cases["status"].isin(imaged_statuses(config.physiology.exclude_implausible))
     count, frames, sizes = int(imaged.sum()), config.loop.frames, config.bmode.sizes
     clips = count * len(config.views) * len(sizes)
     found = [
@@ -59,7 +55,7 @@ def numbers(tree: xr.DataTree, folder: Path, config: Config) -> list[tuple[str, 
         ("frames", spaced(clips * frames)),
         ("trackers", spaced(len(config.tracking.trackers))),
     ]
-    size = _size_on_disk(folder / f"{config.name}.zarr")
+    size = _size_on_disk(repository.folder / f"{config.name}.zarr")
     return [*found, *([("in the store", _bytes(size))] if size else [])]
 
 
@@ -87,16 +83,11 @@ def facts(config: Config) -> list[tuple[str, str]]:
     ]
 
 
-def failures(tree: xr.DataTree, folder: Path, config: Config) -> dict[str, Any]:
+def failures(repository: Repository) -> dict[str, Any]:
     """Hearts that are not complete and trackers that found nothing, with their reasons."""
-    status, cases = statuses(tree), tree["cases"].to_dataset()
-    rows = np.flatnonzero(~np.isin(status, ("complete", "retired")))
-    reasons = cases["reason"].values
-    found = [
-        {"case": str(cases["case"].values[row]), "status": str(status[row]), "reason": str(reasons[row])}
-        for row in rows[:LISTED]
-    ]
-    lost = list(islice(_lost(folder, config), LISTED + 1))
+    rows = repository.cases[~repository.cases["status"].isin(["complete", "retired"])]
+    found = rows[["status", "reason"]].head(LISTED).reset_index().to_dict("records")
+    lost = list(islice(_lost(repository.folder, repository.config), LISTED + 1))
     return {
         "cases": found,
         "more_cases": len(rows) - len(found),
@@ -114,9 +105,8 @@ def _lost(folder: Path, config: Config) -> Any:
                 yield {"tracker": tracker, "clip": f"{path.parent.name}, {path.stem}, {size} px", "reason": str(reason)}
 
 
-def provenance(tree: xr.DataTree, config: Config) -> list[tuple[str, str]]:
-    """From what the repository was made: label and value."""
-    packages = tree.attrs.get("packages", {})
+def provenance(packages: dict[str, str], config: Config) -> list[tuple[str, str]]:
+    """From what the repository was made, with which packages: label and value."""
     return [
         ("Seed", str(config.seed)),
         ("Software", ", ".join(f"{name} {version}" for name, version in packages.items()) or "not recorded"),
@@ -142,9 +132,10 @@ def opening(config: Config, case: str, view: str, best: str) -> str:
     tracker = best or next(iter(config.tracking.trackers))
     return f"""import echotruth as et
 
-clip = et.load_clip("out/{config.name}", case="{case}", view="{view}")  # image, displacement, strain, labels
+repository = et.Repository("out/{config.name}")
+clip = repository.clip("{case}", "{view}")  # image, displacement, strain, labels
 clip["image"].isel(frame=0).plot(yincrease=False, cmap="gray")
-curves = et.strain_curves("out/{config.name}", case="{case}", view="{view}", tracker="{tracker}")
+curves = repository.curves("{case}", "{view}", "{tracker}")
 curves["tracked_line_strain"].sel(contour="middle").plot(x="time")"""
 
 

@@ -19,7 +19,7 @@ from echotruth.config import Config
 from echotruth.repository import durable, ledger
 from echotruth.repository.check import Report
 from echotruth.repository.checksums import checksums
-from echotruth.repository.inventory import JobRecord, Repository, wanted_records
+from echotruth.repository.inventory import Inventory, JobRecord, wanted_records
 
 RULES = (("mechanics",), ("physiology",), ("phantom", "truth", "rf", "bmode"), ("tracking", "evaluation"))
 """Stages of the jobs, in their order."""
@@ -98,7 +98,7 @@ def remake(folder: Path, config: Config, make: Callable[[list[str]], int]) -> in
 
 def _remember(folder: Path, dropped: set[Path]) -> None:
     """Keep time and content of the dropped records, and of all others of their hearts, which may go with them."""
-    repository = Repository(folder)
+    repository = Inventory(folder)
     cases = {record.case for record in repository.records() if record.path in dropped}
     known = _known(folder)
     for record in repository.records():
@@ -127,7 +127,7 @@ def _entry(path: Path) -> Entry:
     return {"mtime_ns": path.stat().st_mtime_ns, "content": _hash(compared)}
 
 
-def _entry_of_files(repository: Repository, record: JobRecord) -> Entry:
+def _entry_of_files(repository: Inventory, record: JobRecord) -> Entry:
     """Entry of a record that cannot be read: that of a complete job which wrote the files as they are.
 
     Its time is theirs, because what damaged the record may have changed its time; without files nothing depends on it.

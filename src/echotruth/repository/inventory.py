@@ -65,7 +65,7 @@ class JobRecord:
         return f"{self.stage} of {self.case}" + (f", {self.view}" if self.view else "")
 
 
-class Repository:
+class Inventory:
     """Folder of a repository, with what a check needs to know of it.
 
     Parameters

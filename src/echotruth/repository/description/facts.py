@@ -17,7 +17,7 @@ from echotruth.repository.description.attribution import DescriptionError
 from echotruth.repository.description.files import StoredFile, damaged, files_beside, store_files
 from echotruth.repository.description.quantities import Quantity, read_quantities
 from echotruth.repository.hierarchy import ROOT
-from echotruth.repository.inventory import CheckError, JobRecord, Repository
+from echotruth.repository.inventory import CheckError, Inventory, JobRecord
 from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
 
 Record = dict[str, Any]
@@ -130,7 +130,7 @@ def read_facts(folder: Path) -> Facts:
         If the folder is not a repository, is damaged, or has no result yet.
     """
     try:
-        repository = Repository(folder)
+        repository = Inventory(folder)
     except CheckError as error:
         raise DescriptionError(str(error)) from None
     records, checksums = _records(repository)
@@ -172,7 +172,7 @@ def _root(folder: Path, store: Path) -> Record:
     return dict(document)
 
 
-def _outcomes(repository: Repository, records: dict[Path, Record], missing: set[Path]) -> Iterator[Outcome]:
+def _outcomes(repository: Inventory, records: dict[Path, Record], missing: set[Path]) -> Iterator[Outcome]:
     folder, views = repository.folder, list(repository.config.views)
     for case in repository.cases:
         gates = [records.get(record_path(folder, stage, case)) for stage in GATES]
@@ -192,7 +192,7 @@ def _failures(records: tuple[tuple[JobRecord, Record], ...]) -> Iterator[str]:
             yield f"{tracker} on {record.case}, {record.view}: {reason}"
 
 
-def _records(repository: Repository) -> tuple[tuple[tuple[JobRecord, Record], ...], dict[str, str]]:
+def _records(repository: Inventory) -> tuple[tuple[tuple[JobRecord, Record], ...], dict[str, str]]:
     """Records of the present cases and views, and the checksums in all records, by path below the store.
 
     Of the checksums the records keep those of the images alone: there may be a million.
@@ -210,7 +210,7 @@ def _records(repository: Repository) -> tuple[tuple[tuple[JobRecord, Record], ..
     return tuple(found), checksums
 
 
-def _run(repository: Repository, records: tuple[tuple[JobRecord, Record], ...], packages: dict[str, str]) -> Run:
+def _run(repository: Inventory, records: tuple[tuple[JobRecord, Record], ...], packages: dict[str, str]) -> Run:
     paths = [record.path for record, _ in records]
     ends = {path: path.stat().st_mtime for path in paths}
     starts = [ends[record.path] - entries.get("seconds", 0.0) for record, entries in records]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from echotruth.repository.checksums import checksums
 from echotruth.repository.description.attribution import DescriptionError
-from echotruth.repository.inventory import Repository, files_below
+from echotruth.repository.inventory import Inventory, files_below
 
 
 @dataclass(frozen=True, slots=True)  # there may be a million
@@ -33,12 +33,12 @@ def damaged(folder: Path, path: Path) -> DescriptionError:
     return DescriptionError(f"{path}: is missing or damaged: {remedy}")
 
 
-def store_files(repository: Repository, known: dict[str, str]) -> tuple[StoredFile, ...]:
+def store_files(repository: Inventory, known: dict[str, str]) -> tuple[StoredFile, ...]:
     """All files of the store.
 
     Parameters
     ----------
-    repository : Repository
+    repository : Inventory
     known : dict
         Path below the store -> SHA-256 in the ledger; what the ledger of an older repository lacks is taken here.
 
@@ -53,7 +53,7 @@ def store_files(repository: Repository, known: dict[str, str]) -> tuple[StoredFi
     return tuple(_listed(repository, path, checksum) for path, checksum in sorted(known.items()))
 
 
-def _listed(repository: Repository, path: str, checksum: str) -> StoredFile:
+def _listed(repository: Inventory, path: str, checksum: str) -> StoredFile:
     file = repository.store / path
     if not file.is_file():
         raise damaged(repository.folder, file)

@@ -3,11 +3,13 @@
 import numpy as np
 
 from echotruth.evaluation.scoring import ground_truth, score
+from echotruth.imaging.view import Plane
 from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
-    truth = ground_truth(job)
+    plane = Plane(**job.read("phantom", "origin", "axes"))
+    truth = ground_truth(job.heart, plane, job.view.plane, job.case.config)
     tracked = job.read("tracking", "displacement")["displacement"]
     scores = [[score(displacement, truth) for displacement in of_size] for of_size in tracked]
     stacked = {name: np.array([[found[name] for found in of_size] for of_size in scores]) for name in scores[0][0]}

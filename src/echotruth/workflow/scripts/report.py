@@ -3,9 +3,9 @@
 import argparse
 from pathlib import Path
 
-from echotruth.config.loading import load
 from echotruth.report import page
 from echotruth.report.figures import PARTS, Figures
+from echotruth.repository.reader import Repository
 from echotruth.workflow.compiled import lock_cache_writes
 
 parser = argparse.ArgumentParser(description=__doc__)
@@ -13,9 +13,8 @@ parser.add_argument("repository", type=Path, help="folder of the repository, suc
 parser.add_argument("part", choices=[*PARTS, "page"], help="figures to draw, or the page")
 arguments = parser.parse_args()
 lock_cache_writes()
-folder = arguments.repository
-config = load(folder / "config.yaml")
+repository = Repository(arguments.repository)
 if arguments.part == "page":
-    page.write(folder, config)
+    page.write(repository)
 else:
-    Figures(folder / f"{config.name}.zarr", config, folder / "figures").draw(arguments.part)
+    Figures(repository, repository.folder / "figures").draw(arguments.part)

@@ -8,13 +8,18 @@ from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.pieces import ARRAYS, Piece, Pieces, fingerprint, known
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
+from echotruth.workflow import superseded
 from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
-    trackers, earlier = job.case.config.tracking.trackers, Pieces(job)
+    config = job.case.config
+    trackers, roots = config.tracking.trackers, superseded.roots(job.folder, job.store.path)
+    earlier = Pieces(job.checkpoints.entry(job.stage), job.index, roots)
+    images = {size: job.read(f"bmode/{size}", "image")["image"] for size in config.bmode.sizes}
+    labels = {size: job.read(f"truth/{size}", "labels")["labels"][0] for size in config.bmode.sizes}
     pieces: dict[int, dict[str, Piece]] = {}
-    for size, clip in clips(job).items():
+    for size, clip in clips(job.case, str(job.view_name), images, labels).items():
         pieces[size] = {name: _piece(job, name, clip, earlier) for name in trackers}
         logging.getLogger("echotruth").info("%d px", size)
     job.remember(pieces=known(pieces), index=list(job.index))
