@@ -204,13 +204,14 @@ def main() -> None:
     if arguments.repository is None:
         heart, name = et.beat(et.configure(geometry=SMALL)), "a small heart"
     else:
-        heart, name = et.Repository(arguments.repository).heart(arguments.case), f"the heart of {arguments.repository.name}"
+        heart = et.Repository(arguments.repository).heart(arguments.case)
+        name = f"the heart of {arguments.repository.name}"
     with tempfile.TemporaryDirectory() as folder:
         made = stored(Path(folder) / "flow", heart)
         ways = {
             "`zarr`, pair by pair": lambda: direct(made),
             "`zarr`, a clip at once": lambda: whole(made),
-            '`echotruth.load_clip(..., variables=("image", "flow"))`': lambda: clip(made),
+            '`echotruth.Repository.clip(..., variables=("image", "flow"))`': lambda: clip(made),
             "`echotruth.learning.FlowPairs`": lambda: iter(FlowPairs(made, ["heart"], [VIEW], SIZE)),
         }
         rates = {way: rate(pairs) for way, pairs in ways.items()}

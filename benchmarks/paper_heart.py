@@ -191,7 +191,11 @@ class Heart:
 
     def _displacement(self, view: str, size: int, tracker: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Displacement at end-systole and position (point, 2), m, and layer of the points of a view."""
-        found = et.Repository(self.repository).tracks(self.case, view, tracker or self.trackers[0], size).isel(frame=self.es)
+        found = (
+            et.Repository(self.repository)
+            .tracks(self.case, view, tracker or self.trackers[0], size)
+            .isel(frame=self.es)
+        )
         true = found.true_displacement.sel(vector=list(found["plane"].values)).transpose("axial", "lateral", "vector")
         vector = (true if tracker is None else found.displacement.transpose("axial", "lateral", "plane")).values
         lateral, axial = np.meshgrid(found.lateral.values, found.axial.values)

@@ -85,8 +85,9 @@ def test_tracked_curves_are_those_of_the_size_and_the_truth_is_the_same(reposito
 
 def test_truth_is_that_of_the_reference_asked_for_and_of_the_plane_if_none_is(repository):
     place = {"measure": "engineering", "region": 0, "wall_component": "RR", "frame": ES}
+    read = et.Repository(repository)
     found = {
-        name: float(et.Repository(repository).curves(view="mid", tracker="one", **given)["true_region_strain"].sel(place))
+        name: float(read.curves(view="mid", tracker="one", **given)["true_region_strain"].sel(place))
         for name, given in {"": {}, **{name: {"reference": name} for name in ("heart", "plane", "operator")}}.items()
     }
     assert found == pytest.approx({"": 0.4, "heart": 1.2, "plane": 0.4, "operator": 0.8}, abs=1e-6)

@@ -10,7 +10,6 @@ import pytest
 from known_repository import SETTINGS, make
 
 import echotruth as et
-from echotruth.evaluation import kept
 from echotruth.evaluation.detection import COLUMNS, detection
 from echotruth.evaluation.reliability import calibration_error, curve
 from echotruth.evaluation.run import prepare
@@ -53,7 +52,7 @@ def repository(finished, tmp_path, monkeypatch):
 
 
 def evaluate(folder, function="steps", sizes=(), views=(), keep=True):
-    run = prepare(folder, "mine", {"method": "external", "track": f"mine:{function}"}, keep)
+    run = prepare(et.Repository(folder), "mine", {"method": "external", "track": f"mine:{function}"}, keep)
     case_views, sizes = run.case_views([], list(views)), run.sizes(list(sizes))
     run.check_writable()
     return run.write(list(run.rows(case_views, sizes)))
@@ -62,15 +61,16 @@ def evaluate(folder, function="steps", sizes=(), views=(), keep=True):
 def test_kept_displacement_is_what_the_tracker_returned_in_metres_on_the_grid(repository):
     evaluate(repository)
     for size in (128, 64):
-        found = et.Repository(repository).tracks(view="mid", tracker="mine", size=size)
+        found = et.Repository(repository).tracks(view="mid", trackers=["mine"], size=size)
+        of_tracker = found.isel(tracker=0)
         spacing = 12e-3 / size
         inside = found["layer"].values > 0
-        assert inside.any() and np.isnan(found["displacement"].values[:, ~inside]).all()
-        moved = found["displacement"].values[:, inside]
+        assert inside.any() and np.isnan(of_tracker["displacement"].values[:, ~inside]).all()
+        moved = of_tracker["displacement"].values[:, inside]
         expected = np.arange(3)[:, None, None] * np.array([1, -2]) * spacing * np.ones((1, inside.sum(), 1))
         np.testing.assert_allclose(moved, expected, atol=1e-6)
-        np.testing.assert_array_equal(found["quality"].values[:, inside], 0.5)
-        assert found.attrs["tracker"] == "mine"
+        np.testing.assert_array_equal(of_tracker["quality"].values[:, inside], 0.5)
+        assert list(found["tracker"]) == ["mine"]
 
 
 def test_kept_curves_are_read_like_those_of_the_repository(repository):
@@ -87,17 +87,16 @@ def test_kept_curves_are_read_like_those_of_the_repository(repository):
 
 
 def test_kept_trackers_stand_after_those_of_the_repository(repository):
-    config = et.configure(repository / "config.yaml")
-    assert kept.trackers(repository, config) == ["one", "two"]
+    assert et.Repository(repository).trackers == ["one", "two"]
     evaluate(repository)
-    assert kept.trackers(repository, config) == ["one", "two", "mine"]
+    assert et.Repository(repository).trackers == ["one", "two", "mine"]
     with pytest.raises(ValueError, match=r"^tracker = 'other': use one of one, two, mine\.$"):
         et.Repository(repository).curves(tracker="other")
 
 
 def test_what_was_not_evaluated_is_unknown_or_refused(repository):
     evaluate(repository, sizes=[128], views=["mid"])
-    assert np.isnan(et.Repository(repository).tracks(view="mid", tracker="mine", size=64)["displacement"]).all()
+    assert np.isnan(et.Repository(repository).tracks(view="mid", trackers=["mine"], size=64)["displacement"]).all()
     with pytest.raises(ValueError, match=r"^tracker = 'mine': it was not evaluated on heart long\.$"):
         et.Repository(repository).curves(view="long", tracker="mine")
     table = et.Repository(repository).summary()
@@ -107,7 +106,7 @@ def test_what_was_not_evaluated_is_unknown_or_refused(repository):
 def test_size_at_which_the_tracker_failed_is_unknown_and_the_other_is_there(repository):
     table = evaluate(repository, "large_only", views=["mid"])
     assert list(table["failure"] != "") == [False, True]
-    large, small = (et.Repository(repository).tracks(view="mid", tracker="mine", size=size) for size in (128, 64))
+    large, small = (et.Repository(repository).tracks(view="mid", trackers=["mine"], size=size) for size in (128, 64))
     assert np.isfinite(large["displacement"]).any() and np.isnan(small["displacement"]).all()
 
 
@@ -117,8 +116,8 @@ def test_images_made_anew_are_not_those_that_were_tracked(repository):
     record = ledger.read(path)
     ledger.commit(path, record | {"sha256": record["sha256"] | {sorted(record["sha256"])[0]: 64 * "0"}})
     with pytest.raises(ValueError, match=r"^tracker = 'mine': it was evaluated on older images of heart mid"):
-        et.Repository(repository).tracks(view="mid", tracker="mine")
-    assert et.Repository(repository).tracks(view="long", tracker="mine") is not None
+        et.Repository(repository).tracks(view="mid", trackers=["mine"])
+    assert et.Repository(repository).tracks(view="long", trackers=["mine"]) is not None
 
 
 def test_points_of_another_grid_are_not_those_that_were_tracked(repository):
@@ -126,14 +125,14 @@ def test_points_of_another_grid_are_not_those_that_were_tracked(repository):
     path = repository / "config.yaml"
     path.write_text(path.read_text().replace("grid_px: 2", "grid_px: 4"))
     with pytest.raises(ValueError, match=r"^tracker = 'mine': it was evaluated with another tracking\.grid_px"):
-        et.Repository(repository).tracks(view="mid", tracker="mine")
+        et.Repository(repository).tracks(view="mid", trackers=["mine"])
 
 
 def test_later_evaluation_replaces_what_was_kept_and_one_that_keeps_nothing_removes_it(repository):
     evaluate(repository)
     evaluate(repository, views=["mid"])
     with pytest.raises(ValueError, match="not evaluated on heart long"):
-        et.Repository(repository).tracks(view="long", tracker="mine")
+        et.Repository(repository).tracks(view="long", trackers=["mine"])
     assert sorted(path.name for path in (repository / "external").iterdir()) == ["mine.csv", "mine.zarr"]
     evaluate(repository, keep=False)
     assert [path.name for path in (repository / "external").iterdir()] == ["mine.csv"]
@@ -142,18 +141,18 @@ def test_later_evaluation_replaces_what_was_kept_and_one_that_keeps_nothing_remo
 
 def test_evaluation_that_is_broken_off_leaves_nothing_and_what_was_kept_before(repository):
     evaluate(repository, views=["mid"])
-    run = prepare(repository, "mine", {"method": "external", "track": "mine:steps"}, keep=True)
+    run = prepare(et.Repository(repository), "mine", {"method": "external", "track": "mine:steps"}, keep=True)
     run.check_writable()
     rows = run.rows(run.case_views([], []), run.sizes([]))
     next(rows)
     rows.close()
     assert sorted(path.name for path in (repository / "external").iterdir()) == ["mine.csv", "mine.zarr"]
-    assert np.isfinite(et.Repository(repository).tracks(view="mid", tracker="mine")["displacement"]).any()
+    assert np.isfinite(et.Repository(repository).tracks(view="mid", trackers=["mine"])["displacement"]).any()
 
 
 def test_folder_that_cannot_hold_the_displacement_is_refused_in_one_sentence(repository):
     (repository / "external").write_text("")
-    run = prepare(repository, "mine", {"method": "external", "track": "mine:steps"}, keep=True)
+    run = prepare(et.Repository(repository), "mine", {"method": "external", "track": "mine:steps"}, keep=True)
     with pytest.raises(EvaluationError, match="external cannot hold the scores"):
         run.check_writable()
 

@@ -52,7 +52,7 @@ def moved(position, start, end):
 def centres(items):
     """Pixel centres about the fixed point of the motion, which is at the transmit focus, (axial, lateral, 3), m."""
     index = (np.arange(items.size) - (items.size - 1) / 2) * items.spacing
-    axial = items.reader.read(f"truth/{items.size}/axial", ...) - items.reader.config.rf.si().focus
+    axial = items.repository.read(f"truth/{items.size}/axial", ...) - items.repository.config.rf.si().focus
     return np.stack(np.broadcast_arrays(index, axial[:, None], 0.0), axis=-1)
 
 
@@ -69,7 +69,7 @@ def linear(repository, tmp_path_factory):
 
 def quantum(items):
     """Step of the stored flow, m."""
-    return items.reader.array(f"truth/{items.size}/flow").attrs["quantum"]
+    return items.repository.array(f"truth/{items.size}/flow").attrs["quantum"]
 
 
 @pytest.mark.parametrize("size", [64, 32])
@@ -88,17 +88,17 @@ def test_flow_is_the_affine_motion_from_frame_to_frame(repository, size):
 
 def test_tissue_leaves_and_enters_where_the_motion_takes_it_beyond_half_the_slice(repository):
     pairs = learning.FlowPairs(repository, views=["mid"])
-    axial, lateral = (pairs.reader.read(f"truth/{SIZE}/{name}", ...) for name in ("axial", "lateral"))
+    axial, lateral = (pairs.repository.read(f"truth/{SIZE}/{name}", ...) for name in ("axial", "lateral"))
     assert_leaves_and_enters(pairs, slice_thickness(Config(), np.hypot(axial[:, None], lateral)) / 2)
 
 
 def test_slice_of_a_linear_scan_is_as_thick_as_at_its_depth(linear):
     pairs = learning.FlowPairs(linear, views=["mid"])
-    axial = pairs.reader.read(f"truth/{SIZE}/axial", ...)
+    axial = pairs.repository.read(f"truth/{SIZE}/axial", ...)
     assert_leaves_and_enters(pairs, slice_thickness(Config(), np.tile(axial[:, None], SIZE)) / 2)
     position, seen = (learning.PointTracks(linear, views=["mid"], points=200)[0][name] for name in NAMES)
     half = slice_thickness(Config(), position[..., 1]) / 2
-    in_scan = np.abs(position[..., 0]) <= scan_width(pairs.reader.config.probe, pairs.reader.config.rf) / 2
+    in_scan = np.abs(position[..., 0]) <= scan_width(pairs.repository.config.probe, pairs.repository.config.rf) / 2
     np.testing.assert_array_equal(seen, in_scan & (np.abs(position[..., 2]) <= half))
 
 
@@ -110,7 +110,7 @@ def assert_leaves_and_enters(pairs, half):
     for item in pairs[: FRAMES - 1]:
         first, second = item["frame"], item["frame"] + 1
         forth, back = (moved(centres(pairs), *way)[..., 2] for way in ((first, second), (second, first)))
-        after = learning.Segmentation(pairs.reader.folder, views=["mid"])[second]["label"].astype(bool)
+        after = learning.Segmentation(pairs.repository.folder, views=["mid"])[second]["label"].astype(bool)
         for name, wall, elevation in (("leaves", item["wall"], forth), ("enters", after, back)):
             beyond = np.abs(elevation) - half
             sure = np.abs(beyond) > quantum(pairs)
@@ -121,7 +121,7 @@ def assert_leaves_and_enters(pairs, half):
 @pytest.mark.parametrize("start", [0, 1])
 def test_points_move_with_the_tissue_and_are_seen_within_the_slice(repository, start):
     tracks = learning.PointTracks(repository, views=["mid"], points=50, start=start)
-    item, focus = tracks[0], tracks.reader.config.rf.si().focus
+    item, focus = tracks[0], tracks.repository.config.rf.si().focus
     about = item["position_m"] - np.array([0, focus, 0], np.float32)
     expected = np.stack([moved(about[start].astype(float), start, frame) for frame in range(FRAMES)])
     np.testing.assert_allclose(about, expected, atol=1e-8)
@@ -194,7 +194,7 @@ def test_copy_for_a_worker_has_no_open_array(repository):
     before = len(pickle.dumps(items))
     assert digests(items)
     copy = pickle.loads(pickle.dumps(items))
-    assert not copy.reader._opened and items.reader._opened
+    assert not copy.repository._opened and items.repository._opened
     assert len(pickle.dumps(items)) < before + 2e4
 
 

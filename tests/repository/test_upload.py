@@ -233,7 +233,7 @@ def test_it_is_read_there_as_it_is_here(bucket, tmp_path):
 
 def test_no_repository_there_is_an_error_in_a_sentence(bucket):
     with pytest.raises(FileNotFoundError, match="is not a repository: give an address"):
-        et.Repository(bucket.url).tree
+        et.Repository(bucket.url)
 
 
 def test_what_a_run_commits_goes_up_while_it_runs(bucket, tmp_path, monkeypatch):

@@ -11,11 +11,11 @@ from itertools import product
 
 import numpy as np
 import pytest
-from echotruth.notebook.points import load_points
 
+import echotruth as et
 from echotruth.cases import expand
 from echotruth.config.loading import validate
-from echotruth.evaluation.scoring import ground_truth, score
+from echotruth.evaluation.scoring import read_truth, score
 from echotruth.repository import ledger
 from echotruth.repository.rounding import CURVE
 from echotruth.workflow.cost import Cost
@@ -252,7 +252,7 @@ def test_scores_are_those_of_the_motion_that_the_store_has(repository):
     """Whoever reads the truth and the tracked motion there finds the scores, to the last bit."""
     job = Job(repository.folder, "evaluation", "heart", "mid")
     stored, tracked_motion = job.read("evaluation"), job.read("tracking", "displacement")["displacement"]
-    truth = ground_truth(job)
+    truth = read_truth(et.Repository(repository.folder), "heart", "mid")
     inside = np.isfinite(stored["wall_axes"]).all((-2, -1))
     read = replace(
         truth,
@@ -269,7 +269,8 @@ def test_scores_are_those_of_the_motion_that_the_store_has(repository):
 
 def test_points_of_a_clip_are_read_with_their_strain_and_layer(repository):
     job = Job(repository.folder, "evaluation", "heart", "mid")
-    found, truth = load_points(repository.folder, "heart", "mid", "tapered", 64), ground_truth(job)
+    read = et.Repository(repository.folder)
+    found, truth = read.tracks("heart", "mid", 64, ["tapered"]).isel(tracker=0), read_truth(read, "heart", "mid")
     np.testing.assert_array_equal(found.displacement, job.read("tracking", "displacement")["displacement"][1, 1])
     np.testing.assert_array_equal(found.layer.values[truth.inside], truth.wall.layer)
     np.testing.assert_array_equal(found.segment.values[truth.inside], truth.wall.segment)
@@ -279,7 +280,7 @@ def test_points_of_a_clip_are_read_with_their_strain_and_layer(repository):
     assert np.isfinite(expected).all()
     np.testing.assert_allclose(mean, expected, rtol=1e-5, atol=CURVE)
     with pytest.raises(ValueError, match=r"^tracker = 'other': use one of plain, tapered\.$"):
-        load_points(repository.folder, "heart", "mid", "other")
+        read.tracks("heart", "mid", 64, ["other"])
 
 
 def test_failure_of_a_tracker_is_tried_again(repository, monkeypatch):

@@ -18,7 +18,7 @@ from echotruth.report import style
 from echotruth.report.clip import round_length, thin
 from echotruth.repository import estimates
 from echotruth.repository.reader import Repository
-from echotruth.tracking.grid import grid_points
+from echotruth.tracking.point_grid import grid_points
 
 if TYPE_CHECKING:
     import pandas as pd

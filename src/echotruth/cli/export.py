@@ -44,13 +44,13 @@ def add(commands: Commands) -> None:
 
 def export(arguments: argparse.Namespace) -> int:
     """Write clips, hearts or RF as files of another format; return 0, or 2 if they cannot be exported."""
-    from echotruth.export import Export, Selection, Source
+    from echotruth.export import Export, Selection
     from echotruth.repository.reader import Repository
 
     chosen = Selection(arguments.case, arguments.view, arguments.size, arguments.tracker)
     try:
-        opened = Source(Repository(arguments.repository), chosen)
-        work = Export(opened, arguments.format, arguments.overlay, arguments.rate, arguments.output)
+        options = arguments.format, arguments.overlay, arguments.rate, arguments.output
+        work = Export(Repository(arguments.repository), chosen, *options)
         clips, left_out = work.clips()
         _print_counted(work.write(clips), len(clips))
     except ValueError as error:

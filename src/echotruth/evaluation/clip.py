@@ -12,7 +12,7 @@ from echotruth.cases import Case
 from echotruth.imaging.labels import unpack
 from echotruth.loop.cycle import read_loop
 from echotruth.seeds import generator
-from echotruth.tracking.grid import grid_pixels, grid_points
+from echotruth.tracking.point_grid import grid_pixels, grid_points
 
 if TYPE_CHECKING:
     from echotruth.repository.reader import Repository

@@ -28,7 +28,7 @@ from echotruth.loop.cycle import read_loop
 from echotruth.repository import estimates
 from echotruth.repository.choice import chosen, image_size
 from echotruth.repository.schema import LABELS
-from echotruth.tracking.grid import grid_pixels, grid_positions
+from echotruth.tracking.point_grid import grid_pixels, grid_positions
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,9 +12,9 @@ from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.imaging.labels import unpack
 from echotruth.repository import estimates
 from echotruth.repository.choice import chosen
-from echotruth.repository.datasets import as_stored, dataset
+from echotruth.repository.datasets import dataset
 from echotruth.repository.kept import NotEvaluated
-from echotruth.tracking.grid import grid_pixels, grid_positions
+from echotruth.tracking.point_grid import grid_pixels, grid_positions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,22 +33,23 @@ def tracks(
     found = repository.case(case)
     grid, known = grid_positions(found.config), chosen("tracker", trackers, repository.trackers)
     points = {"lateral": grid[0, :, 0], "axial": grid[:, 0, 1]}
-    true = estimates.true(repository, case, view, "true_displacement", "true_strain", "wall_axes")
-    strain, tracked = _strain(true.pop("wall_axes"), grid, found.config), {}
+    values = {}
     for name in known:
         try:
-            values = estimates.tracked(repository, case, view, name, size, "displacement", "quality")
+            values[name] = estimates.tracked(repository, case, view, name, size, "displacement", "quality")
         except NotEvaluated:
             if trackers is not None:
                 raise
-            continue
-        tracked[name] = dataset(found, as_stored(found, {"tracking": values}), points)
-        tracked[name]["strain"] = (_STRAIN, strain(values["displacement"]), _ABOUT)
+    true = estimates.true(repository, case, view, "true_displacement", "true_strain", "wall_axes")
+    strain, tracked = _strain(true.pop("wall_axes"), grid, found.config), {}
+    for name, arrays in values.items():
+        tracked[name] = dataset(found, {"tracking": arrays}, points)
+        tracked[name]["strain"] = (_STRAIN, strain(arrays["displacement"]), _ABOUT)
     # As trackers find them, the points are pixel centres of the largest image.
     labels = unpack(repository.read(f"truth/{repository.sizes[0]}/labels", *repository.place(case, view), 0))
     at_points = {name: (_STRAIN[1:3], labels[name][grid_pixels(found.config)], _ABOUT) for name in ("layer", "segment")}
     together = xr.concat(list(tracked.values()), xr.Variable("tracker", list(tracked)), combine_attrs="override")
-    truth = dataset(found, as_stored(found, {"evaluation": true}), points)
+    truth = dataset(found, {"evaluation": true}, points)
     return together.assign(truth.data_vars).assign(at_points).assign_attrs(case=case, view=view, size_px=size)
 
 

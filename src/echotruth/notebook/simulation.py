@@ -30,7 +30,7 @@ from echotruth.notebook.arguments import check_clip, check_heart
 from echotruth.repository.choice import image_size
 from echotruth.repository.datasets import as_stored, case_of, clip_dataset, dataset, plane_of
 from echotruth.seeds import generator
-from echotruth.tracking.grid import grid_points
+from echotruth.tracking.point_grid import grid_points
 from echotruth.tracking.tracker import track as track_points
 
 if TYPE_CHECKING:

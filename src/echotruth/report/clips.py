@@ -15,7 +15,7 @@ from echotruth.report.comparison import LINE, Comparison
 from echotruth.repository import estimates
 from echotruth.repository.reader import Repository
 from echotruth.repository.schema import LABELS
-from echotruth.tracking.grid import grid_points
+from echotruth.tracking.point_grid import grid_points
 
 STRAIN_LIMIT = 30
 """Largest strain on the scale of colours, to either side, %."""

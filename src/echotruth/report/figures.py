@@ -245,7 +245,7 @@ class Figures:
         return error.draw(errors, long_axis)
 
     def _error_of_layers(self, view: str, tracker: str, size: int) -> NDArray[np.float64]:
-        """Error of the tangential displacement of each layer, mean over the hearts in which it is known, (layer,), m."""
+        """Error of the tangential displacement by layer, mean over the hearts in which it is known, (layer,), m."""
         tangential = LABELS["component"].index("tangential")
         clips = ((case, view, tracker, size) for case in self.repository.shown)
         found = [estimates.tracked(self.repository, *clip, "rms_error")["rms_error"] for clip in clips]

@@ -17,7 +17,7 @@ from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import rounding, schema
 from echotruth.repository.derived import derived
-from echotruth.tracking.grid import grid_positions
+from echotruth.tracking.point_grid import grid_positions
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -583,7 +583,11 @@ class Repository:
                 what = " ".join(filter(None, [case, view]))
                 raise NotWritten(f"{self._place}: {path} has no data of {what}: run it to its end")
             found[array.name] = self.read(path, *place[: array.leading], *index, store=store)
-        labels = {pack.dimension: self.labels(f"{group}/{pack.dimension}", store) for pack in packs}
+        labels = {
+            pack.dimension: self.labels(f"{group}/{pack.dimension}", store)
+            for pack in packs
+            if pack.array.name in found
+        }
         values = packing.unpack(packs, found, labels)
         return {name: values[name] for name in names} if names else values
 

@@ -14,7 +14,7 @@ from scipy.ndimage import distance_transform_edt
 from echotruth.arrays import Floats
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.repository import schema
-from echotruth.tracking.grid import grid_positions
+from echotruth.tracking.point_grid import grid_positions
 from echotruth.viewer.clip import Clip
 
 SUBDIVISION = 2.0
