@@ -159,9 +159,7 @@ def test_ten_thousand_cases_open_in_seconds(tmp_path):
     assert page.facts.text.startswith(repository.present[7777]) and len(page.inputs["case"].completions) == 10_000
 
 
-def test_folder_without_a_repository_or_without_its_arrays_is_refused_and_one_with_another_name_is_shown(
-    shown, tmp_path
-):
+def test_folder_without_a_repository_is_refused_and_one_that_was_renamed_is_shown(shown, tmp_path):
     with pytest.raises(FileNotFoundError, match="is not a repository"):
         opened(tmp_path)
     shutil.copytree(shown.folder, tmp_path / "renamed")

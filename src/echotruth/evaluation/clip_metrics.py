@@ -6,7 +6,7 @@ earlier version has them too, and one that is not finished has those of its fini
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ from echotruth.imaging.labels import unpack
 from echotruth.imaging.tracks import visible
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import estimates
-from echotruth.repository.choice import chosen, image_size
+from echotruth.repository.choice import Names, Sizes, chosen, image_size
 from echotruth.repository.schema import LABELS
 from echotruth.tracking.point_grid import grid_pixels, grid_positions
 
@@ -102,11 +102,7 @@ class ClipTruth(NamedTuple):
 
 
 def clip_metrics(
-    repository: Repository,
-    cases: Iterable[str] | None = None,
-    views: Iterable[str] | None = None,
-    sizes: Iterable[int] | None = None,
-    trackers: Iterable[str] | None = None,
+    repository: Repository, cases: Names = None, views: Names = None, sizes: Sizes = None, trackers: Names = None
 ) -> ClipMetrics:
     """Read the metrics of all clips and trackers; parameters, result and errors: see :meth:`.Repository.metrics`."""
     chosen_sizes = [image_size(repository.config, size) for size in sizes or repository.sizes]

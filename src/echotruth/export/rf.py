@@ -42,7 +42,7 @@ def open_rf(clip: Clip) -> xr.Dataset:
 def missing_rf(clip: Clip) -> str:
     """Why a view has no RF that could be exported, in one sentence; "" if it has."""
     repository = clip.repository
-    kept = [name for name in ("lines", "channels") if name in repository.config.rf.keep]
+    kept = [name for name in ("lines", "channels") if name in repository.names("rf")]
     if not kept:
         return f"{repository.store} keeps no RF: set rf.keep to [lines, channels] and run it again"
     if not all(repository.is_written(f"rf/{name}", clip.case.id, clip.view) for name in kept):

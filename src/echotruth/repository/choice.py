@@ -8,6 +8,8 @@ from typing import TypeVar
 from echotruth.config import Config
 
 Name = TypeVar("Name", str, int)
+Names, Sizes = Iterable[str] | None, Iterable[int] | None
+"""Those to choose; all if there are none."""
 
 
 def require_known(what: str, name: Name, known: Collection[Name]) -> Name:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +18,7 @@ from echotruth.config.loading import load, validate
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
 from echotruth.repository import estimates, ledger, packing, schema
-from echotruth.repository.choice import chosen, image_size, main_view, require_known
+from echotruth.repository.choice import Names, Sizes, chosen, image_size, main_view, require_known
 from echotruth.repository.datasets import clip_dataset
 from echotruth.repository.derived import stored_names
 from echotruth.repository.ledger import GATES, imaged_statuses, repository_folder
@@ -203,11 +202,7 @@ class Repository:
         return Heart.of({group: self.arrays(group, found.id) for group in groups}, found.config)
 
     def clip(
-        self,
-        case: str | None = None,
-        view: str | None = None,
-        size: int | None = None,
-        variables: Iterable[str] | None = None,
+        self, case: str | None = None, view: str | None = None, size: int | None = None, variables: Names = None
     ) -> xr.Dataset:
         """Read a clip with its truth, as :func:`echotruth.image` returns it.
 
@@ -239,11 +234,7 @@ class Repository:
         return clip_dataset(self.heart(found.id), found, view, self.plane(found.id, view), values)
 
     def tracks(
-        self,
-        case: str | None = None,
-        view: str | None = None,
-        size: int | None = None,
-        trackers: Iterable[str] | None = None,
+        self, case: str | None = None, view: str | None = None, size: int | None = None, trackers: Names = None
     ) -> xr.Dataset:
         """Read what trackers found at the points of a clip, beside their true motion.
 
@@ -374,11 +365,7 @@ class Repository:
         return rows(self)
 
     def summary(
-        self,
-        cases: Iterable[str] | None = None,
-        views: Iterable[str] | None = None,
-        sizes: Iterable[int] | None = None,
-        trackers: Iterable[str] | None = None,
+        self, cases: Names = None, views: Names = None, sizes: Sizes = None, trackers: Names = None
     ) -> pd.DataFrame:
         """Read GLS, GCS, radial strain, rotation and twist of clips into a table, tracked and true.
 
@@ -410,11 +397,7 @@ class Repository:
         return strain_summary(self, cases, views, sizes, trackers)
 
     def metrics(
-        self,
-        cases: Iterable[str] | None = None,
-        views: Iterable[str] | None = None,
-        sizes: Iterable[int] | None = None,
-        trackers: Iterable[str] | None = None,
+        self, cases: Names = None, views: Names = None, sizes: Sizes = None, trackers: Names = None
     ) -> ClipMetrics:
         """Read the metrics of clips and trackers, as benchmarks of trackers and of strain print them (docs/metrics.md).
 
@@ -504,9 +487,7 @@ class Repository:
         """Name of a view that there is: that which is asked for, or the main one."""
         return main_view(self.config) if view is None else require_known("view", view, self.config.views)
 
-    def finished(
-        self, cases: Iterable[str] | None, views: Iterable[str] | None, *stages: str
-    ) -> list[tuple[Case, list[str]]]:
+    def finished(self, cases: Names, views: Names, *stages: str) -> list[tuple[Case, list[str]]]:
         """Cases of the configuration that are asked for, and of each the views of which some stages are complete."""
         wanted = chosen("view", views, self.config.views)
         known = {case.id: case for case in self.all_cases()}
@@ -616,12 +597,16 @@ class Repository:
         return self._labels[key]
 
     def names(self, group: str) -> list[str]:
-        """Names of the arrays of a group, sorted."""
-        return sorted(zarr.open_group(self.store, path=group, mode="r").array_keys())
+        """Names of the arrays of a group, sorted; none if there is no such group."""
+        with suppress(FileNotFoundError):
+            return sorted(zarr.open_group(self.store, path=group, mode="r").array_keys())
+        return []
 
     def attributes(self, group: str) -> dict[str, Any]:
-        """Attributes of a group; those of the repository for ""."""
-        return zarr.open_group(self.store, path=group, mode="r").attrs.asdict()
+        """Attributes of a group, those of the repository for ""; none if there is no such group."""
+        with suppress(FileNotFoundError):
+            return zarr.open_group(self.store, path=group, mode="r").attrs.asdict()
+        return {}
 
     def is_written(self, path: str, case: str, view: str | None = None) -> bool:
         """Whether the job of a case (and view) wrote its part of an array; of others Zarr reads fill values."""

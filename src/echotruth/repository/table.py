@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
 UNFINISHED = "unfinished"
 """Status of a case that no run has published."""
-STATUSES = ("complete", "implausible", "failed", "retired", UNFINISHED)
-"""What may become of a case."""
 MOTION = ("geometry.", "fibres.", "pathology.", "loop.", "mechanics.", "motion.")
 """Keys on which the motion of a heart depends."""
 
@@ -23,7 +21,10 @@ def table_of(repository: Repository) -> pd.DataFrame:
     """Verdict, heart, labels and differing keys of each case, as :attr:`Repository.cases` describes them."""
     import pandas as pd
 
-    columns = {name: repository.read(f"cases/{name}", ...) for name in repository.names("cases")}
+    names = repository.names("cases")
+    if not names:
+        return pd.DataFrame({"status": UNFINISHED, "reason": ""}, pd.Index(repository.rows, name="case"))
+    columns = {name: repository.read(f"cases/{name}", ...) for name in names}
     found = pd.DataFrame({name: _plain(values) for name, values in columns.items()}).set_index("case")
     known = {key: value for key, value in constants(repository).items() if key not in found and is_label(key)}
     found = found.assign(**known)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from contextlib import suppress
 from math import isnan
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ import numpy as np
 
 from echotruth.evaluation.difficulty.floors import COLUMNS, PARAMETERS, Row, difficulty
 from echotruth.repository import durable
+from echotruth.repository.choice import Names
 from echotruth.repository.digest import digest
 
 if TYPE_CHECKING:
@@ -23,9 +23,7 @@ _VERSION = 1
 """Of what is kept of a clip; to be raised when its definition changes."""
 
 
-def difficulties(
-    repository: Repository, cases: Iterable[str] | None = None, views: Iterable[str] | None = None
-) -> pd.DataFrame:
+def difficulties(repository: Repository, cases: Names = None, views: Names = None) -> pd.DataFrame:
     """Determine how difficult the clips of a repository are to track.
 
     What was found of a clip is kept in the folder `scratch` of the repository, until its images or truth change, or the
