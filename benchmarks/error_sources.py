@@ -32,7 +32,6 @@ from suite.records import read
 from suite.splits import TEST
 from tracking_split import TRACKER, blobs
 
-from echotruth.evaluation.choice import job_of
 from echotruth.evaluation.clip import clips
 from echotruth.evaluation.difficulty.plane import both_ways, plane_path
 from echotruth.evaluation.parallel import in_processes

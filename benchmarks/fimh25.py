@@ -105,7 +105,7 @@ def of_files(folder: Path) -> dict[str, float]:
 
 def of_store(repository: Path) -> dict[str, float]:
     """The same of the groups kinematics, physiology and mechanics."""
-    heart = et.open(repository).sel(case="heart")
+    heart = et.Repository(repository).tree.sel(case="heart")
     es = int(heart["mechanics/es_frame"])
     mean = heart["kinematics/strain_mean"].isel(frame=es).values
     volume = 1e9 * heart["mechanics/volume"].values

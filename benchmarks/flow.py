@@ -87,7 +87,7 @@ def whole(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 def clip(folder: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Pairs of a clip that is read as a whole."""
-    read = et.load_clip(folder, "heart", VIEW, SIZE, variables=("image", "flow"))
+    read = et.Repository(folder).clip("heart", VIEW, SIZE, variables=("image", "flow"))
     image, flow = read["image"].values, read["flow"].sel(to="next").values
     for frame in range(len(image) - 1):
         yield image[frame : frame + 2], flow[frame]
@@ -204,13 +204,14 @@ def main() -> None:
     if arguments.repository is None:
         heart, name = et.beat(et.configure(geometry=SMALL)), "a small heart"
     else:
-        heart, name = et.load_heart(arguments.repository, arguments.case), f"the heart of {arguments.repository.name}"
+        heart = et.Repository(arguments.repository).heart(arguments.case)
+        name = f"the heart of {arguments.repository.name}"
     with tempfile.TemporaryDirectory() as folder:
         made = stored(Path(folder) / "flow", heart)
         ways = {
             "`zarr`, pair by pair": lambda: direct(made),
             "`zarr`, a clip at once": lambda: whole(made),
-            '`echotruth.load_clip(..., variables=("image", "flow"))`': lambda: clip(made),
+            '`echotruth.Repository.clip(..., variables=("image", "flow"))`': lambda: clip(made),
             "`echotruth.learning.FlowPairs`": lambda: iter(FlowPairs(made, ["heart"], [VIEW], SIZE)),
         }
         rates = {way: rate(pairs) for way, pairs in ways.items()}

@@ -91,8 +91,8 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/gallery/flow.png"))
     arguments = parser.parse_args()
     names = ("image", "mask", "flow")
-    clip = et.load_clip(arguments.repository, arguments.case, arguments.view, variables=names)
-    heart = et.load_heart(arguments.repository, arguments.case)
+    clip = et.Repository(arguments.repository).clip(arguments.case, arguments.view, variables=names)
+    heart = et.Repository(arguments.repository).heart(arguments.case)
     motion = np.abs(clip["flow"].sel(to="next", vector=["lateral", "axial"])).mean(("axial", "lateral", "vector"))
     frame = int(np.nanargmax(motion.values)) if arguments.frame is None else arguments.frame
     draw(arguments.output, heart, clip, frame)

@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from echotruth.learning.reading import Reader
 
 from echotruth import learning
-from echotruth.learning.reading import Reader
 
 ROUNDS = 5
 RESULT = Path(__file__).parent / "results/loaders.md"

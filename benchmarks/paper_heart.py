@@ -83,7 +83,7 @@ class Heart:
     @cached_property
     def tree(self) -> xr.DataTree:
         """The store."""
-        return et.open(self.repository)
+        return et.Repository(self.repository).tree
 
     def group(self, path: str) -> xr.Dataset:
         """A group of the store for this heart."""
@@ -118,7 +118,7 @@ class Heart:
     @cached_property
     def mesh(self) -> echotruth.heart.Heart:
         """Mesh and motion."""
-        return et.load_heart(self.repository, self.case)
+        return et.Repository(self.repository).heart(self.case)
 
     @cached_property
     def volumes(self) -> dict[str, float]:
@@ -185,13 +185,17 @@ class Heart:
 
     def tracked_anew(self, view: str, size: int, method: str, options: Mapping[str, object]) -> float:
         """Error of circumferential displacement over its RMS, %, of a tracker that is not in the repository."""
-        clip = et.load_clip(self.repository, self.case, view, size)
+        clip = et.Repository(self.repository).clip(self.case, view, size)
         found = et.evaluate(et.track(clip, method, **options), self.mesh)
         return float(found["tangential_nrmse_percent"])
 
     def _displacement(self, view: str, size: int, tracker: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Displacement at end-systole and position (point, 2), m, and layer of the points of a view."""
-        found = et.load_points(self.repository, self.case, view, tracker or self.trackers[0], size).isel(frame=self.es)
+        found = (
+            et.Repository(self.repository)
+            .tracks(self.case, view, tracker or self.trackers[0], size)
+            .isel(frame=self.es)
+        )
         true = found.true_displacement.sel(vector=list(found["plane"].values)).transpose("axial", "lateral", "vector")
         vector = (true if tracker is None else found.displacement.transpose("axial", "lateral", "plane")).values
         lateral, axial = np.meshgrid(found.lateral.values, found.axial.values)

@@ -53,7 +53,7 @@ import json, resource, sys, time
 import echotruth as et, xarray, zarr
 et.open  # what is imported is not counted
 times = [time.perf_counter()]
-tree = et.open(sys.argv[1])
+tree = et.Repository(sys.argv[1]).tree
 times.append(time.perf_counter())
 table = tree["cases"].to_dataset().to_dataframe()
 times.append(time.perf_counter())

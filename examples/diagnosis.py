@@ -117,7 +117,7 @@ def least_shortening(before, after):
 
 def tracked(repository, case, tracker):
     """Score of a heart by a tracker."""
-    clip, (heart,) = et.load_clip(repository, case, VIEW), diagnoses(repository, [case])
+    clip, (heart,) = et.Repository(repository).clip(case, VIEW), diagnoses(repository, [case])
     moved = et.track(clip, tracker)
     lateral, axial = np.meshgrid(moved["lateral"], moved["axial"])
     displacement = moved["displacement"].values[heart["es_frame"]]

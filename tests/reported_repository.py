@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from echotruth.config.loading import load
 from echotruth.report import page
 from echotruth.report.figures import PARTS, Figures
+from echotruth.repository.reader import Repository
 
 
 def report(folder: Path) -> str:
     """Draw the figures of a repository and write its page; the text of the page."""
-    config = load(folder / "config.yaml")
+    repository = Repository(folder)
     for part in PARTS:
-        Figures(folder / f"{config.name}.zarr", config, folder / "figures").draw(part)
-    return page.write(folder, config).read_text(encoding="utf-8")
+        Figures(repository, folder / "figures").draw(part)
+    return page.write(repository).read_text(encoding="utf-8")

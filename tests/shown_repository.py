@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from known_repository import FRAMES, SETTINGS, SIZES, make
 
-from echotruth.evaluation.clip import grid_positions
 from echotruth.repository.store import Store
+from echotruth.tracking.point_grid import grid_positions
 
 SIDE = 12e-3
 """Of the images, m."""

@@ -14,7 +14,7 @@ from echotruth.config import View
 from echotruth.config.loading import ConfigError
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.tracks import visible
-from echotruth.notebook.derived import derived
+from echotruth.repository.derived import derived
 from echotruth.tracking import TrackerFailed
 
 TUBE = {
@@ -92,11 +92,11 @@ def repository(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def lifted(repository):
-    return et.load_clip(repository)
+    return et.Repository(repository).clip("heart")
 
 
 def test_clip_of_a_repository_has_the_labels_by_name(repository, lifted):
-    stored = et.open(repository)["truth/64"].sel(case="heart", view="mid")["labels"]
+    stored = et.Repository(repository).tree["truth/64"].sel(case="heart", view="mid")["labels"]
     for name in ("layer", "segment", "region"):
         np.testing.assert_array_equal(lifted[name], stored.sel(label=name))
     np.testing.assert_array_equal(lifted["mask"], lifted["displacement"].notnull().all("vector"))
@@ -130,9 +130,9 @@ def test_slice_is_as_thick_as_it_is_for_points_at_the_same_place(scan):
 
 
 def test_only_the_variables_asked_for_are_read(repository, lifted):
-    pair = et.load_clip(repository, variables=("image", "flow"))
+    pair = et.Repository(repository).clip("heart", variables=("image", "flow"))
     assert set(pair.data_vars) == {"image", "flow", "leaves", "enters", "thickness", "grid_mask"}
-    mask = et.load_clip(repository, variables="mask")
+    mask = et.Repository(repository).clip("heart", variables="mask")
     assert set(mask.data_vars) == {"mask", "layer", "segment", "region", "grid_mask"}
     for name, values in {**pair.data_vars, **mask.data_vars}.items():
         np.testing.assert_array_equal(values, lifted[name])
@@ -141,11 +141,11 @@ def test_only_the_variables_asked_for_are_read(repository, lifted):
 @pytest.mark.parametrize("variables, words", [(("image", "speed"), "'speed': use any of"), ((), "none: use any of")])
 def test_variables_that_a_clip_does_not_have_are_refused(repository, variables, words):
     with pytest.raises(ValueError, match=words):
-        et.load_clip(repository, variables=variables)
+        et.Repository(repository).clip("heart", variables=variables)
 
 
 def test_tracks_of_points_are_the_affine_motion_in_all_frames(repository, lifted):
-    heart, start = et.load_heart(repository), 1
+    heart, start = et.Repository(repository).heart("heart"), 1
     rows, columns = np.nonzero(lifted["mask"].values[start])
     tracks = et.point_tracks(heart, lifted, np.column_stack([columns, rows]), frame=start)
     np.testing.assert_allclose(tracks["pixel"].isel(frame=start), np.column_stack([columns, rows]), atol=1e-9)
@@ -160,7 +160,7 @@ def test_tracks_of_points_are_the_affine_motion_in_all_frames(repository, lifted
 
 
 def test_each_point_may_have_its_own_frame_and_one_beside_the_wall_has_no_track(repository, lifted):
-    heart = et.load_heart(repository)
+    heart = et.Repository(repository).heart("heart")
     rows, columns = np.nonzero(lifted["mask"].values.all(0))
     given = np.array([[columns[0], rows[0]], [columns[-1], rows[-1]], [0, 0]])
     tracks = et.point_tracks(heart, lifted, given, frame=[0, 2, 1])
@@ -243,8 +243,7 @@ def test_function_that_raises_is_named(clip):
         (lambda heart, clip: et.beat({"cases": {"seed": [1, 2]}}), ValueError, "cases sweeps seed"),
         (lambda heart, clip: et.heart_dataset(heart, "rf"), ValueError, "group = 'rf': the heart has geometry"),
         (lambda heart, clip: et.evaluate(clip, heart), ValueError, "tracked: has no displacement .*et.track returns"),
-        (lambda heart, clip: et.open("out/nowhere"), FileNotFoundError, "out/nowhere.*is not a repository"),
-        (lambda heart, clip: et.load_heart("out/nowhere"), FileNotFoundError, "out/nowhere.*is not a repository"),
+        (lambda heart, clip: et.Repository("out/nowhere"), FileNotFoundError, "out/nowhere.*is not a repository"),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_sentence(heart, clip, call, error, words):

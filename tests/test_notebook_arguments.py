@@ -9,11 +9,17 @@ import echotruth as et
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
-        (lambda: et.kinematics("out/demo"), "heart = 'out/demo': must be a Heart: echotruth.load_heart reads one"),
+        (
+            lambda: et.kinematics("out/demo"),
+            "heart = 'out/demo': must be a Heart: a Repository has one",
+        ),
         (lambda: et.image("out/demo"), "heart = 'out/demo': must be a Heart"),
         (lambda: et.heart_dataset("out/demo", "mechanics"), "heart = 'out/demo': must be a Heart"),
         (lambda: et.point_tracks("out/demo", "mid", []), "heart = 'out/demo': must be a Heart"),
-        (lambda: et.track("out/demo"), "clip = 'out/demo': must be a Dataset: echotruth.load_clip reads one"),
+        (
+            lambda: et.track("out/demo"),
+            "clip = 'out/demo': must be a Dataset: a Repository has one",
+        ),
         (lambda: et.evaluate("out/demo", None), "tracked = 'out/demo': must be a Dataset: echotruth.track makes one"),
     ],
 )
@@ -26,12 +32,6 @@ def test_path_in_place_of_a_heart_or_a_clip_is_refused(call, sentence):
 def test_clip_that_was_loaded_without_its_mask_is_refused_by_trackers():
     with pytest.raises(ValueError, match="clip: has no mask: load it with image and mask among its variables"):
         et.track(xr.Dataset({"image": ("frame", [0, 1])}))
-
-
-@pytest.mark.parametrize("read", [et.load_heart, et.load_clip, et.load_points])
-def test_address_in_place_of_a_folder_is_told_as_one(read):
-    with pytest.raises(FileNotFoundError, match="s3://bucket/demo: is an address and not a folder: download it"):
-        read("s3://bucket/demo")
 
 
 def test_configuration_that_is_no_mapping_is_refused():

@@ -107,7 +107,7 @@ def tree(made):
 
 def test_clip_read_at_a_notebook_is_tracked_and_scored_as_the_workflow_does(made, tree):
     folder, case = made.out, str(tree["bmode/128"]["case"].values[0])
-    heart, clip = et.load_heart(folder, case), et.load_clip(folder, case, "long_axis", 64)
+    heart, clip = et.Repository(folder).heart(case), et.Repository(folder).clip(case, "long_axis", 64)
     tracked = et.track(clip, "corrected")
     place = {"case": case, "view": "long_axis", "size": 64, "tracker": "corrected"}
     stored = tree["tracking"].to_dataset().sel(place)

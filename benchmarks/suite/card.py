@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import yaml
+from echotruth.benchmark.repositories import opened
 from pydantic import AfterValidator, Field, StringConstraints, ValidationError
 from pydantic_core import ErrorDetails
 
 from echotruth.config.loading import load
 from echotruth.config.reading import ConfigError, read_yaml, shown_key
-from echotruth.evaluation.choice import folder_of
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import durable
 from echotruth.section import Name, Section, meaning
@@ -121,7 +121,7 @@ def attach_card(repositories: list[Path], path: Path) -> str:
     ConfigError if it is no card, EvaluationError if none of the repositories has scores of its tracker.
     """
     card = read(path)
-    folders = [folder_of(repository) for repository in repositories]
+    folders = [opened(repository).folder for repository in repositories]
     scored = [folder for folder in folders if (folder / "external" / f"{card.tracker}.csv").is_file()]
     if not scored:
         if own := [folder for folder in folders if card.tracker in load(folder / "config.yaml").tracking.trackers]:

@@ -13,12 +13,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 
 from echotruth.arrays import Floats
-from echotruth.evaluation import kept
-from echotruth.evaluation.choice import job_of
-from echotruth.evaluation.clip import grid_points
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.report import style
 from echotruth.report.clip import round_length, thin
+from echotruth.repository import estimates
+from echotruth.repository.reader import Repository
+from echotruth.tracking.point_grid import grid_points
 
 DISTANCE = 18
 """Least distance of the points that are drawn, px of the largest image."""
@@ -90,11 +90,10 @@ def example(folder: Path, clip: pd.Series, what: str) -> Example:
     -------
     Example
     """
-    job = job_of(folder, str(clip["case"]), str(clip["view"]))
-    config, size = job.case.config, int(clip["size_px"])
-    es = int(job.store.read("mechanics", job.row, names=("es_frame",))["es_frame"])
-    tracked = kept.read(job, "tracking", "displacement", tracker=str(clip["tracker"]), size=size)["displacement"][es]
-    true = job.read("evaluation", "true_displacement")["true_displacement"][es, ..., :2]
+    repository, case, view, size = Repository(folder), str(clip["case"]), str(clip["view"]), int(clip["size_px"])
+    config, es = repository.case(case).config, int(repository.arrays("mechanics", case, None, "es_frame")["es_frame"])
+    tracked = estimates.tracked(repository, case, view, str(clip["tracker"]), size, "displacement")["displacement"][es]
+    true = estimates.true(repository, case, view, "true_displacement")["true_displacement"][es, ..., :2]
     spacing = config.bmode.si().field_of_view / size
     here = grid_points(config, size)
     wall = np.isfinite(true).all(-1)
@@ -102,7 +101,7 @@ def example(folder: Path, clip: pd.Series, what: str) -> Example:
     shown = thin(here, DISTANCE * size / config.bmode.sizes[0])
     error = 100 * np.linalg.norm(tracked - true, axis=-1) / np.sqrt((true**2).sum(-1).mean())
     places = here + tracked / spacing, here + true / spacing
-    image = job.read(f"bmode/{size}", "image")["image"][es]
+    image = repository.read(f"bmode/{size}/image", *repository.place(case, view), es)
     title = f"{what}: {clip[RANKED_BY]:.1f} %\n{clip['case']}, {style.title(str(clip['view'])).lower()}"
     return Example(title, image, spacing, places[0][shown], places[1][shown], error[shown])
 

@@ -11,10 +11,12 @@ import yaml
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from echotruth.cases import all_cases
-from echotruth.evaluation import kept, reliability
+from echotruth.evaluation import reliability
 from echotruth.evaluation.resampling import CLIP
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.repository import durable
+from echotruth.repository.kept import NotEvaluated
+from echotruth.repository.reader import Repository
 from echotruth.section import Section
 
 from . import card, charts, checks, examples, tables
@@ -156,7 +158,7 @@ class Page:
         charts.draw_floors(folder / "floors.png", clips, self.records.difficulty, first)
         charts.draw_reliability(folder / "reliability.png", reliability.curve(self.main.reliability), first)
         folders = {suite.name: suite.folder for suite in self.records.suites}
-        stored = {name for suite in self.records.suites for name in kept.trackers(suite.folder, suite.config)}
+        stored = {name for suite in self.records.suites for name in Repository(suite.folder).trackers}
         found = []
         for tracker in self.everyone:
             of = clips[(clips["tracker"] == tracker) & (clips["size_px"] == self.largest)]
@@ -165,7 +167,7 @@ class Page:
             rows = examples.chosen(of)
             try:
                 drawn = [examples.example(folders[row["repository"]], row, what) for what, row in rows.items()]
-            except kept.NotEvaluated:  # what is kept is older than the scores
+            except NotEvaluated:  # what is kept is older than the scores
                 continue
             examples.draw(folder / f"example_{tracker}.png", drawn)
             words = "; ".join(one.title.replace("\n", ", ") for one in drawn)

@@ -11,16 +11,17 @@ import pandas as pd
 
 from echotruth.cases import all_cases
 from echotruth.config import Config
-from echotruth.config.loading import load
-from echotruth.evaluation.choice import folder_of, hearts_of, is_complete
 from echotruth.evaluation.clip_metrics import ClipMetrics, clip_metrics
 from echotruth.evaluation.difficulty.table import difficulties
+from echotruth.evaluation.hearts import hearts_of
 from echotruth.evaluation.leaderboard import scores_of_guests
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.resampling import CLIP
 from echotruth.evaluation.tracker_options import EvaluationError
+from echotruth.repository.reader import Repository
 
 from .conditions import MAIN_SPECIES, with_conditions
+from .repositories import opened
 from .splits import check_halves, split_of_label
 
 NEEDED = (*CLIP, "tracker", "split", "true_gls_percent", "true_gcs_percent")
@@ -143,7 +144,7 @@ def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
         if not chosen:
             choices = _listed(suite.config.bmode.sizes)
             raise EvaluationError(f"{suite.folder}: has no images of {sizes[0]} px: use {choices}")
-        metrics = partial(clip_metrics, suite.folder, sizes=chosen)
+        metrics = partial(clip_metrics, Repository(suite.folder), sizes=chosen)
         # A share for each process: what all cases have in common is read once in each.
         shares = _shares(list(dict.fromkeys(case for case, _ in suite.complete)), jobs)
         parts += [(suite, found) for found in in_processes(metrics, shares, jobs)]
@@ -183,10 +184,10 @@ def read_suites(repositories: list[Path]) -> list[Suite]:
 
 def _suite(folder: Path) -> Suite:
     """A repository, given its folder or its store."""
-    folder = folder_of(folder)
-    config = load(folder / "config.yaml")
+    repository = opened(folder)
+    folder, config = repository.folder, repository.config
     try:
-        scores_of_guests(folder, config.tracking.trackers)
+        scores_of_guests(repository)
     except ValueError as error:
         raise EvaluationError(str(error)) from None
     cases = all_cases(config)
@@ -195,7 +196,7 @@ def _suite(folder: Path) -> Suite:
     except EvaluationError as error:
         raise EvaluationError(f"{folder}: {error}") from None
     wanted = [(case, view) for case in cases for view in config.views]
-    return Suite(folder, config, [clip for clip in wanted if is_complete(folder, *clip, "evaluation")], len(wanted))
+    return Suite(folder, config, [clip for clip in wanted if not repository.problem(*clip, "evaluation")], len(wanted))
 
 
 def _listed(sizes: Sequence[int]) -> str:
@@ -210,7 +211,7 @@ def _shares(cases: list[str], number: int) -> list[list[str]]:
 
 def _difficulty(folder: Path, clip: tuple[str, str]) -> pd.DataFrame:
     case, view = clip
-    return difficulties(folder, cases=[case], views=[view])
+    return difficulties(Repository(folder), cases=[case], views=[view])
 
 
 def _of(suite: Suite, table: pd.DataFrame, several: bool) -> pd.DataFrame:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -17,21 +17,22 @@ from threadpoolctl import threadpool_limits
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import load
-from echotruth.evaluation import kept
 from echotruth.evaluation.availability import check_runs
-from echotruth.evaluation.choice import folder_of, is_complete, job_of
-from echotruth.evaluation.clip import clips
-from echotruth.evaluation.digest import digest
+from echotruth.evaluation.clip import read_clips
 from echotruth.evaluation.displacement_error import evaluate
 from echotruth.evaluation.leaderboard import scores_of_guests
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.run import prepare, track_clip
-from echotruth.evaluation.scoring import Truth, ground_truth
+from echotruth.evaluation.scoring import Truth, read_truth
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.loop.cycle import read_loop
+from echotruth.repository import estimates, kept
+from echotruth.repository.digest import digest
+from echotruth.repository.reader import Repository
 from echotruth.section import Section
 
 from . import results
+from .repositories import opened
 from .results import COLUMNS, Row
 from .splits import split_of
 from .variants import VARIANTS, anonymous
@@ -72,14 +73,8 @@ class Rerun:
         EvaluationError
             If there is none.
         """
-        is_own = self.tracker in self.config.tracking.trackers
-        stages = ("truth", "bmode", "tracking") if is_own else ("truth", "bmode")
-        kept_of = {} if is_own else kept.about(self.folder, self.tracker)["clips"]
         cases = [case.id for case in all_cases(self.config).values() if split_of(case) == self.split]
-        wanted = [(case, view) for case in cases for view in self.config.views]
-        found = [clip for clip in wanted if is_complete(self.folder, *clip, *stages)]
-        if not is_own:  # what it found is that of the clip as it is now
-            found = [clip for clip in found if kept_of.get("/".join(clip)) == digest(self.folder, *clip)]
+        found = [(case, view) for case in cases for view in self.config.views if self._is_tracked(case, view)]
         if not found:
             remedy = "run the repository to its end, or evaluate the tracker again with --keep"
             raise EvaluationError(
@@ -91,7 +86,7 @@ class Rerun:
     def sizes(self) -> list[int]:
         """Image sizes at which the tracker was scored, px."""
         own, known = self.config.tracking.trackers, self.config.bmode.sizes
-        table = scores_of_guests(self.folder, own)
+        table = scores_of_guests(Repository(self.folder))
         scored = set(table[table["tracker"] == self.tracker]["size_px"])
         return [size for size in known if self.tracker in own or size in scored] or list(known)
 
@@ -107,6 +102,19 @@ class Rerun:
         """
         for rows in in_processes(partial(_view_rows, self, sizes), self.case_views(), jobs):
             yield from rows
+
+    def _is_tracked(self, case: str, view: str) -> bool:
+        """Whether what the tracker found in a clip is stored, and the clip is still the same."""
+        is_own = self.tracker in self.config.tracking.trackers
+        stages = ("truth", "bmode", *(("tracking",) if is_own else ()))
+        if Repository(self.folder).problem(case, view, *stages):
+            return False
+        return is_own or self.kept_clips.get(f"{case}/{view}") == digest(self.folder, case, view)
+
+    @cached_property
+    def kept_clips(self) -> dict[str, str]:
+        """Digest of every clip of which a tracker from outside has left something, by "CASE/VIEW"."""
+        return dict(kept.about(self.folder, self.tracker)["clips"])
 
 
 def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun:
@@ -130,12 +138,12 @@ def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun
     name = parse_tracker(tracker, None, [])[0] if ":" in tracker else tracker
     if name in config.tracking.trackers:
         return Rerun(folder, config, name, config.tracking.trackers[name], variant, split)
-    known = kept.trackers(folder, config)
+    known = Repository(folder).trackers
     if name not in known:
         remedy = f"evaluate it with --keep first, or use one of {', '.join(known)}"
         raise EvaluationError(f"{tracker}: the motion that it tracked is not kept in {folder}: {remedy}")
     about = kept.about(folder, name)
-    settings = prepare(folder, name, about["settings"]).settings
+    settings = prepare(Repository(folder), name, about["settings"]).settings
     check_runs(settings)
     return Rerun(folder, config, name, settings, variant, split)
 
@@ -150,7 +158,7 @@ def rerun(
     or an image size is that of none.
     """
     runs, reasons = [], []
-    for folder in map(folder_of, repositories):
+    for folder in (opened(repository).folder for repository in repositories):
         known = load(folder / "config.yaml").bmode.sizes
         if missing := [size for size in sizes if size not in known]:
             choices = ", ".join(map(str, known))
@@ -183,18 +191,19 @@ def _line(row: Row, variant: str) -> str:
 def _view_rows(run: Rerun, sizes: list[int], case_view: tuple[str, str]) -> list[Row]:
     """Rows of the variants of the clips of one view of one heart."""
     with threadpool_limits(1):
-        job = job_of(run.folder, *case_view)
+        repository = Repository(run.folder)
         time = read_loop(run.config.loop).time
         found: dict[int, tuple[np.ndarray, str, int]] = {}
-        for size, clip in clips(job).items():
+        for size, clip in read_clips(repository, *case_view).items():
             if size in sizes:
                 variant = VARIANTS[run.variant](clip)
                 estimate, failure = track_clip(anonymous(variant.clip, time), run.settings)
                 found[size] = clip.on_grid(*variant.restored(*estimate))[0], failure, variant.last
-        truth, of_clip = ground_truth(job), digest(run.folder, *case_view)
+        truth, of_clip = read_truth(repository, *case_view), digest(run.folder, *case_view)
         rows = []
         for size, (displacement, failure, last) in found.items():
-            before = kept.read(job, "tracking", "displacement", tracker=run.tracker, size=size)["displacement"]
+            found_before = estimates.tracked(repository, *case_view, run.tracker, size, "displacement")
+            before = found_before["displacement"]
             frame = min(truth.es, last)
             errors = (_error(values, truth, frame) for values in (displacement, before))
             rows.append(dict(zip(COLUMNS, (*case_view, size, of_clip, *errors, failure), strict=True)))

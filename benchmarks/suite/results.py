@@ -14,10 +14,9 @@ import numpy as np
 import pandas as pd
 
 from echotruth.config import Config
-from echotruth.evaluation import kept
-from echotruth.evaluation.digest import digest
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.repository import durable
+from echotruth.repository import durable, kept
+from echotruth.repository.digest import digest
 
 COLUMNS = ("case", "view", "size_px", "clip", "error_percent", "before_percent", "failure")
 """Columns of a row: error in the variant, and in the same frame of the clip as it was scored, as `nrmse_all` has them;
@@ -60,7 +59,7 @@ def settings_of(folder: Path, config: Config, tracker: str) -> dict[str, Any]:
     """
     if tracker in config.tracking.trackers:
         return config.tracking.trackers[tracker].model_dump(mode="json")
-    if tracker not in kept.trackers(folder, config):
+    if tracker not in kept.names(folder):
         return {}
     return dict(kept.about(folder, tracker)["settings"])
 

@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 
 from echotruth.cases import Case, all_cases, diagnosis
-from echotruth.evaluation.choice import hearts_of, is_complete, job_of
+from echotruth.evaluation.hearts import hearts_of
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP, LEAST_HEARTS
+from echotruth.repository.reader import Repository
 
 from .conditions import PLAIN
 from .records import Suite
@@ -119,10 +120,10 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
 
 def ejection_fraction(suite: Suite, case: str) -> float:
     """Ejection fraction of a heart; NaN if it was not solved."""
-    if not is_complete(suite.folder, case, None, "physiology"):
+    repository = Repository(suite.folder)
+    if repository.record("physiology", case).get("status") != "complete":
         return np.nan
-    job = job_of(suite.folder, case)
-    return float(job.store.read("physiology", job.row, names=("ejection_fraction",))["ejection_fraction"])
+    return float(repository.arrays("physiology", case, None, "ejection_fraction")["ejection_fraction"])
 
 
 def _group(case: Case) -> str:

@@ -16,20 +16,15 @@ if TYPE_CHECKING:
     from echotruth.config import Config, Probe, Rf, View
     from echotruth.config.building import configure
     from echotruth.config.loading import ConfigError
-    from echotruth.evaluation.clip_metrics import clip_metrics
     from echotruth.evaluation.curves import strain_peaks
-    from echotruth.evaluation.summary import strain_summary
     from echotruth.heart import Heart
     from echotruth.imaging.beamforming.scanner import Scanner
     from echotruth.imaging.rf.full_matrix import FullMatrix
     from echotruth.notebook.datasets import heart_dataset
-    from echotruth.notebook.difficulty import difficulty
     from echotruth.notebook.kinematics import kinematics
     from echotruth.notebook.point_tracks import point_tracks
-    from echotruth.notebook.points import load_points
-    from echotruth.notebook.repositories import load_clip, load_heart, open
     from echotruth.notebook.simulation import beat, evaluate, image, track
-    from echotruth.notebook.strain import strain_curves, twist_curves
+    from echotruth.repository.reader import Repository
     from echotruth.repository.unpacking import unpack
     from echotruth.tracking.failure import TrackerFailed
 
@@ -41,30 +36,22 @@ __all__ = [
     "FullMatrix",
     "Heart",
     "Probe",
+    "Repository",
     "Rf",
     "Scanner",
     "TrackerFailed",
     "View",
     "beat",
-    "clip_metrics",
     "configure",
-    "difficulty",
     "evaluate",
     "expand",
     "heart_dataset",
     "image",
     "kinematics",
     "learning",
-    "load_clip",
-    "load_heart",
-    "load_points",
-    "open",
     "point_tracks",
-    "strain_curves",
     "strain_peaks",
-    "strain_summary",
     "track",
-    "twist_curves",
     "unpack",
 ]
 
@@ -73,20 +60,15 @@ _ORIGIN = {
     "config": ("Config", "Probe", "Rf", "View"),
     "config.building": ("configure",),
     "config.loading": ("ConfigError",),
-    "evaluation.clip_metrics": ("clip_metrics",),
     "evaluation.curves": ("strain_peaks",),
-    "evaluation.summary": ("strain_summary",),
     "heart": ("Heart",),
     "imaging.beamforming.scanner": ("Scanner",),
     "imaging.rf.full_matrix": ("FullMatrix",),
     "notebook.datasets": ("heart_dataset",),
-    "notebook.difficulty": ("difficulty",),
     "notebook.kinematics": ("kinematics",),
     "notebook.point_tracks": ("point_tracks",),
-    "notebook.points": ("load_points",),
-    "notebook.repositories": ("load_clip", "load_heart", "open"),
     "notebook.simulation": ("beat", "evaluate", "image", "track"),
-    "notebook.strain": ("strain_curves", "twist_curves"),
+    "repository.reader": ("Repository",),
     "repository.unpacking": ("unpack",),
     "tracking.failure": ("TrackerFailed",),
 }

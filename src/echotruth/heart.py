@@ -42,7 +42,7 @@ class Heart:
     Examples
     --------
     >>> import echotruth as et
-    >>> heart = et.load_heart("out/demo")
+    >>> heart = et.Repository("out/demo").heart()
     >>> heart.positions(heart.es).shape == heart.nodes.shape  # nodes at end-systole, m
     True
     """

@@ -57,7 +57,7 @@ def test_repository_opens_as_it_is_told(call, tmp_path):
     with chdir(tmp_path):
         found: dict = {}
         exec(code, found)
-    assert found["tree"]["cases"].sizes["case"] == 1
+    assert len(found["repository"].cases) == 1
     np.testing.assert_array_equal(found["clip"]["image"].values, known.images(known_repository.SIZES[0]))
 
 
@@ -68,7 +68,7 @@ def test_repository_that_no_run_has_published_is_told_so(call, finished, tmp_pat
     status, output, _ = call("info", "begun")
     found = told(output)
     assert status == 0 and found["cases"] == "3: 3 unfinished" and "not published" in found["made by"]
-    assert "et.open" not in output
+    assert "et.Repository" not in output
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from finished_repository import configured, finish
 import echotruth as et
 from echotruth.cases import expand
 from echotruth.config import Cases
-from echotruth.evaluation.choice import hearts_of
+from echotruth.evaluation.hearts import hearts_of
 from echotruth.evaluation.resampling import by_heart
 
 pytestmark = pytest.mark.slow
@@ -24,7 +24,7 @@ f,6,0.4,,test,7
 @pytest.fixture(scope="module")
 def clips(tmp_path_factory):
     config = configured(name="sorted", views=("mid",), cases=Cases(table=TABLE))
-    return et.clip_metrics(finish(tmp_path_factory.mktemp("sorted") / "sorted", config)).clips
+    return et.Repository(finish(tmp_path_factory.mktemp("sorted") / "sorted", config)).metrics().clips
 
 
 def test_clips_have_the_labels_of_their_case_and_nothing_where_it_has_none(clips):

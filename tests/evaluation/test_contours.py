@@ -8,12 +8,12 @@ from scipy.special import ellipe
 
 import echotruth as et
 from echotruth.config import View
-from echotruth.evaluation.clip import grid_positions
 from echotruth.evaluation.contours import Contours, contours
 from echotruth.evaluation.scoring import truth_at
 from echotruth.heart import Heart
 from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.fibres import wall_depth
+from echotruth.tracking.point_grid import grid_positions
 
 CONTRACTION, SHORTENING, TORSION = 0.3, 0.12, 14.0
 TUBE = {

@@ -63,7 +63,7 @@ def arrays(view):
 
 
 def test_curves_of_a_clip_stand_at_their_labels(repository):
-    curves = et.strain_curves(repository, view="mid", tracker="one")
+    curves = et.Repository(repository).curves(view="mid", tracker="one")
     frame = curves.isel(frame=ES)
     line = frame[["true_line_strain", "tracked_line_strain"]].sel(contour="middle")
     np.testing.assert_allclose([line["true_line_strain"], line["tracked_line_strain"]], [-0.2, -0.18], atol=1e-6)
@@ -78,22 +78,23 @@ def test_curves_of_a_clip_stand_at_their_labels(repository):
 
 
 def test_tracked_curves_are_those_of_the_size_and_the_truth_is_the_same(repository):
-    large, small = (et.strain_curves(repository, view="mid", tracker="two", size=size) for size in (128, 64))
+    large, small = (et.Repository(repository).curves(view="mid", tracker="two", size=size) for size in (128, 64))
     np.testing.assert_allclose(small["tracked_line_strain"], 0.5 * large["tracked_line_strain"], atol=1e-6)
     np.testing.assert_array_equal(small["true_line_strain"], large["true_line_strain"])
 
 
 def test_truth_is_that_of_the_reference_asked_for_and_of_the_plane_if_none_is(repository):
     place = {"measure": "engineering", "region": 0, "wall_component": "RR", "frame": ES}
+    read = et.Repository(repository)
     found = {
-        name: float(et.strain_curves(repository, view="mid", tracker="one", **given)["true_region_strain"].sel(place))
+        name: float(read.curves(view="mid", tracker="one", **given)["true_region_strain"].sel(place))
         for name, given in {"": {}, **{name: {"reference": name} for name in ("heart", "plane", "operator")}}.items()
     }
     assert found == pytest.approx({"": 0.4, "heart": 1.2, "plane": 0.4, "operator": 0.8}, abs=1e-6)
 
 
 def test_peaks_come_after_end_systole_where_the_curve_says_so(repository):
-    curves = et.strain_curves(repository, view="mid", tracker="one")
+    curves = et.Repository(repository).curves(view="mid", tracker="one")
     middle = et.strain_peaks(curves).sel(contour="middle")
     step = 0.12 / FRAMES
     values = [float(middle[f"true_line_strain_{name}"]) for name in ("es", "peak", "time_to_peak", "systolic_rate")]
@@ -103,7 +104,7 @@ def test_peaks_come_after_end_systole_where_the_curve_says_so(repository):
 
 
 def test_twist_is_the_rotation_of_the_apex_less_that_of_the_base(repository):
-    twist = et.twist_curves(repository, tracker="one")
+    twist = et.Repository(repository).twist(tracker="one")
     assert (twist.attrs["basal_view"], twist.attrs["apical_view"]) == ("basal", "apical")
     np.testing.assert_allclose(twist["true_twist"], 0.2 * COURSE, atol=1e-6)
     np.testing.assert_allclose(twist["tracked_twist"], 0.18 * COURSE, atol=1e-6)
@@ -112,7 +113,7 @@ def test_twist_is_the_rotation_of_the_apex_less_that_of_the_base(repository):
 
 
 def test_table_has_the_numbers_of_the_curves_of_every_view_and_of_the_heart(repository):
-    table = et.strain_summary(repository, trackers=["one"]).set_index(["view", "quantity"])
+    table = et.Repository(repository).summary(trackers=["one"]).set_index(["view", "quantity"])
     np.testing.assert_allclose(table.loc[("long", "gls"), "tracked_es"], -18, atol=1e-4)
     np.testing.assert_allclose(table.loc[("mid", "gcs_endocardial"), "true_peak"], -33, atol=1e-4)
     np.testing.assert_allclose(
@@ -124,7 +125,7 @@ def test_table_has_the_numbers_of_the_curves_of_every_view_and_of_the_heart(repo
         (("mid", "gcs"), "line_strain", {"contour": "middle"}),
         (("long", "radial"), "region_strain", {"measure": "engineering", "region": 0, "wall_component": "RR"}),
     ):
-        peaks = et.strain_peaks(et.strain_curves(repository, view=view, tracker="one")).sel(place)
+        peaks = et.strain_peaks(et.Repository(repository).curves(view=view, tracker="one")).sel(place)
         for what in ("tracked", "true"):
             of = f"{what}_{curve}"
             row = table.loc[(view, quantity)]
@@ -135,7 +136,7 @@ def test_table_has_the_numbers_of_the_curves_of_every_view_and_of_the_heart(repo
 
 
 def test_mean_of_a_heart_is_over_all_its_views_or_there_is_none(repository):
-    table = et.strain_summary(repository, trackers=["one"], views=["basal", "apical", "long"])
+    table = et.Repository(repository).summary(trackers=["one"], views=["basal", "apical", "long"])
     of_heart = set(table.loc[table["view"] == "all", "quantity"])
     assert of_heart == {"gls", "gls_endocardial", "twist"}
 
@@ -152,19 +153,19 @@ def test_mean_of_a_heart_is_over_all_its_views_or_there_is_none(repository):
 )
 def test_what_there_is_not_is_refused_in_one_sentence(repository, given, expected):
     with pytest.raises(ValueError, match=expected):
-        et.strain_curves(repository, **{"tracker": "one"} | given)
+        et.Repository(repository).curves(**{"tracker": "one"} | given)
 
 
 def test_curves_without_their_attributes_have_no_peaks(repository):
-    curves = et.strain_curves(repository, view="mid", tracker="one").drop_attrs()
+    curves = et.Repository(repository).curves(view="mid", tracker="one").drop_attrs()
     with pytest.raises(ValueError, match="lost its attribute es_frame"):
         et.strain_peaks(curves)
     with pytest.raises(ValueError, match=r"^view = 'top': use one of"):
-        et.strain_summary(repository, views=["top"])
+        et.Repository(repository).summary(views=["top"])
 
 
 def test_clips_have_the_strain_of_the_middle_line_and_its_rate(repository):
-    clips = et.clip_metrics(repository, sizes=[128], trackers=["one"]).clips.set_index("view")
+    clips = et.Repository(repository).metrics(sizes=[128], trackers=["one"]).clips.set_index("view")
     mid, long = clips.loc["mid"], clips.loc["long"]
     assert list(mid[["tracked_gcs_percent", "true_gcs_percent"]]) == pytest.approx([-18, -20], abs=1e-4)
     assert list(long[["tracked_gls_percent", "true_gls_percent"]]) == pytest.approx([-18, -20], abs=1e-4)
@@ -175,7 +176,7 @@ def test_clips_have_the_strain_of_the_middle_line_and_its_rate(repository):
 
 
 def test_segments_that_a_view_shows_have_their_peaks(repository):
-    found = et.clip_metrics(repository, views=["mid", "long"], sizes=[64], trackers=["two"])
+    found = et.Repository(repository).metrics(views=["mid", "long"], sizes=[64], trackers=["two"])
     table = found.segments.set_index(["view", "aha", "component"])
     assert {aha for view, aha, _ in table.index if view == "mid"} == set(range(7, 13))
     assert set(table.loc["long"].index.get_level_values("component")) == {"radial", "longitudinal"}

@@ -10,7 +10,6 @@ from scipy import fft
 
 import echotruth as et
 from echotruth.config import Config
-from echotruth.evaluation.clip import grid_positions
 from echotruth.evaluation.difficulty import floors, table
 from echotruth.evaluation.difficulty.bound import AlignedImages
 from echotruth.evaluation.difficulty.plane import plane_path, tissue_path
@@ -19,7 +18,7 @@ from echotruth.imaging import spline
 from echotruth.imaging.view import imaging_plane
 from echotruth.tracking.alignment import interpolate_with_gradient
 from echotruth.tracking.grey import decompress
-from echotruth.workflow.job import Job
+from echotruth.tracking.point_grid import grid_positions
 
 CONFIG = Config()
 SIDE = 12e-3
@@ -74,7 +73,7 @@ def test_errors_are_carried_to_end_systole_by_the_motion_in_the_plane(moving):
     plane = imaging_plane(CONFIG.views["mid"], CONFIG.rf, heart.endo_at_ed)
     truth = truth_at(heart, plane, "short_axis", grid_positions(CONFIG)[::4, ::4], CONFIG)
     in_plane = plane.axes[:2] @ maps[heart.es][0] @ plane.axes[:2].T
-    found = floors._Scene(None, plane, truth, ([0], [0])).cauchy_green
+    found = floors._Scene(heart, CONFIG, plane, truth, ([0], [0])).cauchy_green
     assert found == pytest.approx(in_plane.T @ in_plane, abs=2**-11)  # strain is rounded to 2^-12
 
 
@@ -215,16 +214,16 @@ def known(tmp_path_factory):
 
 
 def carried(known, fades):
-    """`clips` with speckle that moves as the rigid body does; where it fades, every frame has its own."""
-    original = floors.clips
+    """`read_clips` with speckle that moves as the rigid body does; where it fades, every frame has its own."""
+    original = floors.read_clips
 
-    def clips(job):
-        found = original(job)
+    def clips(repository, case, view):
+        found = original(repository, case, view)
         random = np.random.default_rng(2)
         for size, clip in found.items():
             k = 2 * np.pi * fft.fftfreq(size, clip.spacing)
             k = np.stack(np.meshgrid(k, k))
-            shift = job.heart.displacement.mean(1) @ known.plane(job.view_name).axes[:2].T
+            shift = known.heart.displacement.mean(1) @ known.plane(view).axes[:2].T
             shift -= shift[0]
             smooth = np.exp(-((2 * clip.spacing) ** 2) * (k**2).sum(0) / 2)
             still = fft.fft2(random.standard_normal((size, size))) * smooth
@@ -242,8 +241,8 @@ def carried(known, fades):
 @pytest.mark.slow
 @pytest.mark.parametrize("view", ["mid", "long"])
 def test_speckle_that_moves_as_a_rigid_body_has_no_floor_and_stays_the_same(known, monkeypatch, view):
-    monkeypatch.setattr(floors, "clips", carried(known, fades=False))
-    rows = floors.difficulty(Job(known.folder, "tracking", known.case, view, code="1"))
+    monkeypatch.setattr(floors, "read_clips", carried(known, fades=False))
+    rows = floors.difficulty(et.Repository(known.folder), known.case.id, view)
     assert [row["size_px"] for row in rows] == list(SIZES) and set(rows[0]) == set(floors.COLUMNS)
     for row in rows:
         # The truth is rounded to 1/256 px.
@@ -255,19 +254,20 @@ def test_speckle_that_moves_as_a_rigid_body_has_no_floor_and_stays_the_same(know
 
 
 def test_speckle_that_is_new_in_every_frame_cannot_be_tracked(known, monkeypatch):
-    monkeypatch.setattr(floors, "clips", carried(known, fades=True))
-    for row in floors.difficulty(Job(known.folder, "tracking", known.case, "mid", code="1")):
+    monkeypatch.setattr(floors, "read_clips", carried(known, fades=True))
+    for row in floors.difficulty(et.Repository(known.folder), known.case.id, "mid"):
         assert abs(row["correlation_median"]) < 0.15
         assert np.isnan(row["floor_crb_percent"]) or row["floor_crb_percent"] > 20
 
 
 def test_given_frames_are_followed_where_trackers_get_every_second_one(known, monkeypatch):
-    case = replace(known.case, config=et.configure(known.case.config, tracking={"frame_step": 2}))
-    monkeypatch.setattr(floors, "clips", carried(known, fades=False))
+    slow = replace(known.case, config=et.configure(known.case.config, tracking={"frame_step": 2}))
+    monkeypatch.setattr(et.Repository, "case", lambda *_: slow)
+    monkeypatch.setattr(floors, "read_clips", carried(known, fades=False))
     visits = []
     follow = floors.plane_path
     monkeypatch.setattr(floors, "plane_path", lambda *given: visits.append(given[-1]) or follow(*given))
-    row = floors.difficulty(Job(known.folder, "tracking", case, "mid", code="1"))[0]
+    row = floors.difficulty(et.Repository(known.folder), known.case.id, "mid")[0]
     assert visits == [[0, 2], [0, 2]] and FRAMES == 3
     assert row["floor_plane_percent"] < 0.2 and np.hypot(*SHIFT[:2]) > 3e-4
 
@@ -275,37 +275,39 @@ def test_given_frames_are_followed_where_trackers_get_every_second_one(known, mo
 def test_table_of_a_repository_is_kept_until_its_images_change(known, monkeypatch):
     asked = []
 
-    def found(job):
-        asked.append(job.view_name)
+    def found(_, case, view):
+        asked.append(view)
         values = dict.fromkeys(floors.COLUMNS, 1.5) | {"floor_crb_percent": np.nan}
-        return [values | {"case": job.case.id, "view": job.view_name, "size_px": size} for size in SIZES]
+        return [values | {"case": case, "view": view, "size_px": size} for size in SIZES]
 
     monkeypatch.setattr(table, "difficulty", found)
-    first = table.difficulties(known.folder)
+    first = table.difficulties(et.Repository(known.folder))
     assert asked == ["mid", "long"] and list(first["size_px"]) == [*SIZES, *SIZES]
-    assert table.difficulties(known.folder).equals(first) and asked == ["mid", "long"]
+    assert table.difficulties(et.Repository(known.folder)).equals(first) and asked == ["mid", "long"]
     monkeypatch.setattr(table, "digest", lambda *_: "of other images")
-    assert table.difficulties(known.folder, views=["long"])["view"].tolist() == ["long", "long"]
+    assert table.difficulties(et.Repository(known.folder), views=["long"])["view"].tolist() == ["long", "long"]
     assert asked == ["mid", "long", "long"]
     monkeypatch.undo()
     kept = known.folder / "scratch" / known.case.id / "mid" / "difficulty.json"
     kept.write_text(json.dumps({"key": []}))
-    again = et.difficulty(known.folder, known.case.id, "mid")
+    again = et.Repository(known.folder).difficulty(known.case.id, "mid")
     assert list(again["size_px"]) == list(SIZES) and (again["floor_plane_percent"] < 0.2).all()
 
 
 def test_table_is_made_again_for_the_points_of_another_grid(known, monkeypatch):
     asked = []
-    monkeypatch.setattr(table, "difficulty", lambda job: asked.append(job.case.config.tracking.grid_px) or [])
+    monkeypatch.setattr(table, "difficulty", lambda _, *clip: asked.append(read.case().config.tracking.grid_px) or [])
+    read = et.Repository(known.folder)
     finer = replace(known.case, config=et.configure(known.case.config, tracking={"grid_px": 3}))
     for case in (known.case, known.case, finer):
-        table._kept(Job(known.folder, "tracking", case, "long", code="read"))
+        monkeypatch.setattr(read, "case", lambda *_, case=case: case)
+        table._kept(read, case.id, "long")
     assert asked[-2:] == [5, 3] and len(asked) == 2
 
 
 def test_unknown_case_or_view_is_named(known):
     with pytest.raises(ValueError, match="view = 'apex': use one of mid, long"):
-        et.difficulty(known.folder, known.case.id, "apex")
+        et.Repository(known.folder).difficulty(known.case.id, "apex")
     for names in (["nobody"], "nobody"):
         with pytest.raises(ValueError, match="case = 'nobody': use one of"):
-            table.difficulties(known.folder, cases=names)
+            table.difficulties(et.Repository(known.folder), cases=names)

@@ -10,7 +10,6 @@ import pytest
 from known_repository import SETTINGS, make
 
 import echotruth as et
-from echotruth.evaluation import kept
 from echotruth.evaluation.detection import COLUMNS, detection
 from echotruth.evaluation.reliability import calibration_error, curve
 from echotruth.evaluation.run import prepare
@@ -53,7 +52,7 @@ def repository(finished, tmp_path, monkeypatch):
 
 
 def evaluate(folder, function="steps", sizes=(), views=(), keep=True):
-    run = prepare(folder, "mine", {"method": "external", "track": f"mine:{function}"}, keep)
+    run = prepare(et.Repository(folder), "mine", {"method": "external", "track": f"mine:{function}"}, keep)
     case_views, sizes = run.case_views([], list(views)), run.sizes(list(sizes))
     run.check_writable()
     return run.write(list(run.rows(case_views, sizes)))
@@ -62,52 +61,52 @@ def evaluate(folder, function="steps", sizes=(), views=(), keep=True):
 def test_kept_displacement_is_what_the_tracker_returned_in_metres_on_the_grid(repository):
     evaluate(repository)
     for size in (128, 64):
-        found = et.load_points(repository, view="mid", tracker="mine", size=size)
+        found = et.Repository(repository).tracks(view="mid", trackers=["mine"], size=size)
+        of_tracker = found.isel(tracker=0)
         spacing = 12e-3 / size
         inside = found["layer"].values > 0
-        assert inside.any() and np.isnan(found["displacement"].values[:, ~inside]).all()
-        moved = found["displacement"].values[:, inside]
+        assert inside.any() and np.isnan(of_tracker["displacement"].values[:, ~inside]).all()
+        moved = of_tracker["displacement"].values[:, inside]
         expected = np.arange(3)[:, None, None] * np.array([1, -2]) * spacing * np.ones((1, inside.sum(), 1))
         np.testing.assert_allclose(moved, expected, atol=1e-6)
-        np.testing.assert_array_equal(found["quality"].values[:, inside], 0.5)
-        assert found.attrs["tracker"] == "mine"
+        np.testing.assert_array_equal(of_tracker["quality"].values[:, inside], 0.5)
+        assert list(found["tracker"]) == ["mine"]
 
 
 def test_kept_curves_are_read_like_those_of_the_repository(repository):
     evaluate(repository)
-    mine, own = (et.strain_curves(repository, view="mid", tracker=name, size=64) for name in ("mine", "two"))
+    mine, own = (et.Repository(repository).curves(view="mid", tracker=name, size=64) for name in ("mine", "two"))
     assert set(mine) == set(own) and mine.sizes == own.sizes
     np.testing.assert_array_equal(mine["true_line_strain"], own["true_line_strain"])
     # A tracker that shifts all points alike finds neither strain nor rotation, where there are points enough to say so.
     for name in ("tracked_region_strain", "tracked_rotation", "tracked_line_strain"):
         seen = mine[name].values[np.isfinite(mine[name].values)]
         np.testing.assert_allclose(seen, 0, atol=1e-4)
-    table = et.strain_summary(repository, trackers=["mine"])
+    table = et.Repository(repository).summary(trackers=["mine"])
     assert set(table["tracker"]) == {"mine"} and set(table["view"]) == {"mid", "long", "all"}
 
 
 def test_kept_trackers_stand_after_those_of_the_repository(repository):
-    config = et.configure(repository / "config.yaml")
-    assert kept.trackers(repository, config) == ["one", "two"]
+    assert et.Repository(repository).trackers == ["one", "two"]
     evaluate(repository)
-    assert kept.trackers(repository, config) == ["one", "two", "mine"]
+    assert et.Repository(repository).trackers == ["one", "two", "mine"]
     with pytest.raises(ValueError, match=r"^tracker = 'other': use one of one, two, mine\.$"):
-        et.strain_curves(repository, tracker="other")
+        et.Repository(repository).curves(tracker="other")
 
 
 def test_what_was_not_evaluated_is_unknown_or_refused(repository):
     evaluate(repository, sizes=[128], views=["mid"])
-    assert np.isnan(et.load_points(repository, view="mid", tracker="mine", size=64)["displacement"]).all()
+    assert np.isnan(et.Repository(repository).tracks(view="mid", trackers=["mine"], size=64)["displacement"]).all()
     with pytest.raises(ValueError, match=r"^tracker = 'mine': it was not evaluated on heart long\.$"):
-        et.strain_curves(repository, view="long", tracker="mine")
-    table = et.strain_summary(repository)
+        et.Repository(repository).curves(view="long", tracker="mine")
+    table = et.Repository(repository).summary()
     assert set(table.loc[table["tracker"] == "mine", "view"]) == {"mid", "all"}
 
 
 def test_size_at_which_the_tracker_failed_is_unknown_and_the_other_is_there(repository):
     table = evaluate(repository, "large_only", views=["mid"])
     assert list(table["failure"] != "") == [False, True]
-    large, small = (et.load_points(repository, view="mid", tracker="mine", size=size) for size in (128, 64))
+    large, small = (et.Repository(repository).tracks(view="mid", trackers=["mine"], size=size) for size in (128, 64))
     assert np.isfinite(large["displacement"]).any() and np.isnan(small["displacement"]).all()
 
 
@@ -117,8 +116,8 @@ def test_images_made_anew_are_not_those_that_were_tracked(repository):
     record = ledger.read(path)
     ledger.commit(path, record | {"sha256": record["sha256"] | {sorted(record["sha256"])[0]: 64 * "0"}})
     with pytest.raises(ValueError, match=r"^tracker = 'mine': it was evaluated on older images of heart mid"):
-        et.load_points(repository, view="mid", tracker="mine")
-    assert et.load_points(repository, view="long", tracker="mine") is not None
+        et.Repository(repository).tracks(view="mid", trackers=["mine"])
+    assert et.Repository(repository).tracks(view="long", trackers=["mine"]) is not None
 
 
 def test_points_of_another_grid_are_not_those_that_were_tracked(repository):
@@ -126,14 +125,14 @@ def test_points_of_another_grid_are_not_those_that_were_tracked(repository):
     path = repository / "config.yaml"
     path.write_text(path.read_text().replace("grid_px: 2", "grid_px: 4"))
     with pytest.raises(ValueError, match=r"^tracker = 'mine': it was evaluated with another tracking\.grid_px"):
-        et.load_points(repository, view="mid", tracker="mine")
+        et.Repository(repository).tracks(view="mid", trackers=["mine"])
 
 
 def test_later_evaluation_replaces_what_was_kept_and_one_that_keeps_nothing_removes_it(repository):
     evaluate(repository)
     evaluate(repository, views=["mid"])
     with pytest.raises(ValueError, match="not evaluated on heart long"):
-        et.load_points(repository, view="long", tracker="mine")
+        et.Repository(repository).tracks(view="long", trackers=["mine"])
     assert sorted(path.name for path in (repository / "external").iterdir()) == ["mine.csv", "mine.zarr"]
     evaluate(repository, keep=False)
     assert [path.name for path in (repository / "external").iterdir()] == ["mine.csv"]
@@ -142,18 +141,18 @@ def test_later_evaluation_replaces_what_was_kept_and_one_that_keeps_nothing_remo
 
 def test_evaluation_that_is_broken_off_leaves_nothing_and_what_was_kept_before(repository):
     evaluate(repository, views=["mid"])
-    run = prepare(repository, "mine", {"method": "external", "track": "mine:steps"}, keep=True)
+    run = prepare(et.Repository(repository), "mine", {"method": "external", "track": "mine:steps"}, keep=True)
     run.check_writable()
     rows = run.rows(run.case_views([], []), run.sizes([]))
     next(rows)
     rows.close()
     assert sorted(path.name for path in (repository / "external").iterdir()) == ["mine.csv", "mine.zarr"]
-    assert np.isfinite(et.load_points(repository, view="mid", tracker="mine")["displacement"]).any()
+    assert np.isfinite(et.Repository(repository).tracks(view="mid", trackers=["mine"])["displacement"]).any()
 
 
 def test_folder_that_cannot_hold_the_displacement_is_refused_in_one_sentence(repository):
     (repository / "external").write_text("")
-    run = prepare(repository, "mine", {"method": "external", "track": "mine:steps"}, keep=True)
+    run = prepare(et.Repository(repository), "mine", {"method": "external", "track": "mine:steps"}, keep=True)
     with pytest.raises(EvaluationError, match="external cannot hold the scores"):
         run.check_writable()
 
@@ -165,7 +164,7 @@ def px256(clips, tracker, view="mid"):
 
 def test_metrics_of_tracks_are_those_of_displacements_that_are_known(repository):
     evaluate(repository, views=["mid"])
-    found = et.clip_metrics(repository)
+    found = et.Repository(repository).metrics()
     assert len(found.clips) == 2 * 2 * 2 + 2 and set(found.clips["heart"]) == {"heart"}
     # The truth of this repository does not move; tracker one is off by 0.1 mm both ways, 3.02 px of 256 in 12 mm.
     one, two, mine = (px256(found.clips, name) for name in ("one", "two", "mine"))
@@ -195,7 +194,7 @@ def test_tissue_that_leaves_the_slice_is_hidden_and_a_tracker_that_is_sure_of_it
     # The slice is some 0.36 mm thick.
     true["true_displacement"][..., 2] = np.array([0, 0.1e-3, 1e-3])[:, None, None]
     job.store.write("evaluation", true, *job.index)
-    clips = px256(et.clip_metrics(repository, views=["mid"]).clips, "mine")
+    clips = px256(et.Repository(repository).metrics(views=["mid"]).clips, "mine")
     assert list(clips["visible_percent"]) == list(clips["occlusion_accuracy_percent"]) == [50, 50]
     # In the frame in which it is seen it is off by 4.5 px, afterwards by 8.9; the latter claim is false anyhow.
     assert clips.loc[128, "delta_avg_percent"] == 40 and clips.loc[128, "delta_all_avg_percent"] == 30
@@ -205,24 +204,24 @@ def test_tissue_that_leaves_the_slice_is_hidden_and_a_tracker_that_is_sure_of_it
 
 def test_metrics_of_a_tracker_that_was_not_kept_are_those_of_its_scores(repository):
     scores = evaluate(repository, keep=False).set_index(["view", "size_px"])
-    clips = et.clip_metrics(repository, trackers=["mine"]).clips.set_index(["view", "size_px"])
+    clips = et.Repository(repository).metrics(trackers=["mine"]).clips.set_index(["view", "size_px"])
     np.testing.assert_allclose(clips["nrmse_all_percent"], scores.loc[clips.index, "nrmse_all_percent"])
     assert len(clips) == 4 and (clips["failure"] == "").all() and (clips["points"] > 0).all()
-    everything = et.clip_metrics(repository).clips
+    everything = et.Repository(repository).metrics().clips
     assert everything.loc[everything["tracker"] == "mine", "delta_avg_percent"].isna().all()
 
 
 def test_one_name_may_be_given_for_a_list_of_one(repository):
-    of_lists = et.clip_metrics(repository, ["heart"], ["mid"], trackers=["one"])
-    for table, of_list in zip(et.clip_metrics(repository, "heart", "mid", trackers="one"), of_lists, strict=True):
+    of_lists = et.Repository(repository).metrics(["heart"], ["mid"], trackers=["one"])
+    for table, of_list in zip(et.Repository(repository).metrics("heart", "mid", trackers="one"), of_lists, strict=True):
         pd.testing.assert_frame_equal(table, of_list)
     with pytest.raises(ValueError, match=r"^case = 'other': use one of heart\.$"):
-        et.clip_metrics(repository, "other")
+        et.Repository(repository).metrics("other")
 
 
 def test_tables_without_a_row_have_their_columns_and_nothing_to_say(repository):
     evaluate(repository, keep=False)
-    full, empty = et.clip_metrics(repository), et.clip_metrics(repository, trackers=["mine"])
+    full, empty = et.Repository(repository).metrics(), et.Repository(repository).metrics(trackers=["mine"])
     assert list(empty.segments) == list(full.segments) and list(empty.reliability) == list(full.reliability)
     assert empty.segments.empty and detection(empty.segments).empty and list(detection(empty.segments)) == [*COLUMNS]
     assert curve(empty.reliability).empty and list(curve(empty.reliability)) == list(curve(full.reliability))
@@ -231,7 +230,7 @@ def test_tables_without_a_row_have_their_columns_and_nothing_to_say(repository):
 
 def test_metrics_of_a_failed_clip_are_the_worst_or_unknown_and_its_reason_is_told(repository):
     evaluate(repository, "large_only", views=["mid"])
-    small = px256(et.clip_metrics(repository).clips, "mine").loc[64]
+    small = px256(et.Repository(repository).metrics().clips, "mine").loc[64]
     assert "no room" in small["failure"] and small["nrmse_all_percent"] == 100
     assert small["delta_avg_percent"] == 0 and small["survival_percent"] == 0 and small["quality_percent"] == 0
     assert np.isnan(small["tracked_gcs_percent"]) and np.isnan(small["segment_peak_error_pp"])
@@ -239,7 +238,7 @@ def test_metrics_of_a_failed_clip_are_the_worst_or_unknown_and_its_reason_is_tol
 
 def test_clips_that_are_not_evaluated_yet_have_no_metrics(repository):
     record_path(repository, "evaluation", "heart", "long").unlink()
-    assert set(et.clip_metrics(repository).clips["view"]) == {"mid"}
-    assert et.clip_metrics(repository, views=["long"]).clips.empty
+    assert set(et.Repository(repository).metrics().clips["view"]) == {"mid"}
+    assert et.Repository(repository).metrics(views=["long"]).clips.empty
     with pytest.raises(ValueError, match=r"^tracker = 'other': use one of one, two\.$"):
-        et.clip_metrics(repository, trackers=["other"])
+        et.Repository(repository).metrics(trackers=["other"])

@@ -5,12 +5,10 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-import xarray as xr
+from board import Board
 
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking, View
 from echotruth.evaluation.leaderboard import best, rows, standings
-from echotruth.repository import layout
-from echotruth.repository.schema import PACKS
 
 
 def scores(values, views=("mid",), failure=""):
@@ -123,58 +121,49 @@ CONFIG = Config(
 )
 
 
-@pytest.fixture
-def tree():
-    """Three hearts of which everything is 0.1 or, of the second tracker, 0.2."""
-    labels = layout.labels(CONFIG, ["a", "b", "c"], [])
-    coords = {name: labels[name] for name in ("case", "view", "size", "tracker")}
-    coords["score"] = labels["evaluation:score"]
-    scores = next(pack.array for pack in PACKS["evaluation"] if pack.array.name == "scores")
-    values = np.full([len(coords[dim]) for dim in scores.dims], 0.1)
-    values[:, :, :, 1] *= 2
-    return xr.DataTree.from_dict({"/evaluation": xr.Dataset({"scores": (scores.dims, values)}, coords)})
+def board(folder, hearts="abc"):
+    """Hearts of which everything is 0.1 or, of the second tracker, 0.2."""
+    return Board(CONFIG, folder, {case: dict.fromkeys(CONFIG.views, (0.1, 0.2)) for case in hearts})
 
 
-def test_rows_are_of_the_hearts_that_count(tree, tmp_path):
-    table = rows(tree, CONFIG, np.array([0, 2]), tmp_path)
+def test_rows_are_of_the_hearts_that_count(tmp_path):
+    table = rows(board(tmp_path, "ac"))
     assert list(table["case"]) == ["a"] * 4 + ["c"] * 4 and list(table["tracker"]) == ["one", "two"] * 4
     assert list(table["nrmse_percent"][:2]) == [10, 20] and (table["failure"] == "").all()
     assert table["e_cc_rms_pp"].isna().tolist() == [False, False, True, True] * 2
 
 
-def test_scores_of_a_view_are_found_by_its_name(tree, tmp_path):
+def test_scores_of_a_view_are_found_by_its_name(tmp_path):
     """Whatever the order in the store, and beside views that have left the configuration."""
-    data = tree["evaluation"].to_dataset()
-    former = data.isel(view=[1]).assign_coords(view=["former"]) * 3
-    other = xr.concat([former, data.isel(view=[1]) * 2, data.isel(view=[0])], "view")
-    table = rows(xr.DataTree.from_dict({"/evaluation": other}), CONFIG, np.array([0]), tmp_path)
+    views = {"former": [0.9, 0.9], "long_axis": [0.2, 0.4], "mid": [0.1, 0.2]}
+    table = rows(Board(CONFIG, tmp_path, {"a": views}))
     assert list(table["view"]) == ["mid", "mid", "long_axis", "long_axis"]
     np.testing.assert_allclose(table["nrmse_percent"], [10, 20, 20, 40])
 
 
-def test_a_failure_is_read_from_the_ledger(tree, tmp_path):
+def test_a_failure_is_read_from_the_ledger(tmp_path):
     (tmp_path / "ledger/tracking/b").mkdir(parents=True)
     record = {"failures": {"two/64": "two: no motion found"}}
     (tmp_path / "ledger/tracking/b/mid.json").write_text(json.dumps(record))
-    table = rows(tree, CONFIG, np.arange(3), tmp_path)
+    table = rows(board(tmp_path))
     assert list(table[table["failure"] != ""][["case", "view", "tracker"]].iloc[0]) == ["b", "mid", "two"]
     assert overall(standings(table, 1)).loc["two", "failures"] == 1
 
 
-def test_external_trackers_stand_beside_the_others_on_the_clips_that_count(tree, tmp_path):
+def test_external_trackers_stand_beside_the_others_on_the_clips_that_count(tmp_path):
     (tmp_path / "external").mkdir()
-    own = rows(tree, CONFIG, np.arange(3), tmp_path)
+    own = rows(board(tmp_path))
     external = own[own["tracker"] == "one"].assign(tracker="mine", nrmse_all_percent=1.0, failure=np.nan)
     external.to_csv(tmp_path / "external/mine.csv", index=False)
     own.assign(nrmse_all_percent=0.0).to_csv(tmp_path / "external/one.csv", index=False)
-    table = rows(tree, CONFIG, np.arange(2), tmp_path)
+    table = rows(board(tmp_path, "ab"))
     assert len(table) == 12 and set(table["case"]) == {"a", "b"}
     assert best(standings(table, 1)) == ["mine", "one", "two"]
     assert (table["failure"] == "").all()
 
 
-def test_a_table_of_an_external_tracker_without_a_column_is_refused(tree, tmp_path):
+def test_a_table_of_an_external_tracker_without_a_column_is_refused(tmp_path):
     (tmp_path / "external").mkdir()
     pd.DataFrame({"case": ["a"]}).to_csv(tmp_path / "external/mine.csv", index=False)
     with pytest.raises(ValueError, match=r"mine\.csv: has no column view: evaluate that tracker again"):
-        rows(tree, CONFIG, np.arange(3), tmp_path)
+        rows(board(tmp_path))

@@ -16,7 +16,6 @@ from echotruth.cli import main
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tracking, View
 from echotruth.config.tracking import External
 from echotruth.evaluation import scoring
-from echotruth.evaluation.digest import digest
 from echotruth.evaluation.tracker_options import parse_tracker
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
@@ -26,7 +25,9 @@ from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, schema
 from echotruth.repository.checksums import checksums
+from echotruth.repository.digest import digest
 from echotruth.repository.ledger import record_path
+from echotruth.repository.reader import Repository
 from echotruth.repository.store import Store
 from echotruth.tracking import grid
 from echotruth.workflow.job import Job
@@ -326,7 +327,7 @@ def worked(made, evaluate):
 def test_external_tracker_of_the_configuration_gets_the_scores_it_gets_on_the_command_line(made, worked, evaluate):
     job, result = worked
     evaluate("--tracker", "custom:drawn", "--case", job.case.id, "--view", "mid")
-    truth = scoring.ground_truth(job)
+    truth = scoring.read_truth(Repository(made), job.case.id, "mid")
     for _, found in scores(made, "custom_drawn").iterrows():
         tracked = result["tracking"]["displacement"][CONFIG.bmode.sizes.index(found["size_px"]), 1]
         for name, value in scoring.metrics(scoring.score(tracked, truth), "short_axis").items():
@@ -360,9 +361,9 @@ REFUSED = {
     "program": (["--command", "trakk {input} {output}"], "trakk: is not there or cannot be run"),
     "script": (["--command", f"{sys.executable} progam.py {{input}} {{output}}"], "progam.py is not there"),
     "date": (["--tracker", "a:b", "--option", "a=2026-01-01"], "must be finite numbers, text"),
-    "case": (["--tracker", "a:b", "--case", "seed9"], "seed9 is not a case of {made}: use heart, seed2_"),
-    "view": (["--tracker", "a:b", "--view", "base"], "base is not a view of {made}: use mid, apex"),
-    "size": (["--tracker", "a:b", "--size", "512"], "512 is not a size of {made}: use 128, 64"),
+    "case": (["--tracker", "a:b", "--case", "seed9"], "case = 'seed9': use one of heart, seed2_"),
+    "view": (["--tracker", "a:b", "--view", "base"], "view = 'base': use one of mid, apex"),
+    "size": (["--tracker", "a:b", "--size", "512"], "size = 512: use one of 128, 64"),
     "option": (["--tracker", "a:b", "--option", "window"], "--option window: has no value: write key=value"),
     "YAML": (["--tracker", "a:b", "--option", "a=[1"], "--option a=[1: the value is not YAML"),
     "key": (["--tracker", "dis", "--option", "window=3"], "window is not a key of the method dis"),

@@ -1,15 +1,13 @@
 """Scores of external trackers count for unchanged clips only, and a table that cannot be read gives one sentence."""
 
-import numpy as np
 import pytest
-import xarray as xr
+from board import Board
 
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking, View
-from echotruth.evaluation.digest import digest
 from echotruth.evaluation.leaderboard import rows
-from echotruth.repository import layout, ledger
+from echotruth.repository import ledger
+from echotruth.repository.digest import digest
 from echotruth.repository.ledger import record_path
-from echotruth.repository.schema import PACKS
 
 CONFIG = Config(
     views={"mid": View(), "null": View(position=0.7)},
@@ -26,17 +24,11 @@ def commit(folder, stage, view, content):
 @pytest.fixture
 def board(tmp_path):
     """Rows of the leaderboard of one heart and two views."""
-    labels = layout.labels(CONFIG, ["a"], [])
-    coords = {name: labels[name] for name in ("case", "view", "size", "tracker")}
-    coords["score"] = labels["evaluation:score"]
-    scores = next(pack.array for pack in PACKS["evaluation"] if pack.array.name == "scores")
-    values = np.full([len(coords[dim]) for dim in scores.dims], 0.1)
-    tree = xr.DataTree.from_dict({"/evaluation": xr.Dataset({"scores": (scores.dims, values)}, coords)})
     (tmp_path / "external").mkdir()
     for view in CONFIG.views:
         for stage in ("bmode", "truth"):
             commit(tmp_path, stage, view, "0")
-    return lambda: rows(tree, CONFIG, np.arange(1), tmp_path)
+    return lambda: rows(Board(CONFIG, tmp_path, {"a": dict.fromkeys(CONFIG.views, (0.1,))}))
 
 
 @pytest.fixture

@@ -3,7 +3,8 @@
 import pytest
 from known_repository import SETTINGS, SIZES, Known, make
 
-from echotruth.export import Export, Selection, source
+from echotruth.export import Export, Selection
+from echotruth.repository.reader import Repository
 
 
 @pytest.fixture(scope="session")
@@ -16,7 +17,7 @@ def exported(known, tmp_path):
     """A function that exports a format of one view, and gives the path of the file or folder."""
 
     def write(name, view="mid", size=SIZES[0], **options):
-        work = Export(source(known.folder, Selection(["heart"], [view], [size])), name, output=tmp_path, **options)
+        work = Export(Repository(known.folder), Selection(["heart"], [view], [size]), name, output=tmp_path, **options)
         (path,) = work.write(work.clips()[0])
         return path
 

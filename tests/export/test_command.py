@@ -12,7 +12,8 @@ from known_repository import SIZES
 
 from echotruth import cli
 from echotruth.cases import expand
-from echotruth.export import FORMATS, OVERLAYS, Export, ExportError, Selection, destination, png, source
+from echotruth.export import FORMATS, OVERLAYS, Export, ExportError, Selection, destination, png
+from echotruth.repository.reader import Repository
 
 
 def call(monkeypatch, *arguments):
@@ -55,10 +56,10 @@ def test_one_clip_can_be_given_its_file(known, monkeypatch, tmp_path, capsys):
 
 
 REFUSED = {
-    "case": (["--case", "hart"], "hart is not a case of .*: use heart"),
-    "view": (["--view", "middle"], "middle is not a view of .*: use "),
-    "size": (["--size", "512"], "512 is not a size of .*: use 128, 64"),
-    "tracker": (["--format", "csv", "--tracker", "three"], "three is not a tracker of .*: use one, two"),
+    "case": (["--case", "hart"], "case = 'hart': use one of heart"),
+    "view": (["--view", "middle"], "view = 'middle': use one of "),
+    "size": (["--size", "512"], "size = 512: use one of 128, 64"),
+    "tracker": (["--format", "csv", "--tracker", "three"], "tracker = 'three': use one of one, two"),
     "tracker of a video": (["--tracker", "one"], "--tracker does nothing for mp4: it is for matlab, csv"),
     "overlay": (["--overlay", "strain"], "--overlay strain: use wall, segments, displacement"),
     "overlay of tracks": (
@@ -129,7 +130,7 @@ def test_lost_images_are_an_error_and_not_a_black_video(copy, monkeypatch, capsy
     assert not list((tmp_path / "out").iterdir())
 
 
-@pytest.mark.parametrize("name", ["mp4", "uff"])
+@pytest.mark.parametrize("name", ["mp4", "tap"])
 def test_heart_without_a_row_is_told_in_one_sentence(copy, monkeypatch, capsys, tmp_path, name):
     (copy / "registry.txt").write_text("other\n")
     assert call(monkeypatch, copy, "--format", name, "-o", tmp_path / "out") == 2
@@ -138,7 +139,7 @@ def test_heart_without_a_row_is_told_in_one_sentence(copy, monkeypatch, capsys, 
 
 
 def test_what_was_read_of_a_clip_goes_when_it_is_written(known, tmp_path):
-    work = Export(source(known.folder, Selection(sizes=[SIZES[1]])), "tap", output=tmp_path)
+    work = Export(Repository(known.folder), Selection(sizes=[SIZES[1]]), "tap", output=tmp_path)
     clips = work.clips()[0]
     assert len(list(work.write(clips))) == len(clips) == 2
     assert not {"image", "heart", "plane"} & {name for clip in clips for name in vars(clip)}
@@ -149,7 +150,7 @@ def test_failure_half_way_leaves_nothing_new_and_what_was_there(known, monkeypat
         (tmp_path / "reached").touch()
         raise OSError(28, "No space left on device")
 
-    work = Export(source(known.folder, Selection(views=["mid"])), "png", output=tmp_path / "out")
+    work = Export(Repository(known.folder), Selection(views=["mid"]), "png", output=tmp_path / "out")
     (folder,) = work.write(work.clips()[0])
     before = sorted(path.name for path in folder.iterdir())
     monkeypatch.setattr(png, "pictures", fail)

@@ -6,13 +6,14 @@ from known_repository import FRAMES, SHIFT, SIZES
 from scipy.io import loadmat
 
 from echotruth.export import ExportError, matlab
+from echotruth.repository.reader import Repository
 
 
 @pytest.fixture(scope="module")
 def clip(known, tmp_path_factory):
-    from echotruth.export import Export, Selection, source
+    from echotruth.export import Export, Selection
 
-    work = Export(source(known.folder, Selection(views=["mid"])), "matlab", output=tmp_path_factory.mktemp("mat"))
+    work = Export(Repository(known.folder), Selection(views=["mid"]), "matlab", output=tmp_path_factory.mktemp("mat"))
     (file,) = work.write(work.clips()[0])
     return loadmat(file, simplify_cells=True)["clip"]
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from known_repository import FRAMES, SHIFT, SIZES
 
-from echotruth.export import Export, Selection, source
+from echotruth.export import Export, Selection
 from echotruth.imaging.flow import slice_thickness
+from echotruth.repository.reader import Repository
 
 STEP = SHIFT / (FRAMES - 1)
 """Shift from frame to frame: lateral, axial, elevation, m."""
@@ -55,7 +56,7 @@ def test_point_is_occluded_where_it_is_beside_the_slice(tap, known):
 def test_pickle_is_a_dictionary_of_all_clips_with_the_same_arrays(known, exported, tap, tmp_path):
     """As `pickle.load` reads it, without echotruth's own classes and in contiguous arrays that can be written to."""
     chosen = Selection(["heart"], ["mid", "long"], list(SIZES))
-    work = Export(source(known.folder, chosen), "tap_pickle", output=tmp_path)
+    work = Export(Repository(known.folder), chosen, "tap_pickle", output=tmp_path)
     (path,) = work.write(work.clips()[0])
     assert path == tmp_path / f"{known.folder.name}.pkl"
     text = path.read_bytes()
@@ -68,7 +69,8 @@ def test_pickle_is_a_dictionary_of_all_clips_with_the_same_arrays(known, exporte
     for name, values in tap.items():
         np.testing.assert_array_equal(first[name], values)
         assert first[name].dtype == values.dtype
-    (again,) = Export(source(known.folder, chosen), "tap_pickle", output=tmp_path / "one.pkl").write(work.clips()[0])
+    again = Export(Repository(known.folder), chosen, "tap_pickle", output=tmp_path / "one.pkl")
+    (again,) = again.write(work.clips()[0])
     assert again.read_bytes() == text
 
 

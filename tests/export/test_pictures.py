@@ -12,6 +12,7 @@ from known_repository import FRAMES, SHIFT, SIZES
 
 from echotruth.export import ExportError, mp4
 from echotruth.export.clip import Clip
+from echotruth.repository.reader import Repository
 
 PERIOD = 0.12
 """Of the default cycle of a mouse, s."""
@@ -143,7 +144,7 @@ def test_arrows_are_as_long_as_the_displacement(exported, known):
 
 
 def test_video_of_an_odd_number_of_pixels_keeps_its_scale(known, tmp_path):
-    clip = Clip(known.folder, known.case, "mid", 127)
+    clip = Clip(Repository(known.folder), known.case, "mid", 127)
     clip.__dict__["image"] = known.images(SIZES[0])[:, :127, :127]
     mp4.write(clip, tmp_path / "odd.mp4", (), 20.0)
     found, _ = frames(tmp_path / "odd.mp4")

@@ -7,15 +7,15 @@ import pytest
 import pyvista
 from known_repository import FRAMES, SHIFT
 
+from echotruth.export import Export, Selection
 from echotruth.export.vtk import fibres
 from echotruth.heart import SHORT_AXIS
+from echotruth.repository.reader import Repository
 
 
 @pytest.fixture(scope="module")
 def series(known, tmp_path_factory):
-    from echotruth.export import Export, Selection, source
-
-    work = Export(source(known.folder, Selection()), "vtk", output=tmp_path_factory.mktemp("vtk"))
+    work = Export(Repository(known.folder), Selection(), "vtk", output=tmp_path_factory.mktemp("vtk"))
     (folder,) = work.write(work.clips()[0])
     return pyvista.PVDReader(str(folder / "heart.pvd"))
 

@@ -52,7 +52,7 @@ def moved(position, start, end):
 def centres(items):
     """Pixel centres about the fixed point of the motion, which is at the transmit focus, (axial, lateral, 3), m."""
     index = (np.arange(items.size) - (items.size - 1) / 2) * items.spacing
-    axial = items.reader.read(f"truth/{items.size}/axial", ...) - items.reader.config.rf.si().focus
+    axial = items.repository.read(f"truth/{items.size}/axial", ...) - items.repository.config.rf.si().focus
     return np.stack(np.broadcast_arrays(index, axial[:, None], 0.0), axis=-1)
 
 
@@ -69,7 +69,7 @@ def linear(repository, tmp_path_factory):
 
 def quantum(items):
     """Step of the stored flow, m."""
-    return items.reader.array(f"truth/{items.size}/flow").attrs["quantum"]
+    return items.repository.array(f"truth/{items.size}/flow").attrs["quantum"]
 
 
 @pytest.mark.parametrize("size", [64, 32])
@@ -88,17 +88,17 @@ def test_flow_is_the_affine_motion_from_frame_to_frame(repository, size):
 
 def test_tissue_leaves_and_enters_where_the_motion_takes_it_beyond_half_the_slice(repository):
     pairs = learning.FlowPairs(repository, views=["mid"])
-    axial, lateral = (pairs.reader.read(f"truth/{SIZE}/{name}", ...) for name in ("axial", "lateral"))
+    axial, lateral = (pairs.repository.read(f"truth/{SIZE}/{name}", ...) for name in ("axial", "lateral"))
     assert_leaves_and_enters(pairs, slice_thickness(Config(), np.hypot(axial[:, None], lateral)) / 2)
 
 
 def test_slice_of_a_linear_scan_is_as_thick_as_at_its_depth(linear):
     pairs = learning.FlowPairs(linear, views=["mid"])
-    axial = pairs.reader.read(f"truth/{SIZE}/axial", ...)
+    axial = pairs.repository.read(f"truth/{SIZE}/axial", ...)
     assert_leaves_and_enters(pairs, slice_thickness(Config(), np.tile(axial[:, None], SIZE)) / 2)
     position, seen = (learning.PointTracks(linear, views=["mid"], points=200)[0][name] for name in NAMES)
     half = slice_thickness(Config(), position[..., 1]) / 2
-    in_scan = np.abs(position[..., 0]) <= scan_width(pairs.reader.config.probe, pairs.reader.config.rf) / 2
+    in_scan = np.abs(position[..., 0]) <= scan_width(pairs.repository.config.probe, pairs.repository.config.rf) / 2
     np.testing.assert_array_equal(seen, in_scan & (np.abs(position[..., 2]) <= half))
 
 
@@ -110,7 +110,7 @@ def assert_leaves_and_enters(pairs, half):
     for item in pairs[: FRAMES - 1]:
         first, second = item["frame"], item["frame"] + 1
         forth, back = (moved(centres(pairs), *way)[..., 2] for way in ((first, second), (second, first)))
-        after = learning.Segmentation(pairs.reader.folder, views=["mid"])[second]["label"].astype(bool)
+        after = learning.Segmentation(pairs.repository.folder, views=["mid"])[second]["label"].astype(bool)
         for name, wall, elevation in (("leaves", item["wall"], forth), ("enters", after, back)):
             beyond = np.abs(elevation) - half
             sure = np.abs(beyond) > quantum(pairs)
@@ -121,7 +121,7 @@ def assert_leaves_and_enters(pairs, half):
 @pytest.mark.parametrize("start", [0, 1])
 def test_points_move_with_the_tissue_and_are_seen_within_the_slice(repository, start):
     tracks = learning.PointTracks(repository, views=["mid"], points=50, start=start)
-    item, focus = tracks[0], tracks.reader.config.rf.si().focus
+    item, focus = tracks[0], tracks.repository.config.rf.si().focus
     about = item["position_m"] - np.array([0, focus, 0], np.float32)
     expected = np.stack([moved(about[start].astype(float), start, frame) for frame in range(FRAMES)])
     np.testing.assert_allclose(about, expected, atol=1e-8)
@@ -136,7 +136,7 @@ def test_points_move_with_the_tissue_and_are_seen_within_the_slice(repository, s
 def test_clip_is_that_of_the_notebook_with_channels_first(repository):
     clips = learning.Clips(repository, views=["long_axis"], size=32, truth=["displacement", "strain", "flow"])
     item = clips[0]
-    clip = et.load_clip(repository, item["case"], "long_axis", 32)
+    clip = et.Repository(repository).clip(item["case"], "long_axis", 32)
     np.testing.assert_array_equal(np.round(item["image"] * 255), clip["image"])
     np.testing.assert_allclose(item["time"], clip["time"], rtol=1e-6)
     for name, last in (("displacement", "vector"), ("strain", "strain_component"), ("flow", "vector")):
@@ -147,18 +147,18 @@ def test_clip_is_that_of_the_notebook_with_channels_first(repository):
 def test_labels_are_those_of_the_notebook(repository, target):
     items = learning.Segmentation(repository, target=target)
     number = len(items) - 2  # of the last heart, which has an infarct
-    clip = et.load_clip(repository, items[number]["case"], items[number]["view"])
+    clip = et.Repository(repository).clip(items[number]["case"], items[number]["view"])
     expected = clip["mask" if target == "wall" else target].values[items[number]["frame"]]
     np.testing.assert_array_equal(items[number]["label"], expected)
     assert items[number]["image"].shape == (1, SIZE, SIZE)
 
 
 def test_strain_and_diagnosis_are_those_of_the_heart(repository):
-    means, part = et.open(repository)["kinematics"]["strain_mean"], {"views": ["mid"], "size": 32}
+    means, part = et.Repository(repository).tree["kinematics"]["strain_mean"], {"views": ["mid"], "size": 32}
     for strain, diagnosis in zip(
         learning.Strain(repository, **part), learning.Diagnosis(repository, **part), strict=True
     ):
-        heart, mean = et.load_heart(repository, strain["case"]), means.sel(case=strain["case"])
+        heart, mean = et.Repository(repository).heart(strain["case"]), means.sel(case=strain["case"])
         np.testing.assert_allclose(strain["strain"], mean, atol=1e-7)
         assert strain["es_frame"] == heart.es
         assert diagnosis["label"] == (heart.region == 1).any() == (diagnosis["scar_size"] > 0)
@@ -194,7 +194,7 @@ def test_copy_for_a_worker_has_no_open_array(repository):
     before = len(pickle.dumps(items))
     assert digests(items)
     copy = pickle.loads(pickle.dumps(items))
-    assert not copy.reader._opened and items.reader._opened
+    assert not copy.repository._opened and items.repository._opened
     assert len(pickle.dumps(items)) < before + 2e4
 
 

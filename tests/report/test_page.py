@@ -15,8 +15,8 @@ from known_repository import FRAMES, SETTINGS, make
 from reported_repository import report
 from shown_repository import SHIFT
 
-from echotruth.config.loading import load
 from echotruth.report import page
+from echotruth.repository.reader import Repository
 
 pytestmark = [
     pytest.mark.slow,
@@ -114,8 +114,7 @@ def test_table_has_the_numbers_of_the_leaderboard(elements, reported):
 
 
 def test_the_same_repository_gives_the_same_page(reported, text):
-    config = load(reported.folder / "config.yaml")
-    assert page.write(reported.folder, config).read_text(encoding="utf-8") == text
+    assert page.write(Repository(reported.folder)).read_text(encoding="utf-8") == text
 
 
 def test_page_shows_its_figures_in_its_own_colours(text):

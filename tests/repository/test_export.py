@@ -8,7 +8,8 @@ import pytest
 import xarray as xr
 import yaml
 
-from echotruth.export import Export, ExportError, Selection, source
+from echotruth.export import Export, ExportError, Selection
+from echotruth.repository.reader import Repository
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +28,7 @@ def rf(folder):
 
 
 def export(folder, name, case, view, output=None):
-    work = Export(source(folder, Selection([case], [view])), name, output=output)
+    work = Export(Repository(folder), Selection([case], [view]), name, output=output)
     (file,) = work.write(work.clips()[0])
     return file
 
@@ -249,8 +250,8 @@ def test_only_what_is_kept_is_written(rf_repository, tmp_path, name, suffix, kee
 
 REFUSED = {
     ("nowhere", "heart", "mid"): "is not a repository",
-    ("small", "hart", "mid"): "hart is not a case of .*: use heart",
-    ("small", "heart", "middle"): "middle is not a view of .*: use apex, mid",
+    ("small", "hart", "mid"): "case = 'hart': use one of heart",
+    ("small", "heart", "middle"): "view = 'middle': use one of apex, mid",
     ("small", "heart", "apex"): "heart has no RF of apex",
 }
 
@@ -259,7 +260,7 @@ REFUSED = {
 def test_what_is_not_there_is_said_in_one_sentence(folder, tmp_path, asked):
     pytest.importorskip("h5py")
     place, case, view = asked
-    with pytest.raises(ExportError, match=REFUSED[asked]):
+    with pytest.raises((ValueError, FileNotFoundError), match=REFUSED[asked]):
         export(folder if place == "small" else tmp_path, "uff", case, view)
 
 

@@ -215,7 +215,7 @@ def test_case_that_left_the_configuration_is_retired(folder):
 
 def test_table_of_cases_has_a_row_a_case_and_a_column_a_key(folder):
     publish(folder)
-    tree = et.open(folder)
+    tree = et.Repository(folder).tree
     frame = tree["cases"].to_dataset().to_dataframe()
     expected = table(CASES).set_index("case")
     assert list(frame.index) == list(expected.index)
@@ -231,14 +231,14 @@ def test_retired_case_has_no_values_in_the_table(folder):
     fewer = CONFIG.model_copy(update={"cases": Cases(seed=[1])})
     (folder / "config.yaml").write_text(yaml.safe_dump(fewer.model_dump(mode="json")))
     publish(folder)
-    frame = et.open(folder)["cases"].to_dataset().to_dataframe()
+    frame = et.Repository(folder).tree["cases"].to_dataset().to_dataframe()
     assert np.isnan(frame["fibres.endo_deg"].iloc[1]) and frame["geometry.preset"].iloc[1] == ""
     assert frame["fibres.endo_deg"].iloc[0] == CONFIG.fibres.endo_deg
 
 
 def test_groups_opened_together_have_the_labels_and_indexes_that_each_has_alone(folder):
     publish(folder)
-    tree = et.open(folder)
+    tree = et.Repository(folder).tree
     for group in schema.groups(CONFIG):
         alone = xr.open_zarr(folder / "small.zarr", group=group, chunks=None)
         together = tree[group].to_dataset(inherit=False)

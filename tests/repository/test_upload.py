@@ -223,17 +223,17 @@ def test_another_repository_there_is_left_alone(bucket, repository):
 def test_it_is_read_there_as_it_is_here(bucket, tmp_path):
     made = finish(tmp_path / "small", configured(seeds=(1,), views=("mid",)))
     cli("upload", made, bucket.url)
-    there = [et.open(address) for address in (bucket.url, f"{bucket.url}/", f"{bucket.url}/small.zarr")]
+    there = [et.Repository(address).tree for address in (bucket.url, f"{bucket.url}/", f"{bucket.url}/small.zarr")]
     assert len({tuple(tree.groups) for tree in there}) == 1
-    xr.testing.assert_identical(there[0]["bmode"].load(), et.open(made)["bmode"].load())
-    xr.testing.assert_identical(there[0]["cases"].load(), et.open(made)["cases"].load())
+    xr.testing.assert_identical(there[0]["bmode"].load(), et.Repository(made).tree["bmode"].load())
+    xr.testing.assert_identical(there[0]["cases"].load(), et.Repository(made).tree["cases"].load())
     image = zarr.open_array(hierarchy(bucket.url), path="bmode/64/image", mode="r")
     assert (image[...] == zarr.open_array(made / "small.zarr", path="bmode/64/image", mode="r")[...]).all()
 
 
 def test_no_repository_there_is_an_error_in_a_sentence(bucket):
     with pytest.raises(FileNotFoundError, match="is not a repository: give an address"):
-        et.open(bucket.url)
+        et.Repository(bucket.url)
 
 
 def test_what_a_run_commits_goes_up_while_it_runs(bucket, tmp_path, monkeypatch):

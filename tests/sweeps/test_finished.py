@@ -56,7 +56,7 @@ def made(tmp_path_factory) -> Path:
 
 
 def test_table_of_cases_has_labels_notes_and_diagnosis(made):
-    frame = et.open(made)["cases"].to_dataset().to_dataframe()
+    frame = et.Repository(made).tree["cases"].to_dataset().to_dataframe()
     assert list(frame.index) == ["m1", "m2", expand(Config())[0].id]
     assert list(frame["label.group"]) == ["sham", "MI", ""]
     np.testing.assert_array_equal(frame["label.age_weeks"], [12, np.nan, 14])
@@ -72,8 +72,8 @@ def test_table_of_cases_as_a_file_is_read_back_the_same(made):
 
 def test_repository_is_read_and_checked_without_its_table(made, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert et.load_heart(made, "m2").config.fibres.endo_deg == 72.5
-    assert et.load_heart(made, "m1").config.pathology.infarct.segments == [7, 8]
+    assert et.Repository(made).heart("m2").config.fibres.endo_deg == 72.5
+    assert et.Repository(made).heart("m1").config.pathology.infarct.segments == [7, 8]
     report = check(made)
     assert report.faults == [] and report.notes == []
 
@@ -117,7 +117,7 @@ def test_repositories_of_tables_are_merged_under_the_ids_of_their_hearts(made, t
     assert merge_repositories(tmp_path / "both", [first, tmp_path / "other"]) == 0, capsys.readouterr().err
     report = check(tmp_path / "both")
     assert report.faults == [] and report.notes == []
-    frame = et.open(tmp_path / "both")["cases"].to_dataset().to_dataframe()
+    frame = et.Repository(tmp_path / "both").tree["cases"].to_dataset().to_dataframe()
     assert {"m1", "m2", "m9"} < set(frame.index) and len(frame) == 4
     assert list(frame["label.group"]) == ["sham", "MI", "", "sham"]
 

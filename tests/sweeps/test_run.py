@@ -51,7 +51,7 @@ def test_hearts_of_a_table_are_made_in_batches_continued_and_read_without_it(tmp
     run(tmp_path, "tiny.yaml", "--cores", "1", "repository")
     assert planned(tmp_path, "tiny.yaml") == {}
     made = {path: path.stat().st_mtime_ns for path in out.glob("ledger/*/*/*.json")}
-    frame = et.open(out)["cases"].to_dataset().to_dataframe()
+    frame = et.Repository(out).tree["cases"].to_dataset().to_dataframe()
     assert [id.partition("_")[0] for id in frame.index] == ["a", "a", "c", "c"]
     assert list(frame["label.group"]) == ["sham", "sham", "MI", "MI"]
     assert list(frame["status"]) == ["complete"] * 4
@@ -60,10 +60,10 @@ def test_hearts_of_a_table_are_made_in_batches_continued_and_read_without_it(tmp
     assert planned(tmp_path, "tiny.yaml")["imaging"] == 2
     run(tmp_path, "tiny.yaml", "--cores", "1", "repository")
     assert {path: path.stat().st_mtime_ns for path in made} == made
-    assert len(et.open(out)["cases/case"]) == 6
+    assert len(et.Repository(out).tree["cases/case"]) == 6
 
     (tmp_path / "hearts.csv").unlink()
     (tmp_path / "tiny.yaml").unlink()
-    assert et.load_heart(out, frame.index[2]).config.fibres.endo_deg == 70
-    assert et.load_clip(out, frame.index[2])["image"].shape == (4, 128, 128)
+    assert et.Repository(out).heart(frame.index[2]).config.fibres.endo_deg == 70
+    assert et.Repository(out).clip(frame.index[2])["image"].shape == (4, 128, 128)
     assert planned(tmp_path, "out/tiny/config.yaml") == {}

@@ -6,7 +6,7 @@ import sys
 import pytest
 from shown_repository import Shown, shown_repository
 
-from echotruth.viewer.catalogue import Catalogue
+from echotruth.repository.reader import Repository
 
 
 @pytest.fixture(scope="session")
@@ -15,8 +15,8 @@ def shown(tmp_path_factory) -> Shown:
 
 
 @pytest.fixture
-def catalogue(shown) -> Catalogue:
-    return Catalogue(shown.folder)
+def repository(shown) -> Repository:
+    return Repository(shown.folder)
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from known_repository import SIZES
 
 from echotruth.cases import expand
 from echotruth.evaluation.run import prepare
-from echotruth.viewer.catalogue import Catalogue
+from echotruth.repository.reader import Repository
 from echotruth.viewer.choice import TRUTH, Choice, asked, first, refused
 from echotruth.viewer.page import Page
 from echotruth.viewer.server import ShowError, opened, serve
@@ -24,8 +24,8 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def page(catalogue):
-    made = Page(catalogue, first(catalogue), Document())
+def page(repository):
+    made = Page(repository, first(repository), Document())
     made.show()
     return made
 
@@ -45,19 +45,19 @@ def unfinished(tmp_path_factory):
     return folder
 
 
-def test_address_leads_back_to_the_choice(catalogue):
+def test_address_leads_back_to_the_choice(repository):
     choice = Choice("heart", "long", SIZES[1], "two", TRUTH, "strain", "LL", "TT", "green_lagrange", "layer 2", 0)
-    assert asked(catalogue, parse_qs(choice.address)) == choice
+    assert asked(repository, parse_qs(choice.address)) == choice
 
 
-def test_address_of_what_is_not_there_is_left_out(catalogue):
+def test_address_of_what_is_not_there_is_left_out(repository):
     query = {"case": ["none"], "view": ["../.."], "size": ["7"], "colour": ["<b>"], "frame": ["-1"], "else": ["x"]}
-    assert asked(catalogue, query) == first(catalogue)
+    assert asked(repository, query) == first(repository)
 
 
-def test_what_an_address_asks_for_and_is_not_there_is_said_until_something_else_is_chosen(catalogue):
+def test_what_an_address_asks_for_and_is_not_there_is_said_until_something_else_is_chosen(repository):
     query = {"case": ["none"], "view": ["long"], "else": ["x"]}
-    page = Page(catalogue, asked(catalogue, query), Document(), refused(catalogue, query))
+    page = Page(repository, asked(repository, query), Document(), refused(repository, query))
     page.show()
     assert page.message.text == "There is no case none, which the address asks for."
     choose(page, size=str(SIZES[1]))
@@ -93,8 +93,8 @@ def test_part_of_the_wall_follows_the_curve(page):
 
 
 def test_unfinished_case_is_said_so(unfinished):
-    catalogue = Catalogue(unfinished)
-    page = Page(catalogue, first(catalogue), Document())
+    repository = Repository(unfinished)
+    page = Page(repository, first(repository), Document())
     for colour in ("none", "strain", "tracked_strain", "segment"):
         choose(page, colour=colour, other=TRUTH)
         assert "Not made for this case" in page.message.text and "images" in page.message.text
@@ -110,8 +110,8 @@ def test_damaged_file_is_said_and_nothing_else_is_shown(shown, tmp_path):
         content = bytearray(shard.read_bytes())
         content[len(content) // 3] ^= 0xFF
         shard.write_bytes(content)
-    catalogue = Catalogue(folder)
-    page = Page(catalogue, first(catalogue), Document())
+    repository = Repository(folder)
+    page = Page(repository, first(repository), Document())
     page.show()
     assert "cannot be shown" in page.message.text and f"echotruth check {folder}" in page.message.text
     assert not page.clip.data["grey"][0].any()
@@ -128,12 +128,12 @@ def test_kept_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_m
         "    return course * np.ones((1, len(points), 2)), np.ones((len(frames), len(points)))\n"
     )
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
-    run = prepare(folder, "outside", {"method": "external", "track": "diagonal:track"}, True)
+    run = prepare(Repository(folder), "outside", {"method": "external", "track": "diagonal:track"}, True)
     case_views, sizes = run.case_views([], ["mid"]), run.sizes([SIZES[0]])
     run.check_writable()
     run.write(list(run.rows(case_views, sizes)))
-    catalogue = Catalogue(folder)
-    page = Page(catalogue, first(catalogue), Document())
+    repository = Repository(folder)
+    page = Page(repository, first(repository), Document())
     page.arrows.active = [1]
     choose(page, tracker="outside", colour="displacement_error")
     assert not page.message.visible and page.graphs["strain"].source.data["y1"].shape == (3,)
@@ -150,20 +150,22 @@ def test_ten_thousand_cases_open_in_seconds(tmp_path):
     config = configured(seeds=range(1, 10_001))
     lay_out(tmp_path / "small", config, expand(config))
     start = time.process_time()
-    catalogue = Catalogue(tmp_path / "small")
-    page = Page(catalogue, first(catalogue), Document())
+    repository = Repository(tmp_path / "small")
+    page = Page(repository, first(repository), Document())
     page.show()
-    page.inputs["case"].value = catalogue.cases[7777]
+    page.inputs["case"].value = repository.present[7777]
     page.show()
     assert time.process_time() - start < 5
-    assert page.facts.text.startswith(catalogue.cases[7777]) and len(page.inputs["case"].completions) == 10_000
+    assert page.facts.text.startswith(repository.present[7777]) and len(page.inputs["case"].completions) == 10_000
 
 
-def test_folder_without_a_repository_or_with_another_name_is_refused(shown, tmp_path):
+def test_folder_without_a_repository_is_refused_and_one_that_was_renamed_is_shown(shown, tmp_path):
     with pytest.raises(FileNotFoundError, match="is not a repository"):
         opened(tmp_path)
     shutil.copytree(shown.folder, tmp_path / "renamed")
-    with pytest.raises(ShowError, match=r"has no folder renamed\.zarr"):
+    assert opened(tmp_path / "renamed").present == ["heart"]
+    shutil.rmtree(tmp_path / "renamed/known.zarr")
+    with pytest.raises(ShowError, match="has no cases or no views yet: run its configuration first"):
         opened(tmp_path / "renamed")
 
 

@@ -6,7 +6,6 @@ from known_repository import FRAMES, SIZES
 from known_repository import SHIFT as MOTION
 from shown_repository import PIXEL, SHIFT
 
-from echotruth.evaluation.curves import strain_curves
 from echotruth.viewer import arrows, curves
 from echotruth.viewer.clip import Clip
 from echotruth.viewer.points import Points
@@ -14,8 +13,8 @@ from echotruth.viewer.tint import COLOURS, components, indices, nice, tint
 
 
 @pytest.fixture
-def clip(catalogue):
-    return Clip(catalogue, "heart", "mid", SIZES[0])
+def clip(repository):
+    return Clip(repository, "heart", "mid", SIZES[0])
 
 
 @pytest.fixture
@@ -44,8 +43,8 @@ def test_ring_is_covered_without_a_gap(points, shown):
     assert (points.coverage[0][within] > 0).all()
 
 
-def test_coverage_of_a_smaller_image_is_that_of_the_large_one(catalogue, points):
-    small = Points(Clip(catalogue, "heart", "mid", SIZES[1])).coverage
+def test_coverage_of_a_smaller_image_is_that_of_the_large_one(repository, points):
+    small = Points(Clip(repository, "heart", "mid", SIZES[1])).coverage
     large = points.coverage[:, ::2, ::2]
     known = (small > 0) & (large > 0)
     assert known.sum() > 0.9 * (large > 0).sum()
@@ -134,7 +133,7 @@ def test_arrows_of_the_flow_say_how_long_they_are_drawn(clip):
 
 
 def test_curves_are_those_of_the_evaluation(clip):
-    found = {name: strain_curves(clip.job, name, clip.size) for name in ("one", "two")}
+    found = {name: clip.repository.curves(clip.case, clip.view, name, clip.size) for name in ("one", "two")}
     line = curves.strain(clip, found, curves.LINE, "engineering", "middle").curves
     assert {name: round(float(values[1]), 3) for name, values in line.items()} == {"true": -14, "one": -12, "two": -22}
     segment = curves.strain(clip, found, "TT", "engineering", f"segment {curves.segments(found['one'])[0]}").curves

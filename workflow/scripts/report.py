@@ -3,13 +3,12 @@
 import argparse
 from pathlib import Path
 
-from echotruth.config.loading import load
 from echotruth.report import page
 from echotruth.report.figures import Figures
+from echotruth.repository.reader import Repository
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
-folder = parser.parse_args().repository
-config = load(folder / "config.yaml")
-Figures(folder / f"{config.name}.zarr", config, folder / "figures").draw()
-page.write(folder, config)
+repository = Repository(parser.parse_args().repository)
+Figures(repository, repository.folder / "figures").draw()
+page.write(repository)

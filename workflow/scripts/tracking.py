@@ -1,14 +1,13 @@
 """Track one clip with every tracker, and score what they find against the truth."""
 
-from echotruth.evaluation.clip import clip_at, grid_positions
-from echotruth.evaluation.scoring import score, truth_at
+from echotruth.evaluation.scoring import ground_truth, score
 from echotruth.workflow.job import Job, Result, main
-from echotruth.workflow.tracks import Tracks
+from echotruth.workflow.tracks import Tracks, clip_of
 
 
 def work(job: Job) -> Result:
-    truth = truth_at(job.heart, job.plane, job.view.plane, grid_positions(job.config), job.config)
-    tracks, groups = Tracks(job, clip_at(job, truth.inside)), {f"evaluation/{job.size}": truth.arrays}
+    truth = ground_truth(job.heart, job.plane, job.view.plane, job.config)
+    tracks, groups = Tracks(job, clip_of(job, truth.inside)), {f"evaluation/{job.size}": truth.arrays}
     for name in job.config.tracking.trackers:
         displacement, quality = tracks.of(name)
         groups[f"tracking/{job.size}/{name}"] = {"displacement": displacement, "quality": quality}

@@ -48,17 +48,17 @@ def evaluate(arguments: argparse.Namespace) -> int:
       1  it failed on every clip
       2  it cannot be evaluated
     """
-    from echotruth.config.loading import ConfigError
     from echotruth.evaluation.availability import check_name, check_runs
     from echotruth.evaluation.run import format_row, prepare, summary
-    from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
+    from echotruth.evaluation.tracker_options import parse_tracker
+    from echotruth.repository.reader import Repository
 
     rows = []
     try:
         name, settings = parse_tracker(arguments.tracker, arguments.program, arguments.option, arguments.timeout)
         if arguments.tracker is not None:
             check_name(arguments.tracker)
-        evaluation = prepare(arguments.repository, arguments.name or name, settings, arguments.keep)
+        evaluation = prepare(Repository(arguments.repository), arguments.name or name, settings, arguments.keep)
         case_views, sizes = evaluation.case_views(arguments.case, arguments.view), evaluation.sizes(arguments.size)
         check_runs(evaluation.settings)
         evaluation.check_writable()
@@ -66,7 +66,7 @@ def evaluate(arguments: argparse.Namespace) -> int:
             print(format_row(row), flush=True)
             rows.append(row)
         table = evaluation.write(rows)
-    except (EvaluationError, ConfigError) as error:
+    except (ValueError, OSError) as error:
         return fail(str(error))
     print(f"\n{summary(table)}\n\nScores: {evaluation.file}")
     if arguments.keep:

@@ -45,18 +45,20 @@ def export(arguments: argparse.Namespace) -> int:
       0  all files are written
       2  they cannot be exported
     """
-    from echotruth.config.loading import ConfigError
-    from echotruth.export import Export, ExportError, Selection, source
+    from echotruth.export import Export, Selection
+    from echotruth.repository.reader import Repository
 
     chosen = Selection(arguments.case, arguments.view, arguments.size, arguments.tracker)
     try:
-        opened = source(arguments.repository, chosen)
-        work = Export(opened, arguments.format, arguments.overlay, arguments.rate, arguments.output)
+        options = arguments.format, arguments.overlay, arguments.rate, arguments.output
+        work = Export(Repository(arguments.repository), chosen, *options)
         clips, left_out = work.clips()
         _print_counted(work.write(clips), len(clips))
-    except (ExportError, ConfigError) as error:
+    except ValueError as error:
         return fail(str(error))
     except OSError as error:
+        if error.errno is None:  # there is no such repository
+            return fail(str(error))
         place, said = error.filename or arguments.output or arguments.repository, error.strerror or str(error)
         if isinstance(error, FileExistsError | NotADirectoryError):
             return fail(f"{place}: is a file and not a folder: give another folder with --output")

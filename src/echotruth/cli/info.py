@@ -6,6 +6,7 @@ import argparse
 import os
 import platform
 import shutil
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ from echotruth.cli.command import Commands, add_command, fail
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
 
-    from echotruth.repository.overview import Overview
+    from echotruth.repository.reader import Repository
 
 GIB = 2**30
 
@@ -46,23 +47,23 @@ def info(arguments: argparse.Namespace) -> int:
         _print(_installation())
         return 0
     from echotruth.config.loading import ConfigError
-    from echotruth.repository.overview import overview
+    from echotruth.repository.ledger import repository_folder
+    from echotruth.repository.reader import Repository
 
+    place = arguments.repository
     try:
-        found = overview(arguments.repository)
-    except (ConfigError, FileNotFoundError) as error:
+        found = Repository(repository_folder(place))
+        _print(_repository(found))
+    except (FileNotFoundError, ConfigError) as error:
         return fail(str(error))
     except OSError as error:
-        return fail(f"{error.filename or arguments.repository}: cannot be read ({error.strerror or error})")
+        return fail(f"{error.filename or place}: cannot be read ({error.strerror or error})")
     except (ValueError, KeyError) as error:
-        remedy = f"run echotruth check {arguments.repository}"
-        return fail(f"{arguments.repository}: is damaged ({' '.join(str(error).split())}): {remedy}")
-    _print(_repository(found))
-    if found.packages:
-        print(f'\nOpen it:\n  import echotruth as et\n  tree = et.open("{found.folder}")')
-    if found.example:
-        view = next(iter(found.config.views))
-        print(f'  clip = et.load_clip("{found.folder}", case="{found.example}", view="{view}")')
+        return fail(f"{place}: is damaged ({' '.join(str(error).split())}): run echotruth check {place}")
+    if found.attributes(""):
+        print(f'\nOpen it:\n  import echotruth as et\n  repository = et.Repository("{place}")')
+    if found.shown:
+        print(f'  clip = repository.clip("{found.shown[0]}", "{found.views[0]}")')
     return 0
 
 
@@ -129,25 +130,36 @@ def _extra(name: str, packages: list[str]) -> str:
     return f"{name} is missing ({', '.join(missing)})" if missing else f"{name} is installed"
 
 
-def _repository(found: Overview) -> dict[str, str]:
+def _repository(found: Repository) -> dict[str, str]:
     """What a repository holds."""
-    config = found.config
-    statuses = ", ".join(f"{number} {status}" for status, number in found.statuses.items())
-    sizes = ", ".join(map(str, config.bmode.sizes))
+    config, cases, packages = found.config, found.cases, found.attributes("").get("packages", {})
+    statuses = ", ".join(f"{number} {status}" for status, number in cases["status"].value_counts().items())
     views = [f"{name} ({view.plane.replace('_', ' ')})" for name, view in config.views.items()]
-    made = ", ".join(
-        f"{name} {found.packages[name]}" for name in ("echotruth", "numpy", "zarr") if name in found.packages
-    )
+    external = {path.stem for path in (found.folder / "external").glob("[!.]*") if path.suffix in (".csv", ".zarr")}
+    made = ", ".join(f"{name} {packages[name]}" for name in ("echotruth", "numpy", "zarr") if name in packages)
+    sizes, (files, size) = ", ".join(map(str, found.sizes)), _size(found.folder)
     return {
         "repository": f"{found.folder}",
         "name": f"{config.name}, seed {config.seed}",
         "heart": f"{config.geometry.file or config.geometry.preset}, {config.loop.frames} frames of one cycle",
-        "cases": f"{sum(found.statuses.values())}: {statuses}",
+        "cases": f"{len(cases)}: {statuses}",
         "views": f"{len(views)}: {', '.join(views)}",
         "sizes": f"{sizes} px, {config.bmode.field_of_view_mm:g} mm wide; array {config.probe.preset}",
         "RF": ", ".join(config.rf.keep) or "not kept",
         "trackers": ", ".join(config.tracking.trackers),
-        "from outside": ", ".join(found.external),
-        "on disk": f"{_bytes(found.bytes)} in {found.files} files",
+        "from outside": ", ".join(sorted(external)),
+        "on disk": f"{_bytes(size)} in {files} files",
         "made by": made or "not published yet: run it to its end",
     }
+
+
+def _size(folder: Path) -> tuple[int, int]:
+    """Number and size of the files below a folder; those that vanish meanwhile are left out."""
+    from echotruth.repository.inventory import files_below
+
+    number = size = 0
+    for path in files_below(folder):
+        with suppress(FileNotFoundError):
+            size += os.lstat(f"{folder}/{path}").st_size
+            number += 1
+    return number, size

@@ -1,4 +1,4 @@
-"""B-mode clips as trackers receive them, and the grid on which their displacement is stored."""
+"""B-mode clips as trackers receive them."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echotruth.config import Config
-from echotruth.imaging.bmode import pixel_centres
+from echotruth.cases import Case
 from echotruth.imaging.labels import unpack
 from echotruth.loop.cycle import read_loop
-from echotruth.tracking.windows import grid
+from echotruth.seeds import generator
+from echotruth.tracking.point_grid import grid_pixels, grid_points
 
 if TYPE_CHECKING:
-    from echotruth.workflow.job import Job
+    from echotruth.repository.reader import Repository
 
 
 @dataclass(frozen=True)
@@ -117,66 +117,42 @@ def between_frames(values: np.ndarray, step: int, frames: int) -> np.ndarray:
     return np.where(weight > 0, (1 - weight) * given + weight * following, given)
 
 
-def grid_points(config: Config, size: int) -> np.ndarray:
-    """Points of the grid, at the same positions in the tissue for every image size.
+def make_clip(case: Case, view: str, frames: np.ndarray, labels: np.ndarray, inside: np.ndarray) -> Clip:
+    """Clip of one view of one heart at one image size.
 
     Parameters
     ----------
-    config : Config
-    size : int
-        Image size in whose pixels the positions are given.
-
-    Returns
-    -------
-    ndarray of shape (grid rows, grid columns, 2)
-        Lateral, axial, px; pixel centres of the largest image.
+    case : Case
+    view : str
+    frames : ndarray of shape (frame, axial, lateral), uint8
+        Grey levels.
+    labels : ndarray of shape (label, axial, lateral), uint8
+        Labels of the tissue at end-diastole, as :mod:`echotruth.imaging.labels` packs them.
+    inside : ndarray of shape (grid rows, grid columns), bool
+        Whether a point of the grid is in the wall at end-diastole.
     """
-    largest = config.bmode.sizes[0]
-    # A pixel of a smaller image is the mean of a block of pixels: x_small + 1/2 = (x_largest + 1/2) size / largest.
-    return (grid((largest, largest), config.tracking.grid_px) + 0.5) * (size / largest) - 0.5
-
-
-def grid_positions(config: Config) -> np.ndarray:
-    """Positions of the grid, (grid rows, grid columns, 2): lateral, axial, m."""
-    largest = config.bmode.sizes[0]
-    axial, lateral = pixel_centres(config.bmode, largest)
-    points = grid_points(config, largest).round().astype(int)
-    return np.stack([lateral[points[..., 0]], axial[points[..., 1]]], axis=-1)
-
-
-def clip_at(job: Job, inside: np.ndarray) -> Clip:
-    """Clip of the heart, view and image size of a job, given the points of the grid that are in the wall."""
-    config, size = job.config, job.size
+    config, size = case.config, frames.shape[-1]
     return Clip(
-        frames=job.read(f"bmode/{size}", "image")["image"],
-        mask=unpack(job.read(f"truth/{size}", "labels")["labels"][0])["mask"],
+        frames=frames,
+        mask=unpack(labels)["mask"],
         inside=inside,
         points=grid_points(config, size)[inside],
         spacing=config.bmode.si().field_of_view / size,
         frame_time=read_loop(config.loop).time,
-        seed=int(job.random_of("tracking").integers(2**31)),
+        seed=tracker_seed(case, view),
         frame_step=config.tracking.frame_step,
     )
 
 
-def clips(job: Job) -> dict[int, Clip]:
-    """Clips of the heart and view of a job, by image size."""
-    config, largest = job.case.config, job.case.config.bmode.sizes[0]
-    labels = {size: job.read(f"truth/{size}", "labels")["labels"][0] for size in config.bmode.sizes}
-    masks = {size: unpack(label)["mask"] for size, label in labels.items()}
-    lateral, axial = np.moveaxis(grid_points(config, largest).round().astype(int), -1, 0)
-    inside = masks[largest][axial, lateral]
-    seed, time = int(job.random.integers(2**31)), read_loop(config.loop).time
-    return {
-        size: Clip(
-            frames=job.read(f"bmode/{size}", "image")["image"],
-            mask=mask,
-            inside=inside,
-            points=grid_points(config, size)[inside],
-            spacing=config.bmode.si().field_of_view / size,
-            frame_time=time,
-            seed=seed,
-            frame_step=config.tracking.frame_step,
-        )
-        for size, mask in masks.items()
-    }
+def read_clips(repository: Repository, case: str, view: str) -> dict[int, Clip]:
+    """Clips of one view of a repository, by image size."""
+    found, place = repository.case(case), repository.place(case, view)
+    images = {size: repository.arrays(f"bmode/{size}", case, view, "image")["image"] for size in repository.sizes}
+    labels = {size: repository.read(f"truth/{size}/labels", *place, 0) for size in repository.sizes}
+    inside = unpack(labels[repository.sizes[0]])["mask"][grid_pixels(found.config)]
+    return {size: make_clip(found, view, images[size], labels[size], inside) for size in repository.sizes}
+
+
+def tracker_seed(case: Case, view: str) -> int:
+    """Seed of the random numbers of trackers in one view of one heart."""
+    return int(generator(case, view, "tracking").integers(2**31))

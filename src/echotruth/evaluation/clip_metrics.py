@@ -7,35 +7,33 @@ earlier version has them too, and one that is not finished has those of its fini
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import zarr
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.cases import Case, diagnosis
-from echotruth.config.loading import load
-from echotruth.evaluation import kept, point_tracks, reliability, segment_strain
+from echotruth.evaluation import point_tracks, reliability, segment_strain
 from echotruth.evaluation.agreement import REFERENCES
-from echotruth.evaluation.choice import cases_of, chosen, hearts_of, image_size, jobs_of, label_text
-from echotruth.evaluation.clip import grid_points, grid_positions
 from echotruth.evaluation.courses import rate, systolic_rate
 from echotruth.evaluation.curves import REFERENCE
-from echotruth.evaluation.leaderboard import KEYS, failures_of, scores_of_guests
+from echotruth.evaluation.hearts import hearts_of, label_text
+from echotruth.evaluation.leaderboard import KEYS, SCORES, failures_of, scores_of_guests
 from echotruth.evaluation.scoring import metrics
 from echotruth.evaluation.segment_strain import Row
 from echotruth.imaging.labels import unpack
 from echotruth.imaging.tracks import visible
 from echotruth.loop.cycle import read_loop
-from echotruth.repository.ledger import repository_folder
+from echotruth.repository import estimates
+from echotruth.repository.choice import Names, Sizes, chosen, image_size
 from echotruth.repository.schema import LABELS
-from echotruth.repository.tracked import EVALUATION_PACKS
-from echotruth.workflow.job import Job
+from echotruth.tracking.point_grid import grid_pixels, grid_positions
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from echotruth.repository.reader import Repository
 
 
 SORTS = ("heart", "split", "group", "acoustics", "variation")
@@ -46,9 +44,6 @@ BEGIN = (*KEYS[:2], "plane", *KEYS[2:], *SORTS, "diagnosis")
 
 COURSES = ("segment_strain", "line_strain")
 """Curves that are read, by their names less `tracked_` and `true_`."""
-
-SCORES = next(pack.names for pack in EVALUATION_PACKS if pack.array.name == "scores")
-"""Arrays from which the metrics of the leaderboard are made."""
 
 _ENGINEERING, _MIDDLE = LABELS["measure"].index("engineering"), LABELS["contour"].index("middle")
 
@@ -107,57 +102,22 @@ class ClipTruth(NamedTuple):
 
 
 def clip_metrics(
-    repository: str | Path,
-    cases: Sequence[str] | None = None,
-    views: Sequence[str] | None = None,
-    sizes: Sequence[int] | None = None,
-    trackers: Sequence[str] | None = None,
+    repository: Repository, cases: Names = None, views: Names = None, sizes: Sizes = None, trackers: Names = None
 ) -> ClipMetrics:
-    """Read the metrics of all clips and trackers, as benchmarks of trackers and of strain print them (docs/metrics.md).
-
-    Parameters
-    ----------
-    repository : str or Path
-        A repository, finished or not.
-    cases, views, sizes, trackers : sequence, optional
-        Those to include. Default: all that was evaluated.
-
-    Returns
-    -------
-    ClipMetrics
-        Three tables. `clips` has a row per case, view, size_px and tracker; `segments` one per clip, tracker, AHA
-        segment and component of strain; `reliability` one per clip, tracker and tenth of quality. docs/metrics.md
-        tells their columns, which name their units. All begin with case, view, plane, size_px and tracker, and with
-        heart, split, group, acoustics and variation, which are labels of the table of cases, "" where it has none
-        (without a label, heart is that of the first case with the same motion), and the diagnosis.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        If there is no such repository, case, view, size or tracker, or the scores of one from outside cannot be read.
-
-    Examples
-    --------
-    >>> import echotruth as et
-    >>> clips = et.clip_metrics("out/demo", views=["mid"], sizes=[128], trackers=["dis", "bspline_dic"]).clips
-    >>> list(clips["tracker"]), bool(clips["delta_avg_percent"].between(0, 100).all())
-    (['dis', 'bspline_dic'], True)
-    """
-    folder = repository_folder(repository)
-    config = load(folder / "config.yaml")
-    chosen_sizes = [image_size(config, size) for size in sizes or config.bmode.sizes]
-    guests = scores_of_guests(folder, config.tracking.trackers)
-    known = [*kept.trackers(folder, config), *guests["tracker"].unique()]
-    chosen_trackers = chosen("tracker", trackers, list(dict.fromkeys(known)))
-    by_id = cases_of(folder, config)
-    hearts = hearts_of(by_id)
+    """Read the metrics of all clips and trackers; parameters, result and errors: see :meth:`.Repository.metrics`."""
+    chosen_sizes = [image_size(repository.config, size) for size in sizes or repository.sizes]
+    guests = scores_of_guests(repository)
+    known = dict.fromkeys([*repository.trackers, *guests["tracker"].unique()])
+    chosen_trackers = chosen("tracker", trackers, known)
+    hearts = hearts_of({case.id: case for case in repository.all_cases()})
     found: tuple[list[Row], list[Row], list[Row]] = ([], [], [])
-    for job in jobs_of(folder, config, by_id, cases, views, "evaluation"):
-        keys: Row = {"case": job.case.id, "view": str(job.view_name), "plane": job.view.plane}
-        keys |= _sorts(job.case, hearts[job.case.id])
-        for rows in _of_view(job, chosen_sizes, chosen_trackers, guests):
-            for table, more in zip(found, rows, strict=True):
-                table += [keys | row for row in more]
+    for case, complete in repository.finished(cases, views, "evaluation"):
+        for view in complete:
+            keys: Row = {"case": case.id, "view": view, "plane": case.config.views[view].plane}
+            keys |= _sorts(case, hearts[case.id])
+            for rows in _of_view(repository, case.id, view, chosen_sizes, chosen_trackers, guests):
+                for table, more in zip(found, rows, strict=True):
+                    table += [keys | row for row in more]
     clips, segments, steps = found
     return ClipMetrics(_table(clips), _table(segments, segment_strain.COLUMNS), _table(steps, reliability.COLUMNS))
 
@@ -170,22 +130,20 @@ def _table(rows: list[Row], columns: Sequence[str] = ()) -> pd.DataFrame:
     return pd.DataFrame(rows).reindex(columns=list(names))
 
 
-def clip_truth(job: Job) -> ClipTruth:
-    """Read what is true of a view.
+def clip_truth(repository: Repository, case: str, view: str) -> ClipTruth:
+    """Read what is true of a view that was evaluated.
 
     Parameters
     ----------
-    job : Job
-        Of the stage tracking of the view, which was evaluated.
+    repository : Repository
+    case, view : str
     """
-    config, largest = job.case.config, job.case.config.bmode.sizes[0]
-    unit = config.bmode.si().field_of_view / point_tracks.SIDE
-    stored = job.read("evaluation", "true_displacement", *(f"true_{name}" for name in COURSES))
+    config = repository.case(case).config
+    unit, plane = config.bmode.si().field_of_view / point_tracks.SIDE, config.views[view].plane
+    stored = estimates.true(repository, case, view, "true_displacement", *(f"true_{name}" for name in COURSES))
     # Only those of frame 0, of which each frame is a chunk.
-    labels = zarr.open_array(job.store.path, path=f"truth/{largest}/labels", mode="r")
-    at_ed = unpack(np.asarray(labels[(*job.index, 0)]))
-    lateral, axial = np.moveaxis(grid_points(config, largest).round().astype(int), -1, 0)
-    tissue = {name: values[axial, lateral] for name, values in at_ed.items()}
+    at_ed = unpack(repository.read(f"truth/{config.bmode.sizes[0]}/labels", *repository.place(case, view), 0))
+    tissue = {name: values[grid_pixels(config)] for name, values in at_ed.items()}
     inside = np.asarray(tissue["mask"], bool) & np.isfinite(stored["true_displacement"]).all((0, -1))
     displacement = stored["true_displacement"][:, inside].astype(float)
     position = np.column_stack([grid_positions(config)[inside], np.zeros(inside.sum())])
@@ -197,9 +155,9 @@ def clip_truth(job: Job) -> ClipTruth:
         visible=visible(config, position + displacement),
         unit=unit,
         tissue=segment_strain.Tissue(**named, layers=config.fibres.layers),
-        plane=job.view.plane,
+        plane=plane,
         time=read_loop(config.loop).time,
-        es=int(job.store.read("mechanics", job.row, names=("es_frame",))["es_frame"]),
+        es=int(repository.arrays("mechanics", case, None, "es_frame")["es_frame"]),
         curves={"segment_strain": segments, "line_strain": stored["true_line_strain"].astype(float)},
     )
 
@@ -237,17 +195,21 @@ def track_metrics(displacement: Floats, quality: Floats, truth: ClipTruth) -> di
 
 
 def _of_view(
-    job: Job, sizes: list[int], trackers: list[str], guests: pd.DataFrame
+    repository: Repository, case: str, view: str, sizes: list[int], trackers: list[str], guests: pd.DataFrame
 ) -> Iterator[tuple[list[Row], list[Row], list[Row]]]:
     """Rows of the three tables, less those columns that all clips of a view share."""
-    truth = clip_truth(job)
-    failures = failures_of(job.folder, job.case.id, str(job.view_name))
-    scored = guests[(guests["case"] == job.case.id) & (guests["view"] == job.view_name)]
+    truth, failures = clip_truth(repository, case, view), failures_of(repository, case, view)
+    scored = guests[(guests["case"] == case) & (guests["view"] == view)]
     told = {(row["size_px"], row["tracker"]): row for row in scored.to_dict("records")}
-    for size, tracker, found in _tracked(job, sizes, trackers):
+    stored = [name for name in repository.trackers if name in trackers]
+    names = ("displacement", "quality", *SCORES, *(f"tracked_{name}" for name in COURSES))
+    for size, tracker, found in estimates.each(repository, case, view, sizes, stored, *names):
+        # One from outside may have been evaluated at other sizes only.
+        if tracker not in repository.config.tracking.trackers and not np.isfinite(found["nrmse_all"]).any():
+            continue
         keys: Row = {"size_px": size, "tracker": tracker}
         of_guest = told.pop((size, tracker), {})
-        reason = failures.get(f"{tracker}/{size}", of_guest.get("failure", ""))
+        reason = failures.get((tracker, size), str(of_guest.get("failure", "")))
         clip, segments, steps = _of_clip(found, truth)
         yield [{**keys, "failure": reason, **clip}], [keys | row for row in segments], [keys | step for step in steps]
     for (size, tracker), row in told.items():
@@ -273,19 +235,6 @@ def _of_clip(found: Arrays, truth: ClipTruth) -> tuple[Row, list[Row], list[Row]
         **segment_strain.errors(segments),
     }
     return clip, segments, [dict(step) for step in reliability.counts(quality[1:], within[1:])]
-
-
-def _tracked(job: Job, sizes: list[int], trackers: list[str]) -> Iterator[tuple[int, str, Arrays]]:
-    """What trackers found in the clips of a view; those from outside that did not keep it are left out."""
-    names = {
-        "tracking": ("displacement", "quality"),
-        "evaluation": (*SCORES, *(f"tracked_{name}" for name in COURSES)),
-    }
-    stored = kept.trackers(job.folder, job.case.config)
-    for size, tracker, found in kept.read_each(job, sizes, [name for name in trackers if name in stored], names):
-        # One from outside may have been evaluated at other sizes only.
-        if tracker in job.case.config.tracking.trackers or np.isfinite(found["nrmse_all"]).any():
-            yield size, tracker, found
 
 
 def _line_strain(found: Arrays, truth: ClipTruth) -> dict[str, float]:

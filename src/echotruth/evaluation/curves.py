@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echotruth.config import Config
-from echotruth.evaluation import kept
 from echotruth.evaluation.agreement import REFERENCES
-from echotruth.evaluation.choice import image_size, require_known
 from echotruth.evaluation.courses import peak, rate, systolic_rate
 from echotruth.loop.cycle import read_loop
-from echotruth.repository import schema
-from echotruth.workflow.job import Job
+from echotruth.repository import estimates, schema
+from echotruth.repository.choice import image_size, require_known
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from echotruth.repository.reader import Repository
 
 NAMES = ("region_strain", "segment_strain", "line_strain", "rotation")
 """What is tracked over the cycle; the arrays are `tracked_NAME` and `true_NAME`."""
@@ -26,43 +26,29 @@ REFERENCE = "plane"
 blamed for the thickening of a wall that is oblique to the plane, which no image of it shows."""
 
 
-def strain_curves(job: Job, tracker: str, size: int | None = None, reference: str = REFERENCE) -> xr.Dataset:
+def strain_curves(
+    repository: Repository,
+    case: str,
+    view: str,
+    tracker: str,
+    size: int | None = None,
+    reference: str = REFERENCE,
+) -> xr.Dataset:
     """Read the strain and the rotation of one clip over the cycle, tracked and true.
 
-    Parameters
-    ----------
-    job : Job
-        Job of the stage tracking of the view.
-    tracker : str
-        One of :func:`echotruth.evaluation.kept.trackers`.
-    size : int, optional
-        Pixels along a side. Default: the largest.
-    reference : {"plane", "heart", "operator"}
-        Reference of the true strain of points (docs/conventions.md); lines and rotation are those in the plane.
-
-    Returns
-    -------
-    Dataset
-        As :func:`echotruth.strain_curves` returns it.
-
-    Raises
-    ------
-    ValueError
-        If there is no such tracker, size or reference, or the tracker was not evaluated on this clip.
+    The parameters, the result and the errors are those of :meth:`.Repository.curves`.
     """
-    config, es = job.case.config, int(job.store.read("mechanics", job.row, names=("es_frame",))["es_frame"])
-    size = image_size(config, size)
+    config, size = repository.case(case).config, image_size(repository.config, size)
     require_known("reference", reference, REFERENCES)
-    names = [f"{what}_{name}" for name in NAMES for what in ("tracked", "true")]
-    values = kept.read(job, "evaluation", *names, tracker=tracker, size=size)
+    values = estimates.tracked(repository, case, view, tracker, size, *(f"tracked_{name}" for name in NAMES))
+    values |= estimates.true(repository, case, view, *(f"true_{name}" for name in NAMES))
     for name in ("true_region_strain", "true_segment_strain"):
         values[name] = values[name][REFERENCES.index(reference)]
-    time = read_loop(config.loop).time
-    found = _dataset(values, time, config)
-    return found.assign_attrs(
-        case=job.case.id,
-        view=str(job.view_name),
-        plane=job.view.plane,
+    es, time = int(repository.arrays("mechanics", case, None, "es_frame")["es_frame"]), read_loop(config.loop).time
+    return _dataset(values, time, config).assign_attrs(
+        case=case,
+        view=view,
+        plane=config.views[view].plane,
         tracker=tracker,
         size_px=size,
         reference=reference,
@@ -77,7 +63,7 @@ def strain_peaks(strain: xr.Dataset) -> xr.Dataset:
     Parameters
     ----------
     strain : Dataset
-        As :func:`strain_curves` or :func:`echotruth.twist_curves` returns it.
+        As :meth:`.Repository.curves` or :meth:`.Repository.twist` returns it.
 
     Returns
     -------
@@ -95,7 +81,7 @@ def strain_peaks(strain: xr.Dataset) -> xr.Dataset:
     Examples
     --------
     >>> import echotruth as et
-    >>> peaks = et.strain_peaks(et.strain_curves("out/demo", view="mid"))
+    >>> peaks = et.strain_peaks(et.Repository("out/demo").curves(view="mid"))
     >>> peaks["tracked_segment_strain_es"].sel(measure="engineering", wall_component="TT").dims
     ('aha',)
     """
@@ -130,6 +116,15 @@ def twist_views(config: Config) -> tuple[str, str] | None:
     return (views[0], views[-1]) if views and position[views[0]] < position[views[-1]] else None
 
 
+def twist_curves(repository: Repository, case: str, tracker: str, size: int | None = None) -> xr.Dataset:
+    """Read the twist over the cycle; parameters, result and errors are those of :meth:`.Repository.twist`."""
+    views = twist_views(repository.config)
+    if views is None:
+        raise ValueError("Twist needs two short-axis views at different positions, and the repository has not.")
+    base, apex = (strain_curves(repository, case, view, tracker, size) for view in views)
+    return twist_of(base, apex, repository.arrays("physiology", case, None, "twist")["twist"])
+
+
 def twist_of(base: xr.Dataset, apex: xr.Dataset, heart_twist: np.ndarray | None = None) -> xr.Dataset:
     """Twist from the curves of two short-axis views.
 
@@ -160,7 +155,9 @@ def _dataset(values: dict[str, np.ndarray], time: np.ndarray, config: Config) ->
     """Arrays of one clip and their rates, with dimensions, coordinates and units."""
     import xarray as xr
 
-    arrays = {array.name: array for array in schema.named("evaluation")}
+    arrays = {
+        array.name: array for array in (*schema.named("evaluation/SIZE"), *schema.named("evaluation/SIZE/TRACKER"))
+    }
     found: dict[str, tuple[list[str], np.ndarray, dict[str, str]]] = {}
     for name, value in values.items():
         array = arrays[name]

@@ -12,27 +12,31 @@ Ann Stat 1979; 7:1), in which all trackers share the resampled hearts. A single 
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 
-from echotruth.config import Config
 from echotruth.config.imaging import ALL_VIEWS
-from echotruth.evaluation.digest import digest
 from echotruth.evaluation.resampling import draws, interval, means_of_hearts, percentiles, ranks
 from echotruth.evaluation.scoring import metrics
-from echotruth.repository import ledger
-from echotruth.repository.ledger import record_path
-from echotruth.repository.unpacking import unpack
+from echotruth.repository import estimates
+from echotruth.repository.digest import digest
+from echotruth.repository.tracked import EVALUATION_PACKS
 from echotruth.tracking.external_program import in_one_line
+
+if TYPE_CHECKING:
+    from echotruth.repository.reader import Repository
 
 log = logging.getLogger("echotruth")
 
 KEYS = ("case", "view", "size_px", "tracker")
 """Columns that identify a row of :func:`rows`."""
+
+SCORES = next(pack.names for pack in EVALUATION_PACKS if pack.array.name == "scores")
+"""Arrays from which the metrics are made."""
 
 HEART = "heart"
 """Column that tells the hearts apart."""
@@ -41,19 +45,13 @@ RANKED_BY = "nrmse_all_percent"
 """Metric by which trackers are ranked."""
 
 
-def rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path) -> pd.DataFrame:
-    """Scores of every clip by every tracker, external ones included.
+def rows(repository: Repository) -> pd.DataFrame:
+    """Scores of every clip by every tracker, external ones included, of the hearts that are shown.
 
     Parameters
     ----------
-    tree : DataTree
-        The repository.
-    config : Config
-        Configuration of the repository.
-    complete : ndarray of int
-        Rows of the hearts to include.
-    folder : Path
-        Folder of the repository; its ledger says which tracker failed, `external` holds scores of external trackers.
+    repository : Repository
+        Its ledger says which tracker failed, its folder `external` holds scores of external trackers.
 
     Returns
     -------
@@ -66,14 +64,14 @@ def rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path) 
     ValueError
         If a table of an external tracker cannot be read or lacks a column.
     """
-    sizes = config.bmode.sizes
-    builtin = pd.DataFrame([row for size in sizes for row in _builtin_rows(tree, config, complete, folder, size)])
-    clip = ["case", "view", "size_px"]
-    clips = pd.MultiIndex.from_frame(builtin[clip])
-    tables = [builtin]
-    for file in sorted((folder / "external").glob("*.csv")):
+    clips = ((case, view) for case in repository.shown for view in repository.views)
+    found = [row for clip in clips for row in _builtin_rows(repository, *clip)]
+    builtin = pd.DataFrame(sorted(found, key=lambda row: repository.sizes.index(row["size_px"])))
+    clip, tables = ["case", "view", "size_px"], [builtin]
+    known = pd.MultiIndex.from_frame(builtin[clip])
+    for file in _files_of_guests(repository):
         table = _external_rows(file, builtin.columns)
-        table = table[~table["tracker"].isin(builtin["tracker"]) & pd.MultiIndex.from_frame(table[clip]).isin(clips)]
+        table = table[~table["tracker"].isin(builtin["tracker"]) & pd.MultiIndex.from_frame(table[clip]).isin(known)]
         tables += [table] if len(table) else []
     return pd.concat(tables, ignore_index=True)
 
@@ -145,39 +143,29 @@ def _table(clips: pd.DataFrame, clips_of: pd.Series, resamples: np.ndarray) -> p
     return table.sort_values("rank", kind="stable", na_position="last").reset_index()
 
 
-def failures_of(folder: Path, case: str, view: str) -> dict[str, str]:
-    """Why trackers of a repository failed on a view of a heart, by "TRACKER/SIZE"; others are not in it."""
-    record = record_path(folder, "tracking", case, view)
-    return dict(ledger.read(record).get("failures", {})) if record.is_file() else {}
+def failures_of(repository: Repository, case: str, view: str) -> dict[tuple[str, int], str]:
+    """Why trackers of a repository failed on a view of a heart, by tracker and image size; others are not in it."""
+    records = {size: repository.record("tracking", case, view, size) for size in repository.sizes}
+    return {(name, size): why for size, found in records.items() for name, why in found.get("failures", {}).items()}
 
 
-def _builtin_rows(tree: xr.DataTree, config: Config, complete: np.ndarray, folder: Path, size: int) -> list[dict]:
-    """Rows of the repository's own trackers at one image size."""
-    # The store also holds views that have left the configuration, and in its own order.
-    data = tree["evaluation"].to_dataset()[["scores"]].isel(case=complete).sel(view=list(config.views), size=size)
-    scored = unpack(data)
-    values = {str(name): array.values for name, array in scored.items()}
-    rows = []
-    for i, case in enumerate(map(str, scored.case.values)):
-        for j, (view, settings) in enumerate(config.views.items()):
-            failures = failures_of(folder, case, view)
-            for k, tracker in enumerate(config.tracking.trackers):
-                score = {name: value[i, j, k] for name, value in values.items()}
-                keys = dict(zip(KEYS, (case, view, size, tracker), strict=True))
-                failure = failures.get(f"{tracker}/{size}", "")
-                rows.append(keys | metrics(score, settings.plane) | {"failure": failure})
-    return rows
+def _builtin_rows(repository: Repository, case: str, view: str) -> Iterator[dict]:
+    """Rows of the repository's own trackers on one view of a heart."""
+    failures, plane = failures_of(repository, case, view), repository.config.views[view].plane
+    own = list(repository.config.tracking.trackers)
+    for size, tracker, score in estimates.each(repository, case, view, repository.sizes, own, *SCORES):
+        keys = dict(zip(KEYS, (case, view, size, tracker), strict=True))
+        yield keys | metrics(score, plane) | {"failure": failures.get((tracker, size), "")}
 
 
-def scores_of_guests(folder: Path, own: Collection[str]) -> pd.DataFrame:
+def scores_of_guests(repository: Repository) -> pd.DataFrame:
     """Scores that `echotruth evaluate` wrote of trackers from outside, on images that have not changed since.
+
+    Scores of trackers that have the name of one of the repository's own do not count.
 
     Parameters
     ----------
-    folder : Path
-        Folder of the repository.
-    own : collection of str
-        Its own trackers; scores of others of the same name do not count.
+    repository : Repository
 
     Returns
     -------
@@ -189,9 +177,14 @@ def scores_of_guests(folder: Path, own: Collection[str]) -> pd.DataFrame:
     ValueError
         If a table cannot be read or lacks a column.
     """
-    files = sorted((folder / "external").glob("*.csv"))
-    tables = [_external_rows(file, _columns(file)) for file in files if file.stem not in own]
+    files = [file for file in _files_of_guests(repository) if file.stem not in repository.config.tracking.trackers]
+    tables = [_external_rows(file, _columns(file)) for file in files]
     return pd.concat([pd.DataFrame(columns=[*KEYS, "failure"]), *(table for table in tables if len(table))])
+
+
+def _files_of_guests(repository: Repository) -> list[Path]:
+    """Tables of scores of trackers from outside."""
+    return [] if repository.is_remote else sorted((repository.folder / "external").glob("*.csv"))
 
 
 def _columns(file: Path) -> pd.Index:

@@ -17,25 +17,24 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from echotruth.cases import all_cases
-from echotruth.config import Config
-from echotruth.config.loading import load, validate
+from echotruth.config.loading import validate
 from echotruth.evaluation import kept
-from echotruth.evaluation.choice import chosen, folder_of, is_complete
-from echotruth.evaluation.clip import Clip, clips
-from echotruth.evaluation.digest import digest
+from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.parallel import in_processes
-from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
+from echotruth.evaluation.scoring import Truth, metrics, read_truth, score
 from echotruth.evaluation.tracker_options import EvaluationError
+from echotruth.repository.choice import chosen
+from echotruth.repository.digest import digest
 from echotruth.section import Name, Section
 from echotruth.tracking.external_program import in_one_line
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
-from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
+
+    from echotruth.repository.reader import Repository
 
 Row = dict[str, Any]
 """Case, view, size_px, tracker and digest (`clip`) of a clip, its metrics, and why the tracker failed (or "")."""
@@ -47,10 +46,7 @@ class EvaluationRun:
 
     Attributes
     ----------
-    folder : Path
-        Folder of the repository, `out/NAME`.
-    config : Config
-        Configuration of the repository.
+    repository : Repository
     name : str
         Name of the tracker.
     settings : Section
@@ -59,8 +55,7 @@ class EvaluationRun:
         Whether to store displacement, quality and curves beside the scores.
     """
 
-    folder: Path
-    config: Config
+    repository: Repository
     name: str
     settings: Section
     keep: bool = False
@@ -68,7 +63,7 @@ class EvaluationRun:
     @property
     def file(self) -> Path:
         """File of the scores."""
-        return self.folder / "external" / f"{self.name}.csv"
+        return self.repository.folder / "external" / f"{self.name}.csv"
 
     def case_views(self, cases: list[str], views: list[str]) -> list[tuple[str, str]]:
         """Case and view of every complete clip.
@@ -80,20 +75,19 @@ class EvaluationRun:
 
         Raises
         ------
-        EvaluationError
+        ValueError
             If the repository does not have one of them, or has no complete clip.
         """
-        cases = chosen("case", cases, list(all_cases(self.config)), self.folder, EvaluationError)
-        views = chosen("view", views, list(self.config.views), self.folder, EvaluationError)
-        every = [(case, view) for case in cases for view in views]
-        case_views = [clip for clip in every if is_complete(self.folder, *clip, "truth", "bmode")]
+        finished = self.repository.finished(cases, views, "truth", "bmode")
+        case_views = [(case.id, view) for case, complete in finished for view in complete]
         if not case_views:
-            raise EvaluationError(f"{self.folder} has no complete clip of these cases and views: run it to its end")
+            folder = self.repository.folder
+            raise EvaluationError(f"{folder} has no complete clip of these cases and views: run it to its end")
         return case_views
 
     def sizes(self, sizes: list[int]) -> list[int]:
         """Image sizes to include; all if the list is empty."""
-        return chosen("size", sizes, self.config.bmode.sizes, self.folder, EvaluationError)
+        return chosen("size", sizes, self.repository.sizes)
 
     def rows(self, case_views: list[tuple[str, str]], sizes: list[int], jobs: int = 1) -> Iterator[Row]:
         """Score the clips, one row each, in the order of `case_views` and image sizes for any number of jobs.
@@ -143,7 +137,7 @@ class EvaluationRun:
                 clips = {f"{row['case']}/{row['view']}": row["clip"] for row in rows}
                 self.keeping.publish(clips, self.settings.model_dump(mode="json"))
             else:
-                kept.remove(self.folder, self.name)
+                kept.remove(self.repository.folder, self.name)
             for earlier in self.file.parent.glob(f"{self.name}.*.json"):
                 earlier.unlink()
             draft.replace(self.file)
@@ -152,7 +146,7 @@ class EvaluationRun:
     @property
     def keeping(self) -> kept.Keeping:
         """Store of what the tracker finds, in the making."""
-        return kept.Keeping(self.folder, self.config, self.name)
+        return kept.Keeping(self.repository.folder, self.repository.config, self.name)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -163,13 +157,12 @@ class EvaluationRun:
             raise EvaluationError(f"{self.file.parent} cannot hold the scores: {remedy}") from error
 
 
-def prepare(repository: Path, name: str, values: dict[str, Any], keep: bool = False) -> EvaluationRun:
+def prepare(repository: Repository, name: str, values: dict[str, Any], keep: bool = False) -> EvaluationRun:
     """Prepare the evaluation of a tracker that is not one of the repository's.
 
     Parameters
     ----------
-    repository : Path
-        `out/NAME` or `out/NAME/NAME.zarr`.
+    repository : Repository
     name : str
         Name of the tracker; letters, digits and underscores.
     values : dict
@@ -180,22 +173,22 @@ def prepare(repository: Path, name: str, values: dict[str, Any], keep: bool = Fa
     Raises
     ------
     EvaluationError
-        If there is no such repository, it has a tracker of that name, or the name is invalid.
+        If the repository has a tracker of that name, or the name is invalid.
     ConfigError
         If the settings are invalid.
     """
-    folder = folder_of(repository)
-    config = load(folder / "config.yaml")
+    config = repository.config
     try:
         TypeAdapter(Name).validate_python(name)
     except ValidationError:
         remedy = "use letters, digits and underscores, 40 at most and a letter first, with --name"
         raise EvaluationError(f"{name!r} cannot be the name of a tracker: {remedy}") from None
     if name in config.tracking.trackers:
-        raise EvaluationError(f"{name} is already a tracker of {folder}: give this one another name with --name")
+        taken = f"{name} is already a tracker of {repository.folder}"
+        raise EvaluationError(f"{taken}: give this one another name with --name")
     tracking = {"grid_px": config.tracking.grid_px, "trackers": {name: values}}
     checked = validate(config.model_dump() | {"tracking": tracking}, f"tracker {name}")
-    return EvaluationRun(folder, config, name, checked.tracking.trackers[name], keep)
+    return EvaluationRun(repository, name, checked.tracking.trackers[name], keep)
 
 
 def _score_view(run: EvaluationRun, sizes: list[int], case_view: tuple[str, str]) -> list[Row]:
@@ -203,18 +196,18 @@ def _score_view(run: EvaluationRun, sizes: list[int], case_view: tuple[str, str]
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
-        # The random numbers of a job depend on its stage: a tracker is to draw the same as in the workflow.
-        job = Job(run.folder, "tracking", *case_view)
         with _reading(run, case_view):
-            clip_of_size = {size: clip for size, clip in clips(job).items() if size in sizes}
+            clips = read_clips(run.repository, *case_view)
+            clip_of_size = {size: clip for size, clip in clips.items() if size in sizes}
         tracked = {size: track_clip(clip, run.settings) for size, clip in clip_of_size.items()}
         # The truth is read only now, so that a tracker does not find it in its process.
         with _reading(run, case_view):
-            truth = ground_truth(job)
+            truth = read_truth(run.repository, *case_view)
         found = {size: _score_clip(run, case_view, clip_of_size[size], truth, *tracked[size]) for size in tracked}
         if run.keep:
             try:
-                run.keeping.write(job, {size: arrays for size, (_, arrays) in found.items()})
+                arrays = {size: arrays for size, (_, arrays) in found.items()}
+                run.keeping.write(run.repository.place(*case_view), arrays)
             except OSError as error:
                 raise EvaluationError(f"{run.file.parent} cannot hold the displacement: {error.strerror}") from error
         return [row for row, _ in found.values()]
@@ -227,7 +220,7 @@ def _reading(run: EvaluationRun, case_view: tuple[str, str]) -> Iterator[None]:
         yield
     except (ValueError, KeyError, OSError) as error:
         remedy = f"run it again ({in_one_line(str(error))})"
-        raise EvaluationError(f"{run.folder} cannot be read at {' '.join(case_view)}: {remedy}") from error
+        raise EvaluationError(f"{run.repository.folder} cannot be read at {' '.join(case_view)}: {remedy}") from error
 
 
 def track_clip(clip: Clip, settings: Section) -> tuple[tuple[np.ndarray, np.ndarray], str]:
@@ -248,7 +241,7 @@ def _score_clip(
 ) -> tuple[Row, kept.Found]:
     """Row of a clip, and the arrays of the tracker by group."""
     keys = {"case": case_view[0], "view": case_view[1], "size_px": clip.size, "tracker": run.name}
-    keys["clip"] = digest(run.folder, *case_view)
+    keys["clip"] = digest(run.repository.folder, *case_view)
     displacement, quality = clip.on_grid(*estimate)
     scored = score(displacement, truth)
     row = keys | metrics(scored, truth.wall.plane) | {"failure": failure}

@@ -15,7 +15,6 @@ import numpy as np
 from echotruth.config import Config
 from echotruth.evaluation import statistics
 from echotruth.evaluation.agreement import REFERENCES, compare
-from echotruth.evaluation.clip import grid_positions
 from echotruth.evaluation.contours import Contours, contours
 from echotruth.evaluation.courses import motion_courses, peak, strain_courses
 from echotruth.evaluation.displacement_error import WallPoints, evaluate
@@ -27,9 +26,10 @@ from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import rounding, schema
 from echotruth.repository.rounding import length_quantum
+from echotruth.tracking.point_grid import grid_positions
 
 if TYPE_CHECKING:
-    from echotruth.workflow.job import Job
+    from echotruth.repository.reader import Repository
 
 
 DISTANCE_ROUNDING = 1e-9
@@ -114,21 +114,15 @@ class Truth:
         return self.operator.at(self.contours.position.reshape(-1, 2))
 
 
-def ground_truth(job: Job) -> Truth:
-    """True motion of the heart and view of a job.
+def ground_truth(heart: Heart, plane: Plane, kind: str, config: Config) -> Truth:
+    """True motion of a heart at the points that trackers follow in one view; the parameters of :func:`truth_at`."""
+    return truth_at(heart, plane, kind, grid_positions(config), config)
 
-    Parameters
-    ----------
-    job : Job
-        Job of any stage of the view; geometry, mechanics and phantom are read.
 
-    Returns
-    -------
-    Truth
-    """
-    heart, config = job.heart, job.case.config
-    plane = Plane(**job.read("phantom", "origin", "axes"))
-    return truth_at(heart, plane, job.view.plane, grid_positions(config), config)
+def read_truth(repository: Repository, case: str, view: str) -> Truth:
+    """True motion in one view of a repository."""
+    heart, config = repository.heart(case), repository.case(case).config
+    return ground_truth(heart, repository.plane(case, view), config.views[view].plane, config)
 
 
 def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, config: Config) -> Truth:

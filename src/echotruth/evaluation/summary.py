@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from functools import partial
-from itertools import groupby
-from pathlib import Path
+from collections.abc import Iterator
+from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from echotruth.arrays import Floats
+from echotruth.cases import Case
 from echotruth.config import Config
 from echotruth.config.imaging import ALL_VIEWS
-from echotruth.config.loading import load
-from echotruth.evaluation import kept
-from echotruth.evaluation.agreement import REFERENCES
-from echotruth.evaluation.choice import cases_of, chosen, image_size, jobs_of
-from echotruth.evaluation.courses import peak, rate, systolic_rate
-from echotruth.evaluation.curves import REFERENCE, twist_views
+from echotruth.evaluation.curves import strain_curves, strain_peaks, twist_of, twist_views
 from echotruth.evaluation.segment_strain import Row
-from echotruth.loop.cycle import read_loop
-from echotruth.repository.ledger import repository_folder
-from echotruth.repository.schema import LABELS
-from echotruth.workflow.job import Job
+from echotruth.repository.choice import Names, Sizes, chosen, image_size
+from echotruth.repository.kept import NotEvaluated
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
+
+    from echotruth.repository.reader import Repository
 
 
 class Quantity(NamedTuple):
@@ -37,28 +31,27 @@ class Quantity(NamedTuple):
     name : str
         In the column `quantity`.
     curve : str
-        Array of the group evaluation, less `tracked_` or `true_`.
-    place : tuple of int
-        Its place along the dimensions of that array after frame.
+        As :meth:`.Repository.curves` names it, less `tracked_` or `true_`.
+    place : dict
+        Its place along the dimensions of that curve.
     planes : tuple of str
         Planes that show it.
     """
 
     name: str
     curve: str
-    place: tuple[int, ...]
+    place: dict[str, str | int]
     planes: tuple[str, ...]
 
 
-_ENGINEERING, _WHOLE_WALL, _RR = LABELS["measure"].index("engineering"), 0, LABELS["wall_component"].index("RR")
-_MIDDLE, _ENDOCARDIAL = (LABELS["contour"].index(name) for name in ("middle", "endocardial"))
+_RADIAL: dict[str, str | int] = {"measure": "engineering", "region": 0, "wall_component": "RR"}
 QUANTITIES = (
-    Quantity("gls", "line_strain", (_MIDDLE,), ("long_axis",)),
-    Quantity("gls_endocardial", "line_strain", (_ENDOCARDIAL,), ("long_axis",)),
-    Quantity("gcs", "line_strain", (_MIDDLE,), ("short_axis",)),
-    Quantity("gcs_endocardial", "line_strain", (_ENDOCARDIAL,), ("short_axis",)),
-    Quantity("radial", "region_strain", (_ENGINEERING, _WHOLE_WALL, _RR), ("short_axis", "long_axis")),
-    Quantity("rotation", "rotation", (), ("short_axis",)),
+    Quantity("gls", "line_strain", {"contour": "middle"}, ("long_axis",)),
+    Quantity("gls_endocardial", "line_strain", {"contour": "endocardial"}, ("long_axis",)),
+    Quantity("gcs", "line_strain", {"contour": "middle"}, ("short_axis",)),
+    Quantity("gcs_endocardial", "line_strain", {"contour": "endocardial"}, ("short_axis",)),
+    Quantity("radial", "region_strain", _RADIAL, ("short_axis", "long_axis")),
+    Quantity("rotation", "rotation", {}, ("short_axis",)),
 )
 """Quantities of one view."""
 
@@ -74,51 +67,15 @@ WHAT = ("tracked", "true")
 
 
 def strain_summary(
-    repository: str | Path,
-    cases: Sequence[str] | None = None,
-    views: Sequence[str] | None = None,
-    sizes: Sequence[int] | None = None,
-    trackers: Sequence[str] | None = None,
+    repository: Repository, cases: Names = None, views: Names = None, sizes: Sizes = None, trackers: Names = None
 ) -> pd.DataFrame:
-    """Read GLS, GCS, radial strain, rotation and twist of clips into a table, tracked and true.
-
-    Parameters
-    ----------
-    repository : str or Path
-    cases, views, sizes, trackers : sequence, optional
-        Those to include. Default: all that was evaluated, at the largest size.
-
-    Returns
-    -------
-    DataFrame
-        One row per case, view, size_px, tracker and `quantity`: gls and gls_endocardial (long axis), gcs and
-        gcs_endocardial (short axis), radial (engineering, mean of the wall, in the plane), all in %, and rotation
-        (short axis), in degrees. Rows of the view "all" are those of the heart: gls as the mean over its long-axis
-        views, gcs and radial over its short-axis views, if all of these are included, and twist. Columns `tracked_`
-        and `true_` each: `es` and `peak`, in the `unit`; `time_to_peak_ms`; and `systolic_rate`, in the `rate_unit`.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        If there is no such repository, case, view, size or tracker.
-
-    Examples
-    --------
-    >>> import echotruth as et
-    >>> table = et.strain_summary("out/demo", trackers=["bspline_dic"])
-    >>> gls = table.query("quantity == 'gls' and view == 'long_axis'")[["tracked_es", "true_es", "unit"]]
-    >>> list(gls["unit"])
-    ['percent']
-    """
+    """Read GLS, GCS, radial strain, rotation and twist of clips into a table; see :meth:`.Repository.summary`."""
     import pandas as pd
 
-    folder = repository_folder(repository)
-    config = load(folder / "config.yaml")
-    chosen_sizes = [image_size(config, size) for size in sizes or config.bmode.sizes[:1]]
-    chosen_trackers = chosen("tracker", trackers, kept.trackers(folder, config))
-    jobs = jobs_of(folder, config, cases_of(folder, config), cases, views, "evaluation")
-    by_heart = (list(of_heart) for _, of_heart in groupby(jobs, lambda job: job.case.id))
-    rows = [row for of_heart in by_heart for row in _rows(of_heart, chosen_sizes, chosen_trackers)]
+    chosen_sizes = [image_size(repository.config, size) for size in sizes or repository.sizes[:1]]
+    chosen_trackers = chosen("tracker", trackers, repository.trackers)
+    clips = repository.finished(cases, views, "evaluation")
+    rows = [row for clip in clips for row in _rows(repository, *clip, chosen_sizes, chosen_trackers)]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -130,53 +87,39 @@ COLUMNS = (
 """Columns of the table."""
 
 
-def _rows(jobs: list[Job], sizes: list[int], trackers: list[str]) -> Iterator[Row]:
+def _rows(repository: Repository, case: Case, views: list[str], sizes: list[int], trackers: list[str]) -> Iterator[Row]:
     """Rows of one heart: of each view, and of the heart as a whole."""
-    heart, config = jobs[0], jobs[0].case.config
-    es = int(heart.store.read("mechanics", heart.row, names=("es_frame",))["es_frame"])
-    read = partial(_row, time=read_loop(config.loop).time, es=es)
-    every = {str(job.view_name): _curves(job, sizes, trackers) for job in jobs}
-    ends = twist_views(config)
+    config, ends = case.config, twist_views(case.config)
     for size in sizes:
         for tracker in trackers:
-            curves = {view: of_view[size, tracker] for view, of_view in every.items() if (size, tracker) in of_view}
-            keys: Row = {"case": heart.case.id, "size_px": size, "tracker": tracker}
+            curves = {}
+            for view in views:
+                with suppress(NotEvaluated):
+                    curves[view] = strain_curves(repository, case.id, view, tracker, size)
+            keys: Row = {"case": case.id, "size_px": size, "tracker": tracker}
             rows: list[Row] = []
             for view, of_view in curves.items():
+                peaks = strain_peaks(of_view)
                 shown = [quantity for quantity in QUANTITIES if config.views[view].plane in quantity.planes]
-                for name, curve, place, _ in shown:
-                    pair = (np.moveaxis(of_view[f"{what}_{curve}"], 0, -1)[place] for what in WHAT)
-                    rows.append(keys | {"view": view} | read(name, *pair))
+                rows += [keys | {"view": view} | _row(one.name, one.curve, one.place, peaks) for one in shown]
             yield from rows
             yield from _means(rows, config, keys)
             if ends is not None and set(ends) <= set(curves):
-                base, apex = (curves[view] for view in ends)
-                pair = (apex[f"{what}_rotation"] - base[f"{what}_rotation"] for what in WHAT)
-                yield keys | {"view": ALL_VIEWS} | read("twist", *pair)
+                twist = strain_peaks(twist_of(*(curves[view] for view in ends)))
+                yield keys | {"view": ALL_VIEWS} | _row("twist", "twist", {}, twist)
 
 
-def _curves(job: Job, sizes: list[int], trackers: list[str]) -> dict[tuple[int, str], dict[str, Floats]]:
-    """Curves of one view, tracked and true, by size and tracker; without those that were not evaluated on it."""
-    names = list(dict.fromkeys(quantity.curve for quantity in QUANTITIES))
-    true = job.read("evaluation", *(f"true_{name}" for name in names))
-    true["true_region_strain"] = true["true_region_strain"][REFERENCES.index(REFERENCE)]
-    read = kept.read_each(job, sizes, trackers, {"evaluation": [f"tracked_{name}" for name in names]})
-    return {
-        (size, tracker): {name: np.asarray(values, float) for name, values in (true | tracked).items()}
-        for size, tracker, tracked in read
-    }
-
-
-def _row(name: str, tracked: Floats, true: Floats, time: Floats, es: int) -> Row:
+def _row(name: str, curve: str, place: dict[str, str | int], peaks: xr.Dataset) -> Row:
     """Columns of one quantity: strain in %, angles in degrees, rates in 1/s or degrees a second."""
     angle = name in ANGLES
     factor, rate_factor = (np.degrees(1), np.degrees(1)) if angle else (100.0, 1.0)
+    factors = {"es": factor, "peak": factor, "time_to_peak": 1e3, "systolic_rate": rate_factor}
     row: Row = {"quantity": name, "unit": "degree" if angle else "percent"}
-    for what, curve in zip(WHAT, (tracked, true), strict=True):
-        value, when = peak(curve, time)
-        row |= {f"{what}_es": float(factor * curve[es]), f"{what}_peak": float(factor * value)}
-        row[f"{what}_time_to_peak_ms"] = float(1e3 * when)
-        row[f"{what}_systolic_rate"] = float(rate_factor * systolic_rate(rate(curve, time)[: es + 1], curve[es]))
+    for what in WHAT:
+        for kind, scale in factors.items():
+            value = peaks[f"{what}_{curve}_{kind}"]
+            at = {dim: label for dim, label in place.items() if dim in value.dims}
+            row[f"{what}_{kind}{'_ms' if kind == 'time_to_peak' else ''}"] = float(scale * value.sel(at))
     return row | {"rate_unit": "degree s-1" if angle else "s-1"}
 
 

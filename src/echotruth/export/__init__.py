@@ -17,7 +17,8 @@ from typing import Literal
 from echotruth.export.clip import Clip
 from echotruth.export.destination import draft
 from echotruth.export.error import ExportError
-from echotruth.export.selection import Selection, Source, source, unfinished
+from echotruth.repository.choice import chosen
+from echotruth.repository.reader import Repository
 
 FRAME_RATE = 20.0
 """Frames per second of a video, slow motion for a mouse."""
@@ -64,7 +65,7 @@ class Format:
 
             with _told(clip):
                 return missing_rf(clip)
-        return unfinished(clip, "mechanics", *self.stages)
+        return clip.repository.problem(clip.case.id, clip.view, "mechanics", *self.stages)
 
     @property
     def writer(self) -> ModuleType:
@@ -96,11 +97,31 @@ OVERLAYS = ("wall", "segments", "displacement")
 
 
 @dataclass(frozen=True)
+class Selection:
+    """Choice of cases, views, sizes and trackers.
+
+    Attributes
+    ----------
+    cases, views, trackers : sequence of str
+        Their names; all if empty.
+    sizes : sequence of int
+        Pixels along a side; the largest if empty.
+    """
+
+    cases: Sequence[str] = ()
+    views: Sequence[str] = ()
+    sizes: Sequence[int] = ()
+    trackers: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
 class Export:
     """What is to be written, and where to.
 
     Attributes
     ----------
+    repository : Repository
+    selection : Selection
     format : str
         One of :data:`FORMATS`.
     overlay : sequence of {"wall", "segments", "displacement"}
@@ -111,14 +132,15 @@ class Export:
         Folder; for a single file also its path. Default: `export/FORMAT` in the folder of the repository.
     """
 
-    source: Source
+    repository: Repository
+    selection: Selection
     format: str
     overlay: Sequence[str] = ()
     rate: float | None = None
     output: Path | None = None
 
     def __post_init__(self) -> None:
-        chosen = {name: getattr(self.source.selection, name) for name in ("views", "sizes", "trackers")}
+        chosen = {name: getattr(self.selection, name) for name in ("views", "sizes", "trackers")}
         for name, given in {"overlay": self.overlay, "rate": self.rate, **chosen}.items():
             if given and not FORMATS[self.format].takes(name):
                 able = ", ".join(key for key, form in FORMATS.items() if form.takes(name))
@@ -129,17 +151,38 @@ class Export:
         if unknown:
             raise ExportError(f"--overlay {unknown[0]}: use {', '.join(OVERLAYS)}")
 
+    @property
+    def trackers(self) -> list[str]:
+        """Names of the chosen trackers; all of the repository's own if none is named."""
+        named, own = self.selection.trackers, list(self.repository.config.tracking.trackers)
+        return chosen("tracker", named, self.repository.trackers if named else own)
+
     def clips(self) -> tuple[list[Clip], list[str]]:
         """What is to be written, and why other things are left out.
 
         Raises
         ------
-        ExportError
-            If there is no such thing, or it is not finished.
+        ValueError
+            If there is no such thing, none is finished, or one is not whose case was named.
         """
-        form = FORMATS[self.format]
-        every = {"heart": self.source.hearts, "view": self.source.views, "clip": self.source.clips}[form.holds]()
-        return self.source.finished(every, form.problem)
+        found, problems = [], []
+        for clip in self._asked(FORMATS[self.format].holds):
+            if reason := FORMATS[self.format].problem(clip):
+                problems.append(reason)
+            else:
+                found.append(clip)
+        if problems and (self.selection.cases or not found):
+            raise ExportError(problems[0])
+        return found, problems
+
+    def _asked(self, holds: str) -> Iterator[Clip]:
+        """The clips, views or hearts that are asked for."""
+        cases = {case.id: case for case in self.repository.all_cases()}
+        views, sizes = self.repository.views, self.selection.sizes or self.repository.sizes[:1]
+        for case in chosen("case", self.selection.cases, cases):
+            for view in [""] if holds == "heart" else chosen("view", self.selection.views, views):
+                for size in chosen("size", sizes, self.repository.sizes) if holds == "clip" else [0]:
+                    yield Clip(self.repository, cases[case], view, size)
 
     def write(self, clips: Sequence[Clip]) -> Iterator[Path]:
         """Write a file or folder for each clip, view or heart, or one for all, and give its path when it is whole.
@@ -157,7 +200,7 @@ class Export:
         if form.together:
             yield from self._write_together(clips)
             return
-        options = {"overlay": self.overlay, "rate": self.rate or FRAME_RATE, "trackers": self.source.trackers}
+        options = {"overlay": self.overlay, "rate": self.rate or FRAME_RATE, "trackers": self.trackers}
         chosen = {name: options[name] for name in form.options}
         for clip, target in zip(clips, self._targets(clips), strict=True):
             with draft(target) as path, _told(clip):
@@ -165,12 +208,12 @@ class Export:
             yield target
         if form.table and clips and not self._is_file:
             with draft(self._output / form.table) as path, _told(clips[0]):
-                form.writer.write_summary(clips, path, self.source.trackers)
+                form.writer.write_summary(clips, path, self.trackers)
 
     def _write_together(self, clips: Sequence[Clip]) -> Iterator[Path]:
         """Write one file of all clips, which has the name of the repository if it has no other, and give its path."""
         form = FORMATS[self.format]
-        name = f"{self.source.folder.resolve().name}{form.suffix}"
+        name = f"{self.repository.config.name}{form.suffix}"
         target = self._output if self._is_file else self._output / name
         with draft(target) as path, _told(clips[0]):
             form.writer.write_together(clips, path)
@@ -179,7 +222,7 @@ class Export:
     @property
     def _output(self) -> Path:
         """Folder of the files, or path of a single file."""
-        return self.output or self.source.folder / "export" / self.format
+        return self.output or self.repository.folder / "export" / self.format
 
     @property
     def _is_file(self) -> bool:
@@ -205,8 +248,8 @@ def _told(clip: Clip) -> Iterator[None]:
         raise
     except (ValueError, KeyError, RuntimeError, FileNotFoundError) as error:
         said = " ".join(str(error).split())
-        remedy = f"see what echotruth check {clip.folder} says"
-        raise ExportError(f"{clip.folder} cannot be read at {clip.name}: {remedy} ({said})") from error
+        remedy = f"see what echotruth check {clip.repository.folder} says"
+        raise ExportError(f"{clip.repository.folder} cannot be read at {clip.name}: {remedy} ({said})") from error
 
 
-__all__ = ["FORMATS", "OVERLAYS", "Export", "ExportError", "Selection", "source"]
+__all__ = ["FORMATS", "OVERLAYS", "Export", "ExportError", "Selection"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,11 +15,11 @@ from echotruth.cases import Case
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.view import Plane
-from echotruth.notebook.repositories import load_clip
-from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from echotruth.repository.reader import Repository
 
 
 @dataclass(frozen=True)
@@ -29,8 +28,7 @@ class Clip:
 
     Attributes
     ----------
-    folder : Path
-        Folder of the repository, `out/NAME`.
+    repository : Repository
     case : Case
     view : str
         Name of the view; "" for the heart itself.
@@ -38,7 +36,7 @@ class Clip:
         Pixels along a side; 0 for the heart or the view itself.
     """
 
-    folder: Path
+    repository: Repository
     case: Case
     view: str = ""
     size: int = 0
@@ -49,33 +47,28 @@ class Clip:
         return "_".join(str(part) for part in (self.case.id, self.view, self.size) if part)
 
     @cached_property
-    def job(self) -> Job:
-        """What reads the arrays of this case (and view)."""
-        return Job(self.folder, "tracking", self.case, self.view or None, code="export")
-
-    @cached_property
     def image(self) -> NDArray[np.uint8]:
         """Grey levels, (frame, axial, lateral)."""
-        return self.job.read(f"bmode/{self.size}", "image")["image"]
+        return self.repository.arrays(f"bmode/{self.size}", self.case.id, self.view, "image")["image"]
 
     def truth(self, *variables: str) -> xr.Dataset:
-        """Some variables of the clip, or all, as :func:`echotruth.load_clip` returns them."""
-        return load_clip(self.folder, self.case.id, self.view, self.size, variables or None)
+        """Some variables of the clip, or all, as :meth:`echotruth.Repository.clip` returns them."""
+        return self.repository.clip(self.case.id, self.view, self.size, variables or None)
 
     @cached_property
     def heart(self) -> Heart:
-        """The heart, as :func:`echotruth.load_heart` returns it."""
-        return self.job.heart
+        """The heart."""
+        return self.repository.heart(self.case.id)
 
     @cached_property
     def plane(self) -> Plane:
         """The imaging plane in the heart frame."""
-        return Plane(**self.job.read("phantom", "origin", "axes"))
+        return self.repository.plane(self.case.id, self.view)
 
     @cached_property
     def time(self) -> Floats:
         """Time since end-diastole of the frames, (frame,), s."""
-        return self.job.coordinates("mechanics", "time")["time"][self.job.row]
+        return self.repository.read("mechanics/time", *self.repository.place(self.case.id))
 
     @property
     def frame_time(self) -> float:

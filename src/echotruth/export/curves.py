@@ -10,8 +10,6 @@ import numpy as np
 import pandas as pd
 
 from echotruth.arrays import Floats
-from echotruth.evaluation.curves import strain_curves
-from echotruth.evaluation.summary import strain_summary
 from echotruth.export.clip import Clip
 from echotruth.fem.volume import cell_volumes
 
@@ -54,7 +52,7 @@ def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
     """
     parts = [*_heart(clip), *_heart_strain(clip)]
     for tracker in trackers:
-        curves = strain_curves(clip.job, tracker, clip.size)
+        curves = clip.repository.curves(clip.case.id, clip.view, tracker, clip.size)
         parts += [part.assign(tracker=tracker) for part in _tracked(curves)]
     table = pd.concat(parts, ignore_index=True)
     table = table.assign(case=clip.case.id, view=clip.view, size_px=clip.size)
@@ -63,7 +61,7 @@ def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
 
 
 def write_summary(clips: Sequence[Clip], path: Path, trackers: Sequence[str]) -> None:
-    """Write the table of :func:`echotruth.strain_summary` of some clips.
+    """Write the table of :meth:`echotruth.Repository.summary` of some clips.
 
     Parameters
     ----------
@@ -76,7 +74,7 @@ def write_summary(clips: Sequence[Clip], path: Path, trackers: Sequence[str]) ->
         list(dict.fromkeys(found))
         for found in zip(*((clip.case.id, clip.view, clip.size) for clip in clips), strict=True)
     )
-    table = strain_summary(clips[0].folder, cases, views, sizes, trackers)
+    table = clips[0].repository.summary(cases, views, sizes, trackers)
     table.to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
 
 
@@ -89,12 +87,13 @@ def _rows(true: Floats, unit: str, **about: str) -> pd.DataFrame:
 
 def _heart(clip: Clip) -> Iterator[pd.DataFrame]:
     for quantity, (group, array, factor, unit) in CURVES.items():
-        yield _rows(factor * clip.job.read(group, array)[array], unit, quantity=quantity)
+        yield _rows(factor * clip.repository.arrays(group, clip.case.id, None, array)[array], unit, quantity=quantity)
 
 
 def _heart_strain(clip: Clip) -> Iterator[pd.DataFrame]:
     """Green-Lagrange strain of the wall and of its segments since end-diastole, %."""
-    strain, wall = (clip.job.read("kinematics", name)[name] for name in ("strain", "strain_mean"))
+    found = clip.repository.arrays("kinematics", clip.case.id, None, "strain", "strain_mean")
+    strain, wall = found["strain"], found["strain_mean"]
     about = {"quantity": "heart_strain", "measure": "green_lagrange"}
     for k, component in enumerate(COMPONENTS):
         yield _rows(100 * wall[:, k], "percent", place="wall", component=component, **about)

@@ -77,7 +77,7 @@ def _subject(image: Any, clip: Clip) -> None:
     image.PatientBirthDate = image.PatientSex = ""
     image.PatientComments = NOTICE
     image.StudyInstanceUID = _uid("study", *_heart(clip))
-    image.StudyDate, image.StudyTime, image.StudyID = NO_DATE, NO_TIME, str(clip.job.row + 1)
+    image.StudyDate, image.StudyTime, image.StudyID = NO_DATE, NO_TIME, str(clip.repository.rows[clip.case.id] + 1)
     image.AccessionNumber = image.ReferringPhysicianName = ""
     image.StudyDescription = f"Synthetic heart {case}"[:64]
 

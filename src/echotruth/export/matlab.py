@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.evaluation import kept
 from echotruth.export.clip import Clip
 from echotruth.export.error import ExportError
+from echotruth.repository import estimates
 
 HEADER = b"MATLAB 5.0 MAT-file, written by echotruth".ljust(116)
 """In place of the one that holds the date, so that the bytes are the same twice."""
@@ -63,5 +63,5 @@ def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
 
 def _displacement(clip: Clip, tracker: str) -> NDArray[Any]:
     """Displacement since end-diastole by a tracker, (axial, lateral, 2, frame), m."""
-    found = kept.read(clip.job, "tracking", "displacement", tracker=tracker, size=clip.size)["displacement"]
-    return np.moveaxis(found, 0, -1)
+    found = estimates.tracked(clip.repository, clip.case.id, clip.view, tracker, clip.size, "displacement")
+    return np.moveaxis(found["displacement"], 0, -1)

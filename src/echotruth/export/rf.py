@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-import zarr
 from numpy.typing import NDArray
 
 from echotruth.export.clip import Clip
@@ -34,7 +33,7 @@ def open_rf(clip: Clip) -> xr.Dataset:
     """Open the group `rf` of one case and view, without reading its arrays; the size of the elements is the case's."""
     import xarray as xr
 
-    rf = xr.open_zarr(clip.job.store.path, group="rf", consolidated=False, chunks=None)
+    rf = xr.open_zarr(clip.repository.store, group="rf", consolidated=False, chunks=None)
     probe = clip.case.config.probe.si()
     rf = rf.assign_attrs(element_width=probe.width, element_height=probe.height)
     return rf.sel(case=clip.case.id, view=clip.view)
@@ -42,11 +41,11 @@ def open_rf(clip: Clip) -> xr.Dataset:
 
 def missing_rf(clip: Clip) -> str:
     """Why a view has no RF that could be exported, in one sentence; "" if it has."""
-    store = clip.job.store
-    if "rf" not in zarr.open_group(store.path, mode="r", use_consolidated=False):
-        return f"{store.path} keeps no RF: set rf.keep to [lines, channels] and run it again"
-    if not store.files("rf", *clip.job.index):
-        return (
-            f"{clip.case.id} has no RF of {clip.view} in {store.path}: see cases/reason for why, or run it to its end"
-        )
+    repository = clip.repository
+    kept = [name for name in ("lines", "channels") if name in repository.names("rf")]
+    if not kept:
+        return f"{repository.store} keeps no RF: set rf.keep to [lines, channels] and run it again"
+    if not all(repository.is_written(f"rf/{name}", clip.case.id, clip.view) for name in kept):
+        why = "see cases/reason for why, or run it to its end"
+        return f"{clip.case.id} has no RF of {clip.view} in {repository.store}: {why}"
     return ""

@@ -34,7 +34,7 @@ def write(clip: Clip, path: Path) -> None:
     import pyvista
 
     path.mkdir()
-    heart, strain = clip.heart, clip.job.read("kinematics", "strain")["strain"]
+    heart, strain = clip.heart, clip.repository.arrays("kinematics", clip.case.id, None, "strain")["strain"]
     arrays = heart.arrays
     names = [f"{clip.case.id}_{frame:03d}.vtu" for frame in range(len(clip.time))]
     for frame, name in enumerate(names):

@@ -7,11 +7,10 @@ from functools import cached_property
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.cases import find_case
 from echotruth.config import Config
 from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.flow import slice_thickness
-from echotruth.learning.reading import Reader
+from echotruth.repository.reader import Repository
 
 BEAM = ("probe.", "rf.", "bmode.", "phantom.in_plane_only")
 """Keys on which it depends what a pixel shows: field of view, scan, and thickness of the slice."""
@@ -24,11 +23,11 @@ class Beams:
 
     Parameters
     ----------
-    reader : Reader
+    repository : Repository
     """
 
-    def __init__(self, reader: Reader) -> None:
-        self._reader = reader
+    def __init__(self, repository: Repository) -> None:
+        self._repository = repository
         self._configs: dict[str, Config] = {}
         self._tables: dict[str, tuple[Floats, Floats]] = {}
 
@@ -36,8 +35,7 @@ class Beams:
         """Configuration of a case; that of the repository if no case differs from it in its beam."""
         key = self.key(case)
         if key not in self._configs:
-            config = self._reader.config
-            self._configs[key] = find_case(config, case).config if key else config
+            self._configs[key] = self._repository.case(case).config if key else self._repository.config
         return self._configs[key]
 
     def range_(self, case: str, lateral: Floats, axial: Floats) -> Floats:
@@ -60,5 +58,4 @@ class Beams:
     @cached_property
     def differ(self) -> bool:
         """Whether the beams of some cases are not those of others."""
-        columns = (path.name for path in (self._reader.path / "cases").iterdir())
-        return any(name.startswith(BEAM) for name in columns)
+        return any(name.startswith(BEAM) for name in self._repository.names("cases"))

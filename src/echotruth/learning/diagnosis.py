@@ -66,7 +66,7 @@ class Diagnosis(Items):
         return {
             "image": self.image(place),
             "time": self.time(place),
-            "es_frame": int(self.reader.read("mechanics/es_frame", place.row)),
+            "es_frame": int(self.repository.read("mechanics/es_frame", place.row)),
             "diagnosis": name,
             "label": self.classes.index(name),
             "scar_size": self._scar_size(place.row),
@@ -75,5 +75,5 @@ class Diagnosis(Items):
     def _scar_size(self, row: int) -> np.float32:
         """That of a case, computed once."""
         if row not in self._scar_sizes:
-            self._scar_sizes[row] = np.float32(scar_size(self.reader, row))
+            self._scar_sizes[row] = np.float32(scar_size(self.repository, row))
         return self._scar_sizes[row]

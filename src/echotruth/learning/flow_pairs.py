@@ -70,7 +70,7 @@ class FlowPairs(Items):
         """Thickness of the slice at every pixel, (axial, lateral), m."""
         key = self._beams.key(place.case)
         if key not in self._thicknesses:
-            axial, lateral = (self.reader.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
+            axial, lateral = (self.repository.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
             range_ = self._beams.range_(place.case, lateral, axial[:, None])
             self._thicknesses[key] = slice_thickness(self._beams.config(place.case), range_)
         return self._thicknesses[key]
@@ -81,4 +81,4 @@ class FlowPairs(Items):
 
     @cached_property
     def _beams(self) -> Beams:
-        return Beams(self.reader)
+        return Beams(self.repository)

@@ -11,8 +11,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.evaluation.choice import require_known
-from echotruth.learning.reading import Reader
+from echotruth.repository.choice import image_size, require_known
+from echotruth.repository.reader import Repository
 
 Item = dict[str, Any]
 """Name -> array, number or text."""
@@ -75,25 +75,24 @@ class Items(Sequence[Item]):
         views: Iterable[str] | None = None,
         size: int | None = None,
     ) -> None:
-        self.reader = Reader(repository)
-        config = self.reader.config
-        self.size = require_known("size", config.bmode.sizes[0] if size is None else size, config.bmode.sizes)
+        self.repository = Repository(repository)
+        config = self.repository.config
+        self.size = image_size(config, size)
         self.frames = config.loop.frames
         self.spacing = config.bmode.si().field_of_view / self.size
         """Distance of pixel centres, m."""
-        ids = _complete(self.reader) if cases is None else _listed(cases.index if hasattr(cases, "columns") else cases)
+        given = cases.index if hasattr(cases, "columns") else cases
+        ids = _complete(self.repository) if given is None else _listed(given)
         names = list(config.views) if views is None else _listed(views)
         self.places = self._places(ids, [require_known("view", name, list(config.views)) for name in names])
 
     def _places(self, cases: list[str], views: list[str]) -> list[Place]:
-        rows, indices = self.reader.cases, self.reader.views
-        pairs = [(require_known("case", case, rows), view) for case in cases for view in views]
-        places = [Place(case, view, rows[case], indices[view]) for case, view in pairs]
+        places = [Place(case, view, *self.repository.place(case, view)) for case in cases for view in views]
         for place in places:
             for path in self.arrays:
-                if not self.reader.is_written(path, place.row, place.index):
+                if not self.repository.is_written(path, place.case, place.view):
                     raise ValueError(
-                        f"{self.reader.folder}: {place.case} has no {path} in the view {place.view}: "
+                        f"{self.repository.folder}: {place.case} has no {path} in the view {place.view}: "
                         "finish the run, or choose cases of status complete."
                     )
         return places
@@ -135,25 +134,25 @@ class Items(Sequence[Item]):
 
     def image(self, place: Place, frames: int | slice = slice(None)) -> NDArray[np.float32]:
         """Grey levels of one frame (axial, lateral) or several (frame, axial, lateral), from 0 to 1."""
-        grey = self.reader.read(f"bmode/{self.size}/image", place.row, place.index, frames)
+        grey = self.repository.read(f"bmode/{self.size}/image", place.row, place.index, frames)
         return np.divide(grey, 255, dtype=np.float32)
 
     def truth(self, place: Place, name: str, *index: Any) -> NDArray[Any]:
         """Part of an array of the truth of a clip."""
-        return self.reader.read(f"truth/{self.size}/{name}", place.row, place.index, *index)
+        return self.repository.read(f"truth/{self.size}/{name}", place.row, place.index, *index)
 
     def time(self, place: Place) -> NDArray[np.float32]:
         """Time of each frame since end-diastole, (frame,), s."""
-        return self.reader.read(f"bmode/{self.size}/time", place.row).astype(np.float32)
+        return self.repository.read(f"bmode/{self.size}/time", place.row).astype(np.float32)
 
 
 def _listed(names: Any) -> list[str]:
     return [names] if isinstance(names, str) else list(names)
 
 
-def _complete(reader: Reader) -> list[str]:
-    ids, statuses = reader.labels("cases/case"), reader.labels("cases/status")
-    found = [case for case, status in zip(ids, statuses, strict=True) if status == "complete"]
+def _complete(repository: Repository) -> list[str]:
+    cases = repository.cases
+    found = [str(case) for case in cases.index[cases["status"] == "complete"]]
     if not found:
-        raise ValueError(f"{reader.folder}: no case is complete: finish the run, or name the cases.")
+        raise ValueError(f"{repository.folder}: no case is complete: finish the run, or name the cases.")
     return found

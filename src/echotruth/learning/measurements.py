@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from echotruth.arrays import Floats
 from echotruth.fem.volume import cell_volumes
-from echotruth.learning.reading import Reader
+from echotruth.repository.reader import Repository
 
 PHYSIOLOGY = (
     *("ejection_fraction", "gls", "circumferential_strain", "longitudinal_strain", "wall_thickening"),
@@ -16,13 +16,13 @@ INFARCT = 1
 
 
 def physiology(
-    reader: Reader, row: int | slice = slice(None), names: tuple[str, ...] = PHYSIOLOGY
+    repository: Repository, row: int | slice = slice(None), names: tuple[str, ...] = PHYSIOLOGY
 ) -> dict[str, Floats]:
     """Measured function of one heart, or of all of a repository.
 
     Parameters
     ----------
-    reader : Reader
+    repository : Repository
     row : int or slice
         Row of the case. Default: all.
     names : tuple of str
@@ -33,21 +33,21 @@ def physiology(
     dict of ndarray of shape () or (case,)
         By name, in the units of docs/schema.md; NaN for hearts that were not measured.
     """
-    labels, packed = reader.labels("physiology/scalar"), reader.read("physiology/scalars", row)
+    labels, packed = repository.labels("physiology/scalar"), repository.read("physiology/scalars", row)
     return {name: packed[..., labels.index(name)] for name in names}
 
 
-def scar_size(reader: Reader, row: int) -> float:
+def scar_size(repository: Repository, row: int) -> float:
     """Fraction of the wall's volume, unloaded, that is infarcted; without the border zone.
 
     Parameters
     ----------
-    reader : Reader
+    repository : Repository
     row : int
         Row of the case, whose mechanics were solved.
     """
-    infarct = reader.read("pathology/region", row) == INFARCT
+    infarct = repository.read("pathology/region", row) == INFARCT
     if not infarct.any():
         return 0.0
-    volume = cell_volumes(reader.read("geometry/node_position", row), reader.read("geometry/cell_node", row))
+    volume = cell_volumes(repository.read("geometry/node_position", row), repository.read("geometry/cell_node", row))
     return float(volume[infarct].sum() / volume.sum())

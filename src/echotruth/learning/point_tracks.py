@@ -68,7 +68,7 @@ class PointTracks(Items):
         if start is not None and not 0 <= start < self.frames:
             raise ValueError(f"start = {start}: give a frame from 0 to {self.frames - 1}.")
         self.points, self.start, self.seed = points, start, seed
-        self._beams = Beams(self.reader)
+        self._beams = Beams(self.repository)
         self._heart: tuple[int, int, dict[str, NDArray[Any]]] = (0, -1, {})
 
     def __getstate__(self) -> dict[str, Any]:
@@ -84,7 +84,7 @@ class PointTracks(Items):
         start = int(random.integers(self.frames)) if self.start is None else self.start
         wall = np.argwhere(self.truth(place, "labels", start, LABELS.index("layer")))
         pixels = wall[random.choice(len(wall), self.points, replace=len(wall) < self.points)]
-        axial, lateral = (self.reader.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
+        axial, lateral = (self.repository.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
         followed = self._followed(place, start, np.column_stack([lateral[pixels[:, 1]], axial[pixels[:, 0]]]))
         position = (followed[..., :2] - [lateral[0], axial[0]]) / self.spacing
         thickness = self._beams.thickness(
@@ -110,9 +110,9 @@ class PointTracks(Items):
         process = os.getpid()
         if self._heart[:2] != (process, row):
             paths = ("geometry/node_position", "geometry/cell_node", "mechanics/displacement")
-            read = {path.rpartition("/")[2]: self.reader.read(path, row) for path in paths}
+            read = {path.rpartition("/")[2]: self.repository.read(path, row) for path in paths}
             self._heart = (process, row, read)
         return self._heart[2]
 
     def _plane(self, place: Place) -> Plane:
-        return Plane(*(self.reader.read(f"phantom/{name}", place.row, place.index) for name in ("origin", "axes")))
+        return Plane(*(self.repository.read(f"phantom/{name}", place.row, place.index) for name in ("origin", "axes")))

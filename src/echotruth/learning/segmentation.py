@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from echotruth.evaluation.choice import require_known
 from echotruth.imaging.labels import LABELS
 from echotruth.learning.items import Item, Items, Place
+from echotruth.repository.choice import require_known
 
 TARGETS = ("wall", "layer", "segment", "region")
 

@@ -34,11 +34,11 @@ class Strain(Items):
 
     def item(self, place: Place, within: int) -> Item:
         kinematics = ("strain_mean", "layer_strain")
-        mean, layers = (self.reader.read(f"kinematics/{name}", place.row).astype(np.float32) for name in kinematics)
+        mean, layers = (self.repository.read(f"kinematics/{name}", place.row).astype(np.float32) for name in kinematics)
         return {
             "image": self.image(place),
             "time": self.time(place),
             "strain": mean,
             "layer_strain": layers,
-            "es_frame": int(self.reader.read("mechanics/es_frame", place.row)),
-        } | {name: np.float32(value) for name, value in physiology(self.reader, place.row, INDICES).items()}
+            "es_frame": int(self.repository.read("mechanics/es_frame", place.row)),
+        } | {name: np.float32(value) for name, value in physiology(self.repository, place.row, INDICES).items()}

@@ -10,15 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echotruth.learning.measurements import physiology, scar_size
-from echotruth.learning.reading import Reader
+from echotruth.repository.reader import Repository
+from echotruth.repository.table import constants, is_label
 
 if TYPE_CHECKING:
     import pandas as pd
-
-UNFINISHED = "unfinished"
-"""Status of a case that no run has published."""
-MOTION = ("geometry.", "fibres.", "pathology.", "loop.", "mechanics.", "motion.")
-"""Keys on which the motion of a heart depends."""
 
 
 def cases(repository: str | Path, query: str | None = None, measurements: bool = True) -> pd.DataFrame:
@@ -58,75 +54,24 @@ def cases(repository: str | Path, query: str | None = None, measurements: bool =
     >>> list(table.index), list(table["diagnosis"])
     (['heart'], ['healthy'])
     """
-    reader = Reader(repository)
-    found = _columns(reader)
+    opened = Repository(repository)
+    found = opened.cases
     if measurements:
-        known = _measurements(reader, found)
-        found = found.join(known)[[*_first(found), *known, *_keys(found)]]
-    return found if query is None else found.loc[_selected(found, _constants(reader), query)]
+        known = _measurements(opened, found)
+        first = ["status", "reason", "heart", *(name for name in found if is_label(name))]
+        found = found.join(known)[[*first, *known, *(name for name in found if name not in first)]]
+    return found if query is None else found.loc[_selected(found, constants(opened), query)]
 
 
-def _columns(reader: Reader) -> pd.DataFrame:
-    """Verdict, labels and differing keys of each case."""
+def _measurements(repository: Repository, found: pd.DataFrame) -> pd.DataFrame:
     import pandas as pd
 
-    group = reader.path / "cases"
-    names = sorted(path.parent.name for path in group.glob("*/zarr.json"))
-    columns = {name: reader.read(f"cases/{name}", ...) for name in names}
-    found = pd.DataFrame({name: _plain(values) for name, values in columns.items()}).set_index("case")
-    known = {key: value for key, value in _constants(reader).items() if key not in found and _is_label(key)}
-    found = found.assign(**known)
-    found["status"] = found["status"].replace("", UNFINISHED)
-    found["heart"] = _hearts(found)
-    return found[[*_first(found), *_keys(found)]]
-
-
-def _plain(values: np.ndarray) -> np.ndarray:
-    return values if values.dtype.kind in "fiub" else np.array([str(value) for value in values], object)
-
-
-def _first(found: pd.DataFrame) -> list[str]:
-    """Columns that come before the measurements."""
-    return ["status", "reason", "heart", *(str(name) for name in found if _is_label(str(name)))]
-
-
-def _is_label(name: str) -> bool:
-    return name in ("diagnosis", "note") or name.startswith("label.")
-
-
-def _keys(found: pd.DataFrame) -> list[str]:
-    return [str(name) for name in found if name not in _first(found)]
-
-
-def _hearts(found: pd.DataFrame) -> list[str]:
-    """The first case of each row's motion.
-
-    Hearts whose only difference is the seed of their fibres' disarray count as one: they resemble each other.
-    """
-    keys = [name for name in found if str(name).startswith(MOTION)]
-    first: dict[tuple[Any, ...], str] = {}
-    hearts = []
-    for case, status, *values in found[["status", *keys]].fillna("").itertuples():
-        hearts.append(case if status == "retired" else first.setdefault(tuple(values), case))
-    return hearts
-
-
-def _measurements(reader: Reader, found: pd.DataFrame) -> pd.DataFrame:
-    import pandas as pd
-
-    known = pd.DataFrame(physiology(reader), index=found.index)
+    known = pd.DataFrame(physiology(repository), index=found.index)
     sizes = [
-        scar_size(reader, row) if reader.is_written("pathology/region", row) else np.nan for row in range(len(found))
+        scar_size(repository, row) if repository.is_written("pathology/region", case) else np.nan
+        for row, case in enumerate(found.index)
     ]
     return known.assign(scar_size=sizes)
-
-
-def _constants(reader: Reader) -> dict[str, Any]:
-    """Value of every key that is the same in all cases."""
-    import zarr
-
-    attributes: dict[str, Any] = zarr.open_group(reader.path, path="cases", mode="r").attrs.asdict()
-    return dict(attributes["constants"])
 
 
 def _selected(found: pd.DataFrame, constants: dict[str, Any], query: str) -> pd.Index:

@@ -14,7 +14,7 @@ def check_heart(heart: object) -> None:
         If it is something else, such as the path of a repository.
     """
     if not isinstance(heart, Heart):
-        made = "echotruth.load_heart reads one from a repository, echotruth.beat makes one"
+        made = "a Repository has one, echotruth.beat makes one"
         raise TypeError(f"heart = {heart!r:.80}: must be a Heart: {made}.")
 
 
@@ -30,7 +30,7 @@ def check_clip(clip: object, name: str = "clip") -> None:
 
     if not isinstance(clip, xr.Dataset):
         made = {
-            "clip": "echotruth.load_clip reads one from a repository, echotruth.image makes one",
+            "clip": "a Repository has one, echotruth.image makes one",
             "tracked": "echotruth.track makes one from a clip",
         }
         raise TypeError(f"{name} = {clip!r:.80}: must be a Dataset: {made[name]}.")

@@ -1,24 +1,13 @@
-"""Arrays of a heart and of its clips as xarray data sets, with the dimensions and units of the repository."""
+"""Arrays of a heart as xarray data sets, with the dimensions and units of the repository."""
 
 from __future__ import annotations
 
-import json
-from hashlib import sha256
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from echotruth.cases import Case
-from echotruth.config.building import configure
-from echotruth.evaluation.clip import grid_positions
 from echotruth.heart import Heart
-from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.truth import wall_mask
-from echotruth.imaging.view import Plane
-from echotruth.loop.cycle import read_loop
 from echotruth.notebook.arguments import check_heart
-from echotruth.notebook.derived import derived
-from echotruth.repository import rounding, schema
+from echotruth.repository.datasets import as_stored, dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +30,7 @@ def heart_dataset(heart: Heart, group: str) -> xr.Dataset:
     Examples
     --------
     >>> import echotruth as et
-    >>> geometry = et.heart_dataset(et.load_heart("out/demo"), "geometry")
+    >>> geometry = et.heart_dataset(et.Repository("out/demo").heart(), "geometry")
     >>> geometry["node_position"].dims, geometry["node_position"].units
     (('node', 'xyz'), 'm')
     """
@@ -50,91 +39,3 @@ def heart_dataset(heart: Heart, group: str) -> xr.Dataset:
         raise ValueError(f"group = {group!r}: the heart has {', '.join(heart.arrays) or 'no groups'}.")
     case = Case("heart", {}, heart.config)
     return dataset(case, as_stored(case, {group: heart.arrays[group]}), {})
-
-
-def clip_dataset(heart: Heart, case: Case, view: str, plane: Plane, values: dict[str, dict[str, Any]]) -> xr.Dataset:
-    """Clip of one image size with its truth, and all that :func:`echotruth.track` and `evaluate` need.
-
-    Parameters
-    ----------
-    heart : Heart
-    case : Case
-    view : str
-        Name of the view.
-    plane : Plane
-    values : dict of dict of ndarray
-        Groups `bmode/SIZE` and `truth/SIZE`, or some of their arrays.
-    """
-    axial, lateral = pixel_centres(case.config.bmode, int(next(iter(values)).rpartition("/")[2]))
-    found = derived(dataset(case, values, {"axial": axial, "lateral": lateral}), case.config)
-    grid = grid_positions(case.config)
-    lateral, axial = grid[0, :, 0], grid[:, 0, 1]
-    about = {"long_name": "whether a point that trackers follow is in the wall at ED", "units": "1"}
-    points = {"grid_mask": (("grid_axial", "grid_lateral"), wall_mask(heart, plane, axial, lateral), about)}
-    found = found.assign(points).assign_coords(grid_axial=axial, grid_lateral=lateral)
-    return found.assign_attrs(
-        case=case.id,
-        view=view,
-        plane_origin=plane.origin.tolist(),
-        plane_axes=plane.axes.ravel().tolist(),
-        heart=fingerprint(heart),
-        config=case.config.model_dump_json(),
-    )
-
-
-def as_stored(case: Case, groups: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Arrays of groups that were just made, rounded as a repository has them; what is read from one is so already."""
-    return {
-        group: {
-            array.name: rounding.as_stored(values[array.name], array, case.config)
-            for array in schema.named(group.partition("/")[0])
-            if array.name in values
-        }
-        for group, values in groups.items()
-    }
-
-
-def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str, np.ndarray]) -> xr.Dataset:
-    """Arrays of one case, or of one of its views, with the dimensions and units of the repository."""
-    import xarray as xr
-
-    found = {}
-    for group, values in groups.items():
-        for array in schema.named(group.partition("/")[0]):
-            if array.name in values:
-                dims = [dim for dim in array.dims if dim not in ("case", "view", "size", "tracker")]
-                about: dict[str, Any] = {"units": array.units, "long_name": array.long_name}
-                step = rounding.quantum(array, case.config)
-                about |= {} if step is None else {"quantum": step}
-                found[array.name] = (dims, np.asarray(values[array.name], array.dtype), about)
-    data, labels = xr.Dataset(found), schema.LABELS | coordinates
-    data = data.assign_coords({name: (name, np.asarray(labels[name])) for name in data.dims if name in labels})
-    if "frame" in data.dims:
-        data = data.assign_coords(time=("frame", read_loop(case.config.loop).time, {"units": "s"}))
-    return data
-
-
-def case_of(clip: xr.Dataset) -> Case:
-    """The case that a clip, or what was tracked in it, belongs to.
-
-    Raises
-    ------
-    ValueError
-        If the data set has lost its attributes.
-    """
-    missing = [name for name in ("case", "config", "view", "plane_origin", "plane_axes") if name not in clip.attrs]
-    if missing:
-        raise ValueError(f"The data set has lost its attribute {missing[0]}: keep those that echotruth.image gave it.")
-    return Case(clip.attrs["case"], {}, configure(json.loads(clip.attrs["config"])))
-
-
-def plane_of(clip: xr.Dataset, heart: Heart) -> Plane:
-    """The plane of a clip, or of what was tracked in it; ValueError if it was made of another heart."""
-    if clip.attrs.get("heart", fingerprint(heart)) != fingerprint(heart):
-        raise ValueError("The clip was made of another heart: give the one that was imaged.")
-    return Plane(np.array(clip.attrs["plane_origin"]), np.reshape(clip.attrs["plane_axes"], (3, 3)))
-
-
-def fingerprint(heart: Heart) -> str:
-    """Twelve hexadecimal digits that tell one motion from another."""
-    return sha256(np.ascontiguousarray(heart.displacement).tobytes()).hexdigest()[:12]

@@ -22,7 +22,7 @@ def kinematics(heart: Heart) -> xr.Dataset:
     Parameters
     ----------
     heart : Heart
-        As :func:`echotruth.beat` or :func:`echotruth.load_heart` returns it.
+        As :func:`echotruth.beat` or :meth:`echotruth.Repository.heart` returns it.
 
     Returns
     -------
@@ -35,12 +35,12 @@ def kinematics(heart: Heart) -> xr.Dataset:
     Raises
     ------
     ValueError
-        If the heart was not made by echotruth.beat or echotruth.load_heart.
+        If the heart was not made by echotruth.beat or read by echotruth.Repository.
 
     Examples
     --------
     >>> import echotruth as et
-    >>> strain = et.kinematics(et.load_heart("out/demo"))["strain"]
+    >>> strain = et.kinematics(et.Repository("out/demo").heart())["strain"]
     >>> strain.dims
     ('frame', 'cell', 'strain_component')
     >>> float(abs(strain.isel(frame=0)).max()) < 1e-6  # strain is from end-diastole, frame 0
@@ -50,7 +50,7 @@ def kinematics(heart: Heart) -> xr.Dataset:
 
     check_heart(heart)
     if heart.config is None or not {"geometry", "fibres"} <= set(heart.arrays):
-        raise ValueError("The heart has no fibres: make it by echotruth.beat or echotruth.load_heart.")
+        raise ValueError("The heart has no fibres: make it by echotruth.beat, or read one of a Repository.")
     values = centroid_kinematics(heart) | fibre_angles(heart)
     variables = {
         array.name: (array.dims[1:], values[array.name], {"units": array.units, "long_name": array.long_name})

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from echotruth.heart import Heart
 from echotruth.imaging.tracks import follow, visible
 from echotruth.notebook.arguments import check_clip, check_heart
-from echotruth.notebook.datasets import case_of, plane_of
+from echotruth.repository.datasets import case_of, plane_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +26,7 @@ def point_tracks(
     heart : Heart
         The heart that was imaged.
     clip : Dataset
-        As :func:`echotruth.image` or :func:`echotruth.load_clip` returns it.
+        As :func:`echotruth.image` or :meth:`echotruth.Repository.clip` returns it.
     points : array_like of shape (n, 2), px
         Lateral, axial; 0 at the centre of the first pixel, as trackers receive them. Any number of them, anywhere.
     frame : int or array_like of shape (n,)
@@ -50,7 +50,8 @@ def point_tracks(
     Examples
     --------
     >>> import echotruth as et
-    >>> heart, clip = et.load_heart("out/demo"), et.load_clip("out/demo", view="mid", size=128)
+    >>> demo = et.Repository("out/demo")
+    >>> heart, clip = demo.heart(), demo.clip(view="mid", size=128)
     >>> rows, columns = clip["mask"].isel(frame=0).values.nonzero()
     >>> tracks = et.point_tracks(heart, clip, [[columns[0], rows[0]], [columns[-1], rows[-1]]])
     >>> tracks["pixel"].dims, dict(tracks["pixel"].sizes)["point"]

@@ -17,8 +17,7 @@ from echotruth.cases import Case
 from echotruth.config import Config, Probe, View
 from echotruth.config.building import Source, configure
 from echotruth.config.tracking import External
-from echotruth.evaluation.choice import image_size
-from echotruth.evaluation.clip import Clip, grid_points
+from echotruth.evaluation.clip import Clip, tracker_seed
 from echotruth.evaluation.scoring import metrics, score, truth_at
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
@@ -28,8 +27,10 @@ from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.physiology import measures, violated_bound
 from echotruth.notebook.arguments import check_clip, check_heart
-from echotruth.notebook.datasets import as_stored, case_of, clip_dataset, dataset, plane_of
+from echotruth.repository.choice import image_size
+from echotruth.repository.datasets import as_stored, case_of, clip_dataset, dataset, plane_of
 from echotruth.seeds import generator
+from echotruth.tracking.point_grid import grid_points
 from echotruth.tracking.tracker import track as track_points
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ def image(
     Examples
     --------
     >>> import echotruth as et
-    >>> heart = et.load_heart("out/demo")
+    >>> heart = et.Repository("out/demo").heart()
     >>> clip = et.image(heart, et.View(position=0.4), size=128)  # a plane that the repository does not have
     >>> clip["image"].dims, str(clip["image"].dtype)
     (('frame', 'axial', 'lateral'), 'uint8')
@@ -140,7 +141,7 @@ def image(
     """
     check_heart(heart)
     if heart.config is None:
-        raise ValueError("The heart has no configuration: make it by echotruth.beat or echotruth.load_heart.")
+        raise ValueError("The heart has no configuration: make it by echotruth.beat, or read one of a Repository.")
     config, name = _imaged_by(heart.config, view, probe)
     size = image_size(config, size)
     case, plane = Case("heart", {}, config), imaging_plane(config.views[name], config.rf, heart.endo_at_ed)
@@ -166,8 +167,8 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     Parameters
     ----------
     clip : Dataset
-        A whole cycle, as :func:`image` or :func:`echotruth.load_clip` returns it. The tracker sees `image`, and the
-        wall at end-diastole.
+        A whole cycle, as :func:`image` or :meth:`echotruth.Repository.clip` returns it. The tracker sees `image`, and
+        the wall at end-diastole.
     tracker : str or callable
         Name of a tracker of the configuration, of a method (config/README.md, `tracking.trackers`), or
         `package.module:function`; or a function `track(frames, points, mask, spacing, frame_time, seed, **options)`
@@ -193,7 +194,7 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     Examples
     --------
     >>> import echotruth as et
-    >>> clip = et.load_clip("out/demo", view="mid", size=128)
+    >>> clip = et.Repository("out/demo").clip(view="mid", size=128)
     >>> tracked = et.track(clip, "dis")
     >>> tracked["displacement"].dims, tracked["displacement"].units
     (('frame', 'axial', 'lateral', 'plane'), 'm')
@@ -216,13 +217,13 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     inside, size = clip["grid_mask"].values, clip.sizes["axial"]
     points = grid_points(case.config, size)[inside]
     spacing = case.config.bmode.si().field_of_view / size
-    seed = int(generator(case, clip.attrs["view"], "tracking").integers(2**31))
+    seed = tracker_seed(case, clip.attrs["view"])
     frames, mask, times = clip["image"].values, clip["mask"].values[0], clip["time"].values
     arguments = Clip(frames, mask, inside, points, spacing, times, seed, case.config.tracking.frame_step)
     found = track_points(*arguments.tracker_arguments, _settings(case.config, tracker, options))
     displacement, quality = arguments.on_grid(*found)
     coordinates = {"axial": clip["grid_axial"].values, "lateral": clip["grid_lateral"].values}
-    values = {"tracking": {"displacement": displacement, "quality": quality}}
+    values = {"tracking/SIZE/TRACKER": {"displacement": displacement, "quality": quality}}
     return dataset(case, as_stored(case, values), coordinates).assign_attrs(clip.attrs, tracker=_name(tracker))
 
 
@@ -250,7 +251,8 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
     Examples
     --------
     >>> import echotruth as et
-    >>> heart, clip = et.load_heart("out/demo"), et.load_clip("out/demo", view="mid", size=128)
+    >>> demo = et.Repository("out/demo")
+    >>> heart, clip = demo.heart(), demo.clip(view="mid", size=128)
     >>> scores = et.evaluate(et.track(clip, "dis"), heart)
     >>> bool(scores["nrmse_percent"] < 100)  # it finds more than nothing
     True

@@ -7,14 +7,12 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import xarray as xr
-
 from echotruth.cases.labels import diagnosis
 from echotruth.config import Config
 from echotruth.report import style
-from echotruth.report.hearts import statuses
-from echotruth.repository.ledger import GATES, VIEW_STAGES, imaged_statuses, read
+from echotruth.repository.benchmark_files import total
+from echotruth.repository.ledger import STAGES, imaged_statuses, read
+from echotruth.repository.reader import Repository
 
 LISTED = 20
 """Largest number of failures of a kind that are listed."""
@@ -45,11 +43,10 @@ def lead(config: Config) -> str:
     )
 
 
-def numbers(tree: xr.DataTree, folder: Path, config: Config) -> list[tuple[str, str]]:
+def numbers(repository: Repository) -> list[tuple[str, str]]:
     """The largest facts: label and number."""
-    status = statuses(tree)
-    present = int(np.count_nonzero(status != "retired"))
-    imaged = np.isin(status, imaged_statuses(config.physiology.exclude_implausible))
+    config, present = repository.config, len(repository.present)
+    imaged = repository.cases["status"].isin(imaged_statuses(config.physiology.exclude_implausible))
     count, frames, sizes = int(imaged.sum()), config.loop.frames, config.bmode.sizes
     clips = count * len(config.views) * len(sizes)
     found = [
@@ -59,7 +56,7 @@ def numbers(tree: xr.DataTree, folder: Path, config: Config) -> list[tuple[str, 
         ("frames", spaced(clips * frames)),
         ("trackers", spaced(len(config.tracking.trackers))),
     ]
-    size = _size_on_disk(folder / f"{config.name}.zarr")
+    size = _size_on_disk(repository.folder / f"{config.name}.zarr")
     return [*found, *([("in the store", _bytes(size))] if size else [])]
 
 
@@ -87,16 +84,11 @@ def facts(config: Config) -> list[tuple[str, str]]:
     ]
 
 
-def failures(tree: xr.DataTree, folder: Path, config: Config) -> dict[str, Any]:
+def failures(repository: Repository) -> dict[str, Any]:
     """Hearts that are not complete and trackers that found nothing, with their reasons."""
-    status, cases = statuses(tree), tree["cases"].to_dataset()
-    rows = np.flatnonzero(~np.isin(status, ("complete", "retired")))
-    reasons = cases["reason"].values
-    found = [
-        {"case": str(cases["case"].values[row]), "status": str(status[row]), "reason": str(reasons[row])}
-        for row in rows[:LISTED]
-    ]
-    lost = list(islice(_lost(folder, config), LISTED + 1))
+    rows = repository.cases[~repository.cases["status"].isin(["complete", "retired"])]
+    found = rows[["status", "reason"]].head(LISTED).reset_index().to_dict("records")
+    lost = list(islice(_lost(repository.folder, repository.config), LISTED + 1))
     return {
         "cases": found,
         "more_cases": len(rows) - len(found),
@@ -107,16 +99,15 @@ def failures(tree: xr.DataTree, folder: Path, config: Config) -> dict[str, Any]:
 
 def _lost(folder: Path, config: Config) -> Any:
     """Trackers without a result on a clip."""
-    for path in sorted((folder / "ledger/tracking").glob("*/[!.]*.json")):
-        if path.stem in config.views:
-            for name, reason in sorted(read(path).get("failures", {}).items()):
-                tracker, _, size = name.rpartition("/")
-                yield {"tracker": tracker, "clip": f"{path.parent.name}, {path.stem}, {size} px", "reason": str(reason)}
+    for path in sorted((folder / "ledger/tracking").glob("*/*/[!.]*.json")):
+        case, view, size = (*path.parts[-3:-1], path.stem)
+        if view in config.views:
+            for tracker, reason in sorted(read(path).get("failures", {}).items()):
+                yield {"tracker": tracker, "clip": f"{case}, {view}, {size} px", "reason": str(reason)}
 
 
-def provenance(tree: xr.DataTree, config: Config) -> list[tuple[str, str]]:
-    """From what the repository was made: label and value."""
-    packages = tree.attrs.get("packages", {})
+def provenance(packages: dict[str, str], config: Config) -> list[tuple[str, str]]:
+    """From what the repository was made, with which packages: label and value."""
     return [
         ("Seed", str(config.seed)),
         ("Software", ", ".join(f"{name} {version}" for name, version in packages.items()) or "not recorded"),
@@ -126,13 +117,13 @@ def provenance(tree: xr.DataTree, config: Config) -> list[tuple[str, str]]:
 def stages(folder: Path) -> list[dict[str, str]]:
     """What every stage took, from the ledger: its name, number of jobs, CPU time in words and version of the code."""
     found = []
-    for name in (*GATES, *VIEW_STAGES):
+    for name in STAGES:
         paths = sorted((folder / "ledger" / name).glob("**/[!.]*.json"))
         if paths:
             sample = [_record(path) for path in paths[:: -(-len(paths) // SAMPLE)]]
-            seconds = sum(float(record.get("cpu_seconds", 0)) for record in sample) / len(sample) * len(paths)
             codes = sorted({str(record.get("code", "")) for record in sample})
-            took = {"jobs": spaced(len(paths)), "cpu": _duration(seconds), "code": ", ".join(codes)}
+            cpu = _duration(total(folder, name))
+            took = {"jobs": spaced(len(paths)), "cpu": cpu, "code": ", ".join(codes)}
             found.append({"name": name} | took)
     return found
 
@@ -142,9 +133,10 @@ def opening(config: Config, case: str, view: str, best: str) -> str:
     tracker = best or next(iter(config.tracking.trackers))
     return f"""import echotruth as et
 
-clip = et.load_clip("out/{config.name}", case="{case}", view="{view}")  # image, displacement, strain, labels
+repository = et.Repository("out/{config.name}")
+clip = repository.clip("{case}", "{view}")  # image, displacement, strain, labels
 clip["image"].isel(frame=0).plot(yincrease=False, cmap="gray")
-curves = et.strain_curves("out/{config.name}", case="{case}", view="{view}", tracker="{tracker}")
+curves = repository.curves("{case}", "{view}", "{tracker}")
 curves["tracked_line_strain"].sel(contour="middle").plot(x="time")"""
 
 

@@ -8,12 +8,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from echotruth.evaluation import kept
 from echotruth.report import style
 from echotruth.report.cine import STEPS_PER_PIXEL, cine
 from echotruth.report.clip import ClipWithMotion, thin
 from echotruth.report.comparison import LINE, Comparison
-from echotruth.workflow.job import Job
+from echotruth.repository import estimates
+from echotruth.repository.reader import Repository
+from echotruth.repository.schema import LABELS
+from echotruth.tracking.point_grid import grid_points
 
 STRAIN_LIMIT = 30
 """Largest strain on the scale of colours, to either side, %."""
@@ -25,13 +27,11 @@ MAX_VIEWS = 12
 """Largest number of views that can be chosen."""
 
 
-def clips(tree: xr.DataTree, comparison: Comparison) -> dict[str, Any]:
+def clips(comparison: Comparison) -> dict[str, Any]:
     """Clips of one heart with their truth, at the largest image size.
 
     Parameters
     ----------
-    tree : DataTree
-        The repository.
     comparison : Comparison
         Of the heart.
 
@@ -41,16 +41,15 @@ def clips(tree: xr.DataTree, comparison: Comparison) -> dict[str, Any]:
         View -> what :func:`echotruth.report.cine.cine` gives, frame of end-systole and strain over the cycle.
     """
     views = list(comparison.views)[:MAX_VIEWS]
-    return {view: _clip(tree, comparison, view, len(views)) for view in views}
+    return {view: _clip(comparison, view, len(views)) for view in views}
 
 
-def with_motion(tree: xr.DataTree, case: str, view: str, size: int) -> tuple[ClipWithMotion, NDArray[np.bool_]]:
+def with_motion(repository: Repository, case: str, view: str, size: int) -> tuple[ClipWithMotion, NDArray[np.bool_]]:
     """A clip and the true motion of all points of its wall, and which points of the grid these are.
 
     Parameters
     ----------
-    tree : DataTree
-        The repository.
+    repository : Repository
     case, view : str
     size : int
         px.
@@ -60,44 +59,34 @@ def with_motion(tree: xr.DataTree, case: str, view: str, size: int) -> tuple[Cli
     clip : ClipWithMotion
     inside : ndarray of shape (grid rows, grid columns), bool
     """
-    images = tree[f"bmode/{size}"].to_dataset().sel(case=case, view=view)
-    truth = tree["evaluation"].to_dataset().true_displacement.sel(case=case, view=view, vector=["lateral", "axial"])
-    motion = truth.transpose("frame", "axial", "lateral", "vector").values
+    config, group = repository.case(case).config, f"bmode/{size}"
+    image = repository.arrays(group, case, view, "image")["image"]
+    time = repository.read(f"{group}/time", *repository.place(case))
+    motion = estimates.true(repository, case, view, "true_displacement")["true_displacement"][..., :2]
     inside = np.isfinite(motion[0]).all(-1)
-    spacing = float(images.lateral[1] - images.lateral[0])
-    place = np.stack(np.meshgrid(truth.lateral.values, truth.axial.values), -1)[inside]
-    corner = float(images.lateral[0]), float(images.axial[0])
-    found = ClipWithMotion(
-        images.image.values, spacing, images.time.values, (place - corner) / spacing, motion[:, inside].astype(float)
-    )
-    return found, inside
+    spacing = config.bmode.si().field_of_view / size
+    position = grid_points(config, size)[inside]
+    return ClipWithMotion(image, spacing, time, position, motion[:, inside].astype(float)), inside
 
 
-def _clip(tree: xr.DataTree, comparison: Comparison, view: str, count: int) -> dict[str, Any]:
-    job, size = comparison.job(view), comparison.size
-    case, best = job.case.id, comparison.trackers[0]
-    clip, inside = with_motion(tree, case, view, size)
+def _clip(comparison: Comparison, view: str, count: int) -> dict[str, Any]:
+    repository, case, size = comparison.repository, comparison.case.id, comparison.size
+    best = comparison.trackers[0]
+    clip, inside = with_motion(repository, case, view, size)
     chosen = thin(clip.position, ARROW_SPACING * size)
-    tracked = _tracked(job, best, size, inside, clip)[:, chosen]
-    shown = cine(clip, _strain(tree, case, view, inside), chosen, tracked, count)
-    es = int(tree["mechanics"].to_dataset().es_frame.sel(case=case))
-    further = {"es": es, "steps": STEPS_PER_PIXEL, "strain_limit": STRAIN_LIMIT}
-    return shown | further | {"course": _course(comparison.curves[view][best])}
+    found = estimates.tracked(repository, case, view, best, size, "displacement")["displacement"]
+    tracked = clip.position + np.asarray(found, float)[:, inside] / clip.spacing  # (frame, point, 2), px
+    shown = cine(clip, _strain(repository, case, view, inside), chosen, tracked[:, chosen], count)
+    curves = comparison.curves[view][best]
+    further = {"es": curves.attrs["es_frame"], "steps": STEPS_PER_PIXEL, "strain_limit": STRAIN_LIMIT}
+    return shown | further | {"course": _course(curves)}
 
 
-def _tracked(job: Job, tracker: str, size: int, inside: NDArray[np.bool_], clip: ClipWithMotion) -> NDArray[np.float64]:
-    """Where a tracker finds the points of the wall, (frame, point, 2), px."""
-    found = kept.read(job, "tracking", "displacement", tracker=tracker, size=size)["displacement"]
-    return clip.position + np.asarray(found, float)[:, inside] / clip.spacing
-
-
-def _strain(tree: xr.DataTree, case: str, view: str, inside: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _strain(repository: Repository, case: str, view: str, inside: NDArray[np.bool_]) -> NDArray[np.float64]:
     """True engineering strain along the wall, in the plane, (frame, point): sqrt(1 + 2 E) - 1."""
-    strain = (
-        tree["evaluation"].to_dataset().true_strain.sel(case=case, view=view, reference="plane", wall_component="TT")
-    )
-    values = strain.transpose("frame", "axial", "lateral").values[:, inside]
-    return np.sqrt(np.maximum(1 + 2 * values.astype(float), 0)) - 1
+    strain = estimates.true(repository, case, view, "true_strain")["true_strain"]
+    along = strain[LABELS["reference"].index("plane"), ..., LABELS["wall_component"].index("TT")]
+    return np.sqrt(np.maximum(1 + 2 * along[:, inside].astype(float), 0)) - 1
 
 
 def _course(curves: xr.Dataset) -> dict[str, Any]:

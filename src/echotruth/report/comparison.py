@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 
 from echotruth.cases import Case
 from echotruth.config import View
-from echotruth.evaluation.curves import strain_curves, twist_of, twist_views
+from echotruth.evaluation.curves import twist_of, twist_views
 from echotruth.report import style
 from echotruth.report.bullseye import Segments
 from echotruth.report.curves import Panel, segment_title
-from echotruth.workflow.job import Job
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import xarray as xr
+
+    from echotruth.repository.reader import Repository
 
 PERCENT = 100.0
 
@@ -44,14 +43,13 @@ class Comparison:
 
     Attributes
     ----------
-    folder : Path
-        Of the repository.
+    repository : Repository
     case : Case
     candidates : tuple of str
         Trackers of which displacement is stored, the best first.
     """
 
-    folder: Path
+    repository: Repository
     case: Case
     candidates: tuple[str, ...]
 
@@ -72,17 +70,13 @@ class Comparison:
         for name in self.candidates:
             # One from outside may have been evaluated on other clips, or before these were made.
             with suppress(ValueError):
-                found[name] = {view: strain_curves(self.job(view), name, self.size) for view in self.views}
+                found[name] = {view: self.repository.curves(self.case.id, view, name) for view in self.views}
         return {view: {name: of_views[view] for name, of_views in found.items()} for view in self.views}
 
     @property
     def trackers(self) -> list[str]:
         """Trackers that have curves of all views, the best first."""
         return list(next(iter(self.curves.values())))
-
-    def job(self, view: str) -> Job:
-        """Job of a view, through which its arrays are read."""
-        return Job(self.folder, "tracking", self.case, view, code="-")
 
     def of_plane(self, plane: str) -> list[str]:
         """Views that lie in a plane, short_axis or long_axis."""

@@ -5,19 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from echotruth.cases import all_cases, find_case
-from echotruth.config import Config
-from echotruth.evaluation import kept
-from echotruth.evaluation.choice import hearts_of
-from echotruth.evaluation.leaderboard import best, rows, standings
+from echotruth.evaluation.hearts import hearts_of
+from echotruth.evaluation.leaderboard import best, standings
 from echotruth.heart import Heart
 from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
 from echotruth.mechanics.physiology import CC
@@ -38,8 +34,11 @@ from echotruth.report import (
 )
 from echotruth.report.clips import ARROW_SPACING, with_motion
 from echotruth.report.comparison import Comparison
-from echotruth.report.hearts import diagnoses, measures
-from echotruth.repository.unpacking import unpack
+from echotruth.report.hearts import measures
+from echotruth.repository import estimates
+from echotruth.repository.choice import main_view
+from echotruth.repository.reader import Repository
+from echotruth.repository.schema import LABELS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,51 +53,20 @@ NONE_COMPLETE = "No heart is complete, so that there is nothing to show. The rea
 """In place of figures."""
 
 
-def shown_hearts(tree: xr.DataTree, config: Config) -> NDArray[np.int_]:
-    """Rows of the hearts that figures and scores take in.
-
-    Parameters
-    ----------
-    tree : DataTree
-        The repository.
-    config : Config
-
-    Returns
-    -------
-    ndarray of int
-        Those that are complete; if there are none and implausible ones have been imaged too, those; else none.
-    """
-    status = tree["cases/status"].values
-    complete = np.flatnonzero(status == "complete")
-    if not len(complete) and not config.physiology.exclude_implausible:
-        return np.flatnonzero(status == "implausible")
-    return complete
-
-
-def main_view(config: Config) -> str:
-    """The view that is shown where only one can be: the mid one, or the first."""
-    return "mid" if "mid" in config.views else next(iter(config.views))
-
-
 class Figures:
     """Figures of one repository; the first complete heart is shown where only one can be.
 
     Parameters
     ----------
-    store : Path
-        The Zarr hierarchy.
-    config : Config
-        Of the repository.
+    repository : Repository
     folder : Path
         Of the figures.
     """
 
-    def __init__(self, store: Path, config: Config, folder: Path) -> None:
-        self.tree = xr.open_datatree(store, engine="zarr")
-        self.config, self.folder = config, folder
-        self.complete = shown_hearts(self.tree, config)
-        self.sizes = config.bmode.sizes
-        self.view = main_view(config)
+    def __init__(self, repository: Repository, folder: Path) -> None:
+        self.repository, self.config, self.folder = repository, repository.config, folder
+        self.case = repository.shown[0] if repository.shown else ""
+        self.sizes, self.view = repository.sizes, main_view(self.config)
 
     def draw(self) -> None:
         """Draw all figures, and write the leaderboard as a table.
@@ -107,10 +75,10 @@ class Figures:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         for name in NAMES:
-            figure = getattr(self, name)() if len(self.complete) else style.sentence(NONE_COMPLETE)
+            figure = getattr(self, name)() if self.case else style.sentence(NONE_COMPLETE)
             if figure is not None:
                 style.save(figure, self.folder / name)
-        if not len(self.complete):
+        if not self.case:
             self._without_hearts()
 
     def _without_hearts(self) -> None:
@@ -121,20 +89,23 @@ class Figures:
         clip.gif(self.folder / "clip.gif", picture[None])
         clip.mp4(self.folder / "clip.mp4", picture[None])
 
-    def group(self, path: str) -> xr.Dataset:
-        """A group of the store for the heart that is shown."""
-        return self.tree[path].to_dataset().isel(case=self.complete[0])
+    def group(self, path: str, view: str | None = None) -> dict[str, NDArray[Any]]:
+        """Arrays of a group for the heart that is shown."""
+        return self.repository.arrays(path, self.case, view)
+
+    @cached_property
+    def shown(self) -> Heart:
+        """The heart that is shown."""
+        return self.repository.heart(self.case)
 
     @property
-    def es(self) -> int:
-        """Frame of end-systole."""
-        return int(self.group("mechanics").es_frame)
+    def time(self) -> NDArray[np.float64]:
+        """Time of the frames since end-diastole, (frame,), s."""
+        return self.repository.read("mechanics/time", *self.repository.place(self.case))
 
     def heart(self) -> Figure:
         """The heart in space, unloaded, at end-diastole and end-systole."""
-        groups = ("geometry", "fibres", "pathology", "mechanics")
-        arrays = {name: {str(key): array.values for key, array in self.group(name).items()} for name in groups}
-        solved, fibre, frames = Heart.of(arrays, self.config), arrays["fibres"]["fibre"], (0, self.es)
+        solved, fibre, frames = self.shown, self.shown.arrays["fibres"]["fibre"], (0, self.shown.es)
         kinematics = centroid_kinematics(solved, frames)
         states = [heart.State("Unloaded", solved.nodes, fibre, np.zeros(len(fibre)))]
         for number, name in enumerate(("End-diastole", "End-systole")):
@@ -145,31 +116,30 @@ class Figures:
 
     def loop(self) -> Figure:
         """The target and the solved loop, and the active tension."""
-        data = self.group("mechanics")
-        solved = np.stack([data.pressure, data.volume])
-        target = np.stack([data.pressure_target, data.volume_target])
-        return loop.draw(data.time.values, self.es, data.active_tension.values, solved, target)
+        data = self.shown.arrays["mechanics"]
+        solved = np.stack([data["pressure"], data["volume"]])
+        target = np.stack([data["pressure_target"], data["volume_target"]])
+        return loop.draw(self.time, self.shown.es, data["active_tension"], solved, target)
 
     def strain(self) -> Figure:
         """Strain over the cycle."""
         data = self.group("kinematics")
-        arrays = (data[name].values for name in ("strain_mean", "strain_sd", "layer_strain"))
-        return strain.draw(data.time.values, self.es, *arrays)
+        arrays = (data[name] for name in ("strain_mean", "strain_sd", "layer_strain"))
+        return strain.draw(self.time, self.shown.es, *arrays)
 
     def physiology(self) -> Figure:
         """Rotation, strain, axial motion, pressure and volume over the cycle."""
-        mechanics, kinematics = map(self.group, ("mechanics", "kinematics"))
-        measures = unpack(self.group("physiology"))
+        mechanics, measures = self.shown.arrays["mechanics"], self.group("physiology")
         ivc, ejection, ivr = (float(measures[name]) for name in ("ivc_time", "ejection_time", "ivr_time"))
         cycle = physiology.Cycle(
-            mechanics.time.values,
-            self.es,
+            self.time,
+            self.shown.es,
             (ivc, ejection, ivr),
-            {name: measures[key].values for name, key in physiology.ROTATIONS.items()},
-            kinematics.strain_mean.values,
-            {side: measures[f"{side}_motion"].values for side in ("base", "apex")},
-            mechanics.pressure.values,
-            mechanics.volume.values,
+            {name: measures[key] for name, key in physiology.ROTATIONS.items()},
+            self.group("kinematics")["strain_mean"],
+            {side: measures[f"{side}_motion"] for side in ("base", "apex")},
+            mechanics["pressure"],
+            mechanics["volume"],
         )
         geometry, loop = self.config.geometry, self.config.loop
         species = loop.file if geometry.file else geometry.preset
@@ -177,13 +147,12 @@ class Figures:
 
     def population(self) -> Figure:
         """Measures of all hearts by their diagnosis."""
-        found = measures(self.tree, self.complete)
-        return population.draw(found, diagnoses(self.tree)[self.complete])
+        diagnoses = self.repository.cases.loc[self.repository.shown, "diagnosis"].to_numpy(str)
+        return population.draw(measures(self.repository, self.repository.shown), diagnoses)
 
     def clip(self) -> None:
         """The clip with its true motion, as a GIF and as a video."""
-        case = str(self.tree["cases"].case.values[self.complete[0]])
-        moving, _ = with_motion(self.tree, case, self.view, self.sizes[0])
+        moving, _ = with_motion(self.repository, self.case, self.view, self.sizes[0])
         chosen = clip.thin(moving.position, ARROW_SPACING * self.sizes[0])
         overlaid = replace(moving, position=moving.position[chosen], displacement=moving.displacement[:, chosen])
         clip.gif(self.folder / "clip.gif", clip.render(overlaid, 400))
@@ -191,41 +160,40 @@ class Figures:
 
     def resolutions(self) -> Figure:
         """One frame at every image size."""
-        frames = [self.group(f"bmode/{size}").image.sel(view=self.view).isel(frame=0).values for size in self.sizes]
+        frames = [self.group(f"bmode/{size}", self.view)["image"][0] for size in self.sizes]
         return resolutions.draw(frames, self.config.bmode.si().field_of_view)
 
     def views(self) -> Figure:
         """Every view at end-diastole and end-systole."""
-        images, truth = (self.group(f"{stage}/{self.sizes[0]}") for stage in ("bmode", "truth"))
-        layer = truth["labels"].sel(label="layer")
-        pictures = {
-            view: [
-                views.Picture(images.image.sel(view=view, frame=frame).values, layer.sel(view=view, frame=frame).values)
-                for frame in (0, self.es)
+        pictures = {}
+        for view in self.config.views:
+            place = self.repository.place(self.case, view)
+            image, labels = (f"bmode/{self.sizes[0]}/image", f"truth/{self.sizes[0]}/labels")
+            layer = LABELS["label"].index("layer")
+            pictures[view] = [
+                views.Picture(
+                    self.repository.read(image, *place, frame), self.repository.read(labels, *place, frame, layer)
+                )
+                for frame in (0, self.shown.es)
             ]
-            for view in self.config.views
-        }
         return views.draw(pictures, self.config.bmode.si().field_of_view)
 
     @cached_property
     def standings(self) -> pd.DataFrame:
         """The leaderboard, including external trackers; without a label `heart`, every case is one."""
-        cases = all_cases(self.config)
+        cases = {case.id: case for case in self.repository.all_cases()}
         labelled = any(case.labels.get("heart") is not None for case in cases.values())
-        table = rows(self.tree, self.config, self.complete, self.folder.parent)
-        return standings(table, self.config.seed, hearts_of(cases) if labelled else None)
+        return standings(self.repository.scores, self.config.seed, hearts_of(cases) if labelled else None)
 
     @property
     def order(self) -> list[str]:
         """The trackers whose displacement is stored, of the repository and kept beside it, the best first."""
-        stored = kept.trackers(self.folder.parent, self.config)
-        return [name for name in best(self.standings) if name in stored]
+        return [name for name in best(self.standings) if name in self.repository.trackers]
 
     @cached_property
     def comparison(self) -> Comparison:
         """Curves of the heart that is shown, true and by all trackers."""
-        case = find_case(self.config, str(self.tree["cases"].case.values[self.complete[0]]))
-        return Comparison(self.folder.parent, case, tuple(self.order))
+        return Comparison(self.repository, self.repository.case(self.case), tuple(self.order))
 
     def curves(self) -> Figure:
         """Tracked against true curves of strain, rotation and twist."""
@@ -253,15 +221,19 @@ class Figures:
         first = next(iter(self.config.tracking.trackers))
         own = [name for name in self.order if name in self.config.tracking.trackers]
         trackers = dict.fromkeys((first, own[0]))
-        data = unpack(self.tree["evaluation"].to_dataset().isel(case=self.complete), "rms_error").rms_error
-        tangential = data.sel(component="tangential").isel(region=slice(1, None))
-        layers = {size: tangential.sel(size=size) for size in self.sizes}
         errors = {
             view: {
-                tracker: {size: rms.sel(view=view, tracker=tracker).mean("case").values for size, rms in layers.items()}
+                tracker: {size: self._error_of_layers(view, tracker, size) for size in self.sizes}
                 for tracker in trackers
             }
             for view in self.config.views
         }
         long_axis = [name for name, view in self.config.views.items() if view.plane == "long_axis"]
         return error.draw(errors, long_axis)
+
+    def _error_of_layers(self, view: str, tracker: str, size: int) -> NDArray[np.float64]:
+        """Error of the tangential displacement by layer, mean over the hearts in which it is known, (layer,), m."""
+        tangential = LABELS["component"].index("tangential")
+        clips = ((case, view, tracker, size) for case in self.repository.shown)
+        found = [estimates.tracked(self.repository, *clip, "rms_error")["rms_error"] for clip in clips]
+        return np.ma.masked_invalid([values[1:, tangential] for values in found]).mean(0).filled(np.nan)

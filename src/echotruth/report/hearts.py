@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from PIL import Image
 
 from echotruth.report.cine import jpeg_address
-from echotruth.repository.unpacking import unpack
+from echotruth.repository.reader import Repository
 
 MEASURES = {
     "Ejection fraction (%)": ("ejection_fraction", 100.0),
@@ -29,65 +29,26 @@ SHOWN = 24
 THUMBNAIL = 96
 """Side of a small picture, px."""
 
-STATUSES = ("complete", "implausible", "failed", "retired", "unfinished")
-"""What may become of a heart, in the order of the page."""
 
-
-def diagnoses(tree: xr.DataTree) -> NDArray[np.str_]:
-    """Diagnosis of every heart, (case,).
+def measures(repository: Repository, cases: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    """Measures of hearts by the labels of `MEASURES`, each (case,).
 
     Parameters
     ----------
-    tree : DataTree
-        The repository.
+    repository : Repository
+    cases : sequence of str
+        Hearts that have been imaged.
     """
-    cases = tree["cases"].to_dataset()
-    if "diagnosis" in cases:
-        return _plain(cases["diagnosis"].values)
-    return np.full(cases.sizes["case"], str(cases.attrs["constants"].get("diagnosis", "")))
+    found = [repository.arrays("physiology", case) for case in cases]
+    return {label: factor * np.array([each[name] for each in found]) for label, (name, factor) in MEASURES.items()}
 
 
-def statuses(tree: xr.DataTree) -> NDArray[np.str_]:
-    """What became of every heart, (case,): its status, or "unfinished" if it has none yet.
-
-    Parameters
-    ----------
-    tree : DataTree
-        The repository.
-    """
-    found = _plain(tree["cases"].to_dataset()["status"].values)
-    return np.where(found == "", "unfinished", found)
-
-
-def _plain(texts: NDArray[Any]) -> NDArray[np.str_]:
-    """Texts of variable length as NumPy's own."""
-    return np.array([str(text) for text in texts], dtype=str)
-
-
-def measures(tree: xr.DataTree, rows: NDArray[np.int_]) -> dict[str, NDArray[np.float64]]:
-    """Measures of hearts by the labels of `MEASURES`, each (row,).
-
-    Parameters
-    ----------
-    tree : DataTree
-        The repository.
-    rows : ndarray of int
-        Rows of the hearts.
-    """
-    names = [name for name, _ in MEASURES.values()]
-    found = unpack(tree["physiology"].to_dataset().isel(case=rows), *names)
-    return {label: factor * np.asarray(found[name].values, float) for label, (name, factor) in MEASURES.items()}
-
-
-def subjects(tree: xr.DataTree, rows: NDArray[np.int_], view: str, size: int) -> list[dict[str, Any]]:
+def subjects(repository: Repository, view: str, size: int) -> list[dict[str, Any]]:
     """The hearts that the page shows, evenly chosen if there are many.
 
     Parameters
     ----------
-    tree : DataTree
-        The repository.
-    rows : ndarray of int
-        Rows of the hearts that have been imaged.
+    repository : Repository
     view : str
         View of the small pictures.
     size : int
@@ -99,21 +60,20 @@ def subjects(tree: xr.DataTree, rows: NDArray[np.int_], view: str, size: int) ->
         At most `SHOWN`, each with `case`, `status`, `diagnosis`, `volume` (end-diastolic, uL), `measures` (as
         `MEASURES`) and `picture` (as :func:`picture` returns it); numbers are NaN where the heart has none.
     """
-    chosen = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), SHOWN)).round().astype(int))]
-    found = measures(tree, chosen)
-    volume = tree["mechanics"].to_dataset().volume.isel(case=chosen, frame=0).values / UNIT_OF_VOLUME
-    images = tree[f"bmode/{size}"].to_dataset().image.sel(view=view).isel(frame=0)
-    cases, status, diagnosis = tree["cases"].to_dataset()["case"].values, statuses(tree), diagnoses(tree)
+    imaged = repository.shown
+    places = np.unique(np.linspace(0, len(imaged) - 1, min(len(imaged), SHOWN)).round().astype(int))
+    chosen = [imaged[place] for place in places]
+    found = measures(repository, chosen)
     return [
         {
-            "case": str(cases[row]),
-            "status": str(status[row]),
-            "diagnosis": str(diagnosis[row]),
-            "volume": float(volume[k]),
+            "case": case,
+            "status": str(repository.cases.at[case, "status"]),
+            "diagnosis": str(repository.cases.at[case, "diagnosis"]),
+            "volume": float(repository.read("mechanics/volume", *repository.place(case), 0)) / UNIT_OF_VOLUME,
             "measures": [float(values[k]) for values in found.values()],
-            "picture": picture(images.isel(case=row).values),
+            "picture": picture(repository.read(f"bmode/{size}/image", *repository.place(case, view), 0)),
         }
-        for k, row in enumerate(chosen)
+        for k, case in enumerate(chosen)
     ]
 
 

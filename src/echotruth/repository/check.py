@@ -21,7 +21,7 @@ from echotruth.repository.check_structure import (
     check_structure,
     unrecorded_files,
 )
-from echotruth.repository.inventory import Fault, JobRecord, Repository
+from echotruth.repository.inventory import Fault, Inventory, JobRecord
 
 
 @dataclass
@@ -54,7 +54,7 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
     CheckError
         If the folder is not a repository.
     """
-    repository, report = Repository(folder), Report()
+    repository, report = Inventory(folder), Report()
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         structure, report.faults = check_structure(repository, pool)
         is_whole = not report.faults
@@ -88,7 +88,7 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
     return report
 
 
-def _notes(repository: Repository, records: list[JobRecord]) -> list[str]:
+def _notes(repository: Inventory, records: list[JobRecord]) -> list[str]:
     notes = []
     wanted, found = repository.wanted(), {record.path for record in records}
     if missing := sum(path not in found for path in wanted):

@@ -13,7 +13,7 @@ import numpy as np
 import zarr
 
 from echotruth.repository import ledger, packing, schema, values
-from echotruth.repository.inventory import Fault, JobRecord, Repository, reason
+from echotruth.repository.inventory import Fault, Inventory, JobRecord, reason
 from echotruth.repository.ledger import record_path
 from echotruth.repository.schema import packs_of
 from echotruth.repository.verdict import verdict
@@ -34,7 +34,7 @@ class JobFaults:
     arrays: frozenset[str] | None = None
 
 
-def check_job(repository: Repository, job: JobRecord, quick: bool) -> JobFaults:
+def check_job(repository: Inventory, job: JobRecord, quick: bool) -> JobFaults:
     """Record of a job, its files, and their values unless it is to be quick."""
     name = repository.name(job.path)
     remedy = f"echotruth run makes it again ({job.job})"
@@ -70,14 +70,14 @@ COMPRESSED = ("kinematics/volume_ratio_min", "physiology/volume_ratio_min")
 """Arrays that tell that elements collapse, for which a heart is found implausible."""
 
 
-def _is_complete(repository: Repository, case: str) -> bool:
+def _is_complete(repository: Inventory, case: str) -> bool:
     """Whether a heart is within its bounds, as far as it is known."""
     job = JobRecord(record_path(repository.folder, "mechanics", case), "mechanics", case)
     record, _ = _read_record(job)
     return record is None or verdict(record, repository.cases[case].config.physiology).status == "complete"
 
 
-def _fault_of_value(repository: Repository, job: JobRecord, group: str, name: str, problem: str) -> Fault:
+def _fault_of_value(repository: Inventory, job: JobRecord, group: str, name: str, problem: str) -> Fault:
     """A value of an array, or of a member of a pack, that no heart can have."""
     packs = {member: pack.array.name for pack in packs_of(group) for member in pack.names}
     text = f"{name} {problem}" if name in packs else problem
@@ -109,7 +109,7 @@ def are_checksums(hashes: object) -> bool:
     return isinstance(hashes, dict) and all(isinstance(hash, str) and len(hash) == 64 for hash in hashes.values())
 
 
-def _is_current(repository: Repository, path: str) -> bool:
+def _is_current(repository: Inventory, path: str) -> bool:
     """Whether the hierarchy still has the array of a shard, or the path is of none at all.
 
     A case that left the configuration keeps its record, which may name groups that left it later.
@@ -132,7 +132,7 @@ def damage(file: Path, hash: str) -> str:
 
 
 def _check_values(
-    repository: Repository, job: JobRecord, row: tuple[int, ...], files: Iterable[str]
+    repository: Inventory, job: JobRecord, row: tuple[int, ...], files: Iterable[str]
 ) -> Iterator[tuple[str, str, str]]:
     """Group, array and problem of the values of a job."""
     config, arrays = repository.cases[job.case].config, {path.partition("/c/")[0] for path in files}
@@ -178,7 +178,7 @@ def _bytes_of_a_job(array: zarr.Array[Any], leading: int) -> float:
     return float(np.prod(array.shape[leading:])) * array.dtype.itemsize
 
 
-def check_loop(repository: Repository, job: JobRecord) -> list[Fault]:
+def check_loop(repository: Inventory, job: JobRecord) -> list[Fault]:
     """Loop and det F of a heart whose record says that it is complete."""
     record, _ = _read_record(job)
     row = repository.row(job)

@@ -13,14 +13,14 @@ import zarr
 from echotruth.repository import ledger
 from echotruth.repository.array import Array
 from echotruth.repository.check_jobs import are_checksums, damage
-from echotruth.repository.inventory import Fault, Repository, files_below, reason
+from echotruth.repository.inventory import Fault, Inventory, files_below, reason
 from echotruth.repository.store import Store
 
 _REWRITTEN = "echotruth run writes it again"
 """Remedy of a file that no job wrote."""
 
 
-def check_structure(repository: Repository, pool: ThreadPoolExecutor) -> tuple[set[str] | None, list[Fault]]:
+def check_structure(repository: Inventory, pool: ThreadPoolExecutor) -> tuple[set[str] | None, list[Fault]]:
     """Files that no job wrote, and their faults; None if no record of them can be read."""
     record, remedy, publish = repository.structure_record, _REWRITTEN, (repository.publication_record,)
     if repository.is_older:
@@ -43,14 +43,14 @@ def check_structure(repository: Repository, pool: ThreadPoolExecutor) -> tuple[s
     ]
 
 
-def _structure_files(repository: Repository) -> Iterator[Path]:
+def _structure_files(repository: Inventory) -> Iterator[Path]:
     """Files that are not shards of jobs."""
     for path in files_below(repository.store):
         if not ("/c/" in path and path.partition("/c/")[0] in repository.shard_paths):
             yield repository.store / path
 
 
-def check_registries(repository: Repository) -> Iterator[Fault]:
+def check_registries(repository: Inventory) -> Iterator[Fault]:
     """Rows of cases and views against their labels in the store, which then count."""
     store = Store(repository.store)
     for name, dimension in (("registry.txt", "case"), ("views.txt", "view")):
@@ -64,7 +64,7 @@ def check_registries(repository: Repository) -> Iterator[Fault]:
             yield Fault(name, problem, _REWRITTEN, (repository.publication_record,), (path,))
 
 
-def check_others(repository: Repository) -> Iterator[Fault]:
+def check_others(repository: Inventory) -> Iterator[Fault]:
     """Record of the publication."""
     if repository.publication_record.is_file():
         try:
@@ -74,7 +74,7 @@ def check_others(repository: Repository) -> Iterator[Fault]:
             yield Fault(repository.name(path), problem, _REWRITTEN, (path,))
 
 
-def check_metadata(repository: Repository) -> Iterator[Fault]:
+def check_metadata(repository: Inventory) -> Iterator[Fault]:
     """Metadata of the arrays of the jobs against the schema, and times against their order."""
     remedy = "run the configuration with this version of echotruth"
     for path, array in repository.shard_paths.items():
@@ -87,7 +87,7 @@ def check_metadata(repository: Repository) -> Iterator[Fault]:
     yield from _check_times(repository)
 
 
-def _metadata_problem(opened: zarr.Array[Any], array: Array, repository: Repository) -> str:
+def _metadata_problem(opened: zarr.Array[Any], array: Array, repository: Inventory) -> str:
     """How the metadata of an array differ from the schema; empty if they do not."""
     pairs = {
         "dimensions": (tuple(getattr(opened.metadata, "dimension_names", None) or ()), array.dims),
@@ -100,7 +100,7 @@ def _metadata_problem(opened: zarr.Array[Any], array: Array, repository: Reposit
     return next((f"has {key} {found!r}, not {right!r}" for key, (found, right) in pairs.items() if found != right), "")
 
 
-def _check_times(repository: Repository) -> Iterator[Fault]:
+def _check_times(repository: Inventory) -> Iterator[Fault]:
     try:
         times = np.asarray(zarr.open_array(repository.store, path="mechanics/time", mode="r")[...])
     except Exception:  # a repository that was not laid out, or in an earlier layout
@@ -116,7 +116,7 @@ Listed = dict[tuple[str, tuple[int, ...]], frozenset[str]]
 """Stage and row of a job -> arrays of which its record lists the shard."""
 
 
-def unrecorded_files(repository: Repository, listed: Listed, structure: set[str] | None) -> Iterator[Fault]:
+def unrecorded_files(repository: Inventory, listed: Listed, structure: set[str] | None) -> Iterator[Fault]:
     """Files that belong to no record; those of jobs that have none yet are left out."""
     for path in files_below(repository.store):
         file = repository.store / path
@@ -131,7 +131,7 @@ def unrecorded_files(repository: Repository, listed: Listed, structure: set[str]
             yield Fault(repository.name(file), problem, "--heal deletes it", files=(file,))
 
 
-def _has_owner(repository: Repository, path: str, index: str, listed: Listed) -> bool:
+def _has_owner(repository: Inventory, path: str, index: str, listed: Listed) -> bool:
     """Whether a shard is that of a job, or of one that has no record yet."""
     array = repository.shard_paths[path]
     if not all(part.isdecimal() for part in index.split("/")):

@@ -12,7 +12,7 @@ import zarr
 from numpy.typing import NDArray
 
 from echotruth.repository import schema
-from echotruth.repository.inventory import JobRecord, Repository
+from echotruth.repository.inventory import Inventory, JobRecord
 
 TOLERANCE = {
     "mechanics": 1e-5,
@@ -38,14 +38,14 @@ NOISE = ("mechanics/residual", "mechanics/newton_steps")
 """Arrays that hold how the solution was found."""
 
 
-def first_difference(record: JobRecord, giving: Repository, receiving: Repository) -> str | None:
+def first_difference(record: JobRecord, giving: Inventory, receiving: Inventory) -> str | None:
     """Path of the first array of a job that differs by more than rounding between two repositories.
 
     Parameters
     ----------
     record : JobRecord
         A job that both have made.
-    giving, receiving : Repository
+    giving, receiving : Inventory
 
     Returns
     -------
@@ -67,7 +67,7 @@ def first_difference(record: JobRecord, giving: Repository, receiving: Repositor
     return None
 
 
-def _scale(repository: Repository, path: str, *arrays: NDArray[Any]) -> Any:
+def _scale(repository: Inventory, path: str, *arrays: NDArray[Any]) -> Any:
     """Largest magnitude in two arrays; of a pack that of the numbers in the same unit, (n_numbers,)."""
     magnitude = np.max([np.nan_to_num(np.abs(values), posinf=0) for values in arrays], axis=0)
     group = path.rpartition("/")[0]

@@ -1,6 +1,6 @@
 """Healing of a repository: what is damaged is dropped with its record, so that the next run makes it again.
 
-Snakemake finds the record missing, runs its job, and after it the jobs that depend on it; they give the bytes of before.
+Snakemake finds the record missing, runs its job, and after it those that depend on it; they give the bytes of before.
 """
 
 from __future__ import annotations

@@ -155,7 +155,7 @@ def _create_sharded(
     coordinates: tuple[Array, ...],
     alone: tuple[str, ...],
 ) -> None:
-    """Create an array of the jobs: one shard a job, and in it, if it has frames, chunks of one element along `alone`."""
+    """Create an array of the jobs: one shard a job, in it chunks of one element along `alone` if it has frames."""
     dims = set(array.dims)
     auxiliary = [other.name for other in coordinates if other.dims != (other.name,) and set(other.dims) <= dims]
     attributes = {"coordinates": " ".join(auxiliary)} if auxiliary else {}

@@ -69,7 +69,7 @@ class JobRecord:
         return f"{self.stage} of " + ", ".join(filter(None, [self.case, self.view, size]))
 
 
-class Repository:
+class Inventory:
     """Folder of a repository, with what a check needs to know of it.
 
     Parameters

@@ -66,7 +66,11 @@ def read(path: Path) -> dict[str, Any]:
     JSONDecodeError, UnicodeDecodeError
         If it is not what was written.
     """
-    text = path.read_text(encoding="utf-8")
+    return parse(path.read_text(encoding="utf-8"))
+
+
+def parse(text: str) -> dict[str, Any]:
+    """A record from the text of its file, as :func:`read` returns it."""
     record = json.loads(text)
     if isinstance(record, dict) and (seal := record.pop("seal", None)) is not None and seal != _seal(record):
         raise json.JSONDecodeError("the record is not what was written", text, 0)
@@ -91,7 +95,7 @@ def repository_folder(repository: str | Path) -> Path:
         If the folder holds no repository.
     """
     if "://" in str(repository):
-        remedy = "download it, and give the folder; echotruth.open reads an address too"
+        remedy = "download it, and give the folder; echotruth.Repository reads an address too"
         raise FileNotFoundError(f"{repository}: is an address and not a folder: {remedy}")
     folder = Path(repository)
     folder = folder.parent if folder.suffix == ".zarr" else folder

@@ -17,7 +17,7 @@ from echotruth.config.loading import ConfigError, load, validate
 from echotruth.repository import durable, ledger
 from echotruth.repository.checksums import ChecksumError, verify
 from echotruth.repository.equivalence import first_difference
-from echotruth.repository.inventory import JobRecord, Repository
+from echotruth.repository.inventory import Inventory, JobRecord
 from echotruth.section import Section, value_of
 
 OWN = ("name", "cases")
@@ -96,7 +96,7 @@ def compare(source: Path, target: Path) -> None:
     MergeError
         If a job has other results, or is damaged.
     """
-    giving, receiving = Repository(source), Repository(target)
+    giving, receiving = Inventory(source), Inventory(target)
     for record in _records(giving):
         if _in(record, giving, receiving).is_file():
             _compare(record, giving, receiving)
@@ -110,7 +110,7 @@ def verify_files(source: Path) -> None:
     MergeError
         If one is damaged.
     """
-    giving = Repository(source)
+    giving = Inventory(source)
     for record in _records(giving):
         _verify(giving, record.path)
 
@@ -132,7 +132,7 @@ def take_over(source: Path, target: Path) -> tuple[list[JobRecord], int]:
     known : int
         Number of those that the other one had already.
     """
-    giving, receiving = Repository(source), Repository(target)
+    giving, receiving = Inventory(source), Inventory(target)
     records = _records(giving)
     new = [record for record in records if not _in(record, giving, receiving).is_file()]
     for record in new:
@@ -159,7 +159,7 @@ def check_sources(sources: list[Path]) -> dict[Path, Config]:
     except ConfigError as error:
         raise MergeError(str(error)) from None
     for source in sources:
-        repository = Repository(source)
+        repository = Inventory(source)
         if not all((repository.store / path / "zarr.json").is_file() for path in repository.shard_paths):
             raise _older(source)
     return configs
@@ -181,18 +181,18 @@ def _difference(first: Section, second: Section, prefix: str = "") -> str:
     return ""
 
 
-def _records(repository: Repository) -> list[JobRecord]:
+def _records(repository: Inventory) -> list[JobRecord]:
     """Records of the cases and views of the configuration."""
     views = (None, *repository.config.views)
     return [record for record in repository.records() if record.case in repository.cases and record.view in views]
 
 
-def _in(record: JobRecord, giving: Repository, receiving: Repository) -> Path:
+def _in(record: JobRecord, giving: Inventory, receiving: Inventory) -> Path:
     """Place of a record in the other ledger."""
     return receiving.folder / record.path.relative_to(giving.folder)
 
 
-def _renamed(record: JobRecord, giving: Repository, receiving: Repository) -> Iterator[tuple[str, str, str]]:
+def _renamed(record: JobRecord, giving: Inventory, receiving: Inventory) -> Iterator[tuple[str, str, str]]:
     """Path of each shard of a job in both stores, and its SHA-256."""
     before, after = giving.row(record), receiving.row(record)
     if before is None or after is None:
@@ -203,7 +203,7 @@ def _renamed(record: JobRecord, giving: Repository, receiving: Repository) -> It
         yield path, "/".join((array, "c", *map(str, after), *rest)), hash
 
 
-def _compare(record: JobRecord, giving: Repository, receiving: Repository) -> None:
+def _compare(record: JobRecord, giving: Inventory, receiving: Inventory) -> None:
     """Both must have the same bytes of a job that both have, or but for rounding if machines of two kinds made them."""
     mine, theirs = ledger.read(_in(record, giving, receiving)), ledger.read(record.path)
     have_same_verdict = all(mine.get(key) == theirs.get(key) for key in ("status", "reason"))
@@ -224,7 +224,7 @@ def _compare(record: JobRecord, giving: Repository, receiving: Repository) -> No
     raise MergeError(f"{record.path}: {record.job} {what} {receiving.folder}: {remedy}")
 
 
-def _verify(repository: Repository, path: Path) -> None:
+def _verify(repository: Inventory, path: Path) -> None:
     """Compare the files of a job with the checksums in its record."""
     try:
         verify(repository.store, path, ledger.read(path))
@@ -232,7 +232,7 @@ def _verify(repository: Repository, path: Path) -> None:
         raise MergeError(f"{error}: heal {repository.folder} before it is merged") from None
 
 
-def _copy(record: JobRecord, giving: Repository, receiving: Repository) -> None:
+def _copy(record: JobRecord, giving: Inventory, receiving: Inventory) -> None:
     """Copy the shards of a job to their row, then its record, which keeps its time."""
     paths = list(_renamed(record, giving, receiving))
     for old, new, _ in paths:

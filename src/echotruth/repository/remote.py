@@ -61,6 +61,14 @@ class Remote:
         self.url, self._api = url.rstrip("/"), obstore
         self.store = self._asked(lambda: _store(self.url))
 
+    def has(self, name: str) -> bool:
+        """Whether an object is there."""
+        try:
+            self._asked(lambda: self._api.head(self.store, name))
+        except FileNotFoundError:
+            return False
+        return True
+
     def checksum(self, name: str) -> str:
         """SHA-256 of an object as it was sent; empty if it is not there, or was sent by another program."""
         try:
@@ -104,8 +112,8 @@ class Remote:
             raise RemoteError(f"{self.url}: {_reason(error)}: {REMEDY}") from None
 
 
-def hierarchy(url: str) -> ObjectStore:
-    """Open the Zarr hierarchy of a repository in object storage, to be read.
+def hierarchy(url: str) -> tuple[Remote, ObjectStore]:
+    """Open a repository in object storage, to be read: its folder, and its Zarr hierarchy.
 
     Parameters
     ----------
@@ -121,13 +129,12 @@ def hierarchy(url: str) -> ObjectStore:
     """
     from zarr.storage import ObjectStore
 
-    remote = Remote(url)
-    if not remote.url.endswith(".zarr"):
-        names = remote.hierarchies()
-        if len(names) != 1:
-            raise FileNotFoundError(f"{url}: is not a repository: give an address to which one was uploaded")
-        remote = Remote(f"{remote.url}/{names[0]}")
-    return ObjectStore(remote.store, read_only=True)
+    parent, _, name = url.rstrip("/").rpartition("/")
+    folder = Remote(parent if name.endswith(".zarr") else url)
+    names = folder.hierarchies()
+    if len(names) != 1:
+        raise FileNotFoundError(f"{url}: is not a repository: give an address to which one was uploaded")
+    return folder, ObjectStore(Remote(f"{folder.url}/{names[0]}").store, read_only=True)
 
 
 def _store(url: str) -> S3Store:

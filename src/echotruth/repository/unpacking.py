@@ -37,7 +37,7 @@ def unpack(data: xr.Dataset, *names: str) -> xr.Dataset:
     Examples
     --------
     >>> import echotruth as et
-    >>> measures = et.unpack(et.open("out/demo")["physiology"].to_dataset(), "ejection_fraction", "gls")
+    >>> measures = et.unpack(et.Repository("out/demo").tree["physiology"].to_dataset(), "ejection_fraction", "gls")
     >>> measures["gls"].dims, measures["gls"].units
     (('case',), '1')
     """

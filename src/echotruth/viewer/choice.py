@@ -8,7 +8,7 @@ from urllib.parse import urlencode
 
 from bokeh.models import AutocompleteInput, InputWidget, Select
 
-from echotruth.viewer.catalogue import FINISHED, Catalogue
+from echotruth.repository.reader import Repository
 from echotruth.viewer.curves import CONTOURS, LINE, MEASURES, MIDDLE, WALL
 from echotruth.viewer.tint import COLOURS, WALL_COMPONENTS
 
@@ -59,37 +59,37 @@ class Choice:
         return urlencode({name: value for name, value in given.items() if value != plain[name] and name != "frame"})
 
 
-def first(catalogue: Catalogue) -> Choice:
+def first(repository: Repository) -> Choice:
     """What is shown at first: the first case that is complete, or the first of all."""
-    complete = (case for case in catalogue.cases if catalogue.status(case) == FINISHED)
-    case = next(complete, catalogue.cases[0])
-    trackers = catalogue.trackers
-    return Choice(case, catalogue.views[0], catalogue.sizes[0], trackers[-1] if trackers else NOTHING)
+    complete = repository.cases.index[repository.cases["status"] == "complete"]
+    case = str(complete[0]) if len(complete) else repository.present[0]
+    trackers = repository.trackers
+    return Choice(case, repository.views[0], repository.sizes[0], trackers[-1] if trackers else NOTHING)
 
 
-def asked(catalogue: Catalogue, query: Mapping[str, Sequence[str]]) -> Choice:
+def asked(repository: Repository, query: Mapping[str, Sequence[str]]) -> Choice:
     """What an address asks for; what it does not say, or what the repository does not have, is as at first.
 
     Parameters
     ----------
-    catalogue : Catalogue
+    repository : Repository
     query : dict
         Name -> values, as `urllib.parse.parse_qs` gives them.
     """
     given = _given(query)
-    chosen = {name: value for name, value in given.items() if _is_known(catalogue, name, value)}
+    chosen = {name: value for name, value in given.items() if _is_known(repository, name, value)}
     numbers = {name: int(value) for name, value in chosen.items() if name in ("size", "frame")}
     texts = {name: value for name, value in chosen.items() if name not in numbers}
-    return replace(first(catalogue), **numbers, **texts)  # type: ignore[arg-type]  # each has its type
+    return replace(first(repository), **numbers, **texts)  # type: ignore[arg-type]  # each has its type
 
 
-def refused(catalogue: Catalogue, query: Mapping[str, Sequence[str]]) -> list[str]:
+def refused(repository: Repository, query: Mapping[str, Sequence[str]]) -> list[str]:
     """What an address asks for and the repository does not have, a sentence each; other names are ignored."""
     given, names = _given(query), {field.name for field in fields(Choice)}
     return [
         f"There is no {name} {value}, which the address asks for."
         for name, value in given.items()
-        if name in names and not _is_known(catalogue, name, value)
+        if name in names and not _is_known(repository, name, value)
     ]
 
 
@@ -97,32 +97,32 @@ def _given(query: Mapping[str, Sequence[str]]) -> dict[str, str]:
     return {name: values[-1] for name, values in query.items() if values}
 
 
-def _is_known(catalogue: Catalogue, name: str, value: str) -> bool:
+def _is_known(repository: Repository, name: str, value: str) -> bool:
     if name == "case":
-        return value in catalogue.rows
+        return value in repository.rows
     known = {
-        "view": catalogue.views,
-        "size": list(map(str, catalogue.sizes)),
-        "tracker": catalogue.trackers,
-        "other": [TRUTH, *catalogue.trackers],
+        "view": repository.views,
+        "size": list(map(str, repository.sizes)),
+        "tracker": repository.trackers,
+        "other": [TRUTH, *repository.trackers],
         "colour": list(COLOURS),
         "component": ["RR", "CC", "LL", "RC", "RL", "CL", "TT", "RT"],
         "curve": [LINE, *WALL_COMPONENTS],
         "measure": list(MEASURES),
         "part": [*CONTOURS, WALL, *(f"layer {n}" for n in range(1, 99)), *(f"segment {n}" for n in range(1, 18))],
-        "frame": list(map(str, range(catalogue.config.loop.frames))),
+        "frame": list(map(str, range(repository.config.loop.frames))),
     }
     return value in known.get(name, ())
 
 
-def inputs(catalogue: Catalogue, choice: Choice) -> dict[str, InputWidget]:
+def inputs(repository: Repository, choice: Choice) -> dict[str, InputWidget]:
     """Inputs for all but the frame, by name; the page fills in the options that depend on what is chosen."""
-    others = [(NOTHING, "–"), (TRUTH, "the truth"), *((name, name) for name in catalogue.trackers)]
+    others = [(NOTHING, "–"), (TRUTH, "the truth"), *((name, name) for name in repository.trackers)]
     return {
-        "case": _case_input(catalogue.cases, choice.case),
-        "view": Select(title="View", value=choice.view, options=catalogue.views, width=110),
-        "size": Select(title="Size (px)", value=str(choice.size), options=list(map(str, catalogue.sizes)), width=80),
-        "tracker": Select(title="Tracker", value=choice.tracker, options=catalogue.trackers, width=150),
+        "case": _case_input(repository.present, choice.case),
+        "view": Select(title="View", value=choice.view, options=repository.views, width=110),
+        "size": Select(title="Size (px)", value=str(choice.size), options=list(map(str, repository.sizes)), width=80),
+        "tracker": Select(title="Tracker", value=choice.tracker, options=repository.trackers, width=150),
         "other": Select(title="Beside it", value=choice.other, options=others, width=150),
         "colour": Select(title="Colour", value=choice.colour, options=list(COLOURS.items()), width=190),
         "component": Select(title="Component", value=choice.component, options=[], width=220, visible=False),

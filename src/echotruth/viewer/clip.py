@@ -10,21 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
+from echotruth.config import Config
 from echotruth.imaging.labels import LABELS
-from echotruth.repository import schema
-from echotruth.viewer.catalogue import Catalogue
-from echotruth.workflow.job import Job
+from echotruth.learning.beams import Beams
+from echotruth.repository import estimates, schema
+from echotruth.repository.reader import Repository
 
 Floats32 = NDArray[np.float32]
-CURVES = "evaluation/true_courses"
-"""Array that has the curves of a view; earlier versions had none."""
-PARTS = {
-    "images": "bmode/{size}/image",
-    "truth": "truth/{size}/displacement",
-    "tracking": "tracking/displacement",
-    "evaluation": "evaluation/true_displacement",
-}
+PARTS = {"images": "bmode/{size}/image", "truth": "truth/{size}/displacement"}
 """Part of a clip to the array by which it is known to be written."""
+ESTIMATES = {"tracking": "displacement", "evaluation": "true_displacement", "curves": "true_line_strain"}
+"""Part of what was tracked to the array by which it is known to be written; earlier versions had no curves."""
 MISSING = {
     "images": "images",
     "truth": "truth at the pixels",
@@ -40,13 +36,13 @@ class Clip:
 
     Attributes
     ----------
-    catalogue : Catalogue
+    repository : Repository
     case, view : str
     size : int
         Pixels along a side.
     """
 
-    catalogue: Catalogue
+    repository: Repository
     case: str
     view: str
     size: int
@@ -54,61 +50,71 @@ class Clip:
     @cached_property
     def place(self) -> tuple[int, int]:
         """Row of the case, and index of the view."""
-        return self.catalogue.rows[self.case], self.catalogue.indices[self.view]
+        row, index = self.repository.place(self.case, self.view)
+        return row, index
 
     @cached_property
     def missing(self) -> list[str]:
         """Parts of the clip that no job has written."""
-        paths = {part: path.format(size=self.size) for part, path in PARTS.items()}
-        return [part for part, path in paths.items() if not self.catalogue.is_written(path, self.case, self.view)]
-
-    @cached_property
-    def job(self) -> Job:
-        """What reads the arrays of this case and view by their names."""
-        return Job(self.catalogue.reader.folder, "tracking", self.case, self.view, code="viewer")
+        return [part for part in MISSING if not self.has(part)]
 
     def has(self, part: str) -> bool:
         """Whether a part of the clip is written."""
-        return part not in self.missing
+        if part in ESTIMATES:
+            return estimates.is_written(self.repository, self.case, self.view, ESTIMATES[part])
+        return self.repository.is_written(PARTS[part].format(size=self.size), self.case, self.view)
 
     @property
     def has_curves(self) -> bool:
         """Whether there are curves of strain and rotation."""
-        return self.has("evaluation") and self.catalogue.is_written(CURVES, self.case, self.view)
+        return self.has("evaluation") and self.has("curves")
 
     def read(self, path: str, *index: Any) -> NDArray[Any]:
         """Part of an array of this case and view."""
-        return self.catalogue.reader.read(path, *self.place, *index)
+        return self.repository.read(path, *self.place, *index)
+
+    def true(self, *names: str) -> dict[str, NDArray[Any]]:
+        """What is true at the points of the trackers, by name."""
+        return estimates.true(self.repository, self.case, self.view, *names)
+
+    def tracked(self, tracker: str, *names: str) -> dict[str, NDArray[Any]]:
+        """What a tracker found, by name; ValueError if one from outside was not evaluated on this clip."""
+        return estimates.tracked(self.repository, self.case, self.view, tracker, self.size, *names)
+
+    @cached_property
+    def config(self) -> Config:
+        """Configuration of the case, as far as its probe and its image go."""
+        return Beams(self.repository).config(self.case)
 
     @cached_property
     def side(self) -> float:
         """Length of a side of the image, m."""
-        return float(self.catalogue.config_of(self.case).bmode.si().field_of_view)
+        return float(self.config.bmode.si().field_of_view)
 
     @cached_property
     def is_short_axis(self) -> bool:
         """Whether the view is a short axis."""
-        return self.catalogue.config.views[self.view].plane == "short_axis"
+        return self.repository.config.views[self.view].plane == "short_axis"
 
     @cached_property
     def frames(self) -> int:
         """Number of frames."""
-        return self.catalogue.config.loop.frames
+        return self.repository.config.loop.frames
 
     @cached_property
     def time(self) -> Floats:
         """Time since end-diastole, (frame,), s; numbers of frames where the heart has none yet."""
-        path, row = f"bmode/{self.size}/time", self.place[0]
-        if not self.catalogue.reader.has(path):
+        try:
+            return np.asarray(self.repository.read(f"bmode/{self.size}/time", self.place[0]), float)
+        except FileNotFoundError:
             return np.arange(self.frames, dtype=float)
-        return np.asarray(self.catalogue.reader.read(path, row), float)
 
     @cached_property
     def es_frame(self) -> int | None:
         """Frame of end-systole; None for a heart that was not solved."""
-        if not self.catalogue.is_written("mechanics/es_frame", self.case):
+        if not self.repository.is_written("mechanics/es_frame", self.case):
             return None
-        return int(self.catalogue.reader.read("mechanics/es_frame", self.place[0]))
+        return int(self.repository.read("mechanics/es_frame", self.place[0]))
 
     @cached_property
     def image(self) -> NDArray[np.uint8]:

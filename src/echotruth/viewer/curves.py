@@ -48,7 +48,7 @@ def strain(clip: Clip, found: dict[str, xr.Dataset], component: str, measure: st
     ----------
     clip : Clip
     found : dict
-        Tracker -> its curves, as :func:`echotruth.strain_curves` gives them.
+        Tracker -> its curves, as :meth:`echotruth.Repository.curves` gives them.
     component : {"line", "RR", "TT", "RT"}
     measure : {"engineering", "green_lagrange"}
         Ignored for the strain of a contour, which is an engineering strain.
@@ -72,20 +72,18 @@ def rotation(clip: Clip, found: dict[str, xr.Dataset]) -> Plot:
     """Rotation of a short axis, tracked and true; the twist of the heart in a long axis; degrees."""
     if clip.is_short_axis and found:
         return Plot("rotation in this view (°)", _tracked_and_true(found, "rotation", np.degrees(1), {}))
-    reader, row = clip.catalogue.reader, clip.place[0]
-    if not clip.catalogue.is_written("physiology/courses", clip.case):
+    if not clip.repository.is_written("physiology/courses", clip.case):
         return Plot("twist of the heart (°)", {})
-    labels, courses = reader.labels("physiology/course"), reader.read("physiology/courses", row)
     shown = {"base": "rotation_base", "apex": "rotation_apex", "twist": "twist"}
-    curves = {name: np.degrees(courses[:, labels.index(label)]) for name, label in shown.items()}
-    return Plot("rotation of the heart (°)", curves)
+    heart = clip.repository.arrays("physiology", clip.case, None, *shown.values())
+    return Plot("rotation of the heart (°)", {name: np.degrees(heart[label]) for name, label in shown.items()})
 
 
 def volume(clip: Clip) -> Plot:
     """Volume of the cavity, µL or mL."""
-    if not clip.catalogue.is_written("mechanics/volume", clip.case):
+    if not clip.repository.is_written("mechanics/volume", clip.case):
         return Plot("volume of the cavity (µL)", {})
-    values = clip.catalogue.reader.read("mechanics/volume", clip.place[0])
+    values = clip.repository.read("mechanics/volume", clip.place[0])
     factor, unit = (1e9, "µL") if np.nanmax(values, initial=0.0) < MAX_VOLUME_IN_UL else (1e6, "mL")
     return Plot(f"volume of the cavity ({unit})", {TRUE: factor * values})
 
@@ -94,7 +92,7 @@ def parts(clip: Clip, component: str, segments: list[int]) -> list[str]:
     """Parts of the wall of which there are curves: contours, or the wall, its layers and the segments of the view."""
     if component == LINE:
         return list(CONTOURS)
-    layers = range(1, clip.catalogue.config.fibres.layers + 1)
+    layers = range(1, clip.repository.config.fibres.layers + 1)
     return [WALL, *(f"layer {number}" for number in layers), *(f"segment {number}" for number in segments)]
 
 

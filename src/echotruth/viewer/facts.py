@@ -6,8 +6,6 @@ from html import escape
 
 import numpy as np
 
-from echotruth.evaluation import kept
-from echotruth.viewer.catalogue import FINISHED
 from echotruth.viewer.clip import Clip
 
 SCORES = {"nrmse_all": ("NRMSE", 100, "%"), "coverage": ("coverage", 100, "%")}
@@ -28,15 +26,16 @@ def text(clip: Clip, trackers: list[str]) -> str:
     trackers : list of str
         Names that the repository does not know are left out.
     """
-    catalogue, case = clip.catalogue, clip.case
-    status, reason = catalogue.status(case), catalogue.reason(case)
-    verdict = status if status == FINISHED else f"<b>{escape(status)}</b>"
+    repository, case = clip.repository, clip.case
+    known = repository.cases.loc[case].to_dict()
+    status, reason, _ = (known.pop(name) for name in ("status", "reason", "heart"))
+    verdict = status if status == "complete" else f"<b>{escape(status)}</b>"
     lines = [f"{escape(case)}: {verdict}" + (f" ({escape(reason)})" if reason else "")]
     lines.append(", ".join(_measures(clip)))
-    lines += [f"{escape(name)}: {', '.join(_scores(clip, name))}" for name in trackers if name in catalogue.trackers]
+    lines += [f"{escape(name)}: {', '.join(_scores(clip, name))}" for name in trackers if name in repository.trackers]
     particular = [
         f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}"
-        for name, value in catalogue.labels(case).items()
+        for name, value in known.items()
         if value not in ("", None)
     ]
     lines.append(escape(", ".join(particular)))
@@ -44,15 +43,14 @@ def text(clip: Clip, trackers: list[str]) -> str:
 
 
 def _measures(clip: Clip) -> list[str]:
-    catalogue = clip.catalogue
-    if not catalogue.is_written("physiology/scalars", clip.case):
+    repository = clip.repository
+    if not repository.is_written("physiology/scalars", clip.case):
         return []
-    reader = catalogue.reader
-    labels, values = reader.labels("physiology/scalar"), reader.read("physiology/scalars", clip.place[0])
+    values = repository.arrays("physiology", clip.case)
     return [
-        f"{name} {_number(factor * float(values[labels.index(label)]))} {unit}"
+        f"{name} {_number(factor * float(values[label]))} {unit}"
         for label, (name, factor, unit) in MEASURES.items()
-        if label in labels and np.isfinite(values[labels.index(label)])
+        if label in values and np.isfinite(values[label])
     ]
 
 
@@ -60,7 +58,7 @@ def _scores(clip: Clip, tracker: str) -> list[str]:
     if not clip.has("evaluation"):
         return ["not tracked yet"]
     try:
-        found = kept.read(clip.job, "evaluation", *SCORES, tracker=tracker, size=clip.size)
+        found = clip.tracked(tracker, *SCORES)
     except ValueError:  # of a tracker from outside
         return ["not evaluated on this clip"]
     return [f"{name} {_number(factor * float(found[label]))} {unit}" for label, (name, factor, unit) in SCORES.items()]

@@ -23,8 +23,8 @@ from bokeh.models import (
 )
 
 from echotruth.evaluation.curves import strain_curves
+from echotruth.repository.reader import Repository
 from echotruth.viewer import arrows, curves, facts, script
-from echotruth.viewer.catalogue import Catalogue
 from echotruth.viewer.choice import NOTHING, TRUTH, Choice, inputs
 from echotruth.viewer.clip import MISSING, Clip
 from echotruth.viewer.graph import Graph
@@ -45,7 +45,7 @@ class Page:
 
     Parameters
     ----------
-    catalogue : Catalogue
+    repository : Repository
     choice : Choice
         What is shown at first.
     document : Document
@@ -53,15 +53,15 @@ class Page:
         Sentences on what was asked for and is not there; they are shown until something else is chosen.
     """
 
-    def __init__(self, catalogue: Catalogue, choice: Choice, document: Document, refused: Sequence[str] = ()) -> None:
-        self.catalogue, self.choice, self.document, self.refused = catalogue, choice, document, refused
-        self.points = lru_cache(KEPT_CLIPS)(lambda case, view, size: Points(Clip(catalogue, case, view, size)))
+    def __init__(self, repository: Repository, choice: Choice, document: Document, refused: Sequence[str] = ()) -> None:
+        self.repository, self.choice, self.document, self.refused = repository, choice, document, refused
+        self.points = lru_cache(KEPT_CLIPS)(lambda case, view, size: Points(Clip(repository, case, view, size)))
         self._shown: dict[str, Any] = {}
         self._problems: dict[str, None] = {}
         self.clip = ColumnDataSource({"grey": [np.zeros((0, 0, 0), np.uint8)]}, name="clip")
         self.times = ColumnDataSource({"time": [0.0], "text": [""]}, name="times")
         self.address = ColumnDataSource({"query": [""]})
-        frames = catalogue.config.loop.frames
+        frames = repository.config.loop.frames
         self.frame = Slider(start=0, end=frames - 1, value=choice.frame, title="Frame", name="frame", width=380)
         self.side = Slider(start=0, end=1e6, value=1, visible=False)
         self.opacity = Slider(start=0, end=1, step=0.05, value=0.6, title="Opacity", width=110)
@@ -72,13 +72,13 @@ class Page:
         self._widgets()
         self._scripts()
         document.add_root(self._layout())
-        document.title = f"{catalogue.config.name} - echotruth"
+        document.title = f"{repository.config.name} - echotruth"
         # Sent as a change, arrays travel as they are; within the page at first they would be text.
         document.on_event("document_ready", lambda _event: self.show())
 
     def _widgets(self) -> None:
         """What can be chosen."""
-        self.inputs = inputs(self.catalogue, self.choice)
+        self.inputs = inputs(self.repository, self.choice)
         for name, widget in self.inputs.items():
             widget.name = name
             widget.on_change("value", lambda _attribute, _old, value, name=name: self._choose(name, value))
@@ -142,7 +142,7 @@ class Page:
         chosen = int(value) if name == "size" else value
         if chosen == getattr(self.choice, name):  # the page set it itself
             return
-        if name == "case" and value not in self.catalogue.rows:
+        if name == "case" and value not in self.repository.rows:
             self._say(f"There is no case {value}: choose one from the list.")
             return
         self.choice = replace(self.choice, **{name: chosen})  # type: ignore[arg-type]  # each has its type
@@ -158,7 +158,7 @@ class Page:
             self._blank()
             place = f"{self.choice.case}, {self.choice.view}"
             said = str(error).partition("\n")[0] or type(error).__name__
-            self._say(f"{place} cannot be shown: {said}. Run: echotruth check {self.catalogue.reader.folder}")
+            self._say(f"{place} cannot be shown: {said}. Run: echotruth check {self.repository.folder}")
         finally:
             self.document.unhold()
 
@@ -247,7 +247,7 @@ class Page:
         for tracker in (self.choice.tracker, self.choice.other) if clip.has_curves else ():
             with suppress(ValueError):  # not evaluated on this clip, which the picture says
                 if tracker not in (TRUTH, NOTHING):
-                    found[tracker] = strain_curves(clip.job, tracker, clip.size)
+                    found[tracker] = strain_curves(self.repository, clip.case, clip.view, tracker, clip.size)
         return found
 
     def _show_graphs(self, clip: Clip, found: dict[str, Any]) -> None:

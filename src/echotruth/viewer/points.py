@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from echotruth.arrays import Floats
-from echotruth.evaluation import kept
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.repository import schema
+from echotruth.tracking.point_grid import grid_positions
 from echotruth.viewer.clip import Clip
 
 SUBDIVISION = 2.0
@@ -36,7 +36,7 @@ class Points:
     @cached_property
     def _axes(self) -> Floats:
         """Axes of the wall, (axial, lateral, polar, plane)."""
-        return self.clip.read("evaluation/wall_axes").astype(float)
+        return self.clip.true("wall_axes")["wall_axes"].astype(float)
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
@@ -49,10 +49,7 @@ class Points:
 
         They scale with the field of view, in which cases may differ.
         """
-        reader = self.clip.catalogue.reader
-        axial, lateral = (reader.read(f"evaluation/{name}", ...) for name in ("axial", "lateral"))
-        factor = self.clip.side / float(self.clip.catalogue.config.bmode.si().field_of_view)
-        return factor * np.stack(np.meshgrid(lateral, axial), axis=-1)
+        return grid_positions(self.clip.config)
 
     @cached_property
     def position(self) -> Floats:
@@ -67,7 +64,7 @@ class Points:
     @cached_property
     def _true_displacement(self) -> Floats:
         """In the plane, on the grid, (frame, axial, lateral, 2), m."""
-        return self.clip.read("evaluation/true_displacement", ..., slice(0, 2)).astype(float)
+        return self.clip.true("true_displacement")["true_displacement"][..., :2].astype(float)
 
     @cached_property
     def true_displacement(self) -> Floats:
@@ -82,13 +79,7 @@ class Points:
         ValueError
             If a tracker from outside was not evaluated on this clip.
         """
-        catalogue, size = self.clip.catalogue, self.clip.size
-        if tracker in catalogue.own_trackers:  # of which one chunk is read, not those of all trackers
-            place = catalogue.sizes.index(size), catalogue.own_trackers.index(tracker)
-            found = self.clip.read("tracking/displacement", *place)
-        else:
-            found = kept.read(self.clip.job, "tracking", "displacement", tracker=tracker, size=size)["displacement"]
-        return found[:, self.inside].astype(float)
+        return self.clip.tracked(tracker, "displacement")["displacement"][:, self.inside].astype(float)
 
     @cached_property
     def extent(self) -> tuple[float, float, float]:
@@ -104,7 +95,7 @@ class Points:
         It is what a tracker could find: motion out of the plane does not count.
         """
         number = schema.LABELS["reference"].index("plane")
-        return self.clip.read("evaluation/true_strain", number)[:, self.inside].astype(float)
+        return self.clip.true("true_strain")["true_strain"][number][:, self.inside].astype(float)
 
     def tracked_strain(self, tracker: str) -> Floats:
         """Strain of the tracked displacement by the operator of the evaluation, (frame, n, 3)."""

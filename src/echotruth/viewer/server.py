@@ -11,7 +11,7 @@ from bokeh.application.handlers import FunctionHandler
 from bokeh.document import Document
 from bokeh.server.server import Server
 
-from echotruth.viewer.catalogue import Catalogue
+from echotruth.repository.reader import Repository
 from echotruth.viewer.choice import asked, refused
 from echotruth.viewer.page import Page
 
@@ -50,8 +50,8 @@ def serve(repository: str | Path, port: int = 0) -> Server:
         context = document.session_context
         query = context.request.arguments if context is not None and context.request is not None else {}
         texts = {name: [value.decode() for value in values] for name, values in query.items()}
-        catalogue = opened(repository)  # as it is now: a run may be going on
-        Page(catalogue, asked(catalogue, texts), document, refused(catalogue, texts))
+        now = opened(repository)  # a run may be going on
+        Page(now, asked(now, texts), document, refused(now, texts))
 
     try:
         server = Server({"/": Application(FunctionHandler(page))}, port=port, address=LOCAL)
@@ -61,21 +61,18 @@ def serve(repository: str | Path, port: int = 0) -> Server:
     return server
 
 
-def opened(repository: str | Path) -> Catalogue:
-    """Contents of a repository that has something to show.
+def opened(repository: str | Path) -> Repository:
+    """A repository that has something to show.
 
     Raises
     ------
     FileNotFoundError, ShowError
         If the folder holds no repository, or one without cases.
     """
-    catalogue = Catalogue(repository)
-    if not catalogue.reader.path.is_dir():
-        said = "it is named after its folder, which must not be renamed"
-        raise ShowError(f"{repository}: has no folder {catalogue.reader.path.name}: {said}")
-    if not catalogue.cases or not catalogue.views:
+    found = Repository(repository)
+    if not Path(str(found.store)).is_dir() or not found.present or not found.views:
         raise ShowError(f"{repository}: has no cases or no views yet: run its configuration first")
-    return catalogue
+    return found
 
 
 def address(server: Server) -> str:

@@ -150,7 +150,7 @@ def _labels(clip: Clip, name: str) -> Tint:
     if name == "segment":
         return _segments(label)
     if name == "layer":
-        layers = clip.catalogue.config.fibres.layers
+        layers = clip.repository.config.fibres.layers
         palette = [to_hex(colour) for colour in layer_colours(layers)]
         names, title = {number: str(number) for number in range(1, layers + 1)}, "Layer, 1 at the endocardium"
     else:

@@ -7,7 +7,6 @@ one is, by the files that Snakemake's `benchmark` writes.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from csv import DictReader
 from itertools import islice
 from math import sqrt
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 
 from echotruth.config import Config
 from echotruth.workflow.imaged_tissue import areas, scatterers, wall_scatterers
+from echotruth.repository.benchmark_files import core_seconds
 from echotruth.workflow.jobs import places
 
 START_SECONDS = 0.6
@@ -188,17 +188,3 @@ def speed(folder: Path, configs: Mapping[str, Config]) -> dict[str, float]:
             # Not the mean, because the first job of a rule also compiles.
             found[rule] = median(ratios)
     return found
-
-
-def core_seconds(file: Path) -> float:
-    """Time for which a job had a core, by its benchmark file, s; 0 if it cannot be read.
-
-    The CPU time in it lacks the end of the job, because Snakemake looks every half second and later every half minute.
-    So the time itself counts where it is more: that of jobs of one thread.
-    """
-    try:
-        with file.open(encoding="utf-8", newline="") as lines:
-            row = next(DictReader(lines, delimiter="\t"))
-        return max(float(row[key]) for key in ("s", "cpu_time") if row[key] not in ("NA", "-"))
-    except (OSError, ValueError, KeyError, StopIteration):
-        return 0.0

@@ -13,7 +13,7 @@ from echotruth.cases import expand
 from echotruth.config import Config, shipped
 from echotruth.repository import ledger
 from echotruth.repository.checksums import ChecksumError
-from echotruth.repository.inventory import CheckError, JobRecord, Repository
+from echotruth.repository.inventory import CheckError, Inventory, JobRecord
 from echotruth.repository.layout import lay_out
 from echotruth.repository.merge import MergeError, check_sources, compare, spanning, take_over, verify_files
 from echotruth.repository.publication import publish
@@ -66,7 +66,7 @@ def _merge(into: Path, sources: list[Path], config: Config, run: str) -> None:
         all_taken += taken
         print(f"{source}: {len(taken)} jobs taken over" + (f", {known} known already" if known else ""))
     _introduce(into, all_taken, run)
-    missing = [path for path in Repository(into).wanted() if not path.is_file()]
+    missing = [path for path in Inventory(into).wanted() if not path.is_file()]
     if missing:
         print(f"{into}: {len(missing)} jobs of the joint sweep were not made in either: echotruth run makes them")
     else:

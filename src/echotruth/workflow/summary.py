@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from echotruth.repository.benchmark_files import core_seconds
 from echotruth.repository.ledger import imaged_statuses
-from echotruth.workflow.cost import core_seconds
 from echotruth.workflow.progress import format_duration
 from echotruth.workflow.status import status_of, verdicts
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echotruth.evaluation.clip import Clip
+from echotruth.evaluation.clip import Clip, make_clip
 from echotruth.repository.checksums import is_whole
 from echotruth.repository.provenance import code_version, settings_version
 from echotruth.section import Section
@@ -76,6 +76,13 @@ class Tracks:
         """
         method = getattr(tracker, "method", "external")
         return "" if method == "external" else settings_version(method_code(method), tracker, self._content)
+
+
+def clip_of(job: Job, inside: np.ndarray) -> Clip:
+    """The clip that a job tracks, given the points of the grid that are in the wall."""
+    frames = job.read(f"bmode/{job.size}", "image")["image"]
+    labels = job.read(f"truth/{job.size}", "labels")["labels"][0]
+    return make_clip(job.case, str(job.view_name), frames, labels, inside)
 
 
 def method_code(method: str) -> str:

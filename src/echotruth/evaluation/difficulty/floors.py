@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echotruth.arrays import Floats
+from echotruth.config import Config
 from echotruth.evaluation.agreement import REFERENCES
-from echotruth.evaluation.clip import Clip, between_frames, clips
+from echotruth.evaluation.clip import Clip, between_frames, read_clips
 from echotruth.evaluation.difficulty.bound import AlignedImages
 from echotruth.evaluation.difficulty.plane import both_ways, plane_path, tissue_path
 from echotruth.evaluation.displacement_error import evaluate
 from echotruth.evaluation.scoring import Truth, ground_truth
+from echotruth.heart import Heart
 from echotruth.imaging import spline
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.view import Plane
@@ -20,7 +23,9 @@ from echotruth.tracking.alignment import interpolate_with_gradient
 from echotruth.tracking.bidirectional import forward_backward
 from echotruth.tracking.closure import DYNAMIC_RANGE
 from echotruth.tracking.grey import decompress, grey_levels
-from echotruth.workflow.job import Job
+
+if TYPE_CHECKING:
+    from echotruth.repository.reader import Repository
 
 PARAMETERS = 27
 """Parameters for each component of the smooth motion of the Cramer-Rao bound: sines and cosines up to four waves around
@@ -36,27 +41,27 @@ COLUMNS = (
 Row = dict[str, str | int | float]
 
 
-def difficulty(job: Job, parameters: int = PARAMETERS) -> list[Row]:
+def difficulty(repository: Repository, case: str, view: str, parameters: int = PARAMETERS) -> list[Row]:
     """Determine how difficult a clip is to track.
 
     Parameters
     ----------
-    job : Job
-        Job of the stage tracking of the view; mechanics, phantom, truth and B-mode are read.
+    repository : Repository
+    case, view : str
     parameters : int
         Parameters for each component of the smooth motion of the Cramer-Rao bound.
 
     Returns
     -------
     list of dict
-        Of each image size, by :data:`COLUMNS`, as :func:`echotruth.difficulty` describes them.
+        Of each image size, by :data:`COLUMNS`, as :meth:`.Repository.difficulty` describes them.
     """
-    scene, given = _Scene.of(job), clips(job)
+    scene, given = _Scene.read(repository, case, view), read_clips(repository, case, view)
     paths = [_paths(scene, given, order) for order in scene.orders]
     rows: list[Row] = []
     for size, clip in given.items():
         ways = [_way(scene, clip, path, parameters) for path in paths]
-        keys: Row = {"case": job.case.id, "view": str(job.view_name), "size_px": size, "crb_parameters": parameters}
+        keys: Row = {"case": case, "view": view, "size_px": size, "crb_parameters": parameters}
         rows.append(keys | _plane(scene, ways) | _bound(scene, ways) | _correlations(scene, ways))
         rows[-1]["floor_percent"] = float(np.hypot(rows[-1]["floor_plane_percent"], rows[-1]["floor_crb_percent"]))
     return [{name: row[name] for name in COLUMNS} for row in rows]
@@ -64,35 +69,37 @@ def difficulty(job: Job, parameters: int = PARAMETERS) -> list[Row]:
 
 @dataclass(frozen=True)
 class _Scene:
-    """What all image sizes of a clip share: job, plane, truth, and the orders in which the given frames are visited."""
+    """What all image sizes of a clip share: heart, plane, truth, and the orders in which given frames are visited."""
 
-    job: Job
+    heart: Heart
+    config: Config
     plane: Plane
     truth: Truth
     orders: tuple[list[int], list[int]]
 
     @classmethod
-    def of(cls, job: Job) -> _Scene:
-        truth, plane = ground_truth(job), Plane(**job.read("phantom", "origin", "axes"))
-        given = range(0, len(truth.displacement), job.case.config.tracking.frame_step)
+    def read(cls, repository: Repository, case: str, view: str) -> _Scene:
+        heart, config, plane = repository.heart(case), repository.case(case).config, repository.plane(case, view)
+        truth = ground_truth(heart, plane, config.views[view].plane, config)
+        given = range(0, len(truth.displacement), config.tracking.frame_step)
         forward, backward = ([given[visit] for visit in order] for order in forward_backward(len(given)))
-        return cls(job, plane, truth, (forward, backward))
+        return cls(heart, config, plane, truth, (forward, backward))
 
     def follow(self, start: Floats, order: list[int]) -> Floats:
         """Positions (visit, n, 2), m, of a perfect tracker of the plane that starts at points (n, 2)."""
-        path = tissue_path if self.job.case.config.phantom.in_plane_only else plane_path
-        return path(self.job.heart, self.plane, start, order)
+        path = tissue_path if self.config.phantom.in_plane_only else plane_path
+        return path(self.heart, self.plane, start, order)
 
     def at_es(self, values: Floats) -> Floats:
         """Values of the given frames (given frame, ...) at end-systole, as those of trackers are interpolated."""
-        step = self.job.case.config.tracking.frame_step
+        step = self.config.tracking.frame_step
         found: Floats = between_frames(values, step, len(self.truth.displacement))[self.truth.es]
         return found
 
     @property
     def es_visit(self) -> int:
         """Visit, forwards, of the last given frame that is not after end-systole."""
-        return self.truth.es // self.job.case.config.tracking.frame_step
+        return self.truth.es // self.config.tracking.frame_step
 
     @property
     def cauchy_green(self) -> Floats:
@@ -143,7 +150,7 @@ def _paths(scene: _Scene, given: dict[int, Clip], order: list[int]) -> _Paths:
     """Paths of all points of a clip; the mesh is searched once a frame."""
     start = [scene.truth.wall.position]
     for clip in given.values():
-        axial, lateral = pixel_centres(scene.job.case.config.bmode, clip.size)
+        axial, lateral = pixel_centres(scene.config.bmode, clip.size)
         rows, columns = np.nonzero(clip.mask)
         start.append(np.column_stack([lateral[columns], axial[rows]]))
     path = scene.follow(np.concatenate(start), order)
@@ -162,7 +169,7 @@ def _way(scene: _Scene, clip: Clip, paths: _Paths, parameters: int) -> _Way:
 
 def _aligned(scene: _Scene, clip: Clip, paths: _Paths) -> AlignedImages:
     """Amplitudes of a clip along the path of a perfect tracker of the plane, on the rectangle that holds the wall."""
-    axial, lateral = pixel_centres(scene.job.case.config.bmode, clip.size)
+    axial, lateral = pixel_centres(scene.config.bmode, clip.size)
     pixel = (paths.pixels[clip.size] - [lateral[0], axial[0]]) / clip.spacing
     rows, columns = np.nonzero(clip.mask)
     rows, columns = rows - rows.min(), columns - columns.min()

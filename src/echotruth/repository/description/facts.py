@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
@@ -12,11 +11,13 @@ from typing import Any
 
 from echotruth.repository import ledger, schema
 from echotruth.repository.array import Array
+from echotruth.repository.benchmark_files import total
 from echotruth.repository.description.attribution import Attribution, Author, DescriptionError
 from echotruth.repository.description.files import StoredFile, damaged, files_beside, store_files
 from echotruth.repository.hierarchy import ROOT
-from echotruth.repository.inventory import CheckError, JobRecord, Repository
-from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
+from echotruth.repository.inventory import CheckError, Inventory, JobRecord
+from echotruth.repository.ledger import record_paths
+from echotruth.repository.verdict import verdict
 
 Record = dict[str, Any]
 """A record of the ledger."""
@@ -49,7 +50,7 @@ class Run:
 class Facts:
     """What is to be known of a repository."""
 
-    repository: Repository
+    repository: Inventory
     attribution: Attribution
     """With authors, an unnamed group if need be."""
     published: date
@@ -116,7 +117,7 @@ def read_facts(folder: Path, given: Attribution) -> Facts:
         If the folder is not a repository, is damaged, or has no result yet.
     """
     try:
-        repository = Repository(folder)
+        repository = Inventory(folder)
     except CheckError as error:
         raise DescriptionError(str(error)) from None
     records, checksums = _records(repository)
@@ -154,12 +155,12 @@ def _read(folder: Path, path: Path) -> Record:
     return record
 
 
-def _arrays(repository: Repository) -> dict[str, list[Array]]:
+def _arrays(repository: Inventory) -> dict[str, list[Array]]:
     found = {}
     for path, arrays in sorted(repository.groups.items()):
-        members = {pack.array.name: pack.members for pack in schema.PACKS.get(path, ())}
+        members = {pack.array.name: pack.members for pack in schema.packs_of(path)}
         listed = ((array, *_named(members.get(array.name, ()), array.name)) for array in arrays)
-        found[re.sub(r"/\d+$", "/SIZE", path)] = list(chain(*listed))
+        found[schema.kind(path)] = list(chain(*listed))
     return found
 
 
@@ -167,7 +168,7 @@ def _named(members: tuple[Array, ...], pack: str) -> list[Array]:
     return [replace(one, long_name=f"{one.long_name} (in {pack})") for one in members]
 
 
-def _records(repository: Repository) -> tuple[dict[JobRecord, Record], dict[str, str]]:
+def _records(repository: Inventory) -> tuple[dict[JobRecord, Record], dict[str, str]]:
     """Records of the present cases and views, and the checksums in all records, by path below the store.
 
     Of the checksums the records keep those of the images alone: there may be a million.
@@ -186,18 +187,17 @@ def _records(repository: Repository) -> tuple[dict[JobRecord, Record], dict[str,
 
 
 def _outcomes(
-    repository: Repository, records: dict[JobRecord, Record], missing: set[Path]
+    repository: Inventory, records: dict[JobRecord, Record], missing: set[Path]
 ) -> Iterator[tuple[str, tuple[str, str]]]:
     entries = {record.path: each for record, each in records.items()}
+    places = list(repository.config.views), repository.config.bmode.sizes
     for case in repository.cases:
-        gates = [entries.get(record_path(repository.folder, stage, case)) for stage in GATES]
-        stopped = next((gate for gate in gates if gate is None or gate["status"] != "complete"), gates[-1])
-        views = [(stage, view) for stage in VIEW_STAGES for view in repository.config.views]
-        left = any(record_path(repository.folder, stage, case, view) in missing for stage, view in views)
-        if stopped is None or (stopped["status"] != "failed" and left):
+        mechanics, *others = record_paths(repository.folder, case, *places)
+        found = verdict(entries[mechanics], repository.config.physiology) if mechanics in entries else None
+        if found is None or (found.status != "failed" and missing & set(others)):
             yield case, ("unfinished", "not all of its jobs have been run")
         else:
-            yield case, (stopped["status"], stopped.get("reason", ""))
+            yield case, found
 
 
 def _failures(records: dict[JobRecord, Record]) -> Iterator[str]:
@@ -205,18 +205,18 @@ def _failures(records: dict[JobRecord, Record]) -> Iterator[str]:
         if record.view and entries["status"] == "failed":
             yield f"{record.job}: {entries.get('reason', '')}"
         for tracker, reason in sorted(entries.get("failures", {}).items()):
-            yield f"{tracker} on {record.case}, {record.view}: {reason}"
+            yield f"{tracker} on {record.case}, {record.view}, {record.size} px: {reason}"
 
 
-def _run(repository: Repository, records: dict[JobRecord, Record]) -> Run:
+def _run(repository: Inventory, records: dict[JobRecord, Record]) -> Run:
     ends = {record: record.path.stat().st_mtime for record in records}
     published = repository.publication_record
     attributes = _read(repository.folder, repository.store / ROOT).get("attributes", {})
     return Run(
-        started=_moment(min(ends[record] - entries.get("seconds", 0.0) for record, entries in records.items())),
+        started=_moment(min(ends.values())),
         ended=_moment(max([*ends.values(), *([published.stat().st_mtime] if published.is_file() else [])])),
         jobs=len(records),
-        hours=round(sum(entries.get("cpu_seconds", 0.0) for entries in records.values()) / 3600, 2),
+        hours=round(total(repository.folder) / 3600, 2),
         instructions=sorted({entries["instructions"] for entries in records.values() if "instructions" in entries}),
         packages=dict(sorted(attributes.get("packages", {}).items())),
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from echotruth.repository.checksums import checksums
 from echotruth.repository.description.attribution import DescriptionError
-from echotruth.repository.inventory import Repository, files_below
+from echotruth.repository.inventory import Inventory, files_below
 
 MEDIA_TYPES = {"yaml": "application/yaml", "cff": "application/yaml", "md": "text/markdown"}
 """Ending of a name -> media type, of those that Python does not know everywhere."""
@@ -47,12 +47,12 @@ def damaged(folder: Path, path: Path) -> DescriptionError:
     return DescriptionError(f"{path}: is missing or damaged: {remedy}")
 
 
-def store_files(repository: Repository, known: dict[str, str]) -> list[StoredFile]:
+def store_files(repository: Inventory, known: dict[str, str]) -> list[StoredFile]:
     """All files of the store.
 
     Parameters
     ----------
-    repository : Repository
+    repository : Inventory
     known : dict
         Path below the store -> SHA-256 in the ledger; what the ledger of an older repository lacks is taken here.
 

@@ -24,6 +24,6 @@ def digest(folder: Path, case: str, view: str) -> str:
     str
         Twelve hexadecimal digits of the SHA-256 of their checksums in the ledger; empty if it has none.
     """
-    records = [record_path(folder, stage, case, view) for stage in ("bmode", "truth")]
-    files = [ledger.read(path).get("sha256", {}) for path in records if path.is_file()]
+    folders = (record_path(folder, stage, case, view).with_suffix("") for stage in ("bmode", "truth"))
+    files = [ledger.read(path).get("sha256", {}) for one in folders for path in sorted(one.glob("[0-9]*.json"))]
     return sha256(json.dumps(files, sort_keys=True).encode()).hexdigest()[:12] if any(files) else ""

@@ -27,15 +27,24 @@ MEANING = {
 """Variable to the stored array that it is computed from, and its meaning."""
 
 
-def stored(variables: Iterable[str]) -> set[str]:
-    """Names of the stored arrays that variables of a clip are made from.
+def stored_names(variables: Iterable[str] | None, known: set[str]) -> set[str]:
+    """Names of the stored arrays that variables of a clip are made from; ValueError if there is no such variable.
 
     Parameters
     ----------
-    variables : iterable of str
-        Stored or computed.
+    variables : iterable of str, optional
+        Stored or computed. Default: all.
+    known : set of str
+        Stored arrays.
     """
-    return {MEANING[name][0] if name in MEANING else name for name in variables}
+    if variables is None:
+        return known
+    given = [variables] if isinstance(variables, str) else variables
+    asked = {MEANING[name][0] if name in MEANING else name for name in given}
+    if not asked or not asked <= known:
+        unknown = ", ".join(map(repr, sorted(asked - known))) or "none"
+        raise ValueError(f"variables: {unknown}: use any of {', '.join(sorted({*known, *MEANING} - {'label'}))}.")
+    return asked
 
 
 def derived(clip: xr.Dataset, config: Config) -> xr.Dataset:

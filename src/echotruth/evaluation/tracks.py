@@ -1,0 +1,67 @@
+"""The points at which trackers follow a clip of a repository: their motion, tracked and true."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echotruth.config import Config
+from echotruth.evaluation.strain import RADIUS, StrainOperator
+from echotruth.imaging.labels import unpack
+from echotruth.repository import estimates
+from echotruth.repository.choice import chosen
+from echotruth.repository.datasets import dataset
+from echotruth.repository.kept import NotEvaluated
+from echotruth.tracking.point_grid import grid_pixels, grid_positions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from echotruth.repository.reader import Repository
+
+_STRAIN, _ABOUT = ("frame", "axial", "lateral", "wall_component"), {"units": "1"}
+
+
+def tracks(
+    repository: Repository, case: str, view: str, size: int, trackers: Iterable[str] | None = None
+) -> xr.Dataset:
+    """Read what trackers found at the points of a clip; see :meth:`.Repository.tracks`."""
+    import xarray as xr
+
+    found = repository.case(case)
+    grid, known = grid_positions(found.config), chosen("tracker", trackers, repository.trackers)
+    points = {"lateral": grid[0, :, 0], "axial": grid[:, 0, 1]}
+    values = {}
+    for name in known:
+        try:
+            values[name] = estimates.tracked(repository, case, view, name, size, "displacement", "quality")
+        except NotEvaluated:
+            if trackers is not None:
+                raise
+    true = estimates.true(repository, case, view, "true_displacement", "true_strain", "wall_axes")
+    strain, tracked = _strain(true.pop("wall_axes"), grid, found.config), {}
+    for name, arrays in values.items():
+        tracked[name] = dataset(found, {"tracking/SIZE/TRACKER": arrays}, points)
+        tracked[name]["strain"] = (_STRAIN, strain(arrays["displacement"]), _ABOUT)
+    # As trackers find them, the points are pixel centres of the largest image.
+    labels = unpack(repository.read(f"truth/{repository.sizes[0]}/labels", *repository.place(case, view), 0))
+    at_points = {name: (_STRAIN[1:3], labels[name][grid_pixels(found.config)], _ABOUT) for name in ("layer", "segment")}
+    together = xr.concat(list(tracked.values()), xr.Variable("tracker", list(tracked)), combine_attrs="override")
+    truth = dataset(found, {"evaluation/SIZE": true}, points)
+    return together.assign(truth.data_vars).assign(at_points).assign_attrs(case=case, view=view, size_px=size)
+
+
+def _strain(axes: np.ndarray, grid: np.ndarray, config: Config) -> Callable[[np.ndarray], np.ndarray]:
+    """Function from a displacement on the grid to its strain, (frame, axial, lateral, 3), at the points with axes."""
+    inside = np.isfinite(axes).all((-2, -1))
+    radius = RADIUS * config.bmode.si().field_of_view
+    operator = StrainOperator(grid[inside], axes[inside].astype(float), radius)
+
+    def strain(displacement: np.ndarray) -> np.ndarray:
+        found = np.full((*displacement.shape[:3], 3), np.nan)
+        found[:, inside] = operator.strain(displacement[:, inside])
+        return found
+
+    return strain

@@ -1,0 +1,632 @@
+"""Reading a repository: its table of cases, its hearts, and its clips with their truth and what trackers found."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+
+from echotruth.cases import Case, all_cases, find_case
+from echotruth.config import Config
+from echotruth.config.loading import load, validate
+from echotruth.heart import Heart
+from echotruth.imaging.view import Plane
+from echotruth.repository import estimates, ledger, packing, schema
+from echotruth.repository.choice import Names, Sizes, chosen, image_size, main_view, require_known
+from echotruth.repository.datasets import clip_dataset
+from echotruth.repository.derived import stored_names
+from echotruth.repository.ledger import STAGES, imaged_statuses, repository_folder
+from echotruth.repository.remote import Remote, hierarchy, is_url
+from echotruth.repository.store import NotWritten
+from echotruth.repository.table import table_of
+from echotruth.repository.tree import open_tree
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from zarr.storage import ObjectStore
+
+    from echotruth.evaluation.clip_metrics import ClipMetrics
+
+
+class Repository:
+    """A repository that a run made, to be read.
+
+    Nothing is read before it is asked for, and of an array no more chunks than are needed. A case may be left out where
+    the repository has one heart, a view stands for the mid one, or else the first, a size for the largest, and a
+    tracker for the last of the configuration.
+
+    Parameters
+    ----------
+    repository : str or Path
+        `out/NAME`, `out/NAME/NAME.zarr`, or the address `s3://BUCKET/FOLDER` to which it was uploaded.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no repository.
+    RemoteError
+        If the address cannot be reached.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> demo = et.Repository("out/demo")
+    >>> list(demo.cases["status"]), demo.views, demo.sizes
+    (['complete'], ['base', 'mid', 'apex', 'long_axis'], [128])
+    """
+
+    def __init__(self, repository: str | Path) -> None:
+        self._remote: Remote | None = None
+        self._known: dict[str, Case] = {}
+        self._forget()
+        if is_url(repository):
+            self._place = str(repository).rstrip("/")
+            self._remote, self.store = hierarchy(self._place)
+        else:
+            self._place = str(repository_folder(repository))
+            self._folder = Path(self._place).absolute()  # whoever reads may change to another folder meanwhile
+
+    def _forget(self) -> None:
+        """Forget what is opened: Zarr has a thread for reading, which a forked process does not inherit."""
+        self._opened: dict[tuple[str, str], zarr.Array[Any]] = {}
+        self._labels: dict[tuple[str, str], list[str]] = {}
+        self._process = os.getpid()
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {name: value for name, value in vars(self).items() if name not in ("_opened", "_labels", "tree")}
+        return kept | {"_opened": {}, "_labels": {}}
+
+    def __repr__(self) -> str:
+        count = ", ".join(f"{number} {status}" for status, number in self.cases["status"].value_counts().items())
+        views = ", ".join(f"{name} ({view.plane.replace('_', ' ')})" for name, view in self.config.views.items())
+        lines = {
+            "hearts": count,
+            "views": views,
+            "sizes": f"{', '.join(map(str, self.sizes))} px",
+            "trackers": ", ".join(self.trackers),
+            "frames": str(self.config.loop.frames),
+            "path": self._place if self._remote else str(self._folder),
+        }
+        return "\n".join([f"Repository {self.config.name}", *(f"  {name:8}  {text}" for name, text in lines.items())])
+
+    @property
+    def is_remote(self) -> bool:
+        """Whether it is in object storage."""
+        return self._remote is not None
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the repository; FileNotFoundError if it is in object storage."""
+        if self._remote:
+            raise FileNotFoundError(f"{self._place}: is an address and not a folder: download it, and give the folder")
+        return self._folder
+
+    @cached_property
+    def store(self) -> Path | ObjectStore:
+        """The Zarr hierarchy, as Zarr and xarray open it."""
+        return self.folder / f"{self.config.name}.zarr"
+
+    @cached_property
+    def config(self) -> Config:
+        """Configuration, with its sweep."""
+        if self._remote:
+            return validate(self.attributes("")["config"], self._place)
+        return load(self.folder / "config.yaml")
+
+    @cached_property
+    def tree(self) -> xr.DataTree:
+        """All of it as one xarray DataTree, read when used.
+
+        It has one group per stage (docs/schema.md); `tree["cases"].to_dataset().to_dataframe()` is the table of cases
+        with all keys that can be swept. Cases and views that have left the configuration stay: the status of such a
+        case is `retired`, and `tree.attrs["config"]["views"]` are the present views.
+        """
+        return open_tree(self.store)
+
+    @cached_property
+    def cases(self) -> pd.DataFrame:
+        """Table of the cases, a row each, indexed by `case`.
+
+        Columns are `status` (complete, implausible, failed, retired or unfinished), `reason`, `heart` (the first case
+        with the same motion: cases that differ only in speckle, array or image share one), `diagnosis` and `label.*`,
+        and the keys whose value differs among the cases.
+        """
+        return table_of(self)
+
+    @cached_property
+    def rows(self) -> dict[str, int]:
+        """Row of every case that was ever registered."""
+        return self._registered("registry.txt")
+
+    @cached_property
+    def indices(self) -> dict[str, int]:
+        """Index of every view that was ever registered."""
+        return self._registered("views.txt")
+
+    @property
+    def views(self) -> list[str]:
+        """Views of the configuration that have a place in the store."""
+        return [view for view in self.config.views if view in self.indices]
+
+    @property
+    def sizes(self) -> list[int]:
+        """Pixels along a side of the images, the largest first."""
+        return list(self.config.bmode.sizes)
+
+    @property
+    def trackers(self) -> list[str]:
+        """Trackers of the configuration, and those of which `echotruth evaluate --keep` kept the motion."""
+        return estimates.trackers(self)
+
+    @property
+    def _tracker(self) -> str:
+        return list(self.config.tracking.trackers)[-1]
+
+    @cached_property
+    def present(self) -> list[str]:
+        """Cases of the configuration, in the order of their rows."""
+        return [str(case) for case in self.cases.index[self.cases["status"] != "retired"]]
+
+    @cached_property
+    def shown(self) -> list[str]:
+        """Cases that scores and figures take in: those that are complete, or implausible ones if these were imaged."""
+        for status in imaged_statuses(self.config.physiology.exclude_implausible):
+            if len(found := self.cases.index[self.cases["status"] == status]):
+                return [str(case) for case in found]
+        return []
+
+    def heart(self, case: str | None = None) -> Heart:
+        """Read a heart; :func:`echotruth.image` images it anew, with any probe and view.
+
+        Parameters
+        ----------
+        case : str, optional
+            Its id, as in `cases.csv`.
+
+        Examples
+        --------
+        >>> import echotruth as et
+        >>> heart = et.Repository("out/demo").heart()
+        >>> heart.displacement.shape == (heart.config.loop.frames, len(heart.nodes), 3)
+        True
+        """
+        found = self.case(case)
+        groups = ("geometry", "fibres", "pathology", "mechanics")
+        return Heart.of({group: self.arrays(group, found.id) for group in groups}, found.config)
+
+    def clip(
+        self, case: str | None = None, view: str | None = None, size: int | None = None, variables: Names = None
+    ) -> xr.Dataset:
+        """Read a clip with its truth, as :func:`echotruth.image` returns it.
+
+        Parameters
+        ----------
+        case, view : str, optional
+        size : int, optional
+            Pixels along a side.
+        variables : iterable of str, optional
+            Those to read, as `("image", "flow")`, and what follows from them. Default: all.
+
+        Raises
+        ------
+        ValueError
+            If there is no such case, view, size or variable, or it was not made.
+
+        Examples
+        --------
+        >>> import echotruth as et
+        >>> clip = et.Repository("out/demo").clip(view="long_axis", size=128, variables=("image", "flow"))
+        >>> clip["flow"].dims, clip["flow"].units
+        (('frame', 'to', 'axial', 'lateral', 'vector'), 'm')
+        """
+        found, view, size = self.case(case), self.view(view), image_size(self.config, size)
+        arrays = {f"bmode/{size}": schema.BMODE, f"truth/{size}": schema.TRUTH}
+        wanted = stored_names(variables, {array.name for group in arrays.values() for array in group})
+        names = {group: [array.name for array in members if array.name in wanted] for group, members in arrays.items()}
+        values = {group: self.arrays(group, found.id, view, *members) for group, members in names.items() if members}
+        return clip_dataset(self.heart(found.id), found, view, self.plane(found.id, view), values)
+
+    def tracks(
+        self, case: str | None = None, view: str | None = None, size: int | None = None, trackers: Names = None
+    ) -> xr.Dataset:
+        """Read what trackers found at the points of a clip, beside their true motion.
+
+        Parameters
+        ----------
+        case, view : str, optional
+        size : int, optional
+            Pixels along a side.
+        trackers : iterable of str, optional
+            Default: all that tracked this clip.
+
+        Returns
+        -------
+        Dataset
+            displacement (tracker, frame, axial, lateral, plane), m, quality (tracker, frame, axial, lateral) and strain
+            (tracker, frame, axial, lateral, wall_component), the strain by the operator of docs/conventions.md;
+            true_displacement (frame, axial, lateral, vector), m; true_strain (reference, frame, axial, lateral,
+            wall_component); and layer and segment (axial, lateral) of the point, 0 outside the wall. Motion is from
+            end-diastole.
+
+        Raises
+        ------
+        ValueError
+            If there is no such case, view, size or tracker, or a named one was not evaluated on this clip.
+
+        Examples
+        --------
+        >>> import echotruth as et
+        >>> points = et.Repository("out/demo").tracks(view="mid", size=128)
+        >>> error = points["displacement"].sel(tracker="dis") - points["true_displacement"].isel(vector=[0, 1]).values
+        >>> error.dims
+        ('frame', 'axial', 'lateral', 'plane')
+        """
+        from echotruth.evaluation.tracks import tracks
+
+        return tracks(self, self.case(case).id, self.view(view), image_size(self.config, size), trackers)
+
+    def curves(
+        self,
+        case: str | None = None,
+        view: str | None = None,
+        tracker: str | None = None,
+        size: int | None = None,
+        reference: str = "plane",
+    ) -> xr.Dataset:
+        """Read strain and rotation over the cycle, as a tracker found them and as they are (docs/strain.md).
+
+        Parameters
+        ----------
+        case, view, tracker : str, optional
+        size : int, optional
+            Pixels along a side.
+        reference : {"plane", "heart", "operator"}
+            What the true strain of regions and segments is: that of the motion in the plane, which an image can show;
+            that of the heart in space; or that of the operator for tracked strain, applied to the true displacement.
+
+        Returns
+        -------
+        Dataset
+            Of `tracked_` and `true_` each, from end-diastole (frame 0): `region_strain` (measure, frame, region,
+            wall_component), mean over the points of the whole wall (region 0) or of a layer (1 at the endocardium);
+            `segment_strain` (measure, frame, aha, wall_component), NaN where the view does not show a segment;
+            `line_strain` (frame, contour), the relative change of a contour's length, which is circumferential (GCS) in
+            a short axis and longitudinal (GLS) in a long axis; `rotation` (frame), rad, counter-clockwise seen from the
+            apex, NaN in a long axis; and of each its `_rate`, per second. Measures are `engineering` and
+            `green_lagrange`, components RR (radial), TT (circumferential or longitudinal) and RT (shear; engineering:
+            rad). `time` (frame) is in s, and the attributes tell es_frame and end_systole (s). The true curves do not
+            depend on the tracker.
+
+        Raises
+        ------
+        ValueError
+            If there is no such case, view, tracker, size or reference.
+
+        Examples
+        --------
+        >>> import echotruth as et
+        >>> curves = et.Repository("out/demo").curves(view="mid", tracker="bspline_dic")
+        >>> gcs = curves[["tracked_line_strain", "true_line_strain"]].sel(contour="middle")
+        >>> gcs["tracked_line_strain"].dims, gcs["tracked_line_strain"].units
+        (('frame',), '1')
+        """
+        from echotruth.evaluation.curves import strain_curves
+
+        return strain_curves(self, self.case(case).id, self.view(view), tracker or self._tracker, size, reference)
+
+    def twist(self, case: str | None = None, tracker: str | None = None, size: int | None = None) -> xr.Dataset:
+        """Read the twist over the cycle: the rotation of the most apical less that of the most basal short-axis view.
+
+        Parameters
+        ----------
+        case, tracker : str, optional
+        size : int, optional
+            Pixels along a side.
+
+        Returns
+        -------
+        Dataset
+            `tracked_twist` and `true_twist` (frame), rad, counter-clockwise seen from the apex, their `_rate`, rad/s,
+            and `heart_twist`, that of the slices of tissue in the group physiology; the attributes basal_view and
+            apical_view.
+
+        Raises
+        ------
+        ValueError
+            If there is no such case, tracker or size, or there are fewer than two short-axis views.
+
+        Examples
+        --------
+        >>> import echotruth as et
+        >>> twist = et.Repository("out/demo").twist()
+        >>> twist.attrs["apical_view"], twist.attrs["basal_view"], twist["tracked_twist"].units
+        ('apex', 'base', 'rad')
+        """
+        from echotruth.evaluation.curves import twist_curves
+
+        return twist_curves(self, self.case(case).id, tracker or self._tracker, size)
+
+    @property
+    def scores(self) -> pd.DataFrame:
+        """Scores of every clip by every tracker, external ones included: the rows from which the leaderboard is made.
+
+        Columns are case, view, size_px, tracker, the metrics of docs/conventions.md, each with its unit in its name,
+        and `failure`: why the tracker failed, or "".
+        """
+        from echotruth.evaluation.leaderboard import rows
+
+        return rows(self)
+
+    def summary(
+        self, cases: Names = None, views: Names = None, sizes: Sizes = None, trackers: Names = None
+    ) -> pd.DataFrame:
+        """Read GLS, GCS, radial strain, rotation and twist of clips into a table, tracked and true.
+
+        Parameters
+        ----------
+        cases, views, sizes, trackers : iterable, optional
+            Those to include. Default: all that was evaluated, at the largest size.
+
+        Returns
+        -------
+        DataFrame
+            One row per case, view, size_px, tracker and `quantity`: gls and gls_endocardial (long axis), gcs and
+            gcs_endocardial (short axis), radial (engineering, mean of the wall, in the plane), all in %, and rotation
+            (short axis), in degrees. Rows of the view "all" are those of the heart: gls as the mean over its long-axis
+            views, gcs and radial over its short-axis views, if all of these are included, and twist. Columns `tracked_`
+            and `true_` each: `es` and `peak`, in the `unit`; `time_to_peak_ms`; and `systolic_rate`, in the
+            `rate_unit`.
+
+        Examples
+        --------
+        >>> import echotruth as et
+        >>> table = et.Repository("out/demo").summary(trackers=["bspline_dic"])
+        >>> gls = table.query("quantity == 'gls' and view == 'long_axis'")[["tracked_es", "true_es", "unit"]]
+        >>> list(gls["unit"])
+        ['percent']
+        """
+        from echotruth.evaluation.summary import strain_summary
+
+        return strain_summary(self, cases, views, sizes, trackers)
+
+    def metrics(
+        self, cases: Names = None, views: Names = None, sizes: Sizes = None, trackers: Names = None
+    ) -> ClipMetrics:
+        """Read the metrics of clips and trackers, as benchmarks of trackers and of strain print them (docs/metrics.md).
+
+        Parameters
+        ----------
+        cases, views, sizes, trackers : iterable, optional
+            Those to include. Default: all that was evaluated.
+
+        Returns
+        -------
+        ClipMetrics
+            Three tables. `clips` has a row per case, view, size_px and tracker; `segments` one per clip, tracker, AHA
+            segment and component of strain; `reliability` one per clip, tracker and tenth of quality. docs/metrics.md
+            tells their columns, which name their units. All begin with case, view, plane, size_px and tracker, and with
+            heart, split, group, acoustics and variation, which are labels of the table of cases, "" where it has none
+            (without a label, heart is that of the first case with the same motion), and the diagnosis.
+
+        Examples
+        --------
+        >>> import echotruth as et
+        >>> clips = et.Repository("out/demo").metrics(views=["mid"], trackers=["dis", "bspline_dic"]).clips
+        >>> list(clips["tracker"]), bool(clips["delta_avg_percent"].between(0, 100).all())
+        (['dis', 'bspline_dic'], True)
+        """
+        from echotruth.evaluation.clip_metrics import clip_metrics
+
+        return clip_metrics(self, cases, views, sizes, trackers)
+
+    def difficulty(self, case: str | None = None, view: str | None = None) -> pd.DataFrame:
+        """Determine with what error a clip can be tracked at best (docs/difficulty.md); what is found is kept.
+
+        Parameters
+        ----------
+        case, view : str, optional
+
+        Returns
+        -------
+        DataFrame
+            A row of each image size: case, view, size_px; `floor_plane_percent`, the NRMSE at end-systole of a perfect
+            tracker of the plane, whose points go from frame to frame with the tissue that is in the plane where they
+            are (forwards and backwards as trackers combine it, and `_forward` and `_backward` alone), and
+            `floor_plane_coverage`, the fraction of the points that it keeps in the wall; `floor_crb_percent`, the
+            Cramer-Rao bound of the error at end-systole over the RMS displacement, for a smooth motion of
+            `crb_parameters` parameters for each component (and each way alone); `floor_percent`, the root of the sum of
+            the squares of both; `crb_step_um`, the bound of a step, RMS over the cycle; and the correlation of echo
+            amplitudes in the wall along the path of that tracker: `correlation_median` and `_least` of consecutive
+            frames, `_closing` of the last with the first, `_es` of end-systole with end-diastole. NaN where images hold
+            no information.
+
+        Examples
+        --------
+        >>> import echotruth as et
+        >>> floors = et.Repository("out/demo").difficulty(view="mid")
+        >>> list(floors.columns[:4])
+        ['case', 'view', 'size_px', 'floor_percent']
+        """
+        from echotruth.evaluation.difficulty.table import difficulties
+
+        found = self.case(case).id, self.view(view)
+        if problem := self.problem(*found, "truth", "bmode"):
+            raise ValueError(problem)
+        return difficulties(self, [found[0]], [found[1]])
+
+    def all_cases(self) -> list[Case]:
+        """All cases of the configuration, each with its own."""
+        self._known |= all_cases(self.config)
+        return list(self._known.values())
+
+    def case(self, case: str | None = None) -> Case:
+        """A case by its id, with its configuration; that of the only heart if none is given.
+
+        Raises
+        ------
+        ValueError
+            If there is no such case, or there are several to choose from.
+        """
+        if case is None:
+            if len(self.present) != 1:
+                choices = ", ".join(self.present[:20])
+                raise ValueError(f"case: {self._place} has {len(self.present)} hearts: give one of {choices}.")
+            case = self.present[0]
+        if case not in self._known:
+            self._known[case] = find_case(self.config, require_known("case", case, self.rows))
+        return self._known[case]
+
+    def view(self, view: str | None = None) -> str:
+        """Name of a view that there is: that which is asked for, or the main one."""
+        return main_view(self.config) if view is None else require_known("view", view, self.config.views)
+
+    def finished(self, cases: Names, views: Names, *stages: str) -> list[tuple[Case, list[str]]]:
+        """Cases of the configuration that are asked for, and of each the views of which some stages are complete."""
+        wanted = chosen("view", views, self.config.views)
+        known = {case.id: case for case in self.all_cases()}
+        found = [known[case] for case in chosen("case", cases, known)]
+        return [(case, [view for view in wanted if not self.problem(case.id, view, *stages)]) for case in found]
+
+    def problem(self, case: str, view: str | None, *stages: str) -> str:
+        """Why stages of a heart, or of one of its views, are not complete, in one sentence; "" if they are."""
+        for stage in stages:
+            for size in self.sizes if "size" in STAGES[stage] else [None]:
+                if problem := self._problem(case, view if "view" in STAGES[stage] else None, stage, size):
+                    return problem
+        return ""
+
+    def _problem(self, case: str, view: str | None, stage: str, size: int | None) -> str:
+        what = " ".join(filter(None, [case, view]))
+        try:
+            record = self.record(stage, case, view, size)
+        except ValueError:
+            path = ledger.record_path(Path(self._place), stage, case, view, size)
+            return f"{path} is damaged: run echotruth check {self._place} --heal, and the configuration again"
+        if not record:
+            return f"{self._place} has no {stage} of {what} yet: run it to its end"
+        if record.get("status") != "complete":
+            return f"{what} of {self._place} is {record.get('status')}: cases.csv says why"
+        return ""
+
+    def record(self, stage: str, case: str, view: str | None = None, size: int | None = None) -> dict[str, Any]:
+        """Record of a job in the ledger; empty if it is not done."""
+        text = self._text(ledger.record_path(Path(), stage, case, view, size).as_posix())
+        return ledger.parse(text) if text else {}
+
+    def plane(self, case: str, view: str) -> Plane:
+        """The imaging plane of a view in the heart frame."""
+        return Plane(**self.arrays("phantom", case, view, "origin", "axes"))
+
+    def place(self, case: str, view: str | None = None) -> tuple[int, ...]:
+        """Row of a case, and index of a view: their places in the store, which never change."""
+        row = self.rows[require_known("case", case, self.rows)]
+        return (row,) if view is None else (row, self.indices[require_known("view", view, self.indices)])
+
+    def arrays(
+        self,
+        group: str,
+        case: str,
+        view: str | None = None,
+        *names: str,
+        store: Path | None = None,
+    ) -> dict[str, NDArray[Any]]:
+        """Arrays of a group for one case (and view).
+
+        Parameters
+        ----------
+        group : str
+            As "bmode/512".
+        case : str
+        view : str, optional
+        *names : str
+            Names of arrays and of members of packs. Default: all.
+        store : Path, optional
+            Another hierarchy with the same rows.
+
+        Raises
+        ------
+        NotWritten
+            If the job of this case (and view) did not write one of them.
+        """
+        place, packs = self.place(case, view), schema.packs_of(group)
+        holder = {name: pack.array.name for pack in packs for name in pack.names}
+        wanted = dict.fromkeys(holder.get(name, name) for name in names) if names else self.names(group)
+        found = {}
+        for array in (array for array in schema.arrays_of(group) if array.name in wanted):
+            path = f"{group}/{array.name}"
+            if not (store or self.is_written(path, case, view)):
+                what = " ".join(filter(None, [case, view]))
+                raise NotWritten(f"{self._place}: {path} has no data of {what}: run it to its end")
+            found[array.name] = self.read(path, *place[: array.leading], store=store)
+        labels = {
+            pack.dimension: self.labels(f"{group}/{pack.dimension}", store)
+            for pack in packs
+            if pack.array.name in found
+        }
+        values = packing.unpack(packs, found, labels)
+        return {name: values[name] for name in names} if names else values
+
+    def array(self, path: str, store: Path | None = None) -> zarr.Array[Any]:
+        """An array by its path, as "bmode/256/image"; opened once in each process."""
+        if self._process != os.getpid():
+            self._forget()
+        key = str(store or ""), path
+        if key not in self._opened:
+            try:
+                self._opened[key] = zarr.open_array(store or self.store, path=path, mode="r")
+            except FileNotFoundError:
+                remedy = "run its configuration again with this version of echotruth"
+                raise FileNotFoundError(f"{self._place}: has no array {path}: {remedy}") from None
+        return self._opened[key]
+
+    def read(self, path: str, *index: Any, store: Path | None = None) -> NDArray[Any]:
+        """Part of an array, given its indices and slices; only the chunks that hold it are read."""
+        return np.asarray(self.array(path, store)[index])
+
+    def labels(self, path: str, store: Path | None = None) -> list[str]:
+        """Values of a coordinate or column that is text, as "physiology/scalar"; read once."""
+        key = str(store or ""), path
+        if key not in self._labels:
+            self._labels[key] = [str(value) for value in self.read(path, ..., store=store)]
+        return self._labels[key]
+
+    def names(self, group: str) -> list[str]:
+        """Names of the arrays of a group, sorted; none if there is no such group."""
+        with suppress(FileNotFoundError):
+            return sorted(zarr.open_group(self.store, path=group, mode="r").array_keys())
+        return []
+
+    def attributes(self, group: str) -> dict[str, Any]:
+        """Attributes of a group, those of the repository for ""; none if there is no such group."""
+        with suppress(FileNotFoundError):
+            return zarr.open_group(self.store, path=group, mode="r").attrs.asdict()
+        return {}
+
+    def is_written(self, path: str, case: str, view: str | None = None) -> bool:
+        """Whether the job of a case (and view) wrote its part of an array; of others Zarr reads fill values."""
+        group, _, name = path.rpartition("/")
+        array = next(array for array in schema.arrays_of(group) if array.name == name)
+        file = f"{group}/{array.shard(self.place(case, view)[: array.leading])}"
+        if self._remote:
+            return self._remote.has(f"{self.config.name}.zarr/{file}")
+        shard = self.folder / f"{self.config.name}.zarr" / file
+        return shard.is_file() and shard.stat().st_size > 0
+
+    def _registered(self, name: str) -> dict[str, int]:
+        """Place of each case or view: the number of its line."""
+        return {id: row for row, id in enumerate(self._text(name).split())}
+
+    def _text(self, name: str) -> str:
+        """Content of a text file in the folder; empty if there is none."""
+        with suppress(FileNotFoundError, NotADirectoryError):
+            return (self._remote.get(name) if self._remote else (self.folder / name).read_bytes()).decode(
+                errors="replace"
+            )
+        return ""
