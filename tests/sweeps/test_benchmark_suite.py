@@ -7,7 +7,7 @@ import pytest
 
 from echotruth.cases import diagnosis, expand
 from echotruth.config.loading import load
-from echotruth.workflow.settings import motions
+from echotruth.repository.settings import motions
 
 ROOT = Path(__file__).parents[2]
 SUITES = {

@@ -14,7 +14,7 @@ from echotruth.repository import ledger
 from echotruth.repository.checksums import verify
 from echotruth.repository.store import Store
 from echotruth.workflow.job import Job
-from echotruth.workflow.settings import mechanics_settings, motions
+from echotruth.repository.settings import mechanics_settings, motions
 from echotruth.workflow.sharing import first_with_same
 
 SETTINGS = {

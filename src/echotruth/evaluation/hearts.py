@@ -5,7 +5,7 @@ from __future__ import annotations
 from echotruth.cases import Case
 from echotruth.cases.case import Label
 from echotruth.cases.ids import integer_if_whole
-from echotruth.workflow.settings import motions
+from echotruth.repository.settings import motions
 
 
 def hearts_of(cases: dict[str, Case]) -> dict[str, str]:

@@ -14,8 +14,8 @@ from statistics import median
 from typing import Any
 
 from echotruth.config import Config
-from echotruth.workflow.imaged_tissue import areas, scatterers, wall_scatterers
 from echotruth.repository.benchmark_files import core_seconds
+from echotruth.workflow.imaged_tissue import areas, scatterers, wall_scatterers
 from echotruth.workflow.jobs import places
 
 START_SECONDS = 0.6

@@ -14,7 +14,8 @@ from echotruth.repository import ledger
 from echotruth.repository.ledger import record_path, record_paths
 from echotruth.repository.provenance import code_version, settings_version
 from echotruth.repository.verdict import excluded
-from echotruth.workflow import demand, lease, settings
+from echotruth.repository import settings
+from echotruth.workflow import demand, lease
 from echotruth.workflow.blocks import Block
 from echotruth.workflow.processes import script
 from echotruth.workflow.sharing import first_with_same
