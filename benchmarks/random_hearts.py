@@ -59,7 +59,8 @@ def solved(number: int, elements: tuple[int, int, int]) -> dict[str, Any]:
     from echotruth.config import Config
     from echotruth.config.loading import override
     from echotruth.mechanics.beat import beat
-    from echotruth.mechanics.physiology import measures, violated_bound
+    from echotruth.mechanics.bounds import violated_bound
+    from echotruth.mechanics.physiology import measures
     from echotruth.mechanics.solver.newton import Diverged
 
     numba.set_num_threads(1)

@@ -8,7 +8,8 @@ from echotruth.config.loading import override
 from echotruth.loop.cycle import read_loop
 from echotruth.loop.phases import CONTRACTION, EJECTION, FILLING, RELAXATION
 from echotruth.mechanics.beat import beat
-from echotruth.mechanics.physiology import BOUNDS, measures, tension_variation, violated_bound
+from echotruth.mechanics.bounds import BOUNDS, tension_variation, violated_bound
+from echotruth.mechanics.physiology import measures
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation, slice_rotation
 from echotruth.repository.schema import named

@@ -25,7 +25,8 @@ from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.beat import simulate
-from echotruth.mechanics.physiology import measures, violated_bound
+from echotruth.mechanics.bounds import violated_bound
+from echotruth.mechanics.physiology import measures
 from echotruth.notebook.arguments import check_clip, check_heart
 from echotruth.repository.choice import image_size
 from echotruth.repository.datasets import as_stored, case_of, clip_dataset, dataset, plane_of

@@ -15,8 +15,8 @@ from PIL import Image
 from echotruth.evaluation.hearts import hearts_of
 from echotruth.evaluation.leaderboard import best, standings
 from echotruth.heart import Heart
+from echotruth.mechanics.bounds import CC
 from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
-from echotruth.mechanics.physiology import CC
 from echotruth.report import (
     bullseye,
     clip,

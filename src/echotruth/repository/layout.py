@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
-from pydantic import ValidationError
 
 from echotruth.cases import RF_INDEPENDENT, Case, table
 from echotruth.config import Config
@@ -21,6 +20,7 @@ from echotruth.loop.cycle import frame_times
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.motion_file.wall import moving_wall
 from echotruth.repository import durable, ledger, schema
+from echotruth.repository.case_file import case_path
 from echotruth.repository.store import Store
 from echotruth.tracking import grid
 
@@ -58,28 +58,6 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     texts = {case_path(folder, case.id): case.config.model_dump_json() for case in cases}
     texts |= {folder / "cases.csv": case_table.to_csv(index=False), folder / "config.yaml": _as_yaml(config)}
     durable.update_all({path: text.encode() for path, text in texts.items()})
-
-
-def case_path(folder: Path, case: str) -> Path:
-    """File with the configuration of one heart, which its jobs read."""
-    return folder / "cases" / f"{case}.json"
-
-
-def read_case(folder: Path, case: str) -> Case:
-    """The heart of a job.
-
-    Raises
-    ------
-    FileNotFoundError
-        If it has no configuration, or one that is damaged.
-    """
-    path, remedy = case_path(folder, case), "the ids are in cases.csv; run the repository again, which writes the file"
-    try:
-        return Case(case, {}, Config.model_validate_json(path.read_bytes()))
-    except FileNotFoundError:
-        raise FileNotFoundError(f"{path}: is not there: {remedy}") from None
-    except ValidationError:
-        raise FileNotFoundError(f"{path}: is damaged: {remedy}") from None
 
 
 def _rf_metadata(

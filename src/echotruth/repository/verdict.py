@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from echotruth.config import Config
 from echotruth.config.physiology import Physiology
-from echotruth.mechanics.physiology import violation
+from echotruth.mechanics.bounds import violation
 from echotruth.repository import ledger
 from echotruth.repository.ledger import record_path
 

@@ -20,14 +20,14 @@ import zarr
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from echotruth.cases import Case
+from echotruth.cases.case import Case
 from echotruth.config import View
 from echotruth.config.loading import ConfigError
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.repository import ledger, packing, schema
+from echotruth.repository.case_file import read_case
 from echotruth.repository.checksums import ChecksumError, checksums
-from echotruth.repository.layout import read_case
 from echotruth.repository.ledger import STAGES, record_path
 from echotruth.repository.provenance import code_version
 from echotruth.repository.store import NotWritten, Store

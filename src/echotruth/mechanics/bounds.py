@@ -1,0 +1,156 @@
+"""Bounds on the measures of a heart, within which it is plausible (section `physiology` of the configuration)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from operator import ge, itemgetter, le
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from echotruth.arrays import Floats
+from echotruth.config.physiology import Physiology
+
+RR, CC, LL, RC, RL, CL = range(6)
+"""Indices of the components of strain."""
+
+
+class Bound(NamedTuple):
+    """A bound on a measure.
+
+    Attributes
+    ----------
+    key : str
+        Of the section `physiology`; it ends in `min` or `max`, and its unit.
+    description : str
+    value : callable
+        Values of the group `physiology`, or of a course that they leave out, in the unit of the key; the most extreme
+        counts.
+    healthy : bool
+        Whether it is that of healthy hearts alone; what could not be measured violates no such bound.
+    """
+
+    key: str
+    description: str
+    value: Callable[[Mapping[str, ArrayLike]], ArrayLike]
+    healthy: bool = False
+
+
+def _at(measure: str, component: int) -> Callable[[Mapping[str, ArrayLike]], ArrayLike]:
+    return lambda measured: np.asarray(measured[measure])[..., component]
+
+
+def _in_degrees(measure: str) -> Callable[[Mapping[str, ArrayLike]], ArrayLike]:
+    return lambda measured: np.degrees(measured[measure])
+
+
+def _in_kPa(measure: str) -> Callable[[Mapping[str, ArrayLike]], ArrayLike]:
+    return lambda measured: np.asarray(measured[measure]) / 1e3
+
+
+def _range(name: str, unit: str, description: str, value: Callable, healthy: bool) -> tuple[Bound, Bound]:
+    """Bounds on both sides; `unit` is the suffix of their keys."""
+    low, high = (Bound(f"{name}_{side}{unit}", description, value, healthy) for side in ("min", "max"))
+    return low, high
+
+
+_IVC, _ES = "at the end of isovolumic contraction", "at end-systole"
+BOUNDS = (
+    Bound("loop_error_max", "the largest relative error of pressure or volume", itemgetter("loop_error")),
+    Bound("volume_ratio_min", "the smallest det F of all points and frames", itemgetter("volume_ratio_min")),
+    Bound("longitudinal_strain_max", f"the mean longitudinal strain {_ES}", itemgetter("longitudinal_strain")),
+    Bound("twist_max_deg", "the largest twist (deg)", lambda measured: np.abs(np.degrees(measured["twist"]))),
+    *_range("ejection_fraction", "", "the ejection fraction", itemgetter("ejection_fraction"), False),
+    Bound("tension_min_kPa", "the smallest active tension (kPa)", _in_kPa("tension_min")),
+    Bound(
+        "tension_variation_max",
+        "the total variation of the active tension over that of one rise and fall",
+        lambda measured: tension_variation(np.asarray(measured["active_tension"])),
+    ),
+    *_range("tension_es", "_kPa", f"the active tension {_ES} (kPa)", _in_kPa("tension_es"), False),
+    *_range("twist_ivc", "_deg", f"the twist {_IVC} (deg)", _in_degrees("twist_ivc"), True),
+    *_range("twist_es", "_deg", f"the twist {_ES} (deg)", _in_degrees("twist_es"), True),
+    Bound("radial_strain_ivc_max", f"the mean radial strain {_IVC}", _at("strain_ivc", RR), True),
+    Bound(
+        "transmural_shear_ivc_max",
+        f"the largest mean of E_RC or E_RL over a layer {_IVC}",
+        lambda measured: np.abs(np.asarray(measured["layer_strain_ivc"])[..., [RC, RL]]),
+        True,
+    ),
+    *_range("circumferential_strain", "", f"the mean circumferential strain {_ES}", _at("strain_es", CC), True),
+    *_range("gls", "", "the global longitudinal strain", itemgetter("gls"), True),
+    *_range("torsional_shear", "", f"the mean shear strain E_CL {_ES}", _at("strain_es", CL), True),
+    *_range("tei_index", "", "the Tei index", itemgetter("tei_index"), True),
+)
+"""Order of checks: accuracy of the solution, what no heart does, what no healthy heart does."""
+
+
+def tension_variation(tension: Floats) -> float:
+    """Total variation of the active tension around the cycle, over that of one rise and one fall of the same height.
+
+    sum |T_(k+1) - T_k| / (2 (max T - min T)), from the last frame to the first too: 1 of a tension that rises once and
+    falls once, and more the more it oscillates.
+
+    Parameters
+    ----------
+    tension : ndarray of shape (frame,), Pa
+
+    Returns
+    -------
+    float
+        1 of a tension that does not change.
+    """
+    steps, height = np.abs(np.diff(tension, append=tension[0])), np.ptp(tension)
+    return 1.0 if height == 0 else float(steps.sum() / (2 * height))
+
+
+def bounded(measured: Mapping[str, ArrayLike], healthy: bool = True) -> dict[str, float]:
+    """The values of a heart that have bounds, in the unit of their keys.
+
+    Parameters
+    ----------
+    measured : dict of ndarray
+        As :func:`measures` returns it, and `active_tension` (frame,), Pa, of the group `mechanics`.
+    healthy : bool, optional
+        Whether the bounds of healthy hearts apply too; not to a heart with an infarct or late activation.
+
+    Returns
+    -------
+    dict
+        Key of the section `physiology` -> the most extreme value; none of what could not be measured, and not a number
+        where there is no healthy bound to violate.
+    """
+    values = {}
+    for bound in BOUNDS:
+        found = np.atleast_1d(bound.value(measured)).astype(float)
+        if bound.healthy:
+            found = found[np.isfinite(found)]
+        if found.size and (healthy or not bound.healthy):
+            values[bound.key] = float(np.max(found) if "_max" in bound.key else np.min(found))
+    return values
+
+
+def violated_bound(measured: Mapping[str, ArrayLike], bounds: Physiology, healthy: bool = True) -> str:
+    """The first bound that a heart violates, in one sentence; empty where there is none; parameters as of `bounded`."""
+    return violation(bounded(measured, healthy), bounds)
+
+
+def violation(values: dict[str, float], bounds: Physiology) -> str:
+    """The first bound that values violate, in one sentence; empty where there is none.
+
+    Parameters
+    ----------
+    values : dict
+        As :func:`bounded` returns them.
+    bounds : Physiology
+    """
+    for bound in BOUNDS:
+        limit = getattr(bounds, bound.key)
+        if limit is None or bound.key not in values:
+            continue
+        holds, rule = (le, "at most") if "_max" in bound.key else (ge, "at least")
+        if not holds(values[bound.key], limit):
+            value = values[bound.key]
+            return f"{bound.description} is {value:.3g} and must be {rule} {limit:g} (physiology.{bound.key})."
+    return ""

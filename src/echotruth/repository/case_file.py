@@ -1,0 +1,32 @@
+"""The configuration of one heart, cases/CASE.json, which its jobs read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from echotruth.cases.case import Case
+from echotruth.config import Config
+
+
+def case_path(folder: Path, case: str) -> Path:
+    """File with the configuration of one heart, which its jobs read."""
+    return folder / "cases" / f"{case}.json"
+
+
+def read_case(folder: Path, case: str) -> Case:
+    """The heart of a job.
+
+    Raises
+    ------
+    FileNotFoundError
+        If it has no configuration, or one that is damaged.
+    """
+    path, remedy = case_path(folder, case), "the ids are in cases.csv; run the repository again, which writes the file"
+    try:
+        return Case(case, {}, Config.model_validate_json(path.read_bytes()))
+    except FileNotFoundError:
+        raise FileNotFoundError(f"{path}: is not there: {remedy}") from None
+    except ValidationError:
+        raise FileNotFoundError(f"{path}: is damaged: {remedy}") from None
