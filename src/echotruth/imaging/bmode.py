@@ -115,10 +115,8 @@ def downsample(images: np.ndarray, divisor: int) -> np.ndarray:
     *rest, rows, columns = images.shape
     if rows % divisor or columns % divisor:
         raise ValueError(f"An image of {rows} x {columns} px cannot be divided into blocks of {divisor} px.")
-    from skimage.transform import downscale_local_mean
-
-    means = downscale_local_mean(images.astype(np.float32), (*np.ones(len(rest), int), divisor, divisor))
-    return np.rint(means).astype(np.uint8)
+    blocks = images.reshape(*rest, rows // divisor, divisor, columns // divisor, divisor)
+    return np.rint(blocks.mean(axis=(-3, -1), dtype=np.float32)).astype(np.uint8)
 
 
 def envelope_images(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, gain=1.0) -> np.ndarray:
