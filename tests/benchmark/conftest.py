@@ -20,6 +20,7 @@ import numpy as np
 
 from echotruth.config.tracking import Dis
 from echotruth.tracking.tracker import track
+from echotruth.repository.reader import Repository
 from echotruth.workflow.job import Job
 
 
@@ -55,7 +56,7 @@ NAMES = ("honest", "reading")
 def evaluated(folder, name, cases, **options):
     """Scores of a submission, which is evaluated on the repository and kept."""
     settings = {"method": "external", "track": f"submissions:{name}", "options": options}
-    run = prepare(folder, name, settings, keep=True)
+    run = prepare(Repository(folder), name, settings, keep=True)
     run.check_writable()
     return run.write(list(run.rows(run.case_views(cases, []), run.sizes([]))))
 

@@ -42,8 +42,6 @@ def benchmark(arguments: argparse.Namespace) -> int:
     """Rank trackers; return 0, 1 if a check fails, or 2 if it cannot be done."""
     from echotruth.benchmark import records
     from echotruth.benchmark.page import Page, check_writable
-    from echotruth.config.loading import ConfigError
-    from echotruth.evaluation.tracker_options import EvaluationError
 
     if arguments.page is not None and arguments.page.suffix != ".md":
         return fail(f"--page {arguments.page}: must be a Markdown file: give a name that ends in .md")
@@ -59,7 +57,7 @@ def benchmark(arguments: argparse.Namespace) -> int:
         if arguments.page is not None:
             print(f"\nPage: {page.write(arguments.page, _command(arguments))}")
         verdicts = [page.verdict(tracker) for tracker in arguments.check]
-    except (EvaluationError, ConfigError) as error:
+    except ValueError as error:
         return fail(str(error))
     print("\n".join(verdict.text for verdict in verdicts))
     return 1 if any(verdict.flags for verdict in verdicts) else 0

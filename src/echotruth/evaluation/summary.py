@@ -105,7 +105,7 @@ def _rows(repository: Repository, case: Case, views: list[str], sizes: list[int]
             yield from rows
             yield from _means(rows, config, keys)
             if ends is not None and set(ends) <= set(curves):
-                twist = strain_peaks(twist_of(*(curves[view] for view in ends)))
+                twist = strain_peaks(twist_of(curves[ends[0]], curves[ends[1]]))
                 yield keys | {"view": ALL_VIEWS} | _row("twist", "twist", {}, twist)
 
 

@@ -8,8 +8,10 @@ from typing import TypeVar
 from echotruth.config import Config
 
 Name = TypeVar("Name", str, int)
-Names, Sizes = Iterable[str] | None, Iterable[int] | None
-"""Those to choose; all if there are none."""
+Names = Iterable[str] | None
+"""Names to choose; a text is a single one, and None stands for all."""
+Sizes = Iterable[int] | None
+"""Image sizes to choose, px; None stands for all."""
 
 
 def require_known(what: str, name: Name, known: Collection[Name]) -> Name:

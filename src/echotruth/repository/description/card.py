@@ -83,8 +83,8 @@ def _reading(facts: Facts) -> str:
     return f"""```python
 import echotruth as et
 
-tree = et.open("{facts.name}")  # this folder; all of it, as an xarray DataTree
-clip = et.load_clip("{facts.name}", case="{case}", view="{view}")  # one clip with its truth
+repository = et.Repository("{facts.name}")  # this folder; repository.tree is all of it, as an xarray DataTree
+clip = repository.clip("{case}", "{view}")  # one clip with its truth
 print(clip["image"].shape, clip["displacement"].isel(frame=-1).mean().values)  # pixels; m
 ```
 
