@@ -11,6 +11,7 @@ from echotruth.benchmark import records
 from echotruth.benchmark.page import Page
 from echotruth.benchmark.rerun import rerun
 from echotruth.evaluation.run import prepare
+from echotruth.repository.reader import Repository
 
 SUBMISSIONS = '''
 import sys
@@ -20,7 +21,6 @@ import numpy as np
 
 from echotruth.config.tracking import Dis
 from echotruth.tracking.tracker import track
-from echotruth.repository.reader import Repository
 from echotruth.workflow.job import Job
 
 

@@ -20,6 +20,7 @@ from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.run import prepare
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import estimates, ledger
+from echotruth.repository.kept import KeptError
 from echotruth.repository.reader import Repository
 
 pytestmark = pytest.mark.slow
@@ -58,7 +59,7 @@ def test_scores_on_mirrored_clips_of_older_images_do_not_count(repository):
     found = result_of(repository, "honest", "mirrored")
     assert list(found.rows["case"]) == ["b_ideal"] and found.older == 1
     result_path(repository, "honest", "mirrored").write_text("[1, 2")
-    with pytest.raises(EvaluationError, match=r"honest\.mirrored\.json: is not what was written: delete it"):
+    with pytest.raises(ValueError, match=r"honest\.mirrored\.json: is not what was written: delete it"):
         result_of(repository, "honest", "mirrored")
 
 
@@ -223,7 +224,7 @@ def test_damaged_store_of_what_a_tracker_found_is_told_in_a_sentence(repository,
         (store / "zarr.json").write_text(content)
     sentence = r"honest\.zarr: is not what echotruth evaluate --keep wrote: evaluate honest again"
     for what in (lambda: records.read([repository], []), lambda: prepare_rerun(repository, "honest", "open", "test")):
-        with pytest.raises(EvaluationError, match=sentence):
+        with pytest.raises(KeptError, match=sentence):
             what()
 
 
