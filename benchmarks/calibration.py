@@ -27,7 +27,6 @@ from echotruth.cases import Case, expand
 from echotruth.config.loading import load
 from echotruth.evaluation import reliability
 from echotruth.evaluation.clip import Clip, read_clips
-from echotruth.evaluation.clip_metrics import clip_metrics
 from echotruth.evaluation.scoring import read_truth
 from echotruth.repository.reader import Repository
 from echotruth.section import Section
@@ -139,7 +138,7 @@ def spread(cases: list[Case], hearts: int | None) -> list[Case]:
 
 def table(folder: Path) -> list[str]:
     """Reliability of the quality in a repository, by tracker and image size, over the hearts of test."""
-    found = clip_metrics(folder).reliability
+    found = Repository(folder).metrics().reliability
     found = found[found["split"].map(split_of_label) == TEST]
     if found.empty:
         raise SystemExit(f"{folder}: no heart of test is evaluated: run it to its end")
