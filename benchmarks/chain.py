@@ -42,16 +42,17 @@ import report
 from threadpoolctl import threadpool_limits
 
 from echotruth.config.loading import load
-from echotruth.evaluation.clip import Clip, clips
-from echotruth.evaluation.scoring import ground_truth, score
+from echotruth.evaluation.clip import Clip, read_clips
+from echotruth.evaluation.scoring import read_truth, score
 from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.beamforming.scanner import validate_scatterers
 from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import Plane
-from echotruth.repository import ledger, schema
+from echotruth.repository import estimates, ledger, schema
 from echotruth.repository.ledger import GATES, VIEW_STAGES
+from echotruth.repository.reader import Repository
 from echotruth.repository.store import Store
 from echotruth.section import Section
 from echotruth.seeds import generator
@@ -143,6 +144,7 @@ class Parts:
 
     def __init__(self, folder: Path, case: str, view: str) -> None:
         self._job = partial(Job, folder, case=case, view=view)
+        self._repository, self._place = Repository(folder), (case, view)
         self._heart, self._config = self._job(stage="truth").heart, self._job(stage="truth").case.config
         self._frames = len(self._heart.displacement)
         place = self._job(stage="truth").read("phantom", "origin", "axes")
@@ -192,17 +194,18 @@ class Parts:
     def tracking(self) -> float:
         trackers = self._config.tracking.trackers.values()
         excerpts = []
-        for whole in clips(self._job(stage="tracking")).values():
+        for whole in read_clips(self._repository, *self._place).values():
             part = self._frames // 4 + EXCERPT
             excerpts.append(replace(whole, frames=whole.frames[part], frame_time=whole.frame_time[: len(part)]))
         spent = sum(timed(partial(_try, each, tracker)) for each in excerpts for tracker in trackers)
         return (self._frames - 1) / (len(EXCERPT) - 1) * spent
 
     def evaluation(self) -> float:
-        job = self._job(stage="evaluation")
-        tracked, true = job.read("tracking", "displacement")["displacement"][0], ground_truth(job)
-        times = len(self._config.bmode.sizes) * len(tracked)
-        return timed(lambda: ground_truth(job)) + times * timed(lambda: score(tracked[-1], true))
+        tracker, true = list(self._config.tracking.trackers)[-1], read_truth(self._repository, *self._place)
+        sizes = self._config.bmode.sizes
+        found = estimates.tracked(self._repository, *self._place, tracker, sizes[0], "displacement")["displacement"]
+        times = len(sizes) * len(self._config.tracking.trackers)
+        return timed(lambda: read_truth(self._repository, *self._place)) + times * timed(lambda: score(found, true))
 
 
 def _try(excerpt: Clip, tracker: Section) -> None:

@@ -51,7 +51,7 @@ TURNS = 5
 READ = """\
 import json, resource, sys, time
 import echotruth as et, xarray, zarr
-et.open  # what is imported is not counted
+et.Repository  # what is imported is not counted
 times = [time.perf_counter()]
 tree = et.Repository(sys.argv[1]).tree
 times.append(time.perf_counter())

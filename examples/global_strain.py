@@ -7,7 +7,7 @@ import sys
 
 import echotruth as et
 
-tree = et.open(sys.argv[1] if len(sys.argv) > 1 else "out/demo")
+tree = et.Repository(sys.argv[1] if len(sys.argv) > 1 else "out/demo").tree
 measures = et.unpack(tree["physiology"].to_dataset(), "longitudinal_strain", "ejection_fraction")
 table = measures.to_dataframe()
 print((100 * table).round(1).to_string())

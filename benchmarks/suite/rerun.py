@@ -86,7 +86,7 @@ class Rerun:
     def sizes(self) -> list[int]:
         """Image sizes at which the tracker was scored, px."""
         own, known = self.config.tracking.trackers, self.config.bmode.sizes
-        table = scores_of_guests(Repository(self.folder))
+        table = scores_of_guests(self.repository)
         scored = set(table[table["tracker"] == self.tracker]["size_px"])
         return [size for size in known if self.tracker in own or size in scored] or list(known)
 
@@ -107,9 +107,14 @@ class Rerun:
         """Whether what the tracker found in a clip is stored, and the clip is still the same."""
         is_own = self.tracker in self.config.tracking.trackers
         stages = ("truth", "bmode", *(("tracking",) if is_own else ()))
-        if Repository(self.folder).problem(case, view, *stages):
+        if self.repository.problem(case, view, *stages):
             return False
         return is_own or self.kept_clips.get(f"{case}/{view}") == digest(self.folder, case, view)
+
+    @cached_property
+    def repository(self) -> Repository:
+        """The repository, to be read."""
+        return Repository(self.folder)
 
     @cached_property
     def kept_clips(self) -> dict[str, str]:
@@ -191,7 +196,7 @@ def _line(row: Row, variant: str) -> str:
 def _view_rows(run: Rerun, sizes: list[int], case_view: tuple[str, str]) -> list[Row]:
     """Rows of the variants of the clips of one view of one heart."""
     with threadpool_limits(1):
-        repository = Repository(run.folder)
+        repository = run.repository
         time = read_loop(run.config.loop).time
         found: dict[int, tuple[np.ndarray, str, int]] = {}
         for size, clip in read_clips(repository, *case_view).items():

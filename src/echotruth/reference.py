@@ -78,7 +78,7 @@ has the keys that they follow from.
 
 
 _DERIVED = """What follows from the stored arrays is not stored. `echotruth.kinematics(heart)` gives the arrays
-below, for a heart that `echotruth.load_heart` reads or `echotruth.beat` makes. `echotruth.load_points` gives, at the
+below, for a heart that `echotruth.Repository` reads or `echotruth.beat` makes. `Repository.tracks` gives, at the
 points of the trackers, the strain of a tracked motion by the operator of `tracking.md`, and their layer and segment.
 """
 
@@ -94,7 +94,7 @@ def schema_page() -> str:
     cases = (
         "One more array for `seed` and for every key that differs among the cases, with the key's name and unit, and\n"
         "likewise for `diagnosis`, `label.NAME` and `note` (docs/cases.md). The attribute `constants` holds what does\n"
-        "not differ; `echotruth.open` gives the table with all of them.\n"
+        "not differ; `echotruth.Repository(...).tree` gives the table with all of them.\n"
     )
     sized = {f"{name}/SIZE": arrays for name, arrays in schema.SIZED.items()}
     groups = {"cases": schema.CASES} | schema.STAGES | schema.OPTIONAL | sized

@@ -11,6 +11,7 @@ from benchmarks.suite import records
 from benchmarks.suite.page import Page
 from benchmarks.suite.rerun import rerun
 from echotruth.evaluation.run import prepare
+from echotruth.repository.reader import Repository
 
 SUBMISSIONS = '''
 import sys
@@ -55,7 +56,7 @@ NAMES = ("honest", "reading")
 def evaluated(folder, name, cases, **options):
     """Scores of a submission, which is evaluated on the repository and kept."""
     settings = {"method": "external", "track": f"submissions:{name}", "options": options}
-    run = prepare(folder, name, settings, keep=True)
+    run = prepare(Repository(folder), name, settings, keep=True)
     run.check_writable()
     return run.write(list(run.rows(run.case_views(cases, []), run.sizes([]))))
 

@@ -16,11 +16,12 @@ from benchmarks.suite.results import result_path
 from benchmarks.suite.variants import VARIANTS, anonymous
 from echotruth.config.loading import load
 from echotruth.config.reading import ConfigError
-from echotruth.evaluation.clip import Clip, clips
+from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.run import prepare
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.repository import ledger
-from echotruth.workflow.job import Job
+from echotruth.repository import estimates, ledger
+from echotruth.repository.kept import KeptError
+from echotruth.repository.reader import Repository
 
 pytestmark = pytest.mark.slow
 
@@ -58,12 +59,12 @@ def test_scores_on_mirrored_clips_of_older_images_do_not_count(repository):
     found = result_of(repository, "honest", "mirrored")
     assert list(found.rows["case"]) == ["b_ideal"] and found.older == 1
     result_path(repository, "honest", "mirrored").write_text("[1, 2")
-    with pytest.raises(EvaluationError, match=r"honest\.mirrored\.json: is not what was written: delete it"):
+    with pytest.raises(ValueError, match=r"honest\.mirrored\.json: is not what was written: delete it"):
         result_of(repository, "honest", "mirrored")
 
 
 def test_scores_on_mirrored_clips_go_when_the_tracker_is_evaluated_again(repository):
-    prepare(repository, "honest", {"method": "dis"}).write([])
+    prepare(Repository(repository), "honest", {"method": "dis"}).write([])
     assert result_of(repository, "honest", "mirrored").rows.empty
     assert len(result_of(repository, "reading", "mirrored").rows) == 2
 
@@ -109,7 +110,7 @@ def test_a_tracker_is_given_neither_seed_nor_times_by_which_it_would_know_the_cl
     )
     run = prepare_rerun(repository, "dis", "mirrored", "test")
     list(run.rows([64]))
-    known = [clips(Job(repository, "tracking", case, view, code="-"))[64] for case, view in run.case_views()]
+    known = [read_clips(Repository(repository), case, view)[64] for case, view in run.case_views()]
     times, seeds = ([arguments[k] for arguments in given] for k in (4, 5))
     assert not np.array_equal(known[0].frame_time, known[1].frame_time) and known[0].seed != known[1].seed
     # These clips have the same images, so that nothing is left that differs.
@@ -134,8 +135,8 @@ def test_seed_of_an_anonymous_clip_is_that_of_its_images(clip):
 def test_error_of_an_open_clip_is_that_of_its_last_frame(repository):
     lines = list(rerun([repository], "dis", "open", "test", []))
     found = result_of(repository, "dis", "open").rows
-    job = Job(repository, "tracking", "a_ideal", "mid", code="-")
-    stored = job.read("evaluation", "frame_nrmse")["frame_nrmse"][0, 0, 1, -1]  # one of two steps
+    found_before = estimates.tracked(Repository(repository), "a_ideal", "mid", "dis", 64, "frame_nrmse")
+    stored = found_before["frame_nrmse"][1, -1]  # one of two steps
     assert len(lines) == 2 and found["before_percent"][0] == pytest.approx(100 * stored, rel=1e-3)
     assert np.all(found["error_percent"] < 10)
 
@@ -223,7 +224,7 @@ def test_damaged_store_of_what_a_tracker_found_is_told_in_a_sentence(repository,
         (store / "zarr.json").write_text(content)
     sentence = r"honest\.zarr: is not what echotruth evaluate --keep wrote: evaluate honest again"
     for what in (lambda: records.read([repository], []), lambda: prepare_rerun(repository, "honest", "open", "test")):
-        with pytest.raises(EvaluationError, match=sentence):
+        with pytest.raises(KeptError, match=sentence):
             what()
 
 

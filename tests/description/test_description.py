@@ -127,7 +127,7 @@ def test_example_of_the_card_reads_a_clip_in_five_lines(tmp_path):
     with chdir(tmp_path):
         exec(code, names)
     assert names["clip"]["image"].shape == (known_repository.FRAMES, 128, 128)
-    assert names["tree"]["bmode/128"]["image"].shape[2:] == names["clip"]["image"].shape
+    assert names["repository"].tree["bmode/128"]["image"].shape[2:] == names["clip"]["image"].shape
 
 
 def test_card_tells_of_hearts_that_failed_or_were_not_finished(unfinished):

@@ -10,11 +10,12 @@ from pathlib import Path
 import finished_repository
 import numpy as np
 import pytest
+import xarray as xr
 import zarr
 from known_repository import FRAMES, SETTINGS, SIZES, make
 
 import echotruth as et
-from echotruth.repository import estimates
+from echotruth.repository import estimates, remote
 from echotruth.repository.store import NotWritten
 
 pytestmark = pytest.mark.slow
@@ -161,3 +162,20 @@ def test_copy_reads_the_same_and_has_nothing_open(repository):
     copy = pickle.loads(pickle.dumps(repository))
     assert not copy._opened and repository._opened
     np.testing.assert_array_equal(copy.clip()["image"], image)
+
+
+def test_bucket_is_read_as_a_folder_is(repository, known, monkeypatch):
+    """Here the bucket is a folder, in place of a server."""
+    store = pytest.importorskip("obstore").store
+    place = known.folder.as_posix()
+    monkeypatch.setattr(remote, "_store", lambda url: store.LocalStore(url.replace("s3://bucket", place)))
+    for address in ("s3://bucket", "s3://bucket/known.zarr"):
+        distant = et.Repository(address)
+        assert repr(distant).splitlines()[:-1] == repr(repository).splitlines()[:-1]
+        xr.testing.assert_identical(distant.clip(size=SIZES[1]), repository.clip(size=SIZES[1]))
+        xr.testing.assert_identical(distant.tracks(), repository.tracks())
+        assert distant.scores.equals(repository.scores) and distant.config == repository.config
+    with pytest.raises(FileNotFoundError, match=r"known\.zarr: is an address and not a folder: download it"):
+        distant.difficulty()
+    with pytest.raises(FileNotFoundError, match="s3://bucket/ledger: is not a repository"):
+        et.Repository("s3://bucket/ledger")

@@ -227,8 +227,11 @@ def test_it_is_read_there_as_it_is_here(bucket, tmp_path):
     assert len({tuple(tree.groups) for tree in there}) == 1
     xr.testing.assert_identical(there[0]["bmode"].load(), et.Repository(made).tree["bmode"].load())
     xr.testing.assert_identical(there[0]["cases"].load(), et.Repository(made).tree["cases"].load())
-    image = zarr.open_array(hierarchy(bucket.url), path="bmode/64/image", mode="r")
+    image = zarr.open_array(hierarchy(bucket.url)[1], path="bmode/64/image", mode="r")
     assert (image[...] == zarr.open_array(made / "small.zarr", path="bmode/64/image", mode="r")[...]).all()
+    distant, near = et.Repository(bucket.url), et.Repository(made)
+    xr.testing.assert_identical(distant.clip(view="mid"), near.clip(view="mid"))
+    assert distant.scores.equals(near.scores) and distant.cases.equals(near.cases)
 
 
 def test_no_repository_there_is_an_error_in_a_sentence(bucket):

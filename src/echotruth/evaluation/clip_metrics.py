@@ -109,7 +109,7 @@ def clip_metrics(
     guests = scores_of_guests(repository)
     known = dict.fromkeys([*repository.trackers, *guests["tracker"].unique()])
     chosen_trackers = chosen("tracker", trackers, known)
-    hearts = hearts_of({case.id: case for case in repository.all_cases()})
+    hearts = hearts_of(repository.every)
     found: tuple[list[Row], list[Row], list[Row]] = ([], [], [])
     for case, complete in repository.finished(cases, views, "evaluation"):
         for view in complete:

@@ -177,8 +177,8 @@ class Export:
 
     def _asked(self, holds: str) -> Iterator[Clip]:
         """The clips, views or hearts that are asked for."""
-        cases = {case.id: case for case in self.repository.all_cases()}
-        views, sizes = self.repository.views, self.selection.sizes or self.repository.sizes[:1]
+        cases, views = self.repository.every, self.repository.views
+        sizes = self.selection.sizes or self.repository.sizes[:1]
         for case in chosen("case", self.selection.cases, cases):
             for view in [""] if holds == "heart" else chosen("view", self.selection.views, views):
                 for size in chosen("size", sizes, self.repository.sizes) if holds == "clip" else [0]:

@@ -181,7 +181,7 @@ class Figures:
     @cached_property
     def standings(self) -> pd.DataFrame:
         """The leaderboard, including external trackers; without a label `heart`, every case is one."""
-        cases = {case.id: case for case in self.repository.all_cases()}
+        cases = self.repository.every
         labelled = any(case.labels.get("heart") is not None for case in cases.values())
         return standings(self.repository.scores, self.config.seed, hearts_of(cases) if labelled else None)
 

@@ -9,8 +9,9 @@ from echotruth.config import Config
 
 Name = TypeVar("Name", str, int)
 Names = Iterable[str] | None
+"""Names to choose; a text is a single one, and None stands for all."""
 Sizes = Iterable[int] | None
-"""Those to choose; all if there are none."""
+"""Image sizes to choose, px; None stands for all."""
 
 
 def require_known(what: str, name: Name, known: Collection[Name]) -> Name:

@@ -80,8 +80,8 @@ class Repository:
         self._process = os.getpid()
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = {name: value for name, value in vars(self).items() if name not in ("_opened", "_labels", "tree")}
-        return kept | {"_opened": {}, "_labels": {}}
+        emptied: dict[str, dict[str, Any]] = {name: {} for name in ("_opened", "_labels", "_known")}
+        return {name: value for name, value in vars(self).items() if name not in ("tree", "every")} | emptied
 
     def __repr__(self) -> str:
         count = ", ".join(f"{number} {status}" for status, number in self.cases["status"].value_counts().items())
@@ -461,10 +461,11 @@ class Repository:
             raise ValueError(problem)
         return difficulties(self, [found[0]], [found[1]])
 
-    def all_cases(self) -> list[Case]:
-        """All cases of the configuration, each with its own."""
-        self._known |= all_cases(self.config)
-        return list(self._known.values())
+    @cached_property
+    def every(self) -> dict[str, Case]:
+        """All cases of the configuration by id, each with its own."""
+        self._known = all_cases(self.config)
+        return self._known
 
     def case(self, case: str | None = None) -> Case:
         """A case by its id, with its configuration; that of the only heart if none is given.
@@ -490,8 +491,7 @@ class Repository:
     def finished(self, cases: Names, views: Names, *stages: str) -> list[tuple[Case, list[str]]]:
         """Cases of the configuration that are asked for, and of each the views of which some stages are complete."""
         wanted = chosen("view", views, self.config.views)
-        known = {case.id: case for case in self.all_cases()}
-        found = [known[case] for case in chosen("case", cases, known)]
+        found = [self.every[case] for case in chosen("case", cases, self.every)]
         return [(case, [view for view in wanted if not self.problem(case.id, view, *stages)]) for case in found]
 
     def problem(self, case: str, view: str | None, *stages: str) -> str:

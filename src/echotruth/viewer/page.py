@@ -22,7 +22,6 @@ from bokeh.models import (
     Toggle,
 )
 
-from echotruth.evaluation.curves import strain_curves
 from echotruth.repository.reader import Repository
 from echotruth.viewer import arrows, curves, facts, script
 from echotruth.viewer.choice import NOTHING, TRUTH, Choice, inputs
@@ -247,7 +246,7 @@ class Page:
         for tracker in (self.choice.tracker, self.choice.other) if clip.has_curves else ():
             with suppress(ValueError):  # not evaluated on this clip, which the picture says
                 if tracker not in (TRUTH, NOTHING):
-                    found[tracker] = strain_curves(self.repository, clip.case, clip.view, tracker, clip.size)
+                    found[tracker] = self.repository.curves(clip.case, clip.view, tracker, clip.size)
         return found
 
     def _show_graphs(self, clip: Clip, found: dict[str, Any]) -> None:
