@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 
-from echotruth.evaluation.clip import Clip, make_clip
+from echotruth.evaluation.clip import Clip
 from echotruth.repository.checksums import is_whole
 from echotruth.repository.provenance import code_version, settings_version
 from echotruth.section import Section
 from echotruth.tracking import trackers
 from echotruth.tracking.failure import TrackerFailed
-from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job
 
 log = logging.getLogger("echotruth")
@@ -28,6 +28,8 @@ class Tracks:
     job : Job
         Job of the stage tracking.
     clip : Clip
+    track : callable
+        :func:`echotruth.tracking.tracker.track`; the script names it, as its code is among that of the stage.
 
     Attributes
     ----------
@@ -37,8 +39,8 @@ class Tracks:
         Tracker -> why there is no estimate.
     """
 
-    def __init__(self, job: Job, clip: Clip) -> None:
-        self._job, self._clip, self._content = job, clip, _digest(clip)
+    def __init__(self, job: Job, clip: Clip, track: Callable[..., tuple[np.ndarray, np.ndarray]]) -> None:
+        self._job, self._clip, self._track, self._content = job, clip, track, _digest(clip)
         self.made_from: dict[str, str] = {}
         self.failures: dict[str, str] = {}
 
@@ -51,7 +53,7 @@ class Tracks:
             found = self._job.read(f"tracking/{self._job.size}/{name}")
             return found["displacement"], found["quality"]
         try:
-            return self._clip.on_grid(*track(*self._clip.tracker_arguments, tracker))
+            return self._clip.on_grid(*self._track(*self._clip.tracker_arguments, tracker))
         except TrackerFailed as error:
             log.warning("%s: %s", name, error)
             self.failures[name] = str(error)
@@ -76,13 +78,6 @@ class Tracks:
         """
         method = getattr(tracker, "method", "external")
         return "" if method == "external" else settings_version(method_code(method), tracker, self._content)
-
-
-def clip_of(job: Job, inside: np.ndarray) -> Clip:
-    """The clip that a job tracks, given the points of the grid that are in the wall."""
-    frames = job.read(f"bmode/{job.size}", "image")["image"]
-    labels = job.read(f"truth/{job.size}", "labels")["labels"][0]
-    return make_clip(job.case, str(job.view_name), frames, labels, inside)
 
 
 def method_code(method: str) -> str:
