@@ -59,13 +59,5 @@ rule all:
         rules.report.output,
 
 
-# What a block of a large sweep makes; see docs/cluster.md.
-rule hearts:
-    input:
-        PLAN.records,
-    output:
-        touch(PLAN.mark),
-
-
 onstart:
     PLAN.begin()

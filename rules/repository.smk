@@ -30,3 +30,11 @@ rule store:
         ancient(f"{OUT}/ledger/repository.json"),
     output:
         directory(f"{OUT}/{PLAN.config.name}.zarr"),
+
+
+# What a block of a large sweep makes; see docs/cluster.md.
+rule hearts:
+    input:
+        PLAN.records,
+    output:
+        touch(PLAN.mark),

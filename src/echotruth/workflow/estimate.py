@@ -11,9 +11,10 @@ from typing import NamedTuple
 from echotruth.cases import Case
 from echotruth.config import Config
 from echotruth.repository import schema
+from echotruth.repository.ledger import STAGES
 from echotruth.workflow import cost
 from echotruth.workflow.demand import expected_megabytes
-from echotruth.workflow.jobs import FINAL_RULES, RULES, VIEW_RULES, ended, jobs, places
+from echotruth.workflow.jobs import FINAL_RULES, RULES, ended, jobs, places
 from echotruth.workflow.progress import format_duration
 
 MAX_SAMPLED = 100
@@ -116,7 +117,7 @@ def number_of_files(config: Config, hearts: int) -> int:
     views = len(config.views)
     arrays = [array for group, of in schema.groups(config).items() if group != "cases" for array in of]
     of_heart, of_view = (sum(array.leading == number for array in arrays) for number in (1, 2))
-    of_jobs = 3 + views * (3 * len(VIEW_RULES) + len(config.bmode.sizes) * (8 + len(config.tracking.trackers)))
+    of_jobs = 1 + 3 * sum(len(places(rule, config)) for rule in STAGES)  # configuration; record, log and benchmark
     return FIXED_FILES + hearts * (of_heart + views * of_view + of_jobs)
 
 

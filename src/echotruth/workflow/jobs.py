@@ -7,21 +7,19 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from echotruth.config import Config
+from echotruth.repository.ledger import STAGES
 
-VIEW_RULES = ("phantom", "rf")
-"""Rules with a job for each view of a heart."""
-CLIP_RULES = ("truth", "bmode", "tracking")
-"""Rules with a job for each view and image size."""
 FINAL_RULES = ("repository", "report")
 """What is made once, after all hearts."""
-RULES = ("mechanics", "phantom", "truth", "rf", "bmode", "tracking", *FINAL_RULES)
+RULES = (*STAGES, *FINAL_RULES)
 """Rules in the order of their jobs."""
 
 
 def places(rule: str, config: Config) -> list[tuple[str, int]]:
     """View and image size, px, of each job of a rule for one heart; an empty text and 0 where it has none."""
-    views, sizes = config.views if rule in VIEW_RULES + CLIP_RULES else [""], config.bmode.sizes
-    return [(view, size) for view in views for size in (sizes if rule in CLIP_RULES else (0,))]
+    names = STAGES.get(rule, ())
+    views, sizes = config.views if "view" in names else [""], config.bmode.sizes if "size" in names else [0]
+    return [(view, size) for view in views for size in sizes]
 
 
 def jobs(rule: str, config: Config, cases: Iterable[str]) -> set[str]:
