@@ -36,8 +36,3 @@ class Array:
         """Value of elements that were not written."""
         fills: dict[str, float | int | str] = {"f": float("nan"), "s": ""}
         return fills.get(self.dtype[0], 0)
-
-
-def array(name: str, dims: str, dtype: str, units: str, long_name: str, quantum: float | str | None = None) -> Array:
-    """Description of an array whose dimensions are given as one string."""
-    return Array(name, tuple(dims.split()), dtype, units, long_name, quantum)
