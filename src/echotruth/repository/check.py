@@ -95,8 +95,4 @@ def _notes(repository: Inventory, records: list[JobRecord]) -> list[str]:
         notes.append(f"{missing} of {len(wanted)} jobs have not been run yet: echotruth run makes them")
     elif not repository.publication_record.is_file():
         notes.append("the repository has not been published yet: echotruth run does so")
-    if repository.is_older:
-        notes.append(
-            "the repository has no ledger/structure.json, as it is older: only files of jobs were checked, run it"
-        )
     return notes
