@@ -21,6 +21,8 @@ class Array:
     quantum: float | str | None = None
     """Stored values are multiples of it, a power of two in the unit of the array, or the power of two that
     :func:`echotruth.repository.rounding.length_quantum` gives; None if they are stored as they are computed."""
+    values: str = ""
+    """What its values may be, one of :data:`echotruth.repository.values.RANGES`; "" for any that are numbers."""
 
     @property
     def leading(self) -> int:

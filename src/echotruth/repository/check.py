@@ -64,15 +64,13 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
             report.faults += check_metadata(repository)
         records = repository.records()
         listed: Listed = {}
-        alike: dict[frozenset[str], frozenset[str]] = {}  # one set for all jobs of a stage: there may be 100 000
         jobs = pool.map(lambda record: check_job(repository, record, quick), records)
         for done, (record, found) in enumerate(zip(records, jobs, strict=True), 1):
             report.faults += found.faults
             report.files += found.files
             row = repository.row(record)
             if found.arrays is not None and row is not None:
-                arrays = listed.get((record.stage, row), frozenset()) | found.arrays
-                listed[record.stage, row] = alike.setdefault(arrays, arrays)
+                listed[record.stage, row] = listed.get((record.stage, row), frozenset()) | found.arrays
             if progress:
                 progress(done, len(records))
         damaged = {path for fault in report.faults for path in fault.records}

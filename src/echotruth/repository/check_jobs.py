@@ -77,7 +77,7 @@ def _is_complete(repository: Inventory, case: str) -> bool:
 
 def _fault_of_value(repository: Inventory, job: JobRecord, group: str, name: str, problem: str) -> Fault:
     """A value of an array, or of a member of a pack, that no heart can have."""
-    packs = {member: pack.array.name for pack in packs_of(group) for member in pack.names}
+    packs = schema.holders(group)
     text = f"{name} {problem}" if name in packs else problem
     path = f"{repository.name(repository.store)}/{group}/{packs.get(name, name)}"
     record = repository.name(job.path)

@@ -556,7 +556,7 @@ class Repository:
             If the job of this case (and view) did not write one of them.
         """
         place, packs = self.place(case, view), schema.packs_of(group)
-        holder = {name: pack.array.name for pack in packs for name in pack.names}
+        holder = schema.holders(group)
         wanted = dict.fromkeys(holder.get(name, name) for name in names) if names else self.names(group)
         found = {}
         for array in (array for array in schema.arrays_of(group) if array.name in wanted):

@@ -22,7 +22,7 @@ def _listed() -> dict[tuple[str, str], tuple[Array, ...]]:
         for row in csv.DictReader(file):
             step = row["step"]
             quantum = 2.0 ** int(step.removeprefix("2^")) if step.startswith("2^") else step or None
-            about = row["type"], row["units"], row["meaning"], quantum
+            about = row["type"], row["units"], row["meaning"], quantum, row["values"]
             place = row["group"], row["pack"]
             found[place] = (*found.get(place, ()), Array(row["array"], tuple(row["dimensions"].split()), *about))
     return found
@@ -141,6 +141,11 @@ def written_by(stage: str, config: Config, size: int | None = None) -> list[str]
     if stage in SIZED:
         return [f"{stage}/{px}" for px in sizes]
     return [stage] if stage in STAGES or (stage == "rf" and config.rf.keep) else []
+
+
+def holders(group: str) -> dict[str, str]:
+    """Name of each member of the packs of a group -> array that holds it."""
+    return {member: pack.array.name for pack in packs_of(group) for member in pack.names}
 
 
 def named(group: str) -> tuple[Array, ...]:
