@@ -49,7 +49,7 @@ docs: .venv-integration/ready  ## the site, in out/site
 	.venv-integration/bin/python -m sphinx -W --keep-going -b html -c docs . out/site
 
 reference: .venv/ready  ## generated pages: schema and tables
-	$(BIN)/python -m echotruth.reference
+	$(BIN)/python docs/reference.py
 
 validation: .venv/ready  ## docs/validation.md; takes half an hour on one core
 	$(BIN)/echotruth validate

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from echotruth.reference import files
+from docs.reference import files
 
 ROOT = Path(__file__).parents[1]
 

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable, Iterator
 from functools import cache
-from inspect import cleandoc, getsource
-from itertools import pairwise
 from math import log, pi
-from textwrap import dedent
 from types import SimpleNamespace
 from typing import Annotated, Any, TypeVar, get_args, get_origin
 
@@ -88,32 +84,7 @@ def shown_unit(key: str) -> str:
 
 def meaning(section: type[BaseModel], key: str) -> str:
     """What a key of a section means, in one line."""
-    described = section.model_fields[key].description or _docstrings(section).get(key, "")
-    return " ".join(described.split())
-
-
-@cache
-def _docstrings(section: type[BaseModel]) -> dict[str, str]:
-    """Key -> its docstring, from the source of a section and its bases.
-
-    Pydantic would read them as soon as a section is defined, which takes each process 0.1 s.
-    """
-    docstrings: dict[str, str] = {}
-    for kind in reversed(section.mro()):
-        if issubclass(kind, BaseModel) and kind is not BaseModel:
-            [definition] = ast.parse(dedent(getsource(kind))).body
-            assert isinstance(definition, ast.ClassDef)
-            for statement, following in pairwise(definition.body):
-                match statement, following:
-                    case ast.AnnAssign(target=ast.Name(id=key)), ast.Expr(value=ast.Constant(value=str(text))):
-                        docstrings[key] = cleandoc(text)
-    return docstrings
-
-
-def _describe(schema: dict[str, Any], section: type[BaseModel]) -> None:
-    """Add what the keys of a section mean to its JSON schema."""
-    for key, text in _docstrings(section).items():
-        schema["properties"][key].setdefault("description", text)
+    return " ".join((section.model_fields[key].description or "").split())
 
 
 def section_in(annotation: Any) -> Any:
@@ -161,7 +132,7 @@ def discriminator(sections: dict[str, type[Section]]) -> str:
 class Section(BaseModel):
     """A section of the configuration; it is immutable and refuses unknown keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, json_schema_extra=_describe)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
 
     def si(self) -> SimpleNamespace:
         """Values in SI units, named without the unit suffix (`pitch_um` becomes `pitch`, m)."""

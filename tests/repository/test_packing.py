@@ -5,17 +5,17 @@ import pytest
 import xarray as xr
 
 from echotruth.repository import schema
-from echotruth.repository.array import array
+from echotruth.repository.array import Array
 from echotruth.repository.packing import Pack, pack, unpack
 from echotruth.repository.store import Store, packs_of
 from echotruth.repository.unpacking import unpack as unpacked
 from tests.repository.test_store import lay_out
 
 PACK = Pack(
-    array("numbers", "case frame number", "float64", "mixed", "numbers"),
+    Array("numbers", ("case", "frame", "number"), "float64", "mixed", "numbers"),
     (
-        array("alone", "case frame", "float64", "s", "one number"),
-        array("pair", "case region frame polar", "float64", "m", "numbers with dimensions before and after"),
+        Array("alone", ("case", "frame"), "float64", "s", "one number"),
+        Array("pair", ("case", "region", "frame", "polar"), "float64", "m", "numbers with dimensions before and after"),
     ),
 )
 COORDINATES = {"region": [0, 1, 2], "polar": ["radial", "tangential"]}

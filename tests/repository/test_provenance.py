@@ -9,25 +9,14 @@ from types import SimpleNamespace
 import pytest
 
 from echotruth.config import Bmode, PhaseCorrelation
-from echotruth.repository import provenance
-from echotruth.repository.provenance import _dependencies, _parsed, _source, code_version, packages, settings_version
+from echotruth.repository.provenance import _dependencies, _source, code_version, packages, settings_version
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(autouse=True)
-def kept(tmp_path, monkeypatch):
-    """File in which what is found in texts is kept; that of the package stays as it is."""
-    file = tmp_path / "kept.json"
-    monkeypatch.setattr(provenance, "_PARSED", file)
-    _forget()
-    yield file
-    _forget()
-
-
 def _forget():
     """As a new process would start."""
-    for cached in (code_version, _source, _parsed):
+    for cached in (code_version, _source):
         cached.cache_clear()
 
 
@@ -66,24 +55,6 @@ def test_another_statement_changes_the_version(tmp_path):
 )
 def test_statements_that_mean_something_else_have_another_version(tmp_path, one, other):
     assert _version(tmp_path, f"{one}\n") != _version(tmp_path, f"{other}\n")
-
-
-def test_version_is_the_same_from_what_an_earlier_process_kept(tmp_path, kept, monkeypatch):
-    text = "from echotruth.fem import sparse\n\nx = 1\n"
-    first = _version(tmp_path, text)
-    monkeypatch.setattr(provenance, "_parse", None)  # parses nothing
-    assert _version(tmp_path, text) == first
-    monkeypatch.undo()
-    monkeypatch.setattr(provenance, "_PARSED", kept)
-    for damaged in ("", "{", "[]", '{"a": 1}'):
-        kept.write_text(damaged)
-        assert _version(tmp_path, text) == first
-
-
-def test_version_does_not_need_a_folder_that_can_be_written(tmp_path, monkeypatch):
-    first = _version(tmp_path, "x = 1\n")
-    monkeypatch.setattr(provenance, "_PARSED", Path("/proc/none/kept.json"))
-    assert _version(tmp_path, "x = 1\n") == first
 
 
 def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_path):

@@ -26,20 +26,7 @@ class Parser(argparse.ArgumentParser):
             argument, given, listed = match.groups()
             known, otherwise = re.findall(r"[\w.-]+", listed), f"use one of {listed.replace(chr(39), '')}"
             message = f"{argument} = {given}: {did_you_mean(given, known, otherwise)}"
-        elif match := re.search(r"argument (\S+): invalid (int|float) value: '(.*)'", message):
-            argument, kind, given = match.groups()
-            message = f"{argument.partition('/')[0]} = {given}: give a {'whole ' * (kind == 'int')}number"
-        elif meant := self._meant():
-            message = meant  # what is missing is there, under another name
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
-
-    def _meant(self) -> str:
-        """What an option that a command does not take may mean; "" if there is none, or nothing is like it."""
-        known = list(self._option_string_actions)
-        for name in (word.partition("=")[0] for word in sys.argv[1:] if word.startswith("--") and " " in self.prog):
-            if name not in known and (remedy := did_you_mean(name, known)):
-                return f"{name} is not an option: {remedy}"
-        return ""
 
     def options_of(self, command: str) -> list[str]:
         """Options that a command takes."""

@@ -7,7 +7,6 @@ import os
 import platform
 import shutil
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,14 +14,9 @@ import echotruth
 from echotruth.cli.command import Commands, add_command, fail
 
 if TYPE_CHECKING:
-    from packaging.requirements import Requirement
-
     from echotruth.repository.reader import Repository
 
 GIB = 2**30
-
-DEVELOPMENT = ("build", "docs", "integration", "test")
-"""Extras for those who change echotruth."""
 
 
 def add(commands: Commands) -> None:
@@ -81,53 +75,19 @@ def _installation() -> dict[str, str]:
     """What is installed, and the machine."""
     import psutil
 
+    from echotruth.repository.provenance import packages
+
     memory = psutil.virtual_memory()
     disk = shutil.disk_usage(Path.cwd())
-    core, extras = _requirements()
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "echotruth": f"{echotruth.__version__}, {Path(echotruth.__file__).parent}",
         "Python": f"{platform.python_version()} on {platform.system()} {platform.release()} ({platform.machine()})",
-        "packages": ", ".join(f"{name} {_version(name)}" for name in core),
-        "extras": "; ".join(_extra(name, packages) for name, packages in extras.items()),
+        "packages": ", ".join(f"{name} {version}" for name, version in packages().items() if name != "echotruth"),
         "cores": f"{usable} of {os.cpu_count()}",
         "memory": f"{memory.available / GIB:.1f} GiB free of {memory.total / GIB:.1f} GiB",
         "disk": f"{disk.free / GIB:.1f} GiB free of {disk.total / GIB:.1f} GiB in {Path.cwd()}",
     }
-
-
-def _requirements() -> tuple[list[str], dict[str, list[str]]]:
-    """Packages that echotruth needs here, and those of each extra, as its installation lists them."""
-    from packaging.requirements import Requirement
-
-    try:
-        about = metadata("echotruth")
-    except PackageNotFoundError:
-        return [], {}
-    listed = [Requirement(text) for text in about.get_all("Requires-Dist") or ()]
-    extras = {name: _needed(listed, name) for name in about.get_all("Provides-Extra") or ()}
-    return _needed(listed, ""), {name: packages for name, packages in extras.items() if name not in DEVELOPMENT}
-
-
-def _needed(listed: list[Requirement], extra: str) -> list[str]:
-    """Packages of an extra, or of the core if it is ""."""
-    found = [one for one in listed if one.marker is None or one.marker.evaluate({"extra": extra})]
-    core = {one.name for one in listed if one.marker is None or one.marker.evaluate({"extra": ""})}
-    return sorted({one.name for one in found} - (core if extra else set()))
-
-
-def _version(package: str) -> str:
-    """Installed version of a package; "" if it is missing."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ""
-
-
-def _extra(name: str, packages: list[str]) -> str:
-    """Whether the packages of an extra are installed."""
-    missing = [package for package in packages if not _version(package)]
-    return f"{name} is missing ({', '.join(missing)})" if missing else f"{name} is installed"
 
 
 def _repository(found: Repository) -> dict[str, str]:

@@ -24,7 +24,7 @@ from echotruth.evaluation.resampling import draws, interval, means_of_hearts, pe
 from echotruth.evaluation.scoring import metrics
 from echotruth.repository import estimates
 from echotruth.repository.digest import digest
-from echotruth.repository.tracked import EVALUATION_PACKS
+from echotruth.repository.schema import PACKS
 from echotruth.tracking.external_program import in_one_line
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ log = logging.getLogger("echotruth")
 KEYS = ("case", "view", "size_px", "tracker")
 """Columns that identify a row of :func:`rows`."""
 
-SCORES = next(pack.names for pack in EVALUATION_PACKS if pack.array.name == "scores")
+SCORES = next(pack.names for pack in PACKS["evaluation/SIZE/TRACKER"] if pack.array.name == "scores")
 """Arrays from which the metrics are made."""
 
 HEART = "heart"

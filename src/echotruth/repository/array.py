@@ -21,6 +21,8 @@ class Array:
     quantum: float | str | None = None
     """Stored values are multiples of it, a power of two in the unit of the array, or the power of two that
     :func:`echotruth.repository.rounding.length_quantum` gives; None if they are stored as they are computed."""
+    values: str = ""
+    """What its values may be, one of :data:`echotruth.repository.values.RANGES`; "" for any that are numbers."""
 
     @property
     def leading(self) -> int:
@@ -36,8 +38,3 @@ class Array:
         """Value of elements that were not written."""
         fills: dict[str, float | int | str] = {"f": float("nan"), "s": ""}
         return fills.get(self.dtype[0], 0)
-
-
-def array(name: str, dims: str, dtype: str, units: str, long_name: str, quantum: float | str | None = None) -> Array:
-    """Description of an array whose dimensions are given as one string."""
-    return Array(name, tuple(dims.split()), dtype, units, long_name, quantum)

@@ -64,15 +64,13 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
             report.faults += check_metadata(repository)
         records = repository.records()
         listed: Listed = {}
-        alike: dict[frozenset[str], frozenset[str]] = {}  # one set for all jobs of a stage: there may be 100 000
         jobs = pool.map(lambda record: check_job(repository, record, quick), records)
         for done, (record, found) in enumerate(zip(records, jobs, strict=True), 1):
             report.faults += found.faults
             report.files += found.files
             row = repository.row(record)
             if found.arrays is not None and row is not None:
-                arrays = listed.get((record.stage, row), frozenset()) | found.arrays
-                listed[record.stage, row] = alike.setdefault(arrays, arrays)
+                listed[record.stage, row] = listed.get((record.stage, row), frozenset()) | found.arrays
             if progress:
                 progress(done, len(records))
         damaged = {path for fault in report.faults for path in fault.records}
@@ -95,8 +93,4 @@ def _notes(repository: Inventory, records: list[JobRecord]) -> list[str]:
         notes.append(f"{missing} of {len(wanted)} jobs have not been run yet: echotruth run makes them")
     elif not repository.publication_record.is_file():
         notes.append("the repository has not been published yet: echotruth run does so")
-    if repository.is_older:
-        notes.append(
-            "the repository has no ledger/structure.json, as it is older: only files of jobs were checked, run it"
-        )
     return notes

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from hashlib import file_digest, sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import zarr
 
 from echotruth.repository import ledger, packing, schema, values
+from echotruth.repository.checksums import damage
 from echotruth.repository.inventory import Fault, Inventory, JobRecord, reason
 from echotruth.repository.ledger import record_path
 from echotruth.repository.schema import packs_of
@@ -79,7 +77,7 @@ def _is_complete(repository: Inventory, case: str) -> bool:
 
 def _fault_of_value(repository: Inventory, job: JobRecord, group: str, name: str, problem: str) -> Fault:
     """A value of an array, or of a member of a pack, that no heart can have."""
-    packs = {member: pack.array.name for pack in packs_of(group) for member in pack.names}
+    packs = schema.holders(group)
     text = f"{name} {problem}" if name in packs else problem
     path = f"{repository.name(repository.store)}/{group}/{packs.get(name, name)}"
     record = repository.name(job.path)
@@ -116,19 +114,6 @@ def _is_current(repository: Inventory, path: str) -> bool:
     """
     group = path.partition("/c/")[0].rpartition("/")[0]
     return group in repository.groups or schema.kind(group) not in schema.KINDS
-
-
-def damage(file: Path, hash: str) -> str:
-    """What is wrong with a file that must have a SHA-256; empty if nothing is."""
-    try:
-        with file.open("rb") as opened:
-            if file_digest(opened, sha256).hexdigest() == hash:
-                return ""
-            return "differs from what was written" if os.fstat(opened.fileno()).st_size else "is empty"
-    except FileNotFoundError:
-        return "is missing"
-    except OSError as error:
-        return f"cannot be read ({error.strerror})"
 
 
 def _check_values(

@@ -12,7 +12,8 @@ import zarr
 
 from echotruth.repository import ledger
 from echotruth.repository.array import Array
-from echotruth.repository.check_jobs import are_checksums, damage
+from echotruth.repository.check_jobs import are_checksums
+from echotruth.repository.checksums import damage
 from echotruth.repository.inventory import Fault, Inventory, files_below, reason
 from echotruth.repository.store import Store
 
@@ -23,8 +24,6 @@ _REWRITTEN = "echotruth run writes it again"
 def check_structure(repository: Inventory, pool: ThreadPoolExecutor) -> tuple[set[str] | None, list[Fault]]:
     """Files that no job wrote, and their faults; None if no record of them can be read."""
     record, remedy, publish = repository.structure_record, _REWRITTEN, (repository.publication_record,)
-    if repository.is_older:
-        return None, []
     try:
         hashes = ledger.read(record)["sha256"]
         if not are_checksums(hashes):

@@ -7,7 +7,8 @@ Beside these, every chunk in a shard carries a crc32c (see :mod:`.hierarchy`), w
 
 from __future__ import annotations
 
-from hashlib import sha256
+import os
+from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +24,26 @@ def checksums(files: list[Path], root: Path) -> dict[str, str]:
     return {file.relative_to(root).as_posix(): sha256(file.read_bytes()).hexdigest() for file in files}
 
 
+def damage(file: Path, expected: str) -> str:
+    """What is wrong with a file that must have a SHA-256; empty if nothing is."""
+    try:
+        with file.open("rb") as opened:
+            if file_digest(opened, sha256).hexdigest() == expected:
+                return ""
+            return "differs from what was written" if os.fstat(opened.fileno()).st_size else "is empty"
+    except FileNotFoundError:
+        return "is missing"
+    except OSError as error:
+        return f"cannot be read ({error.strerror})"
+
+
 def is_whole(file: Path, expected: str) -> bool:
     """Whether a file is there and has a SHA-256."""
-    return file.is_file() and sha256(file.read_bytes()).hexdigest() == expected
+    return not damage(file, expected)
 
 
 def verify(root: Path, path: Path, record: dict[str, Any]) -> int:
-    """Compare the files of a record with their checksums.
+    """Compare the files of a record with their checksums; return their number.
 
     Parameters
     ----------
@@ -40,51 +54,23 @@ def verify(root: Path, path: Path, record: dict[str, Any]) -> int:
     record : dict
         As :func:`echotruth.repository.ledger.read` returns it.
 
-    Returns
-    -------
-    int
-        Number of files.
-
     Raises
     ------
     ChecksumError
         If a file is missing or differs.
     """
-    return _compare(root, record.get("sha256", {}), f"written: delete {path} and run again")
+    expected = record.get("sha256", {})
+    for name, checksum in expected.items():
+        if problem := damage(root / name, checksum):
+            raise ChecksumError(f"{root / name}: {problem}: delete {path} and run again")
+    return len(expected)
 
 
 def verify_structure(root: Path, path: Path) -> int:
-    """Compare all files that no job wrote with their checksums.
-
-    Parameters
-    ----------
-    root : Path
-        Folder of the store.
-    path : Path
-        Path of the record of the structure.
-
-    Returns
-    -------
-    int
-        Number of files.
-
-    Raises
-    ------
-    ChecksumError
-        If the record is missing or damaged, or a file is missing or differs.
-    """
-    remedy = "run again, which lays the repository out anew"
+    """Compare all files that no job wrote with the record of the structure, as :func:`verify` does."""
     try:
-        expected = dict(ledger.read(path)["sha256"])
+        return verify(root, path, {"sha256": dict(ledger.read(path)["sha256"])})
+    except ChecksumError:
+        raise
     except (OSError, ValueError, KeyError, TypeError):
-        raise ChecksumError(f"{path}: is missing or damaged: {remedy}") from None
-    return _compare(root, expected, f"laid out: {remedy}")
-
-
-def _compare(root: Path, expected: dict[str, str], origin: str) -> int:
-    """Number of files that have their checksum, as all must; `origin` ends the error of one that has not."""
-    for name, checksum in expected.items():
-        file = root / name
-        if not is_whole(file, checksum):
-            raise ChecksumError(f"{file}: is missing or differs from what was {origin}")
-    return len(expected)
+        raise ChecksumError(f"{path}: is missing or damaged: run again, which lays the repository out anew") from None

@@ -50,11 +50,7 @@ def image_size(config: Config, size: int | None) -> int:
     ValueError
         If the configuration has no clips of that size.
     """
-    sizes = config.bmode.sizes
-    if size is not None and size not in sizes:
-        known = ", ".join(map(str, sizes))
-        raise ValueError(f"size = {size}: use one of {known}, which bmode.size_px and bmode.downsampling set.")
-    return sizes[0] if size is None else size
+    return config.bmode.sizes[0] if size is None else require_known("size", size, config.bmode.sizes)
 
 
 def main_view(config: Config) -> str:

@@ -45,8 +45,7 @@ def is_written(repository: Repository, case: str, view: str, name: str) -> bool:
     size, tracker = repository.sizes[0], next(iter(repository.config.tracking.trackers))
     groups = (f"evaluation/{size}", *(f"{kind}/{size}/{tracker}" for kind in schema.TRACKED))
     group = next(group for group in groups if name in [array.name for array in schema.named(group)])
-    holder = {member: pack.array.name for pack in schema.packs_of(group) for member in pack.names}
-    return repository.is_written(f"{group}/{holder.get(name, name)}", case, view)
+    return repository.is_written(f"{group}/{schema.holders(group).get(name, name)}", case, view)
 
 
 def tracked(repository: Repository, case: str, view: str, tracker: str, size: int, *names: str) -> Arrays:

@@ -17,7 +17,7 @@ from echotruth.config import Config
 from echotruth.config.loading import ConfigError, load
 from echotruth.repository import layout, ledger, schema
 from echotruth.repository.array import Array
-from echotruth.repository.ledger import NOT_A_REPOSITORY, STAGES, record_path, record_paths
+from echotruth.repository.ledger import NOT_A_REPOSITORY, STAGES, record_paths
 
 
 class CheckError(ValueError):
@@ -96,15 +96,7 @@ class Inventory:
         self.structure_record = folder / "ledger/structure.json"
         self.publication_record = folder / "ledger/repository.json"
         self.groups = schema.groups(self.config)
-
         self.rows, self.views = ledger.rows(folder / "registry.txt"), ledger.rows(folder / "views.txt")
-        if self.is_older:
-            self.views = {view: index for index, view in enumerate(self.config.views)}
-
-    @property
-    def is_older(self) -> bool:
-        """Whether it was made before views had a registry, and files of the structure a record."""
-        return not any((self.folder / name).exists() for name in ("views.txt", "ledger/structure.json"))
 
     @cached_property
     def stages(self) -> dict[str, str]:
@@ -150,10 +142,6 @@ class Inventory:
         """Paths of the records of all jobs of the configuration."""
         places = list(self.config.views), self.config.bmode.sizes
         return [path for case in self.cases for path in record_paths(self.folder, case, *places)]
-
-    def heart(self, record: JobRecord) -> Path:
-        """Path of the record of the heart of a job."""
-        return record_path(self.folder, "mechanics", record.case)
 
     def row(self, record: JobRecord) -> tuple[int, ...] | None:
         """Row of the case, and index of the view if there is one; None if the registry does not have them."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -150,24 +149,9 @@ def labels(config: Config, rows: list[str], times: ArrayLike, views: list[str] |
         "region": [0, *layers],
         "aha": np.arange(1, 18),
     }
-    return schema.LABELS | common | pack_labels(config, schema.LABELS | common)
-
-
-def pack_labels(config: Config, coordinates: Mapping[str, ArrayLike]) -> dict[str, ArrayLike]:
-    """Labels and units of the numbers of every pack, by `group:dimension`.
-
-    Parameters
-    ----------
-    config : Config
-    coordinates : dict
-        Values of the coordinates of their members.
-    """
-    return {
-        f"{group}:{name}": labels
-        for group in schema.groups(config)
-        for pack in schema.packs_of(group)
-        for name, labels in pack.labels(coordinates).items()
-    }
+    coordinates = schema.LABELS | common
+    packs = ((group, pack.labels(coordinates)) for group in schema.groups(config) for pack in schema.packs_of(group))
+    return coordinates | {f"{group}:{name}": found for group, each in packs for name, found in each.items()}
 
 
 def columns(table: pd.DataFrame, rows: list[str]) -> dict[str, NDArray[Any]]:

@@ -13,15 +13,12 @@ from typing import Any
 
 from echotruth.cases import Case, all_cases, as_table
 from echotruth.config import Cases, Config
-from echotruth.config.loading import ConfigError, load, validate
+from echotruth.config.loading import ConfigError, validate
 from echotruth.repository import durable, ledger
 from echotruth.repository.checksums import ChecksumError, verify
 from echotruth.repository.equivalence import first_difference
 from echotruth.repository.inventory import Inventory, JobRecord
-from echotruth.section import Section, value_of
-
-OWN = ("name", "cases")
-"""Keys in which repositories that are merged may differ."""
+from echotruth.section import dotted_values, value_of
 
 
 class MergeError(ValueError):
@@ -146,39 +143,25 @@ def check_sources(sources: list[Path]) -> dict[Path, Config]:
 
     Raises
     ------
+    CheckError
+        If one is not a repository.
     MergeError
-        If one is not a repository, or was made when the store had other arrays or views had no registry.
+        If one was made when the store had other arrays.
     """
-    for source in sources:
-        if not (source / "config.yaml").is_file():
-            raise MergeError(f"{source}: {ledger.NOT_A_REPOSITORY}")
-        if not (source / "views.txt").is_file():
-            raise _older(source)
-    try:
-        configs = {source: load(source / "config.yaml") for source in sources}
-    except ConfigError as error:
-        raise MergeError(str(error)) from None
+    configs = {}
     for source in sources:
         repository = Inventory(source)
         if not all((repository.store / path / "zarr.json").is_file() for path in repository.shard_paths):
-            raise _older(source)
+            raise MergeError(f"{source}: was made by an earlier version: run it again before it is merged")
+        configs[source] = repository.config
     return configs
 
 
-def _older(source: Path) -> MergeError:
-    return MergeError(f"{source}: was made by an earlier version: run it again before it is merged")
-
-
-def _difference(first: Section, second: Section, prefix: str = "") -> str:
+def _difference(first: Config, second: Config) -> str:
     """Dotted key in which two configurations differ; empty if they do in none, besides name and cases."""
-    for key in type(first).model_fields:
-        one, other = getattr(first, key), getattr(second, key)
-        if one == other or f"{prefix}{key}" in OWN:
-            continue
-        if isinstance(one, Section) and isinstance(other, Section) and type(one) is type(other):
-            return _difference(one, other, f"{prefix}{key}.")
-        return f"{prefix}{key}"
-    return ""
+    bare = (config.model_copy(update={"name": "", "cases": Cases()}) for config in (first, second))
+    one, other = (dict(dotted_values(config)) for config in bare)
+    return next((key for key in one | other if (key in one, one.get(key)) != (key in other, other.get(key))), "")
 
 
 def _records(repository: Inventory) -> list[JobRecord]:

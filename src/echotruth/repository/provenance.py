@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import ast
 import json
-import sys
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import cache, lru_cache
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from echotruth.repository import durable
 from echotruth.section import Section
 
 PACKAGE = Path(__file__).parents[1]
@@ -54,34 +52,13 @@ def code_version(*modules: str, unless: frozenset[tuple[str, str]] = frozenset()
     digest = sha256()
     for name in sorted(_dependencies(modules, unless)):
         digest.update(_source(name).digest.encode())
-    _keep_parsed()
     return digest.hexdigest()[:16]
 
 
 def settings_version(*settings: Any) -> str:
     """Hash of settings: sections or plain values. Their order counts, as that of the trackers is that of the arrays."""
-    texts = (_text(_Same(item)) if isinstance(item, Section) else json.dumps(item) for item in settings)
+    texts = (json.dumps(item.model_dump(mode="json") if isinstance(item, Section) else item) for item in settings)
     return sha256("\n".join(texts).encode()).hexdigest()[:16]
-
-
-class _Same:
-    """A section that equals only itself: thousands of cases share sections, whose values need not be compared."""
-
-    __slots__ = ("section",)
-
-    def __init__(self, section: Section) -> None:
-        self.section = section
-
-    def __hash__(self) -> int:
-        return id(self.section)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and self.section is other.section
-
-
-@lru_cache(maxsize=1000)
-def _text(same: _Same) -> str:
-    return json.dumps(same.section.model_dump(mode="json"))
 
 
 def packages() -> dict[str, str]:
@@ -141,44 +118,10 @@ class _Source(NamedTuple):
     """Modules of echotruth that it imports, and pkgutil."""
 
 
-_PARSED = PACKAGE / "__pycache__" / f"provenance.{sys.implementation.cache_tag}.json"
-"""Hash of the text of a file -> what was found in it, so that no text is parsed twice."""
-_OWN_TEXT = Path(__file__).read_bytes()
-"""What is found depends on this module too."""
-_LARGEST = 1000
-"""Number of texts that are kept."""
-
-
 @cache
 def _source(name: str) -> _Source:
     path = _path(name)
-    text = path.read_bytes() if path else b""
-    known, key = _parsed(), sha256(_OWN_TEXT + text).hexdigest()
-    if key not in known:
-        known[key] = _parse(text)
-    return known[key]
-
-
-@cache
-def _parsed() -> dict[str, _Source]:
-    """What is known of texts; it grows as others are parsed."""
-    return _kept()
-
-
-def _kept() -> dict[str, _Source]:
-    """What earlier processes found; empty if it cannot be read."""
-    with suppress(OSError, ValueError, TypeError, AttributeError):
-        kept = json.loads(_PARSED.read_text(encoding="utf-8"))
-        return {key: _Source(*source) for key, source in kept.items()}
-    return {}
-
-
-def _keep_parsed() -> None:
-    """Save what is known of texts, if that is more than before; where it cannot be saved, it is found again."""
-    known = dict(list(_parsed().items())[-_LARGEST:])
-    if not known.keys() <= _kept().keys():
-        with suppress(OSError):
-            durable.write(_PARSED, json.dumps(known).encode())
+    return _parse(path.read_bytes() if path else b"")
 
 
 def _parse(text: bytes) -> _Source:

@@ -227,7 +227,7 @@ class Repository:
         (('frame', 'to', 'axial', 'lateral', 'vector'), 'm')
         """
         found, view, size = self.case(case), self.view(view), image_size(self.config, size)
-        arrays = {f"bmode/{size}": schema.BMODE, f"truth/{size}": schema.TRUTH}
+        arrays = {f"{stage}/{size}": schema.SIZED[stage] for stage in ("bmode", "truth")}
         wanted = stored_names(variables, {array.name for group in arrays.values() for array in group})
         names = {group: [array.name for array in members if array.name in wanted] for group, members in arrays.items()}
         values = {group: self.arrays(group, found.id, view, *members) for group, members in names.items() if members}
@@ -556,7 +556,7 @@ class Repository:
             If the job of this case (and view) did not write one of them.
         """
         place, packs = self.place(case, view), schema.packs_of(group)
-        holder = {name: pack.array.name for pack in packs for name in pack.names}
+        holder = schema.holders(group)
         wanted = dict.fromkeys(holder.get(name, name) for name in names) if names else self.names(group)
         found = {}
         for array in (array for array in schema.arrays_of(group) if array.name in wanted):

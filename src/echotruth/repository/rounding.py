@@ -22,8 +22,6 @@ LENGTH = "pixel/256"
 STRAIN = 2.0**-12
 CURVE = 2.0**-16
 """Quantum of means of strain and of angles (rad) over time."""
-WALL_DEPTH = 2.0**-10
-QUALITY = 2.0**-8
 
 
 def quantum(array: Array, config: Config) -> float | None:

@@ -115,7 +115,7 @@ class Store:
         """
         opened = self._open(group, "r")
         by_name, packs = {array.name: array for array in schema.arrays_of(group)}, schema.packs_of(group)
-        holder = {name: pack.array.name for pack in packs for name in pack.names}
+        holder = schema.holders(group)
         # Only a part of the RF may be stored.
         stored = [name for name in by_name if name in opened] if names is None else names
         arrays = [by_name[name] for name in dict.fromkeys(holder.get(name, name) for name in stored)]

@@ -31,64 +31,33 @@ class Range:
     """Whether every value must be a number."""
 
 
-NUMBER = Range(finite=True)
-NOT_NEGATIVE = Range(low=0, finite=True)
-POSITIVE = Range(low=np.finfo(float).tiny, finite=True)
-SEGMENT = Range(0, 17)
-REGION = Range(0, 3)
-ANY = Range()
-MAGNITUDE = Range(low=0)
-"""An RMS, or a ratio of two; not a number where there is nothing to average."""
-
 COMPLEMENT = 1e-6
 """Rounding of a fraction near 0 or 1, and of the length of a unit vector, in single precision."""
 
 OVERSHOOT = 0.05
 """Largest excess over 0 to 1 of the wall depth, a Laplace solution, interpolated by quadratic functions."""
 
-EVALUATED = (*schema.named("evaluation/SIZE"), *schema.named("evaluation/SIZE/TRACKER"))
-
-RANGES: dict[str, dict[str, Range]] = {
-    "geometry": {"cell_node": NOT_NEGATIVE, "endo": NOT_NEGATIVE, "epi": NOT_NEGATIVE, "base": NOT_NEGATIVE},
-    "fibres": {"wall_depth": Range(-COMPLEMENT, 1 + COMPLEMENT, finite=True), "layer": Range(1), "segment": SEGMENT},
-    "pathology": {"region": REGION, "stiffness_scale": NOT_NEGATIVE, "tension_scale": NOT_NEGATIVE},
-    # A prescribed motion has no forces, and may have no cavity; a loop may prescribe pressure or volume in some frames.
-    "mechanics": {
-        "volume": Range(low=np.finfo(float).tiny),
-        "pressure": ANY,
-        "pressure_target": ANY,
-        "volume_target": MAGNITUDE,
-        "active_tension": ANY,
-        "stiffness": MAGNITUDE,
-        "residual": MAGNITUDE,
-        "phase": Range(0, 3),
-        "newton_steps": NOT_NEGATIVE,
-        "es_frame": NOT_NEGATIVE,
-    },
-    "kinematics": {"volume_ratio_min": POSITIVE, "volume_ratio_mean": POSITIVE, "strain_sd": NOT_NEGATIVE},
-    # A measure that a heart does not have is not a number.
-    "physiology": {array.name: ANY for array in schema.named("physiology")}
-    | {"volume_ratio_min": POSITIVE, "loop_error": NOT_NEGATIVE, "longitudinal_strain": NUMBER},
-    "phantom": {"scatterer_count": NOT_NEGATIVE, "centre": ANY},
-    "truth": {
-        "displacement": ANY,
-        "strain": ANY,
-        "wall_depth": Range(-OVERSHOOT, 1 + OVERSHOOT),
-        "flow": ANY,
-    },
-    "rf": {"channels_step": POSITIVE},
-    "tracking": {"displacement": ANY, "quality": Range(-COMPLEMENT, 1 + COMPLEMENT)},
-    "evaluation": {array.name: ANY for array in EVALUATED}
-    | {array.name: MAGNITUDE for array in EVALUATED if "rms" in array.name or "nrmse" in array.name}
-    | {
-        "coverage": Range(0, 1, finite=True),
-        "strain_correlation": Range(-1 - COMPLEMENT, 1 + COMPLEMENT),
-        "through_plane_correlation": Range(-1 - COMPLEMENT, 1 + COMPLEMENT),
-        "end_point_error": MAGNITUDE,
-        "drift": MAGNITUDE,
-    },
+RANGES = {
+    "": Range(finite=True),
+    # A measure that a heart does not have, or a force of a prescribed motion, is not a number.
+    "any": Range(),
+    "not negative": Range(low=0, finite=True),
+    "positive": Range(low=np.finfo(float).tiny, finite=True),
+    # A prescribed motion may have no cavity.
+    "volume": Range(low=np.finfo(float).tiny),
+    # An RMS, or a ratio of two; not a number where there is nothing to average.
+    "magnitude": Range(low=0),
+    "fraction": Range(0, 1, finite=True),
+    "correlation": Range(-1 - COMPLEMENT, 1 + COMPLEMENT),
+    "quality": Range(-COMPLEMENT, 1 + COMPLEMENT),
+    "depth": Range(-COMPLEMENT, 1 + COMPLEMENT, finite=True),
+    "interpolated depth": Range(-OVERSHOOT, 1 + OVERSHOOT),
+    "layer": Range(1),
+    "segment": Range(0, 17),
+    "region": Range(0, 3),
+    "phase": Range(0, 3),
 }
-"""Arrays that may be other than any number, by stage; those without an entry must be numbers."""
+"""What the values of an array may be, by the column `values` of arrays.csv."""
 
 LOWEST_STRAIN = -0.5 - rounding.STRAIN
 """E = (F^T F - I) / 2 along an axis is above -1/2, because F^T F is positive; with the rounding of the store."""
@@ -121,9 +90,9 @@ def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[t
     name, problem : str
         Name of the array, and what is wrong with it.
     """
-    stage = group.partition("/")[0]
+    stage, kinds = group.partition("/")[0], {array.name: array.values for array in schema.named(group)}
     for name, values in arrays.items():
-        for problem in _in_range(values, RANGES.get(stage, {}).get(name, NUMBER)):
+        for problem in _in_range(values, RANGES[kinds[name]]):
             yield name, problem
     for name, count in NORMAL_STRAINS.get(stage, {}).items():
         if name in arrays and bool((arrays[name][..., :count] < LOWEST_STRAIN).any()):
@@ -197,7 +166,7 @@ def _truth(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, st
             yield name, "is not a number in a pixel of the wall, or is one outside"
     if bool(((label["segment"] > 0) != mask).any()) or bool(label["region"][~mask].any()):
         yield "labels", "has a pixel of the wall without a segment, or a segment or region outside"
-    for name, highest in (("layer", config.fibres.layers), ("segment", SEGMENT.high), ("region", REGION.high)):
+    for name, highest in {"layer": config.fibres.layers, "segment": 17, "region": 3}.items():
         if label[name].max(initial=0) > highest:
             yield "labels", f"has a {name} of {label[name].max()}, above {highest}"
     if bool((np.isfinite(arrays["flow"]).all(-1) != _has_flow(mask, first, config.loop.frames)).any()):

@@ -193,7 +193,8 @@ def _outcomes(
     places = list(repository.config.views), repository.config.bmode.sizes
     for case in repository.cases:
         mechanics, *others = record_paths(repository.folder, case, *places)
-        found = verdict(entries[mechanics], repository.config.physiology) if mechanics in entries else None
+        bounds = repository.cases[case].config.physiology
+        found = verdict(entries[mechanics], bounds) if mechanics in entries else None
         if found is None or (found.status != "failed" and missing & set(others)):
             yield case, ("unfinished", "not all of its jobs have been run")
         else:

@@ -7,9 +7,8 @@ from hashlib import sha256
 from mimetypes import guess_type
 from pathlib import Path
 
-from echotruth.repository.checksums import checksums
 from echotruth.repository.description.attribution import DescriptionError
-from echotruth.repository.inventory import Inventory, files_below
+from echotruth.repository.inventory import Inventory
 
 MEDIA_TYPES = {"yaml": "application/yaml", "cff": "application/yaml", "md": "text/markdown"}
 """Ending of a name -> media type, of those that Python does not know everywhere."""
@@ -54,7 +53,7 @@ def store_files(repository: Inventory, known: dict[str, str]) -> list[StoredFile
     ----------
     repository : Inventory
     known : dict
-        Path below the store -> SHA-256 in the ledger; what the ledger of an older repository lacks is taken here.
+        Path below the store -> SHA-256 in the ledger.
 
     Raises
     ------
@@ -62,9 +61,6 @@ def store_files(repository: Inventory, known: dict[str, str]) -> list[StoredFile
         If a file of the ledger is missing.
     """
     store = repository.store
-    if repository.is_older:
-        others = (path for path in files_below(store) if path not in known)
-        known = known | checksums([store / path for path in others], store)
     if lost := next((path for path in known if not (store / path).is_file()), None):
         raise damaged(repository.folder, store / lost)
     return [

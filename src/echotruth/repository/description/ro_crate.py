@@ -12,16 +12,13 @@ from typing import Any
 from rocrate.model.contextentity import ContextEntity
 from rocrate.rocrate import ROCrate
 
+from echotruth.config.shipped import ROOT
 from echotruth.repository.description.attribution import Author, slug
 from echotruth.repository.description.citation import filled
 from echotruth.repository.description.facts import Facts
 from echotruth.repository.description.files import StoredFile
-from echotruth.repository.provenance import PACKAGE
 
 NAME = "ro-crate-metadata.json"
-
-WORKFLOW = PACKAGE / "workflow"
-"""Folder of the Snakefile."""
 
 MAIN = "workflow/Snakefile"
 
@@ -43,8 +40,8 @@ OTHERS = {
 
 def workflow_files() -> dict[str, bytes]:
     """The Snakefile and its rules, by their path in the crate."""
-    files = [WORKFLOW / "Snakefile", *sorted((WORKFLOW / "rules").glob("*.smk"))]
-    return {f"workflow/{path.relative_to(WORKFLOW).as_posix()}": path.read_bytes() for path in files}
+    files = [ROOT / "Snakefile", *sorted((ROOT / "rules").glob("*.smk"))]
+    return {f"workflow/{path.relative_to(ROOT).as_posix()}": path.read_bytes() for path in files}
 
 
 def ro_crate(facts: Facts, said: dict[str, Any], made: list[StoredFile]) -> bytes:

@@ -1,0 +1,44 @@
+# Public names and where they come from, as lazy_loader and editors read them.
+from . import learning
+from .cases import expand
+from .config import Config, Probe, Rf, View
+from .config.building import configure
+from .config.loading import ConfigError
+from .evaluation.curves import strain_peaks
+from .heart import Heart
+from .imaging.beamforming.scanner import Scanner
+from .imaging.rf.full_matrix import FullMatrix
+from .notebook.datasets import heart_dataset
+from .notebook.kinematics import kinematics
+from .notebook.point_tracks import point_tracks
+from .notebook.simulation import beat, evaluate, image, track
+from .repository.reader import Repository
+from .repository.unpacking import unpack
+from .tracking.failure import TrackerFailed
+
+__version__: str
+
+__all__ = [
+    "Config",
+    "ConfigError",
+    "FullMatrix",
+    "Heart",
+    "Probe",
+    "Repository",
+    "Rf",
+    "Scanner",
+    "TrackerFailed",
+    "View",
+    "beat",
+    "configure",
+    "evaluate",
+    "expand",
+    "heart_dataset",
+    "image",
+    "kinematics",
+    "learning",
+    "point_tracks",
+    "strain_peaks",
+    "track",
+    "unpack",
+]
