@@ -13,14 +13,12 @@ import zarr
 
 from echotruth.cases import expand, table
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tracking, View
-from echotruth.imaging.bmode import pixel_centres
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, packing, schema
 from echotruth.repository.checksums import ChecksumError, verify_structure
 from echotruth.repository.store import NotWritten, Store, packs_of, schema_of
 from echotruth.repository.unpacking import unpack
-from echotruth.tracking import grid
 
 SMALL = {
     "name": "small",
@@ -54,7 +52,7 @@ def lay_out(path: Path, seeds: list[int], **changes) -> Store:
     for case in cases:
         times[rows[case.id]] = read_loop(case.config.loop).time
     columns = layout.columns(table(cases), list(rows))
-    labels = layout.labels(config, list(rows), times, list(views)) | layout.positions(config, pixel_centres, grid)
+    labels = layout.labels(config, list(rows), times, list(views)) | layout.positions(config)
     arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
     store = Store(path)
     constants = {"cases": {"constants": layout.constants(table(cases))}}

@@ -12,9 +12,9 @@ from echotruth.cases import expand
 from echotruth.config.loading import validate
 from echotruth.repository import ledger
 from echotruth.repository.checksums import verify
+from echotruth.repository.settings import mechanics_settings, motions
 from echotruth.repository.store import Store
 from echotruth.workflow.job import Job
-from echotruth.repository.settings import mechanics_settings, motions
 from echotruth.workflow.sharing import first_with_same
 
 SETTINGS = {
