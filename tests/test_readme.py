@@ -10,6 +10,7 @@ import numpy as np
 import yaml
 from finished_repository import configured
 
+from echotruth.cases import expand
 from echotruth.cli import parser
 from echotruth.config.loading import load
 from echotruth.loop.cycle import SHIPPED

@@ -7,7 +7,7 @@ from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking
 from echotruth.repository import schema
 
 ALL = [*schema.CASES, *schema.COORDINATES]
-ALL += [array for stage in schema.STAGES | schema.SIZED for array in schema.named(stage)]
+ALL += [array for group in schema.KINDS for array in schema.named(group)]
 ALL += schema.DERIVED
 
 
@@ -20,9 +20,9 @@ def test_array_is_whole(array):
 
 
 def test_names_stand_once_in_a_group():
-    for stage, arrays in (schema.STAGES | schema.SIZED).items():
-        for kind in (arrays, schema.named(stage)):
-            names = [array.name for array in (*kind, *schema.coordinates(arrays))]
+    for group, arrays in schema.KINDS.items():
+        for listed in (arrays, schema.named(group)):
+            names = [array.name for array in (*listed, *schema.coordinates(arrays))]
             assert len(names) == len(set(names))
 
 
@@ -37,9 +37,11 @@ def test_labels_belong_to_coordinates():
     assert set(schema.LABELS) <= {array.name for array in schema.COORDINATES}
 
 
-def test_sized_groups_stand_once_for_every_image_size():
+def test_sized_groups_stand_once_for_every_image_size_and_tracked_ones_for_every_tracker():
     groups = schema.groups(Config(bmode=Bmode(size_px=256, downsampling=(1, 4)), tracking=_tracking()))
-    assert {path for path in groups if "/" in path} == {f"{stage}/{px}" for stage in schema.SIZED for px in (256, 64)}
+    sized = {f"{stage}/{px}" for stage in schema.SIZED for px in (256, 64)}
+    tracked = {f"{stage}/{px}/{name}" for stage in schema.TRACKED for px in (256, 64) for name in ("one", "two")}
+    assert {path for path in groups if "/" in path} == sized | tracked
 
 
 def test_fill_says_that_nothing_was_written():
@@ -56,4 +58,4 @@ def test_columns_of_cases_carry_the_unit_of_their_key():
 
 
 def _tracking():
-    return Tracking(trackers={"one": PhaseCorrelation(window_px=32)})
+    return Tracking(trackers={name: PhaseCorrelation(window_px=32) for name in ("one", "two")})

@@ -71,8 +71,7 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
             report.files += found.files
             row = repository.row(record)
             if found.arrays is not None and row is not None:
-                arrays = listed.get((record.stage, row), frozenset()) | found.arrays
-                listed[record.stage, row] = alike.setdefault(arrays, arrays)
+                listed[record.stage, record.size, row] = alike.setdefault(found.arrays, found.arrays)
             if progress:
                 progress(done, len(records))
         damaged = {path for fault in report.faults for path in fault.records}

@@ -121,7 +121,7 @@ def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[t
     name, problem : str
         Name of the array, and what is wrong with it.
     """
-    stage = group.partition("/")[0]
+    stage, kind = group.partition("/")[0], schema.kind(group)
     for name, values in arrays.items():
         for problem in _in_range(values, RANGES.get(stage, {}).get(name, NUMBER)):
             yield name, problem
@@ -129,8 +129,8 @@ def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[t
         if name in arrays and bool((arrays[name][..., :count] < LOWEST_STRAIN).any()):
             yield name, "has a strain below -1/2 along an axis"
     yield from _labels(arrays, config)
-    if stage in RELATIONS:
-        yield from RELATIONS[stage](arrays, first, config)
+    if kind in RELATIONS:
+        yield from RELATIONS[kind](arrays, first, config)
 
 
 def _in_range(values: NDArray[Any], range: Range) -> Iterator[str]:
@@ -242,11 +242,11 @@ RELATIONS: dict[str, Callable[[Arrays, int, Config], Iterator[tuple[str, str]]]]
     "mechanics": _mechanics,
     "kinematics": _kinematics,
     "phantom": _phantom,
-    "truth": _truth,
-    "tracking": _tracking,
-    "evaluation": _evaluation,
+    "truth/SIZE": _truth,
+    "tracking/SIZE/TRACKER": _tracking,
+    "evaluation/SIZE": _evaluation,
 }
-"""Stage -> faults of its arrays in relation to each other."""
+"""Kind of a group -> faults of its arrays in relation to each other."""
 
 
 def loop_faults(arrays: Arrays, measured: Arrays, config: Config) -> Iterator[tuple[str, str]]:
