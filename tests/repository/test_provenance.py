@@ -93,6 +93,7 @@ def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_
     assert "echotruth.mechanics.solver.newton" in dependencies("mechanics")
     assert "echotruth.materials.neo_hooke" in dependencies("mechanics"), "found in its folder, not by an import"
     assert "echotruth.mechanics.solver.newton" not in dependencies("tracking")
+    assert "echotruth.tracking.trackers.dis" in dependencies("tracking")
     assert "echotruth.tracking.trackers.phase_correlation" not in dependencies("mechanics") | dependencies("rf")
 
 
