@@ -1,24 +1,19 @@
 """A small benchmark: hearts that move as rigid bodies, with speckle that moves with them, and labels."""
 
+import runpy
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-from echotruth.workflow.scripts import evaluation, tracking
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.stage_cost import Cost
-from known_repository import FRAMES, SETTINGS, SHIFT, Known
-from known_repository import _commit as commit
+from finished_repository import finish
+from known_repository import FRAMES, SETTINGS, SHIFT, Known, overlaid
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 import echotruth as et
-from echotruth.cases import expand
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import pixel_truth
-from echotruth.repository import ledger
-from echotruth.repository.ledger import GATES, VIEW_STAGES
-from echotruth.repository.publication import publish
 from echotruth.workflow.job import Job
+from echotruth.workflow.processes import script
 
 TABLE = """case,seed,loop.heart_rate_per_min,label.heart,label.split,label.group,label.acoustics,label.variation
 a_ideal,1,500,a,test,healthy,ideal,none
@@ -48,24 +43,17 @@ def moving_speckle() -> np.ndarray:
 
 
 def make(folder: Path) -> Path:
-    """Write the repository as the workflow does; tracking and evaluation are its own."""
+    """Write the repository as the workflow does; tracking is its own."""
     (folder.parent / "hearts.csv").write_text(TABLE)
     config = et.configure(CONFIGURED | {"cases": {"file": str(folder.parent / "hearts.csv")}})
     heart = et.beat(et.configure(config, cases={}), progress=False)
-    cases = expand(config)
-    lay_out(folder, config, cases)
-    made = images_and_truth(Known(folder, config, heart))
-    for case in cases:
-        for stage in GATES:
-            commit(Job(folder, stage, case, code="1"), heart.arrays)
-        for stage in VIEW_STAGES:
-            job = Job(folder, stage, case, "mid", code="1")
-            if work := {"tracking": tracking.work, "evaluation": evaluation.work}.get(stage):
-                job.commit(work(job), Cost())
-            else:
-                commit(job, made)
-    ledger.commit(folder / "ledger/repository.json", publish(folder))
-    return folder
+    made = heart.arrays | images_and_truth(Known(folder, config, heart))
+    track = runpy.run_path(script("tracking"))["work"]
+
+    def result(job: Job):
+        return track(job) if job.stage == "tracking" else overlaid(job, made)
+
+    return finish(folder, config, result)
 
 
 def images_and_truth(known: Known) -> dict[str, dict[str, np.ndarray]]:

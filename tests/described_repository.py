@@ -3,14 +3,13 @@
 import os
 from pathlib import Path
 
-from finished_repository import configured, finish, lay_out, work
+from finished_repository import SIZE, configured, finish, job_of, jobs, lay_out, result
 from PIL import Image
 
 from echotruth.cases import expand
 from echotruth.repository import ledger
 from echotruth.repository.description import attribution, describe
-from echotruth.repository.ledger import GATES, VIEW_STAGES, record_path
-from echotruth.workflow.job import Job
+from echotruth.repository.ledger import record_path
 
 SWEEP = {"fibres.endo_deg": [60.0, 70.0]}
 REASON = "no equilibrium at frame 2 | of 3"
@@ -52,14 +51,12 @@ def make_unfinished(folder: Path) -> Path:
     config = configured(seeds=(1, 2, 3))
     cases = expand(config)
     lay_out(folder, config, cases)
-    for stage in GATES:
-        work(folder, config, stage, cases[0])
-    for stage in VIEW_STAGES:
-        for view in config.views:
-            work(folder, config, stage, cases[0], view)
-    Job(folder, "mechanics", cases[1], None, code="1").record_without_result("failed", REASON)
-    work(folder, config, "mechanics", cases[2])
-    path = record_path(folder, "tracking", cases[0].id, "mid")
-    ledger.commit(path, ledger.read(path) | {"failures": {"one/64": "it ended with status 3"}})
+    for job in jobs(folder, config, cases[0].id):
+        job.commit(result(job))
+    failed, stopped = (job_of(folder, record_path(folder, "mechanics", case.id)) for case in cases[1:])
+    failed.commit_without_result("failed", REASON)
+    stopped.commit(result(stopped))
+    path = record_path(folder, "tracking", cases[0].id, "mid", SIZE)
+    ledger.commit(path, ledger.read(path) | {"failures": {"one": "it ended with status 3"}})
     describe(folder)
     return folder

@@ -1,22 +1,20 @@
 """A small repository whose jobs are all done, with values that a heart could have, made in a second."""
 
 import json
+from collections.abc import Callable, Iterator
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 import zarr
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.stage_cost import Cost
 
 from echotruth.cases import expand
 from echotruth.config import Bmode, Config, Geometry, Loop, Motion, PhaseCorrelation, Tracking, View
 from echotruth.repository import ledger, packing, schema
-from echotruth.repository.ledger import GATES, VIEW_STAGES
+from echotruth.repository.layout import lay_out
 from echotruth.repository.publication import publish
-from echotruth.repository.store import Store, packs_of, schema_of
-from echotruth.workflow.job import Job
+from echotruth.workflow.job import Job, Result
 
 SIZE, FRAMES = 64, 3
 
@@ -54,62 +52,66 @@ VALUES = {
 def shapes(store: Path, group: str) -> dict[str, tuple[int, ...]]:
     """Shape of what one job writes of each array of a group, by the names of those in packs."""
     opened = zarr.open_group(store, path=group, mode="r", use_consolidated=False)
-    blank = {array.name: np.zeros(opened[array.name].shape[array.leading :]) for array in schema_of(group)}
-    found = packing.unpack(packs_of(group), blank, opened.attrs["labels"])
+    blank = {
+        array.name: np.zeros(opened[array.name].shape[array.leading :])
+        for array in schema.arrays_of(group)
+        if array.name in opened
+    }
+    found = packing.unpack(schema.packs_of(group), blank, opened.attrs["labels"])
     return {name: values.shape for name, values in found.items()}
 
 
-def result(store: Store, stage: str, config: Config, seed: int) -> dict:
+def result(job: Job) -> dict[str, dict[str, np.ndarray]]:
     """All arrays of a job by group; images are noise, so that they differ between jobs."""
     arrays = {}
-    for group in schema.written_by(stage, config):
+    for group in schema.written_by(job.stage, job.config, job.size or None):
         values = VALUES.get(group.partition("/")[0], {})
         arrays[group] = {
             name: np.broadcast_to(np.asarray(values.get(name, 0), float), shape)
-            for name, shape in shapes(store.path, group).items()
+            for name, shape in shapes(job.store.path, group).items()
         }
-        if stage == "bmode":
-            noise = np.random.default_rng(seed).integers(256, size=shapes(store.path, group)["image"])
-            arrays[group]["image"] = noise
+        if job.stage == "bmode":
+            noise = np.random.default_rng([job.config.seed, len(str(job.view_name))])
+            arrays[group]["image"] = noise.integers(256, size=shapes(job.store.path, group)["image"])
     return arrays
 
 
-def work(folder: Path, config: Config, stage: str, case, view=None) -> None:
-    """Do a job."""
-    job = Job(folder, stage, case, view, code="1")
-    job.commit(result(job.store, stage, config, [case.config.seed, len(str(view))]), Cost())
+def jobs(folder: Path, config: Config, case: str) -> Iterator[Job]:
+    """Jobs of a heart, in the order of their stages."""
+    for path in ledger.record_paths(folder, case, list(config.views), config.bmode.sizes):
+        yield job_of(folder, path)
 
 
-def finish(folder: Path, config: Config) -> Path:
-    """Make a repository, in its folder, as the workflow does."""
+def job_of(folder: Path, record: Path) -> Job:
+    """The job that a record is of, given the path of it."""
+    stage, case, *place = record.relative_to(folder / "ledger").with_suffix("").parts
+    view, size = (*place, None, None)[:2]
+    return Job(folder, stage, case, view, int(size) if size else None, code="1")
+
+
+def finish(folder: Path, config: Config, result: Callable[[Job], Result] = result) -> Path:
+    """Make a repository, in its folder, as the workflow does, given the arrays of a job."""
     cases = expand(config)
     lay_out(folder, config, cases)
     for case in cases:
-        for stage in GATES:
-            work(folder, config, stage, case)
-        for stage in VIEW_STAGES:
-            for view in config.views:
-                work(folder, config, stage, case, view)
+        for job in jobs(folder, config, case.id):
+            job.commit(result(job))
     ledger.commit(folder / "ledger/repository.json", publish(folder))
     return folder
 
 
-def maker(folder: Path, config: Config, made: list[str]):
-    """A function that makes records again, given their paths, as a run does; it notes which ones in `made`."""
-    cases = {case.id: case for case in expand(config)}
-
-    def make(paths: list[str]) -> int:
-        lay_out(folder, config, list(cases.values()))
-        for path in paths:
-            made.append(Path(path).relative_to(folder).as_posix())
-            if path.endswith("ledger/repository.json"):
-                ledger.commit(Path(path), publish(folder))
-                continue
-            stage, case, *view = Path(path).relative_to(folder / "ledger").with_suffix("").parts
-            work(folder, config, stage, cases[case], *view)
-        return 0
-
-    return make
+def remake(folder: Path, config: Config) -> list[str]:
+    """Make what has no record, as a run does; the records that were made, below the folder."""
+    cases = expand(config)
+    lay_out(folder, config, cases)
+    missing = [job for case in cases for job in jobs(folder, config, case.id) if not job.record.exists()]
+    for job in missing:
+        job.commit(result(job))
+    made, published = [job.record for job in missing], folder / "ledger/repository.json"
+    if made or not published.exists():
+        ledger.commit(published, publish(folder))
+        made.append(published)
+    return [path.relative_to(folder).as_posix() for path in made]
 
 
 def content(folder: Path) -> dict[str, str]:

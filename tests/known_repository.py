@@ -6,8 +6,6 @@ from pathlib import Path
 
 import finished_repository
 import numpy as np
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.stage_cost import Cost
 
 import echotruth as et
 from echotruth.cases import Case, expand
@@ -17,9 +15,7 @@ from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.labels import unpack
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
-from echotruth.repository import ledger
-from echotruth.repository.ledger import GATES, VIEW_STAGES
-from echotruth.repository.publication import publish
+from echotruth.repository import schema
 from echotruth.workflow.job import Job
 
 SIZES = (128, 64)
@@ -41,20 +37,31 @@ SETTINGS["motion"]["rigid"] |= {
 }
 
 
-TRACKED = {
-    "tracking": {"displacement": np.reshape([1e-4, 2e-4], (2, 1, 1, 1, 1))},
-    "evaluation": {
-        "tracked_region_strain": np.reshape([0.1, 0.2], (2, 1, 1, 1, 1)),
-        "tracked_segment_strain": np.reshape([0.11, 0.21], (2, 1, 1, 1, 1)),
-        "tracked_line_strain": np.reshape([-0.12, -0.22], (2, 1, 1)),
-        "tracked_rotation": np.reshape([0.13, 0.23], (2, 1)),
-        "true_region_strain": np.reshape([0.3, 0.4, 0.5], (3, 1, 1, 1, 1)),
-        "true_segment_strain": np.reshape([0.31, 0.41, 0.51], (3, 1, 1, 1, 1)),
-        "true_line_strain": -0.14,
-        "true_rotation": 0.15,
+FOUND = {
+    "one": {
+        "displacement": 1e-4,
+        "tracked_region_strain": 0.1,
+        "tracked_segment_strain": 0.11,
+        "tracked_line_strain": -0.12,
+        "tracked_rotation": 0.13,
+    },
+    "two": {
+        "displacement": 2e-4,
+        "tracked_region_strain": 0.2,
+        "tracked_segment_strain": 0.21,
+        "tracked_line_strain": -0.22,
+        "tracked_rotation": 0.23,
     },
 }
-"""What the two trackers found, and the three references: told apart by their values."""
+"""What the two trackers found: told apart by their values."""
+
+TRUE = {
+    "true_region_strain": np.reshape([0.3, 0.4, 0.5], (3, 1, 1, 1, 1)),
+    "true_segment_strain": np.reshape([0.31, 0.41, 0.51], (3, 1, 1, 1, 1)),
+    "true_line_strain": -0.14,
+    "true_rotation": 0.15,
+}
+"""Of the three references, told apart by their values."""
 
 
 @dataclass(eq=False)
@@ -84,6 +91,19 @@ class Known:
         """Mask, layer, segment and region of the pixels, each (frame, axial, lateral)."""
         return unpack(self.truth(view, size)["labels"])
 
+    def arrays(self, job: Job) -> dict[str, dict[str, np.ndarray]]:
+        """Known arrays of a job, by group."""
+        if job.stage == "mechanics":
+            return self.heart.arrays
+        plane, size = self.plane(job.view_name), job.size
+        if job.stage == "tracking":
+            found = {f"{kind}/{size}/{name}": arrays for kind in schema.TRACKED for name, arrays in FOUND.items()}
+            return found | {f"evaluation/{size}": TRUE}
+        if job.stage == "truth":
+            return {f"truth/{size}": self.truth(job.view_name, size)}
+        images = {f"bmode/{size}": {"image": known_images(size)}} if size else {}
+        return images | {"phantom": {"origin": plane.origin, "axes": plane.axes}}
+
     @cache  # noqa: B019 - one object a session
     def truth(self, view: str, size: int) -> dict[str, np.ndarray]:
         return pixel_truth(self.heart, self.plane(view), *pixel_centres(self.config.bmode, size))
@@ -102,31 +122,15 @@ def make(folder: Path, settings: dict) -> Known:
     """Write a repository as the workflow does, with known images."""
     config = et.configure(settings)
     heart = et.beat(et.configure(settings, cases={}), progress=False)
-    known, cases = Known(folder, config, heart), expand(config)
-    lay_out(folder, config, cases)
-    for case in cases:
-        for stage in GATES:
-            _commit(Job(folder, stage, case, code="1"), heart.arrays)
-        for view in config.views:
-            for stage in VIEW_STAGES:
-                _commit(Job(folder, stage, case, view, code="1"), _arrays(known, view))
-    ledger.commit(folder / "ledger/repository.json", publish(folder))
+    known = Known(folder, config, heart)
+    finished_repository.finish(folder, config, lambda job: overlaid(job, known.arrays(job)))
     return known
 
 
-def _arrays(known: Known, view: str) -> dict[str, dict[str, np.ndarray]]:
-    plane = known.plane(view)
-    arrays = {"phantom": {"origin": plane.origin, "axes": plane.axes}}
-    for size in SIZES:
-        arrays[f"bmode/{size}"] = {"image": known_images(size)}
-        arrays[f"truth/{size}"] = known.truth(view, size)
-    return arrays | TRACKED
-
-
-def _commit(job: Job, known: dict[str, dict[str, np.ndarray]]) -> None:
-    """Commit a job: known arrays, and zeros for all others."""
-    arrays = finished_repository.result(job.store, job.stage, job.case.config, [1, 2])
+def overlaid(job: Job, known: dict[str, dict[str, np.ndarray]]) -> dict[str, dict[str, np.ndarray]]:
+    """Arrays of a job: known ones, and zeros for all others."""
+    arrays = finished_repository.result(job)
     for group, values in arrays.items():
         for name in values.keys() & known.get(group, {}).keys():
             values[name] = np.broadcast_to(known[group][name], np.shape(values[name]))
-    job.commit(arrays, Cost())
+    return arrays

@@ -1,21 +1,18 @@
 """A small repository with exact truth: its hearts move affinely, and its images are textures that move with them."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.stage_cost import Cost
-from finished_repository import configured, work
+from finished_repository import configured, finish, result
 
 import echotruth as et
-from echotruth.cases import expand
-from echotruth.config import Bmode, Motion
+from echotruth.config import Bmode, Config, Motion
 from echotruth.config.motion import Affine
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
-from echotruth.repository import ledger
-from echotruth.repository.publication import publish
+from echotruth.repository.layout import read_case
 from echotruth.workflow.job import Job
 
 GRADIENT = [[0.9, 0.05, 0.0], [0.0, 1.1, 0.0], [0.2, 0.0, 1.0]]
@@ -27,34 +24,37 @@ def made(folder: Path) -> Path:
     """Two hearts, one with an infarct, and each with two seeds; all is done but tracking, which is empty."""
     motion = Motion(kind="affine", affine=Affine(gradient=GRADIENT))
     config = configured(name="small", cases=SWEPT, bmode=Bmode(size_px=64, downsampling=(1, 2)), motion=motion)
-    cases = expand(config)
-    lay_out(folder, config, cases)
-    for case in cases:
-        make(folder, case)
-    ledger.commit(folder / "ledger/repository.json", publish(folder))
-    return folder
+    return make(folder, config)
 
 
-def make(folder, case):
-    """Results of one heart, as the workflow stores them."""
-    heart, config = et.beat(case.config, progress=False), case.config
-    groups = dict(heart.arrays)
-    commit(folder, "physiology", case, None, {"physiology": groups.pop("physiology")})
-    commit(folder, "mechanics", case, None, groups)
-    for number, view in enumerate(config.views):
-        plane = imaging_plane(config.views[view], config.rf, heart.endo_at_ed)
+def make(folder: Path, config: Config) -> Path:
+    """A repository whose hearts, images and truth are those of its configuration."""
+    return finish(folder, config, _result)
+
+
+def _result(job: Job):
+    """Arrays of a job, as the workflow stores them."""
+    heart, config = _beat(job.folder, job.case.id), job.config
+    if job.stage == "mechanics":
+        return heart.arrays
+    view, number = config.views[job.view_name], list(config.views).index(job.view_name)
+    plane = imaging_plane(view, config.rf, heart.endo_at_ed)
+    if job.stage == "phantom":
         posed = {"scatterer_count": 0, "origin": plane.origin, "axes": plane.axes, "centre": np.zeros(2)}
-        commit(folder, "phantom", case, view, {"phantom": posed})
-        images, truth = {}, {}
-        for size in config.bmode.sizes:
-            centres = pixel_centres(config.bmode, size)
-            truth[f"truth/{size}"] = pixel_truth(heart, plane, *centres)
-            random = np.random.default_rng([config.seed, number])
-            images[f"bmode/{size}"] = {"image": texture(truth[f"truth/{size}"]["displacement"], *centres, random)}
-        commit(folder, "truth", case, view, truth)
-        commit(folder, "bmode", case, view, images)
-        for stage in ("rf", "tracking", "evaluation"):
-            work(folder, case.config, stage, case, view)
+        return {"phantom": posed}
+    if job.stage not in ("truth", "bmode"):
+        return result(job)
+    centres = pixel_centres(config.bmode, job.size)
+    truth = pixel_truth(heart, plane, *centres)
+    if job.stage == "truth":
+        return {f"truth/{job.size}": truth}
+    random = np.random.default_rng([config.seed, number])
+    return {f"bmode/{job.size}": {"image": texture(truth["displacement"], *centres, random)}}
+
+
+@cache
+def _beat(folder: Path, case: str):
+    return et.beat(read_case(folder, case).config, progress=False)
 
 
 def texture(displacement, axial, lateral, random):
@@ -64,7 +64,3 @@ def texture(displacement, axial, lateral, random):
     wave = 2 * np.pi / random.uniform(0.6e-3, 1.2e-3, 30) * np.stack([np.cos(direction), np.sin(direction)])
     grey = 128 + 60 * np.sin(position @ wave + phase).sum(-1) / np.sqrt(15)
     return np.nan_to_num(grey).clip(0, 255).round()
-
-
-def commit(folder, stage, case, view, arrays):
-    Job(folder, stage, case, view, code="1").commit(arrays, Cost())

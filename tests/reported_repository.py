@@ -3,13 +3,12 @@
 from pathlib import Path
 
 from echotruth.report import page
-from echotruth.report.figures import PARTS, Figures
+from echotruth.report.figures import Figures
 from echotruth.repository.reader import Repository
 
 
 def report(folder: Path) -> str:
     """Draw the figures of a repository and write its page; the text of the page."""
     repository = Repository(folder)
-    for part in PARTS:
-        Figures(repository, folder / "figures").draw(part)
+    Figures(repository, folder / "figures").draw()
     return page.write(repository).read_text(encoding="utf-8")

@@ -38,5 +38,6 @@ def shown_repository(folder: Path) -> Shown:
     axes = np.where(inside[..., None, None], np.eye(2), np.nan)
     store = Store(known.folder / "known.zarr")
     for index in range(len(known.config.views)):
-        store.write("evaluation", {"true_displacement": moved, "wall_axes": axes}, 0, index)
+        for size in SIZES:
+            store.write(f"evaluation/{size}", {"true_displacement": moved, "wall_axes": axes}, 0, index)
     return Shown(known.folder, grid[inside], inside)

@@ -8,14 +8,12 @@ import learning_repository
 import matplotlib.pyplot as plt
 import numpy as np
 import yaml
-from echotruth.workflow.scripts.cases import lay_out
 from finished_repository import configured
 
 from echotruth.cases import expand
 from echotruth.cli import parser
 from echotruth.config.loading import load
 from echotruth.loop.cycle import SHIPPED
-from echotruth.repository.publication import publish
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -25,11 +23,7 @@ PYTHON, YAML = (re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL) for l
 def test_five_lines_open_a_repository_and_show_motion_upright(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(plt, "show", lambda: None)
-    config = configured("demo", views=("mid",), cases={})
-    (case,) = expand(config)
-    lay_out(tmp_path / "out/demo", config, [case])
-    learning_repository.make(tmp_path / "out/demo", case)
-    publish(tmp_path / "out/demo")
+    learning_repository.make(tmp_path / "out/demo", configured("demo", views=("mid",), cases={}))
     lines = PYTHON[0].replace("frame=10", "frame=2")
     assert len(lines.split("\n\n")[-1].splitlines()) + lines.count("import ") == 5
     names = {}

@@ -66,6 +66,7 @@ BAD = {
     "name: a/b": "name = 'a/b': use letters, digits",
     "views: {a b: {}}": "views: the name 'a b': use letters, digits and underscores only, and begin with a letter",
     "tracking: {trackers: {2d: {}}}": "tracking.trackers: the name '2d': use letters, digits and underscores only",
+    "tracking: {trackers: {wall_axes: {}}}": "tracking.trackers = 'wall_axes': is the name of an array of the repo",
     "a: [": "line 1: did not find expected node content: correct the YAML",
     "seed: 1\nseed: 2": "key 'seed' is given twice",
     "- 3": "contains a list: write a mapping",

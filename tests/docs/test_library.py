@@ -6,14 +6,10 @@ from pathlib import Path
 
 import learning_repository
 import pytest
-from echotruth.workflow.scripts.cases import lay_out
 from finished_repository import configured
 
 import echotruth as et
-from echotruth.cases import expand
 from echotruth.config import Bmode, Geometry, Rf, Tracking, View
-from echotruth.repository import ledger
-from echotruth.repository.publication import publish
 
 PAGES = Path(__file__).parents[2] / "docs/library"
 CONFIGURATIONS = {"Config", "Probe", "Rf", "View"}
@@ -42,10 +38,7 @@ def demo(tmp_path_factory):
         tracking=Tracking(grid_px=4, trackers={"dis": {"method": "dis"}, "bspline_dic": {"method": "bspline_dic"}}),
         geometry=Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1),
     ).model_copy(update={"views": planes})
-    made, (case,) = folder / "out/demo", expand(config)
-    lay_out(made, config, [case])
-    learning_repository.make(made, case)
-    ledger.commit(made / "ledger/repository.json", publish(made))
+    learning_repository.make(folder / "out/demo", config)
     return folder
 
 

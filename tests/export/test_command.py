@@ -106,7 +106,7 @@ def copy(known, tmp_path):
 
 
 def test_unfinished_clip_is_left_out_and_named(copy, monkeypatch, capsys, tmp_path):
-    (copy / "ledger/bmode/heart/long.json").unlink()
+    (copy / f"ledger/bmode/heart/long/{SIZES[0]}.json").unlink()
     assert call(monkeypatch, copy, "--format", "gif", "-o", tmp_path / "out") == 0
     said = capsys.readouterr()
     assert said.out.splitlines() == [str(tmp_path / f"out/heart_mid_{SIZES[0]}.gif")]
@@ -118,9 +118,9 @@ def test_heart_that_failed_is_refused(copy, monkeypatch, capsys):
     record = copy / "ledger/mechanics/heart.json"
     content = json.loads(record.read_text())
     content.pop("seal")
-    record.write_text(json.dumps(content | {"status": "failed"}))
+    record.write_text(json.dumps(content | {"status": "failed", "reason": "no equilibrium"}))
     assert call(monkeypatch, copy, "--format", "mp4") == 2
-    assert f"heart of {copy} is failed: cases.csv says why" in capsys.readouterr().err
+    assert f"heart of {copy} is failed: no equilibrium" in capsys.readouterr().err
 
 
 def test_lost_images_are_an_error_and_not_a_black_video(copy, monkeypatch, capsys, tmp_path):

@@ -1,6 +1,5 @@
 """A small repository that keeps RF, and what tests of records need."""
 
-import sys
 from functools import cache
 
 import numpy as np
@@ -9,12 +8,10 @@ import yaml
 
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Probe, Rf, Tracking, View
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
-from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.recorder import RfRecorder, metadata
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, schema
 from echotruth.repository.store import Store
-from echotruth.tracking import grid
 
 FRAMES = 2
 
@@ -41,7 +38,7 @@ def scanner(**rf):
 
 def lay_out(store, config, **rf):
     arrays, sizes, settings = metadata(config, scanner(**rf)) if config.rf.keep else ({}, {}, {})
-    labels = layout.labels(config, ["heart"], np.zeros((1, FRAMES))) | layout.positions(config, pixel_centres, grid)
+    labels = layout.labels(config, ["heart"], np.zeros((1, FRAMES))) | layout.positions(config)
     labels |= {f"rf:{name}": value for name, value in arrays.items()}
     sizes |= layout.sizes(left_ventricle(config.geometry))
     store.lay_out(schema.groups(config), sizes, labels, {"rf": settings})
@@ -81,11 +78,3 @@ def rf_repository(tmp_path_factory):
         return folder
 
     return make
-
-
-@pytest.fixture(scope="module")
-def script(request):
-    """The version in a record is that of the script that runs: here, of the module of the tests."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", [request.module.__file__])
-        yield

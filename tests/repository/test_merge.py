@@ -23,7 +23,7 @@ FIRST = finished.configured("first", seeds=(1, 2))
 SECOND = finished.configured("second", seeds=(2, 3), views=("long_axis", "mid"))
 
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("script")]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_records_keep_their_times_so_that_nothing_is_run_again(out):
     merge_repositories(out / "both", [out / "first", out / "second"])
     for folder, case in (("first", 0), ("second", 1)):
         id = [case.id for case in finished.expand({"first": FIRST, "second": SECOND}[folder])][case]
-        paths = [record_path(out / name, "bmode", id, "mid") for name in (folder, "both")]
+        paths = [record_path(out / name, "bmode", id, "mid", finished.SIZE) for name in (folder, "both")]
         assert paths[0].stat().st_mtime_ns == paths[1].stat().st_mtime_ns
 
 
@@ -89,7 +89,7 @@ def rewrite(folder, stage, group, index, instructions, **values):
     """Write arrays of a job of the common heart anew, as a machine of some kind would; give the name of the heart."""
     case, store = finished.expand(FIRST)[1].id, Store(folder / f"{folder.name}.zarr")
     store.write(group, values, *index)
-    path = record_path(folder, stage, case, "mid" if len(index) > 1 else None)
+    path = record_path(folder, stage, case, *(("mid", finished.SIZE) if len(index) > 1 else ()))
     record = ledger.read(path)
     kind = {} if instructions == HERE else {"instructions": instructions}
     ledger.commit(
@@ -109,7 +109,7 @@ def solve(out, change):
 def test_same_heart_with_other_bytes_is_refused_by_name_before_anything_changes(out, capsys):
     case = rewrite(out / "first", "bmode", "bmode/64", (1, 0), HERE, image=np.zeros((finished.FRAMES, 64, 64)))
     assert merge_repositories(out / "both", [out / "first", out / "second"]) == 2
-    assert f"bmode of {case}, mid has other bytes than in" in capsys.readouterr().err
+    assert f"bmode of {case}, mid, 64 px has other bytes than in" in capsys.readouterr().err
     assert not (out / "both").exists()
 
 
@@ -167,7 +167,7 @@ def test_images_of_two_kinds_of_machines_may_differ_by_a_grey_level(out, change,
 def test_measures_of_two_kinds_of_machines_may_differ_by_rounding_in_their_unit(out, factor, is_merged, capsys):
     scalars = np.asarray(zarr.open_array(out / "first/first.zarr", path="physiology/scalars")[1])
     assert np.abs(scalars).max() > 0
-    rewrite(out / "first", "physiology", "physiology", (1,), "native older", scalars=scalars * factor)
+    rewrite(out / "first", "mechanics", "physiology", (1,), "native older", scalars=scalars * factor)
     assert (merge_repositories(out / "first", [out / "second"]) == 0) == is_merged
     assert is_merged or "physiology/scalars differs by more than rounding" in capsys.readouterr().err
 
@@ -211,11 +211,11 @@ def test_hearts_of_the_joint_sweep_that_neither_has_are_left_to_a_run(out, capsy
 
 
 def test_repository_of_another_layout_is_refused_in_a_sentence(out, capsys):
-    """A store whose trackers had a group for every image size."""
+    """A store in which image sizes and trackers were dimensions of one group."""
     store = out / "second/second.zarr"
+    (store / "tracking/64/one").rename(store / "one")
     (store / "tracking").rename(store / "64")
-    (store / "tracking").mkdir()
-    (store / "64").rename(store / "tracking/64")
+    (store / "one").rename(store / "tracking")
     assert merge_repositories(out / "first", [out / "second"]) == 2
     told = capsys.readouterr().err
     assert f"{out / 'second'}: was made by an earlier version: run it again" in told and told.count("\n") == 1

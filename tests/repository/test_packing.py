@@ -7,7 +7,7 @@ import xarray as xr
 from echotruth.repository import schema
 from echotruth.repository.array import Array
 from echotruth.repository.packing import Pack, pack, unpack
-from echotruth.repository.store import Store, packs_of
+from echotruth.repository.store import Store
 from echotruth.repository.unpacking import unpack as unpacked
 from tests.repository.test_store import lay_out
 
@@ -18,6 +18,7 @@ PACK = Pack(
         Array("pair", ("case", "region", "frame", "polar"), "float64", "m", "numbers with dimensions before and after"),
     ),
 )
+TRACKED, TRUE, CLIP = "evaluation/32/one", "evaluation/32", {"case": 0, "view": 1}
 COORDINATES = {"region": [0, 1, 2], "polar": ["radial", "tangential"]}
 
 
@@ -57,46 +58,50 @@ def written(tmp_path_factory):
     """Store in which one heart has all scores and measures, and what they are."""
     store = lay_out(tmp_path_factory.mktemp("packed") / "small.zarr", [1])
     random, values = np.random.default_rng(3), {}
-    for group, row in (("evaluation", (0, 1)), ("physiology", (0,))):
+    for group, row in ((TRACKED, (0, 1)), (TRUE, (0, 1)), ("physiology", (0,))):
         opened = store._open(group, "r")
-        stored = {one.array.name: random.random(opened[one.array.name].shape[len(row) :]) for one in packs_of(group)}
-        values[group] = unpack(packs_of(group), stored, opened.attrs["labels"])
+        stored = {
+            one.array.name: random.random(opened[one.array.name].shape[len(row) :]) for one in schema.packs_of(group)
+        }
+        values[group] = unpack(schema.packs_of(group), stored, opened.attrs["labels"])
         store.write(group, values[group], *row)
     return store, values
 
 
 def test_store_reads_single_arrays_of_a_pack_by_their_names(written):
     store, values = written
-    found = store.read("evaluation", 0, 1, names=("nrmse", "coverage", "true_segment_strain"))
-    assert list(found) == ["nrmse", "coverage", "true_segment_strain"]
-    assert found["nrmse"].shape == (2, 1, 7, 3) and found["true_segment_strain"].shape == (3, 4, 2, 17, 3)
-    for name, value in found.items():
-        np.testing.assert_array_equal(value, values["evaluation"][name].astype(value.dtype))
+    for group, shapes in (
+        (TRACKED, {"nrmse": (7, 3), "coverage": ()}),
+        (TRUE, {"true_segment_strain": (3, 4, 2, 17, 3)}),
+    ):
+        found = store.read(group, 0, 1, names=tuple(shapes))
+        assert {name: value.shape for name, value in found.items()} == shapes
+        for name, value in found.items():
+            np.testing.assert_array_equal(value, values[group][name].astype(value.dtype))
 
 
 def test_notebook_finds_every_array_with_its_dimensions_coordinates_and_unit(written):
     store, values = written
-    members = {one.name: one for packs in schema.PACKS.values() for pack in packs for one in pack.members}
     with xr.open_datatree(store.path, engine="zarr") as tree:
-        for group, row in (("evaluation", {"case": 0, "view": 1}), ("physiology", {"case": 0})):
+        for group, row in ((TRACKED, CLIP), (TRUE, CLIP), ("physiology", {"case": 0})):
+            members = {one.name: one for pack in schema.packs_of(group) for one in pack.members}
             data = unpacked(tree[group].to_dataset())
             for name, value in values[group].items():
                 assert data[name].dims == members[name].dims
                 assert data[name].attrs == {"units": members[name].units, "long_name": members[name].long_name}
                 np.testing.assert_array_equal(data[name].isel(row), value.astype(data[name].dtype), err_msg=name)
-        nrmse = unpacked(tree["evaluation"].to_dataset(), "nrmse").nrmse
+        nrmse = unpacked(tree[TRACKED].to_dataset(), "nrmse").nrmse
     assert list(nrmse.region.values) == [*range(7)] and list(nrmse.component.values) == [
         "radial",
         "tangential",
         "total",
     ]
-    assert list(nrmse["size"].values) == [64, 32]
 
 
 def test_selection_in_another_order_gives_the_same_numbers(written):
     store, _ = written
     with xr.open_datatree(store.path, engine="zarr") as tree:
-        data = tree["evaluation"].to_dataset()[["scores"]]
+        data = tree[TRACKED].to_dataset()[["scores"]]
         labels = [str(label) for label in data["score"].values if str(label).startswith("nrmse[")]
         labels[1:] = labels[:0:-1]
         whole, turned = (unpacked(one, "nrmse").nrmse.load() for one in (data, data.sel(score=labels)))
@@ -107,12 +112,12 @@ def test_selection_in_another_order_gives_the_same_numbers(written):
 def test_selection_is_unpacked_as_far_as_it_goes(written):
     store, values = written
     with xr.open_datatree(store.path, engine="zarr") as tree:
-        data = tree["evaluation"].to_dataset()
-        one = unpacked(data.sel(view="long_axis", size=32, tracker="one").isel(case=0), "strain_rms", "wall_axes")
-        assert set(one.data_vars) == {"strain_rms", "wall_axes"}
-        assert "time" not in one.coords and one.coords["tracker"] == "one"
+        data = tree[TRACKED].to_dataset()
+        one = unpacked(data.sel(view="long_axis").isel(case=0), "strain_rms")
+        assert set(one.data_vars) == {"strain_rms"}
+        assert "time" not in one.coords
         assert one.strain_rms.dims == ("reference", "region", "wall_component")
-        np.testing.assert_array_equal(one.strain_rms, values["evaluation"]["strain_rms"][1, 0])
+        np.testing.assert_array_equal(one.strain_rms, values[TRACKED]["strain_rms"])
         with pytest.raises(ValueError, match=r"^nrmse: the selection has a part of its numbers"):
             unpacked(data.sel(score=["nrmse[0,total]", "nrmse[1,radial]"]))
         with pytest.raises(ValueError, match=r"^tracked_strain is not an array of this group"):
@@ -121,8 +126,8 @@ def test_selection_is_unpacked_as_far_as_it_goes(written):
 
 def test_unit_of_every_number_is_that_of_its_array(written):
     store: Store = written[0]
-    opened = store._open("evaluation", "r")
-    members = {member.name: member for member in schema.PACKS["evaluation"][1].members}
+    opened = store._open(TRACKED, "r")
+    members = {member.name: member for member in schema.packs_of(TRACKED)[0].members}
     labels = [str(label) for label in opened["score"][...]]
     assert [str(unit) for unit in opened["score_units"][...]] == [members[x.partition("[")[0]].units for x in labels]
     assert len(set(labels)) == len(labels)

@@ -1,6 +1,5 @@
 """Versions: code is known by what it does, settings by what they say."""
 
-import os
 import sys
 from importlib.metadata import version
 from pathlib import Path
@@ -10,6 +9,7 @@ import pytest
 
 from echotruth.config import Bmode, PhaseCorrelation
 from echotruth.repository.provenance import _dependencies, _source, code_version, packages, settings_version
+from echotruth.workflow.processes import STAGES, cache_name, script
 
 ROOT = Path(__file__).parents[2]
 
@@ -59,11 +59,12 @@ def test_statements_that_mean_something_else_have_another_version(tmp_path, one,
 
 def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_path):
     def dependencies(stage):
-        return _dependencies((str(ROOT / f"src/echotruth/workflow/scripts/{stage}.py"),))
+        return _dependencies((script(stage),))
 
     assert "echotruth.mechanics.solver.newton" in dependencies("mechanics")
     assert "echotruth.materials.neo_hooke" in dependencies("mechanics"), "found in its folder, not by an import"
     assert "echotruth.mechanics.solver.newton" not in dependencies("tracking")
+    assert "echotruth.tracking.trackers.dis" in dependencies("tracking")
     assert "echotruth.tracking.trackers.phase_correlation" not in dependencies("mechanics") | dependencies("rf")
 
 
@@ -79,13 +80,13 @@ def test_import_that_is_left_out_is_not_followed_from_there_but_from_elsewhere(t
 
 
 def test_cache_of_compiled_functions_has_the_version_of_all_modules_that_compile():
-    scripts = tuple(str(script) for script in (ROOT / "src/echotruth/workflow/scripts").glob("*.py"))
+    scripts = tuple(map(script, STAGES))
     texts = {path: path.read_text() for path in (ROOT / "src").rglob("*.py")}
     files = [path.relative_to(ROOT / "src") for path, text in texts.items() if "njit(" in text or "intrinsic" in text]
     compiled = {".".join(file.with_suffix("").parts).removesuffix(".__init__") for file in files}
     assert len(compiled) > 20
     assert compiled <= _dependencies(scripts)
-    assert os.environ["NUMBA_CACHE_DIR"].endswith(code_version(*scripts))
+    assert cache_name() == code_version(*scripts)
 
 
 def test_settings_version_depends_on_values_alone():

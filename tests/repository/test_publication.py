@@ -3,24 +3,20 @@
 from pathlib import Path
 from shutil import copytree
 
+import finished_repository as finished
 import numpy as np
 import pytest
 import xarray as xr
-import yaml
-import zarr
-from echotruth.workflow.stage_cost import Cost
 
 import echotruth as et
 from echotruth.cases import expand, table
 from echotruth.config import Bmode, Cases, Config, Geometry, Loop, PhaseCorrelation, Physiology, Tracking, View
-from echotruth.imaging.bmode import pixel_centres
-from echotruth.mechanics.geometry import left_ventricle
-from echotruth.repository import layout, ledger, schema
+from echotruth.repository import ledger, schema
 from echotruth.repository.checksums import ChecksumError
-from echotruth.repository.ledger import GATES, VIEW_STAGES
+from echotruth.repository.layout import lay_out
+from echotruth.repository.ledger import STAGES
 from echotruth.repository.publication import publish
-from echotruth.repository.store import Store, schema_of
-from echotruth.tracking import grid
+from echotruth.repository.store import Store
 from echotruth.workflow.job import Job
 
 CONFIG = Config(
@@ -33,38 +29,25 @@ CONFIG = Config(
     cases={"seed": [1, 2]},
 )
 CASES = expand(CONFIG)
-GROUPS = {stage: schema.written_by(stage, CONFIG) for stage in (*GATES, *VIEW_STAGES)}
-JOBS = [*((stage, None) for stage in GATES), *((stage, view) for stage in VIEW_STAGES for view in CONFIG.views)]
-LENGTHENS = "the mean longitudinal strain at end-systole is 0.04 and must be at most 0."
+LENGTHENS = (
+    "the mean longitudinal strain at end-systole is 0.04 and must be at most 0 (physiology.longitudinal_strain_max)."
+)
 
 
-def blank(store: Store, group: str) -> dict:
-    """Ones in the shape of every array of one job."""
-    opened = zarr.open_group(store.path, path=group, mode="r", use_consolidated=False)
-    return {array.name: np.ones(opened[array.name].shape[array.leading :]) for array in schema_of(group)}
+def ones(job: Job) -> dict:
+    """Ones in the shape of every array of a job."""
+    shapes = {group: finished.shapes(job.store.path, group) for group in written_by(job)}
+    return {group: {name: np.ones(shape) for name, shape in found.items()} for group, found in shapes.items()}
 
 
-pytestmark = pytest.mark.usefixtures("script")
+def written_by(job: Job) -> list[str]:
+    return schema.written_by(job.stage, job.config, job.size or None)
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory) -> Path:
     """A repository of two cases, all of whose jobs are done."""
-    folder = tmp_path_factory.mktemp("done")
-    (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG.model_dump(mode="json")))
-    rows = list(ledger.register(folder / "registry.txt", [case.id for case in CASES]))
-    ledger.register(folder / "views.txt", list(CONFIG.views))
-    columns = layout.columns(table(CASES), rows)
-    constants = {"cases": {"constants": layout.constants(table(CASES))}}
-    labels = layout.labels(CONFIG, rows, np.zeros((len(rows), 4))) | layout.positions(CONFIG, pixel_centres, grid)
-    groups = schema.groups(CONFIG) | {"cases": schema.parameters(columns)}
-    sizes = layout.sizes(left_ventricle(CONFIG.geometry))
-    Store(folder / "small.zarr").lay_out(groups, sizes, labels | columns, constants)
-    for case in CASES:
-        for stage, view in JOBS:
-            job = Job(folder, stage, case.id, view)
-            job.commit({group: blank(job.store, group) for group in GROUPS[stage]}, Cost())
-    return folder
+    return finished.finish(tmp_path_factory.mktemp("done") / "small", CONFIG, ones)
 
 
 @pytest.fixture
@@ -78,13 +61,14 @@ def test_whole_repository_is_verified_and_opens(folder):
     assert (summary["complete"], summary["implausible"], summary["failed"]) == (2, 0, 0)
     tree = xr.open_datatree(folder / "small.zarr")
     assert list(tree["cases/status"].values) == ["complete", "complete"]
-    assert set(tree.attrs["code"]) == {*GATES, *VIEW_STAGES}
+    assert set(tree.attrs["code"]) == set(STAGES)
 
 
 def test_every_file_of_the_hierarchy_is_verified(folder):
     written = {path for path in (folder / "small.zarr").rglob("*") if path.is_file()}
     assert publish(folder)["files"] == len(written)
-    records = [ledger.read(path)["sha256"] for path in (folder / "ledger").rglob("*.json")]
+    paths = (path for path in (folder / "ledger").rglob("*.json") if path.name != "repository.json")
+    records = [ledger.read(path)["sha256"] for path in paths]
     recorded = [name for record in records for name in record]
     assert len(recorded) == len(set(recorded))
     assert {folder / "small.zarr" / name for name in recorded} == written
@@ -121,7 +105,7 @@ def test_publishing_twice_gives_the_same_bytes(folder):
 
 
 @pytest.mark.parametrize("harm", ["changed", "truncated", "missing"])
-@pytest.mark.parametrize("group, row", [("bmode/64", (1, 0)), ("mechanics", (0,)), ("evaluation", (0, 1))])
+@pytest.mark.parametrize("group, row", [("bmode/64", (1, 0)), ("mechanics", (0,)), ("evaluation/64/one", (0, 1))])
 def test_damaged_file_and_its_record_are_named(folder, group, row, harm):
     file = Store(folder / "small.zarr").files(group, *row)[0]
     content = bytearray(file.read_bytes())
@@ -132,16 +116,16 @@ def test_damaged_file_and_its_record_are_named(folder, group, row, harm):
     with pytest.raises(ChecksumError) as caught:
         publish(folder)
     assert str(file) in str(caught.value)
-    assert f"ledger/{group.partition('/')[0]}/{CASES[row[0]].id}" in str(caught.value)
+    stage = {"evaluation/64/one": "tracking"}.get(group, group.partition("/")[0])
+    assert f"ledger/{stage}/{CASES[row[0]].id}" in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 def test_heart_without_a_solution_is_told_with_its_reason(folder):
-    for stage, view in JOBS:
-        job = Job(folder, stage, CASES[1].id, view)
-        job.record_without_result(
-            "failed" if stage == "mechanics" else "skipped", job.skip_reason() or "no equilibrium at frame 3"
-        )
+    for job in finished.jobs(folder, CONFIG, CASES[1].id):
+        failed = job.stage == "mechanics"
+        job.lines.parent.mkdir(parents=True, exist_ok=True)  # as Snakemake does
+        job.commit_without_result("failed" if failed else "skipped", job.excluded() or "no equilibrium at frame 3")
     assert publish(folder)["failed"] == 1
     cases = xr.open_datatree(folder / "small.zarr")["cases"]
     assert list(cases["status"].values) == ["complete", "failed"]
@@ -149,10 +133,16 @@ def test_heart_without_a_solution_is_told_with_its_reason(folder):
 
 
 def doubt(folder):
-    """The second heart measured again, and found out of bounds."""
-    job = Job(folder, "physiology", CASES[1].id)
-    job.set_verdict("implausible", LENGTHENS)
-    job.commit({"physiology": blank(job.store, "physiology")}, Cost())
+    """The second heart solved again, and found out of bounds."""
+    job = Job(folder, "mechanics", CASES[1].id)
+    job.note(bounded={"longitudinal_strain_max": 0.04})
+    job.commit(ones(job))
+
+
+def change(folder, **sections):
+    """Lay the repository out for a configuration with other sections."""
+    config = CONFIG.model_copy(update=sections)
+    lay_out(folder, config, expand(config))
 
 
 def test_heart_out_of_bounds_keeps_its_arrays_and_is_marked(folder):
@@ -166,49 +156,58 @@ def test_heart_out_of_bounds_keeps_its_arrays_and_is_marked(folder):
     assert (tree["physiology/scalars"].sel(scalar="longitudinal_strain") == 1).all()
 
 
-@pytest.mark.parametrize("stage, view", [("phantom", "mid"), ("evaluation", "long_axis")])
-def test_heart_out_of_bounds_is_imaged_only_where_the_configuration_says_so(folder, stage, view):
+@pytest.mark.parametrize("stage, place", [("phantom", ("mid",)), ("tracking", ("long_axis", 32))])
+def test_heart_out_of_bounds_is_imaged_only_where_the_configuration_says_so(folder, stage, place):
     doubt(folder)
-    assert Job(folder, stage, CASES[0].id, view).skip_reason() == ""
-    assert Job(folder, stage, CASES[1].id, view).skip_reason() == LENGTHENS
-    assert Job(folder, "physiology", CASES[1].id).skip_reason() == ""
-    kept = CONFIG.model_copy(update={"physiology": Physiology(exclude_implausible=False)})
-    (folder / "config.yaml").write_text(yaml.safe_dump(kept.model_dump(mode="json")))
-    assert Job(folder, stage, CASES[1].id, view).skip_reason() == ""
+    assert Job(folder, stage, CASES[0].id, *place).excluded() == ""
+    assert Job(folder, stage, CASES[1].id, *place).excluded() == LENGTHENS
+    assert Job(folder, "mechanics", CASES[1].id).excluded() == ""
+    change(folder, physiology=Physiology(exclude_implausible=False))
+    assert Job(folder, stage, CASES[1].id, *place).excluded() == ""
     assert publish(folder)["implausible"] == 1
+
+
+def test_other_bounds_change_the_verdict_and_not_a_byte_of_the_hearts(folder):
+    doubt(folder)
+    before = finished.content(folder)
+    record = (folder / f"ledger/mechanics/{CASES[1].id}.json").read_bytes()
+    change(folder, physiology=Physiology(longitudinal_strain_max=0.1))
+    assert publish(folder)["implausible"] == 0
+    after = finished.content(folder)
+    shards = {path for path in before if "small.zarr/cases/" not in path and not path.endswith("small.zarr/zarr.json")}
+    assert {path: after[path] for path in shards} == {path: before[path] for path in shards}
+    assert (folder / f"ledger/mechanics/{CASES[1].id}.json").read_bytes() == record
 
 
 @pytest.mark.parametrize("exclude", [True, False])
 def test_heart_without_a_solution_is_never_measured_nor_imaged(folder, exclude):
-    kept = CONFIG.model_copy(update={"physiology": Physiology(exclude_implausible=exclude)})
-    (folder / "config.yaml").write_text(yaml.safe_dump(kept.model_dump(mode="json")))
-    Job(folder, "mechanics", CASES[1].id).record_without_result("failed", "no equilibrium")
-    for stage, view in JOBS[1:]:
-        assert Job(folder, stage, CASES[1].id, view).skip_reason() == "no equilibrium"
+    change(folder, physiology=Physiology(exclude_implausible=exclude))
+    Job(folder, "mechanics", CASES[1].id).commit_without_result("failed", "no equilibrium")
+    for job in list(finished.jobs(folder, CONFIG, CASES[1].id))[1:]:
+        assert job.excluded() == "no equilibrium"
 
 
-@pytest.mark.parametrize("stage, view", [("bmode", "mid"), ("mechanics", None)])
-def test_what_is_skipped_leaves_nothing_of_an_earlier_run(folder, stage, view):
-    other, job = (Job(folder, stage, case.id, view) for case in CASES)
-    job.record_without_result("skipped", LENGTHENS)
-    for group in GROUPS[stage]:
-        assert not job.store.files(group, *job.index)
+@pytest.mark.parametrize("stage, place", [("bmode", ("mid", 64)), ("tracking", ("mid", 32)), ("mechanics", ())])
+def test_what_is_skipped_leaves_nothing_of_an_earlier_run_and_all_of_others(folder, stage, place):
+    other, job = (Job(folder, stage, case.id, *place) for case in CASES)
+    before = {path for path in job.store.path.rglob("*") if path.is_file()}
+    own = {path for group in written_by(job) for path in job.store.files(group, *job.index)}
+    job.commit_without_result("skipped", LENGTHENS)
+    assert own and {path for path in job.store.path.rglob("*") if path.is_file()} == before - own
+    for group in written_by(other):
         assert other.store.files(group, *other.index)
 
 
 def test_job_of_a_view_has_its_place_whatever_is_put_in_front_of_it(folder):
-    before = {view: Job(folder, "bmode", CASES[1].id, view).index for view in CONFIG.views}
+    before = {view: Job(folder, "phantom", CASES[1].id, view).index for view in CONFIG.views}
     assert before == {"mid": (1, 0), "long_axis": (1, 1)}
-    changed = CONFIG.model_copy(update={"views": {"apex": View(position=0.8), **CONFIG.views}})
-    (folder / "config.yaml").write_text(yaml.safe_dump(changed.model_dump(mode="json"), sort_keys=False))
-    ledger.register(folder / "views.txt", list(changed.views))
-    assert {view: Job(folder, "bmode", CASES[1].id, view).index for view in CONFIG.views} == before
-    assert Job(folder, "bmode", CASES[1].id, "apex").index == (1, 2)
+    change(folder, views={"apex": View(position=0.8), **CONFIG.views})
+    assert {view: Job(folder, "phantom", CASES[1].id, view).index for view in CONFIG.views} == before
+    assert Job(folder, "phantom", CASES[1].id, "apex").index == (1, 2)
 
 
 def test_case_that_left_the_configuration_is_retired(folder):
-    fewer = CONFIG.model_copy(update={"cases": Cases(seed=[1])})
-    (folder / "config.yaml").write_text(yaml.safe_dump(fewer.model_dump(mode="json")))
+    change(folder, cases=Cases(seed=[1]))
     assert publish(folder)["complete"] == 1
     assert list(xr.open_datatree(folder / "small.zarr")["cases/status"].values) == ["complete", "retired"]
 
@@ -228,8 +227,7 @@ def test_table_of_cases_has_a_row_a_case_and_a_column_a_key(folder):
 
 
 def test_retired_case_has_no_values_in_the_table(folder):
-    fewer = CONFIG.model_copy(update={"cases": Cases(seed=[1])})
-    (folder / "config.yaml").write_text(yaml.safe_dump(fewer.model_dump(mode="json")))
+    change(folder, cases=Cases(seed=[1]))
     publish(folder)
     frame = et.Repository(folder).tree["cases"].to_dataset().to_dataframe()
     assert np.isnan(frame["fibres.endo_deg"].iloc[1]) and frame["geometry.preset"].iloc[1] == ""
@@ -241,8 +239,9 @@ def test_groups_opened_together_have_the_labels_and_indexes_that_each_has_alone(
     tree = et.Repository(folder).tree
     for group in schema.groups(CONFIG):
         alone = xr.open_zarr(folder / "small.zarr", group=group, chunks=None)
-        together = tree[group].to_dataset(inherit=False)
-        assert set(together.xindexes) == set(alone.xindexes) and set(alone.coords) == set(together.coords)
+        together, above = tree[group].to_dataset(), tree[group].parent.to_dataset()
+        assert set(together.xindexes) == set(alone.xindexes) | set(above.xindexes)
+        assert set(together.coords) == set(alone.coords) | set(above.xindexes)
         for name in alone.coords:
             assert together.coords[name].variable.identical(alone.coords[name].variable), name
             assert name not in alone.xindexes or together.indexes[name].equals(alone.indexes[name])

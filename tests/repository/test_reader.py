@@ -132,9 +132,10 @@ def test_heart_that_is_not_made_is_refused_in_one_sentence(several):
 
 def test_damaged_record_is_told_with_its_remedy(known, tmp_path):
     folder = Path(shutil.copytree(known.folder, tmp_path / "known"))
-    (folder / "ledger/bmode/heart/mid.json").write_text("{")
+    record = folder / "ledger/bmode/heart/mid/128.json"
+    record.write_text("{")
     problem = et.Repository(folder).problem("heart", "mid", "truth", "bmode")
-    assert problem.startswith(f"{folder}/ledger/bmode/heart/mid.json is damaged: run echotruth check {folder} --heal")
+    assert problem.startswith(f"{record} is damaged: run echotruth check {folder} --heal")
 
 
 def test_script_may_go_to_another_folder_before_and_while_it_reads(known, tmp_path):

@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 import yaml
 import zarr
-from echotruth.workflow.scripts.cases import lay_out
 
 from echotruth.cases import expand
 from echotruth.config import Config, Probe, Rf
@@ -13,6 +12,7 @@ from echotruth.config.loading import ConfigError, validate
 from echotruth.imaging.recorder import channels, decimated_samples, quantise
 from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.repository import schema
+from echotruth.repository.layout import lay_out
 from echotruth.repository.store import Store
 
 WAVES = ("focused", "plane", "diverging", "synthetic_aperture")

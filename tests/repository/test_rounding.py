@@ -45,14 +45,14 @@ def test_quantum_of_lengths_is_the_power_of_two_below_a_256th_of_the_finest_pixe
 def test_store_rounds_what_a_job_writes_to_the_quantum_that_its_metadata_state(tmp_path):
     config = Config(**SMALL)
     store = lay_out(tmp_path / "small.zarr", [1])
-    opened = store._open("tracking", "r")
+    opened = store._open("tracking/64/one", "r")
     random, values = np.random.default_rng(2), {}
     for array in schema.TRACKING:
         values[array.name] = random.normal(scale=1e-3, size=opened[array.name].shape[2:])
-    store.write("tracking", values, 0, 1)
-    read = store.read("tracking", 0, 1)
+    store.write("tracking/64/one", values, 0, 1)
+    read = store.read("tracking/64/one", 0, 1)
     stated = {
-        name: json.loads((store.path / f"tracking/{name}/zarr.json").read_bytes())["attributes"]["quantum"]
+        name: json.loads((store.path / f"tracking/64/one/{name}/zarr.json").read_bytes())["attributes"]["quantum"]
         for name in values
     }
     assert stated == {"displacement": rounding.length_quantum(config), "quality": rounding.QUALITY}
@@ -67,6 +67,5 @@ def test_chunk_is_one_component_of_one_frame_or_of_the_cycle_that_one_tracker_fo
     store = lay_out(tmp_path / "small.zarr", [1], tracking=tracking)
     for name in ("displacement", "strain"):
         assert store._open("truth/64", "r")[name].chunks == (1, 1, 1, 64, 64, 1)
-    tracked = store._open("tracking", "r")["displacement"]
-    assert tracked.shape[2:4] == (2, 1)
-    assert tracked.chunks == (1, 1, 1, 1, *tracked.shape[4:7], 1)
+    tracked = store._open("tracking/64/one", "r")["displacement"]
+    assert tracked.chunks == (1, 1, *tracked.shape[2:5], 1)

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking
+from echotruth.config.tracking import NOT_TRACKERS
 from echotruth.repository import schema
 
 ALL = [*schema.CASES, *schema.COORDINATES]
-ALL += [array for stage in schema.STAGES | schema.SIZED for array in schema.named(stage)]
+ALL += [array for group in schema.KINDS for array in schema.named(group)]
 ALL += schema.DERIVED
 
 
@@ -20,9 +21,9 @@ def test_array_is_whole(array):
 
 
 def test_names_stand_once_in_a_group():
-    for stage, arrays in (schema.STAGES | schema.SIZED).items():
-        for kind in (arrays, schema.named(stage)):
-            names = [array.name for array in (*kind, *schema.coordinates(arrays))]
+    for group, arrays in schema.KINDS.items():
+        for listed in (arrays, schema.named(group)):
+            names = [array.name for array in (*listed, *schema.coordinates(arrays))]
             assert len(names) == len(set(names))
 
 
@@ -37,9 +38,19 @@ def test_labels_belong_to_coordinates():
     assert set(schema.LABELS) <= {array.name for array in schema.COORDINATES}
 
 
-def test_sized_groups_stand_once_for_every_image_size():
-    groups = schema.groups(Config(bmode=Bmode(size_px=256, downsampling=(1, 4)), tracking=_tracking()))
-    assert {path for path in groups if "/" in path} == {f"{stage}/{px}" for stage in schema.SIZED for px in (256, 64)}
+def test_sized_groups_stand_once_for_every_image_size_and_tracked_ones_for_every_tracker():
+    trackers = {name: PhaseCorrelation(window_px=32) for name in ("one", "two")}
+    config = Config(bmode=Bmode(size_px=256, downsampling=(1, 4)), tracking=Tracking(trackers=trackers))
+    groups = schema.groups(config)
+    sized = {f"{stage}/{px}" for stage in schema.SIZED for px in (256, 64)}
+    tracked = {f"{stage}/{px}/{name}" for stage in schema.TRACKED for px in (256, 64) for name in ("one", "two")}
+    assert {path for path in groups if "/" in path} == sized | tracked
+
+
+def test_names_that_no_tracker_may_have_are_those_beside_its_group():
+    """In `tracking/SIZE` there is no array; the shards of every array lie in a folder c."""
+    arrays = schema.SIZED["evaluation"]
+    assert {array.name for array in (*arrays, *schema.coordinates(arrays))} | {"c"} == NOT_TRACKERS
 
 
 def test_fill_says_that_nothing_was_written():
@@ -53,7 +64,3 @@ def test_columns_of_cases_carry_the_unit_of_their_key():
     *_, angle, file = schema.parameters(columns)
     assert (angle.name, angle.dtype, angle.units) == ("fibres.endo_deg", "float64", "degree")
     assert (file.name, file.dtype, file.units) == ("loop.file", "string", "1")
-
-
-def _tracking():
-    return Tracking(trackers={"one": PhaseCorrelation(window_px=32)})

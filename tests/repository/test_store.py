@@ -13,14 +13,11 @@ import zarr
 
 from echotruth.cases import expand, table
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tracking, View
-from echotruth.imaging.bmode import pixel_centres
-from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.repository import layout, ledger, packing, schema
 from echotruth.repository.checksums import ChecksumError, verify_structure
-from echotruth.repository.store import NotWritten, Store, packs_of, schema_of
+from echotruth.repository.store import NotWritten, Store
 from echotruth.repository.unpacking import unpack
-from echotruth.tracking import grid
 
 SMALL = {
     "name": "small",
@@ -39,44 +36,34 @@ GROUPS = (
     "phantom",
     "truth/64",
     "bmode/32",
-    "tracking",
-    "evaluation",
+    "tracking/32/one",
+    "evaluation/64",
+    "evaluation/32/one",
 )
 
 
 def lay_out(path: Path, seeds: list[int], **changes) -> Store:
-    """A store for hearts that differ in their seed, as src/echotruth/workflow/scripts/cases.py makes it."""
+    """A store for hearts that differ in their seed, as a run lays it out."""
     config = Config(**(SMALL | changes), cases={"seed": seeds})
-    cases = expand(config)
-    rows = ledger.register(path.parent / "registry.txt", [case.id for case in cases])
-    views = ledger.register(path.parent / "views.txt", list(config.views))
-    times = np.full((len(rows), config.loop.frames), np.nan)
-    for case in cases:
-        times[rows[case.id]] = read_loop(case.config.loop).time
-    columns = layout.columns(table(cases), list(rows))
-    labels = layout.labels(config, list(rows), times, list(views)) | layout.positions(config, pixel_centres, grid)
-    arrays = schema.groups(config) | {"cases": schema.parameters(columns)}
-    store = Store(path)
-    constants = {"cases": {"constants": layout.constants(table(cases))}}
-    store.lay_out(arrays, layout.sizes(MESH), labels | columns, constants)
-    return store
+    layout.lay_out(path.parent, config, expand(config))
+    return Store(path)
 
 
 def fill(store: Store, group: str, *row: int) -> dict:
     """Write random values in a group's arrays for one job, and return them."""
     random, values = np.random.default_rng(row), {}
     opened = store._open(group, "r")
-    for array in schema_of(group):
+    for array in schema.arrays_of(group):
         there = opened[array.name]
         shape = there.shape[array.leading :]
         values[array.name] = random.integers(1, 200, shape).astype(there.dtype)
     store.write(group, values, *row)
-    return packing.unpack(packs_of(group), values, opened.attrs["labels"])
+    return packing.unpack(schema.packs_of(group), values, opened.attrs["labels"])
 
 
 def job(group: str, case: int) -> tuple[int, ...]:
     """Place of a job: row of the case, and a view where the group has views."""
-    return (case, 1) if schema_of(group)[0].leading == 2 else (case,)
+    return (case, 1) if schema.arrays_of(group)[0].leading == 2 else (case,)
 
 
 def snapshot(store: Store) -> dict:
@@ -113,7 +100,7 @@ def test_job_writes_one_file_an_array_that_no_other_job_writes(store, group):
     fill(store, group, *job(group, 0))
     first = {path for path in snapshot(store) if path not in before}
     assert sorted(first) == store.files(group, *job(group, 0))
-    assert len(first) == len(schema_of(group))
+    assert len(first) == len(schema.arrays_of(group))
     kept = snapshot(store)
     fill(store, group, *job(group, 1))
     after = snapshot(store)
@@ -177,9 +164,11 @@ def test_more_cases_keep_the_bytes_and_the_names_of_earlier_rows(store):
 
 def test_job_without_anything_to_tell_still_leaves_its_files(store):
     opened = store._open("truth/32", "r")
-    blank = {a.name: np.full(opened[a.name].shape[2:], a.fill, opened[a.name].dtype) for a in schema_of("truth/32")}
+    blank = {
+        a.name: np.full(opened[a.name].shape[2:], a.fill, opened[a.name].dtype) for a in schema.arrays_of("truth/32")
+    }
     store.write("truth/32", blank, 0, 0)
-    assert len(store.files("truth/32", 0, 0)) == len(schema_of("truth/32"))
+    assert len(store.files("truth/32", 0, 0)) == len(schema.arrays_of("truth/32"))
 
 
 def test_another_image_size_leaves_the_others_and_drops_what_is_gone(store):
@@ -187,6 +176,32 @@ def test_another_image_size_leaves_the_others_and_drops_what_is_gone(store):
     lay_out(store.path, [1, 2], bmode=Bmode(size_px=64, downsampling=(2,)))
     np.testing.assert_array_equal(store.read("bmode/32", 0, 0)["image"], kept["image"])
     assert not (store.path / "bmode/64").exists()
+
+
+def test_records_of_an_image_size_that_left_are_dropped_with_its_arrays(store):
+    records = [store.path.parent / f"ledger/bmode/heart/mid/{size}.json" for size in (64, 32)]
+    for record in records:
+        ledger.commit(record, {})
+    lay_out(store.path, [1, 2], bmode=Bmode(size_px=64, downsampling=(1,)))
+    assert [record.exists() for record in records] == [True, False]
+
+
+@pytest.mark.parametrize("name", ["one", "two"])
+def test_tracker_that_leaves_or_comes_leaves_the_bytes_of_the_others(store, name):
+    trackers = {name: PhaseCorrelation(window_px=16) for name in ("one", "two")}
+    lay_out(store.path, [1, 2], tracking=Tracking(trackers=trackers))
+    for tracker in trackers:
+        fill(store, f"tracking/64/{tracker}", 0, 1)
+        fill(store, f"evaluation/64/{tracker}", 0, 1)
+    fill(store, "evaluation/64", 0, 1)
+    before = snapshot(store)
+    lay_out(store.path, [1, 2], tracking=Tracking(trackers={name: trackers[name]}))
+    after = snapshot(store)
+    (gone,) = trackers.keys() - {name}
+    assert before.keys() - after.keys() == {path for path in before if gone in path.parts}
+    assert {path: content for path, content in before.items() if path in after} == after
+    lay_out(store.path, [1, 2], tracking=Tracking(trackers=trackers))
+    assert {path: snapshot(store)[path] for path in after} == after
 
 
 def every_file(store: Store) -> dict:

@@ -22,7 +22,6 @@ def codes(monkeypatch):
         return {method: tracks.method_code(method) for method in METHODS}
 
     original = provenance._source
-    monkeypatch.setattr(provenance, "_keep_parsed", lambda: None)
     yield changed
     provenance.code_version.cache_clear()
 

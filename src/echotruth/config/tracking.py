@@ -272,6 +272,13 @@ def default_trackers(scale: float = 1.0) -> dict[str, Any]:
     }
 
 
+_OF_TRUTH = ("true_displacement", "true_strain", "wall_axes", "limits", "true_courses")
+_COORDINATES = ("axial", "case", "frame", "lateral", "plane", "polar", "reference", "time", "vector", "view")
+_COORDINATES += ("wall_component", "limit", "limit_units", "true_course", "true_course_units")
+NOT_TRACKERS = {*_OF_TRUTH, *_COORDINATES, "c"}
+"""Names that no tracker may have: its group stands beside the arrays of `evaluation/SIZE`, and Zarr has a folder c."""
+
+
 class Tracking(Section):
     """Trackers and the grid they report on."""
 
@@ -287,3 +294,10 @@ class Tracking(Section):
     )
     """Settings by name: `as_published` is the tracker as the paper prints it; `corrected` has tapered windows with the
     same size in tissue for every image size, leaves out frequencies without speckle, and is bidirectional."""
+
+    @check
+    def _check_names(self) -> None:
+        for name in self.trackers:
+            if name in NOT_TRACKERS:
+                remedy = "is the name of an array of the repository: give the tracker another name"
+                raise invalid("trackers", name, remedy)

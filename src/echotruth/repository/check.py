@@ -70,7 +70,7 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
             report.files += found.files
             row = repository.row(record)
             if found.arrays is not None and row is not None:
-                listed[record.stage, row] = listed.get((record.stage, row), frozenset()) | found.arrays
+                listed[record.stage, record.size, row] = found.arrays
             if progress:
                 progress(done, len(records))
         damaged = {path for fault in report.faults for path in fault.records}

@@ -122,9 +122,8 @@ def _check_values(
     """Group, array and problem of the values of a job."""
     config, arrays = repository.cases[job.case].config, {path.partition("/c/")[0] for path in files}
     for group in sorted({path.rpartition("/")[0] for path in arrays}):
-        opened = {
-            path.rpartition("/")[2]: repository.opened.get(path) for path in arrays if path.startswith(f"{group}/")
-        }
+        names = [name for inside, _, name in (path.rpartition("/") for path in arrays) if inside == group]
+        opened = {name: repository.opened.get(f"{group}/{name}") for name in names}
         if any(array is None for array in opened.values()):
             continue  # its metadata are damaged
         found: dict[str, str] = {}  # the first problem of each array: that of the first part of its frames

@@ -111,8 +111,8 @@ def _check_times(repository: Inventory) -> Iterator[Fault]:
         yield Fault(name, f"does not increase from 0 in row {wrong[0]}", "look at the loop of the configuration")
 
 
-Listed = dict[tuple[str, tuple[int, ...]], frozenset[str]]
-"""Stage and row of a job -> arrays of which its record lists the shard."""
+Listed = dict[tuple[str, int | None, tuple[int, ...]], frozenset[str]]
+"""Stage, image size and row of a job -> arrays of which its record lists the shard."""
 
 
 def unrecorded_files(repository: Inventory, listed: Listed, structure: set[str] | None) -> Iterator[Fault]:
@@ -141,5 +141,5 @@ def _has_owner(repository: Inventory, path: str, index: str, listed: Listed) -> 
         return False
     if row[0] >= len(repository.rows) or (len(row) == 2 and row[1] >= len(repository.views)):
         return False
-    arrays = listed.get((repository.stages[path.rpartition("/")[0]], row))
+    arrays = listed.get((*repository.writers[path.rpartition("/")[0]], row))
     return arrays is None or path in arrays

@@ -54,7 +54,7 @@ def first_difference(record: JobRecord, giving: Inventory, receiving: Inventory)
     """
     for path, array in giving.shard_paths.items():
         group = path.rpartition("/")[0]
-        if giving.stages[group] != record.stage or path in NOISE or path not in receiving.shard_paths:
+        if giving.writers[group] != (record.stage, record.size) or path in NOISE or path not in receiving.shard_paths:
             continue
         one, other = (np.asarray(kept.opened[path][kept.row(record) or ()]) for kept in (giving, receiving))
         if one.shape != other.shape:

@@ -99,15 +99,17 @@ class Inventory:
         self.rows, self.views = ledger.rows(folder / "registry.txt"), ledger.rows(folder / "views.txt")
 
     @cached_property
-    def stages(self) -> dict[str, str]:
-        """Group -> stage whose jobs write it."""
-        return {group: stage for stage in STAGES for group in schema.written_by(stage, self.config)}
+    def writers(self) -> dict[str, tuple[str, int | None]]:
+        """Group -> stage whose jobs write it, and their image size, px, if they have one."""
+        sizes = self.config.bmode.sizes
+        jobs = [(stage, size) for stage, names in STAGES.items() for size in (sizes if "size" in names else [None])]
+        return {group: job for job in jobs for group in schema.written_by(job[0], self.config, job[1])}
 
     @cached_property
     def shard_paths(self) -> dict[str, Array]:
         """Path of every array of the jobs below the store -> its description."""
         return {
-            f"{group}/{array.name}": array for group in self.stages for array in self.groups[group] if array.leading
+            f"{group}/{array.name}": array for group in self.writers for array in self.groups[group] if array.leading
         }
 
     @cached_property

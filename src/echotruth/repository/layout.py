@@ -43,6 +43,7 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     store = Store(folder / f"{config.name}.zarr")
     rows = ledger.register(folder / "registry.txt", [case.id for case in cases], store.labels("case"))
     views = ledger.register(folder / "views.txt", list(config.views), store.labels("view"))
+    _drop_records(folder, store, config)
     times = np.full((len(rows), config.loop.frames), np.nan)
     for case in cases:
         times[rows[case.id]] = frame_times(case.config.loop)
@@ -57,6 +58,14 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     texts = {case_path(folder, case.id): case.config.model_dump_json() for case in cases}
     texts |= {folder / "cases.csv": case_table.to_csv(index=False), folder / "config.yaml": _as_yaml(config)}
     durable.update_all({path: text.encode() for path, text in texts.items()})
+
+
+def _drop_records(folder: Path, store: Store, config: Config) -> None:
+    """Drop the records of image sizes that left the configuration, whose arrays are about to be removed."""
+    left = {path.name for path in store.path.glob("*/[0-9]*")} - {str(size) for size in config.bmode.sizes}
+    for size in left:
+        for record in folder.glob(f"ledger/*/*/*/{size}.json"):
+            record.unlink(missing_ok=True)
 
 
 def _rf_metadata(

@@ -512,7 +512,7 @@ class Repository:
         if not record:
             return f"{self._place} has no {stage} of {what} yet: run it to its end"
         if record.get("status") != "complete":
-            return f"{what} of {self._place} is {record.get('status')}: cases.csv says why"
+            return f"{what} of {self._place} is {record.get('status')}: {record.get('reason')}"
         return ""
 
     def record(self, stage: str, case: str, view: str | None = None, size: int | None = None) -> dict[str, Any]:
