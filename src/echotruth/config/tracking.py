@@ -272,10 +272,11 @@ def default_trackers(scale: float = 1.0) -> dict[str, Any]:
     }
 
 
-_OF_TRUTH = ("true_displacement", "true_strain", "wall_axes", "limits", "true_courses")
-_COORDINATES = ("axial", "case", "frame", "lateral", "plane", "polar", "reference", "time", "vector", "view")
-_COORDINATES += ("wall_component", "limit", "limit_units", "true_course", "true_course_units")
-NOT_TRACKERS = {*_OF_TRUTH, *_COORDINATES, "c"}
+NOT_TRACKERS = {
+    *("true_displacement", "true_strain", "wall_axes", "limits", "true_courses", "c"),
+    *("axial", "case", "frame", "lateral", "plane", "polar", "reference", "time", "vector", "view", "wall_component"),
+    *("limit", "limit_units", "true_course", "true_course_units"),
+}
 """Names that no tracker may have: its group stands beside the arrays of `evaluation/SIZE`, and Zarr has a folder c."""
 
 
