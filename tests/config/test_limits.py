@@ -1,21 +1,61 @@
-"""Files that are malformed or too large are refused at once, in one sentence that says the remedy."""
+"""Files that are malformed, hostile or absurdly large are refused at once, in one sentence that says the remedy."""
 
 import gzip
 import os
+import subprocess
 import sys
+from math import pi
 
+import numpy as np
 import pytest
 
 from echotruth import cli
-from echotruth.config.limits import MAX_CASES
-from echotruth.config.loading import ConfigError, load
-from echotruth.config.reading import MAX_BYTES
+from echotruth.config import Config
+from echotruth.config.limits import MAX_CASES, ventricle_mm3
+from echotruth.config.loading import ConfigError, load, override, validate
+from echotruth.config.reading import MAX_BYTES, MAX_DEPTH, MAX_VALUES
+from echotruth.fem.volume import cell_volumes
+from echotruth.mechanics.geometry import left_ventricle
+
+
+def bomb(key, aliases=9):
+    """YAML of lists of aliases of lists, 9^9 values from a thousand characters."""
+    levels = [f"  - &a{n} [{', '.join([f'*a{n - 1}'] * aliases)}]" for n in range(1, 9)]
+    return "\n".join([f"{key}:", f"  - &a0 [{', '.join('1' * aliases)}]", *levels])
+
+
+def indented(text, spaces):
+    return "\n".join(" " * spaces + line for line in text.splitlines())
+
+
+TRACKER = "tracking:\n  trackers:\n    mine:\n      method: external\n      track: a:b\n      options:\n"
+
+BOMBS = {
+    "a key that there is not": (bomb("x"), "x holds too much: give at most 100000 values"),
+    "a section": (bomb("geometry"), "geometry holds too much"),
+    "the values of a case": ("cases:\n" + indented(bomb("seed"), 2), "cases holds too much"),
+    "the options of a tracker": (TRACKER + indented(bomb("x"), 8), "tracking holds too much"),
+    "merged keys": ("a: &a {x: 1}\nb: {<<: [*a, *a]}", "line 2: << would merge another mapping: write its keys out"),
+    "an alias in its anchor": ("geometry: &a\n  file: *a", "an alias must not lie within its own anchor"),
+    "an alias in its list": ("cases: {seed: &a [1, *a]}", "an alias must not lie within its own anchor"),
+    "an unknown alias": ("seed: *nope", "line 1: found undefined alias: correct the YAML"),
+}
+
+NESTED = {
+    "lists": "cases: " + "[" * 3000 + "]" * 3000,
+    "mappings": "a: " + "{a: " * 3000 + "}" * 3000,
+    "blocks": "".join(" " * n + "a:\n" for n in range(1000)),
+    "unclosed lists": "[" * 100_000,
+    "one level too many": "x: " + "[" * MAX_DEPTH + "]" * MAX_DEPTH,
+}
 
 LARGE = {
+    "cases in a list": (f"cases: {{seed: [{', '.join(map(str, range(5_000_000 // 50)))}]}}", "the file holds too much"),
     "cases in a product": (
         "cases: {" + ", ".join(f"fibres.{k}_deg: {[0.01 * n for n in range(2000)]}" for k in ("endo", "epi")) + "}",
         "makes 2000 x 2000 cases: list fewer values, because a repository has at most 100000",
     ),
+    "keys": ("".join(f"k{n}: 1\n" for n in range(MAX_VALUES)), "the file holds too much: give at most 100000 values"),
     "views": ("views:\n" + "".join(f"  v{n}: {{}}\n" for n in range(20_000)), "must have at most 64 entries"),
     "trackers": (
         "tracking:\n  trackers:\n" + "".join(f"    t{n}: {{}}\n" for n in range(20_000)),
@@ -24,11 +64,13 @@ LARGE = {
     "text": ("name: " + "a" * 3_000_000, "should have at most 60 characters"),
     "name of a key": ("? " + "a" * 3_000_000 + "\n: 1", "is not a key: the keys here are"),
     "bytes": ("# " + "x" * MAX_BYTES, "holds 4.0 MiB: a configuration has at most 4 MiB"),
+    "integer": ("seed: " + "9" * 5000, "line 1: '9999999999999999999999999999999999999999' is not a valid int"),
+    "integer in base 60": ("seed: " + ":".join(["59"] * 3000), "line 1: '59:59:59"),
 }
 
 MALFORMED = {
-    "a list as a key": ("? [a, b]\n: 1", "line 1: found unhashable key: correct the YAML"),
-    "a mapping as a key": ("geometry:\n  ? {a: b}\n  : 1", "line 2: found unhashable key: correct the YAML"),
+    "a list as a key": ("? [a, b]\n: 1", "line 1: a list or a mapping is used as a key: write the name of a key"),
+    "a mapping as a key": ("geometry:\n  ? {a: b}\n  : 1", "line 2: a list or a mapping is used as a key"),
     "a number as a key": ("1: 2", "1 = 1: is not a key: keys are text"),
     "null as a key": ("~: 2", "is not a key: keys are text"),
     "a key twice": ("geometry:\n  scale: 1\n  scale: 2", "line 3: key 'scale' is given twice: give it once"),
@@ -38,11 +80,19 @@ MALFORMED = {
     "text": ("hello", "contains text: write a mapping of keys to values"),
     "a number": ("3", "contains a single value: write a mapping of keys to values"),
     "two documents": ("seed: 1\n---\nseed: 2", "write one document, without a second line of ---"),
-    "an unknown tag": ("seed: !mine 1", "line 1: could not determine a constructor for the tag '!mine'"),
+    "a Python object": (
+        "name: !!python/object/apply:os.system [ls]",
+        "the tag python/object/apply:os.system is not re",
+    ),
+    "an unknown tag": ("seed: !mine 1", "line 1: the tag !mine is not read: leave it out"),
+    "a set": ("geometry: !!set {a, b}", "the tag set is not read: leave it out"),
+    "an ordered mapping": ("geometry: !!omap [a: 1]", "the tag omap is not read: leave it out"),
+    "a time": ("seed: !!timestamp hello", "the tag timestamp is not read: leave it out"),
     "a date": ("seed: 2020-99-99", "seed = '2020-99-99': must be a whole number"),
-    "not an integer": ("seed: !!int hello", "cannot be read (invalid literal for int() with base 10: 'hello')"),
-    "not a truth value": ("seed: !!bool hello", "cannot be read ('hello'): correct the YAML"),
-    "an unknown alias": ("seed: *nope", "line 1: found undefined alias: correct the YAML"),
+    "not an integer": ("seed: !!int hello", "line 1: 'hello' is not a valid int: write a plain value"),
+    "not a float": ("geometry: {scale: !!float hello}", "'hello' is not a valid float: write a plain value"),
+    "not a truth value": ("seed: !!bool hello", "'hello' is not a valid bool: write a plain value"),
+    "not a mapping": ("geometry: !!map [1]", "line 1: this is not a valid map: write a plain value"),
     "an unclosed quote": ("name: 'abc", "found unexpected end of stream: correct the YAML"),
     "a reserved character": ("name: @a", "put text that begins with a special character in quotes"),
     "a line break in a key": ('"a\\nb": 1', "a\\nb is not a key"),
@@ -53,11 +103,19 @@ MALFORMED = {
 
 ABSURD = {
     "phantom: {density_per_mm3: 1.0e+30}": "density_per_mm3 = 1e+30: should be less than or equal to 1000000",
+    "phantom: {density_per_mm3: 1.0e+6}": "density_per_mm3 = 1000000.0: must be at most ",
+    "geometry: {scale: 4}\nphantom: {density_per_mm3: 1.5e+4}\nrf: {focus_mm: 15}\nbmode: {field_of_view_mm: 30}": (
+        "phantom.density_per_mm3 = 15000.0: must be at most "
+    ),
+    "realism: {surroundings: {level_dB: 0, density: 1}}\nphantom: {density_per_mm3: 200000}": "must be at most ",
     "loop: {frames: 1000000}": "loop.frames = 1000000: should be less than or equal to 1000",
+    "loop: {frames: 1000}\nbmode: {size_px: 4096}": "size_px = 4096: must be at most 1000 with loop.frames = 1000",
     "loop: {heart_rate_per_min: 1.0e-300}": "heart_rate_per_min = 1e-300: should be greater than or equal to 1",
     "loop: {edv_uL: 1.0e+300}": "loop.edv_uL = 1e+300: should be less than or equal to 100000000",
     "bmode: {size_px: 1000000}": "bmode.size_px = 1000000: should be less than or equal to 4096",
     "bmode: {field_of_view_mm: 1.0e+12}": "field_of_view_mm = 1000000000000.0: should be less than or equal to 1000",
+    "bmode: {field_of_view_mm: 1000}\nprobe: {elements: 512}": "at most 105 with 512 elements sampled at 100 MHz",
+    "bmode: {field_of_view_mm: 900}\nloop: {frames: 1000}\nrf: {lines: 2048}": "with 1000 frames of 2048 lines sampled",
     "probe: {elements: 100000}": "probe.elements = 100000: should be less than or equal to 512",
     "probe: {frequency_MHz: 1.0e+12}": "frequency_MHz = 1000000000000.0: should be less than or equal to 1000",
     "probe: {sampling_MHz: 1.0e+12}": "sampling_MHz = 1000000000000.0: should be less than or equal to 10000",
@@ -66,6 +124,17 @@ ABSURD = {
     "geometry: {wall_mm: 1.0e+300}": "geometry.wall_mm = 1e+300: should be less than or equal to 1000000000000",
     "fibres: {layers: 1000000}": "fibres.layers = 1000000: should be less than or equal to 24",
 }
+
+
+@pytest.mark.parametrize("what", BOMBS)
+def test_aliases_that_expand_are_refused(refusal, what):
+    text, sentence = BOMBS[what]
+    assert sentence in refusal(text)
+
+
+@pytest.mark.parametrize("what", NESTED)
+def test_deep_nesting_is_refused(refusal, what):
+    assert "nested too deeply: use at most 30 levels" in refusal(NESTED[what])
 
 
 @pytest.mark.parametrize("what", LARGE)
@@ -83,7 +152,7 @@ def test_malformed_yaml_is_refused_with_what_would_be_right(refusal, what):
 
 
 @pytest.mark.parametrize("text", ABSURD)
-def test_absurd_value_is_refused_by_its_own_bound(refusal, text):
+def test_value_that_would_take_days_or_all_memory_is_refused(refusal, text):
     assert ABSURD[text] in refusal(text)
 
 
@@ -117,6 +186,17 @@ def test_byte_order_mark_is_accepted(tmp_path):
     assert load(file).seed == 3
 
 
+def test_values_that_are_already_read_meet_the_same_limits():
+    levels = [1]
+    for _ in range(9):
+        levels = [levels] * 9
+    recursive = []
+    recursive.append(recursive)
+    for values, sentence in (({"geometry": levels}, "holds too much"), ({"cases": recursive}, "nested too deeply")):
+        with pytest.raises(ConfigError, match=f"dict: {next(iter(values))} .*{sentence}"):
+            validate(values, "dict")
+
+
 def test_largest_sweep_is_accepted_and_one_value_more_is_not(tmp_path):
     file = tmp_path / "sweep.yaml"
     angles = [round(0.5 * n, 1) for n in range(100)]
@@ -127,9 +207,48 @@ def test_largest_sweep_is_accepted_and_one_value_more_is_not(tmp_path):
         load(file)
 
 
+def test_bounds_leave_room_about_all_presets():
+    for heart in ("mouse", "rat", "human"):
+        config = validate({"geometry": {"preset": heart}}, heart)
+        density = config.phantom.density_per_mm3
+        # Ten times the scatterers, with blood and surroundings, and clips four times as long and as fine.
+        finer = {"phantom.density_per_mm3": 10 * density, "loop.frames": 160, "bmode.size_px": 2048}
+        tissue = {"realism.blood.level_dB": -30.0, "realism.surroundings.level_dB": -26.0}
+        assert override(config, finer | tissue).loop.frames == 160
+
+
+def test_every_hostile_file_is_refused_within_two_seconds_and_300_MiB(tmp_path):
+    texts = [text for text, _ in (*BOMBS.values(), *LARGE.values(), *MALFORMED.values())]
+    for number, text in enumerate([*texts, *NESTED.values(), *ABSURD]):
+        (tmp_path / f"{number}.yaml").write_text(text)
+    with (tmp_path / "sparse.yaml").open("wb") as file:
+        file.truncate(10**10)
+    limited = (
+        "import sys, time\n"
+        "from pathlib import Path\n"
+        "from echotruth.config.loading import ConfigError, load\n"
+        "for path in Path(sys.argv[1]).glob('*.yaml'):\n"
+        "    start = time.process_time()\n"
+        "    try:\n"
+        "        load(path)\n"
+        "        print(path, 'accepted')\n"
+        "    except ConfigError as error:\n"
+        "        len(str(error).splitlines()) > 21 and print(path, 'many lines')\n"
+        "    if time.process_time() - start > 2:\n"
+        "        print(path, 'slow')\n"
+        # Not `ru_maxrss`, which a process inherits from the one that started it.
+        "peak = Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0]\n"
+        "if int(peak) > 300 * 1024:\n"
+        "    print('memory', peak)\n"
+    )
+    command = [sys.executable, "-c", limited, str(tmp_path)]
+    result = subprocess.run(command, check=False, capture_output=True, text=True, timeout=300)
+    assert (result.stdout, result.stderr, result.returncode) == ("", "", 0)
+
+
 @pytest.mark.parametrize("command", ["check", "cases", "run"])
-@pytest.mark.parametrize("text", ["? [a, b]\n: 1", "seed: !!int a"])
-def test_commands_refuse_a_malformed_file_in_one_sentence(tmp_path, monkeypatch, command, text):
+@pytest.mark.parametrize("text", [bomb("geometry"), NESTED["lists"], "? [a, b]\n: 1", "seed: !!int a"])
+def test_commands_refuse_a_hostile_file_in_one_sentence(tmp_path, monkeypatch, command, text):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.yaml").write_text(text)
     monkeypatch.setattr(sys, "argv", ["echotruth", command, "bad.yaml"])
@@ -137,3 +256,12 @@ def test_commands_refuse_a_malformed_file_in_one_sentence(tmp_path, monkeypatch,
         cli.main()
     assert str(ended.value).startswith("echotruth: bad.yaml")
     assert os.listdir(tmp_path) == ["bad.yaml"]
+
+
+def test_volume_of_the_ventricle_is_that_of_its_mesh_and_of_a_half_ellipsoid():
+    config = override(Config(), {"geometry.apex_wall_mm": 1.0, "geometry.longitudinal_elements": 24})
+    cavity, whole = ventricle_mm3(config.geometry.lengths())
+    mesh = left_ventricle(config.geometry)
+    np.testing.assert_allclose(1e9 * cell_volumes(mesh.nodes, mesh.cells).sum(), whole - cavity, rtol=0.02)
+    half = {"endo_radius_mm": 2.0, "endo_length_mm": 5.0, "wall_mm": 0.0, "apex_wall_mm": 0.0, "base_mm": 0.0}
+    np.testing.assert_allclose(ventricle_mm3(half), [2 / 3 * pi * 2**2 * 5] * 2)

@@ -190,6 +190,7 @@ REFUSED = {
     "case,loop.file\na,mouse\nb,none.csv\n": "hearts.csv, row 2: loop: none.csv: there is no readable loop",
     "case,geometry.file,geometry.remesh\na,a.stl,true\n": "row 1: geometry.file = 'a.stl': file not found",
     "case,loop.edv_uL,loop.esv_uL\na,50,20\nb,20,50\n": "row 2: loop.esv_uL = 50.0: must be smaller than edv_uL",
+    f"case,note\na,{'x' * 4001}\n": "row 1, column note: has 4001 characters: write at most 4000",
     f"case,{','.join(f'label.a{i}' for i in range(MAX_TABLE_COLUMNS))}\n": "has 257 columns",
     f"seed\n{'1' * MAX_TABLE_BYTES}\n": "holds 2.0 MiB: a table has at most 2 MiB",
     "seed\n" + "1\n" * (MAX_CASES + 1): "has more than 100000 rows",

@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
+from reprlib import Repr
 from typing import Any, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from echotruth.config.reading import ConfigError, Errors, read_yaml, shown_key
+from echotruth.config.reading import ConfigError, Errors, check_size, read_yaml, shown_key
 from echotruth.config.sections import Config
 from echotruth.materials import Material
 from echotruth.section import Section, discriminator, section_in, variants
@@ -39,6 +40,8 @@ def load(path: str | Path) -> Config:
 
 def validate(values: dict[str, Any], source: str) -> Config:
     """Check the values of a configuration; errors name their `source`."""
+    if isinstance(values, dict):
+        check_size(values, source)
     try:
         return Config.model_validate(_without_empty(values, Config))
     except ValidationError as error:
@@ -125,7 +128,7 @@ def _shown_value(value: Any) -> str:
     """The value in one line of at most 80 characters, as it is in the file."""
     if value is None or isinstance(value, bool):
         return "null" if value is None else str(value).lower()
-    text = repr(value)
+    text = _REPR.repr(value)
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
@@ -172,6 +175,10 @@ def _written(wanted: str, value: Any) -> str:
 _BOOLEANS = ("true", "false")
 _NUMBER = re.compile(r"[-+]?\d{1,15}(\.\d{0,15})?([eE][-+]?\d{1,2})?")
 """Text that people read as a number."""
+
+_REPR = Repr()
+_REPR.maxlevel, _REPR.maxlist, _REPR.maxdict, _REPR.maxtuple = 4, 12, 12, 12
+_REPR.maxstring = _REPR.maxother = _REPR.maxlong = 80
 
 _MESSAGES = {
     "int_type": "must be a whole number",

@@ -1,9 +1,10 @@
-"""Read YAML files; what is malformed is refused in a sentence, and all errors of a configuration are told at once."""
+"""Read YAML files; what is malformed, or too large to be a configuration, is refused before it is expanded."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,12 @@ import yaml
 
 MAX_BYTES = 4 * 2**20
 """Size of the largest file that is read: 100 000 values of 40 characters."""
+MAX_DEPTH = 30
+"""Largest depth of mappings and lists within each other; the deepest key of the configuration lies at 6."""
+MAX_VALUES = 100_000
+"""Largest number of values of a file, keys included, each counted as often as aliases repeat it."""
+
+
 MAX_ERRORS = 20
 """Largest number of errors that are told at once."""
 
@@ -88,21 +95,54 @@ def read_yaml(path: Path) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        If the file cannot be read, holds no mapping, or exceeds `MAX_BYTES`.
+        If the file cannot be read, holds no mapping, or exceeds `MAX_BYTES`, `MAX_DEPTH` or `MAX_VALUES`.
     """
     text = read_text(path, MAX_BYTES, "YAML file", "a configuration")
     try:
+        _check_events(text)
         values = yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
         raise ConfigError(f"{path}{_sentence(error, len(text.splitlines()))}") from None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:  # a value that its tag is not
-        raise ConfigError(f"{path}: cannot be read ({error}): correct the YAML") from None
     if values is None:
         return {}
     if not isinstance(values, dict):
         kind = "text" if isinstance(values, str) else "a list" if isinstance(values, list) else "a single value"
         raise ConfigError(f"{path}: contains {kind}: write a mapping of keys to values")
+    check_size(values, str(path))
     return values
+
+
+def check_size(values: Any, source: str) -> None:
+    """Check that values are no deeper and no more than those of a file may be.
+
+    Lists that occur several times, as aliases make them, are counted each time; so whoever reads the values later does
+    so in a bounded time.
+
+    Parameters
+    ----------
+    values : dict
+        Of a configuration.
+    source : str
+        Their file.
+
+    Raises
+    ------
+    ConfigError
+        With the key that holds too much.
+    """
+    count = 0
+    for key, value in values.items():
+        level = [value]
+        for _ in range(MAX_DEPTH):
+            level = list(islice(chain.from_iterable(map(_children, level)), MAX_VALUES + 1))
+            count += len(level)
+            if not level:
+                break
+            if count > MAX_VALUES:
+                remedy = f"give at most {MAX_VALUES} values, each counted as often as its aliases repeat it"
+                raise ConfigError(f"{source}: {shown_key([key])} holds too much: {remedy}")
+        if level:
+            raise ConfigError(f"{source}: {shown_key([key])} is nested too deeply: use at most {MAX_DEPTH} levels")
 
 
 def shown_key(parts: list[Any]) -> str:
@@ -110,6 +150,12 @@ def shown_key(parts: list[Any]) -> str:
     text = ".".join(map(str, parts))
     shown = text if text.isprintable() else repr(text)[1:-1]
     return shown if len(shown) <= 200 else f"{shown[:197]}..."
+
+
+def _children(value: Any) -> Iterable[Any]:
+    if isinstance(value, dict):
+        return chain(value, value.values())
+    return value if isinstance(value, list | tuple) else ()
 
 
 def read_text(path: Path, most: int, file: str, what: str) -> str:
@@ -128,17 +174,25 @@ def read_text(path: Path, most: int, file: str, what: str) -> str:
     ConfigError
         If it is no file, cannot be read, is too large, or is not UTF-8.
     """
-    remedy = f"give the path of a {file}"
+    # A pipe or a device could be read for ever.
     try:
-        if path.exists() and not path.is_file():  # a pipe could be read for ever
-            raise ConfigError(f"{path}: is not a file: {remedy}")
-        if (size := path.stat().st_size) > most:
-            raise ConfigError(f"{path}: holds {size / 2**20:.1f} MiB: {what} has at most {most // 2**20} MiB")
-        return path.read_text(encoding="utf-8-sig")
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"{path}: is not a file: give the path of a {file}")
+        with path.open("rb") as opened:
+            content = opened.read(most + 1)
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}): {remedy}") from None
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}): give the path of a {file}") from None
+    except ConfigError:
+        raise
+    except ValueError:
+        raise ConfigError(f"{str(path)!r}: cannot be read: give the path of a {file}") from None
+    if len(content) > most:
+        size = path.stat().st_size / 2**20
+        raise ConfigError(f"{path}: holds {size:.1f} MiB: {what} has at most {most // 2**20} MiB")
+    try:
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ConfigError(f"{path}: is not UTF-8 text: {remedy}") from None
+        raise ConfigError(f"{path}: is not UTF-8 text: give the path of a {file}") from None
 
 
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -146,23 +200,70 @@ _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _Loader(_Base):
-    """YAML loader that refuses a key that is given twice."""
+    """YAML loader of mappings with unique text or numbers as keys; a value that is not what its tag says is refused."""
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        known = set()
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode) and key.value in known:
-                problem = f"key {shown_key([key.value])!r} is given twice: give it once"
-                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
-            known.add(str(key.value))
-        return super().construct_mapping(node, deep)
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            value = super().construct_object(node, deep)
+            if isinstance(value, int) and abs(value) >= 2**64:
+                raise ValueError
+            return value
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            kind = node.tag.removeprefix("tag:yaml.org,2002:")
+            text = f"{str(node.value)[:40]!r}" if isinstance(node, yaml.ScalarNode) else "this"
+            raise yaml.MarkedYAMLError(
+                problem=f"{text} is not a valid {kind}: write a plain value", problem_mark=node.start_mark
+            ) from error
+
+    def construct_unique_mapping(self, node: yaml.Node) -> dict[Any, Any]:
+        """Mapping whose keys are plain, each given once."""
+        if not isinstance(node, yaml.MappingNode):
+            raise TypeError
+        values: dict[Any, Any] = {}
+        for key_node, value_node in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                problem = "a list or a mapping is used as a key: write the name of a key"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
+            if key_node.tag == "tag:yaml.org,2002:merge":
+                problem = "<< would merge another mapping: write its keys out"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
+            key = self.construct_object(key_node, deep=True)
+            if key in values:
+                problem = f"key {shown_key([key])!r} is given twice: give it once"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
+            values[key] = self.construct_object(value_node, deep=True)
+        return values
+
+    def refuse_tag(self, node: yaml.Node) -> Any:
+        """No key takes what other tags make."""
+        problem = f"the tag {shown_key([node.tag.removeprefix('tag:yaml.org,2002:')])} is not read: leave it out"
+        raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
 
 
+_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _Loader.construct_unique_mapping)
+_Loader.add_constructor(None, _Loader.refuse_tag)
+for _kind in ("binary", "omap", "pairs", "set", "timestamp"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.refuse_tag)
 # A date without quotes is the text that it is in the file.
 _Loader.yaml_implicit_resolvers = {
     first: [(tag, pattern) for tag, pattern in resolvers if not tag.endswith(":timestamp")]
     for first, resolvers in _Base.yaml_implicit_resolvers.items()
 }
+
+
+def _check_events(text: str) -> None:
+    """Check the depth and the number of values from the sequence of events, before any value is made."""
+    depth = count = 0
+    event: Any
+    for event in yaml.parse(text, Loader=_Loader):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        count += isinstance(event, yaml.NodeEvent)
+        if depth > MAX_DEPTH:
+            problem = f"lists or mappings are nested too deeply: use at most {MAX_DEPTH} levels"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
+        if count > MAX_VALUES:
+            problem = f"the file holds too much: give at most {MAX_VALUES} values, keys included"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
 
 
 def _sentence(error: yaml.YAMLError, lines: int) -> str:
@@ -174,9 +275,14 @@ def _sentence(error: yaml.YAMLError, lines: int) -> str:
     line = f", line {min(mark.line + 1, lines)}" if mark else ""
     if ": " in problem:
         return f"{line}: {problem}"
-    remedies = {
-        "start any token": "indent by spaces, not tabs, and put text that begins with a special character in quotes",
-        "document": "write one document, without a second line of ---",
-    }
-    remedy = next((remedy for said, remedy in remedies.items() if said in problem), "correct the YAML")
-    return f"{line}: {problem}: {remedy}"
+    return f"{line}: {problem}: {_remedy(problem)}"
+
+
+def _remedy(problem: str) -> str:
+    if "start any token" in problem:
+        return "indent by spaces, not tabs, and put text that begins with a special character in quotes"
+    if "another document" in problem or "expected <document start>" in problem:
+        return "write one document, without a second line of ---"
+    if "recursive" in problem:
+        return "an alias must not lie within its own anchor"
+    return "correct the YAML"

@@ -11,7 +11,7 @@ from echotruth.config.defaults import apply_presets
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import ALL_VIEWS, Bmode, Phantom, Rf, View, standard_views
-from echotruth.config.limits import MAX_CASES, MAX_VIEWS
+from echotruth.config.limits import MAX_VIEWS, check_amounts
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
 from echotruth.config.motion import Motion
@@ -167,9 +167,5 @@ class Config(Section):
             raise invalid("loop.prescribed", prescribed, remedy)
 
     @check
-    def _check_number_of_cases(self) -> None:
-        if self.cases.number > MAX_CASES:
-            shape = self.cases.shape
-            product = " x ".join(map(str, shape[:8])) + (" x ..." if len(shape) > 8 else "")
-            remedy = f"makes {product} cases: list fewer values, because a repository has at most {MAX_CASES}"
-            raise invalid("cases", self.cases.keys, remedy)
+    def _check_amounts(self) -> None:
+        check_amounts(self)

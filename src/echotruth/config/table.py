@@ -7,7 +7,7 @@ import io
 from dataclasses import dataclass
 from functools import lru_cache
 
-from echotruth.config.limits import MAX_CASES, MAX_TABLE_COLUMNS
+from echotruth.config.limits import MAX_CASES, MAX_CELL, MAX_TABLE_COLUMNS
 
 CASE, NOTE, LABEL = "case", "note", "label."
 """Columns of the id and of a note, and how the names of labels begin."""
@@ -93,3 +93,6 @@ def _check_row(number: int, row: tuple[str, ...], columns: tuple[str, ...]) -> N
     if len(row) != len(columns):
         remedy = "leave cells empty rather than out, and put text with commas in quotes"
         raise TableError(f"row {number} has {len(row)} cells and not {len(columns)}, as many as columns: {remedy}")
+    for name, cell in zip(columns, row, strict=True):
+        if len(cell) > MAX_CELL:
+            raise TableError(f"row {number}, column {name}: has {len(cell)} characters: write at most {MAX_CELL}")
