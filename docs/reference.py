@@ -62,8 +62,7 @@ The folder of the repository also contains `cases.csv` (the present cases with l
 (row of every case) and `views.txt` (index of every view), `cases/` (configuration of every heart), `ledger/` (a record
 of every finished job: checksums, seed, version of the code; `structure.json`: checksums of all other files),
 `benchmarks/` (what jobs took), `figures/` and `logs/`; and `external/` what `echotruth evaluate` found of other
-trackers: their scores (NAME.csv) and, with `--keep`, NAME.zarr, which has the groups of that tracker in the same
-rows.
+trackers: their scores (NAME.csv) and, with `--keep`, NAME.zarr, which has the groups of that tracker in the same rows.
 
 This page is generated from `src/echotruth/repository/arrays.csv` by `make reference`.
 

@@ -123,7 +123,7 @@ def _check_values(
     """Group, array and problem of the values of a job."""
     config, arrays = repository.cases[job.case].config, {path.partition("/c/")[0] for path in files}
     for group in sorted({path.rpartition("/")[0] for path in arrays}):
-        names = [path.rpartition("/")[2] for path in arrays if path.rpartition("/")[0] == group]
+        names = [name for inside, _, name in (path.rpartition("/") for path in arrays) if inside == group]
         opened = {name: repository.opened.get(f"{group}/{name}") for name in names}
         if any(array is None for array in opened.values()):
             continue  # its metadata are damaged

@@ -91,6 +91,7 @@ def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[t
         Name of the array, and what is wrong with it.
     """
     stage, kinds = group.partition("/")[0], {array.name: array.values for array in schema.named(group)}
+    kind = schema.kind(group)
     for name, values in arrays.items():
         for problem in _in_range(values, RANGES[kinds[name]]):
             yield name, problem
@@ -98,8 +99,8 @@ def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[t
         if name in arrays and bool((arrays[name][..., :count] < LOWEST_STRAIN).any()):
             yield name, "has a strain below -1/2 along an axis"
     yield from _labels(arrays, config)
-    if stage in RELATIONS:
-        yield from RELATIONS[stage](arrays, first, config)
+    if kind in RELATIONS:
+        yield from RELATIONS[kind](arrays, first, config)
 
 
 def _in_range(values: NDArray[Any], range: Range) -> Iterator[str]:
@@ -211,11 +212,11 @@ RELATIONS: dict[str, Callable[[Arrays, int, Config], Iterator[tuple[str, str]]]]
     "mechanics": _mechanics,
     "kinematics": _kinematics,
     "phantom": _phantom,
-    "truth": _truth,
-    "tracking": _tracking,
-    "evaluation": _evaluation,
+    "truth/SIZE": _truth,
+    "tracking/SIZE/TRACKER": _tracking,
+    "evaluation/SIZE": _evaluation,
 }
-"""Stage -> faults of its arrays in relation to each other."""
+"""Kind of a group -> faults of its arrays in relation to each other."""
 
 
 def loop_faults(arrays: Arrays, measured: Arrays, config: Config) -> Iterator[tuple[str, str]]:
