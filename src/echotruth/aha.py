@@ -6,24 +6,10 @@ from math import pi
 
 import numpy as np
 
+_WALLS = ("anterior", "anteroseptal", "inferoseptal", "inferior", "inferolateral", "anterolateral")
 SEGMENT_NAMES = (
-    "basal anterior",
-    "basal anteroseptal",
-    "basal inferoseptal",
-    "basal inferior",
-    "basal inferolateral",
-    "basal anterolateral",
-    "mid anterior",
-    "mid anteroseptal",
-    "mid inferoseptal",
-    "mid inferior",
-    "mid inferolateral",
-    "mid anterolateral",
-    "apical anterior",
-    "apical septal",
-    "apical inferior",
-    "apical lateral",
-    "apex",
+    *(f"{level} {wall}" for level in ("basal", "mid") for wall in _WALLS),
+    *("apical anterior", "apical septal", "apical inferior", "apical lateral", "apex"),
 )
 """Names of segments 1..17."""
 

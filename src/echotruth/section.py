@@ -106,10 +106,16 @@ def dotted_values(section: Section, prefix: str = "") -> Iterator[tuple[str, Any
 
 
 def value_of(section: Any, dotted_key: str) -> Any:
-    """Value of a dotted key of a section, in which names of views or trackers may be parts of the key."""
+    """Value of a dotted key of a section, in which names of views or trackers may be parts of the key.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If there is no such key.
+    """
     value = section
     for part in dotted_key.split("."):
-        value = value[part] if isinstance(value, dict) else getattr(value, part)
+        value = dict(value)[part]
     return value
 
 

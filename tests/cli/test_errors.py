@@ -70,12 +70,6 @@ def test_all_keys_that_cannot_be_swept_are_told():
     ]
 
 
-def test_condition_that_is_cut_by_a_comment_is_told_so(call, tmp_path):
-    (tmp_path / "cut.yaml").write_text("cases:\n  seed: [1, 2]\n  where:\n    - seed == #3\n")
-    status, output, errors = call("check", "cut.yaml")
-    assert (status, output) == (1, "") and "ends too early" in errors and "put the condition in quotes" in errors
-
-
 def test_each_line_on_the_terminal_has_the_name_of_the_program(call, tmp_path):
     (tmp_path / "bad.yaml").write_text("seed: -1\nfibres: {endo_deg: 95}\n")
     status, output, errors = call("check", "bad.yaml")

@@ -15,7 +15,7 @@ from echotruth.config import Config, Section
 from echotruth.config.loading import ConfigError
 from echotruth.config.reading import Errors
 from echotruth.config.table import LABEL
-from echotruth.section import dotted_values
+from echotruth.section import dotted_values, value_of
 
 NOT_SWEPT = (
     *("name", "cases", "views", "tracking", "geometry.shape", "fibres.layers", "loop.frames", "rf.keep"),
@@ -156,15 +156,10 @@ def _check_swept_key(config: Config, key: str, place: str) -> None:
 
 def _value_of(config: Config, key: str, place: str) -> Any:
     """Value of a dotted key without the sweep."""
-    value: Any = config
-    for part in key.split("."):
-        if isinstance(value, dict) and isinstance(value.get(part), Section):
-            value = value[part]
-        elif isinstance(value, Section) and part in type(value).model_fields:
-            value = getattr(value, part)
-        else:
-            raise ConfigError(f"{place}: {key[:80]} is not a key: {_suggestion(config, key)}")
-    return value
+    try:
+        return value_of(config, key)
+    except (KeyError, TypeError, ValueError):
+        raise ConfigError(f"{place}: {key[:80]} is not a key: {_suggestion(config, key)}") from None
 
 
 def _suggestion(config: Config, key: str) -> str:

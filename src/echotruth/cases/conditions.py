@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import operator
-import re
 from collections.abc import Callable
 from typing import Any
 
@@ -31,14 +30,6 @@ _ORDER: dict[type, Callable[[Any, Any], bool]] = {
 }
 _CONSTANTS = {"true": True, "false": False, "null": None}
 WHOLE = "write comparisons of keys and numbers, joined by and, or and not"
-
-
-def _looks_cut(text: str) -> bool:
-    """Whether a condition ends within a comparison or within quotes."""
-    return bool(_OPEN_END.search(text.strip())) or text.count("'") % 2 == 1 or text.count('"') % 2 == 1
-
-
-_OPEN_END = re.compile(r"([=<>!+*/%,(\[-]|\b(and|or|not|in))$")
 
 
 class ConditionError(ValueError):
@@ -78,9 +69,6 @@ class Condition:
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             if isinstance(error, ConditionError):
                 raise
-            if _looks_cut(text):
-                remedy = "in YAML, # after a space begins a comment: put the condition in quotes"
-                raise ConditionError(f"ends too early: complete it; {remedy} if # is part of it") from None
             raise ConditionError(f"cannot be read: {WHOLE}, such as loop.edv_uL > 40 and seed < 3") from None
 
     def holds(self, lookup: Lookup) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 from echotruth.cli.command import Commands, add_command, add_repeated, fail
@@ -53,7 +52,8 @@ def export(arguments: argparse.Namespace) -> int:
         options = arguments.format, arguments.overlay, arguments.rate, arguments.output
         work = Export(Repository(arguments.repository), chosen, *options)
         clips, left_out = work.clips()
-        _print_counted(work.write(clips), len(clips))
+        for path in work.write(clips):
+            print(path, flush=True)
     except ValueError as error:
         return fail(str(error))
     except OSError as error:
@@ -68,21 +68,3 @@ def export(arguments: argparse.Namespace) -> int:
     if left_out:
         print(f"echotruth: left out {len(left_out)} that are not finished, first: {left_out[0]}", file=sys.stderr)
     return 0
-
-
-def _print_counted(paths: Iterator[Path], total: int) -> None:
-    """Print each path when its file is written; below them, where a person watches, how many of many there are."""
-    watched = sys.stderr.isatty() and total > 1
-
-    def show(line: str) -> None:
-        if watched:
-            print(f"\r\033[K{line}", end="", file=sys.stderr, flush=True)
-
-    try:
-        show(f"0 of {total}")
-        for done, path in enumerate(paths, start=1):
-            show("")
-            print(path, flush=True)
-            show(f"{done} of {total}")
-    finally:
-        show("")

@@ -7,14 +7,10 @@ from typing import Any
 
 from echotruth.config import shipped
 from echotruth.config.loading import ConfigError, read_yaml, validate
+from echotruth.config.merging import KINDS, NAMED, merged, nested
 from echotruth.config.sections import Config
 
 Source = Config | dict[str, Any] | str | Path | None
-
-_NAMED = ("views", "trackers", "cases")
-"""Mappings of names that the user gives: one that is given replaces the other."""
-_KINDS = ("law", "method")
-"""Keys that decide which other keys a section has."""
 
 
 def configure(source: Source = None, **keys: Any) -> Config:
@@ -56,11 +52,7 @@ def configure(source: Source = None, **keys: Any) -> Config:
     else:
         values, name = source or {}, "configuration"
     for key, value in keys.items():
-        *parents, leaf = key.split(".")
-        nested = {leaf: value}
-        for parent in reversed(parents):
-            nested = {parent: nested}
-        values = _merged(values, nested)
+        values = merged(values, nested(key, value))
     return validate(values, name)
 
 
@@ -79,24 +71,11 @@ def _difference(values: dict[str, Any], default: dict[str, Any]) -> dict[str, An
     found = {}
     for key, value in values.items():
         other = default.get(key)
-        if isinstance(value, dict) and isinstance(other, dict) and key not in _NAMED:
-            if any(value.get(kind) != other.get(kind) for kind in _KINDS):
+        if isinstance(value, dict) and isinstance(other, dict) and key not in NAMED:
+            if any(value.get(kind) != other.get(kind) for kind in KINDS):
                 found[key] = value
             elif inner := _difference(value, other):
                 found[key] = inner
         elif value != other:
-            found[key] = value
-    return found
-
-
-def _merged(values: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
-    """Values with those given in place of theirs, section by section."""
-    found = dict(values)
-    for key, value in given.items():
-        old: Any = values.get(key)
-        merges = isinstance(value, dict) and isinstance(old, dict) and key not in _NAMED
-        if merges and all(old.get(kind) == value.get(kind, old.get(kind)) for kind in _KINDS):
-            found[key] = _merged(old, value)
-        else:
             found[key] = value
     return found

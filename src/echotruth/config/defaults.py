@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from echotruth.config.merging import merged, nested
 from echotruth.config.tracking import DEFAULT, METHODS, default_trackers, name_of
 from echotruth.config.transducers import ARRAY_DEFAULTS
 
@@ -80,19 +81,10 @@ def _value(section: Any, key: str) -> Any:
 
 
 def _fill(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
+    """Values with defaults of dotted keys for those that are not given."""
     for dotted_key, default in defaults.items():
-        values = _with_default(values, dotted_key.split("."), default)
+        values = merged(nested(dotted_key, default), values)
     return values
-
-
-def _with_default(section: Any, keys: list[str], default: Any) -> Any:
-    """Section with a default for a key in it, however deep, unless it is given; a model is not changed."""
-    if not isinstance(section, dict):
-        return section
-    key, *rest = keys
-    if not rest:
-        return {key: default} | section
-    return section | {key: _with_default(section.get(key, {}), rest, default)}
 
 
 def _length_scale(values: dict[str, Any]) -> float:

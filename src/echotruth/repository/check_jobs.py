@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -147,8 +148,8 @@ def _blocks(
         return
     axes = {name: by_name[name].dims.index("frame") for name in with_frames}
     frames = opened[with_frames[0]].shape[axes[with_frames[0]]]
-    bytes_a_frame = sum(_bytes_of_a_job(opened[name], by_name[name].leading) for name in with_frames) / frames
-    step = max(1, int(BLOCK_BYTES / bytes_a_frame))
+    of_a_job = (opened[name].nbytes / prod(opened[name].shape[: by_name[name].leading]) for name in with_frames)
+    step = max(1, int(BLOCK_BYTES / sum(of_a_job) * frames))
     for first in range(0, frames, step):
         part = {}
         for name in with_frames:
@@ -156,10 +157,6 @@ def _blocks(
             index: tuple[int | slice, ...] = (*row[:leading], *[slice(None)] * (axes[name] - leading))
             part[name] = np.asarray(opened[name][(*index, slice(first, first + step))])
         yield first, whole | part
-
-
-def _bytes_of_a_job(array: zarr.Array[Any], leading: int) -> float:
-    return float(np.prod(array.shape[leading:])) * array.dtype.itemsize
 
 
 def check_loop(repository: Inventory, job: JobRecord) -> list[Fault]:

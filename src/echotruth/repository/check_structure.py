@@ -65,12 +65,12 @@ def check_registries(repository: Inventory) -> Iterator[Fault]:
 
 def check_others(repository: Inventory) -> Iterator[Fault]:
     """Record of the publication."""
-    if repository.publication_record.is_file():
-        try:
-            ledger.read(repository.publication_record)
-        except ValueError as error:
-            path, problem = repository.publication_record, f"cannot be read ({reason(error)})"
-            yield Fault(repository.name(path), problem, _REWRITTEN, (path,))
+    path = repository.publication_record
+    try:
+        if path.is_file():
+            ledger.read(path)
+    except ValueError as error:
+        yield Fault(repository.name(path), f"cannot be read ({reason(error)})", _REWRITTEN, (path,))
 
 
 def check_metadata(repository: Inventory) -> Iterator[Fault]:

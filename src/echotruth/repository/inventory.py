@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -117,10 +118,8 @@ class Inventory:
         """Arrays of the jobs that can be opened, by path."""
         arrays = {}
         for path in self.shard_paths:
-            try:
+            with suppress(Exception):  # damaged metadata, which is a fault of its own, fail in many ways
                 arrays[path] = zarr.open_array(self.store, path=path, mode="r")
-            except Exception:  # damaged metadata, which is a fault of its own, fail in many ways
-                continue
         return arrays
 
     def pack_labels(self, group: str) -> dict[str, list[str]]:

@@ -89,14 +89,9 @@ def _dependencies(modules: tuple[str, ...], unless: frozenset[tuple[str, str]] =
 def _imports(importer: str) -> list[str]:
     """Modules of echotruth, and their packages, that a module imports anywhere in its source."""
     names = set(_source(importer).imports)
-    names |= _discovered(importer) if "pkgutil" in names else set()
+    if "pkgutil" in names and (path := _path(importer)):  # a package that imports all modules of its folder
+        names |= {f"{importer}.{file.stem}" for file in path.parent.glob("*.py")} - {f"{importer}.__init__"}
     return sorted(name for name in names if name.startswith("echotruth.") and name != importer and _path(name))
-
-
-def _discovered(package: str) -> set[str]:
-    """Modules of a package that imports all modules of its folder."""
-    path = _path(package)
-    return {f"{package}.{file.stem}" for file in path.parent.glob("*.py")} - {f"{package}.__init__"} if path else set()
 
 
 @cache

@@ -100,7 +100,8 @@ class Remote:
     def hierarchies(self) -> list[str]:
         """Names of the Zarr hierarchies, as `demo.zarr`."""
         found = self._asked(lambda: self._api.list_with_delimiter(self.store))
-        return sorted(name for name in map(_last_part, found["common_prefixes"]) if name.endswith(".zarr"))
+        names = (prefix.rstrip("/").rpartition("/")[2] for prefix in found["common_prefixes"])
+        return sorted(name for name in names if name.endswith(".zarr"))
 
     def _asked(self, request: Callable[[], T]) -> T:
         """Answer to a request; a failure is told in a sentence."""
@@ -154,7 +155,3 @@ def _reason(error: Exception) -> str:
     text = str(error).partition("\n\nDebug source")[0]
     found = re.search(r"<Message>(.+?)</Message>", text, re.DOTALL)
     return " ".join((found[1] if found else text.rpartition(" - ")[2]).split()).rstrip(".:")
-
-
-def _last_part(path: str) -> str:
-    return path.rstrip("/").rpartition("/")[2]

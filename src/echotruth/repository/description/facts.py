@@ -156,16 +156,14 @@ def _read(folder: Path, path: Path) -> Record:
 
 
 def _arrays(repository: Inventory) -> dict[str, list[Array]]:
-    found = {}
+    found: dict[str, list[Array]] = {}
     for path, arrays in sorted(repository.groups.items()):
         members = {pack.array.name: pack.members for pack in schema.packs_of(path)}
-        listed = ((array, *_named(members.get(array.name, ()), array.name)) for array in arrays)
-        found[schema.kind(path)] = list(chain(*listed))
+        found[schema.kind(path)] = listed = []
+        for array in arrays:
+            packed = members.get(array.name, ())
+            listed += [array, *(replace(one, long_name=f"{one.long_name} (in {array.name})") for one in packed)]
     return found
-
-
-def _named(members: tuple[Array, ...], pack: str) -> list[Array]:
-    return [replace(one, long_name=f"{one.long_name} (in {pack})") for one in members]
 
 
 def _records(repository: Inventory) -> tuple[dict[JobRecord, Record], dict[str, str]]:

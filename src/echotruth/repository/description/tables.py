@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Iterator
 from functools import cache
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import zarr
 from numpy.typing import NDArray
 
@@ -33,11 +32,7 @@ def clips(facts: Facts, columns: Iterable[str]) -> bytes:
     columns : iterable of str
         Names of the columns, in order.
     """
-    text = StringIO()
-    writer = csv.DictWriter(text, list(columns), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(_rows(facts))
-    return text.getvalue().encode()
+    return pd.DataFrame(_rows(facts), columns=list(columns)).to_csv(index=False).encode()
 
 
 def _rows(facts: Facts) -> Iterator[dict[str, object]]:
