@@ -8,7 +8,7 @@ hold `video` (frame, height, width, 3; uint8), `points` (point, frame, 2; x, y; 
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -55,7 +55,7 @@ class _Videos:
     def __init__(self, clips: Sequence[Clip]) -> None:
         self.clips = clips
 
-    def __reduce__(self) -> tuple[type, tuple[()], None, None, Iterator[tuple[str, dict[str, Any]]]]:
+    def __reduce__(self) -> tuple[Any, ...]:
         # A copy, with which goes what was read of the clip.
         return dict, (), None, None, ((clip.name, arrays(replace(clip))) for clip in self.clips)
 

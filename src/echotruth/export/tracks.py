@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from echotruth.export.clip import Clip
 from echotruth.notebook.point_tracks import point_tracks
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def tracks(clip: Clip, step: int) -> xr.Dataset:
