@@ -57,7 +57,7 @@ class Diagnosis(Items):
         self._diagnosis = {place.case: str(known[place.case]) for place in self.places}
         for case, name in self._diagnosis.items():
             if name not in self.classes:
-                raise ValueError(f"classes = {self.classes}: the diagnosis of {case} is {name}: add it, or leave it out.")
+                raise ValueError(f"classes = {self.classes}: the diagnosis of {case} is {name}: add it, or omit it.")
 
     def item(self, place: Place, within: int) -> Item:
         name = self._diagnosis[place.case]

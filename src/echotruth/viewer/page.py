@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -12,15 +12,7 @@ from typing import Any
 import numpy as np
 from bokeh.document import Document
 from bokeh.layouts import column, row
-from bokeh.models import (
-    CheckboxButtonGroup,
-    ColumnDataSource,
-    Div,
-    Range1d,
-    Select,
-    Slider,
-    Toggle,
-)
+from bokeh.models import CheckboxButtonGroup, ColumnDataSource, Div, Range1d, Select, Slider, Toggle
 
 from echotruth.evaluation.curves import strain_curves
 from echotruth.repository.reader import Repository
@@ -49,12 +41,10 @@ class Page:
     choice : Choice
         What is shown at first.
     document : Document
-    refused : sequence of str
-        Sentences on what was asked for and is not there; they are shown until something else is chosen.
     """
 
-    def __init__(self, repository: Repository, choice: Choice, document: Document, refused: Sequence[str] = ()) -> None:
-        self.repository, self.choice, self.document, self.refused = repository, choice, document, refused
+    def __init__(self, repository: Repository, choice: Choice, document: Document) -> None:
+        self.repository, self.choice, self.document = repository, choice, document
         self.points = lru_cache(KEPT_CLIPS)(lambda case, view, size: Points(Clip(repository, case, view, size)))
         self._shown: dict[str, Any] = {}
         self._problems: dict[str, None] = {}
@@ -165,9 +155,8 @@ class Page:
     def _show(self) -> None:
         choice = self.choice
         points = self.points(choice.case, choice.view, choice.size)
-        clip = points.clip
+        clip, self._problems = points.clip, {}
         self._fit(clip)
-        self._problems = {}
         place = (choice.case, choice.view, choice.size)
         self._once("clip", place, lambda: self._show_clip(points))
         for number, tracker in enumerate((choice.tracker, choice.other)):
@@ -175,8 +164,10 @@ class Page:
         found = self._once("found", (*place, choice.tracker, choice.other), lambda: self._curves(clip))
         self._show_graphs(clip, found)
         self.facts.text = facts.text(clip, [choice.tracker, choice.other])
-        self._say(" ".join([*self.refused, *self._lacking(clip), *self._problems]))
-        self.refused = ()
+        if lacking := ", ".join(name for part, name in MISSING.items() if not clip.has(part)):
+            said = f"Not made for this case and view: {lacking}. The run is not finished, or the heart not complete."
+            self._problems[said] = None
+        self._say(" ".join(self._problems))
         self.address.data = {"query": [self.choice.address]}
 
     def _blank(self) -> None:
@@ -197,8 +188,7 @@ class Page:
 
     def _show_clip(self, points: Points) -> None:
         """Grey levels and times, and the pictures about the wall; the tool of the picture resets them to the whole."""
-        clip = points.clip
-        side = 1e3 * clip.side
+        clip, side = points.clip, 1e3 * points.clip.side
         self.side.value = side
         for panel in self.panels:
             panel.size(clip.size, side)
@@ -244,7 +234,7 @@ class Page:
     def _curves(self, clip: Clip) -> dict[str, Any]:
         """Tracker -> curves, of those that have any."""
         found = {}
-        for tracker in (self.choice.tracker, self.choice.other) if clip.has_curves else ():
+        for tracker in (self.choice.tracker, self.choice.other) if clip.has("evaluation") else ():
             with suppress(ValueError):  # not evaluated on this clip, which the picture says
                 if tracker not in (TRUTH, NOTHING):
                     found[tracker] = strain_curves(self.repository, clip.case, clip.view, tracker, clip.size)
@@ -279,15 +269,6 @@ class Page:
     def _set(self, name: str, value: str, options: list[Any]) -> None:
         """Offer other options in an input, and one of them as chosen."""
         self.inputs[name].update(options=options, value=value)
-
-    def _lacking(self, clip: Clip) -> list[str]:
-        """What is not there."""
-        if clip.missing:
-            lacking = ", ".join(MISSING[part] for part in clip.missing)
-            return [f"Not made for this case and view: {lacking}. The run is not finished, or the heart not complete."]
-        if not clip.has_curves:
-            return ["There are no curves: an earlier version made this repository. Run its configuration again."]
-        return []
 
     def _say(self, text: str) -> None:
         self.message.text = escape(text)
