@@ -15,6 +15,7 @@ from echotruth.cases import Case
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.view import Plane
+from echotruth.notebook.point_tracks import point_tracks
 from echotruth.repository.reader import Repository
 
 
@@ -85,6 +86,17 @@ class Clip:
     def lateral(self) -> Floats:
         """Lateral coordinate of the pixel centres, (size,), m."""
         return pixel_centres(self.case.config.bmode, self.size)[1]
+
+    def tracks(self, step: int) -> xr.Dataset:
+        """Points of the tissue, at the centres of every so many pixels of the wall at end-diastole, and their paths.
+
+        The paths are exact, by the mesh: `pixel` (frame, point, plane), px, `elevation` (frame, point), m, and
+        `visible` (frame, point), as :func:`echotruth.point_tracks` returns them.
+        """
+        along = np.arange(step // 2, self.size, step)
+        pixels = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+        found = point_tracks(self.heart, self.truth("image"), pixels)
+        return found.isel(point=found["elevation"].isel(frame=0).notnull().values)
 
     @property
     def note(self) -> str:

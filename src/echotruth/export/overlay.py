@@ -11,7 +11,6 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from echotruth.export.clip import Clip
-from echotruth.export.tracks import tracks
 from echotruth.report.clip import MOTION
 
 WALL = "#4cc9f0"
@@ -70,7 +69,7 @@ def _wall(clip: Clip, frames: Pictures) -> None:
 def _displacement(clip: Clip, frames: Pictures) -> None:
     """Draw an arrow for each point of a grid that is in the wall at end-diastole."""
     step = max(1, clip.size // ARROWS_ALONG_SIDE)
-    position = tracks(clip, step)["pixel"].values
+    position = clip.tracks(step)["pixel"].values
     for frame, ends in zip(frames, position, strict=True):
         for start, end in zip(_fixed(position[0]), _fixed(ends), strict=True):
             cv2.line(frame, start, end, _rgb(MOTION), _thickness(clip), cv2.LINE_AA, _SHIFT)

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from echotruth.export.clip import Clip
-from echotruth.export.tracks import tracks
 
 POINTS_ALONG_SIDE = 64
 """Points along the side of an image that is all wall."""
@@ -77,7 +76,7 @@ def arrays(clip: Clip) -> dict[str, Any]:
     dict
         video, points, occluded, elevation_m, spacing_m, frame_time_s; see above.
     """
-    found = tracks(clip, max(1, clip.size // POINTS_ALONG_SIDE))
+    found = clip.tracks(max(1, clip.size // POINTS_ALONG_SIDE))
     return {
         "video": np.repeat(clip.image[..., None], 3, axis=-1),
         "points": ((found["pixel"].values + 0.5) / clip.size).transpose(1, 0, 2).astype(np.float32),

@@ -9,11 +9,11 @@ import numpy as np
 
 from echotruth.viewer.clip import Clip
 
-SCORES = {"nrmse_all": ("NRMSE", 100, "%"), "coverage": ("coverage", 100, "%")}
+SCORES = {"nrmse_all": ("NRMSE", 100.0, "%"), "coverage": ("coverage", 100.0, "%")}
 """Score to its name, and factor and unit in which it is shown."""
 MEASURES = {
-    "ejection_fraction": ("ejection fraction", 100, "%"),
-    "gls": ("GLS", 100, "%"),
+    "ejection_fraction": ("ejection fraction", 100.0, "%"),
+    "gls": ("GLS", 100.0, "%"),
     "twist_peak": ("peak twist", np.degrees(1), "°"),
 }
 
@@ -47,7 +47,7 @@ def _scores(clip: Clip, tracker: str) -> str:
     if not clip.has("evaluation"):
         return "not tracked yet"
     try:
-        return _numbers(clip.tracked(tracker, *SCORES), SCORES)
+        return _numbers(clip.tracked(tracker, *SCORES), SCORES) or "unknown"
     except ValueError:  # of a tracker from outside
         return "not evaluated on this clip"
 

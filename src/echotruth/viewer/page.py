@@ -242,13 +242,13 @@ class Page:
 
     def _show_graphs(self, clip: Clip, found: dict[str, Any]) -> None:
         choice = self.choice
-        shown = [curves.segments(data) for data in found.values()][:1]
-        parts = curves.parts(clip, choice.curve, shown[0] if shown else [])
+        segments = curves.segments(next(iter(found.values()))) if found else []
+        parts = curves.parts(clip, choice.curve, segments)
         if choice.part not in parts:
             self.choice = choice = replace(choice, part=parts[0])
         names = [(kind, curves.strain_name(clip, kind)) for kind in (curves.LINE, "TT", "RR", "RT")]
-        self._set("curve", choice.curve, names)
-        self._set("part", choice.part, parts)
+        self.inputs["curve"].update(options=names, value=choice.curve)
+        self.inputs["part"].update(options=parts, value=choice.part)
         self.inputs["measure"].visible = choice.curve != curves.LINE
         plots = {
             "strain": curves.strain(clip, found, choice.curve, choice.measure, choice.part),
@@ -263,12 +263,8 @@ class Page:
         known = components(self.choice.colour)
         if self.choice.component not in known:
             self.choice = replace(self.choice, component=known[min(1, len(known) - 1)] if known else "")
-        self._set("component", self.choice.component, [(name, component_name(name, clip)) for name in known])
-        self.inputs["component"].visible = bool(known)
-
-    def _set(self, name: str, value: str, options: list[Any]) -> None:
-        """Offer other options in an input, and one of them as chosen."""
-        self.inputs[name].update(options=options, value=value)
+        names = [(name, component_name(name, clip)) for name in known]
+        self.inputs["component"].update(options=names, value=self.choice.component, visible=bool(known))
 
     def _say(self, text: str) -> None:
         self.message.text = escape(text)
