@@ -67,7 +67,8 @@ def write_summary(clips: Sequence[Clip], path: Path, trackers: Sequence[str]) ->
     path : Path
     trackers : sequence of str
     """
-    cases, views, sizes = zip(*((clip.case.id, clip.view, clip.size) for clip in clips), strict=True)
+    found = zip(*((clip.case.id, clip.view, clip.size) for clip in clips), strict=True)
+    cases, views, sizes = (list(dict.fromkeys(names)) for names in found)
     table = clips[0].repository.summary(cases, views, sizes, trackers)
     table.to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
 
