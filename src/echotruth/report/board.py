@@ -24,8 +24,8 @@ def of(standings: pd.DataFrame, size: int, cases: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        `size`; `hearts`, their number; `rows`, a dict of each tracker, the best first, which lacks what is not known;
-        `interval`, what the intervals in the figure are.
+        `size`; `hearts`, their number; `known`, the columns of which a tracker has a value; `rows`, a dict of each
+        tracker, the best first, which lacks what is not known; `interval`, what the intervals in the figure are.
     """
     table = standings[(standings["view"] == ALL_VIEWS) & (standings["size_px"] == size)]
     table = table.sort_values("rank", kind="stable", na_position="last")
@@ -35,6 +35,7 @@ def of(standings: pd.DataFrame, size: int, cases: int) -> dict[str, Any]:
     return {
         "size": size,
         "hearts": hearts,
+        "known": list(table.dropna(axis="columns", how="all")),
         "rows": [row.dropna().to_dict() for _, row in table.iterrows()],
         "interval": "With a single heart there are no intervals." if hearts < 2 else bootstrap,
     }

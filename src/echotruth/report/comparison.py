@@ -76,10 +76,6 @@ class Comparison:
         """Trackers that have curves of all views, the best first."""
         return list(next(iter(self.curves.values())))
 
-    def of_plane(self, plane: str) -> list[str]:
-        """Views that lie in a plane, short_axis or long_axis."""
-        return [name for name, view in self.views.items() if view.plane == plane]
-
     @property
     def rows(self) -> list[list[Panel | None]]:
         """Panels of the global strains and of the rotation, a column for each view; twist where there is room."""
@@ -127,8 +123,7 @@ class Comparison:
         """Strain of the segments at end-systole, true and of a tracker, for each component that a view shows."""
         found = []
         for plane, component, title in COMPONENTS:
-            views = self.of_plane(plane)
-            if views:
+            if views := [name for name, view in self.views.items() if view.plane == plane]:
                 true, tracked = (self._segments_at_es(views, tracker, name, component) for name in ("true", "tracked"))
                 found.append(Segments(title, true, tracked))
         return found

@@ -23,9 +23,6 @@ from echotruth.repository.reader import Repository
 
 HERE = Path(__file__).parent
 
-TALLIED = ("status", "diagnosis")
-"""Columns of the table of cases whose values are counted."""
-
 
 def write(repository: Repository) -> Path:
     """Write the page of a repository whose figures are drawn.
@@ -72,7 +69,7 @@ def _context(repository: Repository) -> dict[str, Any]:
         "main_view": view,
         "strain_limit": STRAIN_LIMIT,
         "clips": _json(clips(comparison)) if comparison else "",
-        "tally": {name: cases[name].astype(str).value_counts().sort_index().to_dict() for name in TALLIED},
+        "tally": {name: cases[name].value_counts().sort_index().to_dict() for name in ("status", "diagnosis")},
         "measures": list(MEASURES),
         "hearts": subjects(repository, view, config.bmode.sizes[-1]) if shown else [],
         "failures": account.failures(repository),
