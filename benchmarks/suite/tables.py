@@ -121,7 +121,7 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
 def ejection_fraction(suite: Suite, case: str) -> float:
     """Ejection fraction of a heart; NaN if it was not solved."""
     repository = Repository(suite.folder)
-    if repository.record("physiology", case).get("status") != "complete":
+    if repository.record("mechanics", case).get("status") != "complete":
         return np.nan
     return float(repository.arrays("physiology", case, None, "ejection_fraction")["ejection_fraction"])
 

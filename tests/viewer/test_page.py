@@ -16,7 +16,7 @@ from known_repository import SIZES
 from echotruth.cases import expand
 from echotruth.evaluation.run import prepare
 from echotruth.repository.reader import Repository
-from echotruth.viewer.choice import TRUTH, Choice, asked, first, refused
+from echotruth.viewer.choice import TRUTH, Choice, asked, first
 from echotruth.viewer.page import Page
 from echotruth.viewer.server import ShowError, opened, serve
 
@@ -53,15 +53,6 @@ def test_address_leads_back_to_the_choice(repository):
 def test_address_of_what_is_not_there_is_left_out(repository):
     query = {"case": ["none"], "view": ["../.."], "size": ["7"], "colour": ["<b>"], "frame": ["-1"], "else": ["x"]}
     assert asked(repository, query) == first(repository)
-
-
-def test_what_an_address_asks_for_and_is_not_there_is_said_until_something_else_is_chosen(repository):
-    query = {"case": ["none"], "view": ["long"], "else": ["x"]}
-    page = Page(repository, asked(repository, query), Document(), refused(repository, query))
-    page.show()
-    assert page.message.text == "There is no case none, which the address asks for."
-    choose(page, size=str(SIZES[1]))
-    assert not page.message.visible
 
 
 def test_page_shows_the_images_of_what_is_chosen(page):

@@ -81,9 +81,7 @@ FORMATS = {
     "dicom": Format("dicom", ".dcm"),
     "vtk": Format("vtk", "", (), "heart"),
     "matlab": Format("matlab", ".mat", ("phantom", "truth", "bmode", "tracking"), options=("trackers",)),
-    "csv": Format(
-        "curves", ".csv", ("physiology", "tracking", "evaluation"), options=("trackers",), table="summary.csv"
-    ),
+    "csv": Format("curves", ".csv", ("tracking",), options=("trackers",), table="summary.csv"),
     "tap": Format("tap", ".npz"),
     "tap_pickle": Format("tap", ".pkl", together=True),
     "flo": Format("flo", ""),
@@ -147,8 +145,7 @@ class Export:
                 raise ExportError(f"--{name.removesuffix('s')} does nothing for {self.format}: it is for {able}")
         if self.rate is not None and not 0.1 <= self.rate <= 1000:
             raise ExportError(f"--rate {self.rate:g}: give 0.1 to 1000 frames per second")
-        unknown = [name for name in self.overlay if name not in OVERLAYS]
-        if unknown:
+        if unknown := [name for name in self.overlay if name not in OVERLAYS]:
             raise ExportError(f"--overlay {unknown[0]}: use {', '.join(OVERLAYS)}")
 
     @property
@@ -201,10 +198,10 @@ class Export:
             yield from self._write_together(clips)
             return
         options = {"overlay": self.overlay, "rate": self.rate or FRAME_RATE, "trackers": self.trackers}
-        chosen = {name: options[name] for name in form.options}
         for clip, target in zip(clips, self._targets(clips), strict=True):
             with draft(target) as path, _told(clip):
-                form.writer.write(replace(clip), path, **chosen)  # a copy, with which goes what was read
+                # A copy, with which goes what was read.
+                form.writer.write(replace(clip), path, **{name: options[name] for name in form.options})
             yield target
         if form.table and clips and not self._is_file:
             with draft(self._output / form.table) as path, _told(clips[0]):
@@ -213,8 +210,7 @@ class Export:
     def _write_together(self, clips: Sequence[Clip]) -> Iterator[Path]:
         """Write one file of all clips, which has the name of the repository if it has no other, and give its path."""
         form = FORMATS[self.format]
-        name = f"{self.repository.config.name}{form.suffix}"
-        target = self._output if self._is_file else self._output / name
+        target = self._output if self._is_file else self._output / f"{self.repository.config.name}{form.suffix}"
         with draft(target) as path, _told(clips[0]):
             form.writer.write_together(clips, path)
         yield target

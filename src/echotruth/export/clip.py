@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
@@ -15,11 +15,8 @@ from echotruth.cases import Case
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.view import Plane
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from echotruth.repository.reader import Repository
+from echotruth.notebook.point_tracks import point_tracks
+from echotruth.repository.reader import Repository
 
 
 @dataclass(frozen=True)
@@ -90,18 +87,20 @@ class Clip:
         """Lateral coordinate of the pixel centres, (size,), m."""
         return pixel_centres(self.case.config.bmode, self.size)[1]
 
+    def tracks(self, step: int) -> xr.Dataset:
+        """Points of the tissue, at the centres of every so many pixels of the wall at end-diastole, and their paths.
+
+        The paths are exact, by the mesh: `pixel` (frame, point, plane), px, `elevation` (frame, point), m, and
+        `visible` (frame, point), as :func:`echotruth.point_tracks` returns them.
+        """
+        along = np.arange(step // 2, self.size, step)
+        pixels = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
+        found = point_tracks(self.heart, self.truth("image"), pixels)
+        return found.isel(point=found["elevation"].isel(frame=0).notnull().values)
+
     @property
     def note(self) -> str:
         """Scale, orientation and frame time as JSON, for the comment of a file whose format has no place for them."""
-        return json.dumps(
-            {
-                "case": self.case.id,
-                "view": self.view,
-                "spacing_m": self.spacing,
-                "frame_time_s": self.frame_time,
-                "first_pixel_lateral_m": float(self.lateral[0]),
-                "first_pixel_axial_m": float(self.axial[0]),
-                "synthetic": True,
-                "source": "echotruth",
-            }
-        )
+        about = {"case": self.case.id, "view": self.view, "spacing_m": self.spacing, "frame_time_s": self.frame_time}
+        first = {"first_pixel_lateral_m": float(self.lateral[0]), "first_pixel_axial_m": float(self.axial[0])}
+        return json.dumps(about | first | {"synthetic": True, "source": "echotruth"})

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from echotruth.arrays import Floats
 from echotruth.export.clip import Clip
 from echotruth.fem.volume import cell_volumes
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 COMPONENTS = ("RR", "CC", "LL")
 """Of the heart's strain: radial, circumferential, longitudinal."""
@@ -70,19 +67,16 @@ def write_summary(clips: Sequence[Clip], path: Path, trackers: Sequence[str]) ->
     path : Path
     trackers : sequence of str
     """
-    cases, views, sizes = (
-        list(dict.fromkeys(found))
-        for found in zip(*((clip.case.id, clip.view, clip.size) for clip in clips), strict=True)
-    )
+    found = zip(*((clip.case.id, clip.view, clip.size) for clip in clips), strict=True)
+    cases, views, sizes = (list(dict.fromkeys(names)) for names in found)
     table = clips[0].repository.summary(cases, views, sizes, trackers)
     table.to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
 
 
 def _rows(true: Floats, unit: str, **about: str) -> pd.DataFrame:
     """Rows of one curve of the heart."""
-    return pd.DataFrame({"frame": np.arange(len(true)), "true": true, "unit": unit, "tracker": ""}).assign(
-        **{"measure": "", "place": "", "component": "", "tracked": np.nan} | about
-    )
+    about = dict.fromkeys(("measure", "place", "component", "tracker"), "") | about
+    return pd.DataFrame({"frame": np.arange(len(true)), "true": true, "tracked": np.nan, "unit": unit, **about})
 
 
 def _heart(clip: Clip) -> Iterator[pd.DataFrame]:
@@ -109,9 +103,7 @@ def _tracked(curves: xr.Dataset) -> Iterator[pd.DataFrame]:
     """Rows of the strain and the rotation in the view; strain in %, angles in degrees."""
     places = {"region": lambda number: f"layer_{number}" if number else "wall", "aha": "segment_{:02d}".format}
     for quantity in ("region_strain", "segment_strain", "line_strain", "rotation"):
-        pair = curves[[f"tracked_{quantity}", f"true_{quantity}"]].rename(
-            {f"tracked_{quantity}": "tracked", f"true_{quantity}": "true"}
-        )
+        pair = xr.Dataset({kind: curves[f"{kind}_{quantity}"] for kind in ("tracked", "true")})
         table = pair.drop_vars("time").to_dataframe().reset_index()
         for dim, name in places.items():
             if dim in table:

@@ -27,9 +27,6 @@ TWO_DIMENSIONAL, TISSUE, CENTIMETRES = 1, 1, 3
 CM = 1e2
 """Centimetres in a metre."""
 
-MS = 1e3
-"""Milliseconds in a second."""
-
 NO_DATE, NO_TIME = "19000101", "000000"
 """A simulation has no date, but folders of DICOM files (DICOMDIR) need one."""
 
@@ -110,7 +107,7 @@ def _pixels(image: Any, clip: Clip) -> None:
     image.HighBit, image.PixelRepresentation = 7, 0
     image.Rows, image.Columns, image.NumberOfFrames = rows, columns, frames
     image.FrameIncrementPointer = 0x00181063
-    image.FrameTime = f"{MS * clip.frame_time:.10g}"  # at most 16 characters, as the format has it
+    image.FrameTime = f"{1e3 * clip.frame_time:.10g}"  # ms, in at most 16 characters, as the format has it
     image.HeartRate = round(60 / (frames * clip.frame_time))
     image.add_new(0x7FE00010, "OB", clip.image.tobytes() + b"\0" * (clip.image.size % 2))
 

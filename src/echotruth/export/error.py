@@ -5,9 +5,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-CLINICAL = ("nibabel", "pydicom")
-"""Packages of the extra `clinical`; the extra `export` has these and h5py."""
-
 
 class ExportError(ValueError):
     """Raised if something cannot be exported; the message says why, and what to do."""
@@ -18,5 +15,5 @@ def optional(package: str) -> Any:
     try:
         return import_module(package)
     except ImportError:
-        extra = "clinical" if package in CLINICAL else "export"
+        extra = "export" if package == "h5py" else "clinical"
         raise ExportError(f"needs the package {package}: pip install 'echotruth[{extra}]'") from None

@@ -18,9 +18,6 @@ UNKNOWN = 1e10
 MAGIC = b"PIEH"
 """The number 202021.25 in single precision, then width and height follow."""
 
-NAMES = {"next": "forward", "previous": "backward"}
-"""Frame that the flow leads to -> beginning of the names of its files."""
-
 
 def write(clip: Clip, path: Path) -> None:
     """Write forward_000.flo (of frame 0, to frame 1) and so on, and backward_001.flo (of frame 1, to frame 0).
@@ -34,8 +31,8 @@ def write(clip: Clip, path: Path) -> None:
     path.mkdir()
     flow = clip.truth("flow")["flow"].sel(vector=["lateral", "axial"])
     flow = flow.transpose("to", "frame", "axial", "lateral", "vector")
-    for to, name in NAMES.items():
-        frames = range(len(clip.time) - 1) if to == "next" else range(1, len(clip.time))
+    last = len(clip.time) - 1
+    for to, name, frames in (("next", "forward", range(last)), ("previous", "backward", range(1, last + 1))):
         for frame in frames:
             pixels = flow.sel(to=to).values[frame] / clip.spacing
             known = np.where(np.isnan(pixels), UNKNOWN, pixels).astype("<f4")

@@ -39,13 +39,7 @@ def write(clip: Clip, path: Path, overlay: Sequence[str], rate: float) -> None:
     first, *others = _indexed(pictures(clip, overlay))
     duration = 10 * round(100 / rate)
     first.save(
-        path,
-        save_all=True,
-        append_images=others,
-        duration=duration,
-        loop=0,
-        optimize=False,
-        comment=clip.note.encode(),
+        path, save_all=True, append_images=others, duration=duration, loop=0, optimize=False, comment=clip.note.encode()
     )
 
 

@@ -7,6 +7,7 @@ from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 
+import imageio_ffmpeg
 import numpy as np
 
 from echotruth.export.clip import Clip
@@ -36,8 +37,6 @@ def write(clip: Clip, path: Path, overlay: Sequence[str], rate: float) -> None:
     ExportError
         If the disk is full.
     """
-    import imageio_ffmpeg
-
     frames = pictures(clip, overlay)
     odd = clip.size % 2
     frames = np.pad(frames, [(0, 0), (0, odd), (0, odd), *[(0, 0)] * (frames.ndim - 3)])
@@ -59,16 +58,8 @@ def write(clip: Clip, path: Path, overlay: Sequence[str], rate: float) -> None:
         for frame in frames:
             video.send(np.ascontiguousarray(frame))
     video.close()
-    # ffmpeg ends without a word if the disk is full.
-    if _decoded(path) != len(frames):
+    decoded = 0
+    with suppress(RuntimeError, OSError):  # of a file that is no video
+        decoded, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+    if decoded != len(frames):  # ffmpeg ends without a word if the disk is full
         raise ExportError(f"{path.parent}: the video could not be written: the folder must have space")
-
-
-def _decoded(path: Path) -> int:
-    """Number of frames in a video, 0 if it is none."""
-    import imageio_ffmpeg
-
-    try:
-        return imageio_ffmpeg.count_frames_and_secs(str(path))[0]
-    except (RuntimeError, OSError):
-        return 0

@@ -11,7 +11,6 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from echotruth.export.clip import Clip
-from echotruth.export.tracks import tracks
 from echotruth.report.clip import MOTION
 
 WALL = "#4cc9f0"
@@ -44,9 +43,7 @@ def pictures(clip: Clip, overlay: Sequence[str]) -> Pictures:
     ndarray of shape (frame, axial, lateral), or (frame, axial, lateral, 3) with an overlay, uint8
         Grey levels, unchanged, or RGB.
     """
-    if not overlay:
-        return clip.image
-    found = np.repeat(clip.image[..., None], 3, axis=-1)
+    found = np.repeat(clip.image[..., None], 3, axis=-1) if overlay else clip.image
     for name, draw in DRAWINGS.items():
         if name in overlay:
             draw(clip, found)
@@ -72,25 +69,24 @@ def _wall(clip: Clip, frames: Pictures) -> None:
 def _displacement(clip: Clip, frames: Pictures) -> None:
     """Draw an arrow for each point of a grid that is in the wall at end-diastole."""
     step = max(1, clip.size // ARROWS_ALONG_SIDE)
-    position = tracks(clip, step)["pixel"].values
+    position = clip.tracks(step)["pixel"].values
     for frame, ends in zip(frames, position, strict=True):
         for start, end in zip(_fixed(position[0]), _fixed(ends), strict=True):
-            line = (tuple(start.tolist()), tuple(end.tolist()))
-            cv2.line(frame, *line, _rgb(MOTION), _thickness(clip), cv2.LINE_AA, _SHIFT)
-            cv2.circle(frame, line[1], _thickness(clip) << _SHIFT, _rgb(MOTION), -1, cv2.LINE_AA, _SHIFT)
+            cv2.line(frame, start, end, _rgb(MOTION), _thickness(clip), cv2.LINE_AA, _SHIFT)
+            cv2.circle(frame, end, _thickness(clip) << _SHIFT, _rgb(MOTION), -1, cv2.LINE_AA, _SHIFT)
 
 
 DRAWINGS = {"segments": _segments, "wall": _wall, "displacement": _displacement}
 """Name of an overlay to the function that draws it, those below first."""
 
 
-def _fixed(position: NDArray[np.floating]) -> NDArray[np.int32]:
-    return np.round(position * (1 << _SHIFT)).astype(np.int32)
+def _fixed(position: NDArray[np.floating]) -> list[list[int]]:
+    """Positions (point, 2), px, as OpenCV takes fractions of a pixel."""
+    return np.round(position * (1 << _SHIFT)).astype(int).tolist()
 
 
-def _rgb(colour: str) -> tuple[float, float, float]:
-    red, green, blue = (255 * part for part in to_rgb(colour))
-    return red, green, blue
+def _rgb(colour: str) -> tuple[float, ...]:
+    return tuple(255 * part for part in to_rgb(colour))
 
 
 def _thickness(clip: Clip) -> int:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from echotruth.export.clip import Clip
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def scaled_channels(rf: xr.Dataset) -> Iterator[NDArray[np.float32]]:
@@ -31,8 +28,6 @@ def sample_positions(rf: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 def open_rf(clip: Clip) -> xr.Dataset:
     """Open the group `rf` of one case and view, without reading its arrays; the size of the elements is the case's."""
-    import xarray as xr
-
     rf = xr.open_zarr(clip.repository.store, group="rf", consolidated=False, chunks=None)
     probe = clip.case.config.probe.si()
     rf = rf.assign_attrs(element_width=probe.width, element_height=probe.height)

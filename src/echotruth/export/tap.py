@@ -8,7 +8,7 @@ hold `video` (frame, height, width, 3; uint8), `points` (point, frame, 2; x, y; 
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from echotruth.export.clip import Clip
-from echotruth.export.tracks import tracks
 
 POINTS_ALONG_SIDE = 64
 """Points along the side of an image that is all wall."""
@@ -55,7 +54,7 @@ class _Videos:
     def __init__(self, clips: Sequence[Clip]) -> None:
         self.clips = clips
 
-    def __reduce__(self) -> tuple[type, tuple[()], None, None, Iterator[tuple[str, dict[str, Any]]]]:
+    def __reduce__(self) -> tuple[Any, ...]:
         # A copy, with which goes what was read of the clip.
         return dict, (), None, None, ((clip.name, arrays(replace(clip))) for clip in self.clips)
 
@@ -77,7 +76,7 @@ def arrays(clip: Clip) -> dict[str, Any]:
     dict
         video, points, occluded, elevation_m, spacing_m, frame_time_s; see above.
     """
-    found = tracks(clip, max(1, clip.size // POINTS_ALONG_SIDE))
+    found = clip.tracks(max(1, clip.size // POINTS_ALONG_SIDE))
     return {
         "video": np.repeat(clip.image[..., None], 3, axis=-1),
         "points": ((found["pixel"].values + 0.5) / clip.size).transpose(1, 0, 2).astype(np.float32),

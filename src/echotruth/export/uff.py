@@ -10,17 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from echotruth.export.clip import Clip
 from echotruth.export.error import optional
 from echotruth.export.rf import open_rf, sample_positions, scaled_channels
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 VERSION = "v1.2.0"
 """Version of the format, without which USTB reads no file."""
@@ -42,7 +40,7 @@ def write(clip: Clip, path: Path) -> None:
 
 
 def _channel_data(group: Any, rf: xr.Dataset) -> None:
-    _settings(group, rf, rf.attrs["sampling_frequency"], modulation_frequency=0.0)
+    _settings(group, rf, rf.attrs["sampling_frequency"], 0.0)
     _array(group, "sound_speed", rf.attrs["sound_speed"])
     _array(group, "initial_time", float(rf["sample"][0]))
     sequence = _object(group, "sequence", "uff.wave", len(rf.transmitter))

@@ -6,17 +6,15 @@ A track holds the data (frames first) and the scan (the transmits), all in 32 bi
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from echotruth.export.clip import Clip
 from echotruth.export.error import optional
 from echotruth.export.rf import open_rf, sample_positions, scaled_channels
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 VERSION = "0.1.8"
 """Version of zea whose layout is written."""
@@ -29,8 +27,7 @@ def write(clip: Clip, path: Path) -> None:
     """Write channels as `raw_data` and lines as `beamformed_data` of a view, whichever is stored."""
     with optional("h5py").File(path, "w") as file:
         rf = open_rf(clip)
-        about = {"zea_version": VERSION, "us_machine": "echotruth", "description": "Simulated echocardiogram"}
-        file.attrs.update(about)
+        file.attrs.update(zea_version=VERSION, us_machine="echotruth", description="Simulated echocardiogram")
         _probe(file.create_group("probe"), rf)
         track = file.create_group("tracks/track_0")
         data = track.create_group("data")
@@ -42,16 +39,15 @@ def write(clip: Clip, path: Path) -> None:
 
 
 def _probe(group: Any, rf: xr.Dataset) -> None:
-    element = rf.element.values
     group["type"] = "phased"
-    values = {
-        "probe_center_frequency": rf.attrs["centre_frequency"],
-        "probe_bandwidth_percent": 100 * rf.attrs["bandwidth"],
-        "probe_geometry": np.column_stack([element, np.zeros((len(element), 2))]),
-        "element_width": rf.attrs["element_width"],
-        "element_height": rf.attrs["element_height"],
-    }
-    _put(group, values)
+    _put(
+        group,
+        probe_center_frequency=rf.attrs["centre_frequency"],
+        probe_bandwidth_percent=100 * rf.attrs["bandwidth"],
+        probe_geometry=np.pad(rf.element.values[:, None], ((0, 0), (0, 2))),
+        element_width=rf.attrs["element_width"],
+        element_height=rf.attrs["element_height"],
+    )
 
 
 def _raw(group: Any, rf: xr.Dataset) -> None:
@@ -68,20 +64,20 @@ def _scan(group: Any, rf: xr.Dataset) -> None:
     ones = np.ones(len(element))
     # Without waveforms, zea takes the pulse to peak 1/f0 after it is sent; here it peaks when it is sent.
     initial_time = float(rf["sample"][0]) + 1 / rf.attrs["centre_frequency"]
-    values = {
-        "sampling_frequency": rf.attrs["sampling_frequency"],
-        "center_frequency": rf.attrs["centre_frequency"],
-        "demodulation_frequency": rf.attrs["centre_frequency"],
-        "sound_speed": rf.attrs["sound_speed"],
-        "initial_times": initial_time * ones,
-        "t0_delays": np.zeros((len(element), len(element))),
-        "tx_apodizations": np.eye(len(element)),
-        "focus_distances": -SOURCE_DISTANCE * ones,
-        "transmit_origins": np.column_stack([element, np.zeros((len(element), 2))]),
-        "polar_angles": 0 * ones,
-        "azimuth_angles": 0 * ones,
-    }
-    _put(group, values)
+    _put(
+        group,
+        sampling_frequency=rf.attrs["sampling_frequency"],
+        center_frequency=rf.attrs["centre_frequency"],
+        demodulation_frequency=rf.attrs["centre_frequency"],
+        sound_speed=rf.attrs["sound_speed"],
+        initial_times=initial_time * ones,
+        t0_delays=np.diag(0 * ones),
+        tx_apodizations=np.diag(ones),
+        focus_distances=-SOURCE_DISTANCE * ones,
+        transmit_origins=np.pad(element[:, None], ((0, 0), (0, 2))),
+        polar_angles=0 * ones,
+        azimuth_angles=0 * ones,
+    )
 
 
 def _beamformed(group: Any, rf: xr.Dataset) -> None:
@@ -89,10 +85,10 @@ def _beamformed(group: Any, rf: xr.Dataset) -> None:
     values = group.create_dataset("values", (rf.sizes["frame"], *axial.shape, 2), np.float32)
     for frame, lines in enumerate(rf.lines):
         values[frame] = np.stack([lines.values.real.T, lines.values.imag.T], axis=-1)
-    _put(group, {"coordinates": np.stack([lateral, np.zeros(axial.shape), axial], axis=-1)})
+    _put(group, coordinates=np.stack([lateral, np.zeros(axial.shape), axial], axis=-1))
     group["labels"] = ["I", "Q"]
 
 
-def _put(group: Any, values: dict[str, ArrayLike]) -> None:
+def _put(group: Any, **values: ArrayLike) -> None:
     for name, value in values.items():
         group[name] = np.asarray(value, np.float32)

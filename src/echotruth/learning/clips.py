@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from echotruth.learning.items import Item, Items, Place
+from echotruth.repository.choice import Names
 
 TRUTH = ("displacement", "strain", "wall_depth", "labels", "flow")
 """Arrays of the truth, in the group truth/SIZE of docs/schema.md."""
+
+VECTORS = {"displacement", "strain", "flow"}
+"""Those with vectors or components."""
 
 
 class Clips(Items):
@@ -37,14 +40,9 @@ class Clips(Items):
     """
 
     def __init__(
-        self,
-        repository: str | Path,
-        cases: Any = None,
-        views: Iterable[str] | None = None,
-        size: int | None = None,
-        truth: Iterable[str] = (),
+        self, repository: str | Path, cases: Any = None, views: Names = None, size: int | None = None, truth: Names = ()
     ) -> None:
-        self.names = (truth,) if isinstance(truth, str) else tuple(truth)
+        self.names = (truth,) if isinstance(truth, str) else tuple(truth or ())
         for name in self.names:
             if name not in TRUTH:
                 raise ValueError(f"truth = {name!r}: use any of {', '.join(TRUTH)}.")
@@ -55,11 +53,7 @@ class Clips(Items):
         return (*super().arrays, *(f"truth/{self.size}/{name}" for name in self.names))
 
     def item(self, place: Place, within: int) -> Item:
-        known = {"image": self.image(place), "time": self.time(place)}
-        return known | {name: self._channels_first(name, self.truth(place, name)) for name in self.names}
-
-    @staticmethod
-    def _channels_first(name: str, values: np.ndarray) -> np.ndarray:
-        if name in ("displacement", "strain", "flow"):
-            return np.ascontiguousarray(np.moveaxis(values, -1, -3))
-        return values
+        found = {name: self.truth(place, name) for name in self.names}
+        for name in VECTORS & set(found):
+            found[name] = np.ascontiguousarray(np.moveaxis(found[name], -1, -3))
+        return {"image": self.image(place), "time": self.time(place)} | found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from echotruth.learning.items import Item, Items, Place
 from echotruth.learning.measurements import scar_size
 from echotruth.learning.table import cases as read_cases
+from echotruth.repository.choice import Names
 
 
 class Diagnosis(Items):
@@ -45,9 +45,9 @@ class Diagnosis(Items):
         self,
         repository: str | Path,
         cases: Any = None,
-        views: Iterable[str] | None = None,
+        views: Names = None,
         size: int | None = None,
-        classes: Iterable[str] | None = None,
+        classes: Names = None,
     ) -> None:
         super().__init__(repository, cases, views, size)
         known = read_cases(repository, measurements=False)["diagnosis"]
@@ -57,23 +57,17 @@ class Diagnosis(Items):
         self._diagnosis = {place.case: str(known[place.case]) for place in self.places}
         for case, name in self._diagnosis.items():
             if name not in self.classes:
-                raise ValueError(
-                    f"classes = {self.classes}: the diagnosis of {case} is {name}: add it, or leave it out."
-                )
+                raise ValueError(f"classes = {self.classes}: the diagnosis of {case} is {name}: add it, or omit it.")
 
     def item(self, place: Place, within: int) -> Item:
         name = self._diagnosis[place.case]
+        if place.row not in self._scar_sizes:
+            self._scar_sizes[place.row] = np.float32(scar_size(self.repository, place.row))
         return {
             "image": self.image(place),
             "time": self.time(place),
             "es_frame": int(self.repository.read("mechanics/es_frame", place.row)),
             "diagnosis": name,
             "label": self.classes.index(name),
-            "scar_size": self._scar_size(place.row),
+            "scar_size": self._scar_sizes[place.row],
         }
-
-    def _scar_size(self, row: int) -> np.float32:
-        """That of a case, computed once."""
-        if row not in self._scar_sizes:
-            self._scar_sizes[row] = np.float32(scar_size(self.repository, row))
-        return self._scar_sizes[row]

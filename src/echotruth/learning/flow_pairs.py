@@ -8,7 +8,6 @@ import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.imaging.flow import STEPS, out_of_slice, slice_thickness
-from echotruth.learning.beams import Beams
 from echotruth.learning.items import Item, Items, Place
 
 NEXT, PREVIOUS = list(STEPS).index("next"), list(STEPS).index("previous")
@@ -68,17 +67,13 @@ class FlowPairs(Items):
 
     def _thickness(self, place: Place) -> Floats:
         """Thickness of the slice at every pixel, (axial, lateral), m."""
-        key = self._beams.key(place.case)
+        key = self.beams.key(place.case)
         if key not in self._thicknesses:
             axial, lateral = (self.repository.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
-            range_ = self._beams.range_(place.case, lateral, axial[:, None])
-            self._thicknesses[key] = slice_thickness(self._beams.config(place.case), range_)
+            range_ = self.beams.range_(place.case, lateral, axial[:, None])
+            self._thicknesses[key] = slice_thickness(self.beams.config(place.case), range_)
         return self._thicknesses[key]
 
     @cached_property
     def _thicknesses(self) -> dict[str, Floats]:
         return {}
-
-    @cached_property
-    def _beams(self) -> Beams:
-        return Beams(self.repository)

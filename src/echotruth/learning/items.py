@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
@@ -11,7 +11,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.repository.choice import image_size, require_known
+from echotruth.learning.beams import Beams
+from echotruth.repository.choice import Names, image_size, require_known
 from echotruth.repository.reader import Repository
 
 Item = dict[str, Any]
@@ -68,14 +69,9 @@ class Items(Sequence[Item]):
     ['base', 'mid', 'apex', 'long_axis']
     """
 
-    def __init__(
-        self,
-        repository: str | Path,
-        cases: Any = None,
-        views: Iterable[str] | None = None,
-        size: int | None = None,
-    ) -> None:
+    def __init__(self, repository: str | Path, cases: Any = None, views: Names = None, size: int | None = None) -> None:
         self.repository = Repository(repository)
+        self.beams = Beams(self.repository)
         config = self.repository.config
         self.size = image_size(config, size)
         self.frames = config.loop.frames
@@ -151,8 +147,7 @@ def _listed(names: Any) -> list[str]:
 
 
 def _complete(repository: Repository) -> list[str]:
-    cases = repository.cases
-    found = [str(case) for case in cases.index[cases["status"] == "complete"]]
+    found = [str(case) for case in repository.cases.query("status == 'complete'").index]
     if not found:
         raise ValueError(f"{repository.folder}: no case is complete: finish the run, or name the cases.")
     return found

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -15,8 +13,8 @@ from echotruth.arrays import Floats
 from echotruth.imaging.labels import LABELS
 from echotruth.imaging.tracks import follow, visible
 from echotruth.imaging.view import Plane
-from echotruth.learning.beams import Beams
 from echotruth.learning.items import Item, Items, Place
+from echotruth.repository.choice import Names
 
 
 class PointTracks(Items):
@@ -56,7 +54,7 @@ class PointTracks(Items):
         self,
         repository: str | Path,
         cases: Any = None,
-        views: Iterable[str] | None = None,
+        views: Names = None,
         size: int | None = None,
         points: int = 64,
         start: int | None = 0,
@@ -68,11 +66,10 @@ class PointTracks(Items):
         if start is not None and not 0 <= start < self.frames:
             raise ValueError(f"start = {start}: give a frame from 0 to {self.frames - 1}.")
         self.points, self.start, self.seed = points, start, seed
-        self._beams = Beams(self.repository)
-        self._heart: tuple[int, int, dict[str, NDArray[Any]]] = (0, -1, {})
+        self._heart: tuple[int, dict[str, NDArray[Any]]] = (-1, {})
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_heart": (0, -1, {})}
+        return self.__dict__ | {"_heart": (-1, {})}
 
     @property
     def arrays(self) -> tuple[str, ...]:
@@ -87,16 +84,14 @@ class PointTracks(Items):
         axial, lateral = (self.repository.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
         followed = self._followed(place, start, np.column_stack([lateral[pixels[:, 1]], axial[pixels[:, 0]]]))
         position = (followed[..., :2] - [lateral[0], axial[0]]) / self.spacing
-        thickness = self._beams.thickness(
-            place.case, self._beams.range_(place.case, followed[..., 0], followed[..., 1])
-        )
+        range_ = self.beams.range_(place.case, followed[..., 0], followed[..., 1])
         return {
             "image": self.image(place),
             "time": self.time(place),
             "start": start,
             "position": position.astype(np.float32),
             "position_m": followed.astype(np.float32),
-            "visible": visible(self._beams.config(place.case), followed, thickness),
+            "visible": visible(self.beams.config(place.case), followed, self.beams.thickness(place.case, range_)),
         }
 
     def _followed(self, place: Place, start: int, points: Floats) -> Floats:
@@ -107,12 +102,10 @@ class PointTracks(Items):
 
     def _motion(self, row: int) -> dict[str, NDArray[Any]]:
         """Mesh and motion of a heart; that of the last is kept, for its other views."""
-        process = os.getpid()
-        if self._heart[:2] != (process, row):
+        if self._heart[0] != row:
             paths = ("geometry/node_position", "geometry/cell_node", "mechanics/displacement")
-            read = {path.rpartition("/")[2]: self.repository.read(path, row) for path in paths}
-            self._heart = (process, row, read)
-        return self._heart[2]
+            self._heart = row, {path.rpartition("/")[2]: self.repository.read(path, row) for path in paths}
+        return self._heart[1]
 
     def _plane(self, place: Place) -> Plane:
         return Plane(*(self.repository.read(f"phantom/{name}", place.row, place.index) for name in ("origin", "axes")))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from echotruth.imaging.labels import LABELS
 from echotruth.learning.items import Item, Items, Place
-from echotruth.repository.choice import require_known
+from echotruth.repository.choice import Names, require_known
 
 TARGETS = ("wall", "layer", "segment", "region")
 
@@ -40,7 +39,7 @@ class Segmentation(Items):
         self,
         repository: str | Path,
         cases: Any = None,
-        views: Iterable[str] | None = None,
+        views: Names = None,
         size: int | None = None,
         target: str = "wall",
     ) -> None:

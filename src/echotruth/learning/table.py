@@ -5,16 +5,14 @@ from __future__ import annotations
 import re
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from echotruth.learning.measurements import physiology, scar_size
 from echotruth.repository.reader import Repository
 from echotruth.repository.table import constants, is_label
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def cases(repository: str | Path, query: str | None = None, measurements: bool = True) -> pd.DataFrame:
@@ -64,8 +62,6 @@ def cases(repository: str | Path, query: str | None = None, measurements: bool =
 
 
 def _measurements(repository: Repository, found: pd.DataFrame) -> pd.DataFrame:
-    import pandas as pd
-
     known = pd.DataFrame(physiology(repository), index=found.index)
     sizes = [
         scar_size(repository, row) if repository.is_written("pathology/region", case) else np.nan
@@ -76,8 +72,6 @@ def _measurements(repository: Repository, found: pd.DataFrame) -> pd.DataFrame:
 
 def _selected(found: pd.DataFrame, constants: dict[str, Any], query: str) -> pd.Index:
     """Cases for which a condition holds."""
-    import pandas as pd
-
     same = pd.DataFrame({key: value for key, value in constants.items() if key not in found}, index=found.index)
     try:
         return found.join(same).query(query).index

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import xarray as xr
+
 from echotruth.heart import Heart
 
 
@@ -26,11 +28,6 @@ def check_clip(clip: object, name: str = "clip") -> None:
     TypeError
         If it is something else, such as the path of a repository.
     """
-    import xarray as xr
-
     if not isinstance(clip, xr.Dataset):
-        made = {
-            "clip": "a Repository has one, echotruth.image makes one",
-            "tracked": "echotruth.track makes one from a clip",
-        }
-        raise TypeError(f"{name} = {clip!r:.80}: must be a Dataset: {made[name]}.")
+        clips, tracked = "a Repository has one, echotruth.image makes one", "echotruth.track makes one from a clip"
+        raise TypeError(f"{name} = {clip!r:.80}: must be a Dataset: {clips if name == 'clip' else tracked}.")

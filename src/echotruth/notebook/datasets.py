@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import xarray as xr
 
 from echotruth.cases import Case
 from echotruth.heart import Heart
 from echotruth.notebook.arguments import check_heart
 from echotruth.repository.datasets import as_stored, dataset
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def heart_dataset(heart: Heart, group: str) -> xr.Dataset:

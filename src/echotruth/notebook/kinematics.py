@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from echotruth.heart import Heart
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
 from echotruth.notebook.arguments import check_heart
 from echotruth.repository import schema
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def kinematics(heart: Heart) -> xr.Dataset:
@@ -46,8 +42,6 @@ def kinematics(heart: Heart) -> xr.Dataset:
     >>> float(abs(strain.isel(frame=0)).max()) < 1e-6  # strain is from end-diastole, frame 0
     True
     """
-    import xarray as xr
-
     check_heart(heart)
     if heart.config is None or not {"geometry", "fibres"} <= set(heart.arrays):
         raise ValueError("The heart has no fibres: make it by echotruth.beat, or read one of a Repository.")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from echotruth.heart import Heart
@@ -12,8 +11,7 @@ from echotruth.imaging.tracks import follow, visible
 from echotruth.notebook.arguments import check_clip, check_heart
 from echotruth.repository.datasets import case_of, plane_of
 
-if TYPE_CHECKING:
-    import xarray as xr
+SEEN = "whether the point is within the field of view, the scan and the slice"
 
 
 def point_tracks(
@@ -57,8 +55,6 @@ def point_tracks(
     >>> tracks["pixel"].dims, dict(tracks["pixel"].sizes)["point"]
     (('frame', 'point', 'plane'), 2)
     """
-    import xarray as xr
-
     check_heart(heart)
     check_clip(clip)
     case, plane = case_of(clip), plane_of(clip, heart)
@@ -74,11 +70,7 @@ def point_tracks(
             "position": (("frame", "point", "plane"), position, _about("m", "position in the image")),
             "pixel": (("frame", "point", "plane"), (position - first) / spacing, _about("px", "position in the image")),
             "elevation": (("frame", "point"), followed[..., 2], _about("m", "distance from the plane of the image")),
-            "visible": (
-                ("frame", "point"),
-                visible(case.config, followed, thickness),
-                _about("1", "whether the point is within the field of view, the scan and the slice"),
-            ),
+            "visible": (("frame", "point"), visible(case.config, followed, thickness), _about("1", SEEN)),
         },
         coords={
             "frame": np.arange(len(followed)),

@@ -8,10 +8,13 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 from numpy.typing import ArrayLike
+from threadpoolctl import threadpool_limits
 
 from echotruth.cases import Case
 from echotruth.config import Config, Probe, View
@@ -33,10 +36,6 @@ from echotruth.repository.datasets import as_stored, case_of, clip_dataset, data
 from echotruth.seeds import generator
 from echotruth.tracking.point_grid import grid_points
 from echotruth.tracking.tracker import track as track_points
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 
 def beat(config: Source = None, progress: bool = True) -> Heart:
@@ -73,9 +72,8 @@ def beat(config: Source = None, progress: bool = True) -> Heart:
     """
     settings = config if isinstance(config, Config) else configure(config)
     if settings.cases:
-        raise ValueError(
-            f"cases sweeps {', '.join(settings.cases.keys)}: beat one, as echotruth.expand(config)[0].config"
-        )
+        keys = ", ".join(settings.cases.keys)
+        raise ValueError(f"cases sweeps {keys}: beat one, as echotruth.expand(config)[0].config")
     with _progress_line("beat", progress):
         arrays = simulate(settings)
     depth = arrays["fibres"]["wall_depth"]
@@ -258,8 +256,6 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
     >>> bool(scores["nrmse_percent"] < 100)  # it finds more than nothing
     True
     """
-    import pandas as pd
-
     check_clip(tracked, "tracked")
     check_heart(heart)
     if "displacement" not in tracked or set(tracked["displacement"].dims) != {"frame", "axial", "lateral", "plane"}:
@@ -313,8 +309,6 @@ def _progress_line(what: str, progress: bool) -> Iterator[None]:
 
     Its sums depend on the number of threads, and the bytes must not.
     """
-    from threadpoolctl import threadpool_limits
-
     logger, handler = logging.getLogger("echotruth"), logging.StreamHandler(sys.stderr)
     watched = progress and (sys.stderr.isatty() or "ipykernel" in sys.modules)
     handler.terminator = ""

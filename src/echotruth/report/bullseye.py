@@ -70,12 +70,8 @@ def _row(figure: SubFigure, segments: Segments, tracker: str) -> None:
     common, own = _scale(np.concatenate([segments.true, segments.tracked])), _scale(difference)
     shown = (segments.true, "True", common), (segments.tracked, f"Tracked ({tracker})", common)
     for panel, (values, name, scale) in zip(panels, (*shown, (difference, "Tracked minus true", own)), strict=True):
-        disc(
-            panel,
-            values,
-            scale,
-            decimals=int(scale is own and np.abs(difference).max(initial=0, where=np.isfinite(difference)) < 10),
-        )
+        small = np.abs(difference).max(initial=0, where=np.isfinite(difference)) < 10
+        disc(panel, values, scale, decimals=int(scale is own and small))
         panel.set_title(name, fontweight="normal", fontsize=9)
     bar: dict[str, Any] = {"shrink": 0.8, "aspect": 22, "pad": 0.02}
     figure.colorbar(ScalarMappable(common, COLOURMAP), ax=panels[:2], **bar).set_label(segments.label)
@@ -105,15 +101,9 @@ def disc(axes: Axes, values: np.ndarray, scale: TwoSlopeNorm, decimals: int = 0)
         if known:
             angle, radius = (start + stop) / 2, (inner + outer) / 2 if inner else 0
             is_dark = np.dot(colour[:3], (0.299, 0.587, 0.114)) < 0.55
-            axes.text(
-                radius * np.cos(angle),
-                radius * np.sin(angle),
-                f"{float(value):z.{decimals}f}".replace("-", "−"),
-                ha="center",
-                va="center",
-                fontsize=7,
-                color=style.ON_IMAGE if is_dark else ON_LIGHT,
-            )
+            x, y, text = radius * np.cos(angle), radius * np.sin(angle), f"{float(value):z.{decimals}f}"
+            colour = style.ON_IMAGE if is_dark else ON_LIGHT
+            axes.text(x, y, text.replace("-", "−"), ha="center", va="center", fontsize=7, color=colour)
     _names(axes)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import imageio_ffmpeg
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -110,7 +111,7 @@ def render(clip: ClipWithMotion, side: int) -> np.ndarray:
     frames = []
     for t, image in enumerate(clip.image):
         picture.set_data(image)
-        trails.set_segments(list(_steps(clip.path[: t + 1])))
+        trails.set_segments(list(np.stack([clip.path[:t], clip.path[1 : t + 1]], axis=2).reshape(-1, 2, 2)))
         trails.set_color(_fading(t, len(clip.position)))
         points.set_data(*clip.path[t].T)
         label.set_text(f"{clip.time[t] * 1e3:.0f} ms")
@@ -118,11 +119,6 @@ def render(clip: ClipWithMotion, side: int) -> np.ndarray:
         canvas.draw()
         frames.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())
     return np.stack(frames)
-
-
-def _steps(path: np.ndarray) -> np.ndarray:
-    """Steps of paths (frame, point, 2) from frame to frame: (step, 2, 2), those of one frame after those of another."""
-    return np.stack([path[:-1], path[1:]], axis=2).reshape(-1, 2, 2)
 
 
 def _fading(steps: int, points: int) -> list[tuple[float, float, float, float]]:
@@ -181,12 +177,12 @@ def round_length(side: float) -> float:
     return float(max(step * power for step in (1, 2, 5) if step * power <= side / 5))
 
 
-def gif(path: str | Path, frames: np.ndarray, rate: float = FRAME_RATE) -> Path:
+def gif(path: Path, frames: np.ndarray, rate: float = FRAME_RATE) -> Path:
     """Write a looping GIF with as many colours as its size allows.
 
     Parameters
     ----------
-    path : str or Path
+    path : Path
     frames : ndarray of shape (frame, height, width, 3), uint8
         RGB.
     rate : float
@@ -196,8 +192,6 @@ def gif(path: str | Path, frames: np.ndarray, rate: float = FRAME_RATE) -> Path:
     -------
     Path
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     for colours in (64, 40, 28, 20, 14):
         palette = Image.fromarray(frames.reshape(-1, *frames.shape[2:])[:: max(1, len(frames) // 8)]).quantize(colours)
         pictures = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
@@ -209,12 +203,12 @@ def gif(path: str | Path, frames: np.ndarray, rate: float = FRAME_RATE) -> Path:
     return path
 
 
-def mp4(path: str | Path, frames: np.ndarray, rate: float = FRAME_RATE, beats: int = 3) -> Path:
+def mp4(path: Path, frames: np.ndarray, rate: float = FRAME_RATE, beats: int = 3) -> Path:
     """Write an H.264 video that browsers play.
 
     Parameters
     ----------
-    path : str or Path
+    path : Path
     frames : ndarray of shape (frame, height, width, 3), uint8
         RGB, height and width even.
     rate : float
@@ -226,10 +220,6 @@ def mp4(path: str | Path, frames: np.ndarray, rate: float = FRAME_RATE, beats: i
     -------
     Path
     """
-    import imageio_ffmpeg
-
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     size = frames.shape[2], frames.shape[1]
     video = imageio_ffmpeg.write_frames(
         str(path), size, fps=rate, codec="libx264", pix_fmt_out="yuv420p", quality=6, macro_block_size=2

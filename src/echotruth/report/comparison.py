@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from numpy.typing import NDArray
 
 from echotruth.cases import Case
@@ -18,13 +19,10 @@ from echotruth.evaluation.curves import twist_of, twist_views
 from echotruth.report import style
 from echotruth.report.bullseye import Segments
 from echotruth.report.curves import Panel, segment_title
+from echotruth.repository.reader import Repository
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from echotruth.repository.reader import Repository
-
-PERCENT = 100.0
+FACTORS = {"%": 100.0, "deg": np.degrees(1)}
+"""Unit of curves -> factor from SI."""
 
 LINE = {"short_axis": "Circumferential strain, GCS", "long_axis": "Longitudinal strain, GLS"}
 """Plane -> the strain of the mid-wall contour in it."""
@@ -78,23 +76,18 @@ class Comparison:
         """Trackers that have curves of all views, the best first."""
         return list(next(iter(self.curves.values())))
 
-    def of_plane(self, plane: str) -> list[str]:
-        """Views that lie in a plane, short_axis or long_axis."""
-        return [name for name, view in self.views.items() if view.plane == plane]
-
     @property
     def rows(self) -> list[list[Panel | None]]:
         """Panels of the global strains and of the rotation, a column for each view; twist where there is room."""
         strains: list[list[Panel | None]] = [[], []]
         turns: list[Panel | None] = []
+        whole = {"measure": "engineering", "region": 0, "wall_component": "RR"}
         for view, settings in self.views.items():
-            name = style.title(view)
-            middle = {"contour": "middle"}
-            whole = {"measure": "engineering", "region": 0, "wall_component": "RR"}
-            strains[0].append(self._panel(view, f"{name}\n{LINE[settings.plane]}", "line_strain", PERCENT, "%", middle))
-            strains[1].append(self._panel(view, "Radial strain in the plane", "region_strain", PERCENT, "%", whole))
+            found, title = self.curves[view], f"{style.title(view)}\n{LINE[settings.plane]}"
+            strains[0].append(_panel(title, "%", found, "line_strain", {"contour": "middle"}))
+            strains[1].append(_panel("Radial strain in the plane", "%", found, "region_strain", whole))
             is_short = settings.plane == "short_axis"
-            turns.append(self._panel(view, "Rotation", "rotation", np.degrees(1), "deg", {}) if is_short else None)
+            turns.append(_panel("Rotation", "deg", found, "rotation", {}) if is_short else None)
         if twist := self.twist:
             place = turns.index(None) if None in turns else len(turns)
             for row in (*strains, turns) if place == len(turns) else ():
@@ -109,31 +102,19 @@ class Comparison:
         if views is None:
             return None
         base, apex = (self.curves[view] for view in views)
-        of_trackers = {name: twist_of(base[name], apex[name]) for name in self.trackers}
-        first = next(iter(of_trackers.values()))
-        tracked = {name: np.degrees(one["tracked_twist"].values) for name, one in of_trackers.items()}
-        time, end_systole = self._time(views[0])
-        return Panel("Twist, apex less base", "deg", time, end_systole, np.degrees(first["true_twist"].values), tracked)
+        found = {name: twist_of(base[name], apex[name]) for name in self.trackers}
+        return _panel("Twist, apex less base", "deg", found, "twist", {})
 
     def segments(self, view: str, tracker: str) -> list[list[Panel | None]]:
         """Panels of the strain along the wall of the segments of a view, three in a row.
 
         The strain is circumferential in a short axis and longitudinal in a long axis.
         """
-        time, end_systole = self._time(view)
-        data = self.curves[view][tracker].sel(measure="engineering", wall_component="TT")
-        true, tracked = (PERCENT * data[f"{name}_segment_strain"] for name in ("true", "tracked"))
+        data, chosen = self.curves[view][tracker], {"measure": "engineering", "wall_component": "TT"}
+        known = data["true_segment_strain"].sel(chosen).notnull().any("frame").values
         panels: list[Panel | None] = [
-            Panel(
-                segment_title(int(number)),
-                "%",
-                time,
-                end_systole,
-                true.sel(aha=number).values,
-                {tracker: tracked.sel(aha=number).values},
-            )
-            for number in data.aha.values
-            if bool(np.isfinite(true.sel(aha=number)).any())
+            _panel(segment_title(number), "%", {tracker: data}, "segment_strain", chosen | {"aha": number})
+            for number in data.aha.values[known].tolist()
         ]
         panels += [None] * (-len(panels) % 3)
         return [panels[k : k + 3] for k in range(0, len(panels), 3)]
@@ -142,8 +123,7 @@ class Comparison:
         """Strain of the segments at end-systole, true and of a tracker, for each component that a view shows."""
         found = []
         for plane, component, title in COMPONENTS:
-            views = self.of_plane(plane)
-            if views:
+            if views := [name for name, view in self.views.items() if view.plane == plane]:
                 true, tracked = (self._segments_at_es(views, tracker, name, component) for name in ("true", "tracked"))
                 found.append(Segments(title, true, tracked))
         return found
@@ -154,20 +134,14 @@ class Comparison:
         for view in views:
             data = self.curves[view][tracker]
             strain = data[f"{name}_segment_strain"].sel(measure="engineering", wall_component=component)
-            columns.append(PERCENT * strain.isel(frame=int(data.attrs["es_frame"])).values)
+            columns.append(FACTORS["%"] * strain.isel(frame=int(data.attrs["es_frame"])).values)
         return pd.DataFrame(np.array(columns, float)).mean().to_numpy()  # of those that are known
 
-    def _time(self, view: str) -> tuple[NDArray[np.float64], float]:
-        """Time since end-diastole and that of end-systole, ms."""
-        data = next(iter(self.curves[view].values()))
-        time = 1e3 * np.asarray(data["time"].values, float)
-        return time, float(time[int(data.attrs["es_frame"])])
 
-    def _panel(
-        self, view: str, title: str, name: str, factor: float, unit: str, selection: Mapping[str, object]
-    ) -> Panel:
-        curves = self.curves[view]
-        time, end_systole = self._time(view)
-        true = factor * next(iter(curves.values()))[f"true_{name}"].sel(selection).values
-        tracked = {tracker: factor * data[f"tracked_{name}"].sel(selection).values for tracker, data in curves.items()}
-        return Panel(title, unit, time, end_systole, true, tracked)
+def _panel(title: str, unit: str, found: Mapping[str, xr.Dataset], name: str, selection: Mapping[str, Any]) -> Panel:
+    """Panel of a curve, true and by the trackers of which data sets are given."""
+    first, factor = next(iter(found.values())), FACTORS[unit]
+    time = 1e3 * first["time"].values
+    true = factor * first[f"true_{name}"].sel(selection).values
+    tracked = {tracker: factor * data[f"tracked_{name}"].sel(selection).values for tracker, data in found.items()}
+    return Panel(title, unit, time, float(time[first.attrs["es_frame"]]), true, tracked)

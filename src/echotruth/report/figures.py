@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
@@ -39,9 +40,6 @@ from echotruth.repository import estimates
 from echotruth.repository.choice import main_view
 from echotruth.repository.reader import Repository
 from echotruth.repository.schema import LABELS
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NAMES = (
     *("loop", "strain", "physiology", "population", "curves", "segments", "bullseye", "error", "leaderboard"),
@@ -124,8 +122,7 @@ class Figures:
     def strain(self) -> Figure:
         """Strain over the cycle."""
         data = self.group("kinematics")
-        arrays = (data[name] for name in ("strain_mean", "strain_sd", "layer_strain"))
-        return strain.draw(self.time, self.shown.es, *arrays)
+        return strain.draw(self.time, self.shown.es, data["strain_mean"], data["strain_sd"], data["layer_strain"])
 
     def physiology(self) -> Figure:
         """Rotation, strain, axial motion, pressure and volume over the cycle."""
@@ -167,15 +164,9 @@ class Figures:
         """Every view at end-diastole and end-systole."""
         pictures = {}
         for view in self.config.views:
-            place = self.repository.place(self.case, view)
-            image, labels = (f"bmode/{self.sizes[0]}/image", f"truth/{self.sizes[0]}/labels")
-            layer = LABELS["label"].index("layer")
-            pictures[view] = [
-                views.Picture(
-                    self.repository.read(image, *place, frame), self.repository.read(labels, *place, frame, layer)
-                )
-                for frame in (0, self.shown.es)
-            ]
+            found = self.repository.clip(self.case, view, self.sizes[0], ("image", "layer"))
+            at_ed_and_es = (found.isel(frame=frame) for frame in (0, self.shown.es))
+            pictures[view] = [views.Picture(one["image"].values, one["layer"].values) for one in at_ed_and_es]
         return views.draw(pictures, self.config.bmode.si().field_of_view)
 
     @cached_property
@@ -218,14 +209,10 @@ class Figures:
 
         It shows the first tracker of the configuration and the best one.
         """
-        first = next(iter(self.config.tracking.trackers))
-        own = [name for name in self.order if name in self.config.tracking.trackers]
-        trackers = dict.fromkeys((first, own[0]))
+        own = list(self.config.tracking.trackers)
+        trackers = dict.fromkeys((own[0], next(name for name in self.order if name in own)))
         errors = {
-            view: {
-                tracker: {size: self._error_of_layers(view, tracker, size) for size in self.sizes}
-                for tracker in trackers
-            }
+            view: {name: {size: self._error_of_layers(view, name, size) for size in self.sizes} for name in trackers}
             for view in self.config.views
         }
         long_axis = [name for name, view in self.config.views.items() if view.plane == "long_axis"]

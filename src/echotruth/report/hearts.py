@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from echotruth.report.cine import jpeg_address
+from echotruth.report.clips import jpeg_address
 from echotruth.repository.reader import Repository
 
 MEASURES = {

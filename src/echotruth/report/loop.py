@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -50,14 +52,14 @@ def draw(time: np.ndarray, es: int, tension: np.ndarray, solved: np.ndarray, tar
 
 
 def _loop(axes: Axes, es: int, solved: np.ndarray, target: np.ndarray) -> None:
-    for (pressure, volume), colour, width, label in (
-        (target, style.TARGET, 4, "target"),
-        (solved, style.SOLVED, 1.6, "solved"),
-    ):
-        closed = np.r_[np.arange(len(volume)), 0]
-        axes.plot(volume[closed] / UL, pressure[closed] / style.MMHG, color=colour, linewidth=width, label=label)
+    for curve, colour, width, label in ((target, style.TARGET, 4, "target"), (solved, style.SOLVED, 1.6, "solved")):
+        pressure, volume = np.column_stack([curve, curve[:, :1]])
+        axes.plot(volume / UL, pressure / style.MMHG, color=colour, linewidth=width, label=label)
     for frame, name, offset in ((0, "ED", (15, 0)), (es, "ES", (-13, 8))):
-        style.mark(axes, (solved[1, frame] / UL, solved[0, frame] / style.MMHG), name, offset)
+        point = solved[1, frame] / UL, solved[0, frame] / style.MMHG
+        axes.plot(*point, "o", color=style.RADIAL, markersize=5, zorder=5)
+        look: dict[str, Any] = {"color": style.RADIAL, "fontweight": "bold", "ha": "center", "va": "center"}
+        axes.annotate(name, point, offset, textcoords="offset points", **look)
     axes.set(xlabel="Volume (µL)", ylabel="Pressure (mmHg)", title="Pressure-volume loop")
     axes.set_ylim(bottom=0)
     axes.margins(0.1)

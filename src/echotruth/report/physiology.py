@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -170,9 +171,8 @@ def _phases(axes: Axes, cycle: Cycle) -> None:
     opening, closing, mitral = 1e3 * np.cumsum(cycle.intervals)
     for name, start, stop in (("IVC", 0, opening), ("IVR", closing, mitral)):
         axes.axvspan(start, stop, color=style.SHADE, zorder=0, linewidth=0)
-        axes.text(
-            (start + stop) / 2, 0.015, name, color=style.MUTED, fontsize=6.5, ha="center", va="bottom", transform=top
-        )
+        look: dict[str, Any] = {"color": style.MUTED, "fontsize": 6.5, "ha": "center", "va": "bottom"}
+        axes.text((start + stop) / 2, 0.015, name, transform=top, **look)
 
 
 def _finish(axes: Axes, smallest: float, below: float = 0.02) -> None:
@@ -180,13 +180,5 @@ def _finish(axes: Axes, smallest: float, below: float = 0.02) -> None:
     low, high = axes.get_ylim()
     low, high = min(low, -smallest), max(high, smallest)
     axes.set_ylim(low, high + HEADROOM * (high - low))
-    axes.legend(
-        loc="upper center",
-        bbox_to_anchor=(0.5, -below),
-        ncols=3,
-        fontsize=8,
-        columnspacing=0.9,
-        handlelength=1,
-        handletextpad=0.5,
-        borderaxespad=0.2,
-    )
+    spaces: dict[str, Any] = {"columnspacing": 0.9, "handlelength": 1, "handletextpad": 0.5, "borderaxespad": 0.2}
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -below), ncols=3, fontsize=8, **spaces)

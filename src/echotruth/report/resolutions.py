@@ -26,10 +26,8 @@ def draw(images: Sequence[np.ndarray], field_of_view: float) -> Figure:
     side = 1e3 * field_of_view
     left, right, bottom, top = _bright(images[0], side)
     for panel, image in zip(panels, images, strict=True):
-        panel.imshow(
-            image, cmap="gray", vmin=0, vmax=255, extent=(-side / 2, side / 2, side, 0), interpolation="nearest"
-        )
-        rows, columns = image.shape
+        extent, (rows, columns) = (-side / 2, side / 2, side, 0), image.shape
+        panel.imshow(image, cmap="gray", vmin=0, vmax=255, extent=extent, interpolation="nearest")
         panel.set(title=f"{rows} × {columns} px, {1e6 * field_of_view / columns:.0f} µm/px", xlabel="Lateral (mm)")
         panel.grid(False)
         panel.set(xlim=(left, right), ylim=(bottom, top))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -43,14 +45,8 @@ def draw(time: np.ndarray, es: int, mean: np.ndarray, sd: np.ndarray, layers: np
         right.plot(time * 1e3, 100 * layers[:, k, 1], color=colour, label=f"{k + 1}{border}")
     right.set(title="Circumferential strain by layer", ylabel="$E_{CC}$ since ED (%)")
     for panel, columns, name in ((left, 3, "at ES (%)"), (right, min(count, 6), "layer")):
-        panel.legend(
-            loc="upper center",
-            bbox_to_anchor=(0.5, -0.16),
-            ncols=columns,
-            title=name,
-            columnspacing=1,
-            handlelength=1.2,
-        )
+        place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "ncols": columns}
+        panel.legend(title=name, columnspacing=1, handlelength=1.2, **place)
     for panel in (left, right):
         panel.axvline(time[es] * 1e3, color=style.MUTED, linewidth=0.9, linestyle=":")
         panel.axhline(0, color=style.MUTED, linewidth=0.6)

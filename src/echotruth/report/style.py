@@ -43,32 +43,7 @@ MMHG = 133.322387415
 NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
 """Metadata of an SVG: none, so that nothing but the figure is in it."""
 
-styled = matplotlib.rc_context(
-    {
-        "font.family": "DejaVu Sans",
-        "font.size": 9,
-        "text.color": INK,
-        "axes.edgecolor": INK,
-        "axes.labelcolor": INK,
-        "xtick.color": INK,
-        "ytick.color": INK,
-        "axes.titlesize": 10,
-        "axes.titleweight": "bold",
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "axes.linewidth": 0.8,
-        "axes.grid": True,
-        "axes.axisbelow": True,
-        "grid.color": GRID,
-        "grid.linewidth": 0.6,
-        "legend.frameon": False,
-        "lines.linewidth": 1.6,
-        "lines.solid_capstyle": "round",
-        "hatch.linewidth": 0.6,
-        "savefig.facecolor": PAPER,
-        "svg.hashsalt": "echotruth",
-    }
-)
+styled = matplotlib.rc_context(fname=Path(__file__).with_name("figure.mplstyle"))
 """Decorator of functions that draw a figure."""
 
 
@@ -194,24 +169,6 @@ def layer_colours(layers: int) -> np.ndarray:
         RGBA.
     """
     return matplotlib.colormaps["plasma"](np.linspace(0.28, 0.86, layers))
-
-
-def mark(axes: Axes, position: tuple[float, float], text: str, offset: tuple[float, float]) -> None:
-    """Mark a point with a dot and a label beside it.
-
-    Parameters
-    ----------
-    axes : Axes
-    position : tuple of float
-        In data units.
-    text : str
-    offset : tuple of float
-        From the dot to the centre of the label, points.
-    """
-    axes.plot(*position, "o", color=RADIAL, markersize=5, zorder=5)
-    axes.annotate(
-        text, position, offset, textcoords="offset points", color=RADIAL, fontweight="bold", ha="center", va="center"
-    )
 
 
 def title(view: str) -> str:

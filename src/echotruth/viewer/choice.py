@@ -9,6 +9,7 @@ from urllib.parse import urlencode
 from bokeh.models import AutocompleteInput, InputWidget, Select
 
 from echotruth.repository.reader import Repository
+from echotruth.repository.schema import LABELS
 from echotruth.viewer.curves import CONTOURS, LINE, MEASURES, MIDDLE, WALL
 from echotruth.viewer.tint import COLOURS, WALL_COMPONENTS
 
@@ -54,17 +55,15 @@ class Choice:
     @property
     def address(self) -> str:
         """The choice as the query of an address; what is as it would be without it is left out."""
-        given = asdict(self)
-        plain = {field.name: field.default for field in fields(self)}
-        return urlencode({name: value for name, value in given.items() if value != plain[name] and name != "frame"})
+        plain = {field.name: field.default for field in fields(self)} | {"frame": self.frame}
+        return urlencode({name: value for name, value in asdict(self).items() if value != plain[name]})
 
 
 def first(repository: Repository) -> Choice:
     """What is shown at first: the first case that is complete, or the first of all."""
-    complete = repository.cases.index[repository.cases["status"] == "complete"]
+    complete = repository.cases.query("status == 'complete'").index
     case = str(complete[0]) if len(complete) else repository.present[0]
-    trackers = repository.trackers
-    return Choice(case, repository.views[0], repository.sizes[0], trackers[-1] if trackers else NOTHING)
+    return Choice(case, repository.views[0], repository.sizes[0], repository.trackers[-1])
 
 
 def asked(repository: Repository, query: Mapping[str, Sequence[str]]) -> Choice:
@@ -76,25 +75,10 @@ def asked(repository: Repository, query: Mapping[str, Sequence[str]]) -> Choice:
     query : dict
         Name -> values, as `urllib.parse.parse_qs` gives them.
     """
-    given = _given(query)
-    chosen = {name: value for name, value in given.items() if _is_known(repository, name, value)}
-    numbers = {name: int(value) for name, value in chosen.items() if name in ("size", "frame")}
-    texts = {name: value for name, value in chosen.items() if name not in numbers}
-    return replace(first(repository), **numbers, **texts)  # type: ignore[arg-type]  # each has its type
-
-
-def refused(repository: Repository, query: Mapping[str, Sequence[str]]) -> list[str]:
-    """What an address asks for and the repository does not have, a sentence each; other names are ignored."""
-    given, names = _given(query), {field.name for field in fields(Choice)}
-    return [
-        f"There is no {name} {value}, which the address asks for."
-        for name, value in given.items()
-        if name in names and not _is_known(repository, name, value)
-    ]
-
-
-def _given(query: Mapping[str, Sequence[str]]) -> dict[str, str]:
-    return {name: values[-1] for name, values in query.items() if values}
+    given = {name: values[-1] for name, values in query.items() if values}
+    known = {name: value for name, value in given.items() if _is_known(repository, name, value)}
+    chosen = {name: int(value) if name in ("size", "frame") else value for name, value in known.items()}
+    return replace(first(repository), **chosen)  # type: ignore[arg-type]  # each has its type
 
 
 def _is_known(repository: Repository, name: str, value: str) -> bool:
@@ -106,7 +90,7 @@ def _is_known(repository: Repository, name: str, value: str) -> bool:
         "tracker": repository.trackers,
         "other": [TRUTH, *repository.trackers],
         "colour": list(COLOURS),
-        "component": ["RR", "CC", "LL", "RC", "RL", "CL", "TT", "RT"],
+        "component": [*LABELS["strain_component"], *WALL_COMPONENTS],
         "curve": [LINE, *WALL_COMPONENTS],
         "measure": list(MEASURES),
         "part": [*CONTOURS, WALL, *(f"layer {n}" for n in range(1, 99)), *(f"segment {n}" for n in range(1, 18))],

@@ -19,8 +19,8 @@ from echotruth.repository.reader import Repository
 Floats32 = NDArray[np.float32]
 PARTS = {"images": "bmode/{size}/image", "truth": "truth/{size}/displacement"}
 """Part of a clip to the array by which it is known to be written."""
-ESTIMATES = {"tracking": "displacement", "evaluation": "true_displacement", "curves": "true_line_strain"}
-"""Part of what was tracked to the array by which it is known to be written; earlier versions had no curves."""
+ESTIMATES = {"tracking": "displacement", "evaluation": "true_displacement"}
+"""Part of what was tracked to the array by which it is known to be written."""
 MISSING = {
     "images": "images",
     "truth": "truth at the pixels",
@@ -48,10 +48,9 @@ class Clip:
     size: int
 
     @cached_property
-    def place(self) -> tuple[int, int]:
+    def place(self) -> tuple[int, ...]:
         """Row of the case, and index of the view."""
-        row, index = self.repository.place(self.case, self.view)
-        return row, index
+        return self.repository.place(self.case, self.view)
 
     @cached_property
     def missing(self) -> list[str]:
@@ -63,11 +62,6 @@ class Clip:
         if part in ESTIMATES:
             return estimates.is_written(self.repository, self.case, self.view, ESTIMATES[part])
         return self.repository.is_written(PARTS[part].format(size=self.size), self.case, self.view)
-
-    @property
-    def has_curves(self) -> bool:
-        """Whether there are curves of strain and rotation."""
-        return self.has("evaluation") and self.has("curves")
 
     def read(self, path: str, *index: Any) -> NDArray[Any]:
         """Part of an array of this case and view."""
@@ -96,7 +90,7 @@ class Clip:
         """Whether the view is a short axis."""
         return self.repository.config.views[self.view].plane == "short_axis"
 
-    @cached_property
+    @property
     def frames(self) -> int:
         """Number of frames."""
         return self.repository.config.loop.frames
@@ -112,9 +106,8 @@ class Clip:
     @cached_property
     def es_frame(self) -> int | None:
         """Frame of end-systole; None for a heart that was not solved."""
-        if not self.repository.is_written("mechanics/es_frame", self.case):
-            return None
-        return int(self.repository.read("mechanics/es_frame", self.place[0]))
+        known = self.repository.is_written("mechanics/es_frame", self.case)
+        return int(self.repository.read("mechanics/es_frame", self.place[0])) if known else None
 
     @cached_property
     def image(self) -> NDArray[np.uint8]:
@@ -139,7 +132,5 @@ class Clip:
 
         It is NaN in the last frame and outside the wall.
         """
-        first = step // 2
-        every = slice(first, None, step)
-        following = schema.LABELS["to"].index("next")
+        every, following = slice(step // 2, None, step), schema.LABELS["to"].index("next")
         return self.read(f"truth/{self.size}/flow", slice(None), following, every, every, slice(0, 2))

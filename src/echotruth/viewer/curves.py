@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from echotruth.arrays import Floats
 from echotruth.viewer.clip import Clip
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 LINE = "line"
 """In place of a component: the strain of a contour, which is GCS in a short axis and GLS in a long one."""
@@ -56,13 +52,10 @@ def strain(clip: Clip, found: dict[str, xr.Dataset], component: str, measure: st
         One of :func:`parts`.
     """
     kind, _, number = part.partition(" ")
-    chosen: dict[str, str | int] = {}
-    if component == LINE:
-        name, chosen = "line_strain", {"contour": part}
-    else:
-        key = "aha" if kind == "segment" else "region"
-        name, chosen = f"{'segment' if key == 'aha' else 'region'}_strain", {key: int(number or 0)}
-        chosen |= {"measure": measure, "wall_component": component}
+    name, dim = {LINE: ("line_strain", "contour"), "segment": ("segment_strain", "aha")}.get(
+        LINE if component == LINE else kind, ("region_strain", "region")
+    )
+    chosen = {dim: part if component == LINE else int(number or 0), "measure": measure, "wall_component": component}
     shear = component == "RT" and measure == "engineering"
     factor, unit = (np.degrees(1), "°") if shear else (100, "%")
     return Plot(f"{strain_name(clip, component)} ({unit})", _tracked_and_true(found, name, factor, chosen))
@@ -111,12 +104,12 @@ def segments(found: xr.Dataset) -> list[int]:
 
 
 def _tracked_and_true(
-    found: dict[str, xr.Dataset], name: str, factor: float, chosen: Mapping[str, str | int]
+    found: dict[str, xr.Dataset], name: str, factor: float, chosen: dict[str, str | int]
 ) -> dict[str, Floats]:
     """The true curve, and that of every tracker; the truth is the same for all."""
     curves: dict[str, Floats] = {}
     for tracker, data in found.items():
-        pick = {dim: value for dim, value in chosen.items() if dim in data.dims}
-        curves[TRUE] = factor * data[f"true_{name}"].sel(pick).values
-        curves[tracker] = factor * data[f"tracked_{name}"].sel(pick).values
+        true, tracked = (data[f"{kind}_{name}"] for kind in ("true", "tracked"))
+        pick = {dim: value for dim, value in chosen.items() if dim in true.dims}
+        curves |= {TRUE: factor * true.sel(pick).values, tracker: factor * tracked.sel(pick).values}
     return curves

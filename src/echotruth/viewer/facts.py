@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from html import escape
+from typing import Any
 
 import numpy as np
 
 from echotruth.viewer.clip import Clip
 
-SCORES = {"nrmse_all": ("NRMSE", 100, "%"), "coverage": ("coverage", 100, "%")}
+SCORES = {"nrmse_all": ("NRMSE", 100.0, "%"), "coverage": ("coverage", 100.0, "%")}
 """Score to its name, and factor and unit in which it is shown."""
 MEASURES = {
-    "ejection_fraction": ("ejection fraction", 100, "%"),
-    "gls": ("GLS", 100, "%"),
+    "ejection_fraction": ("ejection fraction", 100.0, "%"),
+    "gls": ("GLS", 100.0, "%"),
     "twist_peak": ("peak twist", np.degrees(1), "°"),
 }
 
@@ -26,13 +27,13 @@ def text(clip: Clip, trackers: list[str]) -> str:
     trackers : list of str
         Names that the repository does not know are left out.
     """
-    repository, case = clip.repository, clip.case
-    known = repository.cases.loc[case].to_dict()
+    repository, known = clip.repository, clip.repository.cases.loc[clip.case].to_dict()
     status, reason, _ = (known.pop(name) for name in ("status", "reason", "heart"))
     verdict = status if status == "complete" else f"<b>{escape(status)}</b>"
-    lines = [f"{escape(case)}: {verdict}" + (f" ({escape(reason)})" if reason else "")]
-    lines.append(", ".join(_measures(clip)))
-    lines += [f"{escape(name)}: {', '.join(_scores(clip, name))}" for name in trackers if name in repository.trackers]
+    lines = [f"{escape(clip.case)}: {verdict}" + (f" ({escape(reason)})" if reason else "")]
+    if repository.is_written("physiology/scalars", clip.case):
+        lines.append(_numbers(repository.arrays("physiology", clip.case), MEASURES))
+    lines += [f"{escape(name)}: {_scores(clip, name)}" for name in trackers if name in repository.trackers]
     particular = [
         f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}"
         for name, value in known.items()
@@ -42,27 +43,19 @@ def text(clip: Clip, trackers: list[str]) -> str:
     return "<br>".join(line for line in lines if line)
 
 
-def _measures(clip: Clip) -> list[str]:
-    repository = clip.repository
-    if not repository.is_written("physiology/scalars", clip.case):
-        return []
-    values = repository.arrays("physiology", clip.case)
-    return [
-        f"{name} {_number(factor * float(values[label]))} {unit}"
-        for label, (name, factor, unit) in MEASURES.items()
-        if label in values and np.isfinite(values[label])
-    ]
-
-
-def _scores(clip: Clip, tracker: str) -> list[str]:
+def _scores(clip: Clip, tracker: str) -> str:
     if not clip.has("evaluation"):
-        return ["not tracked yet"]
+        return "not tracked yet"
     try:
-        found = clip.tracked(tracker, *SCORES)
+        return _numbers(clip.tracked(tracker, *SCORES), SCORES) or "unknown"
     except ValueError:  # of a tracker from outside
-        return ["not evaluated on this clip"]
-    return [f"{name} {_number(factor * float(found[label]))} {unit}" for label, (name, factor, unit) in SCORES.items()]
+        return "not evaluated on this clip"
 
 
-def _number(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else "unknown"
+def _numbers(values: dict[str, Any], shown: dict[str, tuple[str, float, str]]) -> str:
+    """Those of some numbers that are known, in words."""
+    return ", ".join(
+        f"{name} {factor * float(values[label]):.3g} {unit}"
+        for label, (name, factor, unit) in shown.items()
+        if np.isfinite(values[label])
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -12,15 +12,7 @@ from typing import Any
 import numpy as np
 from bokeh.document import Document
 from bokeh.layouts import column, row
-from bokeh.models import (
-    CheckboxButtonGroup,
-    ColumnDataSource,
-    Div,
-    Range1d,
-    Select,
-    Slider,
-    Toggle,
-)
+from bokeh.models import CheckboxButtonGroup, ColumnDataSource, Div, Range1d, Select, Slider, Toggle
 
 from echotruth.repository.reader import Repository
 from echotruth.viewer import arrows, curves, facts, script
@@ -48,12 +40,10 @@ class Page:
     choice : Choice
         What is shown at first.
     document : Document
-    refused : sequence of str
-        Sentences on what was asked for and is not there; they are shown until something else is chosen.
     """
 
-    def __init__(self, repository: Repository, choice: Choice, document: Document, refused: Sequence[str] = ()) -> None:
-        self.repository, self.choice, self.document, self.refused = repository, choice, document, refused
+    def __init__(self, repository: Repository, choice: Choice, document: Document) -> None:
+        self.repository, self.choice, self.document = repository, choice, document
         self.points = lru_cache(KEPT_CLIPS)(lambda case, view, size: Points(Clip(repository, case, view, size)))
         self._shown: dict[str, Any] = {}
         self._problems: dict[str, None] = {}
@@ -164,9 +154,8 @@ class Page:
     def _show(self) -> None:
         choice = self.choice
         points = self.points(choice.case, choice.view, choice.size)
-        clip = points.clip
+        clip, self._problems = points.clip, {}
         self._fit(clip)
-        self._problems = {}
         place = (choice.case, choice.view, choice.size)
         self._once("clip", place, lambda: self._show_clip(points))
         for number, tracker in enumerate((choice.tracker, choice.other)):
@@ -174,8 +163,10 @@ class Page:
         found = self._once("found", (*place, choice.tracker, choice.other), lambda: self._curves(clip))
         self._show_graphs(clip, found)
         self.facts.text = facts.text(clip, [choice.tracker, choice.other])
-        self._say(" ".join([*self.refused, *self._lacking(clip), *self._problems]))
-        self.refused = ()
+        if lacking := ", ".join(name for part, name in MISSING.items() if not clip.has(part)):
+            said = f"Not made for this case and view: {lacking}. The run is not finished, or the heart not complete."
+            self._problems[said] = None
+        self._say(" ".join(self._problems))
         self.address.data = {"query": [self.choice.address]}
 
     def _blank(self) -> None:
@@ -196,8 +187,7 @@ class Page:
 
     def _show_clip(self, points: Points) -> None:
         """Grey levels and times, and the pictures about the wall; the tool of the picture resets them to the whole."""
-        clip = points.clip
-        side = 1e3 * clip.side
+        clip, side = points.clip, 1e3 * points.clip.side
         self.side.value = side
         for panel in self.panels:
             panel.size(clip.size, side)
@@ -243,7 +233,7 @@ class Page:
     def _curves(self, clip: Clip) -> dict[str, Any]:
         """Tracker -> curves, of those that have any."""
         found = {}
-        for tracker in (self.choice.tracker, self.choice.other) if clip.has_curves else ():
+        for tracker in (self.choice.tracker, self.choice.other) if clip.has("evaluation") else ():
             with suppress(ValueError):  # not evaluated on this clip, which the picture says
                 if tracker not in (TRUTH, NOTHING):
                     found[tracker] = self.repository.curves(clip.case, clip.view, tracker, clip.size)
@@ -251,13 +241,13 @@ class Page:
 
     def _show_graphs(self, clip: Clip, found: dict[str, Any]) -> None:
         choice = self.choice
-        shown = [curves.segments(data) for data in found.values()][:1]
-        parts = curves.parts(clip, choice.curve, shown[0] if shown else [])
+        segments = curves.segments(next(iter(found.values()))) if found else []
+        parts = curves.parts(clip, choice.curve, segments)
         if choice.part not in parts:
             self.choice = choice = replace(choice, part=parts[0])
         names = [(kind, curves.strain_name(clip, kind)) for kind in (curves.LINE, "TT", "RR", "RT")]
-        self._set("curve", choice.curve, names)
-        self._set("part", choice.part, parts)
+        self.inputs["curve"].update(options=names, value=choice.curve)
+        self.inputs["part"].update(options=parts, value=choice.part)
         self.inputs["measure"].visible = choice.curve != curves.LINE
         plots = {
             "strain": curves.strain(clip, found, choice.curve, choice.measure, choice.part),
@@ -272,21 +262,8 @@ class Page:
         known = components(self.choice.colour)
         if self.choice.component not in known:
             self.choice = replace(self.choice, component=known[min(1, len(known) - 1)] if known else "")
-        self._set("component", self.choice.component, [(name, component_name(name, clip)) for name in known])
-        self.inputs["component"].visible = bool(known)
-
-    def _set(self, name: str, value: str, options: list[Any]) -> None:
-        """Offer other options in an input, and one of them as chosen."""
-        self.inputs[name].update(options=options, value=value)
-
-    def _lacking(self, clip: Clip) -> list[str]:
-        """What is not there."""
-        if clip.missing:
-            lacking = ", ".join(MISSING[part] for part in clip.missing)
-            return [f"Not made for this case and view: {lacking}. The run is not finished, or the heart not complete."]
-        if not clip.has_curves:
-            return ["There are no curves: an earlier version made this repository. Run its configuration again."]
-        return []
+        names = [(name, component_name(name, clip)) for name in known]
+        self.inputs["component"].update(options=names, value=self.choice.component, visible=bool(known))
 
     def _say(self, text: str) -> None:
         self.message.text = escape(text)

@@ -3,20 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from bokeh import models
 from bokeh.events import MouseMove
-from bokeh.models import (
-    AllLabels,
-    BasicTicker,
-    ColorBar,
-    ColumnDataSource,
-    Div,
-    FixedTicker,
-    GlyphRenderer,
-    Label,
-    LinearColorMapper,
-    Range1d,
-    Slider,
-)
 from bokeh.plotting import figure
 
 from echotruth.report.clip import MOTION
@@ -51,24 +39,30 @@ class Panel:
 
     def __init__(
         self,
-        clip: ColumnDataSource,
-        sliders: tuple[Slider, Slider],
-        ranges: tuple[Range1d, Range1d],
-        said: Div,
+        clip: models.ColumnDataSource,
+        sliders: tuple[models.Slider, models.Slider],
+        ranges: tuple[models.Range1d, models.Range1d],
+        said: models.Div,
         name: str,
     ) -> None:
         frame, side = sliders
-        self.picture = ColumnDataSource({"image": [np.zeros((1, 1), np.uint32)]}, name=f"picture_{name}")
-        self.colour = ColumnDataSource({"index": [NO_COLOUR]}, name=f"colour_{name}")
-        self.palette = ColumnDataSource({"red": EMPTY, "green": EMPTY, "blue": EMPTY})
-        self.names = ColumnDataSource({"name": [""]})
-        self.movements = {kind: ColumnDataSource(dict.fromkeys(("x0", "y0", "x1", "y1"), EMPTY)) for kind in ARROWS}
+        self.picture = models.ColumnDataSource({"image": [np.zeros((1, 1), np.uint32)]}, name=f"picture_{name}")
+        self.colour = models.ColumnDataSource({"index": [NO_COLOUR]}, name=f"colour_{name}")
+        self.palette = models.ColumnDataSource({"red": EMPTY, "green": EMPTY, "blue": EMPTY})
+        self.names = models.ColumnDataSource({"name": [""]})
+        self.movements = {
+            kind: models.ColumnDataSource(dict.fromkeys(("x0", "y0", "x1", "y1"), EMPTY)) for kind in ARROWS
+        }
         ends = ("x0", "y0", "x1", "y1", "head_x", "angle")
-        self.arrows = {kind: ColumnDataSource(dict.fromkeys(ends, EMPTY), name=f"{kind}_{name}") for kind in ARROWS}
-        self.label = Label(x=8, y=8, x_units="screen", y_units="screen", text_color="white", text_font_size="13px")
-        scale = LinearColorMapper(palette=["#ffffff"], low=0, high=1)
-        self.bar = ColorBar(
-            color_mapper=scale, width=12, visible=False, title_standoff=8, major_label_policy=AllLabels()
+        self.arrows = {
+            kind: models.ColumnDataSource(dict.fromkeys(ends, EMPTY), name=f"{kind}_{name}") for kind in ARROWS
+        }
+        self.label = models.Label(
+            x=8, y=8, x_units="screen", y_units="screen", text_color="white", text_font_size="13px"
+        )
+        scale = models.LinearColorMapper(palette=["#ffffff"], low=0, high=1)
+        self.bar = models.ColorBar(
+            color_mapper=scale, width=12, visible=False, title_standoff=8, major_label_policy=models.AllLabels()
         )
         self._ticks: list[int] = []
         self.figure = _figure(ranges, name)
@@ -77,11 +71,11 @@ class Panel:
         self._renderers = {kind: self._draw(kind) for kind in ARROWS}
         self.figure.add_layout(self.label)
         self.figure.add_layout(self.bar, "right")
-        models = {"picture": self.picture, "colour": self.colour, "bar": self.bar, "names": self.names}
-        pointer = script.callback("pointer", clip=clip, slider=frame, side=side, said=said, **models)
+        parts = {"picture": self.picture, "colour": self.colour, "bar": self.bar, "names": self.names}
+        pointer = script.callback("pointer", clip=clip, slider=frame, side=side, said=said, **parts)
         self.figure.js_on_event(MouseMove, pointer)
 
-    def _draw(self, kind: str) -> list[GlyphRenderer]:
+    def _draw(self, kind: str) -> list[models.GlyphRenderer]:
         source, colour = self.arrows[kind], ARROWS[kind]
         line = self.figure.segment("x0", "y0", "x1", "y1", source=source, line_color=colour, line_width=1.6)
         head = self.figure.scatter(
@@ -127,7 +121,7 @@ class Panel:
         self.bar.color_mapper.update(palette=tint.palette, low=tint.low, high=tint.high)
         if list(tint.names) != self._ticks:  # other models make Bokeh look through the whole page
             self._ticks = list(tint.names)
-            self.bar.ticker = FixedTicker(ticks=self._ticks) if tint.names else BasicTicker()
+            self.bar.ticker = models.FixedTicker(ticks=self._ticks) if tint.names else models.BasicTicker()
         # Of a name, the bar has the number if it begins with one; the pointer has all of it.
         short = {number: name.split(" ")[0] if name[0].isdigit() else name for number, name in tint.names.items()}
         self.bar.update(title=tint.title, visible=True, major_label_overrides=short)
@@ -144,7 +138,7 @@ class Panel:
             renderer.visible = arrows is not None
 
 
-def _figure(ranges: tuple[Range1d, Range1d], name: str) -> figure:
+def _figure(ranges: tuple[models.Range1d, models.Range1d], name: str) -> figure:
     """Empty axes in mm, depth downwards."""
     lateral, axial = ranges
     drawn = figure(

@@ -116,7 +116,9 @@ class Points:
         number[self.inside] = np.arange(1, len(self.position) + 1)
         tiles = np.repeat(np.repeat(number, parts, axis=0), parts, axis=1)
         wanted = tiles > 0
-        at_ed = self._refined(parts)[wanted]
+        offset = ((np.arange(parts) + 0.5) / parts - 0.5) * self.spacing
+        axial, lateral = ((start[:, None] + offset).ravel() for start in (self.grid[:, 0, 1], self.grid[0, :, 0]))
+        at_ed = np.stack(np.meshgrid(lateral, axial), axis=-1)[wanted]
         nearest = distance_transform_edt(~self.inside, return_distances=False, return_indices=True)
         found = np.zeros((self.clip.frames, self.clip.size, self.clip.size), np.int32)
         for frame, moved in zip(found, self._true_displacement, strict=True):
@@ -126,10 +128,3 @@ class Points:
             shown = ((pixel >= 0) & (pixel < self.clip.size)).all(-1)
             frame[pixel[shown, 1], pixel[shown, 0]] = tiles[wanted][shown]
         return found
-
-    def _refined(self, parts: int) -> Floats:
-        """Positions of the parts of all tiles, (rows * parts, columns * parts, 2), m."""
-        offset = ((np.arange(parts) + 0.5) / parts - 0.5) * self.spacing
-        axial = (self.grid[:, 0, 1, None] + offset).ravel()
-        lateral = (self.grid[0, :, 0, None] + offset).ravel()
-        return np.stack(np.meshgrid(lateral, axial), axis=-1)

@@ -12,7 +12,7 @@ from bokeh.document import Document
 from bokeh.server.server import Server
 
 from echotruth.repository.reader import Repository
-from echotruth.viewer.choice import asked, refused
+from echotruth.viewer.choice import asked
 from echotruth.viewer.page import Page
 
 LOCAL = "localhost"
@@ -51,7 +51,7 @@ def serve(repository: str | Path, port: int = 0) -> Server:
         query = context.request.arguments if context is not None and context.request is not None else {}
         texts = {name: [value.decode() for value in values] for name, values in query.items()}
         now = opened(repository)  # a run may be going on
-        Page(now, asked(now, texts), document, refused(now, texts))
+        Page(now, asked(now, texts), document)
 
     try:
         server = Server({"/": Application(FunctionHandler(page))}, port=port, address=LOCAL)

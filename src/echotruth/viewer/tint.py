@@ -92,7 +92,9 @@ def tint(clip: Clip, points: Points, colour: str, component: str, tracker: str |
     if colour in ("layer", "segment", "region"):
         return _labels(clip, colour)
     if colour == "strain":
-        return _signed(100 * clip.strain(component), f"{component_name(component, clip)} (%)")
+        values = 100 * clip.strain(component)
+        limit = nice(largest(values[:, ::7, ::7]))
+        return _scaled(values, -limit, limit, DIVERGING, f"{component_name(component, clip)} (%)".capitalize())
     if colour == "wall_depth":
         return _scaled(clip.wall_depth(), 0, 1, SEQUENTIAL, "Wall depth, 0 at the endocardium")
     return _speed(clip)
@@ -114,27 +116,23 @@ def component_name(component: str, clip: Clip) -> str:
 
 
 def _of_points(points: Points, colour: str, component: str, tracker: str | None) -> Tint | None:
-    """Colours of a number at the points of the trackers, at the pixels that the points cover."""
-    if colour == "displacement_error":
-        if tracker is None:
-            return None
+    """Colours of a number at points of the trackers, at the pixels that these cover; the truth has no error."""
+    if tracker is None and colour != "tracked_strain":
+        return None
+    if tracker is not None and colour == "displacement_error":
         true = points.true_displacement
         error = np.linalg.norm(points.tracked_displacement(tracker) - true, axis=-1)
         factor, unit = (1e6, "µm") if points.clip.side < 0.03 else (1e3, "mm")
         # One scale for all trackers of a clip: up to a quarter of its largest motion.
         limit = nice(factor * largest(np.linalg.norm(true, axis=-1), 100) / 4)
         return _scaled(_at_pixels(points, factor * error), 0, limit, SEQUENTIAL, f"Error of displacement ({unit})")
-    number = WALL_COMPONENTS.index(component)
-    true = 100 * points.true_strain()[..., number]
-    name, limit = component_name(component, points.clip), nice(largest(true))
-    if colour == "strain_error":
-        if tracker is None:
-            return None
-        shown, title = 100 * points.tracked_strain(tracker)[..., number] - true, f"Error of {name} (% points)"
-    elif tracker is None:
-        shown, title = true, f"True {name} (%)"
-    else:
+    number, name = WALL_COMPONENTS.index(component), component_name(component, points.clip)
+    shown = true = 100 * points.true_strain()[..., number]
+    limit, title = nice(largest(true)), f"True {name} (%)"
+    if tracker is not None:
         shown, title = 100 * points.tracked_strain(tracker)[..., number], f"Tracked {name} (%)"
+    if colour == "strain_error":
+        shown, title = shown - true, f"Error of {name} (% points)"
     return _scaled(_at_pixels(points, shown), -limit, limit, DIVERGING, title)
 
 
@@ -177,12 +175,6 @@ def _speed(clip: Clip) -> Tint:
     speed = 1e3 * np.hypot(flow[..., 0], flow[..., 1]) / frame_time
     limit = nice(largest(speed[:, ::7, ::7]))
     return _scaled(speed, 0, limit, SEQUENTIAL, "Speed in the plane (mm/s)")
-
-
-def _signed(values: NDArray[np.float32], title: str) -> Tint:
-    """Colours of a quantity with a sign: zero is in the middle."""
-    limit = nice(largest(values[:, ::7, ::7]))
-    return _scaled(values, -limit, limit, DIVERGING, title[0].upper() + title[1:])
 
 
 def _scaled(values: NDArray[np.floating], low: float, high: float, colours: str, title: str) -> Tint:
