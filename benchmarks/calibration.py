@@ -22,11 +22,11 @@ import numpy as np
 import report
 from echotruth.evaluation.choice import is_complete
 from scipy.optimize import minimize
+from suite import reliability
 from suite.splits import DEVELOP, TEST, split_of, split_of_label
 
 from echotruth.cases import Case, expand
 from echotruth.config.loading import load
-from echotruth.evaluation import reliability
 from echotruth.evaluation.clip import Clip, clips
 from echotruth.evaluation.clip_metrics import clip_metrics
 from echotruth.evaluation.scoring import ground_truth
