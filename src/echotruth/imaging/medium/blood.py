@@ -40,7 +40,7 @@ class Cavity:
         self._wall, facets = np.unique(endo, return_inverse=True)
         facets = facets.reshape(endo.shape)
         self._vertices, spokes = np.unique(facets[:, :3], return_inverse=True)
-        edges, number, count = triangle_edges(facets[:, :3])
+        edges, number, count = triangle_edges(facets[:, :3].astype(np.int32))
         self.rim = self._wall[np.unique(edges[count[number] == 1])]
         facets, spokes = 1 + facets, 1 + len(self._wall) + spokes.reshape(-1, 3)
         # The normals point to the centre, so that the order of the vertices is reversed.

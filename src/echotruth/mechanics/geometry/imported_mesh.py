@@ -139,15 +139,19 @@ def _of_grid(source: str, grid: Any) -> ImportedMesh:
     kinds = [[number for number, name in types.items() if name in names] for names in (_TETRAHEDRA, _TRIANGLES)]
     if len(kinds[0]) > 1:
         raise GeometryError(f"{source}: holds linear and quadratic tetrahedra: write all of them in one order")
-    cells = [grid.cells_dict[number] for number in kinds[0]] or [np.empty((0, 4))]
+    tetrahedra = [grid.cells_dict[number] for number in kinds[0]] or [np.empty((0, 4))]
     triangles = [grid.cells_dict[number][:, :3] for number in kinds[1]] or [np.empty((0, 3))]
     arrays = {name: np.asarray(grid.cell_data[name]) for name in grid.cell_data}
-    of_kinds = [{name: _of_types(grid, values, some) for name, values in arrays.items() if some} for some in kinds]
+    of_cells, of_triangles = (
+        {name: _of_types(grid, values, some) for name, values in arrays.items() if some} for some in kinds
+    )
     return ImportedMesh(
         source,
         np.asarray(grid.points, dtype=float),
-        *(np.concatenate(some).astype(np.int32) for some in (cells, triangles)),
-        *of_kinds,
+        np.concatenate(tetrahedra).astype(np.int32),
+        np.concatenate(triangles).astype(np.int32),
+        of_cells,
+        of_triangles,
         {name: np.asarray(grid.point_data[name]) for name in grid.point_data},
     )
 
