@@ -8,9 +8,9 @@ import numpy as np
 from acoustics_agreement import FINE, likeness
 from acoustics_arrays import ARRAYS, Array, Floats, delays
 from acoustics_peers import Pymust
+from exact_sum import Spectra, exact_matrix, one_way
 
 from echotruth.config import Probe
-from echotruth.imaging.rf.exact import Spectra, exact_matrix, one_way
 from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.imaging.rf.probe import element_centres, pulse_spectrum
 

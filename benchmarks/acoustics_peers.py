@@ -11,10 +11,11 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
+from exact_sum import pulse
 from numpy.typing import NDArray
 
 from echotruth.config import Probe
-from echotruth.imaging.rf.probe import pulse, spectral_width
+from echotruth.imaging.rf.probe import spectral_width
 
 Floats = NDArray[np.float64]
 

@@ -21,11 +21,11 @@ from typing import NamedTuple
 import numpy as np
 import report
 from scipy.optimize import minimize
+from suite import reliability
 from suite.splits import DEVELOP, TEST, split_of, split_of_label
 
 from echotruth.cases import Case, expand
 from echotruth.config.loading import load
-from echotruth.evaluation import reliability
 from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.scoring import read_truth
 from echotruth.repository.reader import Repository

@@ -18,7 +18,7 @@ from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.mechanics import fibres
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.cycle import fill_to_end_diastole, solve
+from echotruth.mechanics.solver.cycle import filled_to_end_diastole, solve
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
 from echotruth.mechanics.solver.newton import LoadStepper
 from echotruth.mechanics.solver.support import base_support
@@ -101,8 +101,7 @@ class Ours:
 
     def fill(self, stiffness: float) -> None:
         """Go to end-diastole."""
-        stepper, whole = LoadStepper(self._heart, stiffness), read_loop(Loop())
-        fill_to_end_diastole(stepper, _first(whole, 1), stiffness)
+        stepper = filled_to_end_diastole(self._heart, _first(read_loop(Loop()), 1), stiffness)
         load = stepper.load
         self._state, self._load = stepper.state, replace(load, volume=OFF * load.volume, tension_fraction=1.0)
 

@@ -109,7 +109,7 @@ def beat_of_default(file: Path) -> dict[str, np.ndarray]:
     if not file.exists():
         from echotruth.mechanics.beat import beat
 
-        result = beat(Config(), file.with_suffix(""))
+        result = beat(Config())
         np.savez(file, **{f"{group}/{name}": value for group, of in result.items() for name, value in of.items()})
     with np.load(file) as arrays:
         return {name: arrays[name] for name in arrays.files}

@@ -18,9 +18,8 @@ from echotruth.mechanics import fibres, kinematics
 from echotruth.mechanics.fibres import material_gradients
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.checkpoint import SolvedFrame
-from echotruth.mechanics.solver.cycle import SolvedCycle, solve
-from echotruth.mechanics.solver.equilibrium import Equilibrium, PreviousState
+from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solved_cycle, solved_frames
+from echotruth.mechanics.solver.equilibrium import PreviousState
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
 PAPERS = Path(__file__).parents[1] / "config" / "paper.yaml"
@@ -68,21 +67,6 @@ class SolvedBeat:
         return mean[0], sd[0]
 
 
-class _PreviousStates:
-    """Stands in for the checkpoints of a beat and keeps the previous state of every frame."""
-
-    def __init__(self, equations: Equilibrium) -> None:
-        self._equilibrium, self.previous_states = equations, []
-
-    def load(self) -> list[SolvedFrame]:
-        """None: the beat is solved from its start."""
-        return []
-
-    def add(self, _: SolvedFrame) -> None:
-        """Keep the state before the last frame."""
-        self.previous_states.append(self._equilibrium.previous)
-
-
 @cache
 def solved(around: int, along: int, through: int) -> SolvedBeat:
     """The default heart on a mesh of elements around, along and through the wall; solved once in a run."""
@@ -104,10 +88,11 @@ def solved_heart(config: Config) -> SolvedBeat:
     """The heart of a configuration."""
     cycle, unloaded = read_loop(config.loop), wall(config, left_ventricle(config.geometry))
     equations = equilibrium(config, unloaded)
-    record = _PreviousStates(equations)
     tissue = unloaded.tissue
     activation = Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
-    beat = solve(equations, cycle, activation, checkpoints=record)
+    frames = solved_frames(filled_to_end_diastole(equations, cycle), cycle, activation)
+    frames, previous = zip(*((frame, equations.previous) for frame in frames), strict=True)
+    beat = solved_cycle(equations, cycle, frames)
     equations.close()
-    es, previous = int(np.argmax(cycle.pressure / cycle.volume)), tuple(record.previous_states)
+    es = int(np.argmax(cycle.pressure / cycle.volume))
     return SolvedBeat(config, unloaded, beat, previous, es, cycle.period, equations.assembly.displacement)

@@ -128,7 +128,7 @@ def draw_reliability(path: Path, curves: pd.DataFrame, order: list[str]) -> Path
     path : Path
         PNG to write.
     curves : DataFrame
-        As :func:`echotruth.evaluation.reliability.curve` returns it.
+        As :func:`.reliability.curve` returns it.
     order : list of str
         Trackers that are drawn, the first on top.
 

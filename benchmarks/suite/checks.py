@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 
 from echotruth.evaluation.leaderboard import RANKED_BY
-from echotruth.evaluation.resampling import CLIP, by_heart, draws, interval
+from echotruth.evaluation.resampling import CLIP, draws, interval
 
+from .comparison import by_heart
 from .records import Records, Suite
 from .results import Result, result_of
 from .splits import DEVELOP, TEST

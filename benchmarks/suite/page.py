@@ -11,7 +11,6 @@ import yaml
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from echotruth.cases import all_cases
-from echotruth.evaluation import reliability
 from echotruth.evaluation.resampling import CLIP
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.repository import durable
@@ -19,7 +18,7 @@ from echotruth.repository.kept import NotEvaluated
 from echotruth.repository.reader import Repository
 from echotruth.section import Section
 
-from . import card, charts, checks, examples, tables
+from . import card, charts, checks, examples, reliability, tables
 from .card import Card
 from .conditions import PLAIN, main_conditions
 from .records import Records, Suite

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from echotruth.evaluation.agreement import bland_altman
-from echotruth.evaluation.detection import detection
 from echotruth.evaluation.leaderboard import RANKED_BY
-from echotruth.evaluation.resampling import CLIP, by_heart, standing
+from echotruth.evaluation.resampling import CLIP
 
+from .comparison import bland_altman, by_heart, standing
 from .conditions import PLAIN, groups, main_conditions, variations
+from .detection import detection
 
 METRICS = {
     RANKED_BY: False,
@@ -49,7 +49,7 @@ def standings(clips: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         Columns condition, is_main (whether it is one of disease and acoustics), size_px, metric, tracker, and those of
-        :func:`echotruth.evaluation.resampling.standing`; the best tracker of each first.
+        :func:`.comparison.standing`; the best tracker of each first.
     """
     conditions = [(name, True, part) for name, part in main_conditions(clips).items()]
     conditions += [(name, False, part) for name, part in groups(clips).items()]
@@ -137,7 +137,7 @@ def agreement(clips: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         Columns acoustics, size_px, tracker, strain (gls or gcs) and those of
-        :func:`echotruth.evaluation.agreement.bland_altman`, percentage points; and of_hearts, the number of hearts of
+        :func:`.comparison.bland_altman`, percentage points; and of_hearts, the number of hearts of
         which the true strain is known.
     """
     columns = ["acoustics", "size_px", "tracker", "strain", *bland_altman(np.empty(0), np.empty(0)), "of_hearts"]
@@ -171,7 +171,7 @@ def detections(segments: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns acoustics and those of :func:`echotruth.evaluation.detection.detection`, of both components together;
+        Columns acoustics and those of :func:`.detection.detection`, of both components together;
         empty if no segment is infarcted.
     """
     tables = []

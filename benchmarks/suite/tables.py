@@ -10,9 +10,10 @@ import pandas as pd
 from echotruth.cases import Case, all_cases, diagnosis
 from echotruth.evaluation.hearts import hearts_of
 from echotruth.evaluation.leaderboard import RANKED_BY
-from echotruth.evaluation.resampling import CLIP, LEAST_HEARTS
+from echotruth.evaluation.resampling import CLIP
 from echotruth.repository.reader import Repository
 
+from .comparison import LEAST_HEARTS
 from .conditions import PLAIN
 from .records import Suite
 from .splits import DEVELOP, TEST, split_of

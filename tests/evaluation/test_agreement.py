@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import pearsonr
 
-from echotruth.evaluation.agreement import bland_altman, compare, limits_of_agreement
+from benchmarks.suite.comparison import bland_altman
+from echotruth.evaluation.agreement import compare, limits_of_agreement
 from echotruth.evaluation.displacement_error import WallPoints
 
 COUNT = 60

@@ -4,10 +4,10 @@ import pytest
 from finished_repository import configured, finish
 
 import echotruth as et
+from benchmarks.suite.comparison import by_heart
 from echotruth.cases import expand
 from echotruth.config import Cases
 from echotruth.evaluation.hearts import hearts_of
-from echotruth.evaluation.resampling import by_heart
 
 pytestmark = pytest.mark.slow
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy.stats import mannwhitneyu
 
-from echotruth.evaluation.detection import auc, detection, infarcted
+from benchmarks.suite.detection import auc, detection, infarcted
 
 
 def segments(hearts=6, spoilt=0.0, seed=0):

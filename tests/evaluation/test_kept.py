@@ -10,8 +10,8 @@ import pytest
 from known_repository import SETTINGS, make
 
 import echotruth as et
-from echotruth.evaluation.detection import COLUMNS, detection
-from echotruth.evaluation.reliability import calibration_error, curve
+from benchmarks.suite.detection import COLUMNS, detection
+from benchmarks.suite.reliability import calibration_error, curve
 from echotruth.evaluation.run import prepare
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import ledger

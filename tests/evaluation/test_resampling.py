@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from echotruth.evaluation.resampling import by_heart, draws, interval, paired, ranks, standing
+from benchmarks.suite.comparison import by_heart, paired, standing
+from echotruth.evaluation.resampling import draws, interval, ranks
 
 
 def table(**values):

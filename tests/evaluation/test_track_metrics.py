@@ -6,8 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from benchmarks.suite.reliability import calibration_error, curve
 from echotruth.evaluation.point_tracks import flow_error, median_trajectory_error, survival, tap_vid
-from echotruth.evaluation.reliability import calibration_error, counts, curve, summary
+from echotruth.evaluation.reliability import counts, summary
 
 FRAMES, POINTS = 7, 40
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import brentq
 
 from echotruth.config import Probe
+from echotruth.imaging.flow import fresnel
 from echotruth.imaging.rf.elevation import BEAM_TAIL_ENERGY, Lens, subaperture_bounds
-from echotruth.imaging.rf.exact import fresnel
 from echotruth.imaging.rf.kernel import Band, Grid
 
 WAVELENGTH = 1540 / 25e6

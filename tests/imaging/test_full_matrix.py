@@ -4,9 +4,9 @@ import numba
 import numpy as np
 import pytest
 
+from benchmarks.exact_sum import exact_matrix
 from echotruth.config import Probe
 from echotruth.config.realism import Shadow
-from echotruth.imaging.rf.exact import exact_matrix
 from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
 from echotruth.imaging.rf.shadow import Rib
 

@@ -1,12 +1,13 @@
 """The method of spreading as it is written to be read, against the exact sum and against the engine."""
 
+import nonuniform_fft
 import numpy as np
 import pytest
 
+from benchmarks.exact_sum import exact_matrix
 from echotruth.config import Probe
-from echotruth.imaging.rf import nonuniform_fft, spreading
+from echotruth.imaging.rf import spreading
 from echotruth.imaging.rf.directivity import ANGLES
-from echotruth.imaging.rf.exact import exact_matrix
 from echotruth.imaging.rf.full_matrix import PLANE, PLANE_ACCURACY, FullMatrix, _band, _damping
 from echotruth.imaging.rf.kernel import TAPS
 from echotruth.imaging.rf.probe import pulse_spectrum

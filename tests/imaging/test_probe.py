@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.exact_sum import pulse
 from echotruth.config import Probe
-from echotruth.imaging.rf.probe import element_centres, pulse, pulse_spectrum
+from echotruth.imaging.rf.probe import element_centres, pulse_spectrum
 
 
 def test_elements_are_a_pitch_apart_and_centred():

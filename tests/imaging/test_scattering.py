@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from benchmarks.exact_sum import exact_matrix
 from echotruth.config import Config, Probe
 from echotruth.config.loading import ConfigError, validate
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
-from echotruth.imaging.rf.exact import exact_matrix
 from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
 
 DEPTH = 11e-3

@@ -1,6 +1,5 @@
-"""Hearts driven by each of the prescribed quantities, interrupted and resumed, diseased and healthy."""
+"""Hearts driven by each of the prescribed quantities, diseased and healthy."""
 
-import logging
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from echotruth.mechanics.beat import beat
 from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.checkpoint import Checkpoints
 from echotruth.mechanics.solver.cycle import solve
 from echotruth.mechanics.solver.wall import equilibrium, wall
 
@@ -22,12 +20,12 @@ ELASTIC = Mechanics(viscosity_Pa_s=0.0, pericardium={"dashpot_kPa_s_per_mm": 0.0
 CONFIG = Config(geometry=COARSE, loop=Loop(frames=12), mechanics=ELASTIC)
 
 
-def solved(cycle, config=CONFIG, stiffness=None, checkpoints=None):
+def solved(cycle, config=CONFIG, stiffness=None):
     body = wall(config, left_ventricle(config.geometry))
     activation = Activation(body.tissue.tension_scale, body.tissue.activation_delay, cycle.period / len(cycle.time))
     equations = equilibrium(config, body)
     try:
-        return solve(equations, cycle, activation, stiffness, checkpoints)
+        return solve(equations, cycle, activation, stiffness)
     finally:
         equations.close()
 
@@ -59,19 +57,6 @@ def test_pressure_alone_fills_the_passive_heart_as_its_volume_does(cycle, driven
     assert filled.volume[0] == pytest.approx(driven.volume[0], rel=1e-7)
     back = solved(replace(slack, prescribed="volume", pressure=None, volume=filled.volume), stiffness=driven.stiffness)
     np.testing.assert_allclose(back.pressure, pressure, rtol=1e-6)
-
-
-@pytest.mark.slow
-def test_interrupted_beat_resumes_and_ends_in_the_same_bytes(cycle, driven, tmp_path, caplog):
-    uninterrupted = solved(cycle, checkpoints=Checkpoints(tmp_path))
-    for late in sorted(tmp_path.glob("*.frame"))[5:]:
-        late.unlink()
-    with caplog.at_level(logging.INFO, "echotruth.mechanics"):
-        resumed = solved(cycle, checkpoints=Checkpoints(tmp_path))
-    assert "resuming after 5 of 12 frames" in caplog.text
-    for name in vars(driven):
-        assert np.asarray(getattr(driven, name)).tobytes() == np.asarray(getattr(uninterrupted, name)).tobytes(), name
-        assert np.asarray(getattr(driven, name)).tobytes() == np.asarray(getattr(resumed, name)).tobytes(), name
 
 
 @pytest.mark.slow

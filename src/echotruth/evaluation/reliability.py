@@ -6,16 +6,11 @@ Statistician 1983; 32:12, doi 10.2307/2987588).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.evaluation.statistics import ratio
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 BINS = 10
 """Number of equal steps of quality from 0 to 1."""
@@ -62,59 +57,18 @@ def summary(quality: Floats, within: NDArray[np.bool_]) -> dict[str, float]:
     Returns
     -------
     dict of float
-        quality_percent, the mean quality; within_percent, the share of right points; calibration_error_percent, as
-        :func:`calibration_error`; brier_score, the mean of (quality - right)^2 (Brier, Mon Weather Rev 1950; 78:1).
+        quality_percent, the mean quality; within_percent, the share of right points; calibration_error_percent, the
+        expected calibration error (Naeini et al., Proc AAAI 2015; 29, doi 10.1609/aaai.v29i1.9602); brier_score, the
+        mean of (quality - right)^2 (Brier, Mon Weather Rev 1950; 78:1).
     """
     stated = np.clip(np.nan_to_num(quality, nan=0.0), 0, 1)
     nothing = not stated.size
     return {
         "quality_percent": np.nan if nothing else float(100 * np.mean(stated)),
         "within_percent": np.nan if nothing else float(100 * np.mean(within)),
-        "calibration_error_percent": _expected_error(*_counts(quality, within)),
+        "calibration_error_percent": expected_error(*_counts(quality, within)),
         "brier_score": np.nan if nothing else float(np.mean((stated - within) ** 2)),
     }
-
-
-def curve(table: pd.DataFrame) -> pd.DataFrame:
-    """Stated and observed share of right points by step of quality.
-
-    Parameters
-    ----------
-    table : DataFrame
-        As :attr:`echotruth.evaluation.clip_metrics.ClipMetrics.reliability`.
-
-    Returns
-    -------
-    DataFrame
-        For every size_px, tracker and step of quality, over the clips of the table: count, stated_percent (the mean
-        quality) and observed_percent (the share of right points); NaN where no point has such a quality.
-    """
-    keys = [name for name in ("size_px", "tracker", "quality_low", "quality_high") if name in table]
-    added = table.groupby(keys, sort=False)[list(COUNTS)].sum().reset_index()
-    count = added["count"].to_numpy(float)
-    shares = {
-        "stated_percent": 100 * ratio(added["quality_sum"].to_numpy(float), count),
-        "observed_percent": 100 * ratio(added["within_count"].to_numpy(float), count),
-    }
-    return added[[*keys, "count"]].assign(**shares)
-
-
-def calibration_error(table: pd.DataFrame) -> float:
-    """Expected calibration error (Naeini et al., Proc AAAI 2015; 29, doi 10.1609/aaai.v29i1.9602).
-
-    Parameters
-    ----------
-    table : DataFrame
-        As :func:`curve` takes it, of one tracker and image size.
-
-    Returns
-    -------
-    float
-        Mean over the points of the difference between stated and observed share of their step, in %; NaN without
-        points.
-    """
-    added = table.groupby("quality_low")[list(COUNTS)].sum()
-    return _expected_error(*(added[name].to_numpy(float) for name in COUNTS))
 
 
 def _counts(quality: Floats, within: NDArray[np.bool_]) -> list[Floats]:
@@ -125,7 +79,7 @@ def _counts(quality: Floats, within: NDArray[np.bool_]) -> list[Floats]:
     return [np.asarray(np.bincount(step, weight, BINS), float) for weight in weights]
 
 
-def _expected_error(count: Floats, quality_sum: Floats, within_count: Floats) -> float:
+def expected_error(count: Floats, quality_sum: Floats, within_count: Floats) -> float:
     """Mean difference of stated and observed share over the points, in %, from counts by step (step,)."""
     apart = np.abs(quality_sum - within_count).sum()
     return float(100 * ratio(np.asarray(apart, float), np.asarray(count.sum(), float)))

@@ -12,7 +12,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Config, Probe
 from echotruth.fem.tetrahedra import MaterialPoints, interpolate
 from echotruth.heart import Heart
-from echotruth.imaging.rf.exact import fresnel
+from echotruth.imaging.rf.probe import element_centres
 
 STEPS = {"previous": -1, "next": 1}
 """Frames that flow leads to, in their order along the dimension `to`, and their distance in frames."""
@@ -91,7 +91,7 @@ def _table(probe: Probe, farthest: float) -> tuple[Floats, Floats]:
 def beam_thickness(probe: Probe, range_: Floats) -> Floats:
     """Two-way -6 dB width of the beam in elevation at the centre frequency.
 
-    The lens has the same response E on transmit and on receive (:func:`echotruth.imaging.rf.exact.fresnel`), so that an
+    The lens has the same response E on transmit and on receive (:func:`fresnel`), so that an
     echo has the amplitude |E|^2. In the focus that is sinc^2(H y / (lambda F)), half its maximum at 0.443 lambda F / H.
 
     Parameters
@@ -116,3 +116,32 @@ def beam_thickness(probe: Probe, range_: Floats) -> Floats:
     inner, outer = over[rows, last], over[rows, last + 1]
     thickness: Floats = 2 * (elevation[rows, last] + elevation[:, 1] * inner / (inner - outer))
     return thickness
+
+
+def fresnel(probe: Probe, position: Floats, frequency: float) -> NDArray[np.complex128]:
+    """Response E of the lens of every element to every scatterer.
+
+    It is E(f) = 1/H int exp(-i k [h^2/2 (1/r' - 1/F) - h y/r']) dh, k = 2 pi f / c, of scatterers at elevation y and
+    range r' in the plane of the image, with height H and elevation focus F of the elements.
+
+    Parameters
+    ----------
+    probe : Probe
+    position : ndarray of shape (scatterers, 3), m
+        Lateral, axial, elevation.
+    frequency : float, Hz
+
+    Returns
+    -------
+    ndarray of shape (elements, scatterers), complex
+    """
+    p = probe.si()
+    range_ = np.hypot(position[:, 0] - element_centres(probe)[:, None], position[:, 1])
+    defocus, slope = 1 / range_ - 1 / p.elevation_focus, position[:, 2] / range_
+    wavenumber = 2 * np.pi * frequency / p.sound_speed
+    phase = wavenumber * p.height / 2 * (np.abs(slope).max() + np.abs(defocus).max() * p.height / 4)
+    node, weight = np.polynomial.legendre.leggauss(32 + int(phase))
+    response = np.zeros(range_.shape, complex)
+    for h, part in zip(node * p.height / 2, weight / 2, strict=True):
+        response += part * np.exp(-1j * wavenumber * (h**2 / 2 * defocus - h * slope))
+    return response

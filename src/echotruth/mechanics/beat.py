@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import logging
-import pickle
-from hashlib import sha256
-from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +14,6 @@ from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
 from echotruth.mechanics.history import Arrays, collect_outputs
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.checkpoint import Checkpoints
 from echotruth.mechanics.solver.cycle import SolvedCycle, solve
 from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
@@ -25,15 +21,13 @@ from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 logger = logging.getLogger("echotruth.mechanics")
 
 
-def beat(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
+def beat(config: Config) -> dict[str, Arrays]:
     """Solve one cycle of the heart of a configuration.
 
     Parameters
     ----------
     config : Config
         Only the seed and the sections geometry, fibres, pathology, loop and mechanics are used.
-    scratch : Path, optional
-        Folder in which solved frames are kept until the beat is complete, so that a stopped run continues there.
 
     Returns
     -------
@@ -49,7 +43,7 @@ def beat(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
     """
     cycle = read_loop(config.loop)
     unloaded = unloaded_wall(config, cycle)
-    solved = _solve(config, unloaded, cycle, scratch)
+    solved = _solve(config, unloaded, cycle)
     mechanics = vars(solved) | {
         "time": cycle.time,
         "displacement": _held(config, unloaded, solved),
@@ -60,7 +54,7 @@ def beat(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
     return collect_outputs(config, unloaded, mechanics)
 
 
-def simulate(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
+def simulate(config: Config) -> dict[str, Arrays]:
     """Move the heart of a configuration: by its beat (:func:`beat`), by a formula (:func:`.prescribed_motion`), or as
     its files do (:func:`.motion_from_file`).
     """
@@ -68,7 +62,7 @@ def simulate(config: Config, scratch: Path | None = None) -> dict[str, Arrays]:
         from echotruth.mechanics.motion_file.motion import motion_from_file
 
         return motion_from_file(config)
-    return beat(config, scratch) if config.motion.kind == "beat" else prescribed_motion(config)
+    return beat(config) if config.motion.kind == "beat" else prescribed_motion(config)
 
 
 def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
@@ -82,21 +76,14 @@ def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
     return wall(config, mesh)
 
 
-def _solve(config: Config, unloaded: Wall, cycle: Cycle, scratch: Path | None) -> SolvedCycle:
+def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     tissue = unloaded.tissue
     activation = Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
     equations = equilibrium(config, unloaded)
-    checkpoints = Checkpoints(scratch / _fingerprint(config, unloaded, cycle)) if scratch else None
     try:
-        return solve(equations, cycle, activation, config.mechanics.material.si().stiffness, checkpoints)
+        return solve(equations, cycle, activation, config.mechanics.material.si().stiffness)
     finally:
         equations.close()
-
-
-def _fingerprint(config: Config, unloaded: Wall, cycle: Cycle) -> str:
-    """Hash of all that a solution depends on."""
-    settings = config.fibres.model_dump(), config.seed, config.mechanics.model_dump()
-    return sha256(pickle.dumps((settings, unloaded, cycle))).hexdigest()[:16]
 
 
 def _held(config: Config, unloaded: Wall, solved: SolvedCycle) -> Floats:

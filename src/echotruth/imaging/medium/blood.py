@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from echotruth.config import Config
 from echotruth.fem.location import locate
@@ -18,8 +17,7 @@ from echotruth.fem.tetrahedra import Floats, Integers, MaterialPoints, interpola
 from echotruth.heart import Heart
 from echotruth.imaging.medium.phantom import cube_to_tetrahedron, max_jacobian
 from echotruth.imaging.medium.random_process import RandomProcess
-
-_EDGES = np.array([(0, 1), (1, 2), (2, 0)])
+from echotruth.mechanics.geometry.boundary import triangle_edges
 
 
 class Cavity:
@@ -42,7 +40,8 @@ class Cavity:
         self._wall, facets = np.unique(endo, return_inverse=True)
         facets = facets.reshape(endo.shape)
         self._vertices, spokes = np.unique(facets[:, :3], return_inverse=True)
-        self.rim = self._wall[_rim(facets)]
+        edges, number, count = triangle_edges(facets[:, :3].astype(np.int32))
+        self.rim = self._wall[np.unique(edges[count[number] == 1])]
         facets, spokes = 1 + facets, 1 + len(self._wall) + spokes.reshape(-1, 3)
         # The normals point to the centre, so that the order of the vertices is reversed.
         a, b, c, ab, bc, ca = facets.T
@@ -54,13 +53,6 @@ class Cavity:
         """Nodes of the cavity (n, 3), m, from the nodes of the wall (n_nodes, 3), m."""
         centre, wall = nodes[self.rim].mean(axis=0), nodes[self._wall]
         return np.vstack([centre, wall, (wall[self._vertices] + centre) / 2])
-
-
-def _rim(facets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Vertices of the edges that belong to one triangle only."""
-    edges = np.sort(facets[:, _EDGES].reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    return np.unique(unique[count == 1])
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ At a frequency f of the pulse of spectrum P, the echo between the elements i and
     u_ki(f) = D_i(f) E_i(f) exp(-alpha f r_i) exp(-2 pi i f r_i / c) / r_i,
 
 with the centre frequency f0, the exponent n of the scattering, the distance r_i, directivity D, response E of the lens
-and attenuation alpha of each way; see :mod:`~echotruth.imaging.rf.exact`, where it is summed as it stands. Here echoes
+and attenuation alpha of each way; see benchmarks/exact_sum.py, where it is summed as it stands. Here echoes
 are spread on a grid in time by short kernels (:mod:`~echotruth.imaging.rf.kernel`) and then filtered together, those of
 each exponent by a filter that contains the power of the frequency. By reciprocity only the pairs i <= j
 are computed, and of those only the ones between a few elements, from which all others follow for scatterers that are

@@ -5,7 +5,7 @@ Frame of the probe: origin at the centre of the array, coordinates in the order 
 
 from __future__ import annotations
 
-from math import log, pi, sqrt
+from math import log, sqrt
 
 import numpy as np
 
@@ -57,21 +57,3 @@ def pulse_spectrum(probe: Probe, frequency: np.ndarray) -> np.ndarray:
     low, high = pulse_band(probe)
     gaussian = np.exp(-((frequency - probe.si().frequency) ** 2) / (2 * spectral_width(probe) ** 2))
     return np.where((frequency >= low) & (frequency <= high), gaussian, 0.0)
-
-
-def pulse(probe: Probe, time: np.ndarray) -> np.ndarray:
-    """The two-way pulse in time, its peak at time 0.
-
-    Parameters
-    ----------
-    time
-        Shape (samples,), s.
-
-    Returns
-    -------
-    Shape (samples,), 1: the real part of the inverse transform of :func:`pulse_spectrum`, 1 at time 0.
-    """
-    low, high = pulse_band(probe)
-    frequency = np.linspace(low, high, 1025)
-    spectrum = pulse_spectrum(probe, frequency)
-    return np.cos(2 * pi * np.multiply.outer(np.asarray(time, float), frequency)) @ spectrum / spectrum.sum()

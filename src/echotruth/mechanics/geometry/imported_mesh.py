@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
@@ -23,7 +22,6 @@ METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 VOLUME_SUFFIXES, SURFACE_SUFFIXES = (".vtu", ".vtk", ".msh"), (".stl", ".ply", ".vtp")
 
 _TETRAHEDRA, _TRIANGLES = ("tetra", "tetra10"), ("triangle", "triangle6")
-_USED_TYPES = (*_TETRAHEDRA, *_TRIANGLES)
 _IGNORED_TYPES = ("vertex", "line", "line3", "polygon", "quad", "quad8", "quad9")
 """Cells without a volume, which a file of tetrahedra may hold beside them."""
 
@@ -124,22 +122,43 @@ def _read_vtk(source: str) -> ImportedMesh | None:
     import pyvista
 
     grid = _read_quietly(source)
-    if not isinstance(grid, pyvista.DataSet) or not grid.n_cells:
-        return None
+    return _of_grid(source, grid) if isinstance(grid, pyvista.DataSet) and grid.n_cells else None
+
+
+def _of_grid(source: str, grid: Any) -> ImportedMesh:
+    """The mesh of a data set of PyVista."""
+    import pyvista
+
     if isinstance(grid, pyvista.PolyData):
         grid = grid.triangulate()
     grid = _of_fixed_order(grid.cast_to_unstructured_grid())
     types = {int(number): _VTK_TYPES.get(int(number), f"VTK cell {number}") for number in np.unique(grid.celltypes)}
-    used = {number: name for number, name in types.items() if name in _USED_TYPES}
-    blocks = [(name, grid.cells_dict[number], grid.celltypes == number) for number, name in used.items()]
-    _refuse_other_types(source, types.values())
+    others = sorted(set(types.values()) - {*_TETRAHEDRA, *_TRIANGLES, *_IGNORED_TYPES})
+    if others:
+        raise GeometryError(f"{source}: holds cells of the kind {', '.join(others)}: split them into tetrahedra")
+    kinds = [[number for number, name in types.items() if name in names] for names in (_TETRAHEDRA, _TRIANGLES)]
+    if len(kinds[0]) > 1:
+        raise GeometryError(f"{source}: holds linear and quadratic tetrahedra: write all of them in one order")
+    tetrahedra = [grid.cells_dict[number] for number in kinds[0]] or [np.empty((0, 4))]
+    triangles = [grid.cells_dict[number][:, :3] for number in kinds[1]] or [np.empty((0, 3))]
+    arrays = {name: np.asarray(grid.cell_data[name]) for name in grid.cell_data}
+    of_cells, of_triangles = (
+        {name: _of_types(grid, values, some) for name, values in arrays.items() if some} for some in kinds
+    )
     return ImportedMesh(
         source,
         np.asarray(grid.points, dtype=float),
-        *_tetrahedra_and_triangles(source, [(name, cells) for name, cells, _ in blocks]),
-        *_split_arrays({name: np.asarray(grid.cell_data[name]) for name in grid.cell_data}, blocks),
+        np.concatenate(tetrahedra).astype(np.int32),
+        np.concatenate(triangles).astype(np.int32),
+        of_cells,
+        of_triangles,
         {name: np.asarray(grid.point_data[name]) for name in grid.point_data},
     )
+
+
+def _of_types(grid: Any, values: NDArray, types: list[int]) -> NDArray:
+    """Values at the cells of some types, one type after the other, of those at all cells."""
+    return np.concatenate([values[grid.celltypes == number] for number in types])
 
 
 def _of_fixed_order(grid: Any) -> Any:
@@ -177,45 +196,12 @@ def _read_quietly(source: str) -> Any:
 
 
 def _read_gmsh(source: str) -> ImportedMesh:
+    import pyvista
     from meshio import gmsh
 
     mesh = gmsh.read(source)
-    _refuse_other_types(source, [block.type for block in mesh.cells])
-    blocks = [(block.type, block.data) for block in mesh.cells]
-    arrays: tuple[Arrays, Arrays] = {}, {}
-    for into, types in zip(arrays, (_TETRAHEDRA, _TRIANGLES), strict=True):
-        for name, values in mesh.cell_data.items():
-            parts = [value for value, (kind, _) in zip(values, blocks, strict=True) if kind in types]
-            if parts:
-                into[name] = np.concatenate(parts)
     groups = {name: int(number) for name, (number, _) in mesh.field_data.items()}
-    nodes = np.asarray(mesh.points, dtype=float)
-    cells = _tetrahedra_and_triangles(source, blocks)
-    return ImportedMesh(source, nodes, *cells, *arrays, dict(mesh.point_data), groups)
-
-
-def _refuse_other_types(source: str, types: Iterable[str]) -> None:
-    others = sorted({name for name in types if name not in (*_USED_TYPES, *_IGNORED_TYPES)})
-    if others:
-        raise GeometryError(f"{source}: holds cells of the kind {', '.join(others)}: split them into tetrahedra")
-
-
-def _tetrahedra_and_triangles(source: str, blocks: list[tuple[str, NDArray]]) -> tuple[Integers, Integers]:
-    """Tetrahedra (n, 4 or 10) and straight triangles (n, 3) of blocks of one type each."""
-    tetrahedra = [cells for name, cells in blocks if name in _TETRAHEDRA] or [np.empty((0, 4))]
-    triangles = [cells[:, :3] for name, cells in blocks if name in _TRIANGLES] or [np.empty((0, 3))]
-    if len({cells.shape[1] for cells in tetrahedra}) > 1:
-        raise GeometryError(f"{source}: holds linear and quadratic tetrahedra: write all of them in one order")
-    return np.concatenate(tetrahedra).astype(np.int32), np.concatenate(triangles).astype(np.int32)
-
-
-def _split_arrays(arrays: Arrays, blocks: list[tuple[str, NDArray, NDArray]]) -> tuple[Arrays, Arrays]:
-    """Values at the tetrahedra and at the triangles, of arrays over all cells."""
-    split: list[Arrays] = []
-    for types in (_TETRAHEDRA, _TRIANGLES):
-        masks = [mask for name, _, mask in blocks if name in types]
-        split.append({name: np.concatenate([v[m] for m in masks]) for name, v in arrays.items() if masks})
-    return split[0], split[1]
+    return replace(_of_grid(source, pyvista.from_meshio(mesh)), physical_groups=groups)
 
 
 def merge_points(mesh: ImportedMesh) -> ImportedMesh:

@@ -7,7 +7,9 @@ pressure-volume loop, the volume from pressure and tension, the pressure from vo
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +17,6 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.loop.cycle import Cycle
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.checkpoint import Checkpoints, SolvedFrame
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load, State, Unknown
 from echotruth.mechanics.solver.newton import Diverged, LoadStepper, linear_combination
 
@@ -26,6 +27,26 @@ INITIAL_STIFFNESS = 1100.0
 
 UNKNOWN: dict[str, Unknown] = {"pressure_volume": "tension", "pressure": None, "volume": "cavity_pressure"}
 """Scalar unknown of each value of `loop.prescribed`."""
+
+
+class SolvedFrame(NamedTuple):
+    """A solved frame.
+
+    Attributes
+    ----------
+    state : State
+    load : Load
+        Balanced by the state.
+    factorizations : int
+        Number up to this frame.
+    max_error : float
+        Largest relative residual of force, cavity volume and cell volumes.
+    """
+
+    state: State
+    load: Load
+    factorizations: int
+    max_error: float
 
 
 @dataclass(frozen=True)
@@ -60,13 +81,7 @@ class SolvedCycle:
     stiffness: float
 
 
-def solve(
-    equations: Equilibrium,
-    cycle: Cycle,
-    activation: Activation,
-    stiffness: float | None = None,
-    checkpoints: Checkpoints | None = None,
-) -> SolvedCycle:
+def solve(equations: Equilibrium, cycle: Cycle, activation: Activation, stiffness: float | None = None) -> SolvedCycle:
     """Drive a heart through a cycle.
 
     Parameters
@@ -78,8 +93,6 @@ def solve(
     stiffness : float, optional, Pa
         C of the passive law. If not given, it is solved from end-diastole; if given, the
         volumes of a pressure-volume loop are scaled to the volume at end-diastolic pressure.
-    checkpoints : Checkpoints, optional
-        Frames solved before, from which the solution resumes, and those solved now.
 
     Returns
     -------
@@ -90,45 +103,43 @@ def solve(
     Diverged
         If a frame cannot be solved.
     """
-    stepper = LoadStepper(equations, INITIAL_STIFFNESS if stiffness is None else stiffness)
-    frames = checkpoints.load() if checkpoints else []
-    if frames:
-        logger.info("resuming after %d of %d frames", len(frames), len(cycle.time))
-        stepper.rest(frames[0].state)
-        stepper.resume(frames[-1])
-    else:
-        fill_to_end_diastole(stepper, cycle, stiffness)
-        stepper.rest(stepper.state)
-        frames = [_checkpoint(stepper, checkpoints)]
+    stepper = filled_to_end_diastole(equations, cycle, stiffness)
     if stiffness is not None and cycle.prescribed == "pressure_volume":
-        cycle = cycle.scaled(frames[0].load.volume / cycle.edv)
-    while len(frames) < len(cycle.time):
-        _solve_next(stepper, cycle, activation, [frame.state for frame in frames])
-        frames.append(_checkpoint(stepper, checkpoints))
-        _log(cycle, frames)
-    return _solved_cycle(equations, cycle, frames)
+        cycle = cycle.scaled(stepper.load.volume / cycle.edv)
+    return solved_cycle(equations, cycle, list(solved_frames(stepper, cycle, activation)))
 
 
-def fill_to_end_diastole(stepper: LoadStepper, cycle: Cycle, stiffness: float | None) -> None:
+def filled_to_end_diastole(equations: Equilibrium, cycle: Cycle, stiffness: float | None = None) -> LoadStepper:
     """Fill the passive heart to end-diastole.
 
     Parameters
     ----------
-    stepper : LoadStepper
-        In the unloaded state.
+    equations : Equilibrium
     cycle : Cycle
     stiffness : float, optional, Pa
         C. If not given, it is solved from the end-diastolic pressure and volume.
+
+    Returns
+    -------
+    LoadStepper
+        At end-diastole, at which the surroundings are at rest.
 
     Raises
     ------
     Diverged
         If the heart cannot be filled.
     """
+    stepper = LoadStepper(equations, INITIAL_STIFFNESS if stiffness is None else stiffness)
     if cycle.pressure is None:
         stepper.advance(Load(0.0, cycle.edv, 0.0), "cavity_pressure")
-        return
-    pressure, unloaded_volume = float(cycle.pressure[0]), stepper.load.volume
+    else:
+        _fill_to_pressure(stepper, cycle, float(cycle.pressure[0]), stiffness)
+    stepper.rest()
+    return stepper
+
+
+def _fill_to_pressure(stepper: LoadStepper, cycle: Cycle, pressure: float, stiffness: float | None) -> None:
+    unloaded_volume = stepper.load.volume
     if stiffness is None and cycle.edv <= unloaded_volume:
         edv, unloaded = cycle.edv * 1e9, unloaded_volume * 1e9
         volumes = f"{edv:.3g} uL at end-diastole, and the unloaded cavity {unloaded:.3g} uL"
@@ -138,6 +149,20 @@ def fill_to_end_diastole(stepper: LoadStepper, cycle: Cycle, stiffness: float | 
     if stiffness is None:
         state = stepper.advance(Load(pressure, cycle.edv, 0.0), "stiffness")
         logger.info("C = %.4g kPa for an end-diastolic volume of %.4g uL", state.stiffness / 1e3, cycle.edv * 1e9)
+
+
+def solved_frames(stepper: LoadStepper, cycle: Cycle, activation: Activation) -> Iterator[SolvedFrame]:
+    """The frames of a cycle, of which a stepper has solved the first one."""
+    states: list[State] = []
+    for frame, time in enumerate(cycle.time):
+        before = stepper.factorizations
+        if frame:
+            _solve_next(stepper, cycle, activation, states)
+            loads = stepper.load.pressure / 1e3, stepper.load.volume * 1e9, stepper.state.tension / 1e3
+            text = "frame %d of %d, %.4g ms: %.2f kPa, %.4g uL, T_Ca %.2f kPa, %d factorizations"
+            logger.info(text, frame, len(cycle.time), time * 1e3, *loads, stepper.factorizations - before)
+        states.append(stepper.state)
+        yield SolvedFrame(stepper.state, stepper.load, stepper.factorizations, stepper.max_error)
 
 
 def _solve_next(stepper: LoadStepper, cycle: Cycle, activation: Activation, states: list[State]) -> None:
@@ -159,28 +184,14 @@ def _solve_next(stepper: LoadStepper, cycle: Cycle, activation: Activation, stat
         stepper.state = replace(stepper.state, tension=float(cycle.tension[frame]))
 
 
-def _checkpoint(stepper: LoadStepper, checkpoints: Checkpoints | None) -> SolvedFrame:
-    frame = stepper.solved_frame()
-    if checkpoints:
-        checkpoints.add(frame)
-    return frame
-
-
-def _log(cycle: Cycle, frames: list[SolvedFrame]) -> None:
-    number, (before, now) = len(frames) - 1, frames[-2:]
-    pressure, volume, tension = now.load.pressure / 1e3, now.load.volume * 1e9, now.state.tension / 1e3
-    row = (number, len(cycle.time), cycle.time[number] * 1e3, pressure, volume, tension)
-    text = "frame %d of %d, %.4g ms: %.2f kPa, %.4g uL, T_Ca %.2f kPa, %d factorizations"
-    logger.info(text, *row, now.factorizations - before.factorizations)
-
-
 def _extrapolated(states: list[State]) -> tuple[State, ...]:
     """Next state by polynomials of degrees 3 to 1 through the last ones."""
     weights = ((-1, 4, -6, 4), (1, -3, 3), (-1, 2))
     return tuple(linear_combination(states[-len(row) :], row) for row in weights if len(states) >= len(row))
 
 
-def _solved_cycle(equations: Equilibrium, cycle: Cycle, frames: list[SolvedFrame]) -> SolvedCycle:
+def solved_cycle(equations: Equilibrium, cycle: Cycle, frames: Sequence[SolvedFrame]) -> SolvedCycle:
+    """The solved frames of a cycle together."""
     none = np.full(len(frames), np.nan)
     return SolvedCycle(
         displacement=np.array([equations.assembly.displacement(frame.state.solution) for frame in frames]),

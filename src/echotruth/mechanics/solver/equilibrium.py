@@ -305,7 +305,7 @@ class Equilibrium:
             matrix = matrix if self._acts(surface) else np.zeros_like(matrix)
             blocks.append(self.assembly.pack(surface.facets, matrix))
         self._solver.factor(self.assembly.matrix(self._response.tangent, *blocks))
-        return Tangent(self, unknown, load, state)
+        return Tangent(self, unknown, load)
 
     def solve(self, right: Floats) -> Floats:
         """Solution for a right-hand side (n_equations,) with the factors of the last tangent."""
@@ -324,9 +324,8 @@ class Equilibrium:
 class Tangent:
     """The factored tangent at one state, which gives corrections of this and later states."""
 
-    def __init__(self, equations: Equilibrium, unknown: Unknown, load: Load, state: State) -> None:
-        self._equations, self.unknown, self.load, self.state = equations, unknown, load, state
-        self.previous = equations.previous
+    def __init__(self, equations: Equilibrium, unknown: Unknown, load: Load) -> None:
+        self._equations, self.unknown = equations, unknown
         self._cell_gradient = equations._response.force[:, VOLUMETRIC].copy()  # G_c
         if unknown:
             self._volume_gradient = equations._volume_gradient  # g

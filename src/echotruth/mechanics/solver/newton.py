@@ -18,7 +18,6 @@ from math import log
 import numpy as np
 
 from echotruth.fem.sparse import SingularMatrix
-from echotruth.mechanics.solver.checkpoint import Linearization, SolvedFrame
 from echotruth.mechanics.solver.equilibrium import (
     Correction,
     Equilibrium,
@@ -109,24 +108,10 @@ class LoadStepper:
         self.load = replace(load, pressure=pressure, volume=self.equations.volume(self.state))
         return self.state
 
-    def solved_frame(self) -> SolvedFrame:
-        """The last solved state, with all that the next one depends on."""
-        at = self._tangent
-        linearization = Linearization(at.state, at.load, at.unknown, at.previous) if at and at.previous else None
-        return SolvedFrame(self.state, self.load, self.factorizations, self.max_error, linearization)
-
-    def rest(self, state: State) -> None:
-        """Let the surroundings act from a state on, at which they are at rest."""
-        self.equations.rest_at(state)
+    def rest(self) -> None:
+        """Let the surroundings act from the last solved state on, at which they are at rest."""
+        self.equations.rest_at(self.state)
         self._tangent = None
-
-    def resume(self, frame: SolvedFrame) -> None:
-        """Continue from a solved frame."""
-        self.state, self.load, self.factorizations = frame.state, frame.load, frame.factorizations
-        if frame.linearization:
-            at = frame.linearization
-            self.equations.set_previous(at.previous)
-            self._tangent = self.equations.linearize(at.state, at.load, at.unknown)
 
     def _solve(self, load: Load, unknown: Unknown, predictors: tuple[State, ...], step: float) -> State:
         state, residual = self._best_predictor(load, unknown, predictors)

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.config import Probe
-from echotruth.imaging.rf.probe import element_centres, pulse_spectrum
+from echotruth.imaging.flow import fresnel
+from echotruth.imaging.rf.probe import element_centres, pulse_band, pulse_spectrum
 from echotruth.imaging.rf.shadow import Rib
 
 Spectra = NDArray[np.complex128]
@@ -75,15 +76,19 @@ def one_way(probe: Probe, position: Floats, frequency: float, *, elevation: bool
     return wave * fresnel(probe, position, frequency) if elevation else wave
 
 
-def fresnel(probe: Probe, position: Floats, frequency: float) -> Spectra:
-    """Response E of the lens of every element to every scatterer: (elements, scatterers); as :func:`one_way`."""
-    p = probe.si()
-    range_ = np.hypot(position[:, 0] - element_centres(probe)[:, None], position[:, 1])
-    defocus, slope = 1 / range_ - 1 / p.elevation_focus, position[:, 2] / range_
-    wavenumber = 2 * np.pi * frequency / p.sound_speed
-    phase = wavenumber * p.height / 2 * (np.abs(slope).max() + np.abs(defocus).max() * p.height / 4)
-    node, weight = np.polynomial.legendre.leggauss(32 + int(phase))
-    response = np.zeros(range_.shape, complex)
-    for h, part in zip(node * p.height / 2, weight / 2, strict=True):
-        response += part * np.exp(-1j * wavenumber * (h**2 / 2 * defocus - h * slope))
-    return response
+def pulse(probe: Probe, time: np.ndarray) -> np.ndarray:
+    """The two-way pulse in time, its peak at time 0.
+
+    Parameters
+    ----------
+    time
+        Shape (samples,), s.
+
+    Returns
+    -------
+    Shape (samples,), 1: the real part of the inverse transform of :func:`pulse_spectrum`, 1 at time 0.
+    """
+    low, high = pulse_band(probe)
+    frequency = np.linspace(low, high, 1025)
+    spectrum = pulse_spectrum(probe, frequency)
+    return np.cos(2 * np.pi * np.multiply.outer(np.asarray(time, float), frequency)) @ spectrum / spectrum.sum()

@@ -8,17 +8,14 @@ Radiology 1982; 143:29, doi 10.1148/radiology.143.1.7063747). It needs no thresh
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from echotruth.arrays import Floats
 from echotruth.evaluation.resampling import CLIP, draws, percentiles
 from echotruth.evaluation.segment_strain import SHOWN
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 INFARCTED = 0.5
 """Share of the innermost layer of a segment above which it is infarcted: infarcts begin at the endocardium (Reimer et
@@ -93,8 +90,6 @@ def detection(segments: pd.DataFrame, score: str = "peak_percent", seed: int = 1
         which a view shows a corner only (`SHOWN`) are left out. NaN where there is nothing to compare, and in intervals
         of a single heart.
     """
-    import pandas as pd
-
     view = [name for name in CLIP if name in segments]
     label, fullest = infarcted(segments), segments.groupby(view)["points"].transform("max")
     shown = segments["points"].ge(SHOWN * fullest) & segments["component"].isin(TANGENTIAL)
