@@ -49,7 +49,7 @@ def is_query(option: str) -> bool:
 def option_errors(options: list[str]) -> list[str]:
     """What is wrong with the options that say where and on how many cores jobs run, in a sentence each.
 
-    Snakemake waits for ever with 0 cores, and tells of a profile that it does not find only when the run has begun.
+    Snakemake waits for ever with 0 cores.
 
     Parameters
     ----------
@@ -74,17 +74,8 @@ def option_errors(options: list[str]) -> list[str]:
 
 
 def _is_profile(name: str) -> bool:
-    """Whether a profile of the package, of Snakemake's own folders, or of this path exists."""
-    if name in PROFILES:
-        return True
-    if Path(name).is_file() and not Path(name).name.startswith(("config", "profile")):
-        return False  # Snakemake would read the configuration of a heart as a profile
-    from snakemake.cli import get_profile_dir
-
-    try:
-        return get_profile_dir(name) is not None
-    except OSError:
-        return False
+    """Whether a name may be that of a profile: Snakemake would read the configuration of a heart as one."""
+    return not Path(name).is_file() or Path(name).name.startswith(("config", "profile"))
 
 
 def executor_error(executor: object) -> str | None:
