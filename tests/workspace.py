@@ -61,9 +61,7 @@ class Workspace:
         own = {"PYTHONPATH": str(ROOT / "src"), "MPLBACKEND": "agg"}
         environment = {name: value for name, value in os.environ.items() if name != VARIABLE} | own
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-        return subprocess.Popen(
-            command, cwd=self.folder, env=environment, start_new_session=True, text=True, **pipes
-        )
+        return subprocess.Popen(command, cwd=self.folder, env=environment, start_new_session=True, text=True, **pipes)
 
     def run(self, *command: str, status: int = 0) -> str:
         """Output of a process that must end with a status."""
