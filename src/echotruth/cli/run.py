@@ -189,9 +189,10 @@ def _make(
     options, targets = split_targets(arguments.options)
     command = snakemake(folder / "config.yaml", options)
     running = Running(folder, config, command, targets, arguments.hearts_per_block)
-    status = execute(running.hearts(), config.name, Progress(expected), environment, arguments.blocks_at_once)
+    progress = Progress(expected, running.waiting())
+    status = execute(running.hearts(), config.name, progress, environment, arguments.blocks_at_once)
     if not status:
-        status = execute(running.end(), config.name, Progress(expected), environment)
+        status = execute(running.end(), config.name, progress, environment)
     if status == WRONG_OPTION:
         print("\nechotruth: Snakemake does not take these options: see echotruth run --help", file=sys.stderr)
     elif status:

@@ -60,6 +60,7 @@ class Plan:
         self._choose(Block.parse(block, source))
 
     def _choose(self, block: Block) -> None:
+        self._block = block
         self.cases: dict[str, Case] = {id: self._every[id] for id in block.of(self._motions)}
 
     def block(self, number: int, count: int) -> Plan:
@@ -136,8 +137,12 @@ class Plan:
         return [str(rf)] if "lines" in self.config.rf.keep else [str(rf), str(lines)]
 
     def records(self, wildcards: Wildcards) -> list[str]:
-        """Records of all jobs, so that a lost one is made again."""
-        return [str(path) for path in self._record_paths()]
+        """Records of all jobs, so that a lost one is made again; for what follows the blocks, their marks."""
+        number, count = self._block
+        if number:
+            return [str(path) for path in self._record_paths()]
+        blocks = [self.block(number, count) for number in range(1, count + 1)]
+        return [str(block.mark) for block in blocks if block.cases]
 
     def _record_paths(self) -> list[Path]:
         places = list(self.config.views), self.config.bmode.sizes
