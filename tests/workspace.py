@@ -23,7 +23,7 @@ COMMAND = [sys.executable, "-c", "from echotruth.cli import main; main()"]
 def contents(folder: Path) -> dict[str, str]:
     """Path in the store -> hash, of every file of a repository."""
     store = folder / f"{folder.name}.zarr"
-    files = [path for path in store.rglob("*") if path.is_file()]
+    files = [path for path in store.rglob("*") if path.is_file() and path.name != ".snakemake_timestamp"]
     return {path.relative_to(store).as_posix(): sha256(path.read_bytes()).hexdigest() for path in files}
 
 

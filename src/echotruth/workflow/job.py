@@ -185,7 +185,12 @@ class Job:
         self._commit(status="complete", sha256=checksums(files, self.store.path), **self._notes)
 
     def withdraw(self) -> None:
-        """Withdraw the record of an earlier run, because the files for which it vouches are about to change."""
+        """Withdraw the record of an earlier run, because the files for which it vouches are about to change.
+
+        So are those of the whole repository; and if this job is killed, Snakemake makes a record that is lost again
+        only for what lacks its own output.
+        """
+        (self.folder / "ledger/repository.json").unlink(missing_ok=True)
         self.record.unlink(missing_ok=True)
 
     def commit_without_result(self, status: str, reason: str) -> None:
