@@ -94,9 +94,18 @@ def test_repository_that_grew_step_by_step_equals_one_made_at_once(whole, tmp_pa
 def test_run_killed_while_a_stage_is_made_and_continued_gives_the_same_bytes(whole, tmp_path, stage):
     folder = Folder(tmp_path / "echotruth")
     run = folder.start(*COMMAND, "run", "tiny.yaml", "--cores", "1", "repository")
-    folder.kill_when(run, f"ledger/{stage}/**/*.json")
+    folder.kill_when(run, lambda: folder.has(f"ledger/{stage}/**/*.json"))
     assert differing(folder.make(CONFIG), whole) == []
     assert not (folder.out / "scratch").exists()
+
+
+@pytest.mark.parametrize("lacking", ["the first tracker", "a view"])
+def test_run_killed_while_a_repository_grows_and_continued_gives_the_same_bytes(whole, tmp_path, lacking):
+    folder = Folder(tmp_path / "echotruth")
+    folder.make(BEFORE[lacking])
+    run = folder.start(*COMMAND, "run", folder.write(text(CONFIG)), "--cores", "1", "repository")
+    folder.kill_when(run, lambda: not folder.has("ledger/repository.json"))
+    assert differing(folder.make(CONFIG), whole) == []
 
 
 @pytest.mark.parametrize("group", ["tracking", "evaluation", "bmode", "mechanics"])

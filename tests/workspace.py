@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 
@@ -83,10 +84,14 @@ class Workspace:
         file = "tiny.yaml" if config is None else self.write(config, "changed")
         return planned(self.snakemake("--configfile", file, "-n", "--cores", "2", *options))
 
-    def kill_when(self, process: subprocess.Popen[str], pattern: str) -> None:
-        """Kill a process with all that it started as soon as a file below `out/tiny` has a name of this pattern."""
+    def has(self, pattern: str) -> bool:
+        """Whether a file below `out/tiny` has a name of this pattern."""
+        return any(self.out.glob(pattern))
+
+    def kill_when(self, process: subprocess.Popen[str], condition: Callable[[], bool]) -> None:
+        """Kill a process with all that it started as soon as a condition holds."""
         end = time.monotonic() + SECONDS
-        while not list(self.out.glob(pattern)):
+        while not condition():
             assert process.poll() is None and time.monotonic() < end, process.stdout.read()
             time.sleep(0.02)
         os.killpg(process.pid, signal.SIGKILL)
