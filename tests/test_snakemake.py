@@ -103,6 +103,7 @@ def test_every_job_has_a_log_and_a_benchmark_of_snakemake(made):
 
 OWN = """\
 import yaml
+from echotruth.workflow.plan import Plan
 
 with open("tiny.yaml") as file:
     CONFIG = yaml.safe_load(file)
@@ -112,6 +113,9 @@ module echotruth:
     config: CONFIG
 
 use rule * from echotruth
+
+onstart:  # Snakemake does not run that of a module
+    Plan(CONFIG).begin()
 
 rule sizes:
     default_target: True
