@@ -88,7 +88,7 @@ def test_workflow_travels_in_the_wheel(wheel, name):
 def test_workflow_is_run_from_the_wheel_with_its_own_files(wheel, tmp_path):
     shipped = wheel / "echotruth/shipped"
     output = run(wheel, tmp_path, "run", "demo", "-n", "--cores", "1")
-    assert f"Using workflow specific profile {shipped}/profiles/default" in output
+    assert f"Snakefile: {shipped}/Snakefile" in output
     assert "tracking" in output and not (tmp_path / "out").exists()
     code = "from echotruth.workflow.processes import script; print(script('rf'))"
     environment = os.environ | {"PYTHONPATH": str(wheel)}
