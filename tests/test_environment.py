@@ -26,7 +26,8 @@ def requirements(*extras):
 def conda():
     """Name -> version bounds of every conda package."""
     entries = yaml.safe_load((ROOT / "environment.yml").read_text())["dependencies"]
-    return {name: bounds.strip() for name, _, bounds in (entry.partition(" ") for entry in entries)}
+    packages = [entry for entry in entries if isinstance(entry, str)]  # what pip installs after them is a mapping
+    return {name: bounds.strip() for name, _, bounds in (entry.partition(" ") for entry in packages)}
 
 
 def lock():

@@ -58,22 +58,39 @@ def test_sdist_has_tests_and_docs_and_no_data(sdist):
     assert sum((sdist / name).stat().st_size for name in found) < 20e6
 
 
+def run(wheel: Path, folder: Path, *arguments: str) -> str:
+    """Output of the command `echotruth` of the wheel, which must succeed."""
+    environment = os.environ | {"PYTHONPATH": str(wheel)}
+    command = [sys.executable, "-c", "from echotruth.cli import main; main()", *arguments]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def test_command_works_from_the_wheel_in_an_empty_folder(wheel, tmp_path):
     (tmp_path / "mine.yaml").write_text("name: mine\n")
-    code = f"import sys; sys.path.insert(0, {str(wheel)!r}); import echotruth; print(echotruth.__file__)"
-    command = [sys.executable, "-c", f"{code}; from echotruth.cli import main; main()", "check", "mine.yaml"]
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith(str(wheel))
-    assert "mine.yaml: valid" in done.stdout
+    assert "mine.yaml: valid" in run(wheel, tmp_path, "check", "mine.yaml")
 
 
-def test_shipped_configurations_travel_in_the_wheel_and_are_found_there(wheel, tmp_path):
-    assert files(ROOT / "config") == files(wheel / "echotruth/examples")
-    code = f"import sys; sys.path.insert(0, {str(wheel)!r}); from echotruth.cli import main; main()"
+def test_shipped_configurations_are_found_in_the_wheel(wheel, tmp_path):
     for arguments in (["new", "hearts"], ["cases", "hearts.yaml"], ["cases", "sweep"]):
-        done = subprocess.run(
-            [sys.executable, "-c", code, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
-        )
-        assert (done.returncode, done.stderr) == (0, ""), done.stderr
+        run(wheel, tmp_path, *arguments)
+
+
+@pytest.mark.parametrize("name", ["Snakefile", "environment.yml", "rules", "workflow", "profiles", "config"])
+def test_workflow_travels_in_the_wheel(wheel, name):
+    ours, shipped = ROOT / name, wheel / "echotruth/shipped" / name
+    assert shipped.exists() and files(ours) == files(shipped)
+    for file in files(ours) or {""}:
+        assert (shipped / file).read_bytes() == (ours / file).read_bytes()
+
+
+def test_workflow_is_run_from_the_wheel_with_its_own_files(wheel, tmp_path):
+    shipped = wheel / "echotruth/shipped"
+    output = run(wheel, tmp_path, "run", "demo", "-n", "--cores", "1")
+    assert f"Snakefile: {shipped}/Snakefile" in output
+    assert "tracking" in output and not (tmp_path / "out").exists()
+    code = "from echotruth.workflow.processes import script; print(script('rf'))"
+    environment = os.environ | {"PYTHONPATH": str(wheel)}
+    found = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == str(shipped / "workflow/scripts/rf.py")

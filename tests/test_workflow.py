@@ -1,25 +1,22 @@
 """The whole workflow on coarse hearts: results, reruns, and that a continued run gives the same bytes."""
 
 import json
-import os
-import re
-import signal
-import subprocess
 import sys
-import time
-from hashlib import sha256
+from itertools import product
 from pathlib import Path
 
-import cores
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from workspace import Workspace, differing
 
 import echotruth as et
 from echotruth.workflow.instructions import LEVEL, environment
 
 ROOT = Path(__file__).parents[1]
+TRACKERS = ("as_published", "corrected", "wall", "absent")
+PLAIN = ("--snakefile", str(ROOT / "Snakefile"), "--configfile", "tiny.yaml", "--cores", "1")
 CONFIG = """\
 name: tiny
 geometry: {circumferential_elements: 12, longitudinal_elements: 6, transmural_elements: 1}
@@ -40,62 +37,13 @@ tracking:
 cases:
   seed: [1, 2]
 """
-SNAKEMAKE = ("-m", "snakemake", "--snakefile", str(ROOT / "src/echotruth/workflow/Snakefile"))
-"""The workflow, without the command that runs it."""
-RUN = "from echotruth.cli import main; main()"
-"""The command `echotruth`, without its entry point."""
-
-
-class Workspace:
-    """Empty folder with a configuration, in which the workflow of the package is run.
-
-    It uses the compiled functions of the tests, unless `share_cache` is false.
-    """
-
-    def __init__(self, folder, share_cache=True):
-        self.folder = folder
-        folder.mkdir(exist_ok=True)
-        if share_cache:
-            cores.lend(folder / ".snakemake/numba")
-        (folder / "tiny.yaml").write_text(CONFIG)
-        self.out = folder / "out/tiny"
-
-    def start(self, *command):
-        """Start a process in its own process group."""
-        environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "MPLBACKEND": "agg"}
-        return subprocess.Popen(
-            [sys.executable, *command],
-            cwd=self.folder,
-            env=environment,
-            start_new_session=True,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-
-    def run(self, *command):
-        """Output of a process that must succeed."""
-        process = self.start(*command)
-        output, _ = process.communicate()
-        assert process.returncode == 0, output
-        return output
-
-    def snakemake(self, *options):
-        return self.run(*SNAKEMAKE, "--configfile", "tiny.yaml", *options)
-
-    @property
-    def bytes(self):
-        """Path in the store -> hash, of every file."""
-        root = self.out / "tiny.zarr"
-        files = [path for path in root.rglob("*") if path.is_file()]
-        return {path.relative_to(root).as_posix(): sha256(path.read_bytes()).hexdigest() for path in files}
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A folder in which the workflow ran on two cores."""
-    workspace = Workspace(tmp_path_factory.mktemp("first") / "echotruth")
-    workspace.snakemake("--cores", "2")
+    workspace = Workspace(tmp_path_factory.mktemp("first") / "echotruth", CONFIG)
+    workspace.snakemake("--configfile", "tiny.yaml", "--cores", "2")
     return workspace
 
 
@@ -109,10 +57,9 @@ def test_clip_read_at_a_notebook_is_tracked_and_scored_as_the_workflow_does(made
     folder, case = made.out, str(tree["bmode/128"]["case"].values[0])
     heart, clip = et.Repository(folder).heart(case), et.Repository(folder).clip(case, "long_axis", 64)
     tracked = et.track(clip, "corrected")
-    place = {"case": case, "view": "long_axis", "size": 64, "tracker": "corrected"}
-    stored = tree["tracking"].to_dataset().sel(place)
-    np.testing.assert_array_equal(tracked["displacement"], stored["displacement"])
-    nrmse = tree["evaluation"].to_dataset().scores.sel(place | {"score": "nrmse_all"})
+    place = {"case": case, "view": "long_axis"}
+    np.testing.assert_array_equal(tracked["displacement"], tree["tracking/64/corrected/displacement"].sel(place))
+    nrmse = tree["evaluation/64/corrected/scores"].sel(place | {"score": "nrmse_all"})
     assert et.evaluate(tracked, heart)["nrmse_all_percent"] == 100 * float(nrmse)
 
 
@@ -145,7 +92,12 @@ def test_tree_holds_what_the_schema_page_says_and_nothing_else(made, tree):
     coordinates = groups.pop("Coordinates")
     cases = groups.pop("cases")
     groups = {path: rows for path, rows in groups.items() if " " not in path}  # no members of packs
-    paths = {path.replace("SIZE", size): rows for path, rows in groups.items() for size in ("128", "64")}
+    places = list(product(("128", "64"), TRACKERS))
+    paths = {
+        path.replace("SIZE", size).replace("TRACKER", tracker): rows
+        for path, rows in groups.items()
+        for size, tracker in places
+    }
     nodes = {node.path.strip("/"): node.to_dataset(inherit=False).variables for node in tree.subtree}
     nodes = {path: variables for path, variables in nodes.items() if variables}
     assert set(nodes) == {*paths, "cases"}
@@ -187,37 +139,24 @@ def test_every_view_shows_wall_and_speckle_and_is_tracked(tree):
     for size in (128, 64):
         assert (tree[f"truth/{size}/labels"].sel(label="layer") > 0).any(("axial", "lateral")).all()
         assert (tree[f"bmode/{size}/image"].std(("axial", "lateral")) > 5).all()
-    coverage = tree["evaluation/scores"].sel(score="coverage", tracker=["as_published", "corrected", "wall"])
-    assert coverage.sizes["size"] == 2 and (coverage > 0.5).all()
+        for tracker in ("as_published", "corrected", "wall"):
+            assert (tree[f"evaluation/{size}/{tracker}/scores"].sel(score="coverage") > 0.5).all(), (size, tracker)
 
 
 def test_a_tracker_that_fails_is_a_row_of_the_leaderboard_and_not_the_end_of_the_run(made, tree):
-    assert (tree["evaluation/scores"].sel(score="coverage", tracker="absent", size=128) == 0).all()
-    record = json.loads(next((made.out / "ledger/tracking").glob("*/mid.json")).read_text())
-    assert set(record["failures"]) == {"absent/128", "absent/64"}
-    assert "cannot be imported" in record["failures"]["absent/64"]
+    assert (tree["evaluation/128/absent/scores"].sel(score="coverage") == 0).all()
+    for record in (made.out / "ledger/tracking").glob("*/mid/*.json"):
+        failures = json.loads(record.read_text())["failures"]
+        assert set(failures) == {"absent"} and "cannot be imported" in failures["absent"]
     board = pd.read_csv(made.out / "figures/leaderboard.csv").set_index(["size_px", "view", "tracker"])
     assert board.loc[(128, "all", "absent"), "failures"] == 4
     assert board.loc[(128, "all", "absent"), "nrmse_all_percent"] == pytest.approx(100)
     assert board.loc[(128, "all", "wall"), "rank"] == 1
 
 
-def test_figures_stand_beside_the_repository_and_of_scratch_only_checkpoints_stay(made):
+def test_figures_stand_beside_the_repository_and_nothing_is_left_in_scratch(made):
     assert {path.suffix for path in (made.out / "figures").iterdir()} == {".png", ".svg", ".gif", ".csv", ".mp4"}
-    left = {path.name for path in made.out.glob("scratch/**/*") if path.is_file()}
-    assert left == {"checkpoint.json"}
-
-
-@pytest.mark.slow
-def test_jobs_of_a_view_find_all_that_they_call_compiled(tmp_path):
-    """The miniature compiles all functions that the jobs call, with the same types."""
-    made = Workspace(tmp_path / "echotruth", share_cache=False)
-    (made.folder / "tiny.yaml").write_text(CONFIG.replace("[1, 2]\n", "[1]\n").replace("frames: 6", "frames: 4"))
-    made.snakemake("--cores", "2", "--until", "tracking")
-    records = [json.loads(path.read_text()) for path in made.out.glob("ledger/*/*/*.json")]
-    assert {record["stage"] for record in records} == {"phantom", "truth", "rf", "bmode", "tracking", "evaluation"}
-    assert {record["stage"]: record["compile_seconds"] for record in records if record["compile_seconds"]} == {}
-    assert "miniature failed" not in "".join(path.read_text() for path in made.out.glob("logs/**/*.log"))
+    assert not (made.out / "scratch").exists()
 
 
 def test_every_record_names_the_instructions_that_its_job_used(made):
@@ -228,76 +167,69 @@ def test_every_record_names_the_instructions_that_its_job_used(made):
 
 
 def test_second_run_has_nothing_to_do(made):
-    assert "Nothing to be done" in made.snakemake("-n", "--cores", "2")
+    assert made.planned() == {}
 
 
-def planned(made, text):
-    """Rule -> number of jobs that a configuration would run."""
-    (made.folder / "changed.yaml").write_text(text)
-    output = made.run(*SNAKEMAKE, "-n", "--configfile", "changed.yaml", "--cores", "2")
-    return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", output, re.MULTILINE)}
+END = {"repository": 1, "report": 1}
+IMAGES = {"phantom": 4, "rf": 4, "bmode": 8, "tracking": 8, **END}
+"""Jobs of two hearts with two views, of two sizes."""
 
 
-def test_changed_tracker_reruns_tracking_and_what_follows_it(made):
-    jobs = planned(made, CONFIG.replace("as_published: {window_px: 16}", "as_published: {window_px: 32}"))
-    assert jobs["tracking"] == 4 and jobs["repository"] == jobs["report"] == 1
-    assert not {"mechanics", "imaging"} & set(jobs)
+@pytest.mark.parametrize(("old", "new", "jobs"), [
+    ("as_published: {window_px: 16}", "as_published: {window_px: 32}", {"tracking": 8, **END}),
+    ("    absent: {method: external, track: \"absent:track\"}\n", "", {"tracking": 8, **END}),
+    ("downsampling: [1, 2]", "downsampling: [1, 2, 4]", {"truth": 4, "bmode": 4, "tracking": 4, **END}),
+    ("downsampling: [1, 2]", "downsampling: [1]", END),
+    ("  mid: {position: 0.5}\n", "  mid: {position: 0.5}\n  apex: {position: 0.7}\n",
+     {"phantom": 2, "rf": 2, "truth": 4, "bmode": 4, "tracking": 4, **END}),
+    ("mid: {position: 0.5}", "mid: {position: 0.6}",
+     {"phantom": 2, "rf": 2, "truth": 4, "bmode": 4, "tracking": 4, **END}),
+    ("seed: [1, 2]", "seed: [1, 2, 3]",
+     {"mechanics": 1, "phantom": 2, "rf": 2, "truth": 4, "bmode": 4, "tracking": 4, **END}),
+    ("elements: 16}", "elements: 20}", IMAGES),
+    ("name: tiny\n", "name: tiny\nmechanics: {base: fixed}\n", {"mechanics": 2, "truth": 8, **IMAGES}),
+    ("name: tiny\n", "name: tiny\nphysiology: {ejection_fraction_max: 0.99}\n", END),
+    ("name: tiny\n", "name: tiny\nphysiology: {ejection_fraction_min: 0.98}\n", {"truth": 8, **IMAGES}),
+])  # fmt: skip
+def test_change_runs_again_what_depends_on_it_and_nothing_else(made, old, new, jobs):
+    assert CONFIG.count(old) == 1
+    assert made.planned(CONFIG.replace(old, new)) == jobs
 
 
-@pytest.mark.slow
-def test_changed_probe_reruns_imaging_and_not_mechanics(made):
-    jobs = planned(made, CONFIG.replace("elements: 16}", "elements: 20}"))
-    assert jobs["imaging"] == jobs["tracking"] == 4
-    assert "mechanics" not in jobs
-
-
-@pytest.mark.slow
-def test_changed_bound_solves_no_heart_again(made):
-    jobs = planned(made, CONFIG + "physiology: {twist_max_deg: 50}\n")
-    assert (jobs["physiology"], jobs["imaging"], jobs["tracking"]) == (2, 4, 4)
-    assert "mechanics" not in jobs
-
-
-@pytest.mark.slow
-def test_changed_mechanics_reruns_everything(made):
-    jobs = planned(made, CONFIG + "mechanics: {base: fixed}\n")
-    assert (jobs["mechanics"], jobs["imaging"], jobs["tracking"]) == (2, 4, 4)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("stage, rule", [("phantom", "imaging"), ("bmode", "imaging"), ("tracking", "tracking")])
-def test_record_that_a_failed_job_lost_is_made_again(made, stage, rule):
-    record = next(made.out.glob(f"ledger/{stage}/*/mid.json"))
-    aside = record.rename(made.folder / "aside.json")
+@pytest.mark.parametrize(("record", "jobs"), [
+    ("phantom/*/mid", {"phantom": 1, "rf": 1, "bmode": 2, "tracking": 2, **END}),
+    ("rf/*/mid", {"phantom": 1, "rf": 1, "bmode": 2, "tracking": 2, **END}),
+    ("truth/*/mid/64", {"truth": 1, "tracking": 1, **END}),
+    ("bmode/*/mid/64", {"bmode": 1, "tracking": 1, **END}),
+    ("tracking/*/mid/64", {"tracking": 1, **END}),
+    ("repository", END),
+])  # fmt: skip
+def test_record_that_is_lost_is_made_again_with_what_follows_it(made, record, jobs):
+    path = next(made.out.glob(f"ledger/{record}.json"))
+    aside = path.rename(made.folder / "aside.json")
     try:
-        assert planned(made, CONFIG).get(rule) == 1
+        assert made.planned() == jobs
     finally:
-        aside.rename(record)
+        aside.rename(path)
 
 
 @pytest.fixture(scope="module")
-def killed(made, tmp_path_factory):
-    """Checkout whose run on one core was killed during imaging, after mechanics, and then continued."""
-    workspace = Workspace(tmp_path_factory.mktemp("second") / "echotruth")
-    process = workspace.start(*SNAKEMAKE, "--configfile", "tiny.yaml", "--cores", "1")
-    end = time.monotonic() + 600
-    while not list(workspace.out.glob("scratch/*/*/phantom.npz")):
-        assert process.poll() is None and time.monotonic() < end
-        time.sleep(0.02)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.communicate()
+def killed(tmp_path_factory):
+    """Folder whose run on one core was killed during imaging, after mechanics, and then continued."""
+    workspace = Workspace(tmp_path_factory.mktemp("second") / "echotruth", CONFIG)
+    run = workspace.start(sys.executable, "-m", "snakemake", *PLAIN)
+    workspace.kill_when(run, lambda: workspace.has("scratch/*/*/scatterers.npz"))
     before = {path: path.stat().st_mtime_ns for path in workspace.out.glob("ledger/mechanics/*.json")}
-    unfinished = len(list(workspace.out.glob("ledger/bmode/*/*.json")))
-    workspace.run("-c", RUN, "run", "tiny.yaml", "--cores", "1")
+    unfinished = len(list(workspace.out.glob("ledger/bmode/*/*/*.json")))
+    workspace.echotruth("run", "tiny.yaml", "--cores", "1")
     return workspace, before, unfinished
 
 
 @pytest.mark.slow
 def test_killed_run_taken_up_again_gives_the_bytes_of_an_unbroken_run_on_more_cores(made, killed):
     workspace, _, unfinished = killed
-    assert unfinished < 4
-    first, second = made.bytes, workspace.bytes
-    assert not [path for path in sorted({*first, *second}) if first.get(path) != second.get(path)]
+    assert unfinished < 8
+    assert differing(made.out, workspace.out) == []
 
 
 @pytest.mark.slow
@@ -308,8 +240,20 @@ def test_killed_run_keeps_the_mechanics_it_had(killed):
 
 
 @pytest.mark.slow
-def test_run_leaves_the_report_and_all_words_in_logs(killed):
+def test_run_leaves_the_report_and_all_words_in_logs_and_nothing_in_scratch(killed):
     out = killed[0].out
     assert (out / "report.html").stat().st_size > 10_000
     assert "Job stats" in (out / "logs/snakemake.log").read_text()
-    assert "done in" in next(out.glob("logs/imaging/*/mid.log")).read_text()
+    assert (out / "logs/repository.log").read_text().startswith("repository: 2 complete")
+    assert not (out / "scratch").exists()
+
+
+@pytest.mark.slow
+def test_repository_whose_probe_was_changed_equals_one_made_with_it(tmp_path):
+    text = CONFIG.replace("[1, 2]\n", "[1]\n").replace("frames: 6", "frames: 4")
+    changed, fresh = (Workspace(tmp_path / name, text) for name in ("changed", "fresh"))
+    changed.echotruth("run", "tiny.yaml", "--cores", "2", "repository")
+    for workspace in (changed, fresh):
+        workspace.write(text.replace("elements: 16}", "elements: 20}"))
+        workspace.echotruth("run", "tiny.yaml", "--cores", "2", "repository")
+    assert differing(changed.out, fresh.out) == []

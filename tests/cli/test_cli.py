@@ -105,7 +105,7 @@ def test_run_needs_no_checkout_and_makes_only_the_files_asked_for(tmp_path):
     config = ROOT / "config/demo.yaml"
     file = f"out/demo/ledger/mechanics/{expand(load(config), 'demo')[0].id}.json"
     status, output, _ = run_process("run", config, file, "-n", cwd=tmp_path)
-    assert status == 0 and "mechanics" in output and "imaging" not in output
+    assert status == 0 and "mechanics" in output and "phantom" not in output
 
 
 def test_option_that_snakemake_does_not_take_is_not_told_as_an_interrupted_run(tmp_path):

@@ -1,17 +1,13 @@
 """A SLURM of one node makes the bytes of a local run."""
 
-import hashlib
 import importlib.util
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from rigid_hearts import CONFIG
-
-from echotruth.workflow.lease import VARIABLE
+from workspace import COMMAND, Workspace, differing
 
 PROGRAMS = ("slurmctld", "slurmd", "sbatch", "munged", "mungekey")
 SEARCHED = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
@@ -31,26 +27,14 @@ NOT_STARTED = 78
 """Status of the script if a daemon of the cluster did not start."""
 
 
-def run(folder, *options, prefix=()):
-    folder.mkdir(exist_ok=True)
-    (folder / "tiny.yaml").write_text(CONFIG)
-    command = [*prefix, sys.executable, "-c", "from echotruth.cli import main; main()", "run", "tiny.yaml", *options]
-    environment = {name: value for name, value in os.environ.items() if name != VARIABLE}
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-    if prefix and done.returncode == NOT_STARTED:
-        pytest.skip(f"SLURM does not start on this machine: {done.stderr[-500:]}")
-    assert done.returncode == 0, done.stderr
-
-
-def content(folder):
-    files = [path for path in (folder / "out/tiny").glob("*.zarr/**/*") if path.is_file()]
-    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
-
-
 def test_slurm_makes_the_bytes_of_a_local_run(tmp_path):
-    local, cluster = tmp_path / "local", tmp_path / "cluster"
-    run(local, "--cores", "2")
-    run(cluster, "--profile", "slurm", prefix=["timeout", LIMIT, str(CLUSTER)])
-    assert content(cluster) == content(local)
-    submitted = (cluster / "out/tiny/logs/snakemake.log").read_text().count("has been submitted with SLURM jobid")
-    assert submitted <= 7  # one compilation, two hearts, two views, publication and report; not one a rule and heart
+    local, cluster = Workspace(tmp_path / "local", CONFIG), Workspace(tmp_path / "cluster", CONFIG)
+    local.echotruth("run", "tiny.yaml", "--cores", "2")
+    run = cluster.start("timeout", LIMIT, str(CLUSTER), *COMMAND, "run", "tiny.yaml", "--profile", "slurm")
+    output, _ = run.communicate()
+    if run.returncode == NOT_STARTED:
+        pytest.skip(f"SLURM does not start on this machine: {output[-500:]}")
+    assert run.returncode == 0, output
+    assert differing(cluster.out, local.out) == []
+    submitted = (cluster.out / "logs/snakemake.log").read_text().count("has been submitted with SLURM jobid")
+    assert submitted <= 5  # two hearts, their views, and repository with report; not one a rule and heart

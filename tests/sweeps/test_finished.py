@@ -1,7 +1,6 @@
 """A repository of hearts from a table is whole without the table: it is read, checked, merged and continued."""
 
 import shutil
-import sys
 from pathlib import Path
 
 import finished_repository as finished
@@ -9,13 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from echotruth.workflow.assignment import handed_case, write_configuration, write_sweep
 
 import echotruth as et
 from echotruth.cases import all_cases, expand
 from echotruth.config import Config
 from echotruth.config.loading import load, validate
 from echotruth.repository.check import check
+from echotruth.repository.layout import lay_out, read_case
 from echotruth.workflow.merging import merge_repositories
 
 pytestmark = pytest.mark.slow
@@ -27,14 +26,6 @@ m2,72.5,,MI,,"zwei
 kürzere"
 ,,,,14,
 """
-
-
-@pytest.fixture(scope="module", autouse=True)
-def script():
-    """The version in a record is that of the script that runs: here, of this module."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", [__file__])
-        yield
 
 
 def configured(folder: Path, name: str, table: str = TABLE, **cases):
@@ -84,15 +75,10 @@ def test_configuration_of_the_repository_has_the_lines_of_the_table(made):
     assert yaml.safe_load(text)["cases"]["table"] == TABLE
 
 
-def test_jobs_are_handed_their_heart_and_other_machines_the_whole_table(made, tmp_path):
-    config = load(made / "config.yaml")
-    cases = all_cases(config)
-    path = write_configuration(tmp_path, config)
-    assert "table" not in path.read_text()
-    for id, case in cases.items():
-        assert handed_case(id, path, case.parameters).config == case.config
-    sent = load(write_sweep(tmp_path, config))
-    assert {case.id: case.config for case in expand(sent)} == {id: case.config for id, case in cases.items()}
+def test_jobs_read_their_heart_without_the_table(made):
+    cases = all_cases(load(made / "config.yaml"))
+    assert {id: read_case(made, id).config for id in cases} == {id: case.config for id, case in cases.items()}
+    assert "table" not in (made / "cases/m1.json").read_text()
 
 
 def test_rows_that_are_added_leave_what_was_made(made, tmp_path):
@@ -101,7 +87,7 @@ def test_rows_that_are_added_leave_what_was_made(made, tmp_path):
     new = "m0,61,,MI,9,\n"
     head, rest = TABLE.split("\n", 1)
     config = configured(tmp_path, "small", f"{head}\n{new}{rest}")
-    finished.lay_out(folder, config, expand(config))
+    lay_out(folder, config, expand(config))
     after = finished.content(folder)
     shards = [name for name in before if not owners[name].endswith("structure.json")]
     assert shards and {name: after[name] for name in shards} == {name: before[name] for name in shards}

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from job_files import write_benchmark
 
 from echotruth.cases import expand
 from echotruth.config import Config
@@ -24,20 +25,11 @@ STAGES = {
     "tracking": ("tracking", "evaluation"),
     **{rule: (rule,) for rule in ("phantom", "truth", "rf", "bmode")},
 }
-HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 
 
 def configuration(name) -> Config:
     given = MEASURED[name]["config"]
     return load(ROOT / f"config/{given}.yaml") if isinstance(given, str) else validate(given, name)
-
-
-def write(folder: Path, job: str, s, cpu_time="NA") -> Path:
-    """Write the benchmark file of a job."""
-    file = folder / "benchmarks" / f"{job}.tsv"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(f"{HEADER}{s}\t0:00:01\tNA\tNA\tNA\tNA\t-\t-\tNA\t{cpu_time}\n")
-    return file
 
 
 @pytest.mark.parametrize("name", MEASURED)
@@ -98,12 +90,12 @@ def test_jobs_that_have_ended_tell_how_fast_this_machine_is(tmp_path):
     config = load(ROOT / "config/demo.yaml")
     (case,) = expand(config)
     for view in config.views:
-        write(tmp_path, f"rf/{case.id}/{view}", 3 * seconds("rf", config, view))
+        write_benchmark(tmp_path, f"rf/{case.id}/{view}", 3 * seconds("rf", config, view))
         for size in config.bmode.sizes:
-            write(tmp_path, f"truth/{case.id}/{view}/{size}", 2 * seconds("truth", config, view, size))
-    write(tmp_path, f"rf/{case.id}/mid", 40 + 3 * seconds("rf", config, "mid"))  # it compiled
-    write(tmp_path, "rf/another/mid", 1e6)
-    write(tmp_path, f"rf/{case.id}/a_view_of_before", 1e6)
+            write_benchmark(tmp_path, f"truth/{case.id}/{view}/{size}", 2 * seconds("truth", config, view, size))
+    write_benchmark(tmp_path, f"rf/{case.id}/mid", 40 + 3 * seconds("rf", config, "mid"))  # it compiled
+    write_benchmark(tmp_path, "rf/another/mid", 1e6)
+    write_benchmark(tmp_path, f"rf/{case.id}/a_view_of_before", 1e6)
     found = speed(tmp_path, {case.id: config})
     assert found == {"rf": pytest.approx(3, rel=0.01), "truth": pytest.approx(2, rel=0.01)}
 
@@ -113,9 +105,11 @@ def test_without_jobs_nothing_is_known_of_this_machine(tmp_path):
 
 
 def test_time_of_a_job_is_read_from_its_benchmark_file(tmp_path):
-    assert core_seconds(write(tmp_path, "rf/a/mid", 12.5)) == 12.5
-    assert core_seconds(write(tmp_path, "rf/a/mid", 12.5, 8.0)) == 12.5, "its end is missing from the CPU time"
-    assert core_seconds(write(tmp_path, "mechanics/a", 12.5, 40.0)) == 40, "of several threads"
-    assert core_seconds(write(tmp_path, "rf/a/mid", "NA", "-")) == 0
+    assert core_seconds(write_benchmark(tmp_path, "rf/a/mid", 12.5)) == 12.5
+    assert core_seconds(write_benchmark(tmp_path, "rf/a/mid", 12.5, 8.0)) == 12.5, (
+        "its end is missing from the CPU time"
+    )
+    assert core_seconds(write_benchmark(tmp_path, "mechanics/a", 12.5, 40.0)) == 40, "of several threads"
+    assert core_seconds(write_benchmark(tmp_path, "rf/a/mid", "NA", "-")) == 0
     (tmp_path / "cut.tsv").write_text("s\th:m")
     assert core_seconds(tmp_path / "cut.tsv") == core_seconds(tmp_path / "none.tsv") == 0

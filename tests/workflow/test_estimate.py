@@ -4,7 +4,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from workflow.test_cost import write
+from job_files import finish, write_benchmark
 
 from echotruth.cases import expand
 from echotruth.config import Config
@@ -19,18 +19,6 @@ ROOT = Path(__file__).parents[2]
 
 def estimated(config, cores=2, folder=Path("none"), times=1) -> Estimate:
     return estimate(config, expand(config) * times, cores, folder)
-
-
-def finish(folder: Path, rule: str, config: Config, cases: list[str]) -> None:
-    """Write a record of every job of a rule."""
-    if rule in ("repository", "report"):
-        paths = [folder / ("ledger/repository.json" if rule == "repository" else "report.html")]
-    else:
-        ends = [f"/{name}" for name in config.tracking.trackers] if rule == "tracking" else [""]
-        paths = [folder / f"ledger/{rule}/{job}{end}.json" for job in jobs(rule, config, cases) for end in ends]
-    for path in paths:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text('{"status": "complete"}')
 
 
 def test_demo_takes_the_minutes_that_it_took():
@@ -48,7 +36,7 @@ def test_after_the_first_heart_the_rest_takes_what_it_took(tmp_path):
     for rule in RULES[:6]:
         for view, size in places(rule, config):
             job = "/".join(str(part) for part in (rule, first.id, view, size) if part)
-            write(tmp_path, job, 3 * cost.seconds(rule, first.config, view, size))
+            write_benchmark(tmp_path, job, 3 * cost.seconds(rule, first.config, view, size))
     found = estimated(config, folder=tmp_path)
     assert found.seconds == pytest.approx(3 * before.seconds, rel=0.05)
     assert "jobs of mechanics" in table(found, tmp_path) and "a reference" in table(before, tmp_path)
@@ -74,7 +62,7 @@ def test_jobs_are_those_of_hearts_views_and_sizes():
     numbers = {rule: part.jobs for rule, part in parts.items()}
     assert numbers == {
         **{"mechanics": 2, "phantom": 8, "rf": 8, "truth": 24, "bmode": 24, "tracking": 24},
-        **{"repository": 1, "report": 3},
+        **{"repository": 1, "report": 1},
     }
 
 

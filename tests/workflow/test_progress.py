@@ -86,13 +86,6 @@ def test_a_slow_machine_is_known_by_the_jobs_that_have_ended():
     assert run.progress.activity == "rf (1 of 4)"
 
 
-def test_jobs_of_the_report_count_as_one_rule():
-    run = Run(report=10)
-    run.read("report              1\nreport_images       1\nreport_page         1\n" + began("report_images", 1))
-    run.read(ended("report_images", 1), 10)
-    assert run.progress.share == pytest.approx(1 / 3)
-
-
 def test_several_snakemakes_have_one_progress():
     run = Run({"mechanics": 2, "rf": 8}, mechanics=40, rf=100)
     run.read(PLAN + began("mechanics", 1))

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from echotruth.cli.snakemake import PROFILES, WORKFLOW, executor_error, option_errors, with_profiles
+from echotruth.cli.snakemake import FOLDER, PROFILES, executor_error, option_errors, split_targets, with_profiles
 
-PACKAGED = ["--workflow-profile", str(WORKFLOW / "profiles/slurm")]
+PACKAGED = ["--workflow-profile", str(FOLDER / "slurm")]
 
 
 @pytest.mark.parametrize("options", [["--profile", "slurm"], ["--profile=slurm"], ["--workflow-profile", "slurm"]])
@@ -42,18 +42,39 @@ def test_numbers_of_cores_that_snakemake_takes_are_no_errors(options):
     assert option_errors(options) == []
 
 
-@pytest.mark.slow
-def test_profile_that_is_none_is_refused_before_anything_is_written(tmp_path):
+@pytest.mark.parametrize("option", ["--config", "-C", "--configfile"])
+def test_configuration_is_not_changed_behind_its_file(option):
+    assert option_errors([option, "seed=3"]) == [f"{option}: change the file of the configuration"]
+
+
+def test_configuration_is_not_taken_for_a_profile(tmp_path):
     (tmp_path / "mine").mkdir()
-    (tmp_path / "mine/config.yaml").write_text("jobs: 2\n")
+    (tmp_path / "config.yaml").write_text("jobs: 2\n")
+    (tmp_path / "tiny.yaml").write_text("name: tiny\n")
     with chdir(tmp_path):
-        assert option_errors(["--profile", "mine"]) == option_errors(["--profile=slurm"]) == []
-        (error,) = option_errors(["--profile", "none"])
-        Path("tiny.yaml").write_text("name: tiny\n")
+        assert all(option_errors(["--profile", name]) == [] for name in ("mine", "slurm", "none", "config.yaml"))
         (swapped,) = option_errors(["--profile", "tiny.yaml"])
-    assert error.startswith("--profile none: is not a profile: give") and "slurm" in error and "before" not in error
+    assert swapped.startswith("--profile tiny.yaml: is not a profile: give") and "slurm" in swapped
     assert swapped.endswith("the file of the configuration comes before the options")
-    assert is_refused(run(tmp_path, "--profile", "none")) and not (tmp_path / "out").exists()
+    assert is_refused(run(tmp_path, "--profile", "tiny.yaml")) and not (tmp_path / "out").exists()
+
+
+def test_profile_that_is_not_there_is_told_by_snakemake(tmp_path):
+    done = run(tmp_path, "--profile", "nowhere")
+    assert done.returncode and "nowhere" in done.stderr and "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(("given", "options", "targets"), [
+    ("--cores 2 repository", "--cores 2", "repository"),
+    ("repository -n", "-n", "repository"),
+    ("--rerun-triggers mtime report -p", "--rerun-triggers mtime -p", "report"),
+    ("--forcerun repository", "--forcerun repository", ""),
+    ("-R repository --cores 2 all", "-R repository --cores 2", "all"),
+    ("out/tiny/ledger/rf/heart/mid.json -k", "-k", "out/tiny/ledger/rf/heart/mid.json"),
+    ("-R rf -- a b", "-R rf", "a b"),
+])  # fmt: skip
+def test_what_is_to_be_made_is_told_from_options(given, options, targets):
+    assert split_targets(given.split()) == (options.split(), targets.split())
 
 
 @pytest.mark.parametrize(("executor", "remedy"), [("slurm", "'echotruth[slurm]'"), ("lsf", "executor-plugin-lsf")])
@@ -129,7 +150,7 @@ def test_full_disk_is_told_in_one_line(full):
 def test_help_of_run_names_profiles_and_options_of_snakemake():
     command = [sys.executable, "-c", "from echotruth.cli import main; main()", "run", "--help"]
     text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert all(word in text for word in (*PROFILES, "--profile", "--cores", "--batch", "-n"))
+    assert all(word in text for word in (*PROFILES, "--profile", "--cores", "--hearts-per-block", "-n"))
 
 
 def test_dry_run_leaves_no_repository(tmp_path):

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.series import command, run_series
-from echotruth.workflow.stage_cost import Cost
 
 from echotruth.cases import expand
 from echotruth.config.loading import validate
 from echotruth.repository import ledger
 from echotruth.repository.checksums import verify
-from echotruth.repository.settings import mechanics_settings, motions
+from echotruth.repository.layout import lay_out
+from echotruth.repository.settings import mechanics as motion
+from echotruth.repository.settings import motions
 from echotruth.repository.store import Store
-from echotruth.workflow.job import Job
+from echotruth.workflow.job import Job, main
 from echotruth.workflow.sharing import first_with_same
+from workflow.scripts import mechanics as script
 
 SETTINGS = {
     "name": "small",
@@ -31,8 +31,12 @@ def configs(**changes):
     return {case.id: case.config for case in expand(config)}
 
 
-def mechanics(folder, case, *options):
-    run_series(command().parse_args([str(folder), case, "mechanics", *options]), Cost())
+def mechanics(folder, case, same_as=None):
+    """Run the script of the stage mechanics in this process."""
+    options = ["--same-as", str(record_path(folder, same_as))] if same_as else []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", ["mechanics.py", str(folder), case, *options])
+        main("mechanics", script.work, None)
 
 
 def record_path(folder, case):
@@ -58,11 +62,11 @@ def files(folder, row):
 
 def test_second_heart_takes_over_the_motion_without_solving_it(shared, monkeypatch):
     folder, first, second = shared
-    monkeypatch.setattr("echotruth.workflow.scripts.mechanics.work", lambda job: pytest.fail("solved again"))
-    mechanics(folder, second, "--same-as", first)
+    monkeypatch.setattr(script, "simulate", lambda config: pytest.fail("solved again"))
+    mechanics(folder, second, first)
     one, other = (ledger.read(record_path(folder, case)) for case in (first, second))
     assert (other["status"], other["shared_with"], other["case"]) == ("complete", first, second)
-    assert other["cpu_seconds"] < one["cpu_seconds"]
+    assert other["bounded"] == one["bounded"]
     assert list(one["sha256"].values()) == list(other["sha256"].values())
     sources, targets = files(folder, 0), files(folder, 1)
     assert len(sources) == len(targets) > 30
@@ -82,14 +86,14 @@ def test_files_are_copied_where_links_are_not_possible(shared, monkeypatch):
         raise PermissionError
 
     monkeypatch.setattr("os.link", refuse)
-    mechanics(folder, second, "--same-as", first)
+    mechanics(folder, second, first)
     assert not any(one.samefile(other) for one, other in zip(files(folder, 0), files(folder, 1), strict=True))
     assert verify(folder / "small.zarr", record_path(folder, second), ledger.read(record_path(folder, second)))
 
 
 def test_heart_that_is_written_later_leaves_the_other_as_it_was(shared):
     folder, first, second = shared
-    mechanics(folder, second, "--same-as", first)
+    mechanics(folder, second, first)
     before = [file.read_bytes() for file in files(folder, 0)]
     store = Store(folder / "small.zarr")
     store.write("mechanics", {"pressure": np.ones(3)}, 1)
@@ -101,18 +105,17 @@ def test_heart_that_is_written_later_leaves_the_other_as_it_was(shared):
 def test_motion_taken_over_twice_leaves_no_drafts(shared):
     folder, first, second = shared
     for _ in range(2):
-        mechanics(folder, second, "--same-as", first)
+        mechanics(folder, second, first)
         record_path(folder, second).unlink()
-        (folder / "scratch" / second / "checkpoint.json").unlink()
     assert not list(folder.rglob("*.partial"))
 
 
 def test_heart_fails_with_the_reason_of_the_one_whose_motion_it_shares(shared):
     folder, first, second = shared
-    Job(folder, "mechanics", first, code="0").record_without_result("failed", "no equilibrium")
-    mechanics(folder, second, "--same-as", first)
+    Job(folder, "mechanics", first, code="0").commit_without_result("failed", "no equilibrium")
+    mechanics(folder, second, first)
     record = ledger.read(record_path(folder, second))
-    assert (record["status"], record["reason"], record["shared_with"]) == ("failed", "no equilibrium", first)
+    assert (record["status"], record["reason"]) == ("failed", "no equilibrium")
     assert not files(folder, 1)
 
 
@@ -121,7 +124,7 @@ def test_damaged_motion_is_not_taken_over(shared):
     damaged = files(folder, 0)[7]
     damaged.write_bytes(damaged.read_bytes()[1:])
     with pytest.raises(SystemExit, match="differs from what"):
-        mechanics(folder, second, "--same-as", first)
+        mechanics(folder, second, first)
     assert not record_path(folder, second).exists() and not files(folder, 1)
 
 
@@ -150,7 +153,7 @@ def test_hearts_that_move_differently_do_not(key):
     cases, changes = OTHER[key]
     found = configs(cases=cases, **changes)
     assert len(set(motions(found).values())) == 2
-    assert motions(found) == {case: mechanics_settings(config) for case, config in found.items()}
+    assert motions(found) == {case: motion(config) for case, config in found.items()}
 
 
 def test_first_of_equal_hearts_stays_the_first_when_another_comes_before_it():

@@ -9,8 +9,7 @@ import time
 
 import pytest
 import yaml
-from workflow.test_cost import write
-from workflow.test_estimate import finish
+from job_files import finish, write_benchmark
 
 from echotruth.cases import expand
 from echotruth.config import Config, PhaseCorrelation, Tracking
@@ -53,7 +52,7 @@ def test_finished_repository_is_finished(folder):
     status = status_of(folder)
     assert status["state"] == "finished" and "is finished" in text(status)
     assert counts(status, "rf") == (8, 8, 0, 0, 0) and counts(status, "mechanics") == (2, 2, 0, 0, 0)
-    assert counts(status, "tracking") == (24, 24, 0, 0, 0) and counts(status, "report") == (3, 3, 0, 0, 0)
+    assert counts(status, "tracking") == (24, 24, 0, 0, 0) and counts(status, "report") == (1, 1, 0, 0, 0)
     assert status["verdicts"] == {"complete": 2, "implausible": 0, "failed": 0} and not status["reasons"]
 
 
@@ -82,18 +81,18 @@ def test_run_that_was_stopped_before_its_hearts_were_known_is_not_finished(folde
 
 
 def test_what_has_no_record_waits_although_nobody_works_on_it(folder):
-    (folder / f"ledger/tracking/{FIRST}/mid/512/one.json").unlink()
+    (folder / f"ledger/tracking/{FIRST}/mid/512.json").unlink()
     status = status_of(folder)
     assert status["state"] == "stopped" and counts(status, "tracking") == (24, 23, 0, 0, 1)
 
 
 def test_hearts_that_are_not_complete_are_named_with_the_reason(folder):
     record(folder, FIRST, status="failed", reason="frame 3 has no equilibrium")
-    record(folder, SECOND, status="implausible", reason="it twists by 50 deg")
+    record(folder, SECOND, bounded={"twist_max_deg": 50.0})
     status = status_of(folder)
     assert status["verdicts"] == {"complete": 0, "implausible": 1, "failed": 1}
     assert status["reasons"][FIRST] == {"status": "failed", "reason": "frame 3 has no equilibrium"}
-    assert f"{SECOND}: implausible: it twists by 50 deg" in text(status)
+    assert f"{SECOND}: implausible: the largest twist (deg) is 50 and must be at most" in text(status)
 
 
 def test_damaged_record_of_a_heart_is_a_reason(folder):
@@ -134,7 +133,7 @@ def write_log(folder, content, name="snakemake.log"):
 def test_run_that_goes_on_tells_what_runs_and_how_long_it_will_take(folder):
     for view in CONFIG.views:
         (folder / f"ledger/rf/{FIRST}/{view}.json").unlink()
-        write(folder, f"rf/{SECOND}/{view}", 600)
+        write_benchmark(folder, f"rf/{SECOND}/{view}", 600)
     with lease.held(folder):
         write_log(folder, started(1, FIRST, "mid"))
         status = status_of(folder)
@@ -222,21 +221,21 @@ def test_every_state_has_its_words(folder):
 
 def test_run_ends_with_hearts_reasons_time_and_places(folder):
     start = time.time()
-    write(folder, f"rf/{FIRST}/mid", 200, "NA")
-    write(folder, f"mechanics/{FIRST}", 100, 280)
-    os.utime(write(folder, f"rf/{SECOND}/mid", 9000), (start - 60, start - 60))
-    record(folder, SECOND, status="implausible", reason="it twists by 50 deg")
+    write_benchmark(folder, f"rf/{FIRST}/mid", 200, "NA")
+    write_benchmark(folder, f"mechanics/{FIRST}", 100, 280)
+    os.utime(write_benchmark(folder, f"rf/{SECOND}/mid", 9000), (start - 60, start - 60))
+    record(folder, SECOND, bounded={"twist_max_deg": 50.0})
     said, exit_status = finished_text(folder, start, True)
     assert exit_status == 0
     for word in (
         "1 complete, 1 implausible",
-        "it twists by 50 deg",
+        "(physiology.twist_max_deg)",
         "(8 min of CPU time)",
         "small.zarr",
         "report.html",
     ):
         assert word in said
-    record(folder, FIRST, status="implausible", reason="it twists by 50 deg")
+    record(folder, FIRST, bounded={"twist_max_deg": 50.0})
     said, exit_status = finished_text(folder, start, True)
     assert "No heart is complete" in said and exit_status == NO_HEART
     assert finished_text(folder, start, False)[1] == 0, "implausible hearts are imaged too"

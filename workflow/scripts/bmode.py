@@ -23,8 +23,8 @@ def kept_lines(job: Job) -> tuple[np.ndarray, np.ndarray]:
 
 
 def passed_lines(job: Job) -> tuple[np.ndarray, np.ndarray]:
-    with np.load(job.lines) as file:
-        return file["lines"], file["range"]
+    passed = job.passed_on(job.lines)
+    return passed["lines"], passed["range"]
 
 
 if __name__ == "__main__":

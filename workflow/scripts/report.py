@@ -1,6 +1,7 @@
 """Draw the figures of a repository, and write the page that shows them."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from echotruth.report import page
@@ -9,6 +10,10 @@ from echotruth.repository.reader import Repository
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
-repository = Repository(parser.parse_args().repository)
+folder = parser.parse_args().repository
+try:
+    repository = Repository(folder)
+except FileNotFoundError as error:
+    sys.exit(f"report: {error}")
 Figures(repository, repository.folder / "figures").draw()
 page.write(repository)

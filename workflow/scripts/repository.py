@@ -10,8 +10,8 @@ from echotruth.repository.publication import publish
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
-folder = parser.parse_args().repository
 try:
+    folder = ledger.repository_folder(parser.parse_args().repository)
     summary = publish(folder)
 except (ChecksumError, FileNotFoundError) as error:
     sys.exit(f"repository: {error}")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echotruth.cli.command import Commands, add_command, add_configuration, fail
-from echotruth.cli.snakemake import executor_error, is_query, option_errors, with_profiles
+from echotruth.cli.snakemake import executor_error, is_query, option_errors, split_targets, with_profiles
 from echotruth.config import shipped
 
 if TYPE_CHECKING:
@@ -186,11 +186,13 @@ def _make(
     except (GeometryError, MotionError) as error:
         return fail(f"{arguments.config}: {error}")
     # The copy in the repository: the file may change while jobs wait in a queue.
-    command = snakemake(folder / "config.yaml", arguments.options)
-    running = Running(folder, config, command, arguments.hearts_per_block)
-    status = execute(running.hearts(), config.name, Progress(expected), environment, arguments.blocks_at_once)
+    options, targets = split_targets(arguments.options)
+    command = snakemake(folder / "config.yaml", options)
+    running = Running(folder, config, command, targets, arguments.hearts_per_block)
+    progress = Progress(expected, running.waiting())
+    status = execute(running.hearts(), config.name, progress, environment, arguments.blocks_at_once)
     if not status:
-        status = execute(running.end(), config.name, Progress(expected), environment)
+        status = execute(running.end(), config.name, progress, environment)
     if status == WRONG_OPTION:
         print("\nechotruth: Snakemake does not take these options: see echotruth run --help", file=sys.stderr)
     elif status:

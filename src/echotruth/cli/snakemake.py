@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from echotruth.config import shipped
+from echotruth.workflow.jobs import TARGETS
 
 FOLDER = shipped.ROOT / "workflow/profiles"
 PROFILES = sorted(path.name for path in FOLDER.iterdir())
@@ -17,6 +18,12 @@ PROFILE_OPTIONS = ("--profile", "--workflow-profile")
 
 NUMBER_OPTIONS = {"--cores": "all", "-c": "all", "--jobs": "unlimited", "-j": "unlimited"}
 """Options that take a number of jobs at the same time -> the word that they take as well."""
+
+CONFIG_OPTIONS = ("--config", "-C", "--configfile", "--configfiles")
+"""Options that would change the configuration after it was read."""
+
+RULE_OPTIONS = ("--forcerun", "-R", "--until", "-U", "--omit-from", "-O", "--prioritize", "-P", "--allowed-rules")
+"""Options that take names of rules."""
 
 OWN_EXECUTORS = ("local", "dryrun", "touch")
 """Executors of Snakemake itself; others are packages."""
@@ -41,22 +48,40 @@ def with_profiles(options: list[str]) -> list[str]:
     return options
 
 
-def is_query(option: str) -> bool:
-    """Whether an option makes Snakemake only print."""
-    return option in QUERY_OPTIONS or re.fullmatch(r"-[a-z]*n[a-z]*", option) is not None
-
-
-def option_errors(options: list[str]) -> list[str]:
-    """What is wrong with the options that say where and on how many cores jobs run, in a sentence each.
-
-    Snakemake waits for ever with 0 cores, and tells of a profile that it does not find only when the run has begun.
+def split_targets(options: list[str]) -> tuple[list[str], list[str]]:
+    """Options without the rules and files that are to be made, and these.
 
     Parameters
     ----------
     options : list of str
         Options for Snakemake, as the user gave them.
     """
-    found = []
+    others: list[str] = []
+    targets: list[str] = []
+    flag = ""
+    for option in options:
+        flag = option if option.startswith("-") else flag
+        is_target = flag == "--" or (flag not in RULE_OPTIONS and (option in TARGETS or option.startswith("out/")))
+        (targets if is_target else others).append(option)
+    return others, [target for target in targets if target != "--"]
+
+
+def is_query(option: str) -> bool:
+    """Whether an option makes Snakemake only print."""
+    return option in QUERY_OPTIONS or re.fullmatch(r"-[a-z]*n[a-z]*", option) is not None
+
+
+def option_errors(options: list[str]) -> list[str]:
+    """What is wrong with the options that say what is run, where and on how many cores, in a sentence each.
+
+    Snakemake waits for ever with 0 cores.
+
+    Parameters
+    ----------
+    options : list of str
+        Options for Snakemake, as the user gave them.
+    """
+    found = [f"{flag}: change the file of the configuration" for flag in CONFIG_OPTIONS if flag in options]
     parts = [part for option in options for part in (option.split("=", 1) if option.startswith("--") else [option])]
     for flag, value in pairwise(parts):
         if value.startswith("-") and not value[1:].isdigit():
@@ -74,17 +99,8 @@ def option_errors(options: list[str]) -> list[str]:
 
 
 def _is_profile(name: str) -> bool:
-    """Whether a profile of the package, of Snakemake's own folders, or of this path exists."""
-    if name in PROFILES:
-        return True
-    if Path(name).is_file() and not Path(name).name.startswith(("config", "profile")):
-        return False  # Snakemake would read the configuration of a heart as a profile
-    from snakemake.cli import get_profile_dir
-
-    try:
-        return get_profile_dir(name) is not None
-    except OSError:
-        return False
+    """Whether a name may be that of a profile: Snakemake would read the configuration of a heart as one."""
+    return not Path(name).is_file() or Path(name).name.startswith(("config", "profile"))
 
 
 def executor_error(executor: object) -> str | None:

@@ -164,12 +164,16 @@ class Inventory:
         return path.relative_to(self.folder).as_posix()
 
 
+TIMESTAMP = ".snakemake_timestamp"
+"""File that Snakemake leaves in a folder that is a target."""
+
+
 def files_below(folder: Path) -> Iterator[str]:
     """Paths of all files below a folder, of which only one folder at a time is kept in memory."""
     length = len(str(folder)) + 1
     for parent, _, names in os.walk(folder):
         below = parent[length:].replace(os.sep, "/")
-        yield from (f"{below}/{name}" if below else name for name in names)
+        yield from (f"{below}/{name}" if below else name for name in names if name != TIMESTAMP)
 
 
 def reason(error: BaseException) -> str:

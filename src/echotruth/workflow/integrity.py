@@ -61,6 +61,9 @@ def _heal(folder: Path, quick: bool) -> int:
     report = check(folder, progress=_progress, quick=quick)
     status = _print(folder, report)
     records, files = heal(report)
+    if records:
+        # What was published is no more; only for what lacks its output, Snakemake makes a record again.
+        (folder / "ledger/repository.json").unlink(missing_ok=True)
     if records or files:
         print(f"dropped: {records} records and {files} files: echotruth run makes them again")
     return status

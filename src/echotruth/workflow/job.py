@@ -28,7 +28,7 @@ from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.repository import ledger, packing, schema
 from echotruth.repository.case_file import read_case
 from echotruth.repository.checksums import ChecksumError, checksums
-from echotruth.repository.ledger import STAGES, record_path
+from echotruth.repository.ledger import STAGES, record_path, repository_folder
 from echotruth.repository.provenance import code_version
 from echotruth.repository.store import NotWritten, Store
 from echotruth.repository.verdict import excluded
@@ -141,6 +141,25 @@ class Job:
         """Files of this job in a group."""
         return self.store.files(group, *self.index)
 
+    def pass_on(self, file: Path, arrays: Mapping[str, np.ndarray]) -> None:
+        """Write the file with which a stage of a view passes arrays on."""
+        file.parent.mkdir(parents=True, exist_ok=True)
+        np.savez(file, **arrays)  # type: ignore[arg-type]  # no array has the name of an option
+
+    def passed_on(self, file: Path) -> dict[str, np.ndarray]:
+        """Arrays that an earlier stage of the view passed on.
+
+        Raises
+        ------
+        FileNotFoundError
+            If they are not there, or not any more.
+        """
+        if not file.is_file():
+            stage = {self.scatterers: "phantom", self.lines: "rf"}[file]
+            raise FileNotFoundError(f"{file}: is not there: run the stage {stage} first")
+        with np.load(file) as opened:
+            return dict(opened)
+
     def note(self, **entries: Any) -> None:
         """Add entries to the record of this job."""
         self._notes |= entries
@@ -166,7 +185,12 @@ class Job:
         self._commit(status="complete", sha256=checksums(files, self.store.path), **self._notes)
 
     def withdraw(self) -> None:
-        """Withdraw the record of an earlier run, because the files for which it vouches are about to change."""
+        """Withdraw the record of an earlier run, because the files for which it vouches are about to change.
+
+        So are those of the whole repository; and if this job is killed, Snakemake makes a record that is lost again
+        only for what lacks its own output.
+        """
+        (self.folder / "ledger/repository.json").unlink(missing_ok=True)
         self.record.unlink(missing_ok=True)
 
     def commit_without_result(self, status: str, reason: str) -> None:
@@ -177,7 +201,7 @@ class Job:
                 file.unlink()
         passed_on = {"phantom": [self.scatterers], "rf": [self.lines]}
         for file in passed_on.get(self.stage, []):
-            file.touch()
+            self.pass_on(file, {})
         self._commit(status=status, reason=reason)
 
     def _commit(self, **entries: Any) -> None:
@@ -190,10 +214,11 @@ class Job:
 def main(stage: str, work: Work, description: str | None) -> None:
     """Run a stage with the arguments of its command line, and record its result, or that the heart has none."""
     arguments = vars(_parser(stage, description).parse_args())
+    folder = arguments.pop("folder")
     _prepare(arguments.pop("threads"), " ".join(str(arguments[name]) for name in STAGES[stage]))
     try:
-        lease.follow(arguments["folder"])
-        job = Job(stage=stage, **arguments)
+        lease.follow(folder)
+        job = Job(repository_folder(folder), stage, **arguments)
     except (ConfigError, FileNotFoundError, KeyError, lease.LeaseError) as error:
         sys.exit(f"{stage}: {error}")
     if job.view_name is not None and job.view_name not in job.config.views:

@@ -13,6 +13,8 @@ FINAL_RULES = ("repository", "report")
 """What is made once, after all hearts."""
 RULES = (*STAGES, *FINAL_RULES)
 """Rules in the order of their jobs."""
+TARGETS = ("all", "hearts", "store", *FINAL_RULES)
+"""Rules that can be asked for by their names: they are for all hearts."""
 
 
 def places(rule: str, config: Config) -> list[tuple[str, int]]:

@@ -9,12 +9,11 @@ from typing import Any
 
 from echotruth.cases import Case, expand
 from echotruth.config import Config
-from echotruth.config.loading import validate
-from echotruth.repository import ledger
+from echotruth.config.loading import ConfigError, load, validate
+from echotruth.repository import ledger, settings
 from echotruth.repository.ledger import record_path, record_paths
 from echotruth.repository.provenance import code_version, settings_version
 from echotruth.repository.verdict import excluded
-from echotruth.repository import settings
 from echotruth.workflow import demand, lease
 from echotruth.workflow.blocks import Block
 from echotruth.workflow.processes import script
@@ -52,15 +51,16 @@ class Plan:
     def __init__(self, values: dict[str, Any], source: str = "configuration") -> None:
         given = dict(values)
         block = given.pop("block", None)
-        self._is_laid_out, self._block = block is not None, Block.parse(block, source)
+        self._is_block = block is not None
         self.config: Config = validate(given, source)
         self.folder = Path("out") / self.config.name
         self._every = {case.id: case for case in expand(self.config, source)}
         self._motions = settings.motions({id: case.config for id, case in self._every.items()})
         self._same = first_with_same(self._motions, ledger.rows(self.folder / "registry.txt"))
-        self._choose(self._block)
+        self._choose(Block.parse(block, source))
 
     def _choose(self, block: Block) -> None:
+        self._block = block
         self.cases: dict[str, Case] = {id: self._every[id] for id in block.of(self._motions)}
 
     def block(self, number: int, count: int) -> Plan:
@@ -88,13 +88,20 @@ class Plan:
     def begin(self) -> None:
         """Hold the lease of the folder until this process ends, and lay the repository out.
 
-        Whoever starts the blocks of a sweep has done so already.
+        For the blocks of a sweep that is done once.
         """
         lease.hold(self.folder)
-        if not self._is_laid_out:
+        if not (self._is_block and self._is_laid_out()):
             from echotruth.repository.layout import lay_out
 
             lay_out(self.folder, self.config, list(self._every.values()))
+
+    def _is_laid_out(self) -> bool:
+        """Whether the repository is laid out for this configuration."""
+        try:
+            return load(self.folder / "config.yaml") == self.config
+        except ConfigError:
+            return False
 
     def code(self, stage: str) -> str:
         """Version of the code of a stage; if it changes, the stage is run again."""
@@ -130,8 +137,12 @@ class Plan:
         return [str(rf)] if "lines" in self.config.rf.keep else [str(rf), str(lines)]
 
     def records(self, wildcards: Wildcards) -> list[str]:
-        """Records of all jobs, so that a lost one is made again."""
-        return [str(path) for path in self._record_paths()]
+        """Records of all jobs, so that a lost one is made again; for what follows the blocks, their marks."""
+        number, count = self._block
+        if number:
+            return [str(path) for path in self._record_paths()]
+        blocks = [self.block(number, count) for number in range(1, count + 1)]
+        return [str(block.mark) for block in blocks if block.cases]
 
     def _record_paths(self) -> list[Path]:
         places = list(self.config.views), self.config.bmode.sizes

@@ -7,15 +7,17 @@ from math import ceil
 from pathlib import Path
 
 from echotruth.config import Config
+from echotruth.repository.ledger import STAGES
 from echotruth.workflow.execution import Snakemake
+from echotruth.workflow.jobs import TARGETS, ended, jobs
 from echotruth.workflow.plan import Plan
 
 
 class Running:
     """The Snakemakes of a run.
 
-    A sweep that fits in one block is one Snakemake. In a larger one, a block whose mark and records are there is not
-    planned again.
+    A sweep that fits in one block, or of which single files are to be made, is one Snakemake. In a larger one, a block
+    whose mark and records are there is not planned again.
 
     Parameters
     ----------
@@ -24,30 +26,37 @@ class Running:
     config : Config
     command : list of str
         Command of Snakemake, without the block.
+    targets : list of str
+        Rules and files that are to be made; empty for all.
     hearts_per_block : int
     """
 
-    def __init__(self, folder: Path, config: Config, command: list[str], hearts_per_block: int) -> None:
-        self._folder, self._command, self._made_any = folder, command, False
+    def __init__(
+        self, folder: Path, config: Config, command: list[str], targets: list[str], hearts_per_block: int
+    ) -> None:
+        self._folder, self._command, self._targets = folder, command, targets
         self._plan = Plan(config.model_dump(), config.name)
-        self._count = ceil(len(self._plan.cases) / hearts_per_block)
+        self._count = ceil(len(self._plan.cases) / hearts_per_block) if {*targets} <= {*TARGETS} else 1
 
     def hearts(self) -> Iterator[Snakemake]:
         """Snakemakes of the blocks that are not made, if there are several."""
         for number in range(1, self._count + 1 if self._count > 1 else 0):
             plan = self._plan.block(number, self._count)
             if plan.cases and not plan.stands():
-                self._made_any = True
+                plan.mark.unlink(missing_ok=True)  # or Snakemake would not make a record that is lost
                 yield self._snakemake(number, ["hearts"])
 
     def end(self) -> Iterator[Snakemake]:
         """Snakemake of repository and report; of all, if there is one block."""
-        if self._count == 1:
-            yield self._snakemake(1, [])
-        else:
-            yield self._snakemake(0, ["--forcerun", "repository"] if self._made_any else [])
+        yield self._snakemake(1 if self._count == 1 else 0, self._targets)
 
-    def _snakemake(self, number: int, options: list[str]) -> Snakemake:
+    def waiting(self) -> dict[str, int]:
+        """Rule -> number of its jobs without a record, if there are several blocks: the last ones are planned late."""
+        cases, config = self._plan.cases, self._plan.config
+        rules = STAGES if self._count > 1 else ()
+        return {rule: len(jobs(rule, config, cases) - ended(self._folder, rule, config)) for rule in rules}
+
+    def _snakemake(self, number: int, targets: list[str]) -> Snakemake:
         name = "snakemake" if self._count == 1 else f"snakemake_{number:0{len(str(self._count))}}"
-        block = ["--config", f"block={number}/{self._count}"]
-        return Snakemake([*self._command, *options, *block], self._folder / f"logs/{name}.log")
+        block = ["--config", f"block={number}/{self._count}", "--", *targets]
+        return Snakemake([*self._command, *block], self._folder / f"logs/{name}.log")

@@ -1,0 +1,1 @@
+"""Scripts, one a stage: each reads, calls one function, and writes."""
