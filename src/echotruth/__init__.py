@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from echotruth.repository.unpacking import unpack
     from echotruth.tracking.failure import TrackerFailed
 
-__version__ = "0.1.0"
+__version__ = "0.1.1"
 
 __all__ = [
     "Config",

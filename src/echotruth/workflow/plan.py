@@ -10,11 +10,10 @@ from typing import Any
 from echotruth.cases import Case, expand
 from echotruth.config import Config
 from echotruth.config.loading import validate
-from echotruth.repository import ledger
+from echotruth.repository import ledger, settings
 from echotruth.repository.ledger import record_path, record_paths
 from echotruth.repository.provenance import code_version, settings_version
 from echotruth.repository.verdict import excluded
-from echotruth.repository import settings
 from echotruth.workflow import demand, lease
 from echotruth.workflow.blocks import Block
 from echotruth.workflow.processes import script
