@@ -20,21 +20,19 @@ from typing import NamedTuple
 
 import numpy as np
 import report
-from echotruth.evaluation.choice import is_complete
 from scipy.optimize import minimize
 from suite.splits import DEVELOP, TEST, split_of, split_of_label
 
 from echotruth.cases import Case, expand
 from echotruth.config.loading import load
 from echotruth.evaluation import reliability
-from echotruth.evaluation.clip import Clip, clips
-from echotruth.evaluation.clip_metrics import clip_metrics
-from echotruth.evaluation.scoring import ground_truth
+from echotruth.evaluation.clip import Clip, read_clips
+from echotruth.evaluation.scoring import read_truth
+from echotruth.repository.reader import Repository
 from echotruth.section import Section
 from echotruth.tracking import accumulation, quality
 from echotruth.tracking.tracker import tracked_path
 from echotruth.tracking.tracker_input import TrackerInput
-from echotruth.workflow.job import Job
 
 RESULTS = Path(__file__).parent / "results"
 EVERY = 7
@@ -92,11 +90,11 @@ def gathered(
     """Samples of every clip of the cases that has images, by the name of the constants."""
     found: dict[str, list[Samples]] = {}
     for case in cases:
-        for view in ready(folder, case):
-            job = Job(folder, "tracking", case, view, code="read")
-            true = ground_truth(job).displacement
-            for size, clip in clips(job).items():
-                for name, tracker in job.case.config.tracking.trackers.items():
+        repository = Repository(folder)
+        for view in ready(repository, case):
+            true = read_truth(repository, case.id, view).displacement
+            for size, clip in read_clips(repository, case.id, view).items():
+                for name, tracker in case.config.tracking.trackers.items():
                     chosen = size in (sizes or [size]) and name in (trackers or [name])
                     if tracker.method == "external" or not chosen:
                         continue
@@ -106,10 +104,10 @@ def gathered(
     return found
 
 
-def ready(folder: Path, case: Case) -> Iterator[str]:
+def ready(repository: Repository, case: Case) -> Iterator[str]:
     """Views of a case that have images."""
     for view in case.config.views:
-        if is_complete(folder, case.id, view, "truth", "bmode"):
+        if not repository.problem(case.id, view, "truth", "bmode"):
             yield view
 
 
@@ -140,7 +138,7 @@ def spread(cases: list[Case], hearts: int | None) -> list[Case]:
 
 def table(folder: Path) -> list[str]:
     """Reliability of the quality in a repository, by tracker and image size, over the hearts of test."""
-    found = clip_metrics(folder).reliability
+    found = Repository(folder).metrics().reliability
     found = found[found["split"].map(split_of_label) == TEST]
     if found.empty:
         raise SystemExit(f"{folder}: no heart of test is evaluated: run it to its end")

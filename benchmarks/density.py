@@ -18,7 +18,7 @@ import numpy as np
 import speckle
 
 from echotruth.config import Probe, Rf
-from echotruth.evaluation.clip import Clip, grid_points
+from echotruth.evaluation.clip import Clip
 from echotruth.evaluation.scoring import ground_truth, score
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import bmode_clip
@@ -27,6 +27,7 @@ from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
 from echotruth.seeds import generator
+from echotruth.tracking.point_grid import grid_points
 from echotruth.tracking.tracker import track
 from echotruth.workflow.job import Job
 
@@ -64,7 +65,8 @@ def clips(job: Job, density: float) -> dict[int, np.ndarray]:
 
 def errors(job: Job, images: dict[int, np.ndarray], tracker: str) -> list[float]:
     """NRMSE of a tracker at ES at every size, %."""
-    truth, config, found = ground_truth(job), job.case.config, []
+    plane, config, found = Plane(**job.read("phantom", "origin", "axes")), job.case.config, []
+    truth = ground_truth(job.heart, plane, job.view.plane, config)
     for size, frames in images.items():
         mask = unpack(job.read(f"truth/{size}", "labels")["labels"][0])["mask"]
         given = Clip(

@@ -32,13 +32,14 @@ from suite.records import read
 from suite.splits import TEST
 from tracking_split import TRACKER, blobs
 
-from echotruth.evaluation.clip import clips
+from echotruth.evaluation.clip import read_clips
 from echotruth.evaluation.difficulty.plane import both_ways, plane_path
 from echotruth.evaluation.parallel import in_processes
-from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
+from echotruth.evaluation.scoring import Truth, metrics, read_truth, score
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import downsample
 from echotruth.imaging.view import Plane
+from echotruth.repository.reader import Repository
 from echotruth.tracking import track
 from echotruth.tracking.bidirectional import forward_backward
 
@@ -63,10 +64,11 @@ Row = dict[str, str | int | float]
 
 def limits(folder: Path, view: tuple[str, str]) -> list[Row]:
     """What a tracker misses without the beam in a view, named by case and view; a row for each image size."""
-    job = job_of(folder, *view)
-    truth, given, plane = ground_truth(job), clips(job), Plane(**job.read("phantom", "origin", "axes"))
-    free = blobs(job, plane, next(iter(given.values())))
-    perfect = metrics(score(perfect_tracker(job.heart, plane, truth), truth), truth.wall.plane)
+    repository = Repository(folder)
+    truth, given, plane = read_truth(repository, *view), read_clips(repository, *view), repository.plane(*view)
+    heart = repository.heart(view[0])
+    free = blobs(heart, plane, next(iter(given.values())))
+    perfect = metrics(score(perfect_tracker(heart, plane, truth), truth), truth.wall.plane)
     rows: list[Row] = []
     for size, clip in given.items():
         frames = downsample(free, free.shape[-1] // size)

@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from echotruth.learning.reading import Reader
 
 from echotruth import learning
+from echotruth.repository.reader import Repository
 
 ROUNDS = 5
 RESULT = Path(__file__).parent / "results/loaders.md"
@@ -36,26 +36,26 @@ KINDS: dict[str, Callable[..., learning.Items]] = {
 }
 
 
-class Recorder(Reader):
-    """A reader that notes what is read through it."""
+class Recorder(Repository):
+    """A repository that notes what is read through it."""
 
     def __init__(self, repository: str | Path) -> None:
         super().__init__(repository)
         self.noted: list[tuple[str, tuple[Any, ...]]] = []
 
-    def read(self, path: str, *index: Any) -> np.ndarray:
+    def read(self, path: str, *index: Any, store: Path | None = None) -> np.ndarray:
         self.noted.append((path, index))
-        return super().read(path, *index)
+        return super().read(path, *index, store=store)
 
 
 def reads_of(items: learning.Items, number: int) -> list[tuple[str, tuple[Any, ...]]]:
     """Arrays, and their parts, that are read for an item."""
-    recorder = Recorder(items.reader.folder)
-    usual, items.reader = items.reader, recorder
+    recorder = Recorder(items.repository.folder)
+    usual, items.repository = items.repository, recorder
     try:
         _ = items[number]
     finally:
-        items.reader = usual
+        items.repository = usual
     return recorder.noted
 
 
@@ -65,7 +65,7 @@ def rates(items: learning.Items, seconds: float) -> tuple[float, float]:
     for number in order[:3]:
         _ = items[number]
     reads = {number: reads_of(items, number) for number in order}
-    arrays = {path: items.reader.array(path) for each in reads.values() for path, _ in each}
+    arrays = {path: items.repository.array(path) for each in reads.values() for path, _ in each}
 
     def raw(number: int) -> None:
         for path, index in reads[number]:

@@ -107,7 +107,7 @@ class Heart:
     @cached_property
     def trackers(self) -> list[str]:
         """Names of the trackers."""
-        return [str(name) for name in self.tree["tracking"].tracker.values]
+        return list(et.Repository(self.repository).config.tracking.trackers)
 
     @cached_property
     def field_of_view(self) -> float:
@@ -191,11 +191,8 @@ class Heart:
 
     def _displacement(self, view: str, size: int, tracker: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Displacement at end-systole and position (point, 2), m, and layer of the points of a view."""
-        found = (
-            et.Repository(self.repository)
-            .tracks(self.case, view, tracker or self.trackers[0], size)
-            .isel(frame=self.es)
-        )
+        read = et.Repository(self.repository).tracks(self.case, view, size, [tracker or self.trackers[0]])
+        found = read.isel(frame=self.es, tracker=0)
         true = found.true_displacement.sel(vector=list(found["plane"].values)).transpose("axial", "lateral", "vector")
         vector = (true if tracker is None else found.displacement.transpose("axial", "lateral", "plane")).values
         lateral, axial = np.meshgrid(found.lateral.values, found.axial.values)

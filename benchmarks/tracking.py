@@ -27,12 +27,12 @@ from scipy.ndimage import gaussian_filter
 
 from echotruth.config import Config
 from echotruth.config.tracking import External, default_trackers
-from echotruth.evaluation.clip import Clip, clips
+from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import bmode_clip
 from echotruth.repository import ledger
+from echotruth.repository.reader import Repository
 from echotruth.tracking import grid, track
-from echotruth.workflow.job import Job
 
 RESULTS = Path(__file__).parent / "results"
 LOW, HIGH = np.array([-1.8e-3, 5.2e-3, -0.4e-3]), np.array([1.8e-3, 8.2e-3, 0.4e-3])
@@ -109,7 +109,7 @@ def full(clip: Clip) -> Clip:
 def pace(folder: Path, trackers: dict[str, Any], external: str) -> dict[str, list[float]]:
     """Time of a pair of the largest images, s, of each tracker at every turn: that of the clip over its pairs."""
     case = next(iter(ledger.rows(folder / "registry.txt")))
-    clip = next(iter(clips(Job(folder, "tracking", case, "mid")).values()))
+    clip = next(iter(read_clips(Repository(folder), case, "mid").values()))
     entries = [(name, settings, clip) for name, settings in trackers.items()]
     if external:
         entries.append((external + WHOLE, trackers[external], full(clip)))

@@ -26,17 +26,17 @@ import numpy as np
 import report
 
 from echotruth.config.tracking import BsplineDic
-from echotruth.evaluation.clip import Clip, clips
+from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.difficulty.floors import difficulty
-from echotruth.evaluation.scoring import Truth, ground_truth, metrics, score
+from echotruth.evaluation.scoring import Truth, metrics, read_truth, score
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import MaterialPoints
+from echotruth.heart import Heart
 from echotruth.imaging.bmode import downsample
 from echotruth.imaging.truth import displacement
 from echotruth.imaging.view import Plane
-from echotruth.repository import ledger
+from echotruth.repository.reader import Repository
 from echotruth.tracking import track
-from echotruth.workflow.job import Job
 
 RESULTS = Path(__file__).parent / "results"
 WIDTH = 28e-6
@@ -56,9 +56,9 @@ def nrmse(found: np.ndarray, true: np.ndarray) -> float:
     return float(100 * np.sqrt((error[known] ** 2).sum() / (true[known] ** 2).sum()))
 
 
-def blobs(job: Job, plane: Plane, clip: Clip) -> np.ndarray:
+def blobs(heart: Heart, plane: Plane, clip: Clip) -> np.ndarray:
     """Images, uint8, of the shape of the clip's, of blobs that move in the plane with their tissue."""
-    heart, side = job.heart, clip.size * clip.spacing
+    side = clip.size * clip.spacing
     random = np.random.default_rng(1)
     low, high = (extreme(plane.to_image(heart.positions(0))[:, :2], axis=0) for extreme in (np.min, np.max))
     place = random.uniform(low, high, (int(np.prod((high - low) / SPACING)), 2))
@@ -96,12 +96,11 @@ def halved(clip: Clip, truth: Truth) -> float:
     return nrmse(found, truth.displacement[2 * (truth.es // 2)])
 
 
-def rows(job: Job, view: str) -> list[list[str]]:
+def rows(repository: Repository, case: str, view: str) -> list[list[str]]:
     """Lines of the table for one view, one an image size."""
-    truth, plane = ground_truth(job), Plane(**job.read("phantom", "origin", "axes"))
-    given, found = clips(job), []
-    free = blobs(job, plane, next(iter(given.values())))
-    for (size, clip), floor in zip(given.items(), difficulty(job), strict=True):
+    truth, given, found = read_truth(repository, case, view), read_clips(repository, case, view), []
+    free = blobs(repository.heart(case), repository.plane(case, view), next(iter(given.values())))
+    for (size, clip), floor in zip(given.items(), difficulty(repository, case, view), strict=True):
         floors = "plane_forward", "plane_backward", "plane", "crb"
         cells = [view, str(size), *(f"{floor[f'floor_{name}_percent']:.1f}" for name in floors)]
         for frames in (downsample(free, free.shape[-1] // size), clip.frames):
@@ -120,13 +119,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("repository", type=Path, help="folder of a repository, as out/demo")
     folder = parser.parse_args().repository
-    case = next(iter(ledger.rows(folder / "registry.txt")))
-    jobs = {view: Job(folder, "tracking", case, view) for view in Job(folder, "tracking", case).case.config.views}
+    repository = Repository(folder)
+    case = repository.present[0]
     strains = ("NRMSE", "E_CC or E_LL RMS", "E_RR bias")
     head = ["view", "px", "plane, forwards", "plane, backwards", "plane, both", "bound"]
     head += [f"{images}: {figure}" for images in ("blobs", "images") for figure in strains]
     head += ["images, every other frame: NRMSE", "correlation, least", "correlation, median"]
-    table = report.table(head, [line for view, job in jobs.items() for line in rows(job, view)])
+    table = report.table(head, [line for view in repository.views for line in rows(repository, case, view)])
     units = "`bspline_dic` at end-systole: % and percentage points of strain."
     text = ["# What of the error is whose", "", units, "", *table, ""]
     (RESULTS / "tracking_split.md").write_text("\n".join(text))

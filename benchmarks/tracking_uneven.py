@@ -19,13 +19,12 @@ import report
 
 from echotruth.config import Config
 from echotruth.config.tracking import BsplineDic
-from echotruth.evaluation.clip import clips
-from echotruth.evaluation.scoring import ground_truth, metrics, score
+from echotruth.evaluation.clip import read_clips
+from echotruth.evaluation.scoring import metrics, read_truth, score
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import bmode_clip
-from echotruth.repository import ledger
+from echotruth.repository.reader import Repository
 from echotruth.tracking import track
-from echotruth.workflow.job import Job
 
 RESULTS = Path(__file__).parent / "results"
 INNER, OUTER, DEPTH = 1.4e-3, 2.3e-3, 6.5e-3
@@ -80,10 +79,11 @@ def recovered(frames: np.ndarray, config: Config, harmonic: int, tracker: Bsplin
     return 100 * float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2))), shares[[0, -1]]
 
 
-def heart(job: Job, tracker: BsplineDic) -> list[str]:
+def heart(repository: Repository, tracker: BsplineDic) -> list[str]:
     """NRMSE (%) of a repository's view, one an image size."""
-    truth, cells = ground_truth(job), []
-    for one in clips(job).values():
+    place, cells = (repository.case().id, "mid"), []
+    truth = read_truth(repository, *place)
+    for one in read_clips(repository, *place).values():
         answer = one.on_grid(*track(*one.tracker_arguments, tracker))[0]
         cells.append(f"{metrics(score(answer, truth), truth.wall.plane)['nrmse_percent']:.1f}")
     return cells
@@ -93,7 +93,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("repository", type=Path, help="folder of a repository with a view mid, as out/demo")
     folder, config = parser.parse_args().repository, Config()
-    job = Job(folder, "tracking", next(iter(ledger.rows(folder / "registry.txt"))), "mid")
+    repository = Repository(folder)
     rings = {harmonic: ring(config, harmonic) for harmonic in HARMONICS}
 
     def cells(size: int, tracker: BsplineDic) -> list[str]:
@@ -105,7 +105,7 @@ def main() -> None:
     lines = []
     for smoothness in SMOOTHNESS:
         tracker, name = BsplineDic(smoothness=smoothness), f"{smoothness:g}" if smoothness else "by the images"
-        lines.append([name, *cells(largest, tracker), *heart(job, tracker)])
+        lines.append([name, *cells(largest, tracker), *heart(repository, tracker)])
         print(*lines[-1], sep=" | ", flush=True)
     head = []
     for harmonic in HARMONICS:
