@@ -55,6 +55,7 @@ localrules:
 rule all:
     default_target: True
     input:
+        PLAN.records,  # Snakemake makes what is lost again only if it is asked for
         rules.repository.output,
         rules.report.output,
 

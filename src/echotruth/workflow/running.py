@@ -37,6 +37,7 @@ class Running:
         for number in range(1, self._count + 1 if self._count > 1 else 0):
             plan = self._plan.block(number, self._count)
             if plan.cases and not plan.stands():
+                plan.mark.unlink(missing_ok=True)  # or Snakemake would not make a record that is lost
                 self._made_any = True
                 yield self._snakemake(number, ["hearts"])
 
