@@ -2,31 +2,30 @@
 
     python benchmarks/chain.py out/demo out/human
 
-The first table of a repository is made of the records in its ledger: processor seconds a heart and a frame, how many of
-them compiling and starting, seconds of the clock, greatest memory, and bytes written. The second has, for one view,
-what the stage cost without compiling and starting, and what its parts cost in a short loop in this process, on one
-thread:
+The first table of a repository is made of the files that Snakemake's `benchmark` wrote: processor seconds a heart and a
+frame, seconds of the clock, greatest memory, and bytes written. The second has, for one view, what the stage cost
+without the start of its processes, and what its parts cost in a short loop in this process, on one thread:
 
 phantom      seeding
 truth        the truth of four frames, for all frames
 rf           the full matrix of as many scatterers, evenly spread over the block that they fill, and beamforming; of one
              frame, for all frames
 bmode        images from four frames of noise, for all frames
-tracking     every tracker on a few frames of ejection, there and back, for all frames
-evaluation   the truth at the points, and one score, for all trackers and image sizes
+tracking     every tracker on a few frames of ejection, there and back, for all frames; the truth at the points, and
+             one score, for all trackers and image sizes
 
 To each is added what it takes to round, compress and write what the stage has stored of the view.
 
-Above 1.3, and by more than a second, something is spent between the parts. The machine's own speed stands above:
-figures of machines compare only over it. The results are results/chain.md.
+Above 1.3, and by more than a second, something is spent between the parts, or the job has compiled, or the machine had
+other work. Its speed stands above: figures of machines compare only over it. The results are results/chain.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import shutil
 import time
-from collections import defaultdict
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -41,7 +40,6 @@ import numpy as np
 import report
 from threadpoolctl import threadpool_limits
 
-from echotruth.config.loading import load
 from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.scoring import read_truth, score
 from echotruth.imaging.beamforming.scan import scan_lines
@@ -49,16 +47,16 @@ from echotruth.imaging.beamforming.scanner import validate_scatterers
 from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
-from echotruth.imaging.view import Plane
-from echotruth.repository import estimates, ledger, schema
-from echotruth.repository.ledger import GATES, VIEW_STAGES
+from echotruth.repository import estimates, packing, schema
+from echotruth.repository.benchmark_files import core_seconds
+from echotruth.repository.ledger import STAGES
 from echotruth.repository.reader import Repository
 from echotruth.repository.store import Store
 from echotruth.section import Section
 from echotruth.seeds import generator
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
-from echotruth.workflow.job import Job
+from echotruth.workflow.cost import START_SECONDS
 
 RESULTS = Path(__file__).parent / "results"
 EXCERPT = np.array([0, 1, 2, 1, 0])
@@ -69,8 +67,6 @@ TURNS = 3
 """How often a part is timed; the median counts."""
 BEYOND = 1.3
 """Cost over that of its parts above which a stage is marked."""
-
-Record = dict[str, Any]
 
 
 def timed(work: Callable[[], Any]) -> float:
@@ -97,39 +93,31 @@ def machine() -> dict[str, float]:
     return {"loop": timed(loop), "product": timed(lambda: matrix @ matrix)}
 
 
-def records(folder: Path) -> list[Record]:
-    """Records of all jobs that were timed, of a repository."""
-    found = [ledger.read(path) for stage in (*GATES, *VIEW_STAGES) for path in folder.glob(f"ledger/{stage}/**/*.json")]
-    return [record for record in found if "cpu_seconds" in record]
-
-
-def costs(folder: Path, found: list[Record]) -> list[list[Any]]:
+def costs(folder: Path) -> list[list[Any]]:
     """Rows of the first table, one a stage."""
-    stages: dict[str, list[Record]] = defaultdict(list)
-    for record in found:
-        stages[record["stage"]].append(record)
-    store = folder / f"{load(folder / 'config.yaml').name}.zarr"
-    return [_cost(stage, members, store) for stage, members in stages.items()]
+    repository = Repository(folder)
+    store, frames = folder / f"{repository.config.name}.zarr", repository.config.loop.frames
+    rows = []
+    for stage in STAGES:
+        files = list(folder.glob(f"benchmarks/{stage}/**/*.tsv"))
+        told = [next(csv.DictReader(file.open(), delimiter="\t")) for file in files]
+        hearts, spent = len(repository.present), sum(map(core_seconds, files))
+        shards = (path for group in _groups(repository, stage) for path in store.glob(f"{group}/*/c/**/*"))
+        written = sum(path.stat().st_size for path in shards if path.is_file())
+        rows.append([
+            stage,
+            len(files),
+            f"{spent / hearts:.1f}",
+            f"{spent / hearts / frames / (1 if stage == 'mechanics' else len(repository.views)):.3f}",
+            f"{sum(float(each['s']) for each in told) / hearts:.1f}",
+            f"{max(float(each['max_rss']) for each in told):.0f}",
+            f"{written / hearts / 1e6:.1f}",
+        ])  # fmt: skip
+    return rows
 
 
-def _cost(stage: str, members: list[Record], store: Path) -> list[Any]:
-    def total(name: str) -> float:
-        return sum(record[name] for record in members)
-
-    hearts = len({record["case"] for record in members})
-    written = sum((store / name).stat().st_size for record in members for name in record["sha256"])
-    frames = total("frames") if stage in VIEW_STAGES else hearts * members[0]["frames"]
-    return [
-        stage,
-        len(members),
-        f"{total('cpu_seconds') / hearts:.1f}",
-        f"{total('cpu_seconds') / frames:.3f}",
-        f"{total('compile_seconds') / hearts:.1f}",
-        f"{total('start_seconds') / hearts:.1f}",
-        f"{total('seconds') / hearts:.1f}",
-        f"{max(record['memory_MB'] for record in members):.0f}",
-        f"{written / hearts / 1e6:.1f}",
-    ]
+def _groups(repository: Repository, stage: str) -> list[str]:
+    return schema.written_by(stage, repository.config)
 
 
 class Parts:
@@ -143,27 +131,26 @@ class Parts:
     """
 
     def __init__(self, folder: Path, case: str, view: str) -> None:
-        self._job = partial(Job, folder, case=case, view=view)
         self._repository, self._place = Repository(folder), (case, view)
-        self._heart, self._config = self._job(stage="truth").heart, self._job(stage="truth").case.config
-        self._frames = len(self._heart.displacement)
-        place = self._job(stage="truth").read("phantom", "origin", "axes")
-        self._plane, random = Plane(**place), partial(generator, self._job(stage="rf").case, view)
+        self._heart, self._config = self._repository.heart(case), self._repository.case(case).config
+        self._frames, self._plane = len(self._heart.displacement), self._repository.plane(case, view)
+        random = partial(generator, self._repository.case(case), view)
         self._sequence = Sequence(self._config, self._heart, self._plane, random)
 
     def writing(self, stage: str) -> float:
         """What it takes to write what is stored of a stage, to another folder."""
-        job = self._job(stage=stage)
-        groups = [group for group in schema.groups(self._config) if group.partition("/")[0] == stage]
+        store = Store(self._repository.folder / f"{self._config.name}.zarr")
+        index = self._repository.place(*self._place)
         with TemporaryDirectory() as folder:
             other, spent = Store(Path(folder)), 0.0
-            for group in groups:
-                for file in job.store.path.glob(f"{group}/**/zarr.json"):
-                    copy = other.path / file.relative_to(job.store.path)
+            for group in _groups(self._repository, stage):
+                for file in store.path.glob(f"{group}/**/zarr.json"):
+                    copy = other.path / file.relative_to(store.path)
                     copy.parent.mkdir(parents=True, exist_ok=True)
                     shutil.copyfile(file, copy)
-                values = job.store.read(group, *job.index)
-                spent += timed(partial(other.write, group, values, *job.index))
+                values = packing.pack(schema.packs_of(group), store.read(group, *index))
+                own = {array.name: values[array.name] for array in schema.arrays_of(group) if array.leading == 2}
+                spent += timed(partial(other.write, group, own, *index))
         return spent
 
     def phantom(self) -> float:
@@ -192,20 +179,21 @@ class Parts:
         return self._frames / SOME * timed(lambda: bmode_clip(lines, scan, scanner.range, config.bmode, gain))
 
     def tracking(self) -> float:
-        trackers = self._config.tracking.trackers.values()
+        trackers = self._config.tracking.trackers
         excerpts = []
         for whole in read_clips(self._repository, *self._place).values():
             part = self._frames // 4 + EXCERPT
             excerpts.append(replace(whole, frames=whole.frames[part], frame_time=whole.frame_time[: len(part)]))
-        spent = sum(timed(partial(_try, each, tracker)) for each in excerpts for tracker in trackers)
-        return (self._frames - 1) / (len(EXCERPT) - 1) * spent
+        spent = sum(timed(partial(_try, each, tracker)) for each in excerpts for tracker in trackers.values())
+        return (self._frames - 1) / (len(EXCERPT) - 1) * spent + self._scoring(list(trackers))
 
-    def evaluation(self) -> float:
-        tracker, true = list(self._config.tracking.trackers)[-1], read_truth(self._repository, *self._place)
-        sizes = self._config.bmode.sizes
-        found = estimates.tracked(self._repository, *self._place, tracker, sizes[0], "displacement")["displacement"]
-        times = len(sizes) * len(self._config.tracking.trackers)
-        return timed(lambda: read_truth(self._repository, *self._place)) + times * timed(lambda: score(found, true))
+    def _scoring(self, trackers: list[str]) -> float:
+        sizes, true = self._config.bmode.sizes, read_truth(self._repository, *self._place)
+        found = estimates.tracked(self._repository, *self._place, trackers[-1], sizes[0], "displacement")[
+            "displacement"
+        ]
+        a_score = timed(lambda: score(found, true))
+        return len(sizes) * (timed(lambda: read_truth(self._repository, *self._place)) + len(trackers) * a_score)
 
 
 def _try(excerpt: Clip, tracker: Section) -> None:
@@ -214,41 +202,26 @@ def _try(excerpt: Clip, tracker: Section) -> None:
         track(*excerpt.tracker_arguments, tracker)
 
 
-def beside(folder: Path, found: list[Record]) -> list[list[Any]]:
-    """Rows of the second table: the stages of the first view that has them all."""
-    by_view: dict[tuple[str, str], dict[str, Record]] = defaultdict(dict)
-    for record in found:
-        by_view[record["case"], record["view"]][record["stage"]] = record
-    views = [(place, stages) for place, stages in by_view.items() if set(stages) >= set(VIEW_STAGES)]
-    if not views:
-        return []
-    (case, view), stages = views[0]
+def beside(folder: Path) -> list[list[Any]]:
+    """Rows of the second table: the stages of the first view of the first heart."""
+    repository = Repository(folder)
+    case, view = repository.shown[0], repository.views[0]
     parts, rows = Parts(folder, case, view), []
-    for stage in VIEW_STAGES:
-        record = stages[stage]
-        spent = record["cpu_seconds"] - record["compile_seconds"] - record["start_seconds"]
+    for stage in [stage for stage, place in STAGES.items() if "view" in place]:
+        at = folder / "benchmarks" / stage / case
+        files = [*at.glob(f"{view}.tsv"), *at.glob(f"{view}/*.tsv")]
+        spent = sum(core_seconds(file) - START_SECONDS for file in files)
         predicted = getattr(parts, stage)() + parts.writing(stage)
         mark = " **" if spent > max(BEYOND * predicted, predicted + 1) else ""
         rows.append([stage, f"{spent:.1f}", f"{predicted:.1f}", f"{spent / predicted:.2f}{mark}"])
     return rows
 
 
-def starting(folder: Path, found: list[Record]) -> str:
-    """What it takes to start the processes, for each image and of all, in a sentence."""
-    sizes = len(load(folder / "config.yaml").bmode.sizes)
-    images = sizes * sum(record["frames"] for record in found if record["stage"] == "bmode")
-    seconds, total = (sum(record[key] for record in found) for key in ("start_seconds", "cpu_seconds"))
-    return f"Starting takes {1e3 * seconds / images:.1f} ms of CPU an image, {seconds / total:.1%} of all CPU seconds."
-
-
 def section(folder: Path) -> list[str]:
     """Markdown of one repository."""
-    found = records(folder)
-    head = ["stage", "jobs", "CPU s a heart", "CPU s a frame", "compiling", "starting", "wall s", "memory, MB", "MB"]
-    text = [f"## {folder.name}", "", *report.table(head, costs(folder, found)), "", starting(folder, found), ""]
-    if rows := beside(folder, found):
-        text += [*report.table(["stage, one view", "CPU s", "CPU s of its parts", "ratio"], rows), ""]
-    return text
+    head = ["stage", "jobs", "CPU s a heart", "CPU s a frame", "wall s", "memory, MB", "MB"]
+    parts = report.table(["stage, one view", "CPU s", "CPU s of its parts", "ratio"], beside(folder))
+    return [f"## {folder.name}", "", *report.table(head, costs(folder)), "", *parts, ""]
 
 
 def main() -> None:
@@ -262,9 +235,7 @@ def main() -> None:
         sections = [line for folder in arguments.repositories for line in section(folder)]
     told = f"A loop of ten million turns in plain Python takes this machine {speed['loop']:.2f} s, a product of two "
     told += f"matrices of 2048 x 2048 in single precision {speed['product']:.2f} s, on one thread."
-    remark = (
-        f"Compiling and starting are CPU seconds a heart; wall seconds are added up over views. **: beyond {BEYOND}."
-    )
+    remark = f"Wall seconds are added up over the jobs of a heart. **: beyond {BEYOND}."
     text = ["# The chain, stage by stage", "", told, "", remark, "", *sections]
     (arguments.results / "chain.md").write_text("\n".join(text))
     print("\n".join(text))

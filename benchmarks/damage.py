@@ -4,8 +4,9 @@
 
 makes a small repository of two hearts with prescribed motion in the folder, or takes the one that is there. Then, in
 rounds, it flips bits, truncates, empties and deletes files of the hierarchy. In each round the check must name the
-damaged files and no others, the jobs that write them are run and no others, and all bytes are those of before. The
-first rounds have one fault each. At the end nothing is left to be done. Writes results/damage.json.
+damaged files and no others, the jobs that write them and those that follow them are run and no others, and all bytes
+are those of before. The first rounds have one fault each. At the end nothing is left to be done. Writes
+results/damage.json.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import re
 import subprocess
 import sys
 import time
@@ -23,10 +23,8 @@ from pathlib import Path
 
 import numpy as np
 
-from echotruth.config.loading import load
 from echotruth.repository.check import check
-from echotruth.repository.healing import heal, remake
-from echotruth.workflow import series
+from echotruth.repository.healing import heal
 
 CONFIG = """\
 name: tiny
@@ -47,8 +45,17 @@ cases:
   seed: [1, 2]
 """
 RESULTS = Path(__file__).parent / "results/damage.json"
-RULES = {"phantom": "imaging", "truth": "imaging", "rf": "imaging", "bmode": "imaging", "evaluation": "tracking"}
-"""Rule of the stages that have no rule of their own name."""
+FOLLOWING = {
+    "mechanics": ("phantom", "rf", "truth", "bmode", "tracking"),
+    "phantom": ("rf", "bmode", "tracking"),
+    "rf": ("bmode", "tracking"),
+    "truth": ("tracking",),
+    "bmode": ("tracking",),
+    "tracking": (),
+}
+"""Stage -> those that follow it, of the same heart, view and image size as far as both have them."""
+LARGEST = "64"
+"""Image size from whose clip the others are made."""
 
 Harm = Callable[[Path, np.random.Generator], None]
 
@@ -99,10 +106,9 @@ class Repository:
         self.cores, self.folder = str(cores), Path("out/tiny")
         Path("tiny.yaml").write_text(CONFIG)
         if self.folder.is_dir():
-            heal(self.folder, check(self.folder))
+            heal(check(self.folder))
         self.echotruth("run", "tiny.yaml", "--cores", self.cores)
-        self.config = load("tiny.yaml")
-        self.hashes, self.times = self.content(), self.record_times()
+        self.hashes = self.content()
         self.owners = {
             f"tiny.zarr/{name}": path.relative_to(self.folder).as_posix()
             for path in (self.folder / "ledger").rglob("*.json")
@@ -121,42 +127,34 @@ class Repository:
         files = [path for path in (self.folder / "tiny.zarr").rglob("*") if path.is_file()]
         return {path.relative_to(self.folder).as_posix(): sha256(path.read_bytes()).hexdigest() for path in files}
 
-    def record_times(self) -> dict[str, int]:
-        """Path of every record of a job -> time of its last change."""
-        records = [path for path in (self.folder / "ledger").rglob("*.json") if path.name != "structure.json"]
-        return {path.relative_to(self.folder).as_posix(): path.stat().st_mtime_ns for path in records}
+    def records(self) -> dict[tuple[str, ...], int]:
+        """Stage, case, view and size of every record of a job -> time of its last change."""
+        ledger = self.folder / "ledger"
+        return {
+            path.relative_to(ledger).with_suffix("").parts: path.stat().st_mtime_ns for path in ledger.rglob("*/*.json")
+        }
 
-    def run(self) -> set[str]:
-        """Make what was dropped; give the rules, with case and view, that were run."""
-        ran: set[str] = set()
+    def run(self) -> set[tuple[str, ...]]:
+        """Make what was dropped; give the jobs that were run."""
+        before = self.records()
+        self.echotruth("run", "tiny.yaml", "--cores", self.cores)
+        return {job for job, time_ in self.records().items() if before.get(job) != time_}
 
-        def make(paths: list[str]) -> int:
-            snakefile = Path(series.__file__).parent / "Snakefile"
-            command = [sys.executable, "-m", "snakemake", "--snakefile", str(snakefile), "--configfile", "tiny.yaml"]
-            result = subprocess.run(
-                [*command, "--cores", self.cores, *paths],
-                env=os.environ | {series.ALONE: "1"},
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-                check=False,
-            )
-            found = re.findall(r"^(?:local)?rule (\w+):((?:\n    .*)*)", result.stdout, re.MULTILINE)
-            ran.update(" ".join((rule, *re.findall(r"(?:case|view)=(\w+)", text))) for rule, text in found)
-            if result.returncode:
-                print(result.stdout, file=sys.stderr)
-            return result.returncode
+    def concerned(self, names: list[str]) -> set[tuple[str, ...]]:
+        """Jobs that make files of the hierarchy again, and those that follow them."""
+        owners = [Path(self.owners[name]).relative_to("ledger").with_suffix("").parts for name in names]
+        damaged = {owner for owner in owners if len(owner) > 1}  # the structure belongs to no job
+        # Scatterers are deleted when the echoes are made.
+        damaged |= {("phantom", *place) for stage, *place in damaged if stage == "rf"}
+        return damaged | {job for job in self.records() if any(_follows(job, first) for first in damaged)}
 
-        assert remake(self.folder, self.config, make) == 0
-        return ran
 
-    def job(self, name: str) -> str:
-        """Rule, with case and view, that makes a file of the hierarchy again."""
-        record = Path(self.owners[name])
-        if record.name == "structure.json":
-            return "repository"
-        stage, *place = record.relative_to("ledger").with_suffix("").parts
-        return " ".join((RULES.get(stage, stage), *place))
+def _follows(job: tuple[str, ...], first: tuple[str, ...]) -> bool:
+    """Whether a job is run because another one was."""
+    (stage, *place), (before, *other) = job, first
+    if before == "bmode" and other[2] == LARGEST:
+        return place[:2] == other[:2] and stage in ("bmode", "tracking")
+    return stage in FOLLOWING[before] and all(ours == theirs for ours, theirs in zip(place, other, strict=False))
 
 
 def damage(repository: Repository, harm: Harm, count: int, random: np.random.Generator) -> dict[str, float]:
@@ -169,12 +167,12 @@ def damage(repository: Repository, harm: Harm, count: int, random: np.random.Gen
     checked = time.perf_counter()
     found = {fault.path for fault in report.faults}
     assert found == set(files), sorted(found ^ set(files))
-    heal(repository.folder, report)
-    ran, concerned = repository.run(), {repository.job(name) for name in files}
+    concerned = repository.concerned(list(files))
+    heal(report)
+    ran = repository.run()
     assert ran == concerned, sorted(ran ^ concerned)
     healed = time.perf_counter()
     assert repository.content() == repository.hashes
-    assert repository.record_times() == repository.times
     return {"faults": count, "jobs": len(ran), "check_seconds": checked - start, "run_seconds": healed - checked}
 
 

@@ -44,7 +44,7 @@ cases: {{mechanics.material.stiffness_kPa: {stiffnesses}}}
 RESULTS = Path(__file__).parent / "results/endurance.json"
 CLUSTER = Path(__file__).parents[1] / "tests/cluster/slurm.sh"
 TWO_CORES = ("--cores", "2")
-SLURM = ("--profile", "slurm", "--group-components", "heart=10", "view=10", "shared=50")
+SLURM = ("--profile", "slurm", "--group-components", "heart=10", "view=10")
 """Ten hearts, or views, to a job of the cluster, as docs/cluster.md advises for small ones."""
 SHORTEST, LONGEST = 2.0, 25.0
 """Time until a kill, s."""

@@ -21,8 +21,6 @@ from pathlib import Path
 
 import numpy as np
 import zarr
-from echotruth.workflow.scripts.cases import lay_out
-from echotruth.workflow.stage_cost import Cost
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 import echotruth as et
@@ -36,6 +34,7 @@ from echotruth.imaging.tracks import follow
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
 from echotruth.learning import FlowPairs
+from echotruth.repository.layout import lay_out
 from echotruth.repository.rounding import length_quantum, rounded
 from echotruth.workflow.job import Job
 
@@ -57,13 +56,10 @@ def stored(folder: Path, heart: Heart) -> Path:
     image = np.clip(128 + 200 * gaussian_filter(noise, (0, 1, 1)), 0, 255).astype(np.uint8)
     truth = pixel_truth(heart, plane, *pixel_centres(config.bmode, SIZE))
     kept = ("geometry", "fibres", "pathology", "mechanics")
-    Job(folder, "mechanics", case, code="1").commit({name: heart.arrays[name] for name in kept}, Cost())
-    for stage, groups in {
-        "phantom": {"phantom": posed},
-        "truth": {f"truth/{SIZE}": truth},
-        "bmode": {f"bmode/{SIZE}": {"image": image}},
-    }.items():
-        Job(folder, stage, case, VIEW, code="1").commit(groups, Cost())
+    Job(folder, "mechanics", case.id).commit({name: heart.arrays[name] for name in kept})
+    Job(folder, "phantom", case.id, VIEW).commit({"phantom": posed})
+    Job(folder, "truth", case.id, VIEW, SIZE).commit({f"truth/{SIZE}": truth})
+    Job(folder, "bmode", case.id, VIEW, SIZE).commit({f"bmode/{SIZE}": {"image": image}})
     return folder
 
 

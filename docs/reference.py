@@ -36,8 +36,9 @@ _SCHEMA_HEAD = """# The tree on disk
 The repository is one Zarr hierarchy (format 3) that `xarray.open_datatree` opens. Every array is rectangular over
 case, view and frame; one job writes a shard, and a chunk is one component of one frame (of what was tracked: of the
 whole cycle) with a crc32c checksum. Numbers are compressed by Blosc (zstd, bytes shuffled).
-`SIZE` stands for each image size of the configuration (512, 256, 128 px), `TRACKER` for each tracker. Missing values
-are `nan`, 0 or "": outside the wall, and in the row of a case that failed (`cases/status`).
+`SIZE` stands for each image size of the configuration (512, 256, 128 px) and `TRACKER` for each tracker, as in
+`evaluation/512/bspline_dic`. Missing values are `nan`, 0 or "": outside the wall, and in the row of a case that failed
+(`cases/status`).
 Axes, signs and reference states are in `conventions.md`.
 
 Arrays with a **step** hold ordinary numbers rounded to multiples of it, so that they take less place: they are off by
@@ -46,9 +47,8 @@ of two, in metres, not above 1/256 pixel of the largest image. Scores are comput
 reads the truth and the tracked motion finds the same.
 
 A **pack** is one array of many small numbers, with a label for each, such as `nrmse[0,total]`, and its unit beside it:
-`tree["evaluation/512/dis/scores"].sel(score="nrmse[0,total]")`. The array itself is
-`echotruth.unpack(tree["evaluation/512/dis"].to_dataset(), "nrmse")`, with the dimensions that are listed under its
-pack.
+`tree["evaluation/512/dis/scores"].sel(score="nrmse[0,total]")`. `echotruth.unpack(group.to_dataset(), "nrmse")`, of the
+group `tree["evaluation/512/dis"]`, gives the array itself, with the dimensions that are listed under its pack.
 
 The root has the attributes title, summary, references, config (the whole configuration), seed, code (version of
 each stage's source) and packages (their versions). Every group has the coordinates of its dimensions, and the
@@ -58,11 +58,12 @@ order of the rows, are in that of the group `cases` only.
 Cases and views keep their place for good: new ones are appended, whatever their order in the configuration, and those
 that leave it stay, a case as `retired`. Find them by their labels.
 
-The folder of the repository also contains `cases.csv` (the present cases with labels and all keys), `registry.txt`
-(row of every case) and `views.txt` (index of every view), `cases/` (configuration of every heart), `ledger/` (a record
-of every finished job: checksums, seed, version of the code; `structure.json`: checksums of all other files),
-`benchmarks/` (what jobs took), `figures/` and `logs/`; and `external/` what `echotruth evaluate` found of other
-trackers: their scores (NAME.csv) and, with `--keep`, NAME.zarr, which has the groups of that tracker in the same rows.
+The folder of the repository also contains `config.yaml`, `cases.csv` (the present cases with labels and all keys) and
+`cases/CASE.json` (the configuration of each), `registry.txt` (row of every case) and `views.txt` (index of every view),
+`ledger/STAGE/CASE/VIEW/SIZE.json` (a record of every finished job, without what the stage does not have: status,
+checksums, seed, code; `structure.json`: checksums of all other files of the tree), `benchmarks/` (time and memory of
+every job), `figures/` and `logs/`; and `external/` what `echotruth evaluate` found of other trackers: their scores
+(NAME.csv) and, with `--keep`, NAME.zarr, which has their groups of tracking and evaluation, in the same rows.
 
 This page is generated from `src/echotruth/repository/arrays.csv` by `make reference`.
 

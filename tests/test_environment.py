@@ -25,9 +25,12 @@ def requirements(*extras):
 
 def conda():
     """Name -> version bounds of every conda package."""
-    entries = yaml.safe_load((ROOT / "environment.yml").read_text())["dependencies"]
-    packages = [entry for entry in entries if isinstance(entry, str)]  # what pip installs after them is a mapping
+    packages = (entry for entry in conda_entries() if isinstance(entry, str))
     return {name: bounds.strip() for name, _, bounds in (entry.partition(" ") for entry in packages)}
+
+
+def conda_entries():
+    return yaml.safe_load((ROOT / "environment.yml").read_text())["dependencies"]
 
 
 def lock():
@@ -54,6 +57,10 @@ def tracked():
 def test_conda_asks_for_what_pip_asks_for():
     expected = {CONDA_NAMES.get(each.name, each.name): str(each.specifier) for each in requirements("test")}
     assert {name: bounds for name, bounds in conda().items() if name not in CONDA_ONLY} == expected
+
+
+def test_conda_installs_the_checkout_and_nothing_else_by_pip():
+    assert [entry for entry in conda_entries() if not isinstance(entry, str)] == [{"pip": ["-e ."]}]
 
 
 def test_conda_has_the_same_python():

@@ -9,7 +9,7 @@
 
 import lazy_loader
 
-__version__ = "0.1.0"
+__version__ = "0.1.1"
 
 # Modules are imported when one of their names is first used; __init__.pyi lists them.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

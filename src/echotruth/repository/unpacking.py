@@ -20,14 +20,14 @@ def unpack(data: xr.Dataset, *names: str) -> xr.Dataset:
     Parameters
     ----------
     data : Dataset
-        The group `evaluation` or `physiology` of a repository, or a selection of it.
+        A group of a repository, as `physiology` or `evaluation/512/dis`, or a selection of it.
     *names : str
         Names of the arrays that are wanted, as `nrmse`; all and those that are not packed if there are none.
 
     Returns
     -------
     Dataset
-        As `nrmse` (case, view, size, tracker, region, component); docs/schema.md lists all.
+        As `nrmse` (case, view, region, component); docs/schema.md lists all.
 
     Raises
     ------
