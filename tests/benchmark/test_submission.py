@@ -16,10 +16,11 @@ from benchmarks.suite.results import result_path
 from benchmarks.suite.variants import VARIANTS, anonymous
 from echotruth.config.loading import load
 from echotruth.config.reading import ConfigError
-from echotruth.evaluation.clip import Clip, clips
+from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.run import prepare
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import ledger
+from echotruth.repository.reader import Repository
 from echotruth.workflow.job import Job
 
 pytestmark = pytest.mark.slow
@@ -53,7 +54,7 @@ def result_of(folder, tracker, variant):
 
 def test_scores_on_mirrored_clips_of_older_images_do_not_count(repository):
     assert len(result_of(repository, "honest", "mirrored").rows) == 2
-    path = repository / "ledger/bmode/a_ideal/mid.json"
+    path = repository / "ledger/bmode/a_ideal/mid/64.json"
     ledger.commit(path, ledger.read(path) | {"sha256": {"image": "another"}})
     found = result_of(repository, "honest", "mirrored")
     assert list(found.rows["case"]) == ["b_ideal"] and found.older == 1
@@ -109,7 +110,7 @@ def test_a_tracker_is_given_neither_seed_nor_times_by_which_it_would_know_the_cl
     )
     run = prepare_rerun(repository, "dis", "mirrored", "test")
     list(run.rows([64]))
-    known = [clips(Job(repository, "tracking", case, view, code="-"))[64] for case, view in run.case_views()]
+    known = [read_clips(Repository(repository), case, view)[64] for case, view in run.case_views()]
     times, seeds = ([arguments[k] for arguments in given] for k in (4, 5))
     assert not np.array_equal(known[0].frame_time, known[1].frame_time) and known[0].seed != known[1].seed
     # These clips have the same images, so that nothing is left that differs.
@@ -134,8 +135,8 @@ def test_seed_of_an_anonymous_clip_is_that_of_its_images(clip):
 def test_error_of_an_open_clip_is_that_of_its_last_frame(repository):
     lines = list(rerun([repository], "dis", "open", "test", []))
     found = result_of(repository, "dis", "open").rows
-    job = Job(repository, "tracking", "a_ideal", "mid", code="-")
-    stored = job.read("evaluation", "frame_nrmse")["frame_nrmse"][0, 0, 1, -1]  # one of two steps
+    job = Job(repository, "tracking", "a_ideal", "mid", 64, code="-")
+    stored = job.read("evaluation/64/dis", "frame_nrmse")["frame_nrmse"][1, -1]  # one of two steps
     assert len(lines) == 2 and found["before_percent"][0] == pytest.approx(100 * stored, rel=1e-3)
     assert np.all(found["error_percent"] < 10)
 
