@@ -196,7 +196,7 @@ def _suite(folder: Path) -> Suite:
     except EvaluationError as error:
         raise EvaluationError(f"{folder}: {error}") from None
     wanted = [(case, view) for case in cases for view in config.views]
-    return Suite(folder, config, [clip for clip in wanted if not repository.problem(*clip, "evaluation")], len(wanted))
+    return Suite(folder, config, [clip for clip in wanted if not repository.problem(*clip, "tracking")], len(wanted))
 
 
 def _listed(sizes: Sequence[int]) -> str:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 import zarr
 
 from echotruth.cases import expand
@@ -29,7 +28,6 @@ from echotruth.repository.digest import digest
 from echotruth.repository.ledger import record_path
 from echotruth.repository.reader import Repository
 from echotruth.repository.store import Store
-from echotruth.tracking import grid
 from echotruth.workflow.job import Job
 from echotruth.workflow.processes import script
 

@@ -111,7 +111,7 @@ def clip_metrics(
     chosen_trackers = chosen("tracker", trackers, known)
     hearts = hearts_of({case.id: case for case in repository.all_cases()})
     found: tuple[list[Row], list[Row], list[Row]] = ([], [], [])
-    for case, complete in repository.finished(cases, views, "evaluation"):
+    for case, complete in repository.finished(cases, views, "tracking"):
         for view in complete:
             keys: Row = {"case": case.id, "view": view, "plane": case.config.views[view].plane}
             keys |= _sorts(case, hearts[case.id])

@@ -74,7 +74,7 @@ def strain_summary(
 
     chosen_sizes = [image_size(repository.config, size) for size in sizes or repository.sizes[:1]]
     chosen_trackers = chosen("tracker", trackers, repository.trackers)
-    clips = repository.finished(cases, views, "evaluation")
+    clips = repository.finished(cases, views, "tracking")
     rows = [row for clip in clips for row in _rows(repository, *clip, chosen_sizes, chosen_trackers)]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 

@@ -81,9 +81,7 @@ FORMATS = {
     "dicom": Format("dicom", ".dcm"),
     "vtk": Format("vtk", "", (), "heart"),
     "matlab": Format("matlab", ".mat", ("phantom", "truth", "bmode", "tracking"), options=("trackers",)),
-    "csv": Format(
-        "curves", ".csv", ("physiology", "tracking", "evaluation"), options=("trackers",), table="summary.csv"
-    ),
+    "csv": Format("curves", ".csv", ("tracking",), options=("trackers",), table="summary.csv"),
     "tap": Format("tap", ".npz"),
     "tap_pickle": Format("tap", ".pkl", together=True),
     "flo": Format("flo", ""),
