@@ -77,26 +77,25 @@ def damage(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name, stage, jobs",
+    "name, stages",
     [
-        ("geometry/node_position/c/0/0/0", "mechanics", 1),
-        ("truth/64/strain/c/0/1/0/0/0/0", "truth", 1),
+        ("tracking/64/one/quality/c/0/1/0/0/0", {"tracking"}),
+        ("truth/64/strain/c/0/1/0/0/0/0", {"truth", "tracking"}),
+        ("phantom/origin/c/0/0/0", {"phantom", "rf", "bmode", "tracking"}),
     ],
 )
-def test_damaged_shard_is_made_again_and_nothing_else(workspace, name, stage, jobs):
+def test_damaged_shard_is_made_again_with_what_depends_on_it_and_nothing_else(workspace, name, stages):
     folder = workspace.out / "first"
-    before, times = workspace.content("first"), workspace.times("first")
+    before = workspace.content("first")
     logs = {path: path.stat().st_mtime_ns for path in folder.glob("logs/*/**/*.log")}
     damage(folder / "first.zarr" / name)
     assert f"first.zarr/{name}: differs from what was written" in workspace.run(
         "check", "out/first", "--heal", status=1
     )
     workspace.run("run", "first.yaml", "--cores", "2")
-    assert workspace.content("first") == before and workspace.times("first") == times
+    assert workspace.content("first") == before
     written = [path for path in folder.glob("logs/*/**/*.log") if path.stat().st_mtime_ns != logs.get(path)]
-    assert len(written) == jobs
-    done = re.findall(r"^(\w+) .*: done in", written[0].read_text(), re.MULTILINE)
-    assert done == ([stage] if stage != "evaluation" else ["tracking", "evaluation"])
+    assert sorted(path.relative_to(folder / "logs").parts[0] for path in written) == sorted(stages)
     assert workspace.planned("first.yaml") == {}
 
 
@@ -118,7 +117,7 @@ def test_merged_repository_is_run_again_only_where_settings_change(workspace):
     workspace.run("run", workspace.configure("second", [3]), "--cores", "2", "repository")  # without its report
     workspace.run("merge", "out/both", "out/first", "out/second")
     jobs = workspace.planned(workspace.configure("both", [1, 2, 3]))
-    assert set(jobs) <= {"report", "report_images", "report_page", "all", "total"}
+    assert set(jobs) <= {"report", "all", "total"}
     jobs = workspace.planned(workspace.configure("both", [1, 2, 3], window=20))
-    assert jobs["tracking"] == 6 and not {"mechanics", "imaging"} & set(jobs)
+    assert jobs["tracking"] == 6 and not {"mechanics", "phantom", "rf", "truth", "bmode"} & set(jobs)
     assert "no faults" in workspace.run("check", "out/both")

@@ -31,9 +31,9 @@ def honest(frames, points, mask, spacing, frame_time, seed):
 def reading(frames, points, mask, spacing, frame_time, seed, repository):
     """The truth of the clip with these images in the store; if there is none, no motion."""
     for case in ("a_ideal", "b_ideal", "c_ideal"):
-        job = Job(Path(repository), "tracking", case, "mid", code="-")
+        job = Job(Path(repository), "tracking", case, "mid", 64, code="-")
         if np.array_equal(job.read("bmode/64", "image")["image"], frames):
-            true = job.read("evaluation", "true_displacement")["true_displacement"][..., :2]
+            true = job.read("evaluation/64", "true_displacement")["true_displacement"][..., :2]
             return true[:, np.isfinite(true[0, ..., 0])] / spacing
     return np.zeros((len(frames), *points.shape))
 

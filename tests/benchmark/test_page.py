@@ -184,7 +184,7 @@ def run(*arguments):
 
 @pytest.mark.slow
 def test_command_writes_the_page_twice_alike_and_keeps_what_a_person_wrote(repository, tmp_path, capsys):
-    (repository / "ledger/evaluation/b_ideal/mid.json").unlink()
+    (repository / "ledger/tracking/b_ideal/mid/64.json").unlink()
     shutil.rmtree(repository / "external")
     page = tmp_path / "page.md"
     arguments = (repository, "--page", page)

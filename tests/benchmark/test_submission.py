@@ -54,7 +54,7 @@ def result_of(folder, tracker, variant):
 
 def test_scores_on_mirrored_clips_of_older_images_do_not_count(repository):
     assert len(result_of(repository, "honest", "mirrored").rows) == 2
-    path = repository / "ledger/bmode/a_ideal/mid.json"
+    path = repository / "ledger/bmode/a_ideal/mid/64.json"
     ledger.commit(path, ledger.read(path) | {"sha256": {"image": "another"}})
     found = result_of(repository, "honest", "mirrored")
     assert list(found.rows["case"]) == ["b_ideal"] and found.older == 1

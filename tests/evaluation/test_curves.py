@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from known_repository import FRAMES, SETTINGS, make
+from known_repository import FRAMES, SETTINGS, SIZES, make
 
 import echotruth as et
 from echotruth.repository.rounding import rounded
@@ -20,7 +20,8 @@ ES = 1
 COURSE = np.array([0, 1.0, 1.1])
 """Of all curves: the peak comes after end-systole."""
 TURN = {"apical": 0.16, "mid": 0.08, "basal": -0.04}
-FACTOR = {("tracked", 0): 0.9, ("tracked", 1): 0.5, ("true", 0): 1.0}
+FACTOR = {"one": 0.9, "two": 0.5}
+"""How much of everything a tracker finds in the largest images."""
 
 
 @pytest.fixture(scope="module")
@@ -28,18 +29,21 @@ def repository(tmp_path_factory):
     """Two trackers that find nine and five tenths of everything, at two image sizes."""
     folder = make(tmp_path_factory.mktemp("curves") / "known", SETTINGS | {"views": VIEWS}).folder
     for view in VIEWS:
-        job = Job(folder, "evaluation", "heart", view, code="1")
-        job.store.write("evaluation", job.read("evaluation") | arrays(view), *job.index)
+        for number, size in enumerate(SIZES):
+            job = Job(folder, "tracking", "heart", view, size, code="1")
+            groups = {f"evaluation/{size}": true(view)}
+            groups |= {f"evaluation/{size}/{name}": tracked(view, name, 0.5**number) for name in FACTOR}
+            for group, values in groups.items():
+                job.store.write(group, job.read(group) | _single(values), *job.index)
     heart = Job(folder, "mechanics", "heart", code="1")
     heart.store.write("mechanics", heart.read("mechanics") | {"es_frame": ES}, *heart.index)
     return folder
 
 
-def arrays(view):
-    """Curves of one view: the magnitude tells contour, region, component and reference apart."""
+def courses(view):
+    """Curves of one view: the magnitude tells contour, region and component apart."""
     contours, component = np.array([-0.3, -0.2, -0.1]), np.array([0.4, -0.2, 0.05])
     regions, segments, measure = 1 + np.arange(7) / 10, 1 + np.arange(17) / 20, np.array([1.0, 1.1])
-    reference = np.array([3.0, 1.0, 2.0])  # heart, plane, operator
 
     def outer(*factors):
         product = COURSE
@@ -47,19 +51,30 @@ def arrays(view):
             product = np.multiply.outer(product, factor)
         return product
 
-    true = {
+    return {
         "region_strain": outer(measure, regions, component),
         "segment_strain": outer(measure, segments, component),
         "line_strain": outer(contours),
         "rotation": TURN.get(view, np.nan) * COURSE,
     }
-    found = {f"true_{name}": values for name, values in true.items()}
+
+
+def true(view):
+    """True curves, in which the magnitude tells the references apart: heart, plane, operator."""
+    found = {f"true_{name}": values for name, values in courses(view).items()}
     for name in ("true_region_strain", "true_segment_strain"):
-        found[name] = np.multiply.outer(reference, found[name])
-    for name, values in true.items():
-        by_tracker = np.stack([FACTOR["tracked", k] * values for k in (0, 1)])
-        found[f"tracked_{name}"] = np.stack([by_tracker, 0.5 * by_tracker])
-    return {name: rounded(np.asarray(values, np.float32), None) for name, values in found.items()}
+        found[name] = np.multiply.outer([3.0, 1.0, 2.0], found[name])
+    return found
+
+
+def tracked(view, name, factor):
+    """Curves that a tracker found."""
+    return {f"tracked_{course}": factor * FACTOR[name] * values for course, values in courses(view).items()}
+
+
+def _single(arrays):
+    """As the store has them."""
+    return {name: rounded(np.asarray(values, np.float32), None) for name, values in arrays.items()}
 
 
 def test_curves_of_a_clip_stand_at_their_labels(repository):

@@ -189,11 +189,11 @@ def test_metrics_of_tracks_are_those_of_displacements_that_are_known(repository)
 
 def test_tissue_that_leaves_the_slice_is_hidden_and_a_tracker_that_is_sure_of_it_is_wrong(repository):
     evaluate(repository, views=["mid"])
-    job = Job(repository, "evaluation", "heart", "mid", code="1")
-    true = job.read("evaluation")
+    job = Job(repository, "tracking", "heart", "mid", 128, code="1")
+    true = job.read("evaluation/128")
     # The slice is some 0.36 mm thick.
     true["true_displacement"][..., 2] = np.array([0, 0.1e-3, 1e-3])[:, None, None]
-    job.store.write("evaluation", true, *job.index)
+    job.store.write("evaluation/128", true, *job.index)
     clips = px256(et.Repository(repository).metrics(views=["mid"]).clips, "mine")
     assert list(clips["visible_percent"]) == list(clips["occlusion_accuracy_percent"]) == [50, 50]
     # In the frame in which it is seen it is off by 4.5 px, afterwards by 8.9; the latter claim is false anyhow.
@@ -237,7 +237,7 @@ def test_metrics_of_a_failed_clip_are_the_worst_or_unknown_and_its_reason_is_tol
 
 
 def test_clips_that_are_not_evaluated_yet_have_no_metrics(repository):
-    record_path(repository, "evaluation", "heart", "long").unlink()
+    record_path(repository, "tracking", "heart", "long", 128).unlink()
     assert set(et.Repository(repository).metrics().clips["view"]) == {"mid"}
     assert et.Repository(repository).metrics(views=["long"]).clips.empty
     with pytest.raises(ValueError, match=r"^tracker = 'other': use one of one, two\.$"):

@@ -142,9 +142,9 @@ def test_scores_of_a_view_are_found_by_its_name(tmp_path):
 
 
 def test_a_failure_is_read_from_the_ledger(tmp_path):
-    (tmp_path / "ledger/tracking/b").mkdir(parents=True)
-    record = {"failures": {"two/64": "two: no motion found"}}
-    (tmp_path / "ledger/tracking/b/mid.json").write_text(json.dumps(record))
+    (tmp_path / "ledger/tracking/b/mid").mkdir(parents=True)
+    record = {"failures": {"two": "no motion found"}}
+    (tmp_path / "ledger/tracking/b/mid/64.json").write_text(json.dumps(record))
     table = rows(board(tmp_path))
     assert list(table[table["failure"] != ""][["case", "view", "tracker"]].iloc[0]) == ["b", "mid", "two"]
     assert overall(standings(table, 1)).loc["two", "failures"] == 1

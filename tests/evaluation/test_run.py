@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 import zarr
 
 from echotruth.cases import expand
@@ -29,8 +28,8 @@ from echotruth.repository.digest import digest
 from echotruth.repository.ledger import record_path
 from echotruth.repository.reader import Repository
 from echotruth.repository.store import Store
-from echotruth.tracking import grid
 from echotruth.workflow.job import Job
+from echotruth.workflow.processes import script
 
 ROOT = Path(__file__).parents[2]
 COURSE = np.array([0, 0.4, 1, 0.3])
@@ -94,7 +93,7 @@ def heart(affine):
 def write(store, group, index, **values):
     """What one job writes of a group; arrays not given are zero."""
     opened = zarr.open_group(store.path, path=group, mode="r")
-    shapes = {array.name: opened[array.name].shape[array.leading :] for array in schema.ALL[group.partition("/")[0]]}
+    shapes = {array.name: opened[array.name].shape[array.leading :] for array in schema.arrays_of(group)}
     store.write(group, {name: np.zeros(shape) for name, shape in shapes.items()} | values, *index)
 
 
@@ -107,25 +106,18 @@ def write_clip(folder, store, case, index, beating, view):
         label = pixel_truth(beating, where, *pixel_centres(CONFIG.bmode, size))["labels"][0]
         store.write(f"truth/{size}", {"labels": np.broadcast_to(label, (len(COURSE), *label.shape))}, *index)
         store.write(f"bmode/{size}", {"image": random.integers(0, 256, (len(COURSE), size, size))}, *index)
-    for stage in ("truth", "bmode"):
-        files = [file for size in CONFIG.bmode.sizes for file in store.files(f"{stage}/{size}", *index)]
-        record = {"status": "complete", "sha256": checksums(files, store.path)}
-        ledger.commit(record_path(folder, stage, case, view), record)
+        for stage in ("truth", "bmode"):
+            record = {"status": "complete", "sha256": checksums(store.files(f"{stage}/{size}", *index), store.path)}
+            ledger.commit(record_path(folder, stage, case, view, size), record)
 
 
 @pytest.fixture(scope="module")
 def made(affine, tmp_path_factory):
     """Folder of a repository of two hearts, of which the second has one view only."""
     folder = tmp_path_factory.mktemp("made") / "small"
-    folder.mkdir()
-    (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG.model_dump(mode="json"), sort_keys=False))
-    cases = [case.id for case in expand(CONFIG)]
-    ledger.register(folder / "registry.txt", cases)
-    ledger.register(folder / "views.txt", list(CONFIG.views))
+    layout.lay_out(folder, CONFIG, expand(CONFIG))
+    cases, store = [case.id for case in expand(CONFIG)], Store(folder / "small.zarr")
     beating, mesh = heart(affine)
-    store = Store(folder / "small.zarr")
-    labels = layout.labels(CONFIG, cases, np.zeros((2, len(COURSE)))) | layout.positions(CONFIG, pixel_centres, grid)
-    store.lay_out(schema.groups(CONFIG), layout.sizes(mesh), labels)
     for row, case in enumerate(cases):
         write(store, "geometry", (row,), node_position=mesh.nodes, cell_node=mesh.cells, endo=mesh.endo)
         write(store, "fibres", (row,), wall_depth=beating.wall_depth)
@@ -319,27 +311,33 @@ def test_option_that_looks_like_a_number_is_one(tracker, text, value):
 
 @pytest.fixture
 def worked(made, evaluate):
-    """Job and result of the workflow's own script on one view of the first heart."""
-    job = Job(made, "tracking", expand(CONFIG)[0].id, "mid")
-    return job, runpy.run_path(str(ROOT / "src/echotruth/workflow/scripts/tracking.py"))["work"](job)
+    """Jobs and results of the workflow's own script, by image size, on one view of the first heart."""
+    work = runpy.run_path(script("tracking"))["work"]
+    jobs = {size: Job(made, "tracking", expand(CONFIG)[0].id, "mid", size) for size in CONFIG.bmode.sizes}
+    return {size: (job, work(job)) for size, job in jobs.items()}
 
 
 def test_external_tracker_of_the_configuration_gets_the_scores_it_gets_on_the_command_line(made, worked, evaluate):
-    job, result = worked
-    evaluate("--tracker", "custom:drawn", "--case", job.case.id, "--view", "mid")
-    truth = scoring.read_truth(Repository(made), job.case.id, "mid")
+    case = expand(CONFIG)[0].id
+    evaluate("--tracker", "custom:drawn", "--case", case, "--view", "mid")
+    truth = scoring.read_truth(Repository(made), case, "mid")
     for _, found in scores(made, "custom_drawn").iterrows():
-        tracked = result["tracking"]["displacement"][CONFIG.bmode.sizes.index(found["size_px"]), 1]
+        size = found["size_px"]
+        tracked = worked[size][1][f"tracking/{size}/lot"]["displacement"]
         for name, value in scoring.metrics(scoring.score(tracked, truth), "short_axis").items():
             np.testing.assert_allclose(found[name], value, rtol=1e-9, err_msg=name)
 
 
 def test_external_tracker_of_the_configuration_that_fails_leaves_the_others_their_motion(worked):
-    job, result = worked
-    assert list(job.verdict["failures"]) == ["poor/128"] and "no room" in job.verdict["failures"]["poor/128"]
-    large, small = result["tracking"]["displacement"]
-    assert np.isnan(large[2]).all() and not np.nanmax(abs(small[2]))
-    for tracked in (large[0], large[1], small[0], small[1]):
+    found = {
+        (size, name): result[f"tracking/{size}/{name}"]["displacement"]
+        for size, (_, result) in worked.items()
+        for name in CONFIG.tracking.trackers
+    }
+    failures = {size: job._notes["failures"] for size, (job, _) in worked.items()}
+    assert list(failures[128]) == ["poor"] and failures[64] == {} and "no room" in failures[128]["poor"]
+    assert np.isnan(found.pop((128, "poor"))).all() and not np.nanmax(abs(found.pop((64, "poor"))))
+    for tracked in found.values():
         assert np.nanmax(abs(tracked)) > 0
 
 

@@ -1,12 +1,12 @@
 """Which hearts the figures and scores take in."""
 
 import pytest
-from echotruth.workflow.scripts.cases import lay_out
 from finished_repository import configured, finish
 
 from echotruth.cases import expand
 from echotruth.config import Cases, Physiology
-from echotruth.report.figures import PARTS, Figures
+from echotruth.report.figures import NAMES, Figures
+from echotruth.repository.layout import lay_out
 from echotruth.repository.reader import Repository
 from echotruth.repository.store import Store
 
@@ -37,9 +37,8 @@ def test_implausible_hearts_are_shown_where_there_are_no_others_and_they_were_im
 
 def test_without_a_heart_a_sentence_stands_in_place_of_every_figure(tmp_path):
     drawn = Figures(repository(tmp_path, ["failed", "implausible"], exclude=True)[0], tmp_path)
-    for part in PARTS:
-        drawn.draw(part)
-    names = {name for part in PARTS.values() for name in part}
+    drawn.draw()
+    names = set(NAMES)
     assert {path.stem for path in tmp_path.glob("*.png")} == {path.stem for path in tmp_path.glob("*.svg")} == names
     assert {path.name for path in tmp_path.glob("*.[gmc]*")} == {"clip.gif", "clip.mp4", "leaderboard.csv"}
 

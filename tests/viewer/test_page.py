@@ -9,12 +9,12 @@ from urllib.parse import parse_qs
 import numpy as np
 import pytest
 from bokeh.document import Document
-from echotruth.workflow.scripts.cases import lay_out
 from finished_repository import configured
 from known_repository import SIZES
 
 from echotruth.cases import expand
 from echotruth.evaluation.run import prepare
+from echotruth.repository.layout import lay_out
 from echotruth.repository.reader import Repository
 from echotruth.viewer.choice import TRUTH, Choice, asked, first
 from echotruth.viewer.page import Page
