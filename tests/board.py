@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from echotruth.cases import Case
 from echotruth.evaluation.leaderboard import SCORES
 from echotruth.repository import schema
 from echotruth.repository.reader import Repository
@@ -25,9 +26,10 @@ class Board(Repository):
         self._remote, self._place, self._folder, self.config = None, str(folder), folder, config
         self.hearts, self.shown = hearts, list(hearts)
         self.indices = dict.fromkeys(config.views, 0)
+        self._known = {case: Case(case, {}, config) for case in hearts}
 
-    def arrays(self, group, case, view=None, *names, index=(), store=None):
-        dims = {array.name: array.dims[4:] for array in schema.named(group)}
-        score = np.array([self.hearts[case][view]])
+    def arrays(self, group, case, view=None, *names, store=None):
+        dims = {array.name: array.dims[array.leading :] for array in schema.named(group)}
+        scores = dict(zip(self.config.tracking.trackers, self.hearts[case][view], strict=True))
         assert set(names) == set(SCORES)
-        return {name: np.multiply.outer(score, np.ones([LENGTHS[dim] for dim in dims[name]])) for name in names}
+        return {name: np.full([LENGTHS[dim] for dim in dims[name]], scores[group.rpartition("/")[2]]) for name in names}

@@ -112,7 +112,7 @@ def test_size_at_which_the_tracker_failed_is_unknown_and_the_other_is_there(repo
 
 def test_images_made_anew_are_not_those_that_were_tracked(repository):
     evaluate(repository)
-    path = record_path(repository, "bmode", "heart", "mid")
+    path = record_path(repository, "bmode", "heart", "mid", 128)
     record = ledger.read(path)
     ledger.commit(path, record | {"sha256": record["sha256"] | {sorted(record["sha256"])[0]: 64 * "0"}})
     with pytest.raises(ValueError, match=r"^tracker = 'mine': it was evaluated on older images of heart mid"):

@@ -244,7 +244,7 @@ def test_scores_of_images_made_anew_are_of_another_clip(made, evaluate, tmp_path
     shutil.copytree(made, again, ignore=shutil.ignore_patterns("external"))
     evaluate("--tracker", "custom:still", "--view", "mid", "--size", "64", repository=again)
     before = scores(again, "custom_still")
-    path = record_path(again, "bmode", before["case"][0], "mid")
+    path = record_path(again, "bmode", before["case"][0], "mid", 64)
     record = ledger.read(path)
     ledger.commit(path, record | {"seconds": 7})
     assert list(before["clip"]) == [digest(again, case, "mid") for case in before["case"]]

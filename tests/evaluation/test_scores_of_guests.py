@@ -18,7 +18,7 @@ CONFIG = Config(
 
 def commit(folder, stage, view, content):
     record = {"status": "complete", "sha256": {f"{stage}/64/c/0": content}, "seconds": 1.0}
-    ledger.commit(record_path(folder, stage, "a", view), record)
+    ledger.commit(record_path(folder, stage, "a", view, 64), record)
 
 
 @pytest.fixture
