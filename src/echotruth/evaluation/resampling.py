@@ -1,4 +1,4 @@
-"""Bootstrap over hearts: intervals of means and medians, paired differences of trackers, and the ranks they allow.
+"""Bootstrap over hearts: intervals of means and medians, and ranks.
 
 Clips of one heart resemble each other, so that hearts and not clips are drawn with replacement (Efron, Ann Stat 1979;
 7:1, doi 10.1214/aos/1176344552; Field & Welsh, J R Stat Soc B 2007; 69:369, doi 10.1111/j.1467-9868.2007.00593.x, on
