@@ -11,7 +11,8 @@ import pytest
 
 from echotruth import cli
 from echotruth.config import Config
-from echotruth.config.limits import MAX_CASES, ventricle_mm3
+from echotruth.config.amounts import ventricle_mm3
+from echotruth.config.limits import MAX_CASES
 from echotruth.config.loading import ConfigError, load, override, validate
 from echotruth.config.reading import MAX_BYTES, MAX_DEPTH, MAX_VALUES
 from echotruth.fem.volume import cell_volumes

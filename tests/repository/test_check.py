@@ -231,11 +231,3 @@ def test_units_that_are_not_those_of_the_schema_are_found(folder):
     record["sha256"] |= checksums([file], folder / "small.zarr")
     ledger.commit(folder / "ledger/structure.json", record)
     assert faults(folder) == {"small.zarr/mechanics/pressure": "has units 'kPa', not 'Pa'"}
-
-
-def test_repository_made_before_structure_had_a_record_says_so(folder):
-    for name in ("views.txt", "ledger/structure.json"):
-        (folder / name).unlink()
-    report = check(folder)
-    assert report.faults == []
-    assert "no ledger/structure.json" in report.notes[0]

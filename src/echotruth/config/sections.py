@@ -6,12 +6,13 @@ from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints, model_validator
 
+from echotruth.config import amounts
 from echotruth.config.cases import Cases
 from echotruth.config.defaults import apply_presets
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import ALL_VIEWS, Bmode, Phantom, Rf, View, standard_views
-from echotruth.config.limits import MAX_VIEWS, check_amounts
+from echotruth.config.limits import MAX_VIEWS
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
 from echotruth.config.motion import Motion
@@ -168,4 +169,8 @@ class Config(Section):
 
     @check
     def _check_amounts(self) -> None:
-        check_amounts(self)
+        frames, side = self.loop.frames, self.bmode.field_of_view_mm
+        amounts.check_cases(self.cases)
+        amounts.check_pixels(self.bmode, frames)
+        amounts.check_samples(self.probe, self.bmode, self.rf.lines, frames)
+        amounts.check_scatterers(self.phantom, self.realism, self.geometry, amounts.imaged_mm3(self.probe, side))

@@ -59,18 +59,22 @@ def verify(root: Path, path: Path, record: dict[str, Any]) -> int:
     ChecksumError
         If a file is missing or differs.
     """
-    expected = record.get("sha256", {})
-    for name, checksum in expected.items():
-        if problem := damage(root / name, checksum):
-            raise ChecksumError(f"{root / name}: {problem}: delete {path} and run again")
-    return len(expected)
+    return _compare(root, record.get("sha256", {}), f"written: delete {path} and run again")
 
 
 def verify_structure(root: Path, path: Path) -> int:
-    """Compare all files that no job wrote with the record of the structure, as :func:`verify` does."""
+    """Compare all files that no job wrote with their checksums in the record of the structure; return their number."""
+    remedy = "run again, which lays the repository out anew"
     try:
-        return verify(root, path, {"sha256": dict(ledger.read(path)["sha256"])})
-    except ChecksumError:
-        raise
+        expected = dict(ledger.read(path)["sha256"])
     except (OSError, ValueError, KeyError, TypeError):
-        raise ChecksumError(f"{path}: is missing or damaged: run again, which lays the repository out anew") from None
+        raise ChecksumError(f"{path}: is missing or damaged: {remedy}") from None
+    return _compare(root, expected, f"laid out: {remedy}")
+
+
+def _compare(root: Path, expected: dict[str, str], origin: str) -> int:
+    """Number of files that have their checksum, as all must; `origin` ends the error of one that has not."""
+    for name, checksum in expected.items():
+        if not is_whole(root / name, checksum):
+            raise ChecksumError(f"{root / name}: is missing or differs from what was {origin}")
+    return len(expected)

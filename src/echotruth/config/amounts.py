@@ -1,0 +1,102 @@
+"""Checks of what keys of several sections amount to together, by the bounds of :mod:`echotruth.config.limits`."""
+
+from __future__ import annotations
+
+from math import floor, isqrt, pi
+
+from echotruth.config.anatomy import Lengths
+from echotruth.config.cases import Cases
+from echotruth.config.geometry import Geometry
+from echotruth.config.imaging import Bmode, Phantom
+from echotruth.config.limits import MAX_CASES, MAX_CLIP_PIXELS, MAX_ECHO_SAMPLES, MAX_LINE_SAMPLES, MAX_SCATTERERS
+from echotruth.config.probe import Probe
+from echotruth.config.realism import Realism
+from echotruth.section import invalid
+
+
+def check_cases(cases: Cases) -> None:
+    """Check the number of hearts, also of those that conditions leave out."""
+    if cases.number > MAX_CASES:
+        shape = cases.shape
+        product = " x ".join(map(str, shape[:8])) + (" x ..." if len(shape) > 8 else "")
+        remedy = f"makes {product} cases: list fewer values, because a repository has at most {MAX_CASES}"
+        raise invalid("cases", cases.keys, remedy)
+
+
+def check_pixels(bmode: Bmode, frames: int) -> None:
+    """Check the number of pixels of a clip."""
+    size = bmode.size_px
+    if frames * size**2 > MAX_CLIP_PIXELS:
+        remedy = f"must be at most {isqrt(MAX_CLIP_PIXELS // frames)} with loop.frames = {frames}"
+        raise invalid("bmode.size_px", size, remedy)
+
+
+def check_samples(probe: Probe, bmode: Bmode, lines: int, frames: int) -> None:
+    """Check the number of samples of a frame's RF, and of a clip's lines."""
+    side = bmode.field_of_view_mm
+    # Both ways, in samples per mm; the corners of the image are 1.12 times as deep.
+    per_mm = 2 * 1.12 * probe.sampling_MHz * 1e3 / probe.sound_speed_m_per_s
+    pairs = probe.elements * (probe.elements + 1) // 2
+    amounts = (
+        (pairs, MAX_ECHO_SAMPLES, f"{probe.elements} elements"),
+        (frames * lines, MAX_LINE_SAMPLES, f"{frames} frames of {lines} lines"),
+    )
+    for number, most, what in amounts:
+        if number * side * per_mm > most:
+            remedy = f"must be at most {most / number / per_mm:.3g} with {what} sampled at {probe.sampling_MHz:g} MHz"
+            raise invalid("bmode.field_of_view_mm", side, remedy)
+
+
+def check_scatterers(phantom: Phantom, realism: Realism, geometry: Geometry, beam_mm3: float) -> None:
+    """Check the number of scatterers of a view, whose beam has a volume (:func:`imaged_mm3`)."""
+    density = phantom.density_per_mm3
+    volume = 0.0 if phantom.in_plane_only else _tissue_mm3(realism, geometry, beam_mm3)
+    if density * volume > MAX_SCATTERERS:
+        most = floor(MAX_SCATTERERS / volume * 1000) / 1000
+        remedy = (
+            f"must be at most {most:g}, because {volume:.3g} mm^3 are filled with at most {MAX_SCATTERERS} scatterers"
+        )
+        raise invalid("phantom.density_per_mm3", density, remedy)
+
+
+def _tissue_mm3(realism: Realism, geometry: Geometry, beam_mm3: float) -> float:
+    """Estimate of the volume that is filled with scatterers, each part times its density relative to muscle, mm^3."""
+    blood, surroundings, volume = realism.blood, realism.surroundings, 0.0
+    if geometry.file is None:
+        cavity, whole = ventricle_mm3(geometry.lengths(), geometry.scale * max(geometry.dilation, 1))
+        volume = (whole - cavity) * max(geometry.hypertrophy, 1)
+        volume += cavity * blood.density if blood.level_dB is not None else 0
+    if surroundings.level_dB is not None:
+        volume += surroundings.density * beam_mm3
+    return volume
+
+
+def imaged_mm3(probe: Probe, side: float) -> float:
+    """Upper estimate of the volume of the beam: the square image, as thick as the beam at its lower edge, mm^3."""
+    wavelength = probe.sound_speed_m_per_s / probe.frequency_MHz / 1e3
+    rays = probe.height_mm * max(1.0, side / probe.elevation_focus_mm - 1)
+    return 1.5 * side**2 * (rays + 2 * wavelength * side / probe.height_mm)
+
+
+def ventricle_mm3(lengths: Lengths, scale: float = 1.0) -> tuple[float, float]:
+    """Volume of the cavity, and of cavity and wall, of a truncated ellipsoid.
+
+    Parameters
+    ----------
+    lengths : dict
+        Of :meth:`echotruth.config.geometry.Geometry.lengths`, mm.
+    scale : float
+        Factor on all of them.
+
+    Returns
+    -------
+    tuple of float, mm^3
+    """
+    radius, length, base = (lengths[key] * scale for key in ("endo_radius_mm", "endo_length_mm", "base_mm"))
+    wall, apex_wall = lengths["wall_mm"] * scale, lengths["apex_wall_mm"] * scale
+    return _truncated_mm3(radius, length, base), _truncated_mm3(radius + wall, length + apex_wall, base)
+
+
+def _truncated_mm3(radius: float, length: float, base: float) -> float:
+    """Integral of pi radius^2 (1 - z^2 / length^2) from the apex at -length to the base, mm^3."""
+    return pi * radius**2 * (length + base - (length**3 + base**3) / (3 * length**2))
