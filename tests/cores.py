@@ -9,17 +9,17 @@ import subprocess
 import sys
 from pathlib import Path
 
-from echotruth.workflow.processes import cache_name, lock_cache_writes
-
-ROOT = Path(__file__).parents[1]
-# The cache of jobs that run in the checkout.
-CACHE = ROOT / ".snakemake/numba" / cache_name()
-os.environ["NUMBA_CACHE_DIR"] = str(CACHE)
 # Threads of BLAS that wait for a core that is taken spin: a decomposition of a matrix then costs twenty times its work.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 # The instructions of jobs, so that what is compiled here serves jobs too; another process asks numpy for its names.
 _CODE = "import json; from echotruth.workflow.instructions import environment; print(json.dumps(environment()))"
 os.environ.update(json.loads(subprocess.run([sys.executable, "-c", _CODE], check=True, stdout=subprocess.PIPE).stdout))
+
+from echotruth.workflow.processes import cache_name, lock_cache_writes  # noqa: E402 - it imports numpy
+
+# The cache of jobs that run in the checkout.
+CACHE = Path(__file__).parents[1] / ".snakemake/numba" / cache_name()
+os.environ["NUMBA_CACHE_DIR"] = str(CACHE)
 
 
 def lend(caches):
