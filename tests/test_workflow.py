@@ -102,7 +102,10 @@ def test_tree_holds_what_the_schema_page_says_and_nothing_else(made, tree):
     nodes = {path: variables for path, variables in nodes.items() if variables}
     assert set(nodes) == {*paths, "cases"}
     for path, rows in paths.items():
-        assert {name: found(variable) for name, variable in nodes[path].items()} == expected(coordinates, rows), path
+        # A group of a tracker has coordinates in common with that of its size, which xarray reads once.
+        wanted, variables = expected(coordinates, rows), tree[path].to_dataset().variables
+        assert {name: found(variables[name]) for name in wanted} == wanted, path
+        assert set(nodes[path]) <= set(wanted), path
     keys = set(pd.read_csv(made.out / "cases.csv").columns) - {"case", "seed"}
     assert set(nodes["cases"]) == {*cases, "case", "seed"}  # only the seed differs
     assert set(tree["cases"].attrs["constants"]) == keys
@@ -189,7 +192,7 @@ IMAGES = {"phantom": 4, "rf": 4, "bmode": 8, "tracking": 8, **END}
     ("elements: 16}", "elements: 20}", IMAGES),
     ("name: tiny\n", "name: tiny\nmechanics: {base: fixed}\n", {"mechanics": 2, "truth": 8, **IMAGES}),
     ("name: tiny\n", "name: tiny\nphysiology: {ejection_fraction_max: 0.99}\n", END),
-    ("name: tiny\n", "name: tiny\nphysiology: {ejection_fraction_min: 0.98}\n", {"truth": 8, **IMAGES}),
+    ("name: tiny\n", "name: tiny\nphysiology: {ejection_fraction_min: 0.89}\n", {"truth": 8, **IMAGES}),
 ])  # fmt: skip
 def test_change_runs_again_what_depends_on_it_and_nothing_else(made, old, new, jobs):
     assert CONFIG.count(old) == 1
