@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import yaml
-from echotruth.benchmark.repositories import opened
 from pydantic import AfterValidator, Field, StringConstraints, ValidationError
 from pydantic_core import ErrorDetails
 
@@ -17,6 +16,8 @@ from echotruth.config.reading import ConfigError, read_yaml, shown_key
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository import durable
 from echotruth.section import Name, Section, meaning
+
+from .repositories import opened
 
 Text = Annotated[str, StringConstraints(min_length=1, max_length=300, pattern=r"^[^\n\r]*\S[^\n\r]*$")]
 """One line of text."""
