@@ -12,7 +12,7 @@ from echotruth.config.motion import Affine
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
-from echotruth.repository.layout import read_case
+from echotruth.repository.case_file import read_case
 from echotruth.workflow.job import Job
 
 GRADIENT = [[0.9, 0.05, 0.0], [0.0, 1.1, 0.0], [0.2, 0.0, 1.0]]

@@ -356,7 +356,7 @@ REFUSED = {
     "function": (["--tracker", "custom:exat"], "has no attribute 'exat'"),
     "not a function": (["--tracker", "custom:np.pi"], "is no function but a float: name a function"),
     "needs an option": (["--tracker", "custom:exact"], "missing a required argument: 'course': it gets frames, points"),
-    "an option": (["--tracker", "custom:exact", "--option", "shif=0"], "got an unexpected keyword argument 'shif'"),
+    "an option": (["--tracker", "custom:still", "--option", "shif=0"], "got an unexpected keyword argument 'shif'"),
     "program": (["--command", "trakk {input} {output}"], "trakk: is not there or cannot be run"),
     "date": (["--tracker", "a:b", "--option", "a=2026-01-01"], "must be finite numbers, text"),
     "case": (["--tracker", "a:b", "--case", "seed9"], "case = 'seed9': use one of heart, seed2_"),

@@ -47,7 +47,7 @@ def test_store_rounds_what_a_job_writes_to_the_quantum_that_its_metadata_state(t
     store = lay_out(tmp_path / "small.zarr", [1])
     opened = store._open("tracking/64/one", "r")
     random, values = np.random.default_rng(2), {}
-    for array in schema.TRACKING:
+    for array in schema.KINDS["tracking/SIZE/TRACKER"]:
         values[array.name] = random.normal(scale=1e-3, size=opened[array.name].shape[2:])
     store.write("tracking/64/one", values, 0, 1)
     read = store.read("tracking/64/one", 0, 1)
@@ -55,7 +55,7 @@ def test_store_rounds_what_a_job_writes_to_the_quantum_that_its_metadata_state(t
         name: json.loads((store.path / f"tracking/64/one/{name}/zarr.json").read_bytes())["attributes"]["quantum"]
         for name in values
     }
-    assert stated == {"displacement": rounding.length_quantum(config), "quality": rounding.QUALITY}
+    assert stated == {"displacement": rounding.length_quantum(config), "quality": 2.0**-8}
     for name, quantum in stated.items():
         expected = np.round(values[name].astype("float32") / quantum) * quantum
         np.testing.assert_array_equal(read[name], expected)

@@ -13,8 +13,9 @@ import echotruth as et
 from echotruth.cases import all_cases, expand
 from echotruth.config import Config
 from echotruth.config.loading import load, validate
+from echotruth.repository.case_file import read_case
 from echotruth.repository.check import check
-from echotruth.repository.layout import lay_out, read_case
+from echotruth.repository.layout import lay_out
 from echotruth.workflow.merging import merge_repositories
 
 pytestmark = pytest.mark.slow
