@@ -106,7 +106,7 @@ def test_heart_has_to_be_named_where_there_are_several(several):
 REFUSED = {
     "case": (lambda read: read.clip("hart"), r"^case = 'hart': use one of heart\.$"),
     "view": (lambda read: read.clip(view="front"), r"^view = 'front': use one of mid, long\.$"),
-    "size": (lambda read: read.clip(size=100), r"^size = 100: use one of 128, 64, which"),
+    "size": (lambda read: read.clip(size=100), r"^size = 100: use one of 128, 64"),
     "variable": (lambda read: read.clip(variables="speed"), r"^variables: 'speed': use any of displacement"),
     "tracker": (lambda read: read.curves(tracker="three"), r"^tracker = 'three': use one of one, two\.$"),
     "trackers": (lambda read: read.tracks(trackers=["three"]), r"^tracker = 'three': use one of one, two\.$"),
