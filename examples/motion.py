@@ -15,7 +15,6 @@ import numpy as np
 import torch
 from torch import nn
 
-import echotruth as et
 from echotruth import learning
 from echotruth.torch import FlowPairs, loader
 from echotruth.tracking import TrackerFailed
@@ -134,7 +133,7 @@ def tracked(item, settings):
 
 def scores(network, pairs):
     """Mean end-point error of each method, px."""
-    trackers = et.configure(pairs.reader.folder / "config.yaml").tracking.trackers
+    trackers = pairs.repository.config.tracking.trackers
     found = {name: [] for name in ("no motion", *trackers, "network")}
     for item in pairs:
         true = item["flow"][:, item["wall"]].T
