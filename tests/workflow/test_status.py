@@ -14,6 +14,7 @@ from job_files import finish, write_benchmark
 from echotruth.cases import expand
 from echotruth.config import Config, PhaseCorrelation, Tracking
 from echotruth.repository import ledger
+from echotruth.repository.case_file import case_path
 from echotruth.repository.ledger import record_path
 from echotruth.workflow import lease
 from echotruth.workflow.jobs import RULES
@@ -35,6 +36,9 @@ def folder(tmp_path):
     folder.mkdir()
     (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG.model_dump(mode="json")))
     (folder / "cases.csv").write_text("case,seed\n" + "".join(f"{case},1\n" for case in CASES))
+    (folder / "cases").mkdir()
+    for case in expand(CONFIG):
+        case_path(folder, case.id).write_text(case.config.model_dump_json())
     for rule in RULES:
         finish(folder, rule, CONFIG, CASES)
     return folder
@@ -46,6 +50,15 @@ def counts(status, rule):
 
 def record(folder, case, **entries):
     ledger.commit(record_path(folder, "mechanics", case), {"status": "complete"} | entries)
+
+
+def test_heart_is_judged_by_bounds_of_its_own(folder):
+    wide = expand(CONFIG)[1].config
+    wide = wide.model_copy(update={"physiology": wide.physiology.model_copy(update={"twist_max_deg": 90.0})})
+    case_path(folder, SECOND).write_text(wide.model_dump_json())
+    for case in CASES:
+        record(folder, case, bounded={"twist_max_deg": 50.0})
+    assert list(status_of(folder)["reasons"]) == [FIRST]
 
 
 def test_finished_repository_is_finished(folder):

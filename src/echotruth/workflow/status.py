@@ -14,8 +14,8 @@ from typing import Any
 
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, load
-from echotruth.config.physiology import Physiology
 from echotruth.repository import ledger
+from echotruth.repository.case_file import read_case
 from echotruth.repository.ledger import NOT_A_REPOSITORY, record_path
 from echotruth.repository.verdict import Verdict, verdict
 from echotruth.workflow import cost, lease
@@ -93,7 +93,7 @@ def status_before(config: Config, cases: Iterable[str], folder: Path) -> Status:
     cases = list(cases)
     holder, lives = lease.current(folder)
     progress = _progress(folder, config, cases, holder)
-    known = {case: found for case in cases if (found := verdict_of(folder, case, config.physiology))}
+    known = {case: found for case in cases if (found := verdict_of(folder, case))}
     numbers = Counter(status for status, _ in known.values())
     parts = _parts(folder, config, cases, progress, lives)
     runs = lives and progress.is_planned
@@ -116,7 +116,7 @@ def status_before(config: Config, cases: Iterable[str], folder: Path) -> Status:
     }
 
 
-def verdict_of(folder: Path, case: str, bounds: Physiology) -> Verdict | None:
+def verdict_of(folder: Path, case: str) -> Verdict | None:
     """Status of a heart and its reason, empty if it is complete; None while it is not known.
 
     Parameters
@@ -124,13 +124,13 @@ def verdict_of(folder: Path, case: str, bounds: Physiology) -> Verdict | None:
     folder : Path
         Folder of the repository, `out/NAME`.
     case : str
-    bounds : Physiology
+        Its bounds are its own: species that are swept have others.
     """
     path = record_path(folder, "mechanics", case)
     if not path.is_file():
         return None
     try:
-        return verdict(ledger.read(path), bounds)
+        return verdict(ledger.read(path), read_case(folder, case).config.physiology)
     except (OSError, ValueError, KeyError):
         return Verdict("failed", "its record cannot be read")
 
