@@ -78,7 +78,7 @@ def result(job: Job) -> dict[str, dict[str, np.ndarray]]:
 
 def jobs(folder: Path, config: Config, case: str) -> Iterator[Job]:
     """Jobs of a heart, in the order of their stages."""
-    for path in ledger.record_paths(folder, case, list(config.views), config.bmode.sizes):
+    for path in ledger.record_paths(folder, case, config):
         yield job_of(folder, path)
 
 

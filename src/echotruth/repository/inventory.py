@@ -141,8 +141,7 @@ class Inventory:
 
     def wanted(self) -> list[Path]:
         """Paths of the records of all jobs of the configuration."""
-        places = list(self.config.views), self.config.bmode.sizes
-        return [path for case in self.cases for path in record_paths(self.folder, case, *places)]
+        return [path for case in self.cases for path in record_paths(self.folder, case, self.config)]
 
     def row(self, record: JobRecord) -> tuple[int, ...] | None:
         """Row of the case, and index of the view if there is one; None if the registry does not have them."""

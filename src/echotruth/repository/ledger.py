@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from echotruth.config import Config
 from echotruth.repository import durable
 
 STAGES: dict[str, tuple[str, ...]] = {
@@ -36,7 +37,7 @@ def record_path(folder: Path, stage: str, case: str, view: str | None = None, si
     return folder / "ledger" / stage / f"{place}.json"
 
 
-def record_paths(folder: Path, case: str, views: Sequence[str], sizes: Sequence[int]) -> list[Path]:
+def record_paths(folder: Path, case: str, config: Config) -> list[Path]:
     """Paths of the records of all jobs of a heart, in the order of the stages.
 
     Parameters
@@ -44,11 +45,10 @@ def record_paths(folder: Path, case: str, views: Sequence[str], sizes: Sequence[
     folder : Path
         Folder of the repository, `out/NAME`.
     case : str
-    views : sequence of str
-    sizes : sequence of int
-        Image sizes, px.
+    config : Config
+        Its views and image sizes are those of all cases.
     """
-    values: dict[str, Sequence[Any]] = {"case": [case], "view": views, "size": sizes}
+    values: dict[str, Sequence[Any]] = {"case": [case], "view": [*config.views], "size": config.bmode.sizes}
     places = {stage: product(*(values[name] for name in names)) for stage, names in STAGES.items()}
     return [record_path(folder, stage, *place) for stage, found in places.items() for place in found]
 

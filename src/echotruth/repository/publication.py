@@ -38,7 +38,7 @@ def publish(folder: Path) -> dict[str, Any]:
     store = Store(folder / f"{config.name}.zarr")
     rows = ledger.rows(folder / "registry.txt")
     cases = expand(config)
-    records = {case.id: record_paths(folder, case.id, list(config.views), config.bmode.sizes) for case in cases}
+    records = {case.id: record_paths(folder, case.id, config) for case in cases}
     files = verify_structure(store.path, store.record)
     files += sum(verify(store.path, path, ledger.read(path)) for paths in records.values() for path in paths)
     verdicts = {case.id: verdict(ledger.read(records[case.id][0]), case.config.physiology) for case in cases}

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from echotruth.cases import Case, expand
-from echotruth.config import Config
+from echotruth.config import Cases, Config
 from echotruth.config.loading import ConfigError, load, validate
 from echotruth.repository import ledger, settings
 from echotruth.repository.ledger import record_path, record_paths
@@ -73,13 +73,9 @@ class Plan:
     def mark(self) -> Path:
         """File that says that the hearts of this plan were made, with these settings and this code."""
         code = [self.code(stage) for stage in ledger.STAGES]
-        settings = [self._settings(stage, case, view) for case in self.cases for stage, view in self._places(case)]
-        hearts = [[case, self._motions[case]] for case in self.cases]
-        version = settings_version(self.config.physiology, self.config.tracking, code, hearts, settings)
-        return self.folder / "blocks" / f"{version}.made"
-
-    def _places(self, case: str) -> list[tuple[str, str]]:
-        return [(stage, view) for stage in settings.OF_VIEW for view in self._every[case].config.views]
+        hearts = [[id, case.parameters, self._motions[id]] for id, case in self.cases.items()]
+        common = self.config.model_copy(update={"cases": Cases()})
+        return self.folder / "blocks" / f"{settings_version(common, code, hearts)}.made"
 
     def stands(self) -> bool:
         """Whether the hearts of this plan were made, and all their records are there."""
@@ -145,8 +141,7 @@ class Plan:
         return [str(block.mark) for block in blocks if block.cases]
 
     def _record_paths(self) -> list[Path]:
-        places = list(self.config.views), self.config.bmode.sizes
-        return [path for case in self.cases for path in record_paths(self.folder, case, *places)]
+        return [path for case in self.cases for path in record_paths(self.folder, case, self.config)]
 
     def external_scores(self, wildcards: Wildcards) -> list[str]:
         """Scores of trackers from outside."""

@@ -188,9 +188,8 @@ def _outcomes(
     repository: Inventory, records: dict[JobRecord, Record], missing: set[Path]
 ) -> Iterator[tuple[str, tuple[str, str]]]:
     entries = {record.path: each for record, each in records.items()}
-    places = list(repository.config.views), repository.config.bmode.sizes
     for case in repository.cases:
-        mechanics, *others = record_paths(repository.folder, case, *places)
+        mechanics, *others = record_paths(repository.folder, case, repository.config)
         bounds = repository.cases[case].config.physiology
         found = verdict(entries[mechanics], bounds) if mechanics in entries else None
         if found is None or (found.status != "failed" and missing & set(others)):
