@@ -5,7 +5,7 @@ from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import Bmode, Phantom, Rf, View
 from echotruth.config.loop import Loop
-from echotruth.config.mechanics import Mechanics
+from echotruth.config.mechanics import Active, Mechanics
 from echotruth.config.motion import Motion
 from echotruth.config.pathology import Pathology
 from echotruth.config.physiology import Physiology
@@ -15,6 +15,7 @@ from echotruth.config.tracking import PhaseCorrelation, Tracking
 from echotruth.section import Section
 
 __all__ = [
+    "Active",
     "Bmode",
     "Cases",
     "Config",

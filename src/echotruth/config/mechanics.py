@@ -13,7 +13,7 @@ NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 
 class Active(Section):
-    """Active tension along the fibres, T_a = T_Ca [1 + beta (lambda - 1)]."""
+    """Active tension along the fibres, T_a = h T_Ca [1 + beta (lambda - 1)], with the force-velocity relation h."""
 
     length_dependence: Annotated[FiniteFloat, Field(ge=0, le=5)] = 1.4
     """beta."""
@@ -25,6 +25,13 @@ class Active(Section):
     Physiol 289, H692)."""
     normal_share: Fraction = 0.2
     """Share of the tension that acts along the sheet normal too, likewise."""
+    shortening_velocity_max_per_s: Annotated[FiniteFloat, Field(gt=0)] | None = None
+    """Velocity, in lengths per second, at which shortening muscle bears no load; `null`: the tension does not depend on
+    the velocity, as in the paper."""
+    hill_curvature: Annotated[FiniteFloat, Field(gt=0, le=10)] = 0.5
+    """a / F_0 of Hill's hyperbola."""
+    eccentric_max: Annotated[FiniteFloat, Field(gt=1, le=5)] = 2.5
+    """Force of muscle that is stretched fast, over the isometric one."""
 
 
 class Pericardium(Section):

@@ -23,6 +23,7 @@ from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.mechanics.fibres import material_gradients
 from echotruth.mechanics.solver import stress_point as point
+from echotruth.mechanics.solver.active_stress import ActiveLaw
 from echotruth.mechanics.solver.stress_point import COMPILED, PASSIVE, TOTAL, VOLUMETRIC
 from echotruth.threads import share
 
@@ -68,8 +69,8 @@ class WallLaw(NamedTuple):
         Energy of the passive law, from `materials.compiled`.
     constants : ndarray
         Constants of the passive law.
-    active : ndarray of shape (2,)
-        beta of the active law, and the power of the stretch by which the tension is divided.
+    active : ActiveLaw
+        Constants of the active stress.
     bulk_modulus : float, Pa
         kappa, of the mean volume of each cell.
     pointwise_bulk_ratio : float
@@ -81,7 +82,7 @@ class WallLaw(NamedTuple):
 
     energy: Any
     constants: Floats
-    active: Floats
+    active: ActiveLaw
     bulk_modulus: float
     pointwise_bulk_ratio: float = 0.0
     viscosity: float = 0.0
@@ -95,16 +96,16 @@ class CellState(NamedTuple):
     ----------
     stiffness, tension, pressure : ndarray of shape (n_cells,), Pa
         C, T_Ca and the pressure, positive in tension.
-    viscous_modulus : ndarray of shape (n_cells,), Pa
-        Viscosity over the time since the previous state.
+    rate : float, 1/s
+        One over the time since the previous state; 0 at rest.
     previous_c : ndarray of shape (n_cells, n_points, 6)
-        Right Cauchy-Green tensor of that state, in the fibre axes.
+        Right Cauchy-Green tensor of that state, in the fibre axes; ignored at rest.
     """
 
     stiffness: Floats
     tension: Floats
     pressure: Floats
-    viscous_modulus: Floats
+    rate: float
     previous_c: Floats
 
 
@@ -181,7 +182,7 @@ def _evaluate_cells(nodes, elements, law, state, out, bounds):
         force[:], out.volume[cell] = 0.0, 0.0
         if with_tangent:
             ke[:] = 0.0
-        scale = state.stiffness[cell], state.tension[cell], state.pressure[cell], state.viscous_modulus[cell]
+        scale = state.stiffness[cell], state.tension[cell], state.pressure[cell], state.rate
         _gather(nodes, elements.cells, cell, x)
         for q in range(elements.weight.shape[1]):
             dN_dX, weight = elements.dN_dX[cell, q], elements.weight[cell, q]

@@ -16,12 +16,13 @@ that the support leaves free (:func:`.support.base_support`), is
 with the second Piola-Kirchhoff stress S of the wall, term by term (:func:`.stress_point.evaluate`),
 
     S = C S_passive                                      a law of materials/, stress.isochoric_stress
-      + T sum_a share_a S_active(lambda_a) a (x) a       active_stress.py; the T of each cell: activation.py
+      + T sum_a share_a S_active(lambda_a, lambda_a') a (x) a
+                                                         active_stress.py; the T of each cell: activation.py
       + [p_c + C b (J - 1)] J C_G^-1                     stress_point.evaluate; b is the pointwise bulk ratio
       + eta dE/dt                                        the same, over the step since the previous state.
 
 Here x = X + u, F = dx/dX, J = det F, C_G = F^T F, E = (C_G - I) / 2, and a is fibre, sheet and normal, along which the
-stretch is lambda_a and the share of the tension 1 and those of the configuration. Springs act on the unloaded surface
+stretch is lambda_a, its rate lambda_a' over the same step, and the share of the tension 1 and those of the configuration. Springs act on the unloaded surface
 of normal n, per area: k and d are those of the pericardium, at rest at end-diastole (ED), k_z and k_t those of the base
 along and around the long axis; u' is the velocity. Stresses are in Pa, lengths in m.
 
@@ -221,17 +222,14 @@ class Equilibrium:
         self.previous: PreviousState | None = None
         self._end_diastole: Floats | None = None
         self._previous_nodes, self._rate = mesh.nodes, 0.0
-        self._viscous_modulus = np.zeros(len(mesh.cells))
         self._previous_c = np.zeros((*self.elements.weight.shape, 6))
 
     def set_previous(self, previous: PreviousState) -> None:
-        """Set the previous state; without time since, the wall is elastic."""
+        """Set the previous state; without time since, nothing depends on velocities."""
         self.previous = previous
-        elastic = previous.time <= 0 or self.law.viscosity == 0
-        self._viscous_modulus[:] = 0.0 if elastic else self.law.viscosity / previous.time
         self._previous_nodes = self.positions(previous.state, previous.prescribed_fraction)
         self._rate = 1 / previous.time if previous.time > 0 else 0.0
-        if not elastic:
+        if self._rate:
             element.right_cauchy_green(self._previous_nodes, self.elements, self._previous_c)
 
     def rest_at(self, state: State) -> None:
@@ -265,7 +263,7 @@ class Equilibrium:
         nodes = self.positions(state, load.prescribed_fraction)
         stiffness = state.stiffness * self.stiffness_scale
         tension = np.zeros(len(self.mesh.cells)) + state.tension * load.tension_fraction + load.tension
-        cell_state = element.CellState(stiffness, tension, state.cell_pressure, self._viscous_modulus, self._previous_c)
+        cell_state = element.CellState(stiffness, tension, state.cell_pressure, self._rate, self._previous_c)
         element.evaluate(nodes, self.elements, self.law, cell_state, response)
         gradient = cavity.volume_gradient(nodes, self.mesh.endo)
         self._volume_gradient = self.assembly.vector(self.assembly.rotate(self.mesh.endo, gradient), ENDO)

@@ -115,7 +115,7 @@ class LoadStepper:
 
     def _solve(self, load: Load, unknown: Unknown, predictors: tuple[State, ...], step: float) -> State:
         state, residual = self._best_predictor(load, unknown, predictors)
-        if residual.total_error > MAX_PREDICTOR_RESIDUAL and self.load.pressure and step > _MIN_LOAD_STEP:
+        if not self.equations._rate and residual.total_error > MAX_PREDICTOR_RESIDUAL and self.load.pressure and step > _MIN_LOAD_STEP:
             raise Diverged(f"The load step is too large {_at(load, unknown)}.")
         if self._tangent is not None and self._tangent.unknown != unknown:
             self._tangent = None

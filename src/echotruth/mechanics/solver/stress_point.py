@@ -1,7 +1,8 @@
 """Stress at one point of the wall, and its derivative by the deformation.
 
 Parts of the stress stand in the order `PASSIVE`, `ACTIVE`, `VOLUMETRIC`, each for a factor of one, and
-after them `TOTAL`, with the viscous stress; `scale` holds the factors C, T_Ca, p and viscous modulus.
+after them `TOTAL`, with the viscous stress; `scale` holds the factors C, T_Ca and p, and one over the time since the
+previous state, 1/s.
 """
 
 from __future__ import annotations
@@ -96,11 +97,13 @@ def evaluate(j, law, scale, previous_c, work, with_tangent):
     """Fill the parts of the stress and its tangent of a point whose C and J are known.
 
     S = C S_passive + T_Ca S_active + (p + C pointwise_bulk_ratio (J - 1)) J C^-1
-    + viscous modulus (C - C_previous) / 2; the last term is viscous (Kelvin-Voigt), with the growth of C since the
-    previous state. S_active acts along the fibre, and by its shares along sheet and normal, in each direction as the
-    stretch there demands: the stress of fibres that are dispersed into these directions.
+    + viscosity (C - C_previous) / (2 time since); the last term is viscous (Kelvin-Voigt), with the growth of C since
+    the previous state. S_active acts along the fibre, and by its shares along sheet and normal, in each direction as
+    the stretch there demands: the stress of fibres that are dispersed into these directions. Only that along the fibre
+    falls with the velocity, because fibres midway to a direction in which the wall lengthens hardly shorten.
     """
-    stiffness, tension, pressure, viscous_modulus = scale
+    stiffness, tension, pressure, rate = scale
+    viscous_modulus = law.viscosity * rate
     c, inverse, passive, stress, tangent = work.c, work.inverse, work.passive, work.stress, work.dS_dE
     active_stiffness = work.active_stiffness
     laws.invert(c, inverse)
@@ -114,7 +117,7 @@ def evaluate(j, law, scale, previous_c, work, with_tangent):
         stress[TOTAL, k] = stiffness * passive[k] + hydrostatic * j * inverse[k] + viscous
     for k in range(3):
         share = 1.0 if k == 0 else law.cross_fibre[k - 1]
-        active, active_tangent = active_stress(c[k], law.active[0], law.active[1])
+        active, active_tangent = active_stress(c[k], previous_c[k], rate if k == 0 else 0.0, law.active)
         stress[TOTAL, k] += tension * share * active
         stress[ACTIVE, k], stress[ACTIVE, k + 3] = share * active, 0.0
         active_stiffness[k] = share * active_tangent

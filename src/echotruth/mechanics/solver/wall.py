@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.config import Config, Mechanics
+from echotruth.config import Active, Config, Mechanics
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.materials import compiled
 from echotruth.mechanics import fibres
 from echotruth.mechanics.pathology import Tissue, tissue
 from echotruth.mechanics.solver import element
+from echotruth.mechanics.solver.active_stress import ActiveLaw
 from echotruth.mechanics.solver.equilibrium import Equilibrium
 from echotruth.mechanics.solver.support import base_support
 from echotruth.mechanics.solver.surroundings import surroundings
@@ -65,9 +66,20 @@ def equilibrium(config: Config, wall: Wall) -> Equilibrium:
 
 def wall_law(section: Mechanics) -> element.WallLaw:
     """Laws of the wall, SI, from their section of the configuration."""
-    power = 2.0 if section.active.stress == "cauchy" else 0.0
-    active = np.array([section.active.length_dependence, power])
+    active = active_law(section.active)
     material, si = section.material, section.si()
     bulk = si.bulk_modulus, si.pointwise_bulk_ratio
     cross_fibre = np.array([section.active.sheet_share, section.active.normal_share])
     return element.WallLaw(compiled(material.law), material.constants(), active, *bulk, si.viscosity, cross_fibre)
+
+
+def active_law(section: Active) -> ActiveLaw:
+    """Constants of the active stress, SI, from their section of the configuration."""
+    velocity = section.shortening_velocity_max_per_s
+    return ActiveLaw(
+        section.length_dependence,
+        2.0 if section.stress == "cauchy" else 0.0,
+        np.inf if velocity is None else velocity,
+        section.hill_curvature,
+        section.eccentric_max,
+    )
