@@ -175,9 +175,9 @@ def _make(
     from echotruth.mechanics.geometry import GeometryError
     from echotruth.mechanics.prescribed import MotionError
     from echotruth.repository.layout import lay_out
-    from echotruth.workflow.execution import execute
     from echotruth.workflow.progress import Progress
     from echotruth.workflow.running import Running
+    from echotruth.workflow.snakemake_process import execute
     from echotruth.workflow.summary import finished, unfinished
 
     start, folder = time.time(), Path("out") / config.name

@@ -42,7 +42,7 @@ COORDINATES = KINDS.pop("coordinates")
 DERIVED = KINDS.pop("derived")
 """Arrays that follow from those of a heart; :func:`echotruth.kinematics` computes them."""
 
-STAGES = {kind: arrays for kind, arrays in KINDS.items() if "/" not in kind and kind != "rf"}
+SINGLE = {kind: arrays for kind, arrays in KINDS.items() if "/" not in kind and kind != "rf"}
 """Groups that exist once; `rf` exists only if RF is kept."""
 
 SIZED = {kind.partition("/")[0]: arrays for kind, arrays in KINDS.items() if kind.endswith("/SIZE")}
@@ -110,7 +110,7 @@ _UNITS |= {"per_mm3": "mm-3", "per_min": "min-1", "m_per_s": "m s-1", "deg": "de
 def groups(config: Config) -> dict[str, tuple[Array, ...]]:
     """Arrays of every group, without coordinates, by the path of the group; each quantum is a number."""
     sizes, trackers = config.bmode.sizes, config.tracking.trackers
-    every = {"cases": CASES} | STAGES
+    every = {"cases": CASES} | SINGLE
     every |= {f"{name}/{size}": arrays for name, arrays in SIZED.items() for size in sizes}
     every |= {f"{name}/{size}/{one}": arrays for name, arrays in TRACKED.items() for size in sizes for one in trackers}
     every |= {"rf": rf_arrays(config)} if config.rf.keep else {}
@@ -134,13 +134,13 @@ def written_by(stage: str, config: Config, size: int | None = None) -> list[str]
     """
     sizes = config.bmode.sizes if size is None else [size]
     if stage == "mechanics":
-        return [group for group, arrays in STAGES.items() if arrays[0].leading == 1]
+        return [group for group, arrays in SINGLE.items() if arrays[0].leading == 1]
     if stage == "tracking":
         of_trackers = [f"{name}/{px}/{one}" for name in TRACKED for px in sizes for one in config.tracking.trackers]
         return [f"evaluation/{px}" for px in sizes] + of_trackers
     if stage in SIZED:
         return [f"{stage}/{px}" for px in sizes]
-    return [stage] if stage in STAGES or (stage == "rf" and config.rf.keep) else []
+    return [stage] if stage in SINGLE or (stage == "rf" and config.rf.keep) else []
 
 
 def holders(group: str) -> dict[str, str]:

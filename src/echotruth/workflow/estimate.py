@@ -13,9 +13,9 @@ from echotruth.config import Config
 from echotruth.repository import schema
 from echotruth.repository.ledger import STAGES
 from echotruth.workflow import cost
-from echotruth.workflow.demand import expected_megabytes
 from echotruth.workflow.jobs import FINAL_RULES, RULES, ended, jobs, places
 from echotruth.workflow.progress import format_duration
+from echotruth.workflow.resources import expected_megabytes
 
 MAX_SAMPLED = 100
 """Largest number of hearts whose cost is worked out; in a larger sweep it is that of as many, evenly spaced."""

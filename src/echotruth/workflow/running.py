@@ -8,9 +8,9 @@ from pathlib import Path
 
 from echotruth.config import Config
 from echotruth.repository.ledger import STAGES
-from echotruth.workflow.execution import Snakemake
 from echotruth.workflow.jobs import TARGETS, ended, jobs
 from echotruth.workflow.plan import Plan
+from echotruth.workflow.snakemake_process import Snakemake
 
 
 class Running:
