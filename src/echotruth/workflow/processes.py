@@ -1,4 +1,4 @@
-"""What every process of a stage has in common: instructions of the processor, and the cache of compiled functions."""
+"""What the processes of all jobs have in common: beginning of their shell commands, and cache of compiled functions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run Snakemakes with their output in logs and their progress on one line, and end all jobs with them."""
+"""Snakemakes as processes: their output goes to logs, their progress to one line, and all jobs end with them."""
 
 from __future__ import annotations
 
