@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echotruth.cli.command import Commands, add_command, add_configuration, fail
+from echotruth.cli.command import add_configuration, fail
 from echotruth.cli.snakemake import executor_error, is_query, option_errors, split_targets, with_profiles
 from echotruth.config import shipped
 
@@ -24,9 +24,8 @@ WRONG_OPTION = 2
 WRITABLE = "the working folder must be writable and have space"
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth run`."""
-    parser = add_command(commands, run)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth run`."""
     add_configuration(parser)
     parser.allow_abbrev = False  # what looks like the beginning of an option may be one of Snakemake
     text = "upload each result when it is finished (docs/storage.md); exit status 3 if all is made but not uploaded"
