@@ -135,7 +135,7 @@ def _phases(axes: Axes, cycle: Cycle) -> None:
     axes.axhline(0, color=style.MUTED, linewidth=0.6)
     axes.margins(x=0.01)
     top = axes.get_xaxis_transform()
-    end = 1e3 * cycle["time"][cycle["es_frame"]]
+    end = float(1e3 * cycle["time"][cycle["es_frame"]])
     axes.axvline(end, color=style.MUTED, linewidth=0.9, linestyle=":")
     axes.text(end, 0.985, "ES ", color=style.MUTED, fontsize=7, ha="right", va="top", transform=top)
     opening, closing, mitral = 1e3 * np.cumsum([cycle[name] for name in ("ivc_time", "ejection_time", "ivr_time")])
