@@ -70,7 +70,7 @@ def test_version_follows_imports_into_the_package_and_not_into_other_stages(tmp_
 
 def test_import_that_is_left_out_is_not_followed_from_there_but_from_elsewhere(tmp_path):
     script, other = tmp_path / "script.py", tmp_path / "other.py"
-    script.write_text("from echotruth.tracking.trackers import dis\n")
+    script.write_text("import echotruth.tracking.trackers.dis\n")
     other.write_text("from echotruth.tracking import closure\n")
     dis = "echotruth.tracking.trackers.dis"
     unless = frozenset({(str(script), dis)})

@@ -6,17 +6,14 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-from echotruth.cli.command import Commands, add_command
-
 SHELLS = ("bash", "zsh")
 
 PATHS = ("config", "output", "repository", "folder")
 """Arguments that are text and name a file or a folder."""
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth completion`."""
-    parser = add_command(commands, completion)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth completion`."""
     parser.add_argument("shell", choices=SHELLS, help="shell for which it is")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 _PLACES = (Path(__file__).parents[1] / "shipped", Path(__file__).parents[3])
 ROOT = next((place for place in _PLACES if (place / "Snakefile").is_file()), _PLACES[0])
-"""Folder of Snakefile, rules, workflow and config: that of an installed package (pyproject.toml), or a checkout."""
+"""Folder of what is shipped: `shipped` in an installed package (pyproject.toml), or the checkout."""
 
 
 def folder() -> Path:

@@ -14,7 +14,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -24,11 +23,9 @@ from echotruth.evaluation.resampling import draws, interval, means_of_hearts, pe
 from echotruth.evaluation.scoring import metrics
 from echotruth.repository import estimates
 from echotruth.repository.digest import digest
+from echotruth.repository.reader import Repository
 from echotruth.repository.schema import PACKS
 from echotruth.tracking.external_program import in_one_line
-
-if TYPE_CHECKING:
-    from echotruth.repository.reader import Repository
 
 log = logging.getLogger("echotruth")
 

@@ -14,17 +14,19 @@ from echotruth.repository.array import Array
 from echotruth.repository.packing import Pack
 from echotruth.section import unit_of
 
+with Path(__file__).with_name("arrays.csv").open(encoding="utf-8", newline="") as _file:
+    _ROWS = list(csv.DictReader(_file))
+
 
 def _listed() -> dict[tuple[str, str], tuple[Array, ...]]:
     """Arrays by the kind of their group and by the pack that holds them, "" for those that stand alone."""
     found: dict[tuple[str, str], tuple[Array, ...]] = {}
-    with Path(__file__).with_name("arrays.csv").open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            step = row["step"]
-            quantum = 2.0 ** int(step.removeprefix("2^")) if step.startswith("2^") else step or None
-            about = row["type"], row["units"], row["meaning"], quantum, row["values"]
-            place = row["group"], row["pack"]
-            found[place] = (*found.get(place, ()), Array(row["array"], tuple(row["dimensions"].split()), *about))
+    for row in _ROWS:
+        step = row["step"]
+        quantum = 2.0 ** int(step.removeprefix("2^")) if step.startswith("2^") else step or None
+        about = row["type"], row["units"], row["meaning"], quantum, row["values"]
+        place = row["group"], row["pack"]
+        found[place] = (*found.get(place, ()), Array(row["array"], tuple(row["dimensions"].split()), *about))
     return found
 
 
@@ -57,23 +59,7 @@ PACKS = {
 }
 """Arrays that hold several others, by the kind of their group."""
 
-LABELS: dict[str, tuple[str, ...]] = {
-    "xyz": ("x", "y", "z"),
-    "vector": ("lateral", "axial", "elevation"),
-    "label": ("layer", "segment", "region"),
-    "to": ("previous", "next"),
-    "plane": ("lateral", "axial"),
-    "strain_component": ("RR", "CC", "LL", "RC", "RL", "CL"),
-    "fibre_component": ("ff", "ss", "nn", "fs", "fn", "sn"),
-    "wall_component": ("RR", "TT", "RT"),
-    "reference": ("heart", "plane", "operator"),
-    "measure": ("engineering", "green_lagrange"),
-    "contour": ("endocardial", "middle", "epicardial"),
-    "statistic": ("mean", "median", "p95"),
-    "agreement": ("bias", "lower", "upper", "correlation"),
-    "polar": ("radial", "tangential"),
-    "component": ("radial", "tangential", "total"),
-}
+LABELS = {row["array"]: tuple(row["labels"].split()) for row in _ROWS if row["labels"]}
 """Labels of the dimensions that are the same in every repository."""
 
 
