@@ -8,8 +8,6 @@
 (torch.Size([8, 2, 128, 128]), torch.Size([8, 2, 128, 128]))
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

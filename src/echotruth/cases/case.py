@@ -1,7 +1,5 @@
 """A case of the sweep, and what is known of it before its configuration is made."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

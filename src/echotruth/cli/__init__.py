@@ -1,7 +1,5 @@
 """Command line: one module a command, each with `add`, which adds its arguments, and the function that does it."""
 
-from __future__ import annotations
-
 import os
 import sys
 from importlib import import_module

@@ -1,7 +1,5 @@
 """`echotruth check`: a configuration, or all files and values of a repository."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`echotruth completion`: the script that completes commands, options and paths in a shell."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`echotruth describe`: documents that describe a repository."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

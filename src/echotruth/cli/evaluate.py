@@ -1,7 +1,5 @@
 """`echotruth evaluate`: a tracker on every clip of a repository."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

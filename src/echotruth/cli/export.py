@@ -1,7 +1,5 @@
 """`echotruth export`: clips, hearts or RF as files of other programs."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

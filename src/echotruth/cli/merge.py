@@ -1,7 +1,5 @@
 """`echotruth merge`: the hearts of other repositories taken over into one."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

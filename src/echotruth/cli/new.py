@@ -1,7 +1,5 @@
 """`echotruth new`: a commented configuration to begin with."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

@@ -1,7 +1,5 @@
 """`echotruth show`: a repository in the browser."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`echotruth upload`: a repository in object storage."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

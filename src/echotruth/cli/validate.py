@@ -1,7 +1,5 @@
 """`echotruth validate`: the mechanics against what is known."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What comes with the package: the workflow, and the configurations of the folder config; both travel in the wheel."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """B-mode clips as trackers receive them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

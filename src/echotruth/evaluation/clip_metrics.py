@@ -4,8 +4,6 @@ They are made when they are read, from the displacement, the quality and the str
 earlier version has them too, and one that is not finished has those of its finished clips.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 

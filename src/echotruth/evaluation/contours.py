@@ -9,8 +9,6 @@ image shows. It is that of one image, tracked and true; GLS of the heart in 3-D,
 :func:`echotruth.mechanics.contours.global_longitudinal_strain`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Curves of strain and rotation of one clip, tracked beside true, as they are read from a repository."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

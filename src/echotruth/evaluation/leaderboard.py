@@ -9,8 +9,6 @@ clips would be too good. Intervals are the middle 95 % of the means (and ranks) 
 Ann Stat 1979; 7:1), in which all trackers share the resampled hearts. A single heart has no interval.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator, Mapping
 from pathlib import Path

@@ -7,8 +7,6 @@ few hearts they are too narrow: of normal values, those of the mean of 6, 12 and
 cases, those of the median in 93, 94 and 94.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

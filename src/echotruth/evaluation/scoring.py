@@ -4,8 +4,6 @@ The formulas stand in :mod:`.displacement_error` (NRMSE and others), :mod:`.agre
 :mod:`.contours` (strain and rotation over the cycle) and :mod:`.statistics`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

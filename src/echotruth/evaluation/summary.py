@@ -1,7 +1,5 @@
 """Strain of clips as one table: at end-systole, at its peak, its time to peak and its rate, tracked and true."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The points at which trackers follow a clip of a repository: their motion, tracked and true."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 import numpy as np

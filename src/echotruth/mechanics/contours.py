@@ -6,8 +6,6 @@ strain here is that of the heart in 3-D; that of one image, tracked and true, is
 :mod:`echotruth.evaluation.contours`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

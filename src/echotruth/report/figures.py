@@ -1,7 +1,5 @@
 """All figures of a repository, drawn from its store."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Motion of the heart over the cycle, beside what was measured in animals and people."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """All views at end-diastole and end-systole, with the borders of the wall and of its layers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The configuration of one case, cases/CASE.json, which its jobs read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from pydantic import ValidationError

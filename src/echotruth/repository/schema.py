@@ -1,7 +1,5 @@
 """All arrays of a repository, which `arrays.csv` lists; `docs/schema.md` is generated from it."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 from typing import Any

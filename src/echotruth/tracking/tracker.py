@@ -1,7 +1,5 @@
 """Call of any tracker."""
 
-from __future__ import annotations
-
 import logging
 from typing import Any
 

@@ -4,8 +4,6 @@ Before the first heart the seconds are those of a reference machine. Then the jo
 one is, by the files that Snakemake's `benchmark` writes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
 from math import sqrt

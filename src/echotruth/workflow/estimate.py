@@ -1,7 +1,5 @@
 """What a run will take, before anything runs: CPU time by rule, time on some cores, bytes, files, jobs, memory."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Sequence
 from math import ceil, sqrt

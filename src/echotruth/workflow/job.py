@@ -5,8 +5,6 @@ writes the arrays to the store. Last of all it commits a record with their check
 that Snakemake knows of. A job that was killed has no record, and is run again.
 """
 
-from __future__ import annotations
-
 import argparse
 import logging
 import sys

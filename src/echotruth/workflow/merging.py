@@ -1,7 +1,5 @@
 """The command `echotruth merge`: hearts of repositories of the same settings in one."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

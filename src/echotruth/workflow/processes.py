@@ -1,7 +1,5 @@
 """What the processes of all jobs have in common: beginning of their shell commands, and cache of compiled functions."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import sys

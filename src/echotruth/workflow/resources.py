@@ -3,8 +3,6 @@
 Asked is three times the time and one and a half times the memory, because nodes differ.
 """
 
-from __future__ import annotations
-
 from math import ceil
 
 from echotruth.config import Config

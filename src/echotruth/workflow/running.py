@@ -1,7 +1,5 @@
 """The Snakemakes of a run: one for every block of hearts that is not made yet, then one for repository and report."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import ceil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Snakemakes as processes: their output goes to logs, their progress to one line, and all jobs end with them."""
 
-from __future__ import annotations
-
 import shutil
 import signal
 import subprocess

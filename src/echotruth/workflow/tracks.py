@@ -1,7 +1,5 @@
 """What trackers find in a clip; what an earlier run found in the same clip is not tracked again."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from hashlib import sha256

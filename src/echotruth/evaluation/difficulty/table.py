@@ -1,7 +1,5 @@
 """Table of the difficulty of the clips of a repository."""
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 from math import isnan

@@ -5,8 +5,6 @@ vertex is the centre of the base. It moves with the wall at the endocardium and 
 centre of the base.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The medium: all scatterers in the frames of one view."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any
 

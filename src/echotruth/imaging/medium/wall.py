@@ -1,7 +1,5 @@
 """The wall: scatterers seeded in it, carried by the shape functions of their elements."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

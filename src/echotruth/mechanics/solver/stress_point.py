@@ -4,8 +4,6 @@ Parts of the stress stand in the order `PASSIVE`, `ACTIVE`, `VOLUMETRIC`, each f
 after them `TOTAL`, with the viscous stress; `scale` holds the factors C, T_Ca, p and viscous modulus.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

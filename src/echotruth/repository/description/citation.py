@@ -1,7 +1,5 @@
 """CITATION.cff of a repository (Citation File Format 1.2.0, doi 10.5281/zenodo.5171937)."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

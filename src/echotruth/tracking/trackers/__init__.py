@@ -1,7 +1,5 @@
 """The trackers: one module per method, each with a function `track`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from pkgutil import iter_modules
