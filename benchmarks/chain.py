@@ -56,7 +56,7 @@ from echotruth.section import Section
 from echotruth.seeds import generator
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
-from echotruth.workflow.cost import START_SECONDS
+from echotruth.workflow.cost import START_CPU_SECONDS
 
 RESULTS = Path(__file__).parent / "results"
 EXCERPT = np.array([0, 1, 2, 1, 0])
@@ -210,7 +210,7 @@ def beside(folder: Path) -> list[list[Any]]:
     for stage in [stage for stage, place in STAGES.items() if "view" in place]:
         at = folder / "benchmarks" / stage / case
         files = [*at.glob(f"{view}.tsv"), *at.glob(f"{view}/*.tsv")]
-        spent = sum(core_seconds(file) - START_SECONDS for file in files)
+        spent = sum(core_seconds(file) - START_CPU_SECONDS for file in files)
         predicted = getattr(parts, stage)() + parts.writing(stage)
         mark = " **" if spent > max(BEYOND * predicted, predicted + 1) else ""
         rows.append([stage, f"{spent:.1f}", f"{predicted:.1f}", f"{spent / predicted:.2f}{mark}"])

@@ -17,7 +17,7 @@ import numpy as np
 from echotruth.fem.tetrahedra import MaterialPoints
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.medium.medium import seed_medium
-from echotruth.imaging.medium.phantom import Scatterers
+from echotruth.imaging.medium.wall import Scatterers
 from echotruth.imaging.rf import elevation
 from echotruth.imaging.view import Plane
 from echotruth.repository.ledger import record_path

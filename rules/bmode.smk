@@ -1,9 +1,12 @@
-"""B-mode: the largest clip from the lines (envelope, log compression, scan conversion), smaller ones from the largest."""
+"""B-mode: the largest clip from the lines (envelope, log compression, scan conversion), smaller ones from the largest.
+
+The lines are in the store if the configuration keeps them (`rf.keep`), else in the file that rf passes on.
+"""
 
 
 rule bmode:
     input:
-        PLAN.bmode_source,
+        PLAN.bmode_source,  # record of rf, and lines.npz unless rf.keep has lines; for smaller clips, record of the largest
     output:
         f"{OUT}/ledger/bmode/{{case}}/{{view}}/{{size}}.json",
     params:

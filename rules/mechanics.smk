@@ -1,12 +1,12 @@
-"""The heart: mesh, fibres, finite-element solution over the beat, kinematics and measures.
+"""The heart of a case: mesh, fibres, finite-element solution over the beat, kinematics and measures.
 
-Of hearts with the same motion only the first is solved; the others take over its files.
+Of cases that share one heart (the same motion) only the first is solved; the others take over its files.
 """
 
 
 rule mechanics:
     input:
-        PLAN.same_motion,
+        PLAN.same_motion,  # record of the case whose motion is taken over, if there is one
     output:
         f"{OUT}/ledger/mechanics/{{case}}.json",
     params:

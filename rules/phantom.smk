@@ -10,7 +10,7 @@ rule phantom:
     params:
         code=PLAN.code("phantom"),
         settings=PLAN.settings("phantom"),
-        excluded=PLAN.excluded,
+        excluded=PLAN.excluded,  # why the case is not imaged: its record then says skipped
     log:
         f"{OUT}/logs/phantom/{{case}}/{{view}}.log",
     benchmark:

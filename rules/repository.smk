@@ -3,7 +3,7 @@
 
 rule repository:
     input:
-        PLAN.records,
+        PLAN.records,  # of all jobs, also failed and skipped ones
     output:
         f"{OUT}/ledger/repository.json",
     params:

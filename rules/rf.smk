@@ -1,4 +1,7 @@
-"""The RF of every frame, focused to lines."""
+"""The RF of every frame, focused to lines.
+
+The script also reads the heart from the store. It is there: phantom, whose record is the input, needs it too.
+"""
 
 
 rule rf:
@@ -17,6 +20,7 @@ rule rf:
     group:
         "view"
     priority: 2
+    threads: 1
     resources:
         runtime=PLAN.runtime("rf"),
         mem_mb=PLAN.mem_mb("rf"),

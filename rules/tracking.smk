@@ -1,6 +1,7 @@
 """Tracking: every tracker on one clip, scored against the truth.
 
-The record of an earlier run is updated, not deleted: what a tracker found in the same clip stays.
+The record of an earlier run is updated, not deleted: what a tracker found in the same clip stays. The script also reads
+the heart from the store. It is there: truth, whose record is an input, needs it too.
 """
 
 
@@ -20,6 +21,7 @@ rule tracking:
     group:
         "view"
     priority: 5
+    threads: 1
     resources:
         runtime=PLAN.runtime("tracking"),
         mem_mb=PLAN.mem_mb("tracking"),

@@ -9,7 +9,7 @@ rule truth:
     params:
         code=PLAN.code("truth"),
         settings=PLAN.settings("truth"),
-        excluded=PLAN.excluded,
+        excluded=PLAN.excluded,  # why the case is not imaged: its record then says skipped
     log:
         f"{OUT}/logs/truth/{{case}}/{{view}}/{{size}}.log",
     benchmark:

@@ -77,7 +77,10 @@ def test_shipped_configurations_are_found_in_the_wheel(wheel, tmp_path):
         run(wheel, tmp_path, *arguments)
 
 
-@pytest.mark.parametrize("name", ["Snakefile", "environment.yml", "rules", "workflow", "profiles", "config"])
+SHIPPED = ["Snakefile", "environment.yml", "CITATION.cff", "rules", "workflow", "profiles", "config"]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
 def test_workflow_travels_in_the_wheel(wheel, name):
     ours, shipped = ROOT / name, wheel / "echotruth/shipped" / name
     assert shipped.exists() and files(ours) == files(shipped)

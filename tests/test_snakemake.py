@@ -193,7 +193,7 @@ def test_scripts_are_short(path):
 
 DOCUMENTED = {"snakemake.utils", "snakemake.api", "snakemake.exceptions"}
 """Modules that Snakemake documents for others."""
-INTERNAL = re.compile(r"\bworkflow\.(?!cores\b)\w+|\b(?:rules|checkpoints)\._\w+")
+INTERNAL = re.compile(r"(?<!docs/)\bworkflow\.(?!cores\b)\w+|\b(?:rules|checkpoints)\._\w+")
 """Attributes of Snakemake's objects that it does not document for rules."""
 
 

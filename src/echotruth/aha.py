@@ -1,7 +1,5 @@
 """AHA segments of the left ventricle (Cerqueira 2002, Circulation 105:539) and their bullseye plot."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np

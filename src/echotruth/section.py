@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from math import log, pi
 from types import SimpleNamespace
-from typing import Annotated, Any, TypeVar, get_args, get_origin
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import (
     BaseModel,
     ConfigDict,
+    Discriminator,
     Field,
     FiniteFloat,
     StringConstraints,
@@ -127,6 +128,16 @@ def variants(annotation: Any) -> dict[str, type[Section]]:
         return variants(annotation.__origin__)
     members = [member for member in get_args(annotation) if hasattr(member, "__metadata__")]
     return {tag.tag: member.__origin__ for member in members for tag in member.__metadata__ if isinstance(tag, Tag)}
+
+
+def tagged(key: str, default: str, sections: Mapping[str, type[Section]]) -> Any:
+    """Union of the variants of a section, by the name that a key has in each; without the key, the default one."""
+
+    def name_of(values: Any) -> Any:
+        return values.get(key, default) if isinstance(values, dict) else getattr(values, key, default)
+
+    members = tuple(Annotated[section, Tag(name)] for name, section in sections.items())
+    return Annotated[Union[members], Discriminator(name_of)]  # noqa: UP007
 
 
 def discriminator(sections: dict[str, type[Section]]) -> str:

@@ -1,7 +1,5 @@
 """Seeds of random numbers: a generator for each thing that is drawn, whatever else is drawn and in whatever order."""
 
-from __future__ import annotations
-
 import json
 from hashlib import sha256
 

@@ -4,8 +4,6 @@ Compiled loops let go of Python's lock, so that threads of Python run them side 
 two to three times as long to compile.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor

@@ -8,8 +8,6 @@
 (torch.Size([8, 2, 128, 128]), torch.Size([8, 2, 128, 128]))
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -51,49 +49,34 @@ class Tensors(Dataset[Item]):
         return tensors(self.items[index])
 
 
-class _Made(Tensors):
-    """A sequence of items, made and then wrapped."""
-
-    sequence: type[Items]
-
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(self.sequence(*arguments, **options))
-
-
-class Clips(_Made):
+def Clips(*arguments: Any, **options: Any) -> Tensors:
     """:class:`echotruth.learning.Clips` as tensors; it takes the same parameters."""
+    return Tensors(learning.Clips(*arguments, **options))
 
-    sequence = learning.Clips
 
-
-class FlowPairs(_Made):
+def FlowPairs(*arguments: Any, **options: Any) -> Tensors:
     """:class:`echotruth.learning.FlowPairs` as tensors; it takes the same parameters."""
+    return Tensors(learning.FlowPairs(*arguments, **options))
 
-    sequence = learning.FlowPairs
 
-
-class PointTracks(_Made):
+def PointTracks(*arguments: Any, **options: Any) -> Tensors:
     """:class:`echotruth.learning.PointTracks` as tensors; it takes the same parameters."""
+    return Tensors(learning.PointTracks(*arguments, **options))
 
-    sequence = learning.PointTracks
 
-
-class Segmentation(_Made):
+def Segmentation(*arguments: Any, **options: Any) -> Tensors:
     """:class:`echotruth.learning.Segmentation` as tensors; it takes the same parameters."""
+    return Tensors(learning.Segmentation(*arguments, **options))
 
-    sequence = learning.Segmentation
 
-
-class Strain(_Made):
+def Strain(*arguments: Any, **options: Any) -> Tensors:
     """:class:`echotruth.learning.Strain` as tensors; it takes the same parameters."""
+    return Tensors(learning.Strain(*arguments, **options))
 
-    sequence = learning.Strain
 
-
-class Diagnosis(_Made):
+def Diagnosis(*arguments: Any, **options: Any) -> Tensors:
     """:class:`echotruth.learning.Diagnosis` as tensors; it takes the same parameters."""
-
-    sequence = learning.Diagnosis
+    return Tensors(learning.Diagnosis(*arguments, **options))
 
 
 def loader(

@@ -12,7 +12,7 @@ from echotruth import cli
 from echotruth.cli.command import Parser
 from echotruth.cli.snakemake import PROFILES
 
-NAMES = [module.__name__.rpartition(".")[2] for module in cli.COMMANDS]
+NAMES = list(cli.COMMANDS)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -5,7 +5,7 @@ import numpy as np
 from echotruth.config import Phantom
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import EDGES, MaterialPoints, interpolate, jacobian
-from echotruth.imaging.medium.phantom import seed_volume
+from echotruth.imaging.medium.wall import seed_volume
 
 
 def _bent(nodes):

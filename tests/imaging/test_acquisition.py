@@ -50,7 +50,7 @@ def acquire(twisting_heart, scanner):
 
 @pytest.mark.slow
 def test_without_realism_the_bytes_are_those_of_the_matrix(acquire, scanner, twisting_heart):
-    from echotruth.imaging.medium.phantom import seed_wall
+    from echotruth.imaging.medium.wall import seed_wall
 
     acquisition, _ = acquire()
     config = Config.model_validate(SMALL)

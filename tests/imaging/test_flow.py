@@ -11,7 +11,7 @@ from echotruth.config import Config, Phantom, Probe
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.flow import STEPS, beam_thickness, out_of_slice, slice_thickness
 from echotruth.imaging.labels import LABELS, pack, unpack
-from echotruth.imaging.medium.phantom import seed_volume
+from echotruth.imaging.medium.wall import seed_volume
 from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.imaging.tracks import follow, visible
 from echotruth.imaging.truth import pixel_truth

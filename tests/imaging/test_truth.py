@@ -9,7 +9,7 @@ from echotruth.config import Config, Phantom
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import interpolate
 from echotruth.imaging.labels import unpack
-from echotruth.imaging.medium.phantom import seed_volume
+from echotruth.imaging.medium.wall import seed_volume
 from echotruth.imaging.truth import cavity_centroid, displacement, material_truth, pixel_truth
 from echotruth.imaging.view import imaging_plane
 

@@ -14,7 +14,7 @@ from echotruth.fem.volume import cell_volumes
 from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import bmode_clip, time_gain_compensation
-from echotruth.imaging.medium.phantom import seed_wall
+from echotruth.imaging.medium.wall import seed_wall
 from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.fibres import CENTROID

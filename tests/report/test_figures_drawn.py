@@ -3,6 +3,7 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -57,16 +58,12 @@ def test_strain(tmp_path, layers):
 
 def cycle(pressure, intervals):
     """A heart that twists, shortens and moves its base as a raised cosine."""
-    return physiology.Cycle(
-        TIME,
-        5,
-        intervals,
-        {"base": -0.05 * WAVE, "apex": 0.1 * WAVE, "twist": 0.15 * WAVE},
-        WAVE[:, None] * [0.4, -0.17, -0.15, 0.0, 0.02, 0.03],
-        {"base": -5e-4 * WAVE, "apex": 1e-4 * WAVE},
-        pressure,
-        50e-9 - 0 * TIME + 0 * pressure,
-    )
+    turns = {"rotation_base": -0.05 * WAVE, "rotation_apex": 0.1 * WAVE, "twist": 0.15 * WAVE}
+    motion = {"base_motion": -5e-4 * WAVE, "apex_motion": 1e-4 * WAVE}
+    strain_mean = WAVE[:, None] * [0.4, -0.17, -0.15, 0.0, 0.02, 0.03]
+    loop = {"pressure": pressure, "volume": 50e-9 - 0 * TIME + 0 * pressure, "es_frame": 5, "time": TIME}
+    durations = dict(zip(("ivc_time", "ejection_time", "ivr_time"), intervals, strict=True))
+    return turns | motion | {"strain_mean": strain_mean} | loop | durations
 
 
 def coloured(picture, colour):
@@ -107,7 +104,11 @@ def test_views(tmp_path):
     image = np.random.default_rng(0).integers(0, 256, (64, 64)).astype(np.uint8)
     layer = np.zeros((64, 64), int)
     layer[20:40, 20:40] = 1
-    one = {"mid": [views.Picture(image, layer)] * 2, "long_axis": [views.Picture(image, 0 * layer)] * 2}
+    shown, outside = (
+        xr.Dataset({"image": (("axial", "lateral"), image), "layer": (("axial", "lateral"), labels)})
+        for labels in (layer, 0 * layer)
+    )
+    one = {"mid": [shown] * 2, "long_axis": [outside] * 2}
     border = coloured(seen(style.save(views.draw(one, 12e-3), tmp_path / "one.png")), views.BORDER)
     layer[30:40, 20:40] = 2
     two = coloured(seen(style.save(views.draw(one, 12e-3), tmp_path / "two.png")), views.BORDER)

@@ -33,7 +33,7 @@ WRITE = (
     START
     + """
 for row in range(int(sys.argv[2]), int(sys.argv[3])):
-    arrays = schema.STAGES["physiology"]
+    arrays = schema.SINGLE["physiology"]
     values = {array.name: np.full([lengths[dim] for dim in array.dims[1:]], row) for array in arrays}
     store.write("physiology", values, row)
     sha256 = checksums(store.files("physiology", row), store.path)
@@ -85,7 +85,7 @@ def lay_out(folder: Path, cases: int) -> Store:
     rows = [f"case{row}" for row in range(cases)]
     labels = layout.labels(Config(loop={"frames": FRAMES}), rows, np.zeros((cases, FRAMES)))
     store = Store(folder / "small.zarr")
-    store.lay_out({"cases": schema.CASES, "physiology": schema.STAGES["physiology"]}, {}, labels)
+    store.lay_out({"cases": schema.CASES, "physiology": schema.SINGLE["physiology"]}, {}, labels)
     return store
 
 
@@ -109,7 +109,7 @@ def test_writers_beside_a_reader_and_a_publisher_lose_nothing(tmp_path, writers,
     records = sorted((tmp_path / "ledger/physiology").glob("*.json"))
     assert len(records) == cases
     shards = sum(verify(store.path, path, ledger.read(path)) for path in records)
-    assert shards == cases * len(schema.STAGES["physiology"])
+    assert shards == cases * len(schema.SINGLE["physiology"])
     assert {path: path.read_bytes() for path in before} == before
     assert not list(store.path.rglob("*.partial"))
     measured = zarr.open_array(store.path, path="physiology/scalars", mode="r")[...]

@@ -350,12 +350,12 @@ def test_many_cases_are_laid_out_in_few_files(tmp_path):
     """One file a column, and none a case."""
     rows = [f"case{number}" for number in range(10_000)]
     columns = {"cases:seed": np.arange(10_000.0), "cases:loop.file": np.repeat(["mouse", "rat"], 5_000)}
-    arrays = {"cases": schema.parameters(columns), "physiology": schema.STAGES["physiology"]}
+    arrays = {"cases": schema.parameters(columns), "physiology": schema.SINGLE["physiology"]}
     labels = columns | layout.labels(Config(**SMALL), rows, np.zeros((10_000, 4)))
     Store(tmp_path / "many.zarr").lay_out(arrays, {}, labels)
     files = [path for path in (tmp_path / "many.zarr").rglob("*") if path.is_file()]
-    whole = len(schema.coordinates(schema.STAGES["physiology"])) + len(arrays["cases"]) + 1
-    assert len(files) == 3 + len(schema.STAGES["physiology"]) + 2 * whole
+    whole = len(schema.coordinates(schema.SINGLE["physiology"])) + len(arrays["cases"]) + 1
+    assert len(files) == 3 + len(schema.SINGLE["physiology"]) + 2 * whole
     tree = xr.open_datatree(tmp_path / "many.zarr", engine="zarr")
     assert str(tree["cases"].sel(case="case7654")["loop.file"].values) == "rat"
 

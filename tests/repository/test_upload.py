@@ -290,7 +290,7 @@ def test_the_command_run_uploads_and_its_status_says_whether(bucket, tmp_path, m
         commit(tmp_path / "out/small", "mechanics", "0", displacement=b"0")
         return 0
 
-    with patch("echotruth.workflow.execution.execute", make), patch("echotruth.repository.layout.lay_out"):
+    with patch("echotruth.workflow.snakemake_process.execute", make), patch("echotruth.repository.layout.lay_out"):
         status, output, errors = cli("run", "my.yaml", "--cores", "1", "--upload", url)
     assert status == expected, errors
     if works:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from echotruth.workflow.processes import STAGES, cache_name, prefix, script
+from echotruth.workflow.processes import SCRIPTS_THAT_COMPILE, cache_name, prefix, script
 
 ROOT = Path(__file__).parents[2]
 FORMS = """\
@@ -46,7 +46,7 @@ def test_shell_of_a_job_knows_its_scripts_and_repository_and_the_python_of_this_
     code = 'echo "$SCRIPTS"; echo "$REPOSITORY"; command -v python; echo "$NUMBA_CACHE_DIR"'
     done = subprocess.run(["bash", "-c", prefix(folder) + code], capture_output=True, text=True, check=True)
     scripts, repository, python, cache = done.stdout.splitlines()
-    assert {path.stem for path in Path(scripts).glob("*.py")} >= set(STAGES)
+    assert {path.stem for path in Path(scripts).glob("*.py")} >= set(SCRIPTS_THAT_COMPILE)
     assert repository == str(folder) and Path(python).parent == Path(sys.executable).parent
     assert Path(cache).is_absolute() and Path(cache).parts[-3:] == (".snakemake", "numba", cache_name())
 
@@ -57,8 +57,8 @@ def test_shell_of_a_job_ends_with_the_first_command_that_fails(tmp_path):
 
 
 def test_every_stage_has_a_script_that_is_part_of_the_name_of_the_cache(monkeypatch):
-    assert all(Path(script(stage)).is_file() for stage in STAGES)
+    assert all(Path(script(stage)).is_file() for stage in SCRIPTS_THAT_COMPILE)
     read = []
     monkeypatch.setattr("echotruth.workflow.processes.code_version", lambda *paths: read.extend(paths) or "0")
-    assert cache_name() == "0" and read == [script(stage) for stage in STAGES]
+    assert cache_name() == "0" and read == [script(stage) for stage in SCRIPTS_THAT_COMPILE]
     assert shlex.quote(str(ROOT / "workflow/scripts")) in prefix(Path("out/tiny"))

@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from echotruth.workflow.execution import ProgressLine
 from echotruth.workflow.progress import Progress, RunLog, format_duration
+from echotruth.workflow.snakemake_process import ProgressLine
 
 PLAN = """\
 Provided cores: 2

@@ -1,4 +1,4 @@
-"""Expand the sweep of a configuration into cases, one heart each, with stable ids.
+"""Expand the sweep of a configuration into cases, each a heart and its imaging, with stable ids.
 
 A sweep is a grid of values, the rows of a table, random draws, and conditions on them (docs/cases.md).
 """

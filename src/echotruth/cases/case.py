@@ -1,6 +1,4 @@
-"""A heart of the sweep, and what is known of it before its configuration is made."""
-
-from __future__ import annotations
+"""A case of the sweep, and what is known of it before its configuration is made."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +11,7 @@ Label = str | float | None
 
 @dataclass(frozen=True)
 class Case:
-    """One heart of the sweep."""
+    """One row of the sweep: a heart and its imaging. Several cases may share one heart (docs/conventions.md)."""
 
     id: str
     """Readable and stable: given by the table, or else it depends only on the swept keys whose value is not the one

@@ -1,7 +1,5 @@
 """Values in the cells of a table, which has text alone: each is read as what its key takes."""
 
-from __future__ import annotations
-
 import json
 import re
 from math import isfinite

@@ -1,7 +1,5 @@
 """Checks of a sweep: its keys, that all hearts differ, and the files that they name."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """Conditions that leave out cases: comparisons of dotted keys, as Python writes them, and nothing else of Python."""
 
-from __future__ import annotations
-
 import ast
 import operator
 from collections.abc import Callable

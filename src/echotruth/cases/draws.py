@@ -7,8 +7,6 @@ scipy) are shifted by a random number whose bits are added without carry, which 
 (doi:10.2307/1268522).
 """
 
-from __future__ import annotations
-
 import json
 from hashlib import sha256
 from math import ceil, log2

@@ -3,8 +3,6 @@
 They are the rows of the table, times the grid, times draws, without those that conditions leave out.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Stable ids of hearts."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from hashlib import sha256

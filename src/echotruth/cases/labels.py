@@ -1,7 +1,5 @@
 """Labels of hearts: the diagnosis that a configuration gives, and those that a table carries along."""
 
-from __future__ import annotations
-
 from math import nan
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Rows of the table as values of swept keys, ids, labels and notes; and hearts as such a table."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """Configurations of the hearts; each combination of values within a section is validated once."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

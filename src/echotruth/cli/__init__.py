@@ -1,46 +1,17 @@
-"""Command line: one module a command, each with `add`, which adds its parser, and the function that does it."""
-
-from __future__ import annotations
+"""Command line: one module a command, each with `add`, which adds its arguments, and the function that does it."""
 
 import os
 import sys
+from importlib import import_module
 
 import echotruth
-from echotruth.cli import (
-    cases,
-    check,
-    completion,
-    describe,
-    evaluate,
-    export,
-    info,
-    merge,
-    new,
-    run,
-    show,
-    status,
-    upload,
-    validate,
-)
-from echotruth.cli.command import Parser, did_you_mean, fail
+from echotruth.cli.command import Parser, add_command, did_you_mean, fail
 
 COMMANDS = (
-    new,
-    check,
-    cases,
-    run,
-    status,
-    info,
-    show,
-    evaluate,
-    export,
-    describe,
-    merge,
-    upload,
-    validate,
-    completion,
+    *("new", "check", "cases", "run", "status", "info", "show"),
+    *("evaluate", "export", "describe", "merge", "upload", "validate", "completion"),
 )
-"""Modules of the commands, in the order of `echotruth --help`."""
+"""Commands, and their modules and functions, in the order of `echotruth --help`."""
 
 PASSES_ON = "run"
 """Command of which the options that it does not know are passed on."""
@@ -80,8 +51,9 @@ def parser() -> Parser:
     )
     whole.add_argument("--version", action="version", version=echotruth.__version__)
     commands = whole.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for module in COMMANDS:
-        module.add(commands)
+    for name in COMMANDS:
+        module = import_module(f"{__name__}.{name}")
+        module.add(add_command(commands, getattr(module, name)))
     return whole
 
 

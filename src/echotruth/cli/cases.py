@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from echotruth.cli.command import Commands, add_command, add_configuration
+from echotruth.cli.command import add_configuration
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from echotruth.cases import Case
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth cases`."""
-    parser = add_command(commands, cases)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth cases`."""
     add_configuration(parser)
     parser.add_argument("--all", action="store_true", help="also print the columns that are the same in all cases")
 

@@ -1,16 +1,13 @@
 """`echotruth check`: a configuration, or all files and values of a repository."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
-from echotruth.cli.command import Commands, add_command, add_configuration
+from echotruth.cli.command import add_configuration
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth check`."""
-    parser = add_command(commands, check)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth check`."""
     text = "YAML file, a name of `echotruth new --list`, or folder of a repository, such as out/demo"
     add_configuration(parser, text, metavar="path")
     parser.add_argument(

@@ -1,7 +1,5 @@
 """Parser of one command: what it does, its examples and what its exit statuses mean."""
 
-from __future__ import annotations
-
 import argparse
 import inspect
 import re

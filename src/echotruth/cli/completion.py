@@ -1,12 +1,8 @@
 """`echotruth completion`: the script that completes commands, options and paths in a shell."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
-
-from echotruth.cli.command import Commands, add_command
 
 SHELLS = ("bash", "zsh")
 
@@ -14,9 +10,8 @@ PATHS = ("config", "output", "repository", "folder")
 """Arguments that are text and name a file or a folder."""
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth completion`."""
-    parser = add_command(commands, completion)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth completion`."""
     parser.add_argument("shell", choices=SHELLS, help="shell for which it is")
 
 

@@ -1,7 +1,5 @@
 """Configuration and cases that a command is given."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

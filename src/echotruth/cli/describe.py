@@ -1,16 +1,13 @@
 """`echotruth describe`: documents that describe a repository."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
-from echotruth.cli.command import Commands, add_command, fail
+from echotruth.cli.command import fail
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth describe`."""
-    parser = add_command(commands, describe)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth describe`."""
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     parser.add_argument("-o", "--output", type=Path, help="folder for the documents (default: that of the repository)")
     parser.add_argument("--license", help="identifier of SPDX, such as CC-BY-4.0, or an address (default: none)")

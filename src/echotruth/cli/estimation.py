@@ -1,7 +1,5 @@
 """What a run will take, before it starts: its estimate, and what speaks against it."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -1,16 +1,13 @@
 """`echotruth evaluate`: a tracker on every clip of a repository."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
-from echotruth.cli.command import Commands, add_command, add_repeated, fail
+from echotruth.cli.command import add_repeated, fail
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth evaluate`."""
-    parser = add_command(commands, evaluate)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth evaluate`."""
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     tracker = parser.add_mutually_exclusive_group(required=True)
     tracker.add_argument("--tracker", help="package.module:function, an entry point, or a method such as dis")

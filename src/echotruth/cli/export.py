@@ -1,20 +1,17 @@
 """`echotruth export`: clips, hearts or RF as files of other programs."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path
 
-from echotruth.cli.command import Commands, add_command, add_repeated, fail
+from echotruth.cli.command import add_repeated, fail
 
 EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap", "tap_pickle", "flo", "uff", "zea")
 """Formats of `echotruth export`."""
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth export`."""
-    parser = add_command(commands, export)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth export`."""
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     parser.add_argument("--format", choices=EXPORTED, required=True, help="format of the files")
     add_repeated(

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import echotruth
-from echotruth.cli.command import Commands, add_command, fail
+from echotruth.cli.command import fail
 
 if TYPE_CHECKING:
     from echotruth.repository.reader import Repository
@@ -19,9 +19,8 @@ if TYPE_CHECKING:
 GIB = 2**30
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth info`."""
-    parser = add_command(commands, info)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth info`."""
     text = "folder of a repository, such as out/demo (default: show the installation and the machine)"
     parser.add_argument("repository", nargs="?", help=text)
 

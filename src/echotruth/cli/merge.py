@@ -1,16 +1,11 @@
 """`echotruth merge`: the hearts of other repositories taken over into one."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
-from echotruth.cli.command import Commands, add_command
 
-
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth merge`."""
-    parser = add_command(commands, merge)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth merge`."""
     parser.add_argument("into", type=Path, help="folder of the repository that receives them; made if need be")
     parser.add_argument("sources", type=Path, nargs="+", help="folders of repositories, which stay as they are")
 

@@ -1,22 +1,19 @@
 """`echotruth new`: a commented configuration to begin with."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys
 from pathlib import Path
 from shlex import quote
 
-from echotruth.cli.command import Commands, add_command, did_you_mean, fail
+from echotruth.cli.command import did_you_mean, fail
 
 STANDARD_OUTPUT = "-"
 """What `--output` is called to print the configuration."""
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth new`."""
-    parser = add_command(commands, new)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth new`."""
     text = "mouse, rat, human or another of --list (default: mouse)"
     parser.add_argument("preset", nargs="?", default="mouse", help=text)
     parser.add_argument("-o", "--output", metavar="FILE", help="file to write (default: PRESET.yaml; - prints it)")

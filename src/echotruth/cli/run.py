@@ -10,9 +10,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echotruth.cli.command import Commands, add_command, add_configuration, fail
+from echotruth.cli.command import add_configuration, fail
 from echotruth.cli.snakemake import executor_error, is_query, option_errors, split_targets, with_profiles
-from echotruth.config import shipped
 
 if TYPE_CHECKING:
     from echotruth.cases import Case
@@ -24,9 +23,8 @@ WRONG_OPTION = 2
 WRITABLE = "the working folder must be writable and have space"
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth run`."""
-    parser = add_command(commands, run)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth run`."""
     add_configuration(parser)
     parser.allow_abbrev = False  # what looks like the beginning of an option may be one of Snakemake
     text = "upload each result when it is finished (docs/storage.md); exit status 3 if all is made but not uploaded"
@@ -108,22 +106,13 @@ def run(arguments: argparse.Namespace) -> int:
 def _started(arguments: argparse.Namespace, config: Config, cases: list[Case], expected: dict[str, float]) -> int:
     """Make a repository, unless the package that starts jobs elsewhere is missing; return the exit status."""
     from echotruth.cli.estimation import profile_content
+    from echotruth.workflow.snakemake_process import snakemake_command
 
     if error := executor_error((profile_content(arguments.options) or {}).get("executor")):
         return fail(error)
     if any(map(is_query, arguments.options)):
-        return subprocess.call(snakemake(arguments.config, arguments.options))
+        return subprocess.call(snakemake_command(arguments.config, with_profiles(arguments.options)))
     return make_repository(arguments, config, cases, expected)
-
-
-def snakemake(path: Path | str, options: list[str]) -> list[str]:
-    """Command that runs the workflow of a configuration file.
-
-    Snakemake's own lock is that of the working folder, where other names may run; a repository has its lease.
-    """
-    command = [sys.executable, "-m", "snakemake", "--snakefile", str(shipped.ROOT / "Snakefile")]
-    # Not at the end: --configfile takes all that follows, files to make too.
-    return [*command, "--configfile", str(path), "--nolock", *with_profiles(options)]
 
 
 def make_repository(
@@ -175,9 +164,9 @@ def _make(
     from echotruth.mechanics.geometry import GeometryError
     from echotruth.mechanics.prescribed import MotionError
     from echotruth.repository.layout import lay_out
-    from echotruth.workflow.execution import execute
     from echotruth.workflow.progress import Progress
     from echotruth.workflow.running import Running
+    from echotruth.workflow.snakemake_process import execute, snakemake_command
     from echotruth.workflow.summary import finished, unfinished
 
     start, folder = time.time(), Path("out") / config.name
@@ -187,7 +176,7 @@ def _make(
         return fail(f"{arguments.config}: {error}")
     # The copy in the repository: the file may change while jobs wait in a queue.
     options, targets = split_targets(arguments.options)
-    command = snakemake(folder / "config.yaml", options)
+    command = snakemake_command(folder / "config.yaml", with_profiles(options))
     running = Running(folder, config, command, targets, arguments.hearts_per_block)
     progress = Progress(expected, running.waiting())
     status = execute(running.hearts(), config.name, progress, environment, arguments.blocks_at_once)

@@ -1,16 +1,13 @@
 """`echotruth show`: a repository in the browser."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
-from echotruth.cli.command import Commands, add_command, fail
+from echotruth.cli.command import fail
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth show`."""
-    parser = add_command(commands, show)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth show`."""
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     parser.add_argument("--port", type=int, default=0, help="port of the page (default: any that is free)")
     parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")

@@ -1,7 +1,5 @@
 """Options of `echotruth run` that go to Snakemake."""
 
-from __future__ import annotations
-
 import re
 from importlib.util import find_spec
 from itertools import pairwise

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echotruth.cli.command import Commands, add_command, fail
+from echotruth.cli.command import fail
 
 if TYPE_CHECKING:
     from echotruth.workflow.status import Status
@@ -18,9 +18,8 @@ WATCH_SECONDS = 5.0
 """Interval of `--watch`."""
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth status`."""
-    parser = add_command(commands, status)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth status`."""
     parser.add_argument("path", type=Path, help="folder of the repository, such as out/demo, or its YAML file")
     parser.add_argument("--watch", action="store_true", help="show it again every 5 s, until the run has ended")
     parser.add_argument("--json", action="store_true", help="print it as JSON")

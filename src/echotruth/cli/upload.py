@@ -1,16 +1,11 @@
 """`echotruth upload`: a repository in object storage."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
-from echotruth.cli.command import Commands, add_command
 
-
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth upload`."""
-    parser = add_command(commands, upload)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth upload`."""
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     text = "folder in object storage, empty or with an earlier upload of this repository"
     parser.add_argument("url", metavar="s3://BUCKET/FOLDER", help=text)

@@ -1,17 +1,14 @@
 """`echotruth validate`: the mechanics against what is known."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path
 
-from echotruth.cli.command import Commands, add_command, fail
+from echotruth.cli.command import fail
 
 
-def add(commands: Commands) -> None:
-    """Add the parser of `echotruth validate`."""
-    parser = add_command(commands, validate)
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth validate`."""
     parser.add_argument("--quick", action="store_true", help="use coarse meshes; takes a few minutes")
     parser.add_argument("--folder", default="docs", help="folder for validation.md (default: docs)")
 

@@ -1,7 +1,5 @@
 """What a key may be, in words, from the JSON schema of its section."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Checks of what keys of several sections amount to together, by the bounds of :mod:`echotruth.config.limits`."""
 
-from __future__ import annotations
-
 from math import floor, isqrt, pi
 
 from echotruth.config.anatomy import Lengths

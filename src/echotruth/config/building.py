@@ -1,7 +1,5 @@
 """Building a configuration in Python: from a file, another configuration or nothing, and some keys."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Section `cases`: which hearts a configuration makes, by a grid, a table, random draws and conditions."""
 
-from __future__ import annotations
-
 from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal

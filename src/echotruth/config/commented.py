@@ -1,7 +1,5 @@
 """A configuration written out with the meaning, unit, limits and default of its keys, from the models themselves."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from dataclasses import dataclass

@@ -2,8 +2,6 @@
 from the field of view.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from echotruth.config.merging import merged, nested

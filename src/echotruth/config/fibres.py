@@ -1,7 +1,5 @@
 """Section `fibres`: fibre and sheet directions."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat

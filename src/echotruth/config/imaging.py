@@ -1,7 +1,5 @@
 """Sections `views`, `phantom`, `rf` and `bmode`."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat

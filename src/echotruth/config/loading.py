@@ -1,7 +1,5 @@
 """Read and check configuration files; errors name file, key, value and remedy in one sentence."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """Section of the configuration: the pressure-volume loop, or the other cycle, that drives the heart."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat

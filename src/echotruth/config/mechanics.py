@@ -1,7 +1,5 @@
 """Section of the configuration: the laws of the wall and its support."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat

@@ -1,7 +1,5 @@
 """Merging of sections before they are validated: of what is given with defaults, or with other keys."""
 
-from __future__ import annotations
-
 from typing import Any
 
 NAMED = ("views", "trackers", "cases")

@@ -1,7 +1,5 @@
 """Section `motion`: the beat of the heart, or a motion prescribed by a formula or read from a file."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 import numpy as np

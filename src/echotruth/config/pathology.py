@@ -1,7 +1,5 @@
 """Section `pathology`: infarct and late activation."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat

@@ -1,7 +1,5 @@
 """Section `physiology`: bounds on the behaviour of a solved heart."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field, FiniteFloat

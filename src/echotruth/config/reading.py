@@ -1,7 +1,5 @@
 """Read YAML files; what is malformed, or too large to be a configuration, is refused before it is expanded."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from itertools import chain, islice

@@ -1,7 +1,5 @@
 """Section `realism`: blood, surroundings, noise and artefacts of real clips; all are off by default."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import Annotated, Literal
 

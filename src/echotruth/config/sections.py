@@ -1,7 +1,5 @@
 """The configuration, and checks across its sections; these models define all keys and defaults."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints, model_validator

@@ -1,7 +1,5 @@
 """What comes with the package: the workflow, and the configurations of the folder config; both travel in the wheel."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from difflib import get_close_matches
@@ -10,7 +8,7 @@ from pathlib import Path
 
 _PLACES = (Path(__file__).parents[1] / "shipped", Path(__file__).parents[3])
 ROOT = next((place for place in _PLACES if (place / "Snakefile").is_file()), _PLACES[0])
-"""Folder of Snakefile, rules, workflow and config: that of an installed package (pyproject.toml), or a checkout."""
+"""Folder of what is shipped: `shipped` in an installed package (pyproject.toml), or the checkout."""
 
 
 def folder() -> Path:

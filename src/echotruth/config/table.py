@@ -1,7 +1,5 @@
 """The table of hearts as it is written: the cells of a CSV text, whose columns are named by its first row."""
 
-from __future__ import annotations
-
 import csv
 import io
 from dataclasses import dataclass

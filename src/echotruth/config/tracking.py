@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from math import isfinite
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, FiniteFloat, Tag
+from pydantic import BeforeValidator, Field, FiniteFloat
 
 from echotruth.config.limits import MAX_TRACKERS
-from echotruth.section import Name, Positive, Section, check, invalid
+from echotruth.section import Name, Positive, Section, check, invalid, tagged
 
 Reference = Annotated[
     Literal["ED", "previous", "bidirectional"],
@@ -239,17 +239,10 @@ def name_of(method: type[Section]) -> str:
     return method.model_fields["method"].default
 
 
-def _method_of(values: Any) -> Any:
-    return values.get("method", DEFAULT) if isinstance(values, dict) else getattr(values, "method", DEFAULT)
-
-
 if TYPE_CHECKING:
     Tracker = Section
 else:
-    Tracker = Annotated[
-        Union[tuple(Annotated[method, Tag(name_of(method))] for method in METHODS)],  # noqa: UP007
-        Discriminator(_method_of),
-    ]
+    Tracker = tagged("method", DEFAULT, {name_of(method): method for method in METHODS})
 """Section of one of the methods."""
 
 

@@ -5,8 +5,6 @@ The error of a strain has three parts: a wall oblique to the image plane thicken
 `operator`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.evaluation import statistics

@@ -1,7 +1,5 @@
 """Refusal of a tracker that cannot run, before the first clip."""
 
-from __future__ import annotations
-
 import inspect
 import shutil
 import sys

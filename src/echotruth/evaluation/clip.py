@@ -1,20 +1,15 @@
 """B-mode clips as trackers receive them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echotruth.cases import Case
 from echotruth.imaging.labels import unpack
 from echotruth.loop.cycle import read_loop
+from echotruth.repository.reader import Repository
 from echotruth.seeds import generator
 from echotruth.tracking.point_grid import grid_pixels, grid_points
-
-if TYPE_CHECKING:
-    from echotruth.repository.reader import Repository
 
 
 @dataclass(frozen=True)

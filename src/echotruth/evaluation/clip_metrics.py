@@ -4,12 +4,11 @@ They are made when they are read, from the displacement, the quality and the str
 earlier version has them too, and one that is not finished has those of its finished clips.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
@@ -27,14 +26,9 @@ from echotruth.imaging.tracks import visible
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import estimates
 from echotruth.repository.choice import Names, Sizes, chosen, image_size
+from echotruth.repository.reader import Repository
 from echotruth.repository.schema import LABELS
 from echotruth.tracking.point_grid import grid_pixels, grid_positions
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from echotruth.repository.reader import Repository
-
 
 SORTS = ("heart", "split", "group", "acoustics", "variation")
 """Labels of the table of cases that sort clips; `heart` is the one that hearts are told apart by."""
@@ -124,8 +118,6 @@ def clip_metrics(
 
 def _table(rows: list[Row], columns: Sequence[str] = ()) -> pd.DataFrame:
     """A table of which the columns of `BEGIN` are first, and then those that are given, also without rows."""
-    import pandas as pd
-
     names = dict.fromkeys([*BEGIN, *columns, *(name for row in rows for name in row)])
     return pd.DataFrame(rows).reindex(columns=list(names))
 

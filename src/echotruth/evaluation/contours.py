@@ -5,10 +5,9 @@ of the length of a line of tissue, e(t) = (L(t) - L(ED)) / L(ED), along the endo
 epicardium, and the line has to be named. In a short axis it is global circumferential strain (GCS), in a long axis,
 where the line leads from the base to the apex and back, global longitudinal strain (GLS). The line is that of the
 tissue which lies in the plane at end-diastole, and its length is that of its picture in the plane, which is what an
-image shows.
+image shows. It is that of one image, tracked and true; GLS of the heart in 3-D, the mean over six planes, is
+:func:`echotruth.mechanics.contours.global_longitudinal_strain`.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -48,7 +47,9 @@ class Contours:
     contour: NDArray[np.integer]
 
     def line_strain(self, displacement: Floats) -> Floats:
-        """Relative change of the length of each contour since end-diastole.
+        """Global strain of each contour, longitudinal (GLS) in a long axis, circumferential (GCS) in a short axis.
+
+        It is the relative change of the length of the contour since end-diastole.
 
         Parameters
         ----------

@@ -1,7 +1,5 @@
 """Strain, rotation and their rates over the cycle, and the peaks of such curves."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

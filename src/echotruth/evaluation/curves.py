@@ -1,10 +1,7 @@
 """Curves of strain and rotation of one clip, tracked beside true, as they are read from a repository."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from echotruth.config import Config
 from echotruth.evaluation.agreement import REFERENCES
@@ -12,11 +9,7 @@ from echotruth.evaluation.courses import peak, rate, systolic_rate
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import estimates, schema
 from echotruth.repository.choice import image_size, require_known
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from echotruth.repository.reader import Repository
+from echotruth.repository.reader import Repository
 
 NAMES = ("region_strain", "segment_strain", "line_strain", "rotation")
 """What is tracked over the cycle; the arrays are `tracked_NAME` and `true_NAME`."""
@@ -85,8 +78,6 @@ def strain_peaks(strain: xr.Dataset) -> xr.Dataset:
     >>> peaks["tracked_segment_strain_es"].sel(measure="engineering", wall_component="TT").dims
     ('aha',)
     """
-    import xarray as xr
-
     if "es_frame" not in strain.attrs:
         raise ValueError("The data set has lost its attribute es_frame: keep those that echotruth gave it.")
     es, time = strain.attrs["es_frame"], strain["time"].values
@@ -135,8 +126,6 @@ def twist_of(base: xr.Dataset, apex: xr.Dataset, heart_twist: np.ndarray | None 
     heart_twist : ndarray of shape (frame,), rad, optional
         That of the group physiology.
     """
-    import xarray as xr
-
     time = base["time"].values
     about = "rotation of the apical less that of the basal view, counter-clockwise seen from the apex"
     found = {}
@@ -153,8 +142,6 @@ def twist_of(base: xr.Dataset, apex: xr.Dataset, heart_twist: np.ndarray | None 
 
 def _dataset(values: dict[str, np.ndarray], time: np.ndarray, config: Config) -> xr.Dataset:
     """Arrays of one clip and their rates, with dimensions, coordinates and units."""
-    import xarray as xr
-
     arrays = {
         array.name: array for array in (*schema.named("evaluation/SIZE"), *schema.named("evaluation/SIZE/TRACKER"))
     }

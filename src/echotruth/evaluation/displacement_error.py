@@ -4,8 +4,6 @@ Every metric is taken over the points that have both a true and a tracked displa
 the wall's points that have one; in `nrmse_all` points without a tracked displacement count as points that did not move.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The hearts of a table of cases: several cases may be of one."""
 
-from __future__ import annotations
-
 from echotruth.cases import Case
 from echotruth.cases.case import Label
 from echotruth.cases.ids import integer_if_whole

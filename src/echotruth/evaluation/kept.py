@@ -1,7 +1,5 @@
 """Keeping what a tracker from outside found, beside its scores (:mod:`echotruth.repository.kept`)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -9,12 +9,9 @@ clips would be too good. Intervals are the middle 95 % of the means (and ranks) 
 Ann Stat 1979; 7:1), in which all trackers share the resampled hearts. A single heart has no interval.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -24,11 +21,9 @@ from echotruth.evaluation.resampling import draws, interval, means_of_hearts, pe
 from echotruth.evaluation.scoring import metrics
 from echotruth.repository import estimates
 from echotruth.repository.digest import digest
+from echotruth.repository.reader import Repository
 from echotruth.repository.schema import PACKS
 from echotruth.tracking.external_program import in_one_line
-
-if TYPE_CHECKING:
-    from echotruth.repository.reader import Repository
 
 log = logging.getLogger("echotruth")
 

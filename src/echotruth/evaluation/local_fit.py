@@ -6,8 +6,6 @@ points of the wall within the radius r: c = (P^T W P)^-1 P^T W u, u(x_0) = c_0 a
 w = 1 - (|x - x_0| / r)^2 (Epanechnikov) fall to 0 at the radius.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

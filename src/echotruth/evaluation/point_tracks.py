@@ -4,8 +4,6 @@ Lengths are in 1/256 of the side of the image, the pixels of TAP-Vid, whose imag
 frame 0, which does not count.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

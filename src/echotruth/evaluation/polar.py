@@ -1,7 +1,5 @@
 """Polar components of in-plane vectors: radial and tangential to the ventricle."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

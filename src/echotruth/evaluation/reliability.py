@@ -4,8 +4,6 @@ A tracker is calibrated if of the points of which it is sure to 0.8, 80 % are ri
 Statistician 1983; 32:12, doi 10.2307/2987588).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -7,18 +7,13 @@ few hearts they are too narrow: of normal values, those of the mean of 6, 12 and
 cases, those of the median in 93, 94 and 94.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 RESAMPLES = 2000
 """Number of bootstrap samples."""

@@ -4,11 +4,8 @@ The formulas stand in :mod:`.displacement_error` (NRMSE and others), :mod:`.agre
 :mod:`.contours` (strain and rotation over the cycle) and :mod:`.statistics`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,12 +22,9 @@ from echotruth.imaging.truth import cavity_centroid, material_truth
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import rounding, schema
+from echotruth.repository.reader import Repository
 from echotruth.repository.rounding import length_quantum
 from echotruth.tracking.point_grid import grid_positions
-
-if TYPE_CHECKING:
-    from echotruth.repository.reader import Repository
-
 
 DISTANCE_ROUNDING = 1e-9
 """Standard deviation of distances that rounding can cause if they are not rounded to a quantum, m: that of a motion of

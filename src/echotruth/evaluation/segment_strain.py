@@ -1,7 +1,5 @@
 """Strain of the AHA segments of a clip: at end-systole, at its peak, with its time, and its rate, tracked and true."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Values have the shape (..., point, k), masks (mask, point) and results (..., mas
 few points.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -14,8 +14,6 @@ and 0.9 with noise of 2.3 and 0.6; one of 0.60 mm 7.1 and 1.2 with 1.2 and 0.3. 
 default heart.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

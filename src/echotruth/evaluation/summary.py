@@ -1,12 +1,12 @@
 """Strain of clips as one table: at end-systole, at its peak, its time to peak and its rate, tracked and true."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 
 from echotruth.cases import Case
 from echotruth.config import Config
@@ -15,12 +15,7 @@ from echotruth.evaluation.curves import strain_curves, strain_peaks, twist_of, t
 from echotruth.evaluation.segment_strain import Row
 from echotruth.repository.choice import Names, Sizes, chosen, image_size
 from echotruth.repository.kept import NotEvaluated
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
-
-    from echotruth.repository.reader import Repository
+from echotruth.repository.reader import Repository
 
 
 class Quantity(NamedTuple):
@@ -70,8 +65,6 @@ def strain_summary(
     repository: Repository, cases: Names = None, views: Names = None, sizes: Sizes = None, trackers: Names = None
 ) -> pd.DataFrame:
     """Read GLS, GCS, radial strain, rotation and twist of clips into a table; see :meth:`.Repository.summary`."""
-    import pandas as pd
-
     chosen_sizes = [image_size(repository.config, size) for size in sizes or repository.sizes[:1]]
     chosen_trackers = chosen("tracker", trackers, repository.trackers)
     clips = repository.finished(cases, views, "tracking")

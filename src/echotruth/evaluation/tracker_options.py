@@ -1,7 +1,5 @@
 """Name and settings of a tracker from the arguments of `echotruth evaluate`."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from shlex import split

@@ -1,11 +1,9 @@
 """The points at which trackers follow a clip of a repository: their motion, tracked and true."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from echotruth.config import Config
 from echotruth.evaluation.strain import RADIUS, StrainOperator
@@ -14,12 +12,8 @@ from echotruth.repository import estimates
 from echotruth.repository.choice import chosen
 from echotruth.repository.datasets import dataset
 from echotruth.repository.kept import NotEvaluated
+from echotruth.repository.reader import Repository
 from echotruth.tracking.point_grid import grid_pixels, grid_positions
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from echotruth.repository.reader import Repository
 
 _STRAIN, _ABOUT = ("frame", "axial", "lateral", "wall_component"), {"units": "1"}
 
@@ -28,8 +22,6 @@ def tracks(
     repository: Repository, case: str, view: str, size: int, trackers: Iterable[str] | None = None
 ) -> xr.Dataset:
     """Read what trackers found at the points of a clip; see :meth:`.Repository.tracks`."""
-    import xarray as xr
-
     found = repository.case(case)
     grid, known = grid_positions(found.config), chosen("tracker", trackers, repository.trackers)
     points = {"lateral": grid[0, :, 0], "axial": grid[:, 0, 1]}

@@ -4,8 +4,6 @@ Its function `write` takes a clip, view or heart, the path of its file or folder
 `overlay` (what is drawn over the images), `rate` (frames per second) and `trackers` (their names).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace

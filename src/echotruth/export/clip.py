@@ -1,7 +1,5 @@
 """One clip of a repository, of which each part is read when it is used."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from functools import cached_property

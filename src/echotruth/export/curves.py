@@ -1,7 +1,5 @@
 """Curves as tidy CSV: one row a frame, tracker and quantity, and a table of what is read off them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Files and folders that are whole or absent: they are written under another name first."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ Attributes are those of the modules Patient, General Study, General Series, Gene
 Pixel, Cine, Multi-frame, US Region Calibration, US Image and SOP Common (DICOM PS3.3, A.7 and C.8.5).
 """
 
-from __future__ import annotations
-
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path

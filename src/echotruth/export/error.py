@@ -1,7 +1,5 @@
 """What is said if something cannot be exported."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

@@ -4,8 +4,6 @@ Baker et al., A Database and Evaluation Methodology for Optical Flow, Int J Comp
 and downwards, larger than 1e9 where it is unknown.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """GIF: grey levels as they are, or 256 colours with an overlay."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

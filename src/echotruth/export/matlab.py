@@ -1,7 +1,5 @@
 """MATLAB: a MAT-file of version 5, which every MATLAB since 7 and Octave read."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

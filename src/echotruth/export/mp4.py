@@ -1,7 +1,5 @@
 """MP4 (H.264), which browsers and slides play."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from fractions import Fraction

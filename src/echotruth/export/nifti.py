@@ -1,7 +1,5 @@
 """NIfTI-1 (https://nifti.nimh.nih.gov/nifti-1): a plane over time, placed in the frame of the heart."""
 
-from __future__ import annotations
-
 import gzip
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The truth drawn over B-mode images, on their own pixels, so that the scale stays."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import cv2

@@ -1,7 +1,5 @@
 """A folder of PNG images, one a frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

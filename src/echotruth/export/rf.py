@@ -1,7 +1,5 @@
 """RF as uff and zea need it: channels without quantisation step, and positions of the samples of the lines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

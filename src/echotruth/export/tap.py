@@ -5,8 +5,6 @@ hold `video` (frame, height, width, 3; uint8), `points` (point, frame, 2; x, y; 
 `occluded` (point, frame; bool); those of its DAVIS and RGB-stacking sets are pickled dictionaries.
 """
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Sequence
 from dataclasses import replace

@@ -6,8 +6,6 @@ its dimensions in Fortran order, the last one of the toolbox first. A complex ar
 Rodriguez-Molares et al., The UltraSound ToolBox, IEEE Int Ultrason Symp 2017.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

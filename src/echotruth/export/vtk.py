@@ -1,7 +1,5 @@
 """The beating mesh for ParaView: a .vtu of every frame and a .pvd with their times."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr

@@ -3,8 +3,6 @@
 A track holds the data (frames first) and the scan (the transmits), all in 32 bits; the probe stands beside it.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

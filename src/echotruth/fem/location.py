@@ -6,8 +6,6 @@ reaches beyond each face of the straight tetrahedron with the same corners. That
 Newton's method on x(xi) = x tests.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import NDArray

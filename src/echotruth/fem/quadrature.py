@@ -1,7 +1,5 @@
 """Quadrature rules on the reference tetrahedron and triangle, with positive weights."""
 
-from __future__ import annotations
-
 from itertools import permutations
 
 import numpy as np

@@ -5,8 +5,6 @@ material point, given by a tetrahedron and local coordinates xi in it; the shape
 carry it to x(xi) = sum_a N_a(xi) x_a.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Volume of quadratic tetrahedra."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -3,8 +3,6 @@
 Applied to the full matrix, so that every synthesised transmit contains them.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

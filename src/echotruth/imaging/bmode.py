@@ -4,8 +4,6 @@ The envelope is interpolated before it is compressed, which keeps the statistics
 to one reference for the whole clip, so that brightness means the same in every frame.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.config import Bmode, Probe

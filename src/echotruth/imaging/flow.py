@@ -1,7 +1,5 @@
 """Motion of the tissue from one frame to the next and to the one before, and the slice of tissue that is imaged."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from math import hypot
 

@@ -3,8 +3,6 @@
 :mod:`echotruth.imaging.truth` finds them, the segment by :func:`echotruth.aha.segment`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@ diverging transmit would have recorded: the sum of its elements' channels, delay
 than 64 focused transmits.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

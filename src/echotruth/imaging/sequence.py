@@ -1,7 +1,5 @@
 """A sequence: all frames of one view, from the scatterers to the lines."""
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

@@ -3,8 +3,6 @@
 Beyond the first and last sample the data are mirrored about it. The bytes do not depend on the number of threads.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

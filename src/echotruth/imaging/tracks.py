@@ -1,7 +1,5 @@
 """Point tracks: points of the image followed through all frames as the tissue that is there moves."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

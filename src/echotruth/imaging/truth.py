@@ -1,7 +1,5 @@
 """The truth in the image: motion of the tissue at every pixel, interpolated as that of the scatterers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 

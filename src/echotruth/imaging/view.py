@@ -1,7 +1,5 @@
 """Views: the pose of the probe and the plane it images."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

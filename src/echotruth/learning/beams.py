@@ -1,7 +1,5 @@
 """Beams and scans of the cases, read only where cases differ in them."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whole clips, with as much of the truth as is asked for."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Clips with the disease of the heart."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Pairs of frames with the true motion between them."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

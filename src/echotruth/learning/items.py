@@ -1,7 +1,5 @@
 """What all sequences of items have in common: which clips they are made from, and how these are chosen."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Measurements of hearts, for the table of cases and as targets of regression."""
 
-from __future__ import annotations
-
 from echotruth.arrays import Floats
 from echotruth.fem.volume import cell_volumes
 from echotruth.repository.reader import Repository

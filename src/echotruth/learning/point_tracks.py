@@ -1,7 +1,5 @@
 """Clips with points of the tissue that are followed through all frames."""
 
-from __future__ import annotations
-
 from hashlib import sha256
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Single frames with the label of every pixel."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Splits of a table of cases by heart."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from hashlib import sha256
 

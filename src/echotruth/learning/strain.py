@@ -1,7 +1,5 @@
 """Clips with the strain of the heart, as targets of regression."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.learning.items import Item, Items, Place

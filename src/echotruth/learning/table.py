@@ -1,7 +1,5 @@
 """Table of the cases of a repository, with what is known of each heart."""
 
-from __future__ import annotations
-
 import re
 from difflib import get_close_matches
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Times and rates of the beat, from the curves of pressure and volume."""
+"""Times of the valves and of the phases, Tei index, dP/dt and tau, from the curves of pressure and volume."""
 
 from __future__ import annotations
 

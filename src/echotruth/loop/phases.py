@@ -1,7 +1,5 @@
 """End-systole and the phases of the beat, from the curves of pressure and volume."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

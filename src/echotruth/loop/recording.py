@@ -1,7 +1,5 @@
 """A recorded cycle, read from a CSV file whose columns have their units in their names."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass
 from pathlib import Path

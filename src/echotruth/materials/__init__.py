@@ -15,11 +15,10 @@ from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Annotated, Any, Union
-
-from pydantic import Discriminator, Tag
+from typing import TYPE_CHECKING
 
 from echotruth.materials.material import Material
+from echotruth.section import tagged
 
 DEFAULT = "fung"
 """Name of the default law."""
@@ -30,21 +29,13 @@ LAWS = {name: import_module(f"{__name__}.{name}") for name in _NAMES}
 """Name to module of each law."""
 
 
-def _law_name(values: Any) -> Any:
-    """Name of the law of a section of the configuration."""
-    return values.get("law", DEFAULT) if isinstance(values, dict) else getattr(values, "law", DEFAULT)
-
-
 if TYPE_CHECKING:
 
     class AnyLaw(Material):
         law: str
 
 else:
-    AnyLaw = Annotated[
-        Union[tuple(Annotated[module.Law, Tag(name)] for name, module in LAWS.items())],  # noqa: UP007
-        Discriminator(_law_name),
-    ]
+    AnyLaw = tagged("law", DEFAULT, {name: module.Law for name, module in LAWS.items()})
 """Section of the configuration of any law."""
 
 

@@ -1,7 +1,5 @@
 """The paper's transversely isotropic law with an exponential of Fung's type."""
 
-from __future__ import annotations
-
 from math import exp
 from typing import Literal
 

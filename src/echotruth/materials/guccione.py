@@ -1,7 +1,5 @@
 """The exponential law of an orthotropic wall."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

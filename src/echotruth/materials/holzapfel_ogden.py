@@ -1,7 +1,5 @@
 """The structural law of an orthotropic wall: a matrix, fibres, sheets, and the shear between the two."""
 
-from __future__ import annotations
-
 from math import exp
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Base class of the passive laws."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.section import Positive, Section

@@ -1,7 +1,5 @@
 """The isotropic law of rubber."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Conversion between the material axes of the wall and the angles of its fibres and sheets."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.fem.tetrahedra import Floats

@@ -1,7 +1,5 @@
 """Simulation of one heart over one cycle: geometry, fibres, mechanics and kinematics."""
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

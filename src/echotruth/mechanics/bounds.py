@@ -1,7 +1,5 @@
 """Bounds on the measures of a heart, within which it is plausible (section `physiology` of the configuration)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from operator import ge, itemgetter, le
 from typing import NamedTuple

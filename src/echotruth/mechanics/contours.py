@@ -1,10 +1,10 @@
 """Lengths and thickness of the wall where planes cut it, as echocardiography measures them.
 
 A surface of triangles is cut where a value at its vertices, such as the distance from a plane, changes sign. Of each
-point of the cut the edge and the place on it are kept, so that it can be followed as tissue.
+point of the cut the edge and the place on it are kept, so that it can be followed as tissue. The global longitudinal
+strain here is that of the heart in 3-D; that of one image, tracked and true, is in
+:mod:`echotruth.evaluation.contours`.
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 

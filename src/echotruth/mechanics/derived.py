@@ -1,7 +1,5 @@
 """What follows from the stored arrays of a heart: deformation and strain of its cells, and angles of its fibres."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

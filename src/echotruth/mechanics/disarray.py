@@ -1,7 +1,5 @@
 """Fibre disarray: a random rotation about the wall normal, smooth in space."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.fem.tetrahedra import Floats

@@ -6,8 +6,6 @@ Helix and sheet angle are alpha and beta of Bayer et al., Ann Biomed Eng 40 (201
 the two rules differ.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import csr_matrix, triu
 

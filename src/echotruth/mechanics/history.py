@@ -1,7 +1,5 @@
 """The output arrays of a heart: geometry, fibres, pathology, mechanics and kinematics."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -3,8 +3,6 @@
 Strains are relative to the unloaded state or to end-diastole (F_rel = F F_ED^-1, along the axes deformed to ED).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

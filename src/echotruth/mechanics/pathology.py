@@ -1,7 +1,5 @@
 """Regional pathology: stiffness, active tension and activation delay of every cell of the wall."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

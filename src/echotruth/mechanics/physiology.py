@@ -1,7 +1,5 @@
 """Measures of a solved heart; the bounds within which it is plausible stand in :mod:`.bounds`."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

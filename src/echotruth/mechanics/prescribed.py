@@ -1,7 +1,5 @@
 """Prescribed motions: hearts and tubes that move by a formula, so that their motion is known exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

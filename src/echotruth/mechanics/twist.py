@@ -4,8 +4,6 @@ The rotation of a clip, with the same sign, is in :mod:`echotruth.evaluation.cou
 :mod:`.prescribed`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Refusal of what is no heart and no clip, with the function that makes one."""
 
-from __future__ import annotations
-
 import xarray as xr
 
 from echotruth.heart import Heart

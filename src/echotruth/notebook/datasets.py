@@ -1,7 +1,5 @@
 """Arrays of a heart as xarray data sets, with the dimensions and units of the repository."""
 
-from __future__ import annotations
-
 import xarray as xr
 
 from echotruth.cases import Case

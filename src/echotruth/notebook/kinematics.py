@@ -1,7 +1,5 @@
 """Deformation and strain of a heart, which the repository does not hold since its mesh and its motion give them."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

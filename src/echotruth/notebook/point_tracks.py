@@ -1,7 +1,5 @@
 """Points of a clip followed as the tissue moves, in place of a tracker."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray

@@ -1,7 +1,5 @@
 """From a configuration to a heart, from a heart to a clip, and from a clip to a score."""
 
-from __future__ import annotations
-
 import logging
 import sys
 import warnings

@@ -1,7 +1,5 @@
 """What a page tells of a repository: how much was made, what failed, and what the stages took."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path

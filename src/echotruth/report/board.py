@@ -1,7 +1,5 @@
 """Leaderboard as a table of the page."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pandas as pd

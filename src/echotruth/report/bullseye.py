@@ -1,7 +1,5 @@
 """AHA bullseyes of what is true and what was tracked in the segments, and of the difference."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

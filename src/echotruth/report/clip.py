@@ -1,7 +1,5 @@
 """B-mode clip with the true motion of the wall overlaid."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """All views of one heart for the player of the page: frames in one picture, and points that move with the tissue."""
 
-from __future__ import annotations
-
 from base64 import b64encode
 from io import BytesIO
 from typing import Any

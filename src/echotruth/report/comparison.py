@@ -1,7 +1,5 @@
 """What trackers found in one heart beside the truth: strain, rotation and twist over the cycle."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Tracked against true curves over the cycle: strain of the wall and rotation of every view, and strain of segments."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Error of tracked circumferential displacement through the wall (the paper's figure 4)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from typing import Any, Literal
 

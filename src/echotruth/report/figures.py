@@ -1,7 +1,5 @@
 """All figures of a repository, drawn from its store."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -126,21 +124,10 @@ class Figures:
 
     def physiology(self) -> Figure:
         """Rotation, strain, axial motion, pressure and volume over the cycle."""
-        mechanics, measures = self.shown.arrays["mechanics"], self.group("physiology")
-        ivc, ejection, ivr = (float(measures[name]) for name in ("ivc_time", "ejection_time", "ivr_time"))
-        cycle = physiology.Cycle(
-            self.time,
-            self.shown.es,
-            (ivc, ejection, ivr),
-            {name: measures[key] for name, key in physiology.ROTATIONS.items()},
-            self.group("kinematics")["strain_mean"],
-            {side: measures[f"{side}_motion"] for side in ("base", "apex")},
-            mechanics["pressure"],
-            mechanics["volume"],
-        )
+        arrays = self.shown.arrays["mechanics"] | self.group("kinematics") | self.group("physiology")
         geometry, loop = self.config.geometry, self.config.loop
         species = loop.file if geometry.file else geometry.preset
-        return physiology.draw(cycle, physiology.PUBLISHED.get(species, {}))
+        return physiology.draw(arrays | {"time": self.time}, physiology.PUBLISHED.get(species, {}))
 
     def population(self) -> Figure:
         """Measures of all hearts by their diagnosis."""
@@ -165,8 +152,7 @@ class Figures:
         pictures = {}
         for view in self.config.views:
             found = self.repository.clip(self.case, view, self.sizes[0], ("image", "layer"))
-            at_ed_and_es = (found.isel(frame=frame) for frame in (0, self.shown.es))
-            pictures[view] = [views.Picture(one["image"].values, one["layer"].values) for one in at_ed_and_es]
+            pictures[view] = [found.isel(frame=frame) for frame in (0, self.shown.es)]
         return views.draw(pictures, self.config.bmode.si().field_of_view)
 
     @cached_property

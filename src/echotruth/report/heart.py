@@ -1,7 +1,5 @@
 """The heart in three dimensions: fibres and circumferential strain, unloaded, at end-diastole and at end-systole."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The hearts of a repository at a glance: what became of them, their measures and a small picture of each."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Leaderboard of the trackers: error of displacement and of strain at every image size and view."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes

@@ -1,7 +1,5 @@
 """Target and solved pressure-volume loop of the heart, with the active tension that drives it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

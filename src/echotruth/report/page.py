@@ -1,7 +1,5 @@
 """Page of a repository: one file with figures, playing clips, tables and provenance, which needs no network."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

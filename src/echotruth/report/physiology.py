@@ -1,13 +1,11 @@
 """Motion of the heart over the cycle, beside what was measured in animals and people."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from echotruth.report import style
 
@@ -34,9 +32,6 @@ al., J Magn Reson Imaging 42 (2015) 153, doi 10.1002/jmri.24749; E_LL = e + e^2 
 501 people, PMC5234340.
 """
 
-ROTATIONS = {"base": "rotation_base", "apex": "rotation_apex", "twist": "twist"}
-"""Curve -> array of the group `physiology`."""
-
 COMPONENTS = ("RR", "CC", "LL", "RC", "RL", "CL")
 NORMAL = {"RR": style.RADIAL, "CC": style.CIRCUMFERENTIAL, "LL": style.LONGITUDINAL}
 SHEAR = {"RC": "#8a4f9e", "RL": "#c98a1b", "CL": "#2f9aa0"}
@@ -46,37 +41,11 @@ HEADROOM = 0.06
 """Room above the curves for the word ES, over the height of the others."""
 _UL, _MM = 1e-9, 1e-3
 
+Cycle = dict[str, NDArray[Any]]
+"""Arrays of the groups `mechanics`, `kinematics` and `physiology` of one heart, and `time`, (frame,), s.
 
-@dataclass(frozen=True)
-class Cycle:
-    """Curves of one cycle.
-
-    Attributes
-    ----------
-    time : ndarray of shape (frame,), s
-        Since end-diastole.
-    es : int
-        Frame of end-systole.
-    intervals : tuple of float, s
-        Durations of isovolumic contraction, ejection and isovolumic relaxation; not a number where there are none.
-    rotation : dict of ndarray of shape (frame,), rad
-        `base`, `apex` and `twist`.
-    strain : ndarray of shape (frame, 6)
-        Wall means of `COMPONENTS`.
-    axial : dict of ndarray of shape (frame,), m
-        `base` and `apex`: displacement towards the base.
-    pressure, volume : ndarray of shape (frame,), Pa and m^3
-        Not a number for a prescribed motion.
-    """
-
-    time: np.ndarray
-    es: int
-    intervals: tuple[float, float, float]
-    rotation: dict[str, np.ndarray]
-    strain: np.ndarray
-    axial: dict[str, np.ndarray]
-    pressure: np.ndarray
-    volume: np.ndarray
+The pressure and the volume of a prescribed motion are not numbers, and nor are the durations of phases that it lacks.
+"""
 
 
 @style.styled
@@ -92,8 +61,8 @@ def draw(cycle: Cycle, published: Published) -> Figure:
     _strains(normal, cycle, NORMAL, published)
     _strains(shear, cycle, SHEAR, published)
     _axial_motion(axial, cycle)
-    _curve(pressure, cycle, cycle.pressure / style.MMHG, "Pressure (mmHg)")
-    _curve(volume, cycle, cycle.volume / _UL, "Volume (µL)")
+    _curve(pressure, cycle, cycle["pressure"] / style.MMHG, "Pressure (mmHg)")
+    _curve(volume, cycle, cycle["volume"] / _UL, "Volume (µL)")
     for panel, title in zip(panels.flat, _TITLES, strict=True):
         panel.set_title(title, loc="left")
         _phases(panel, cycle)
@@ -106,9 +75,9 @@ _TITLES = ("Rotation", "Normal strain", "Shear strain", "Axial motion", "Pressur
 
 
 def _rotations(axes: Axes, cycle: Cycle, published: Published) -> None:
-    colours = {"base": style.CIRCUMFERENTIAL, "apex": style.RADIAL, "twist": style.SOLVED}
-    for name, colour in colours.items():
-        _line(axes, cycle, name, np.degrees(cycle.rotation[name]), colour)
+    _line(axes, cycle, "base", np.degrees(cycle["rotation_base"]), style.CIRCUMFERENTIAL)
+    _line(axes, cycle, "apex", np.degrees(cycle["rotation_apex"]), style.RADIAL)
+    _line(axes, cycle, "twist", np.degrees(cycle["twist"]), style.SOLVED)
     _measured(axes, cycle, {"twist": style.SOLVED}, published)
     axes.set_ylabel("Counter-clockwise from apex (deg)")
     _finish(axes, 0.1)
@@ -116,7 +85,7 @@ def _rotations(axes: Axes, cycle: Cycle, published: Published) -> None:
 
 def _strains(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Published) -> None:
     for name, colour in colours.items():
-        _line(axes, cycle, f"$E_{{{name}}}$", 100 * cycle.strain[:, COMPONENTS.index(name)], colour)
+        _line(axes, cycle, f"$E_{{{name}}}$", 100 * cycle["strain_mean"][:, COMPONENTS.index(name)], colour)
     _measured(axes, cycle, colours, published)
     axes.set_ylabel("Wall mean since ED (%)")
     _finish(axes, 0.1)
@@ -124,15 +93,16 @@ def _strains(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Publi
 
 def _axial_motion(axes: Axes, cycle: Cycle) -> None:
     for name, colour in (("base", style.CIRCUMFERENTIAL), ("apex", style.RADIAL)):
-        _line(axes, cycle, name, cycle.axial[name] / _MM, colour, decimals=2)
+        _line(axes, cycle, name, cycle[f"{name}_motion"] / _MM, colour, decimals=2)
     axes.set_ylabel("Towards the base (mm)")
     _finish(axes, 0.01, 0.2)
 
 
 def _line(axes: Axes, cycle: Cycle, name: str, values: np.ndarray, colour: str, decimals: int = 1) -> None:
     """Draw a curve, whose label has its value at end-systole."""
-    label = f"{name} {float(values[cycle.es]):+z.{decimals}f}".replace("-", "−")  # z: not -0
-    axes.plot(cycle.time * 1e3, values, color=colour, label=label)
+    at_es = float(values[cycle["es_frame"]])
+    label = f"{name} {at_es:+z.{decimals}f}".replace("-", "−")  # z: not -0
+    axes.plot(cycle["time"] * 1e3, values, color=colour, label=label)
 
 
 def _curve(axes: Axes, cycle: Cycle, values: np.ndarray, label: str) -> None:
@@ -141,21 +111,21 @@ def _curve(axes: Axes, cycle: Cycle, values: np.ndarray, label: str) -> None:
         axes.text(0.5, 0.5, "none: the motion is prescribed", color=style.MUTED, ha="center", transform=axes.transAxes)
         axes.set_yticks([])
         return
-    axes.plot(cycle.time * 1e3, values, color=style.SOLVED)
+    axes.plot(cycle["time"] * 1e3, values, color=style.SOLVED)
     axes.set_ylim(0, 1.15 * np.max(values))
 
 
 def _measured(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Published) -> None:
     """Bars of mean and standard deviation beside end-systole, and a circle at 0 at the end of IVC."""
-    step, end = 0.045 * 1e3 * cycle.time[-1], 1e3 * cycle.time[cycle.es]
+    step, end = 0.045 * 1e3 * cycle["time"][-1], 1e3 * cycle["time"][cycle["es_frame"]]
     shown = [name for name in colours if name in published]
     for k, name in enumerate(shown):
         mean, sd = published[name]
         at = end + (k - (len(shown) - 1) / 2) * step
         axes.plot([at, at], [mean - sd, mean + sd], color=colours[name], linewidth=5, alpha=0.35, solid_capstyle="butt")
         axes.plot(at, mean, "_", color=colours[name], markersize=7, markeredgewidth=1.6)
-    if shown and np.isfinite(cycle.intervals[0]):
-        axes.plot(1e3 * cycle.intervals[0], 0, "o", color=style.MUTED, markersize=6, markerfacecolor="none", zorder=5)
+    if shown and np.isfinite(cycle["ivc_time"]):
+        axes.plot(1e3 * cycle["ivc_time"], 0, "o", color=style.MUTED, markersize=6, markerfacecolor="none", zorder=5)
 
 
 def _phases(axes: Axes, cycle: Cycle) -> None:
@@ -163,12 +133,12 @@ def _phases(axes: Axes, cycle: Cycle) -> None:
     axes.axhline(0, color=style.MUTED, linewidth=0.6)
     axes.margins(x=0.01)
     top = axes.get_xaxis_transform()
-    end = 1e3 * cycle.time[cycle.es]
+    end = float(1e3 * cycle["time"][cycle["es_frame"]])
     axes.axvline(end, color=style.MUTED, linewidth=0.9, linestyle=":")
     axes.text(end, 0.985, "ES ", color=style.MUTED, fontsize=7, ha="right", va="top", transform=top)
-    if not np.isfinite(cycle.intervals).all():
+    opening, closing, mitral = 1e3 * np.cumsum([cycle[name] for name in ("ivc_time", "ejection_time", "ivr_time")])
+    if not np.isfinite(mitral):
         return
-    opening, closing, mitral = 1e3 * np.cumsum(cycle.intervals)
     for name, start, stop in (("IVC", 0, opening), ("IVR", closing, mitral)):
         axes.axvspan(start, stop, color=style.SHADE, zorder=0, linewidth=0)
         look: dict[str, Any] = {"color": style.MUTED, "fontsize": 6.5, "ha": "center", "va": "bottom"}

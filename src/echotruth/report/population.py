@@ -1,7 +1,5 @@
 """Measures of all hearts by their diagnosis."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

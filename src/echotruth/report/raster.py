@@ -6,8 +6,6 @@ A z-buffer and Gouraud shading under parallel projection: Foley, van Dam, Feiner
 Computer Graphics: Principles and Practice, chapters 15 and 16.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numba

@@ -1,7 +1,5 @@
 """The image sizes of one view side by side, where the wall is."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

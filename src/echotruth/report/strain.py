@@ -1,7 +1,5 @@
 """Strain of the wall over the cycle: mean and standard deviation, and circumferential strain of the layers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

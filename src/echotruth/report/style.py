@@ -1,7 +1,5 @@
 """Style shared by all figures."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal

@@ -1,7 +1,5 @@
 """Figures as SVG within a page, in its colours, which are light or dark."""
 
-from __future__ import annotations
-
 import re
 from html import escape
 from pathlib import Path

@@ -1,11 +1,9 @@
 """All views at end-diastole and end-systole, with the borders of the wall and of its layers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -18,35 +16,19 @@ CONTOUR_PIXELS = 256
 """Pixels along the side of an image from which contours are drawn."""
 
 
-@dataclass(frozen=True)
-class Picture:
-    """One frame of a view.
-
-    Attributes
-    ----------
-    image : ndarray of shape (axial, lateral), uint8
-        Grey levels.
-    layer : ndarray of shape (axial, lateral), integer
-        Transmural layer, 1 at the endocardium; 0 outside the wall.
-    """
-
-    image: np.ndarray
-    layer: np.ndarray
-
-
 @style.styled
-def draw(pictures: Mapping[str, Sequence[Picture]], field_of_view: float) -> Figure:
+def draw(pictures: Mapping[str, Sequence[xr.Dataset]], field_of_view: float) -> Figure:
     """Draw one column per view, end-diastole above end-systole.
 
     Parameters
     ----------
-    pictures : mapping of view to sequence of two Picture
-        At ED and ES.
+    pictures : mapping of view to sequence of two Dataset
+        Frames at ED and ES, with `image`, grey levels, and `layer`, that at the endocardium 1 and 0 outside the wall.
     field_of_view : float
         Side of the images, m; the array stands in the middle of the upper edge.
     """
     side = 1e3 * field_of_view
-    left, right, bottom, top = _shown([picture.layer for pair in pictures.values() for picture in pair], side)
+    left, right, bottom, top = _shown([picture["layer"].values for pair in pictures.values() for picture in pair], side)
     height = 2.6 * min((bottom - top) / (right - left), 1.6)
     figure = style.figure(2.6 * len(pictures) + 0.5, 2 * height + 0.8)
     panels = figure.subplots(2, len(pictures), sharex=True, sharey=True, squeeze=False)
@@ -62,10 +44,10 @@ def draw(pictures: Mapping[str, Sequence[Picture]], field_of_view: float) -> Fig
     return figure
 
 
-def _image(axes: Axes, picture: Picture, side: float) -> None:
+def _image(axes: Axes, picture: xr.Dataset, side: float) -> None:
     """Draw grey levels and the borders of the wall and, in the left half, of its layers; the side is in mm."""
-    extent, layer = (-side / 2, side / 2, side, 0), picture.layer
-    axes.imshow(picture.image, cmap="gray", vmin=0, vmax=255, extent=extent)
+    extent, layer = (-side / 2, side / 2, side, 0), picture["layer"].values
+    axes.imshow(picture["image"].values, cmap="gray", vmin=0, vmax=255, extent=extent)
     step = max(1, layer.shape[0] // CONTOUR_PIXELS)
     layer = layer[step // 2 :: step, step // 2 :: step]
     axial, lateral = ((np.arange(n) + 0.5) / n * side for n in layer.shape)

@@ -1,7 +1,5 @@
 """Description of one array of the repository."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

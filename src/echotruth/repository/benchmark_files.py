@@ -1,7 +1,5 @@
 """What jobs took, by the files that Snakemake's `benchmark` wrote: benchmarks/RULE/CASE/VIEW/SIZE.tsv."""
 
-from __future__ import annotations
-
 from csv import DictReader
 from pathlib import Path
 

@@ -1,6 +1,4 @@
-"""The configuration of one heart, cases/CASE.json, which its jobs read."""
-
-from __future__ import annotations
+"""The configuration of one case, cases/CASE.json, which its jobs read."""
 
 from pathlib import Path
 
@@ -11,12 +9,12 @@ from echotruth.config import Config
 
 
 def case_path(folder: Path, case: str) -> Path:
-    """File with the configuration of one heart, which its jobs read."""
+    """File with the configuration of one case, which its jobs read."""
     return folder / "cases" / f"{case}.json"
 
 
 def read_case(folder: Path, case: str) -> Case:
-    """The heart of a job.
+    """The case of a job.
 
     Raises
     ------

@@ -4,8 +4,6 @@ The records of the ledger vouch for the shards of their jobs, and `ledger/struct
 hierarchy. The check goes on to the end and names every fault with what heals it; :mod:`.healing` does so.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Check of a job: its record, its files, and their values."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import prod

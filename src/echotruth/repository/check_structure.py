@@ -1,7 +1,5 @@
 """Check of what belongs to no job: the structure of the hierarchy, registries, and files of no record."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path

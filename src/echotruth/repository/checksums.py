@@ -5,8 +5,6 @@ The record of a job holds those of its shards, and `ledger/structure.json` those
 Beside these, every chunk in a shard carries a crc32c (see :mod:`.hierarchy`), which raises when damaged data are read.
 """
 
-from __future__ import annotations
-
 import os
 from hashlib import file_digest, sha256
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Choosing among what a repository has: names and image sizes that are known."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from typing import TypeVar
 

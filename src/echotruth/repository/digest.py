@@ -1,7 +1,5 @@
 """Digest of a clip, by which scores of older images are recognised."""
 
-from __future__ import annotations
-
 import json
 from hashlib import sha256
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files that are whole or absent, on disk before anything vouches for them, and written by one process at a time."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import shutil

@@ -3,8 +3,6 @@
 docs/determinism.md says where the differences come from, and how large they were where instructions were held back.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

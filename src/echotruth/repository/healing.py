@@ -3,8 +3,6 @@
 Snakemake finds the record missing, runs its job, and after it those that depend on it; they give the bytes of before.
 """
 
-from __future__ import annotations
-
 from echotruth.repository.check import Report
 
 

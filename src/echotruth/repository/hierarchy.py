@@ -9,8 +9,6 @@ of what was tracked, of one cycle, so that it can be read alone and its bytes co
 of the table are one chunk each. Chunks carry a crc32c checksum: a flipped bit is an error, not a wrong number.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

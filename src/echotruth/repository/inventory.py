@@ -1,7 +1,5 @@
 """What a check needs to know of a repository: its configuration, records, rows and arrays."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import suppress

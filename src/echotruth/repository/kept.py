@@ -4,8 +4,6 @@ It has the groups tracking and evaluation of a repository (docs/schema.md), with
 this one tracker, and without what does not depend on a tracker.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

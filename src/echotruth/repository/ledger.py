@@ -1,7 +1,5 @@
 """The ledger: one record for every finished job, which commits its results, and the rows of cases and views."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from hashlib import sha256

@@ -3,8 +3,6 @@
 What was there before keeps its place and its bytes. The structure is not of a job; whoever merges lays it out again.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from dataclasses import replace

@@ -4,8 +4,6 @@ Along its last dimension, a pack has a label for every number, the name of the a
 as `nrmse[0,total]`; a coordinate gives the unit of each. Jobs and readers deal with the arrays by their names.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

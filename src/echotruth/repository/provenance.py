@@ -1,7 +1,5 @@
 """Versions of the code, settings and packages from which a result was made."""
 
-from __future__ import annotations
-
 import ast
 import json
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Publication of a repository: verification of its files against the ledger, verdicts and attributes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -4,8 +4,6 @@ The bits below the quantum are zero, and so take next to no place once they are 
 floating-point numbers, which every reader reads; rounding moves each by half its quantum at most.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import floor, log2
 from typing import Any, cast

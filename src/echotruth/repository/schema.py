@@ -1,7 +1,5 @@
 """All arrays of a repository, which `arrays.csv` lists; `docs/schema.md` is generated from it."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 from typing import Any
@@ -14,17 +12,19 @@ from echotruth.repository.array import Array
 from echotruth.repository.packing import Pack
 from echotruth.section import unit_of
 
+with Path(__file__).with_name("arrays.csv").open(encoding="utf-8", newline="") as _file:
+    _ROWS = list(csv.DictReader(_file))
+
 
 def _listed() -> dict[tuple[str, str], tuple[Array, ...]]:
     """Arrays by the kind of their group and by the pack that holds them, "" for those that stand alone."""
     found: dict[tuple[str, str], tuple[Array, ...]] = {}
-    with Path(__file__).with_name("arrays.csv").open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            step = row["step"]
-            quantum = 2.0 ** int(step.removeprefix("2^")) if step.startswith("2^") else step or None
-            about = row["type"], row["units"], row["meaning"], quantum, row["values"]
-            place = row["group"], row["pack"]
-            found[place] = (*found.get(place, ()), Array(row["array"], tuple(row["dimensions"].split()), *about))
+    for row in _ROWS:
+        step = row["step"]
+        quantum = 2.0 ** int(step.removeprefix("2^")) if step.startswith("2^") else step or None
+        about = row["type"], row["units"], row["meaning"], quantum, row["values"]
+        place = row["group"], row["pack"]
+        found[place] = (*found.get(place, ()), Array(row["array"], tuple(row["dimensions"].split()), *about))
     return found
 
 
@@ -42,7 +42,7 @@ COORDINATES = KINDS.pop("coordinates")
 DERIVED = KINDS.pop("derived")
 """Arrays that follow from those of a heart; :func:`echotruth.kinematics` computes them."""
 
-STAGES = {kind: arrays for kind, arrays in KINDS.items() if "/" not in kind and kind != "rf"}
+SINGLE = {kind: arrays for kind, arrays in KINDS.items() if "/" not in kind and kind != "rf"}
 """Groups that exist once; `rf` exists only if RF is kept."""
 
 SIZED = {kind.partition("/")[0]: arrays for kind, arrays in KINDS.items() if kind.endswith("/SIZE")}
@@ -57,23 +57,7 @@ PACKS = {
 }
 """Arrays that hold several others, by the kind of their group."""
 
-LABELS: dict[str, tuple[str, ...]] = {
-    "xyz": ("x", "y", "z"),
-    "vector": ("lateral", "axial", "elevation"),
-    "label": ("layer", "segment", "region"),
-    "to": ("previous", "next"),
-    "plane": ("lateral", "axial"),
-    "strain_component": ("RR", "CC", "LL", "RC", "RL", "CL"),
-    "fibre_component": ("ff", "ss", "nn", "fs", "fn", "sn"),
-    "wall_component": ("RR", "TT", "RT"),
-    "reference": ("heart", "plane", "operator"),
-    "measure": ("engineering", "green_lagrange"),
-    "contour": ("endocardial", "middle", "epicardial"),
-    "statistic": ("mean", "median", "p95"),
-    "agreement": ("bias", "lower", "upper", "correlation"),
-    "polar": ("radial", "tangential"),
-    "component": ("radial", "tangential", "total"),
-}
+LABELS = {row["array"]: tuple(row["labels"].split()) for row in _ROWS if row["labels"]}
 """Labels of the dimensions that are the same in every repository."""
 
 
@@ -110,7 +94,7 @@ _UNITS |= {"per_mm3": "mm-3", "per_min": "min-1", "m_per_s": "m s-1", "deg": "de
 def groups(config: Config) -> dict[str, tuple[Array, ...]]:
     """Arrays of every group, without coordinates, by the path of the group; each quantum is a number."""
     sizes, trackers = config.bmode.sizes, config.tracking.trackers
-    every = {"cases": CASES} | STAGES
+    every = {"cases": CASES} | SINGLE
     every |= {f"{name}/{size}": arrays for name, arrays in SIZED.items() for size in sizes}
     every |= {f"{name}/{size}/{one}": arrays for name, arrays in TRACKED.items() for size in sizes for one in trackers}
     every |= {"rf": rf_arrays(config)} if config.rf.keep else {}
@@ -134,13 +118,13 @@ def written_by(stage: str, config: Config, size: int | None = None) -> list[str]
     """
     sizes = config.bmode.sizes if size is None else [size]
     if stage == "mechanics":
-        return [group for group, arrays in STAGES.items() if arrays[0].leading == 1]
+        return [group for group, arrays in SINGLE.items() if arrays[0].leading == 1]
     if stage == "tracking":
         of_trackers = [f"{name}/{px}/{one}" for name in TRACKED for px in sizes for one in config.tracking.trackers]
         return [f"evaluation/{px}" for px in sizes] + of_trackers
     if stage in SIZED:
         return [f"{stage}/{px}" for px in sizes]
-    return [stage] if stage in STAGES or (stage == "rf" and config.rf.keep) else []
+    return [stage] if stage in SINGLE or (stage == "rf" and config.rf.keep) else []
 
 
 def holders(group: str) -> dict[str, str]:

@@ -1,7 +1,5 @@
 """Settings on which the results of stages depend: if these and the code are the same, so are the bytes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any

@@ -1,7 +1,5 @@
 """The Zarr hierarchy on disk: laid out once, then written by jobs, one whole shard at a time."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ the records there vouch for what is there. Where a record has changed, the old o
 replaced. What is there with the same checksum is not sent again.
 """
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from hashlib import sha256

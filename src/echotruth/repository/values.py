@@ -3,8 +3,6 @@
 A fault that is found here stands in bytes that are as their job wrote them: it is one of the code or of its settings.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import inf

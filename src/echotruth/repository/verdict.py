@@ -1,7 +1,5 @@
 """Verdict on a heart: whether it is solved, and within the bounds of the section `physiology`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, NamedTuple
 

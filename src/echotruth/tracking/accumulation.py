@@ -3,8 +3,6 @@
 Of `bspline_dic`, which follows its own template, :mod:`.trackers.bspline_dic` says when the template is updated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol

@@ -3,8 +3,6 @@
 All run in one thread, release the GIL, and take their sums in one order.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Tracking from end-diastole both forwards and backwards; the last frame of a cycle is followed by the first."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -4,8 +4,6 @@ A field is u(x, y) = sum_kl c_kl B(x - x_l) B(y - y_k) on a square lattice of kn
 depends on the 4 x 4 knots around it. One thread takes all sums in one order, so the bytes are reproducible.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numba

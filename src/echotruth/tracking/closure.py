@@ -1,7 +1,5 @@
 """Whether a clip is a closed cycle, so that its last frame is followed by its first."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

@@ -3,8 +3,6 @@
 Lags are summed side by side, so that the order of no sum changes with the machine or the number of threads.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

@@ -11,8 +11,6 @@ weight has a gamma distribution as its own prior, worth `PRIOR_UNKNOWNS` more un
 times the squared displacement of the step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

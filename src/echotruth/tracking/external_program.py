@@ -1,7 +1,5 @@
 """External trackers that are programs: they read one .npz file and write another."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Displacement fields from vectors at the centres of windows: outliers, smoothing, and spline interpolation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

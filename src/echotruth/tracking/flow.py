@@ -1,7 +1,5 @@
 """Trackers that compute a dense optical flow between two images."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

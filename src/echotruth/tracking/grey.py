@@ -1,7 +1,5 @@
 """Grey values of clips: normalisation, inversion of the log compression, gain, and local correlation of two images."""
 
-from __future__ import annotations
-
 from math import log
 
 import cv2

@@ -1,7 +1,5 @@
 """Normalised cross-correlation of two images of the same wall pixels, around single points and over the whole wall."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.tracking.bspline import lattice_around

@@ -1,7 +1,5 @@
 """The grid of points that trackers follow, at the same places in the tissue for every image size."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.config import Config

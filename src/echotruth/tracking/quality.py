@@ -7,8 +7,6 @@ backwards are apart, and how far the point has moved. The constants of each meth
 (benchmarks/calibration.py); docs/tracking.md says on which hearts.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Pixels of the wall at end-diastole with their B-spline, and the alignment of an image with a template on them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

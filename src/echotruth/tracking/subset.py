@@ -9,8 +9,6 @@ v_x dx + v_y dy. Grey values and gradients of a subset are images (side, side) i
 gathered column by column, so that the processor adds several at once, though always in the same order.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

@@ -1,14 +1,12 @@
 """Call of any tracker."""
 
-from __future__ import annotations
-
 import logging
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from echotruth.section import Section
+from echotruth.tracking import trackers
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.quality import error_model
@@ -77,9 +75,7 @@ def track(
 def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and quality of the points of a clip, by a method of ours or from outside."""
     if settings.method == "external":
-        from echotruth.tracking.trackers.external import track
-
-        return track(clip, settings)
+        return trackers.function("external")(clip, settings)
     path = tracked_path(clip, settings)
     return path.displacement, error_model(settings).probability(path, clip.shape)
 
@@ -98,25 +94,4 @@ def tracked_path(clip: TrackerInput, settings: Any) -> Path:
             logging.getLogger("echotruth").warning(f"the clip is no closed cycle ({closing}): tracked {ways}")
         if not closing.is_followed:
             settings = settings.model_copy(update={"reference": "previous"})
-    return _method(settings.method)(clip, settings)
-
-
-def _method(name: str) -> Callable[[TrackerInput, Any], Path]:
-    """Function `track` of a method; its module is imported only here, because some take long to import."""
-    function: Callable[[TrackerInput, Any], Path]
-    match name:
-        case "phase_correlation":
-            from echotruth.tracking.trackers.phase_correlation import track as function
-        case "window_deformation":
-            from echotruth.tracking.trackers.window_deformation import track as function
-        case "affine_dic":
-            from echotruth.tracking.trackers.affine_dic import track as function
-        case "bspline_dic":
-            from echotruth.tracking.trackers.bspline_dic import track as function
-        case "dis":
-            from echotruth.tracking.trackers.dis import track as function
-        case "ilk":
-            from echotruth.tracking.trackers.ilk import track as function
-        case _:
-            raise ValueError(f"{name} is not a method of ours.")
-    return function
+    return trackers.function(settings.method)(clip, settings)

@@ -1,7 +1,5 @@
 """What every tracker is given."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

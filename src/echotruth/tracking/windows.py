@@ -3,8 +3,6 @@
 Pixel coordinates count pixel centres: 0 is the centre of the first row or column.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

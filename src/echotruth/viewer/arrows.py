@@ -1,7 +1,5 @@
 """Arrows over the wall: true and tracked motion since end-diastole, and the flow to the next frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a viewer has chosen to see, the inputs for it, and the address that says so."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from urllib.parse import urlencode

@@ -1,7 +1,5 @@
 """Curves of a clip and of its heart over the cycle: strain and rotation, tracked and true, and the volume."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

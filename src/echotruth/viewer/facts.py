@@ -1,7 +1,5 @@
 """What is known of a case and of its trackers, as text for the page."""
 
-from __future__ import annotations
-
 from html import escape
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A graph on the page: curves over the cycle, with a line at the frame that is shown."""
 
-from __future__ import annotations
-
 import numpy as np
 from bokeh.models import BasicTicker, ColumnDataSource, Legend, LegendItem, Range1d, Span
 from bokeh.plotting import figure

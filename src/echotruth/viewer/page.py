@@ -1,7 +1,5 @@
 """The page of the viewer: what can be chosen, the pictures, the curves, and what is known of the case."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace

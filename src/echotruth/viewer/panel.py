@@ -1,7 +1,5 @@
 """A picture on the page: a frame of the clip with its colours and arrows, axes in mm, and the scale of its colour."""
 
-from __future__ import annotations
-
 import numpy as np
 from bokeh import models
 from bokeh.events import MouseMove

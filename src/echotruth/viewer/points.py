@@ -1,7 +1,5 @@
 """The points that the trackers of a clip followed: where they are, how they move, and which pixels they cover."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil

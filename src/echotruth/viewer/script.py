@@ -1,7 +1,5 @@
 """The scripts that run in the browser, so that playing needs no answer from the server."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 from typing import Any
 

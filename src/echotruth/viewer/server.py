@@ -1,7 +1,5 @@
 """The server of the viewer, on this machine alone."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Callable
 from pathlib import Path

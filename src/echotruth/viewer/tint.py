@@ -2,8 +2,6 @@
 what it means.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import matplotlib

@@ -1,7 +1,5 @@
 """What speaks against a run: it does not fit this machine, or its images cannot show the heart."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple

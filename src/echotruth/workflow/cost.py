@@ -4,8 +4,6 @@ Before the first heart the seconds are those of a reference machine. Then the jo
 one is, by the files that Snakemake's `benchmark` writes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
 from math import sqrt
@@ -18,8 +16,8 @@ from echotruth.repository.benchmark_files import core_seconds
 from echotruth.workflow.imaged_tissue import areas, scatterers, wall_scatterers
 from echotruth.workflow.jobs import places
 
-START_SECONDS = 0.6
-"""CPU time of a process before its work."""
+START_CPU_SECONDS = 0.6
+"""CPU time of a process before its work, s, without compilation, which only the first jobs do."""
 REFERENCE = {
     **{"mechanics": 0.235, "phantom": 0.22, "rf": 5.9, "truth": 5.4, "bmode": 0.05, "tracking": 1.0},
     **{"repository": 0.03, "report": 8.0},
@@ -41,7 +39,7 @@ MAX_FILES = 200
 
 def seconds(rule: str, config: Config, view: str = "", size: int = 0) -> float:
     """CPU time of a job on the reference machine, s; the arguments are those of :func:`units`."""
-    return START_SECONDS + REFERENCE[rule] * units(rule, config, view, size)
+    return START_CPU_SECONDS + REFERENCE[rule] * units(rule, config, view, size)
 
 
 def mean_seconds(rule: str, configs: Sequence[Config]) -> float:

@@ -1,7 +1,5 @@
 """What a run will take, before anything runs: CPU time by rule, time on some cores, bytes, files, jobs, memory."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Sequence
 from math import ceil, sqrt
@@ -13,9 +11,9 @@ from echotruth.config import Config
 from echotruth.repository import schema
 from echotruth.repository.ledger import STAGES
 from echotruth.workflow import cost
-from echotruth.workflow.demand import expected_megabytes
 from echotruth.workflow.jobs import FINAL_RULES, RULES, ended, jobs, places
 from echotruth.workflow.progress import format_duration
+from echotruth.workflow.resources import expected_megabytes
 
 MAX_SAMPLED = 100
 """Largest number of hearts whose cost is worked out; in a larger sweep it is that of as many, evenly spaced."""

@@ -1,7 +1,7 @@
 """Failure of a case: its job records the reason in the ledger, and publication copies it to `cases/reason`.
 
-Errors of the mechanics become failures in workflow/scripts/mechanics.py, and :func:`.job.carry_out` records them. A
-heart outside the bounds of `physiology` has not failed but is implausible: workflow/scripts/physiology.py.
+Errors of the mechanics become failures in workflow/scripts/mechanics.py, and :func:`.job.run` records them. A heart
+outside the bounds of `physiology` has not failed but is implausible: :mod:`echotruth.repository.verdict`.
 """
 
 

@@ -1,7 +1,5 @@
 """How much tissue a view images: the wall in its plane, and what scatters within its beam, of the ideal ellipsoid."""
 
-from __future__ import annotations
-
 from math import asin, pi, sqrt
 from typing import NamedTuple
 

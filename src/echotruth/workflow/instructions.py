@@ -6,8 +6,6 @@ level of the System V ABI, AMD64 supplement), and no others. MKL is set in :mod:
 branch on Intel's processors only. docs/determinism.md says what was measured.
 """
 
-from __future__ import annotations
-
 import os
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command `echotruth check FOLDER`: a line for every fault of a repository, and its healing."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from uuid import uuid4

@@ -1,11 +1,9 @@
-"""Execution of one stage for one heart, view and image size, and the record that commits its result.
+"""Execution of one stage for one case, view and image size, and the record that commits its result.
 
 A stage is a script: it reads the configuration of its case and what it needs from the store, calls one function, and
 writes the arrays to the store. Last of all it commits a record with their checksums to the ledger, which is the output
 that Snakemake knows of. A job that was killed has no record, and is run again.
 """
-
-from __future__ import annotations
 
 import argparse
 import logging
@@ -45,7 +43,7 @@ log = logging.getLogger("echotruth")
 
 
 class Job:
-    """Inputs, results and record of one stage for one heart, view and image size.
+    """Inputs, results and record of one stage for one case, view and image size.
 
     Parameters
     ----------
@@ -53,7 +51,7 @@ class Job:
         Folder of the repository, `out/NAME`.
     stage : str
     case : str
-        Id of the heart, whose configuration is `cases/CASE.json`.
+        Id of the case, whose configuration is `cases/CASE.json`.
     view : str, optional
         Name of the view, for stages that are run per view.
     size : int, optional
@@ -61,12 +59,12 @@ class Job:
     code : str, optional
         Version of the code of the stage (default: that of its script).
     same_as : Path, optional
-        Record of the heart whose motion is taken over.
+        Record of the case whose motion is taken over.
 
     Attributes
     ----------
     config : Config
-        Configuration of the heart.
+        Configuration of the case.
     scatterers, lines : Path
         Files that the stages of a view pass on, and Snakemake deletes when they are not needed any more.
     earlier : dict

@@ -1,7 +1,5 @@
 """Jobs of a repository: which each rule has, and which have ended, by the ledger."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from pathlib import Path

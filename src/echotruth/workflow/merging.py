@@ -1,7 +1,5 @@
 """The command `echotruth merge`: hearts of repositories of the same settings in one."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -10,7 +8,7 @@ from pathlib import Path
 from uuid import uuid4
 
 from echotruth.cases import expand
-from echotruth.config import Config, shipped
+from echotruth.config import Config
 from echotruth.repository import ledger
 from echotruth.repository.checksums import ChecksumError
 from echotruth.repository.inventory import CheckError, Inventory, JobRecord
@@ -18,6 +16,7 @@ from echotruth.repository.layout import lay_out
 from echotruth.repository.merge import MergeError, check_sources, compare, spanning, take_over, verify_files
 from echotruth.repository.publication import publish
 from echotruth.workflow import lease
+from echotruth.workflow.snakemake_process import snakemake_command
 
 BATCH = 5000
 """Largest number of records on one command line."""
@@ -83,26 +82,10 @@ def _introduce(into: Path, taken: list[JobRecord], run: str) -> None:
         return
     paths = [str(Path("out", into.resolve().name, record.path.relative_to(into))) for record in taken]
     # Times stay in order: what a job depends on is touched before it.
-    snakemake = [
-        sys.executable,
-        "-m",
-        "snakemake",
-        "--snakefile",
-        str(shipped.ROOT / "Snakefile"),
-        "--nolock",
-        "--cores",
-        "1",
-    ]
-    command = [*snakemake, "--configfile", str(into / "config.yaml"), "--touch", "--forceall"]
+    command = snakemake_command(into / "config.yaml", ["--cores", "1", "--touch", "--forceall"])
     for first in range(0, len(paths), BATCH):
-        environment = os.environ | {lease.VARIABLE: run}
-        result = subprocess.run(
-            [*command, *paths[first : first + BATCH]],
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            check=False,
-        )
-        if result.returncode:
-            raise MergeError(f"{into}: Snakemake could not be told of the merged hearts: {result.stdout[-500:]}")
+        batch, environment = paths[first : first + BATCH], os.environ | {lease.VARIABLE: run}
+        told = subprocess.run([*command, *batch], env=environment, capture_output=True, text=True, check=False)
+        if told.returncode:
+            why = (told.stdout + told.stderr)[-500:]
+            raise MergeError(f"{into}: Snakemake could not be told of the merged hearts: {why}")

@@ -14,7 +14,7 @@ from echotruth.repository import ledger, settings
 from echotruth.repository.ledger import record_path, record_paths
 from echotruth.repository.provenance import code_version, settings_version
 from echotruth.repository.verdict import excluded
-from echotruth.workflow import demand, lease
+from echotruth.workflow import lease, resources
 from echotruth.workflow.blocks import Block
 from echotruth.workflow.processes import script
 from echotruth.workflow.sharing import first_with_same
@@ -149,13 +149,13 @@ class Plan:
 
     def runtime(self, rule: str) -> Callable[..., int]:
         """Time that a job asks for, min; one that failed asks for more."""
-        return lambda wildcards, attempt: attempt * self._demand(demand.minutes, rule, wildcards)
+        return lambda wildcards, attempt: attempt * self._resource(resources.minutes, rule, wildcards)
 
     def mem_mb(self, rule: str) -> Callable[..., int]:
         """Memory that a job asks for, MB; one that failed asks for more."""
-        return lambda wildcards, attempt: attempt * self._demand(demand.megabytes, rule, wildcards)
+        return lambda wildcards, attempt: attempt * self._resource(resources.megabytes, rule, wildcards)
 
-    def _demand(self, of: Callable[..., int], rule: str, wildcards: Wildcards) -> int:
+    def _resource(self, of: Callable[..., int], rule: str, wildcards: Wildcards) -> int:
         place = dict(wildcards.items())
         config = self._every[place["case"]].config if "case" in place else self.config
         return of(rule, config, place.get("view", ""), int(place.get("size", 0)))

@@ -1,6 +1,4 @@
-"""What every process of a stage has in common: instructions of the processor, and the cache of compiled functions."""
-
-from __future__ import annotations
+"""What the processes of all jobs have in common: beginning of their shell commands, and cache of compiled functions."""
 
 import fcntl
 import os
@@ -13,7 +11,7 @@ from echotruth.config import shipped
 from echotruth.repository.provenance import code_version
 from echotruth.workflow import instructions
 
-STAGES = ("mechanics", "phantom", "rf", "truth", "bmode", "tracking", "report")
+SCRIPTS_THAT_COMPILE = ("mechanics", "phantom", "rf", "truth", "bmode", "tracking", "report")
 """Scripts that call compiled functions."""
 
 
@@ -35,7 +33,7 @@ def cache_name() -> str:
     Numba checks only the file of a cached function for changes, not those of the functions that it calls. Therefore
     each version of the code has a cache of its own.
     """
-    return code_version(*map(script, STAGES))
+    return code_version(*map(script, SCRIPTS_THAT_COMPILE))
 
 
 def script(stage: str) -> str:

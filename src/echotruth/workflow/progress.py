@@ -1,7 +1,5 @@
 """Progress of a run, from the logs of its Snakemakes and the time that jobs are expected to take."""
 
-from __future__ import annotations
-
 import re
 import time
 from collections import Counter

@@ -1,16 +1,14 @@
 """The Snakemakes of a run: one for every block of hearts that is not made yet, then one for repository and report."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import ceil
 from pathlib import Path
 
 from echotruth.config import Config
 from echotruth.repository.ledger import STAGES
-from echotruth.workflow.execution import Snakemake
 from echotruth.workflow.jobs import TARGETS, ended, jobs
 from echotruth.workflow.plan import Plan
+from echotruth.workflow.snakemake_process import Snakemake
 
 
 class Running:

@@ -1,4 +1,4 @@
-"""Hearts that differ only in their images share one motion: it is solved once, and the others take over its files."""
+"""Cases that differ only in their images share one heart: it is solved once, and the others take over its files."""
 
 from __future__ import annotations
 

@@ -3,8 +3,6 @@
 Everything is read from its folder, so that it does not matter on which machine the run is, or whether there is one.
 """
 
-from __future__ import annotations
-
 import csv
 import time
 from collections import Counter

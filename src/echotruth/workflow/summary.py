@@ -1,7 +1,5 @@
 """What a run has made, and what it took."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -1,11 +1,8 @@
 """What trackers find in a clip; what an earlier run found in the same clip is not tracked again."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from hashlib import sha256
-from pathlib import Path
 
 import numpy as np
 
@@ -82,10 +79,8 @@ class Tracks:
 
 def method_code(method: str) -> str:
     """Version of the code of one method: a change of the others leaves its results as they are."""
-    call = "echotruth.tracking.tracker"
-    names = {file.stem for file in Path(*trackers.__path__).glob("*.py")} - {method}
-    others = frozenset((call, f"{trackers.__name__}.{name}") for name in names)
-    return code_version("echotruth.evaluation.clip", call, unless=others)
+    others = frozenset((trackers.__name__, f"{trackers.__name__}.{name}") for name in trackers.NAMES - {method})
+    return code_version("echotruth.evaluation.clip", "echotruth.tracking.tracker", unless=others)
 
 
 def _digest(clip: Clip) -> str:

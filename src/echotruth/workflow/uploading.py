@@ -1,7 +1,5 @@
 """Upload of a repository beside its run, and the command `echotruth upload`."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

@@ -18,8 +18,6 @@ B^T N^-1 B is tr(N^-1 integral B B^T) / area = p / area. A smooth field and wind
 the same bound.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,13 +18,11 @@ from echotruth.heart import Heart
 from echotruth.imaging import spline
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.view import Plane
+from echotruth.repository.reader import Repository
 from echotruth.tracking.alignment import interpolate_with_gradient
 from echotruth.tracking.bidirectional import forward_backward
 from echotruth.tracking.closure import DYNAMIC_RANGE
 from echotruth.tracking.grey import decompress, grey_levels
-
-if TYPE_CHECKING:
-    from echotruth.repository.reader import Repository
 
 PARAMETERS = 27
 """Parameters for each component of the smooth motion of the Cramer-Rao bound: sines and cosines up to four waves around

@@ -1,7 +1,5 @@
 """A perfect tracker of the plane: it follows the tissue that an image shows, and does not see what leaves the plane."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -1,23 +1,17 @@
 """Table of the difficulty of the clips of a repository."""
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 from math import isnan
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from echotruth.evaluation.difficulty.floors import COLUMNS, PARAMETERS, Row, difficulty
 from echotruth.repository import durable
 from echotruth.repository.choice import Names
 from echotruth.repository.digest import digest
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from echotruth.repository.reader import Repository
+from echotruth.repository.reader import Repository
 
 _VERSION = 1
 """Of what is kept of a clip; to be raised when its definition changes."""
@@ -45,8 +39,6 @@ def difficulties(repository: Repository, cases: Names = None, views: Names = Non
     ValueError
         If the repository does not have one of them.
     """
-    import pandas as pd
-
     finished = repository.finished(cases, views, "truth", "bmode")
     rows = [row for case, complete in finished for view in complete for row in _kept(repository, case.id, view)]
     return pd.DataFrame(rows, columns=list(COLUMNS))

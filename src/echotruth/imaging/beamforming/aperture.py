@@ -4,8 +4,6 @@ The aperture of a point at range r is r / f_number wide, at most the whole array
 where it would extend beyond the array it is shifted inwards.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

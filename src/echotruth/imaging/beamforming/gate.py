@@ -5,8 +5,6 @@ to time once, sampled little above the Nyquist rate; each zone cuts out its gate
 are tapered so smoothly that its spectrum hardly leaves the band.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numba

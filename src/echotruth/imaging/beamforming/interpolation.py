@@ -5,8 +5,6 @@ The data, below their carrier, are interpolated by the exponential of a semicirc
 interpolator, the error is 1e-5 or less of a strong echo.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from llvmlite import ir
 from numba import types

@@ -1,7 +1,5 @@
 """Receive focusing: from channel data to lines, focused at every range."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numba

@@ -3,8 +3,6 @@
 Coordinates are those of the probe: origin at the centre of the array, in the order lateral, axial.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import hypot
 

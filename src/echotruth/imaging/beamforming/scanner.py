@@ -1,7 +1,5 @@
 """The scanner: from scatterers to the lines of a frame."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.config import Probe, Rf

@@ -5,8 +5,6 @@ each frequency a matrix product. The channels are prepared for interpolation: sa
 their band, and with their spectrum divided by that of the interpolator.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 

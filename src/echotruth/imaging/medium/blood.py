@@ -5,8 +5,6 @@ vertex is the centre of the base. It moves with the wall at the endocardium and 
 centre of the base.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +13,8 @@ from echotruth.config import Config
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, Integers, MaterialPoints, interpolate, jacobian
 from echotruth.heart import Heart
-from echotruth.imaging.medium.phantom import cube_to_tetrahedron, max_jacobian
 from echotruth.imaging.medium.random_process import RandomProcess
+from echotruth.imaging.medium.wall import cube_to_tetrahedron, max_jacobian
 from echotruth.mechanics.geometry.boundary import triangle_edges
 
 

@@ -1,7 +1,5 @@
 """The medium: all scatterers in the frames of one view."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -14,9 +12,9 @@ from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, MaterialPoints, interpolate
 from echotruth.heart import Heart
 from echotruth.imaging.medium.blood import Blood, Cavity, seed_blood
-from echotruth.imaging.medium.phantom import Scatterers, seed_wall
 from echotruth.imaging.medium.random_process import Random, ar1, brownian, diffusion_std
 from echotruth.imaging.medium.surroundings import SurroundingsMotion, outside_heart, seed_surroundings
+from echotruth.imaging.medium.wall import Scatterers, seed_wall
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
 

@@ -1,7 +1,5 @@
 """Random processes over the frames of a clip, each frame drawn from the one before."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import exp, pi, sqrt
 

@@ -1,7 +1,5 @@
 """Surroundings: scatterers around the heart, in the part of space that the probe images."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -4,8 +4,6 @@ In a full matrix the time of arrival tells the path, so that exp(-alpha (f - f0)
 have been summed. As a function of time and frequency it is of low rank: the sum of a few products of the two.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.arrays import Floats

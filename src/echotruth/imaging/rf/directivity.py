@@ -7,8 +7,6 @@ argument of the sinc at f0. So the product depends on b_i + b_j above all, and a
 angle from the centre of the array that is fitted by polynomials.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

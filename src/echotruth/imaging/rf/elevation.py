@@ -8,8 +8,6 @@ For each element E is taken at the range from the centre of the array, its delay
 centres of a few subapertures.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from numpy.typing import NDArray

@@ -6,8 +6,6 @@ its wavefront is still that of the near position, so it is out of focus there an
 times from an exponential distribution, some in every resolution cell, they reproduce the statistics of clutter.
 """
 
-from __future__ import annotations
-
 from math import ceil, log, pi, sqrt
 
 import numpy as np

@@ -6,8 +6,6 @@ least-squares sense, with W the spectrum of a fixed window. Outside of the band 
 suffice. Divided by W and multiplied by the spectrum of the pulse, they are the echo.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -4,8 +4,6 @@ The responses E_i and E_j of two elements are looked up, multiplied, and carried
 fraction of a sample, in the rows that :mod:`~echotruth.imaging.rf.spreading` adds.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

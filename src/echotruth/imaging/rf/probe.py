@@ -3,8 +3,6 @@
 Frame of the probe: origin at the centre of the array, coordinates in the order lateral, axial, elevation.
 """
 
-from __future__ import annotations
-
 from math import log, sqrt
 
 import numpy as np

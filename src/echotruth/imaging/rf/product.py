@@ -3,8 +3,6 @@
 A tile of the product stays in registers while the sum runs; sums run in the order of the rows, each step rounded once.
 """
 
-from __future__ import annotations
-
 import numba
 from llvmlite import ir
 from numba import types

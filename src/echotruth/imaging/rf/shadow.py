@@ -6,8 +6,6 @@ the edge projects to one position on the array, and the elements beyond are bloc
 a scatterer is multiplied by a transmission.
 """
 
-from __future__ import annotations
-
 from math import pi, tan
 
 import numpy as np

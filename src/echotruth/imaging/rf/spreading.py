@@ -7,8 +7,6 @@ the fraction of a sample, added with factors in which a pair differs from others
 of the inverse-range offsets of its two elements.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 from llvmlite import ir

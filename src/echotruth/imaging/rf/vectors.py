@@ -1,7 +1,5 @@
 """LLVM code for vectors of single-precision numbers, where a compiler would not vectorise the loop by itself."""
 
-from __future__ import annotations
-
 from llvmlite import ir
 from numba import types
 from numba.core.cgutils import get_or_insert_function

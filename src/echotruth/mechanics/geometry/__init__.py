@@ -1,7 +1,5 @@
 """Meshes of the left ventricle: an ellipsoid, the wall in a file, or a tube in its place."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.config import Geometry

@@ -1,7 +1,5 @@
 """Boundary triangles of a tetrahedral mesh, and the adjacency of its cells and triangles."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix

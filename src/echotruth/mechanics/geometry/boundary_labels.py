@@ -4,8 +4,6 @@ The cavity is the region from which most directions meet the wall. The endocardi
 faces it; the base is the part beyond its rim that faces the opening of the cavity; the rest is the epicardium.
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Extraction of the wall from the tetrahedra of a file, with a clean cut surface."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 

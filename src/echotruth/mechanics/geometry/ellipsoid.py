@@ -1,7 +1,5 @@
 """The truncated thick ellipsoid, the idealised ventricle of Land et al., Proc R Soc A 471 (2015) 20150641."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

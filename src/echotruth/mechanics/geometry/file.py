@@ -1,7 +1,5 @@
 """The left ventricle from a file, as a mesh in the heart frame, with the fibre and sheet directions of the file."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 

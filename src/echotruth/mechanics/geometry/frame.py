@@ -1,7 +1,5 @@
 """The heart frame of docs/conventions.md, from the labelled boundary of a wall."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reading a wall from a file: tetrahedra or a closed surface, and the arrays over them."""
 
-from __future__ import annotations
-
 import logging
 import warnings
 from dataclasses import dataclass, field, replace

@@ -3,8 +3,6 @@
 The tube is a wall of uniform thickness about the long axis, open at both ends.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import permutations
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Shape and orientation of tetrahedra, and the checks that a ventricle must pass to be solved."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.fem.tetrahedra import Floats, Integers, Mesh

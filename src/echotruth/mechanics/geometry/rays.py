@@ -1,7 +1,5 @@
 """Intersections of straight lines with a triangulated surface."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

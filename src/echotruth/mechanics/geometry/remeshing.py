@@ -7,8 +7,6 @@ functions there, the apex included. So the wall is as smooth as the elements can
 numbering.
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass
 from functools import partial

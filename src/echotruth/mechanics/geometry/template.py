@@ -5,8 +5,6 @@ base along the wall (0 to 1) and azimuth. The mesh is made in these parameters a
 of edges lie on its curved surfaces, and all walls of one template share their numbering.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

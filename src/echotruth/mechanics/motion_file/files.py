@@ -1,7 +1,5 @@
 """Files of a series: those that a pattern matches, those that a .pvd or .xdmf file names, and the hash of all."""
 
-from __future__ import annotations
-
 import glob
 import re
 from functools import cache

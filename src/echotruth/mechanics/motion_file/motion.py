@@ -1,7 +1,5 @@
 """Motion from files: the arrays of a heart that moves as a series of meshes does."""
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Series of meshes, or of positions of the points of one mesh, as the files hold them."""
 
-from __future__ import annotations
-
 import glob
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The wall that a series moves: its tetrahedra, its sides and its cavity, in the heart frame of end-diastole."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -5,8 +5,6 @@ with topology and geometry of its own or, by reference, of the mesh at the begin
 binary file or, read with h5py, in an HDF5 file.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from xml.etree import ElementTree
 

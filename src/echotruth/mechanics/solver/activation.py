@@ -1,7 +1,5 @@
 """When and how strongly each cell of the wall is active."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

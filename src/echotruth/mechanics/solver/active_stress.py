@@ -1,7 +1,5 @@
 """Active stress of the muscle along an axis of the wall, and its derivative by the strain there."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import NamedTuple
 

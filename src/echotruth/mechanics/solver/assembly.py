@@ -4,8 +4,6 @@ Every sum runs in a fixed order, so that the result is the same to the last byte
 whatever the number of threads.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix

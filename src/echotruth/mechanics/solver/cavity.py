@@ -6,8 +6,6 @@ coordinates, x . n da = det(x, x,1, x,2) dxi, which quadrature on quadratic tria
 is work-conjugate to V: its nodal forces, which follow the wall, are P dV/dx, and their tangent P d2V/dx2 is symmetric.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from echotruth.arrays import Floats

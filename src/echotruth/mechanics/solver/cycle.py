@@ -4,8 +4,6 @@ Two of pressure, volume and tension are prescribed and the third is solved: the 
 pressure-volume loop, the volume from pressure and tension, the pressure from volume and tension.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

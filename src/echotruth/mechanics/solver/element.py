@@ -9,8 +9,6 @@ vanishes as the mesh is refined. Strains are taken in the fibre axes, into which
 functions, are turned once.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, NamedTuple
 

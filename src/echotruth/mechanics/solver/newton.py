@@ -7,8 +7,6 @@ reused, also from frame to frame, with Broyden's updates, as long as the remaini
 factors. Load steps are halved where Newton's method fails.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from dataclasses import fields, replace

@@ -5,8 +5,6 @@ have their tensor components, tangents act on strains with doubled shear. The nu
 functions fill arrays passed to them, for one point at a time.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

@@ -5,8 +5,6 @@ after them `TOTAL`, with the viscous stress; `scale` holds the factors C, T_Ca a
 previous state, 1/s.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

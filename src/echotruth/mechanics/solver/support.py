@@ -1,7 +1,5 @@
 """Support of the heart: which displacements of its base are free."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -5,8 +5,6 @@ is elastically held acts along and around the long axis. The law is linear in th
 unloaded surface, so that each is a constant matrix of a facet, in residual and tangent (:mod:`.equilibrium`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

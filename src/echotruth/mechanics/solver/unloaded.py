@@ -4,8 +4,6 @@ X_(k+1) = X_k + (x_image - x(X_k)): the misfit of the inflated guess is added to
 inflates it to the image (inverse displacement method; Bols et al., J Comput Appl Math 246 (2013) 10).
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from dataclasses import replace

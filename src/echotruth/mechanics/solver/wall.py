@@ -1,7 +1,5 @@
 """The wall of a heart - mesh, depth and tissue - and its equations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Documents by which others find, judge, read and cite a repository; one module for each."""
 
-from __future__ import annotations
-
 from itertools import starmap
 from pathlib import Path
 

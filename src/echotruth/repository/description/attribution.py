@@ -1,7 +1,5 @@
 """Who made a repository, and under which terms it is given away: what no file of it says."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from datetime import date

@@ -1,7 +1,5 @@
 """README.md of a repository: its data card; its words are in README.md.jinja."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

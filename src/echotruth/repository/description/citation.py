@@ -1,37 +1,23 @@
 """CITATION.cff of a repository (Citation File Format 1.2.0, doi 10.5281/zenodo.5171937)."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 
 import yaml
 
+from echotruth.config import shipped
 from echotruth.repository.description.attribution import Author
 from echotruth.repository.description.facts import Facts
 
 MARK = "# Made by echotruth describe.\n"
 """First line, by which the file is known as one that may be replaced."""
 
-PAPER = {
-    "type": "conference-paper",
-    "title": "Synthetic ultrasound images to benchmark echocardiography-based biomechanics",
-    "authors": [
-        {"family-names": "Mukherjee", "given-names": "Tanmay"},
-        {"family-names": "Neelakantan", "given-names": "Sunder"},
-        {"family-names": "Myers", "given-names": "Kyle"},
-        {"family-names": "Tong", "given-names": "Carl"},
-        {"family-names": "Avazmohammadi", "given-names": "Reza"},
-    ],
-}
-"""The paper whose method is used, as in CITATION.cff of echotruth."""
+_OWN = yaml.safe_load((shipped.ROOT / "CITATION.cff").read_text(encoding="utf-8"))
 
-SOFTWARE = {
-    "type": "software",
-    "title": "echotruth",
-    "license": "BSD-3-Clause",
-    "authors": [{"name": "The echotruth developers"}],
-}
+PAPER = _OWN["preferred-citation"]
+"""The paper whose method is used."""
+
+SOFTWARE = {key: _OWN[key] for key in ("type", "title", "license", "authors")}
 
 
 def citation(facts: Facts, said: dict[str, Any]) -> bytes:

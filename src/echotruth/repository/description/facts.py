@@ -1,7 +1,5 @@
 """What is to be known of a repository to describe it, from its configuration, its ledger and its store."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime

@@ -1,7 +1,5 @@
 """Files of a repository with their sizes and checksums."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from hashlib import sha256
 from mimetypes import guess_type

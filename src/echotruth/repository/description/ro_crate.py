@@ -4,8 +4,6 @@ The main workflow is the Snakefile, the configuration is its input, and the repo
 rules are written to the folder `workflow`, so that the crate holds all it names.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the documents of a repository say of it in words; the words are in statements.yaml.jinja."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 from pathlib import Path

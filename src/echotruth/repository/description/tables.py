@@ -1,7 +1,5 @@
 """Tables of a repository for readers of any kind: its clips, and the checksums of all files of its store."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path

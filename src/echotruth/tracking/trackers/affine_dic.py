@@ -4,8 +4,6 @@ The initial estimate is the field of window deformation: on clips of a heart it 
 search where speckle decorrelates most. Where an alignment strays too far from it, the initial estimate is kept.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

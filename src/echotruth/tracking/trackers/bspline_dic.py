@@ -29,8 +29,6 @@ term of J: if it does (:mod:`.closure`), the clip is tracked from end-diastole b
 :func:`combine` takes the mean of the two with weights from their variances.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass

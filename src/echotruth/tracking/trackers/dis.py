@@ -1,7 +1,5 @@
 """Dense inverse search of OpenCV, unmodified (Kroeger et al. 2016, ECCV, LNCS 9908:471)."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import cv2

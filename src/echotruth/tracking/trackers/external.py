@@ -3,8 +3,6 @@
 It receives copies of the clip, the points and the mask, and nothing of the truth. What it prints goes to stderr.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from contextlib import redirect_stdout

@@ -1,7 +1,5 @@
 """Iterative Lucas-Kanade of scikit-image, unmodified (Le Besnerais and Champagnat 2005, ICIP, 1:137)."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -7,7 +7,7 @@ import pytest
 
 from echotruth.config import Config
 from echotruth.config.loading import load, validate
-from echotruth.workflow.demand import megabytes, minutes
+from echotruth.workflow.resources import megabytes, minutes
 
 ROOT = Path(__file__).parents[2]
 MEASURED = json.loads((Path(__file__).parent / "measured_costs.json").read_text())

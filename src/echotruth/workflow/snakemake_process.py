@@ -1,6 +1,4 @@
-"""Run Snakemakes with their output in logs and their progress on one line, and end all jobs with them."""
-
-from __future__ import annotations
+"""Snakemakes as processes: their output goes to logs, their progress to one line, and all jobs end with them."""
 
 import shutil
 import signal
@@ -14,6 +12,7 @@ from typing import TextIO
 
 import psutil
 
+from echotruth.config import shipped
 from echotruth.workflow.progress import Progress, RunLog, format_duration
 
 POLL_SECONDS = 0.5
@@ -28,6 +27,16 @@ LOG_LINES = 15
 """Number of lines shown of the log of a failed job."""
 MAX_LOGS = 3
 """Largest number of logs shown."""
+
+
+def snakemake_command(path: Path | str, options: list[str]) -> list[str]:
+    """Command that runs the workflow of a configuration file, with options, and rules and files to make after them.
+
+    Snakemake's own lock is that of the working folder, where other names may run; a repository has its lease.
+    """
+    command = [sys.executable, "-m", "snakemake", "--snakefile", str(shipped.ROOT / "Snakefile")]
+    # Not at the end: --configfile takes all that follows, files to make too.
+    return [*command, "--configfile", str(path), "--nolock", *options]
 
 
 class Snakemake:

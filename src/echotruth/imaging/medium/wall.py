@@ -1,6 +1,4 @@
-"""Scatterers in the wall, carried by the shape functions of their elements."""
-
-from __future__ import annotations
+"""The wall: scatterers seeded in it, carried by the shape functions of their elements."""
 
 from dataclasses import dataclass
 

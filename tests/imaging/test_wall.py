@@ -1,4 +1,4 @@
-"""Phantom: scatterers are spread evenly, normally strong, and ride with the tissue."""
+"""The wall: its scatterers are spread evenly, normally strong, and ride with the tissue."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from echotruth.config import Config, Phantom
 from echotruth.fem.tetrahedra import interpolate
 from echotruth.fem.volume import cell_volumes
-from echotruth.imaging.medium.phantom import seed_volume, seed_wall
+from echotruth.imaging.medium.wall import seed_volume, seed_wall
 from echotruth.imaging.view import imaging_plane
 
 CONFIG = Config(phantom=Phantom(density_per_mm3=1500.0))

@@ -1,9 +1,7 @@
-"""Time and memory that a job asks a cluster for, from the size of its work.
+"""Time and memory that a job asks a cluster for (`runtime`, `mem_mb` of its rule), from the size of its work.
 
 Asked is three times the time and one and a half times the memory, because nodes differ.
 """
-
-from __future__ import annotations
 
 from math import ceil
 
@@ -15,8 +13,8 @@ TIME_MARGIN = 3.0
 """Time asked for over the time expected."""
 MEMORY_MARGIN = 1.5
 """Memory asked for over the memory expected."""
-START_SECONDS = 120.0
-"""Time to start a process and, once, to compile its functions, s."""
+START_AND_COMPILE_SECONDS = 120.0
+"""Time to start a process and, once, to compile its functions, s; for what is asked, not for what is expected."""
 BASE_MB = 400.0
 """Memory of a process with its modules."""
 SCATTERERS, FRAMES = 196_000, 40
@@ -25,7 +23,7 @@ SCATTERERS, FRAMES = 196_000, 40
 
 def minutes(rule: str, config: Config, view: str = "", size: int = 0) -> int:
     """Time that a job asks for, min; the arguments are those of :func:`.cost.units`."""
-    return ceil(TIME_MARGIN * (START_SECONDS + seconds(rule, config, view, size)) / 60)
+    return ceil(TIME_MARGIN * (START_AND_COMPILE_SECONDS + seconds(rule, config, view, size)) / 60)
 
 
 def megabytes(rule: str, config: Config, view: str = "", size: int = 0) -> int:

@@ -10,8 +10,8 @@ import psutil
 import pytest
 
 from echotruth.workflow import lease
-from echotruth.workflow.execution import LOG_LINES, Snakemake, execute
 from echotruth.workflow.progress import Progress
+from echotruth.workflow.snakemake_process import LOG_LINES, Snakemake, execute
 
 
 def python(code):
@@ -83,12 +83,12 @@ time.sleep(60)
 RUN = """
 import signal, sys
 from pathlib import Path
-from echotruth.workflow import execution
+from echotruth.workflow import snakemake_process
 # A shell may start background processes with SIGINT ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-execution.TERMINATION_SECONDS = 0.5
-run = execution.Snakemake([sys.executable, "-c", sys.argv[1]], Path(sys.argv[2]))
-execution.execute([run], "demo", execution.Progress({}))
+snakemake_process.TERMINATION_SECONDS = 0.5
+run = snakemake_process.Snakemake([sys.executable, "-c", sys.argv[1]], Path(sys.argv[2]))
+snakemake_process.execute([run], "demo", snakemake_process.Progress({}))
 """
 
 
@@ -129,13 +129,13 @@ subprocess.run(["bash", "-c", 'set -eu; {{ true; "$@"; true; }}', "job", *job], 
 RUNNER = """
 import os, sys
 from pathlib import Path
-from echotruth.workflow import execution, lease
+from echotruth.workflow import lease, snakemake_process
 folder = Path(sys.argv[2])
 with lease.held(folder) as run:
     environment = os.environ | {lease.VARIABLE: run}
     command = [sys.executable, "-c", sys.argv[1], *sys.argv[2:]]
-    run = execution.Snakemake(command, folder / "snakemake.log")
-    sys.exit(execution.execute([run], "demo", execution.Progress({}), environment))
+    run = snakemake_process.Snakemake(command, folder / "snakemake.log")
+    sys.exit(snakemake_process.execute([run], "demo", snakemake_process.Progress({}), environment))
 """
 
 
