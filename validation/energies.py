@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from echotruth.fem.tetrahedra import Floats
 from echotruth.materials import LAWS, Material, compiled
 from echotruth.mechanics.solver import element
+from echotruth.mechanics.solver.active_stress import ActiveLaw
 
 COMPLEX_STEP = 1e-30
 """Imaginary part h added to an argument, f'(x) = Im f(x + ih) / h: far below round-off, for nothing cancels."""
@@ -79,7 +80,7 @@ class ConstitutiveModel:
 
     def law(self) -> element.WallLaw:
         """The same model for the solver."""
-        active = np.array([self.beta, self.power])
+        active = ActiveLaw(self.beta, self.power)
         energy = compiled(name(self.material))
         return element.WallLaw(
             energy, self.material.constants(), active, self.bulk, pointwise_bulk_ratio=self.pointwise_bulk_ratio
@@ -114,6 +115,20 @@ def active(f: NDArray, beta: float, power: float, axis: int = 0) -> NDArray:
     if power == 2:
         return (1 - beta) * np.log(stretch) + beta * (stretch - 1)
     return (1 - beta) * stretch ** (2 - power) / (2 - power) + beta * stretch ** (3 - power) / (3 - power)
+
+
+def force_velocity(velocity: NDArray, curvature: float, eccentric_max: float) -> NDArray:
+    """Force over the isometric one at velocities over that without load, negative in shortening; of the same shape.
+
+    Hill's equation (F + a) (b - v) = (F_0 + a) b solved for F, with v_max = b F_0 / a, and beyond isometric the
+    hyperbola with the same slope whose asymptote is `eccentric_max`.
+    """
+    a = curvature
+    shortening = np.maximum((1 + a) * a / (a + np.maximum(-velocity, 0)) - a, 0)
+    room = eccentric_max - 1
+    half = room * a / (1 + a)  # velocity at which half of the room is used
+    stretched = np.maximum(velocity, 0)
+    return np.where(velocity <= 0, shortening, 1 + room * stretched / (half + stretched))
 
 
 def first_piola_kirchhoff(f: Floats, density: Callable[[NDArray], NDArray]) -> Floats:

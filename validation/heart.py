@@ -24,6 +24,7 @@ from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
 PAPERS = Path(__file__).parents[1] / "config" / "paper.yaml"
 
+COUNTS = {"circumferential_elements", "longitudinal_elements", "transmural_elements"}
 DEFAULT_MESH = (24, 12, 3)
 """Elements around, along and through the wall."""
 
@@ -76,8 +77,8 @@ def solved(around: int, along: int, through: int) -> SolvedBeat:
 @cache
 def solved_papers(around: int, along: int, through: int) -> SolvedBeat:
     """The paper's heart on such a mesh: its fibres pull along themselves alone, and nothing surrounds it."""
-    config = load(PAPERS).model_copy(update={"geometry": _geometry(around, along, through)})
-    return solved_heart(config)
+    config, counts = load(PAPERS), _geometry(around, along, through).model_dump(include=COUNTS)
+    return solved_heart(config.model_copy(update={"geometry": config.geometry.model_copy(update=counts)}))
 
 
 def _geometry(around: int, along: int, through: int) -> Geometry:

@@ -87,7 +87,7 @@ class _VirtualWork:
         f = np.swapaxes(self.frames, -1, -2) + self.gradient(u) + step * self.gradient(change)
         parts = (
             beat.stiffness * self._passive(f),
-            beat.active_tension[frame] * self._active(f),
+            beat.active_tension[frame] * self._active(f, frame),
             self._volumetric(f),
             self._viscous(f, frame),
         )
@@ -107,13 +107,28 @@ class _VirtualWork:
         local = self.section.pointwise_bulk_ratio / 2 * (energies.determinant(f) - 1) ** 2
         return np.sum((energies.passive(f, self.section.material) + local) * self.volume)
 
-    def _active(self, f: Floats) -> complex:
+    def _active(self, f: Floats, frame: int) -> complex:
+        """Energy of the tension, which the velocity of the fibres, that of the frame, lowers along them."""
         section = self.section.active
-        power, shares = 2.0 if section.stress == "cauchy" else 0.0, (1.0, section.sheet_share, section.normal_share)
+        power = 2.0 if section.stress == "cauchy" else 0.0
+        shares = self._force_velocity(f.real, frame), section.sheet_share, section.normal_share
         return sum(
-            share * np.sum(energies.active(f, section.length_dependence, power, axis) * self.volume)
+            np.sum(share * energies.active(f, section.length_dependence, power, axis) * self.volume)
             for axis, share in enumerate(shares)
         )
+
+    def _force_velocity(self, f: Floats, frame: int) -> Floats:
+        previous, section = self.previous_states[frame], self.section.active
+        if previous.time <= 0 or section.shortening_velocity_max_per_s is None or self.beat.active_tension[frame] <= 0:
+            return np.ones(f.shape[:2])
+        now, before = (np.linalg.norm(g[..., 0], axis=-1) for g in (f, self._before(frame)))
+        velocity = (now - before) / previous.time / section.shortening_velocity_max_per_s
+        return energies.force_velocity(velocity, section.hill_curvature, section.eccentric_max)
+
+    def _before(self, frame: int) -> Floats:
+        """F of the state before a frame."""
+        displacement = self.displacement(self.previous_states[frame].state.solution)
+        return np.swapaxes(self.frames, -1, -2) + self.gradient(displacement)
 
     def _volumetric(self, f: Floats) -> complex:
         """Energy of the mean dilatation of each cell."""
@@ -126,8 +141,7 @@ class _VirtualWork:
         previous = self.previous_states[frame]
         if previous.time <= 0:
             return 0j
-        before = np.swapaxes(self.frames, -1, -2) + self.gradient(self.displacement(previous.state.solution))
-        strain = (_right_cauchy_green(f) - _right_cauchy_green(before)) / 2
+        strain = (_right_cauchy_green(f) - _right_cauchy_green(self._before(frame))) / 2
         viscosity = self.section.si().viscosity
         return viscosity / (2 * previous.time) * np.sum(np.sum(strain**2, axis=(-2, -1)) * self.volume)
 

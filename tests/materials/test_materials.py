@@ -209,6 +209,7 @@ INFLATE = """
     from echotruth.config import Geometry
     from echotruth.config.loading import validate
     from echotruth.mechanics.solver import element
+    from echotruth.mechanics.solver.active_stress import ActiveLaw
     from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
     from echotruth.mechanics.geometry import left_ventricle
     from echotruth.mechanics.solver.newton import LoadStepper
@@ -216,7 +217,7 @@ INFLATE = """
 
     config = validate({"mechanics": {"material": {"law": "dropped", "exponent": 3.0}}}, "test")
     material = config.mechanics.material
-    law = element.WallLaw(package.compiled(material.law), material.constants(), np.array([0.0, 2.0]), 2e6)
+    law = element.WallLaw(package.compiled(material.law), material.constants(), ActiveLaw(), 2e6)
     mesh = left_ventricle(Geometry(circumferential_elements=6, longitudinal_elements=4, transmural_elements=1))
     frames = np.tile(np.eye(3), (len(mesh.cells), 14, 1, 1))
     heart = Equilibrium(mesh, frames, law, base_support(mesh, "fixed"))

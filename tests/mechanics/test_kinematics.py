@@ -90,7 +90,7 @@ def test_layers_add_up_to_the_wall(wall):
     rng = np.random.default_rng(0)
     values, layer = rng.normal(size=(2, len(mesh.cells), 6)), rng.integers(1, 6, len(mesh.cells))
     weight = cell_volumes(mesh.nodes, mesh.cells)
-    layers = kinematics.layer_strain(values, weight, layer, 6)
+    layers = kinematics.group_means(values, weight, layer, 6)
     assert np.isnan(layers[:, 5]).all()
     share = np.array([weight[layer == k].sum() for k in range(1, 6)]) / weight.sum()
     mean, sd = kinematics.weighted_mean_sd(values, weight)

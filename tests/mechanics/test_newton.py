@@ -13,6 +13,7 @@ from echotruth.mechanics import fibres
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver import element
+from echotruth.mechanics.solver.active_stress import ActiveLaw
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
 from echotruth.mechanics.solver.newton import Diverged, LoadStepper
 from echotruth.mechanics.solver.support import base_support
@@ -46,7 +47,7 @@ def hemisphere():
     mesh = left_ventricle(Geometry(**size, **COARSE))
     frames = fibres.fibre_frames(mesh, fibres.wall_depth(mesh), Fibres(), tetrahedron()[0])
     constants = LAWS["fung"].Law(fibre=B, transverse=B, shear=B).constants()
-    law = element.WallLaw(compiled("fung"), constants, np.array([0.0, 2.0]), 1e8)
+    law = element.WallLaw(compiled("fung"), constants, ActiveLaw(), 1e8)
     equations = Equilibrium(mesh, frames, law, base_support(mesh, "radial_free"))
     yield equations
     equations.close()

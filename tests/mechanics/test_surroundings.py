@@ -137,7 +137,11 @@ def test_a_dashpot_alone_delays_and_a_slow_beat_does_not_feel_it():
     """Its force falls as the rate: at a tenth of the heart rate the tension of the free heart comes back."""
 
     def tension(rate, dashpot):
-        wall = Mechanics(pericardium={"spring_kPa_per_mm": 0.0, "dashpot_kPa_s_per_mm": dashpot}, viscosity_Pa_s=0.0)
+        wall = Mechanics(
+            pericardium={"spring_kPa_per_mm": 0.0, "dashpot_kPa_s_per_mm": dashpot},
+            viscosity_Pa_s=0.0,
+            active={"shortening_velocity_max_per_s": None},
+        )
         config = Config(geometry=COARSE, loop=Loop(frames=10, heart_rate_per_min=rate), mechanics=wall)
         return beat(config)["mechanics"]["active_tension"]
 

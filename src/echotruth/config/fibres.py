@@ -14,11 +14,10 @@ class Fibres(Section):
 
     source: Literal["rule", "file"] = "rule"
     """`rule`: the angles below are functions of wall depth. `file`: directions of the cells of the mesh file."""
-    endo_deg: Angle = 66.0
+    endo_deg: Angle = 80.0
     """Helix angle at the endocardium: from the circumferential direction, positive towards the base. DT-MRI of mice has
     52 +- 5 deg, and -41 +- 3 at the epicardium (Angeli 2014, doi 10.1186/s12968-014-0077-x), averaged over depth;
-    docs/physiology.md says why these defaults. `rat`: 72 and -44,
-    `human`: 70 and -53; the paper: 84 and -42."""
+    docs/physiology.md says why these defaults. `rat`: 80 and -41, `human`: 72 and -52; the paper: 84 and -42."""
     epi_deg: Angle = -42.0
     """Helix angle at the epicardium."""
     transverse_endo_deg: TransverseAngle = -1.5

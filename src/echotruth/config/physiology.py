@@ -27,7 +27,7 @@ class Physiology(Section):
     healthy hearts (Young & Cowan 2012, doi 10.1186/1532-429X-14-49); with the wrong fibres it is 60 to 90 deg."""
     volume_ratio_min: Fraction | None = 0.2
     """Smallest det F at any point in any frame. Lower values mean that elements nearly collapse, whereas myocardium
-    hardly changes its volume; the default heart has 0.56."""
+    hardly changes its volume; the default heart has 0.87."""
     loop_error_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.005
     """Largest relative difference between prescribed and solved pressure or volume in any frame."""
     tension_min_kPa: FiniteFloat | None = -1.0
@@ -39,10 +39,9 @@ class Physiology(Section):
     1.00 to 1.05. Where it is larger, the tension that meets the loop oscillates from frame to frame, and with it the
     motion: it is 3.6 in the default heart with the preset `lbbb`."""
     tension_es_min_kPa: FiniteFloat | None = 20.0
-    """Smallest active tension at end-systole; the default heart ejects between 20 and 90 kPa (about 50 for its
-    loop)."""
-    tension_es_max_kPa: FiniteFloat | None = 90.0
-    """Largest active tension at end-systole."""
+    """Smallest active tension at end-systole; the default mouse has 70, and its largest is 120."""
+    tension_es_max_kPa: FiniteFloat | None = 120.0
+    """Largest active tension at end-systole; the default human has 95."""
     ejection_fraction_min: Fraction | None = 0.2
     """Smallest ejection fraction; healthy mice and rats have 0.42 to 0.89 (Pacher 2008, doi 10.1038/nprot.2008.138,
     table 1), failing hearts less."""
@@ -67,6 +66,20 @@ class Physiology(Section):
     """Largest mean of E_RC or E_RL over a layer, in either direction, at the end of isovolumic contraction. E_RC
     virtually does not change in this phase, and its amplitude over the cycle is about 0.1 in people (Bovendeerd 2009,
     Am J Physiol 297, H1058); at end-systole E_RC is 0.00 +- 0.08 and E_RL 0.04 +- 0.12 in mice (Zhong 2011)."""
+    level_circumferential_strain_ivc_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.06
+    """Largest mean of E_CC over a fifth of the wall's height, in either direction, at the end of isovolumic
+    contraction. No part of a healthy wall beats before the heart ejects: base, middle and apex begin to shorten
+    together (Young & Cowan 2012)."""
+    level_radial_strain_ivc_max: FiniteFloat | None = 0.15
+    """Largest mean of E_RR over a level at the end of isovolumic contraction."""
+    level_fibre_strain_ivc_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.07
+    """Largest mean strain along the fibres of a level, in either direction, at the end of isovolumic contraction."""
+    fibre_shortening_rate_max_per_s: Annotated[FiniteFloat, Field(gt=0)] | None = 10.0
+    """Fastest shortening of the fibres of a level, in lengths per second, between two frames; about as fast as a
+    mouse's muscle shortens without a load. `rat` 7, `human` 3."""
+    fibre_strain_spread_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.4
+    """Largest standard deviation over the wall of the strain along the fibres at end-systole, over its mean. Muscle
+    adapts until its fibres shorten alike (Arts 1994, Biophys J 66, 953)."""
     circumferential_strain_min: FiniteFloat | None = -0.25
     """Smallest wall-mean circumferential strain at end-systole. In mice it is -0.13 +- 0.03 by MRI (Zhong 2011) and
     -16.9 +- 3.1 % by echo (Tee 2015, doi 10.1155/2015/148501); `human` -0.26, because the prediction

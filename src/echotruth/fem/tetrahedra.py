@@ -6,7 +6,6 @@ carry it to x(xi) = sum_a N_a(xi) x_a.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numba
 import numpy as np
@@ -18,16 +17,6 @@ Integers = NDArray[np.int32]
 
 EDGES = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])
 """Vertices of the edge of each mid-edge node 4..9, in VTK's order."""
-
-
-class Tetrahedra(Protocol):
-    """Whatever consists of quadratic tetrahedra: a mesh or a heart; its attributes are those of `Mesh`."""
-
-    @property
-    def nodes(self) -> Floats: ...
-
-    @property
-    def cells(self) -> Integers: ...
 
 
 @dataclass(frozen=True)
@@ -89,7 +78,7 @@ def shape(xi: Floats) -> Floats:
     ndarray of shape (n, 10), or (n, 6)
         Zienkiewicz & Taylor, The Finite Element Method, vol. 1, section 6.
     """
-    corner, (a, b) = barycentric(xi), _edges(xi)
+    corner, (a, b) = _barycentric(xi), _edges(xi)
     return np.hstack([corner * (2 * corner - 1), 4 * corner[:, a] * corner[:, b]])
 
 
@@ -104,14 +93,13 @@ def shape_gradient(xi: Floats) -> Floats:
     -------
     ndarray of shape (n, 10, 3), or (n, 6, 2)
     """
-    corner, (a, b) = barycentric(xi)[..., None], _edges(xi)
+    corner, (a, b) = _barycentric(xi)[..., None], _edges(xi)
     dcorner_dxi = np.vstack([-np.ones(xi.shape[1]), np.eye(xi.shape[1])])
     middle = 4 * (corner[:, a] * dcorner_dxi[b] + corner[:, b] * dcorner_dxi[a])
     return np.concatenate([(4 * corner - 1) * dcorner_dxi, middle], axis=1)
 
 
-def barycentric(xi: Floats) -> Floats:
-    """Barycentric coordinates of a tetrahedron (n, 4), or of a triangle (n, 3): linear shape functions of the corners."""
+def _barycentric(xi: Floats) -> Floats:
     return np.column_stack([1 - xi.sum(axis=1), xi])
 
 

@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix, triu
 from echotruth.config import Fibres
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.sparse import factorization
-from echotruth.fem.tetrahedra import Floats, Integers, Mesh, Tetrahedra, shape, shape_gradient
+from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape, shape_gradient
 from echotruth.mechanics import angles, disarray
 
 CENTROID = np.full((1, 3), 0.25)
@@ -70,13 +70,12 @@ def _minimize(mesh: Mesh, k: Floats, f: Floats | None, zero: Integers, one: Inte
     return values
 
 
-def material_gradients(mesh: Tetrahedra, xi: Floats) -> tuple[Floats, Floats]:
+def material_gradients(mesh: Mesh, xi: Floats) -> tuple[Floats, Floats]:
     """Gradients of the shape functions by the position X in the unloaded wall.
 
     Parameters
     ----------
-    mesh : Tetrahedra
-        Unloaded.
+    mesh : Mesh
     xi : ndarray of shape (n_points, 3)
         Local coordinates, the same in every tetrahedron.
 

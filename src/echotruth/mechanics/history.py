@@ -1,5 +1,7 @@
 """The output arrays of a heart: geometry, fibres, pathology, mechanics and kinematics."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,8 @@ from echotruth.mechanics.solver.wall import Wall
 
 Arrays = dict[str, NDArray]
 
+LEVELS = 5
+"""Levels of the wall from base to apex."""
 MAX_VALUES = 50_000_000
 """Number of strains that are held at a time."""
 
@@ -57,7 +61,7 @@ def collect_outputs(config: Config, wall: Wall, mechanics: Arrays) -> dict[str, 
         "mechanics": mechanics,
         "kinematics": {
             "strain": strain.astype(np.float32),
-            **_wall_strain_statistics(mesh, displacement, depth, config.fibres.layers),
+            **_wall_strain_statistics(config, wall, displacement),
             "volume_ratio_min": smallest,
             "volume_ratio_mean": mean,
         },
@@ -75,20 +79,76 @@ def _fibre_arrays(mesh: Mesh, depth: Floats, frames: Floats, layers: int) -> Arr
     }
 
 
-def _wall_strain_statistics(mesh: Mesh, displacement: Floats, depth: Floats, layers: int) -> Arrays:
-    """Statistics over the quadrature points, for a layer may be thinner than a cell and hold no centroid."""
-    xi, weight = tetrahedron()
-    volume = (fibres.material_gradients(mesh, xi)[1] * weight).ravel()
-    axes = fibres.wall_axes(mesh, depth, xi)
-    layer = fibres.layer(fibres.interpolate_in_cells(mesh, depth, xi), layers).ravel()
-    parts: dict[str, list[Floats]] = {"strain_mean": [], "strain_sd": [], "layer_strain": []}
+class WallPoints(NamedTuple):
+    """Quadrature points of a wall, one after the other, and what is known of them at end-diastole.
+
+    Attributes
+    ----------
+    volume : ndarray of shape (n_points,), m^3
+        Unloaded.
+    axes : ndarray of shape (n_cells, n_points of a cell, 3, 3)
+        Rows R, C, L of the wall at ED.
+    fibre : ndarray of shape (n_points, 3)
+        Direction of the fibres at ED; components along R, C, L.
+    layer, level : ndarray of shape (n_points,)
+        1 at the endocardium, and at the base.
+    """
+
+    volume: Floats
+    axes: Floats
+    fibre: Floats
+    layer: NDArray[np.integer]
+    level: NDArray[np.integer]
+
+
+def _wall_points(config: Config, wall: Wall, at_ed: Floats) -> WallPoints:
+    """The quadrature points; a layer may be thinner than a cell and hold no centroid."""
+    mesh, depth, (xi, weight) = wall.mesh, wall.depth, tetrahedron()
+    gradient = kinematics.deformation_gradient(mesh, at_ed, xi)
+    axes = kinematics.deformed_wall_axes(fibres.wall_axes(mesh, depth, xi), gradient)
+    fibre = fibres.fibre_frames(mesh, depth, config.fibres, xi, config.seed)[..., 0, :]
+    stretched = fibres.unit(np.einsum("...ij,...j->...i", gradient, fibre))
+    return WallPoints(
+        volume=(fibres.material_gradients(mesh, xi)[1] * weight).ravel(),
+        axes=axes,
+        fibre=np.einsum("...ij,...j->...i", axes, stretched).reshape(-1, 3),
+        layer=fibres.layer(fibres.interpolate_in_cells(mesh, depth, xi), config.fibres.layers).ravel(),
+        level=level(fibres.interpolate_in_cells(mesh, mesh.nodes[:, 2], xi), mesh).ravel(),
+    )
+
+
+def level(z: Floats, mesh: Mesh) -> NDArray[np.integer]:
+    """Number of the level, 1 at the base and `LEVELS` at the apex, at heights z (m) of any shape in the unloaded wall.
+
+    The levels share the height from the highest node to the lowest evenly.
+    """
+    top, bottom = mesh.nodes[:, 2].max(), mesh.nodes[:, 2].min()
+    return np.clip((LEVELS * (top - z) / (top - bottom)).astype(int) + 1, 1, LEVELS)
+
+
+def _wall_strain_statistics(config: Config, wall: Wall, displacement: Floats) -> Arrays:
+    points = _wall_points(config, wall, displacement[0])
+    volume, layers = points.volume, config.fibres.layers
+    parts: list[Arrays] = []
     # A fine mesh has gigabytes of strain.
     frames = max(1, MAX_VALUES // (volume.size * len(kinematics.RCL_COMPONENTS)))
     for start in range(0, len(displacement), frames):
         part = displacement[start : start + frames]
-        strains = kinematics.wall_strain(mesh, part, axes, displacement[0]).reshape(len(part), volume.size, -1)
+        strains = kinematics.wall_strain(wall.mesh, part, points.axes, displacement[0])
+        strains = strains.reshape(len(part), volume.size, -1)
+        along = kinematics.strain_along(strains, points.fibre)[..., None]
         mean, sd = kinematics.weighted_mean_sd(strains, volume)
-        by_layer = kinematics.layer_strain(strains, volume, layer, layers)
-        for name, values in zip(parts, (mean, sd, by_layer), strict=True):
-            parts[name].append(values)
-    return {name: np.concatenate(values) for name, values in parts.items()}
+        fibre_mean, fibre_sd = kinematics.weighted_mean_sd(along, volume)
+        parts.append(
+            {
+                "strain_mean": mean,
+                "strain_sd": sd,
+                "layer_strain": kinematics.group_means(strains, volume, points.layer, layers),
+                "level_strain": kinematics.group_means(strains, volume, points.level, LEVELS),
+                "fibre_strain_mean": fibre_mean[:, 0],
+                "fibre_strain_sd": fibre_sd[:, 0],
+                "layer_fibre_strain": kinematics.group_means(along, volume, points.layer, layers)[..., 0],
+                "level_fibre_strain": kinematics.group_means(along, volume, points.level, LEVELS)[..., 0],
+            }
+        )
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.mechanics.fibres import CENTROID, axes_from_normal, material_gradients, unit
 from echotruth.mechanics.solver import element
@@ -103,7 +102,7 @@ def wall_strain(mesh: Mesh, displacement: Floats, axes: Floats, at_ed: Floats) -
     mesh : Mesh
     displacement : ndarray of shape (n_frames, n_nodes, 3), m
     axes : ndarray of shape (n_cells, n_points, 3, 3)
-        Rows R, C, L of the unloaded wall; the strain is along these, deformed to ED.
+        Rows: axes of the wall at ED, such as R, C, L.
     at_ed : ndarray of shape (n_nodes, 3), m
         Displacement at ED.
 
@@ -112,13 +111,31 @@ def wall_strain(mesh: Mesh, displacement: Floats, axes: Floats, at_ed: Floats) -
     ndarray of shape (n_frames, n_cells, n_points, 6)
         RR, CC, LL, RC, RL, CL.
     """
-    deformed = deformed_wall_axes(axes, deformation_gradient(mesh, at_ed, tetrahedron()[0]))
     # With the wall at ED in place of the unloaded one, the gradient by its positions is F F_ED^-1.
-    wall = element.build_elements(replace(mesh, nodes=mesh.nodes + at_ed), deformed)
+    wall = element.build_elements(replace(mesh, nodes=mesh.nodes + at_ed), axes)
     c = np.empty((len(displacement), *wall.weight.shape, 6))
     for u, c_of_frame in zip(displacement, c, strict=True):
         element.right_cauchy_green(mesh.nodes + u, wall, c_of_frame)
     return (c - [1, 1, 1, 0, 0, 0]) / 2
+
+
+def strain_along(strains: Floats, direction: Floats) -> Floats:
+    """Strain a . E a along a direction.
+
+    Parameters
+    ----------
+    strains : ndarray of shape (..., 6)
+        RR, CC, LL, RC, RL, CL.
+    direction : ndarray of shape (..., 3)
+        Unit vectors a; components along R, C, L.
+
+    Returns
+    -------
+    ndarray of shape (...)
+    """
+    products = [(1 if i == j else 2) * direction[..., i] * direction[..., j] for i, j in RCL_COMPONENTS]
+    along: Floats = np.sum(strains * np.stack(products, axis=-1), axis=-1)
+    return along
 
 
 def volume_ratios(mesh: Mesh, displacement: Floats) -> tuple[Floats, Floats]:
@@ -208,24 +225,24 @@ def strain_since_ed(gradient: Floats, axes: Floats) -> Floats:
     return strain(relative, deformed_wall_axes(axes, gradient[0]), RCL_COMPONENTS)
 
 
-def layer_strain(strains: Floats, weight: Floats, layer: NDArray[np.integer], layers: int) -> Floats:
-    """Mean strain of each layer.
+def group_means(strains: Floats, weight: Floats, group: NDArray[np.integer], groups: int) -> Floats:
+    """Mean strain of each group of points, such as the layers or the levels of a wall.
 
     Parameters
     ----------
-    strains : ndarray of shape (n_frames, n_cells, 6)
-    weight : ndarray of shape (n_cells,)
-    layer : ndarray of shape (n_cells,)
-        1 to `layers`.
-    layers : int
+    strains : ndarray of shape (n_frames, n_points, n_components)
+    weight : ndarray of shape (n_points,)
+    group : ndarray of shape (n_points,)
+        1 to `groups`.
+    groups : int
 
     Returns
     -------
-    ndarray of shape (n_frames, layers, 6)
-        Not a number for a layer in which no cell has its centroid.
+    ndarray of shape (n_frames, groups, n_components)
+        Not a number for a group without a point.
     """
-    means = np.full((len(strains), layers, strains.shape[-1]), np.nan)
-    for number in np.unique(layer):
-        in_layer = np.where(layer == number, weight, 0.0)
-        means[:, number - 1] = np.einsum("fci,c->fi", strains, in_layer / np.sum(in_layer))
+    means = np.full((len(strains), groups, strains.shape[-1]), np.nan)
+    for number in np.unique(group):
+        inside = np.where(group == number, weight, 0.0)
+        means[:, number - 1] = np.einsum("fci,c->fi", strains, inside / np.sum(inside))
     return means

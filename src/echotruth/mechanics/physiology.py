@@ -8,7 +8,7 @@ from echotruth.config import Config
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.loop.cycle import read_loop
 from echotruth.loop.haemodynamics import intervals, pressure_rates
-from echotruth.loop.phases import CONTRACTION, FILLING
+from echotruth.loop.phases import CONTRACTION, FILLING, RELAXATION
 from echotruth.mechanics.bounds import CC, LL, bounded
 from echotruth.mechanics.contours import MID_SLICE, global_longitudinal_strain, wall_thickness
 from echotruth.mechanics.fibres import wall_depth
@@ -89,20 +89,55 @@ def _rotations(mesh: Mesh, positions: Floats, mechanics: Arrays) -> Arrays:
         "twist_es": twist[es],
         "twist_peak": twist[peak],
         "twist_peak_delay": time[peak] - time[es],
+        **_untwisting(twist, mechanics),
     }
+
+
+def _untwisting(twist: Floats, mechanics: Arrays) -> Arrays:
+    """Share of the twist at ES that is given back in isovolumic relaxation, and the fastest untwisting (rad/s)."""
+    es, time = int(mechanics["es_frame"]), mechanics["time"]
+    relaxing = np.flatnonzero(mechanics["phase"] == RELAXATION)
+    given_back = (twist[es] - twist[relaxing[-1]]) / twist[es] if len(relaxing) and twist[es] else np.nan
+    rates = np.diff(twist[es:]) / np.diff(time[es:])
+    return {"untwist_ivr": np.asarray(given_back), "untwist_rate": np.asarray(-rates.min(initial=0.0))}
 
 
 def _strains(kinematics: Arrays, mechanics: Arrays) -> Arrays:
     es, phase = int(mechanics["es_frame"]), mechanics["phase"]
-    mean, layers = kinematics["strain_mean"], kinematics["layer_strain"]
+    names = {"strain": "strain_mean"} | {name: name for name in ("layer_strain", "level_strain", "level_fibre_strain")}
+    ends: Arrays = {}
+    for name, array in names.items():
+        ends |= {f"{name}_ivc": _at_end_of_ivc(kinematics[array], phase), f"{name}_es": kinematics[array][es]}
+    mean = kinematics["strain_mean"][es]
     return {
-        "strain_ivc": _at_end_of_ivc(mean, phase),
-        "strain_es": mean[es],
-        "layer_strain_ivc": _at_end_of_ivc(layers, phase),
-        "layer_strain_es": layers[es],
-        "longitudinal_strain": mean[es, LL],
-        "circumferential_strain": mean[es, CC],
+        **ends,
+        "longitudinal_strain": mean[LL],
+        "circumferential_strain": mean[CC],
+        "fibre_strain_spread": _spread(kinematics["fibre_strain_mean"][es], kinematics["fibre_strain_sd"][es]),
+        "fibre_shortening_rate": fastest_shortening(kinematics["level_fibre_strain"], mechanics["time"]),
     }
+
+
+def _spread(mean: Floats, sd: Floats) -> Floats:
+    return np.asarray(sd / abs(mean) if mean else np.nan)
+
+
+def fastest_shortening(strain: Floats, time: Floats) -> Floats:
+    """Fastest shortening of the fibres of a level between two frames.
+
+    Parameters
+    ----------
+    strain : ndarray of shape (n_frames, n_levels)
+        Green-Lagrange strain E along the fibres since ED, whose stretch is sqrt(1 + 2 E).
+    time : ndarray of shape (n_frames,), s
+
+    Returns
+    -------
+    ndarray of shape (), 1/s
+        In lengths at ED; 0 where nothing shortens.
+    """
+    rate = np.diff(np.sqrt(1 + 2 * strain), axis=0) / np.diff(time)[:, None]
+    return np.asarray(-np.nanmin(rate, initial=0.0))
 
 
 def _at_end_of_ivc(values: Floats, phase: NDArray[np.uint8]) -> Floats:

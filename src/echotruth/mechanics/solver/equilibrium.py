@@ -22,9 +22,10 @@ with the second Piola-Kirchhoff stress S of the wall, term by term (:func:`.stre
       + eta dE/dt                                        the same, over the step since the previous state.
 
 Here x = X + u, F = dx/dX, J = det F, C_G = F^T F, E = (C_G - I) / 2, and a is fibre, sheet and normal, along which the
-stretch is lambda_a, its rate lambda_a' over the same step, and the share of the tension 1 and those of the configuration. Springs act on the unloaded surface
-of normal n, per area: k and d are those of the pericardium, at rest at end-diastole (ED), k_z and k_t those of the base
-along and around the long axis; u' is the velocity. Stresses are in Pa, lengths in m.
+stretch is lambda_a and the share of the tension 1 and those of the configuration; only the stress along the fibre
+depends on the rate lambda_a' over the same step. Springs act on the unloaded surface of normal n, per area: k and d are
+those of the pericardium, at rest at end-diastole (ED), k_z and k_t those of the base along and around the long axis; u'
+is the velocity. Stresses are in Pa, lengths in m.
 
 Discretised by quadratic tetrahedra (:mod:`.element`) and summed by :class:`.assembly.Assembly`, the residuals are
 

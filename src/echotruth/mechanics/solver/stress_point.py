@@ -98,7 +98,8 @@ def evaluate(j, law, scale, previous_c, work, with_tangent):
     + viscosity (C - C_previous) / (2 time since); the last term is viscous (Kelvin-Voigt), with the growth of C since
     the previous state. S_active acts along the fibre, and by its shares along sheet and normal, in each direction as
     the stretch there demands: the stress of fibres that are dispersed into these directions. Only that along the fibre
-    falls with the velocity, because fibres midway to a direction in which the wall lengthens hardly shorten.
+    falls with the velocity, because fibres midway to a direction in which the wall lengthens hardly shorten; and so
+    does no tension below zero, which is none of muscle but what is left of a solution.
     """
     stiffness, tension, pressure, rate = scale
     viscous_modulus = law.viscosity * rate
@@ -115,7 +116,7 @@ def evaluate(j, law, scale, previous_c, work, with_tangent):
         stress[TOTAL, k] = stiffness * passive[k] + hydrostatic * j * inverse[k] + viscous
     for k in range(3):
         share = 1.0 if k == 0 else law.cross_fibre[k - 1]
-        active, active_tangent = active_stress(c[k], previous_c[k], rate if k == 0 else 0.0, law.active)
+        active, active_tangent = active_stress(c[k], previous_c[k], rate if k == 0 and tension > 0 else 0.0, law.active)
         stress[TOTAL, k] += tension * share * active
         stress[ACTIVE, k], stress[ACTIVE, k + 3] = share * active, 0.0
         active_stiffness[k] = share * active_tangent
