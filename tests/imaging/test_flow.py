@@ -94,8 +94,7 @@ class Beating:
 
 @pytest.fixture(scope="module")
 def solved():
-    with pytest.warns(UserWarning, match="implausible"):
-        return et.beat(et.configure(geometry=SMALL, fibres=STRAIGHT))
+    return et.beat(et.configure(geometry=SMALL, fibres=STRAIGHT))
 
 
 @pytest.fixture(scope="module")

@@ -316,7 +316,7 @@ def test_mesh_that_is_remeshed_has_the_topology_of_the_template(tmp_path, monkey
     """So hearts with and without a mesh stand in the same arrays."""
     monkeypatch.chdir(tmp_path)
     coarse = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
-    template = left_ventricle(Geometry(**coarse))
+    template = left_ventricle(Geometry(**coarse, apex_wall_mm=0.8))
     nodes = 1e3 * template.nodes
     pyvista.UnstructuredGrid({24: template.cells.astype(np.int64)}, nodes).save("a.vtu")
     config = Config(geometry=coarse, cases={"table": "geometry.file,geometry.remesh\na.vtu,true\n"})
