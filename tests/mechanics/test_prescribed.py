@@ -32,7 +32,8 @@ def config(kind, elements=(12, 4, 1), frames=2, **section):
     around, along, through = elements
     counts = {"circumferential_elements": around, "longitudinal_elements": along, "transmural_elements": through}
     motion = {"kind": kind, "time_course": "ramp", kind: section}
-    return Config(geometry={"shape": "tube", "wall_mm": 1.0, **counts}, loop={"file": "mouse", "frames": frames}, motion=motion)
+    geometry = {"shape": "tube", "wall_mm": 1.0, **counts}
+    return Config(geometry=geometry, loop={"file": "mouse", "frames": frames}, motion=motion)
 
 
 def heart(config, arrays=None):
