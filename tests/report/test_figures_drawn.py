@@ -63,7 +63,12 @@ def cycle(pressure, intervals):
     strain_mean = WAVE[:, None] * [0.4, -0.17, -0.15, 0.0, 0.02, 0.03]
     loop = {"pressure": pressure, "volume": 50e-9 - 0 * TIME + 0 * pressure, "es_frame": 5, "time": TIME}
     durations = dict(zip(("ivc_time", "ejection_time", "ivr_time"), intervals, strict=True))
-    return turns | motion | {"strain_mean": strain_mean} | loop | durations
+    later = np.linspace(1, 0.8, 5)
+    levels = {
+        "level_strain": strain_mean[:, None] * later[:, None],
+        "level_fibre_strain": -0.15 * WAVE[:, None] * later,
+    }
+    return turns | motion | {"strain_mean": strain_mean} | levels | loop | durations
 
 
 def coloured(picture, colour):

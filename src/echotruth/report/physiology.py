@@ -50,28 +50,49 @@ The pressure and the volume of a prescribed motion are not numbers, and nor are 
 
 @style.styled
 def draw(cycle: Cycle, published: Published) -> Figure:
-    """Draw rotation, strain, axial motion, pressure and volume over one cycle.
+    """Draw rotation, strain, also by level from base to apex, axial motion, pressure and volume over one cycle.
 
     `published` is an entry of `PUBLISHED`, or empty.
     """
-    figure = style.figure(8.6, 6.0)
-    panels = figure.subplots(2, 3, sharex=True)
-    (turn, normal, shear), (axial, pressure, volume) = panels
+    figure = style.figure(8.6, 8.8)
+    panels = figure.subplots(3, 3, sharex=True)
+    (turn, normal, shear), levels, (axial, pressure, volume) = panels
     _rotations(turn, cycle, published)
     _strains(normal, cycle, NORMAL, published)
     _strains(shear, cycle, SHEAR, published)
+    for panel, values in zip(levels, _by_level(cycle), strict=True):
+        _levels(panel, cycle, 100 * values)
     _axial_motion(axial, cycle)
     _curve(pressure, cycle, cycle["pressure"] / style.MMHG, "Pressure (mmHg)")
     _curve(volume, cycle, cycle["volume"] / _UL, "Volume (µL)")
     for panel, title in zip(panels.flat, _TITLES, strict=True):
         panel.set_title(title, loc="left")
         _phases(panel, cycle)
-    for panel in panels[1]:
+    for panel in panels[-1]:
         panel.set_xlabel("Time since end-diastole (ms)")
     return figure
 
 
-_TITLES = ("Rotation", "Normal strain", "Shear strain", "Axial motion", "Pressure", "Volume")
+_TITLES = (
+    *("Rotation", "Normal strain", "Shear strain"),
+    *("Circumferential by level", "Radial by level", "Along the fibres by level"),
+    *("Axial motion", "Pressure", "Volume"),
+)
+LEVELS = {"basal": "#1b4965", "upper": "#2f7fa8", "middle": "#5fae8b", "lower": "#d69c2f", "apical": "#b8432f"}
+"""Level of the wall -> colour."""
+
+
+def _by_level(cycle: Cycle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """E_CC, E_RR and the strain along the fibres, each (frame, level)."""
+    strain = cycle["level_strain"]
+    return strain[..., COMPONENTS.index("CC")], strain[..., COMPONENTS.index("RR")], cycle["level_fibre_strain"]
+
+
+def _levels(axes: Axes, cycle: Cycle, values: np.ndarray) -> None:
+    for (name, colour), of_level in zip(LEVELS.items(), values.T, strict=True):
+        _line(axes, cycle, name, of_level, colour)
+    axes.set_ylabel("Mean of the level since ED (%)")
+    _finish(axes, 0.1, columns=2)
 
 
 def _rotations(axes: Axes, cycle: Cycle, published: Published) -> None:
@@ -145,10 +166,10 @@ def _phases(axes: Axes, cycle: Cycle) -> None:
         axes.text((start + stop) / 2, 0.015, name, transform=top, **look)
 
 
-def _finish(axes: Axes, smallest: float, below: float = 0.02) -> None:
+def _finish(axes: Axes, smallest: float, below: float = 0.02, columns: int = 3) -> None:
     """Give the axis a smallest limit to both sides, lest it show rounding errors, and values at ES below it."""
     low, high = axes.get_ylim()
     low, high = min(low, -smallest), max(high, smallest)
     axes.set_ylim(low, high + HEADROOM * (high - low))
     spaces: dict[str, Any] = {"columnspacing": 0.9, "handlelength": 1, "handletextpad": 0.5, "borderaxespad": 0.2}
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -below), ncols=3, fontsize=8, **spaces)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -below), ncols=columns, fontsize=8, **spaces)
