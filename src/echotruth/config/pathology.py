@@ -49,8 +49,8 @@ class LateActivation(Section):
 
     preset: Literal["lbbb"] | None = None
     """`lbbb`: left bundle branch block of a mouse; the lateral wall is 8 ms late, anterior and inferior wall 4 ms. Most
-    of the wall is late then, so that in the default heart the tension that meets the loop oscillates from frame to
-    frame, and the heart is implausible (`physiology.tension_variation_max`); at a `scale` of 0.75 it does not."""
+    of the wall is late then, so that the tension that meets the loop may oscillate from frame to frame, which marks the
+    heart as implausible (`physiology.tension_variation_max`); at a `scale` of 0.75 it does so less."""
     delay_ms: dict[Annotated[Segment, BeforeValidator(_integer)], Delay] = Field(default_factory=dict)
     """Delay of each AHA segment, instead of a preset; other segments have none."""
     scale: Annotated[FiniteFloat, Field(ge=0, le=100)] = 1.0

@@ -1,6 +1,7 @@
 """Simulation of one heart over one cycle: geometry, fibres, mechanics and kinematics."""
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
 from echotruth.mechanics.history import Arrays, collect_outputs
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.cycle import SolvedCycle, solve
+from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solve
 from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
@@ -77,9 +78,22 @@ def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
 def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     tissue = unloaded.tissue
     activation = Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
+    stiffness = config.mechanics.material.si().stiffness
+    if stiffness is None and np.any(tissue.stiffness_scale != 1):
+        stiffness = _healthy_stiffness(config, unloaded, cycle)
     equations = equilibrium(config, unloaded)
     try:
-        return solve(equations, cycle, activation, config.mechanics.material.si().stiffness)
+        return solve(equations, cycle, activation, stiffness)
+    finally:
+        equations.close()
+
+
+def _healthy_stiffness(config: Config, unloaded: Wall, cycle: Cycle) -> float:
+    """C, Pa, of the heart without its scar, so that the tissue around a scar stays what it was."""
+    tissue = replace(unloaded.tissue, stiffness_scale=np.ones(len(unloaded.mesh.cells)))
+    equations = equilibrium(config, replace(unloaded, tissue=tissue))
+    try:
+        return filled_to_end_diastole(equations, cycle).state.stiffness
     finally:
         equations.close()
 

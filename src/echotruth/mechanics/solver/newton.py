@@ -33,8 +33,8 @@ TOLERANCE = 1e-8
 """Relative residual of force, cavity volume and cell volumes at which a state counts as solved."""
 
 MAX_PREDICTOR_RESIDUAL = 0.3
-"""Residual of a predictor above which a load step without time is halved without an attempt, except from the unloaded
-state."""
+"""Residual of a predictor above which the load step is halved without an attempt, except from the unloaded state and
+where the tension follows the velocity."""
 
 GOOD_PREDICTOR_RESIDUAL = 0.05
 """Residual of a predictor below which it is used without trying the others."""
@@ -114,8 +114,7 @@ class LoadStepper:
 
     def _solve(self, load: Load, unknown: Unknown, predictors: tuple[State, ...], step: float) -> State:
         state, residual = self._best_predictor(load, unknown, predictors)
-        # Where time passes, forces follow the velocity, and a shorter step brings no state nearer.
-        far = residual.total_error > MAX_PREDICTOR_RESIDUAL and load.time == self.load.time
+        far = residual.total_error > MAX_PREDICTOR_RESIDUAL and not self._follows_velocity(load)
         if far and self.load.pressure and step > _MIN_LOAD_STEP:
             raise Diverged(f"The load step is too large {_at(load, unknown)}.")
         if self._tangent is not None and self._tangent.unknown != unknown:
@@ -127,6 +126,10 @@ class LoadStepper:
             state, residual = self._newton(state, residual, load, unknown)
         self._tangent = None
         raise Diverged(f"No equilibrium within {_MAX_NEWTON_STEPS} Newton steps {_at(load, unknown)}: {_REMEDY}.")
+
+    def _follows_velocity(self, load: Load) -> bool:
+        """Whether the tension follows the velocity, so that a shorter step brings no state nearer."""
+        return load.time > self.load.time and bool(np.isfinite(self.equations.law.active.max_velocity))
 
     def _best_predictor(self, load: Load, unknown: Unknown, predictors: tuple[State, ...]) -> tuple[State, Residual]:
         """The first predictor (or the last state) with a small residual, or the one with the smallest."""
