@@ -28,7 +28,7 @@ class Active(Section):
     the tension does not depend on the velocity, as in the paper, and by default where `pathology.late_activation`
     delays tissue, because early tissue alone cannot raise the pressure as fast as the loop of a healthy heart. Muscle
     gives most power at about a third of it, and hearts eject near there (ter Keurs 2012, PMC3568939, whose human heart
-    shortens by 1.6 per second at most): the default mouse ejects at 4.2 per second, the rat at 2.6, the human at 1.2."""
+    shortens by 1.6 per second at most): the default mouse ejects at 4.2 per second, rat at 2.6, human at 1.2."""
     hill_curvature: Annotated[FiniteFloat, Field(gt=0, le=10)] = 0.5
     """Curvature a / F_0 of the force-velocity relation: 0.5 in the model of cardiac muscle of Hunter, McCulloch & ter
     Keurs (Prog Biophys Mol Biol 69 (1998) 289)."""
