@@ -41,7 +41,8 @@ class Physiology(Section):
     tension_es_min_kPa: FiniteFloat | None = 20.0
     """Smallest active tension at end-systole; the default mouse has 70, and its largest is 120."""
     tension_es_max_kPa: FiniteFloat | None = 180.0
-    """Largest active tension at end-systole; the default human has 90, and with five or six frames a beat the mouse 140 to 155."""
+    """Largest active tension at end-systole; the default human has 90, and with five or six frames a beat the mouse
+    140 to 155."""
     ejection_fraction_min: Fraction | None = 0.2
     """Smallest ejection fraction; healthy mice and rats have 0.42 to 0.89 (Pacher 2008, doi 10.1038/nprot.2008.138,
     table 1), failing hearts less."""
