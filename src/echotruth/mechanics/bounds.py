@@ -35,7 +35,7 @@ class Bound(NamedTuple):
     healthy: bool = False
 
 
-def _at(measure: str, component: int) -> Callable[[Mapping[str, ArrayLike]], ArrayLike]:
+def _at(measure: str, component: int | list[int]) -> Callable[[Mapping[str, ArrayLike]], ArrayLike]:
     return lambda measured: np.asarray(measured[measure])[..., component]
 
 
@@ -45,6 +45,10 @@ def _in_degrees(measure: str) -> Callable[[Mapping[str, ArrayLike]], ArrayLike]:
 
 def _in_kPa(measure: str) -> Callable[[Mapping[str, ArrayLike]], ArrayLike]:
     return lambda measured: np.asarray(measured[measure]) / 1e3
+
+
+def _magnitude(value: Callable[[Mapping[str, ArrayLike]], ArrayLike]) -> Callable[[Mapping[str, ArrayLike]], ArrayLike]:
+    return lambda measured: np.abs(value(measured))
 
 
 def _range(name: str, unit: str, description: str, value: Callable, healthy: bool) -> tuple[Bound, Bound]:
@@ -58,7 +62,7 @@ BOUNDS = (
     Bound("loop_error_max", "the largest relative error of pressure or volume", itemgetter("loop_error")),
     Bound("volume_ratio_min", "the smallest det F of all points and frames", itemgetter("volume_ratio_min")),
     Bound("longitudinal_strain_max", f"the mean longitudinal strain {_ES}", itemgetter("longitudinal_strain")),
-    Bound("twist_max_deg", "the largest twist (deg)", lambda measured: np.abs(np.degrees(measured["twist"]))),
+    Bound("twist_max_deg", "the largest twist (deg)", _magnitude(_in_degrees("twist"))),
     *_range("ejection_fraction", "", "the ejection fraction", itemgetter("ejection_fraction"), False),
     Bound("tension_min_kPa", "the smallest active tension (kPa)", _in_kPa("tension_min")),
     Bound(
@@ -73,13 +77,13 @@ BOUNDS = (
     Bound(
         "transmural_shear_ivc_max",
         f"the largest mean of E_RC or E_RL over a layer {_IVC}",
-        lambda measured: np.abs(np.asarray(measured["layer_strain_ivc"])[..., [RC, RL]]),
+        _magnitude(_at("layer_strain_ivc", [RC, RL])),
         True,
     ),
     Bound(
         "level_circumferential_strain_ivc_max",
         f"the largest mean of E_CC over a level, in either direction, {_IVC}",
-        lambda measured: np.abs(np.asarray(measured["level_strain_ivc"])[..., CC]),
+        _magnitude(_at("level_strain_ivc", CC)),
         True,
     ),
     Bound(
@@ -91,7 +95,7 @@ BOUNDS = (
     Bound(
         "level_fibre_strain_ivc_max",
         f"the largest mean strain along the fibres of a level, in either direction, {_IVC}",
-        lambda measured: np.abs(np.asarray(measured["level_fibre_strain_ivc"])),
+        _magnitude(itemgetter("level_fibre_strain_ivc")),
         True,
     ),
     Bound(

@@ -106,12 +106,12 @@ def _wall_points(config: Config, wall: Wall, at_ed: Floats) -> WallPoints:
     mesh, depth, (xi, weight) = wall.mesh, wall.depth, tetrahedron()
     gradient = kinematics.deformation_gradient(mesh, at_ed, xi)
     axes = kinematics.deformed_wall_axes(fibres.wall_axes(mesh, depth, xi), gradient)
-    fibre = fibres.fibre_frames(mesh, depth, config.fibres, xi, config.seed)[..., 0, :]
-    stretched = fibres.unit(np.einsum("...ij,...j->...i", gradient, fibre))
+    frames = fibres.fibre_frames(mesh, depth, config.fibres, xi, config.seed)
+    fibre = kinematics.deformed_fibre_frames(frames, gradient)[..., 0, :]
     return WallPoints(
         volume=(fibres.material_gradients(mesh, xi)[1] * weight).ravel(),
         axes=axes,
-        fibre=np.einsum("...ij,...j->...i", axes, stretched).reshape(-1, 3),
+        fibre=np.einsum("...ij,...j->...i", axes, fibre).reshape(-1, 3),
         layer=fibres.layer(fibres.interpolate_in_cells(mesh, depth, xi), config.fibres.layers).ravel(),
         level=level(fibres.interpolate_in_cells(mesh, mesh.nodes[:, 2], xi), mesh).ravel(),
     )
