@@ -91,15 +91,3 @@ def test_radius_of_the_heart_is_that_of_its_mesh():
     geometry = Geometry(preset="rat", dilation=1.3, hypertrophy=1.5, scale=0.9, **few)
     nodes = left_ventricle(geometry).nodes[:, :2]
     assert (nodes**2).sum(axis=1).max() ** 0.5 == pytest.approx(1e-3 * geometry.outer_radius_mm(), rel=0.01)
-
-
-def test_tension_of_a_wall_that_is_late_in_part_does_not_depend_on_the_velocity():
-    late = [{"preset": "lbbb"}, {"delay_ms": {8: 5.0}}]
-    for late_activation in late:
-        assert (
-            Config(pathology={"late_activation": late_activation}).mechanics.active.shortening_velocity_max_per_s
-            is None
-        )
-    config = Config(pathology={"late_activation": late[0]}, mechanics={"active": {"shortening_velocity_max_per_s": 30}})
-    assert config.mechanics.active.shortening_velocity_max_per_s == 30
-    assert Config(pathology={"infarct": {"segments": [7]}}).mechanics.active.shortening_velocity_max_per_s == 15

@@ -59,19 +59,10 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
     dict
         A new mapping with the defaults added.
     """
-    values = _fill(values, _tension_of_late_walls(values.get("pathology")))
     values = _fill(values, HEART_DEFAULTS.get(_preset(values, "geometry"), HEART_DEFAULTS["mouse"]))
     values = _fill(values, ARRAY_DEFAULTS.get(_preset(values, "probe"), {}))
     values = _fill(values, _mesh_of_motion(values.get("motion")))
     return _scale_trackers(values, _length_scale(values))
-
-
-def _tension_of_late_walls(pathology: Any) -> dict[str, Any]:
-    """No force-velocity relation where tissue is late: what is early alone cannot raise the pressure as fast as a
-    healthy loop prescribes, however strong, if it weakens as it shortens."""
-    late = _value(pathology, "late_activation")
-    is_late = _value(late, "preset") is not None or bool(_value(late, "delay_ms"))
-    return {"mechanics.active.shortening_velocity_max_per_s": None} if is_late else {}
 
 
 def _mesh_of_motion(motion: Any) -> dict[str, Any]:

@@ -4,16 +4,50 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
-from echotruth.section import Section, check, invalid
+from echotruth.section import Positive, Section, check, invalid
 
 Volume = Annotated[FiniteFloat, Field(gt=0, le=1e8)]
 Pressure = Annotated[FiniteFloat, Field(gt=0, le=1e4)]
 Prescribed = Literal["pressure_volume", "pressure", "volume"]
 
 
+Factor = Annotated[FiniteFloat, Field(ge=0.05, le=20)]
+
+
+class Circulation(Section):
+    """The circulation of `kind: circulation`: a three-element Windkessel behind the aortic valve and an atrium behind the
+    mitral one. Its resistances and the atrium's pressure are those with which the healthy heart gives its measured loop
+    back; the factors change them and the muscle, as drugs and diseases do."""
+
+    contractility: Factor = 1.0
+    """Factor on the active tension of the whole wall."""
+    resistance: Factor = 1.0
+    """Factor on the peripheral resistance of the arteries: afterload."""
+    compliance: Factor = 1.0
+    """Factor on the compliance of the arteries."""
+    preload: Factor = 1.0
+    """Factor on the pressure of the atrium, and on that of end-diastole with which the first beat begins."""
+    decay_time_periods: Positive = 2.0
+    """Time in which the pressure of the healthy arteries decays, resistance times compliance, in periods of the heart
+    beat. The ratio is the same in all mammals (Westerhof & Elzinga, Am J Physiol 261 (1991) R126); 2 is somewhat below
+    the 2.3 of people's mean pressure over their pulse pressure (93 and 40 mmHg), since stroke volume over pulse pressure
+    overestimates the compliance."""
+    characteristic_share: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.06
+    """Characteristic resistance of the healthy aorta over the peripheral one; the same in all mammals (likewise)."""
+    mitral_gradient_mmHg: Annotated[FiniteFloat, Field(gt=0, le=50)] = 2.5
+    """Pressure that drives the fastest filling of the healthy heart: that of blood at 0.8 m/s, 4 v^2."""
+    beats_max: Annotated[int, Field(ge=1, le=100)] = 20
+    """Beats after which a heart that is not yet steady is given up."""
+
+
 class Loop(Section):
     """The cycle that drives the heart: what is prescribed over time."""
 
+    kind: Literal["measured", "circulation"] = "measured"
+    """`measured`: the heart goes through the curves of the file, whatever its disease. `circulation`: the tension that
+    takes the healthy heart - without `pathology`, `hypertrophy`, `dilation` and disarray - through them drives this heart against `circulation`, beat after beat until it is steady, and pressure and volume follow."""
+    circulation: Circulation = Circulation()
+    """The circulation of `kind: circulation`."""
     prescribed: Prescribed = "pressure_volume"
     """What is prescribed: `pressure_volume` (the active tension is solved); `volume` with active tension, zero if
     the file has none (the pressure is solved); or `pressure` with active tension (the volume is solved, and is not
@@ -41,6 +75,16 @@ class Loop(Section):
             raise invalid("esv_uL", self.esv_uL, f"must be smaller than edv_uL = {self.edv_uL}")
         if self.edp_mmHg is not None and self.esp_mmHg is not None and self.esp_mmHg <= self.edp_mmHg:
             raise invalid("esp_mmHg", self.esp_mmHg, f"must be greater than edp_mmHg = {self.edp_mmHg}")
+
+    @check
+    def _circulates(self) -> None:
+        if self.kind == "circulation" and self.prescribed != "pressure_volume":
+            remedy = "must be pressure_volume with loop.kind = circulation, which is calibrated on both"
+            raise invalid("prescribed", self.prescribed, remedy)
+        altered = self.circulation.model_dump(exclude_defaults=True)
+        if self.kind == "measured" and altered:
+            remedy = "needs loop.kind = circulation, because a measured loop is followed whatever the circulation"
+            raise invalid(f"circulation.{next(iter(altered))}", next(iter(altered.values())), remedy)
 
     @check
     def _maps_what_it_prescribes(self) -> None:

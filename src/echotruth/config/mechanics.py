@@ -25,8 +25,9 @@ class Active(Section):
     """Share of the tension that acts along the sheet normal too, likewise. `human` 0.18."""
     shortening_velocity_max_per_s: Annotated[FiniteFloat, Field(gt=0)] | None = 15.0
     """Velocity, in unloaded lengths per second, at which shortening muscle bears no load. `rat` 12, `human` 8. `null`:
-    the tension does not depend on the velocity, as in the paper, and by default where `pathology.late_activation`
-    delays tissue, because early tissue alone cannot raise the pressure as fast as the loop of a healthy heart. Muscle
+    the tension does not depend on the velocity, as in the paper. Nor does it where `pathology.late_activation` delays
+    tissue in a measured loop, because early tissue alone cannot raise the pressure as fast as a healthy heart does; with
+    `loop.kind: circulation` it does. Muscle
     gives most power at about a third of it, and hearts eject near there (ter Keurs 2012, PMC3568939, whose human heart
     shortens by 1.6 per second at most): the default mouse ejects at 4.2 per second, rat at 2.6, human at 1.2."""
     hill_curvature: Annotated[FiniteFloat, Field(gt=0, le=10)] = 0.5

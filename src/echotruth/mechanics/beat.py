@@ -8,12 +8,15 @@ import numpy as np
 from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.loop import phases
+from echotruth.loop.circulation import altered, calibrate
 from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
 from echotruth.mechanics.history import Arrays, collect_outputs
+from echotruth.mechanics.pathology import healthy_heart
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solve
+from echotruth.mechanics.solver.circulation import steady_beat
+from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solve, solved_cycle
 from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
@@ -42,7 +45,7 @@ def beat(config: Config) -> dict[str, Arrays]:
     """
     cycle = read_loop(config.loop)
     unloaded = unloaded_wall(config, cycle)
-    solved = _solve(config, unloaded, cycle)
+    solved = (_circulate if config.loop.kind == "circulation" else _solve)(config, unloaded, cycle)
     mechanics = vars(solved) | {
         "time": cycle.time,
         "displacement": _held(config, unloaded, solved),
@@ -75,15 +78,36 @@ def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
     return wall(config, mesh)
 
 
-def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
+def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
+    """Drive a heart by the tension of the healthy one, in the circulation that gives the healthy one its loop."""
+    settings, healthy = config.loop.circulation, healthy_heart(config)
+    circulation, cycle = calibrate(cycle, settings)
+    logger.info("the healthy heart, in its measured loop")
+    measured = _solve(healthy, unloaded_wall(healthy, cycle), cycle)
+    circulation = altered(circulation.scaled(float(measured.volume[0]) / cycle.edv), settings)
+    twitch = settings.contractility * measured.active_tension
+    logger.info("the heart in its circulation")
+    equations = equilibrium(config, unloaded)
+    try:
+        stepper = filled_to_end_diastole(equations, cycle.filled(settings.preload), measured.stiffness)
+        frames = steady_beat(stepper, circulation, twitch, _activation(unloaded, cycle), settings.beats_max)
+        return solved_cycle(equations, replace(cycle, pressure=None, volume=None), frames)
+    finally:
+        equations.close()
+
+
+def _activation(unloaded: Wall, cycle: Cycle) -> Activation:
     tissue = unloaded.tissue
-    activation = Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
+    return Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
+
+
+def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     stiffness = config.mechanics.material.si().stiffness
-    if stiffness is None and np.any(tissue.stiffness_scale != 1):
+    if stiffness is None and np.any(unloaded.tissue.stiffness_scale != 1):
         stiffness = _healthy_stiffness(config, unloaded, cycle)
     equations = equilibrium(config, unloaded)
     try:
-        return solve(equations, cycle, activation, stiffness)
+        return solve(equations, cycle, _activation(unloaded, cycle), stiffness)
     finally:
         equations.close()
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from echotruth.aha import segment
-from echotruth.config import Pathology
+from echotruth.config import Config, Pathology
 from echotruth.config.pathology import Infarct, LateActivation
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, MaterialPoints, Mesh, interpolate, shape
@@ -53,6 +53,13 @@ class Tissue:
     stiffness_scale: Floats
     tension_scale: Floats
     activation_delay: Floats
+
+
+def healthy_heart(config: Config) -> Config:
+    """The configuration of a heart without what `loop.kind: circulation` takes for its disease."""
+    geometry = config.geometry.model_copy(update={"hypertrophy": 1.0, "dilation": 1.0})
+    fibres = config.fibres.model_copy(update={"disarray_deg": 0.0})
+    return config.model_copy(update={"geometry": geometry, "fibres": fibres, "pathology": Pathology()})
 
 
 def tissue(mesh: Mesh, depth: Floats, pathology: Pathology) -> Tissue:

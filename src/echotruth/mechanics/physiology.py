@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.config import Config
+from echotruth.config.loop import Circulation
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.loop.cycle import read_loop
 from echotruth.loop.haemodynamics import intervals, pressure_rates
@@ -15,6 +16,7 @@ from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import epicardial_apex
 from echotruth.mechanics.geometry.boundary import area_vectors
 from echotruth.mechanics.history import Arrays
+from echotruth.mechanics.pathology import healthy_heart
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation
 
 
@@ -71,8 +73,13 @@ def measured_heart(groups: dict[str, Arrays], config: Config) -> tuple[Arrays, d
     found = measures(groups["geometry"], mechanics, groups["kinematics"], groups["fibres"]["wall_depth"])
     if config.motion.kind != "beat":
         return found, {}
-    healthy = not groups["pathology"]["region"].any()
-    return found, bounded({**found, "active_tension": mechanics["active_tension"]}, healthy)
+    return found, bounded({**found, "active_tension": mechanics["active_tension"]}, _is_healthy(groups, config))
+
+
+def _is_healthy(groups: dict[str, Arrays], config: Config) -> bool:
+    """Whether no tissue is diseased and, in a circulation, nothing else differs from the healthy heart."""
+    changed = config.loop.circulation != Circulation() or config != healthy_heart(config)
+    return not groups["pathology"]["region"].any() and not (config.loop.kind == "circulation" and changed)
 
 
 def _rotations(mesh: Mesh, positions: Floats, mechanics: Arrays) -> Arrays:

@@ -34,3 +34,8 @@ class Activation:
         """Tension of each cell, shape (n_cells,), Pa, in the last of the frames whose T_Ca (Pa) is given."""
         frame = np.arange(-1, len(t_ca))
         return self.scale * np.interp(len(t_ca) - 1 - self.delay / self.step, frame, [0.0, *t_ca], left=0.0)
+
+    def periodic_tension(self, t_ca: Floats, frame: int) -> Floats:
+        """Tension of each cell, shape (n_cells,), Pa, in a frame of any beat; T_ca (n_frames,), Pa, is that of one."""
+        frames = np.arange(len(t_ca))
+        return self.scale * np.interp(frame - self.delay / self.step, frames, t_ca, period=len(t_ca))

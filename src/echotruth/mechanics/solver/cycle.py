@@ -39,12 +39,15 @@ class SolvedFrame(NamedTuple):
         Number up to this frame.
     max_error : float
         Largest relative residual of force, cavity volume and cell volumes.
+    arterial_pressure : float, Pa
+        Of the circulation; not a number without one.
     """
 
     state: State
     load: Load
     factorizations: int
     max_error: float
+    arterial_pressure: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,8 @@ class SolvedCycle:
     residual : ndarray of shape (n_frames,)
         Largest relative residual of force, cavity volume and cell volumes.
     stiffness : float, Pa
+    arterial_pressure : ndarray of shape (n_frames,), Pa
+        Of the compliance of the arteries; not a number without a circulation.
     """
 
     displacement: Floats
@@ -77,6 +82,7 @@ class SolvedCycle:
     newton_steps: NDArray[np.int64]
     residual: Floats
     stiffness: float
+    arterial_pressure: Floats
 
 
 def solve(equations: Equilibrium, cycle: Cycle, activation: Activation, stiffness: float | None = None) -> SolvedCycle:
@@ -177,12 +183,12 @@ def _solve_next(stepper: LoadStepper, cycle: Cycle, activation: Activation, stat
         assert cycle.tension is not None
         fraction, tension = 0.0, activation.tension(cycle.tension[: frame + 1])
     load = Load(pressure, volume, fraction, tension, time=float(cycle.time[frame]))
-    stepper.advance(load, unknown, _extrapolated(states))
+    stepper.advance(load, unknown, extrapolated(states))
     if cycle.tension is not None:
         stepper.state = replace(stepper.state, tension=float(cycle.tension[frame]))
 
 
-def _extrapolated(states: list[State]) -> tuple[State, ...]:
+def extrapolated(states: list[State]) -> tuple[State, ...]:
     """Next state by polynomials of degrees 3 to 1 through the last ones."""
     weights = ((-1, 4, -6, 4), (1, -3, 3), (-1, 2))
     return tuple(linear_combination(states[-len(row) :], row) for row in weights if len(states) >= len(row))
@@ -201,4 +207,5 @@ def solved_cycle(equations: Equilibrium, cycle: Cycle, frames: Sequence[SolvedFr
         newton_steps=np.diff([frame.factorizations for frame in frames], prepend=0),
         residual=np.array([frame.max_error for frame in frames]),
         stiffness=frames[0].state.stiffness,
+        arterial_pressure=np.array([frame.arterial_pressure for frame in frames]),
     )

@@ -11,7 +11,7 @@ that the support leaves free (:func:`.support.base_support`), is
     = 0,
 
     int_c (J - 1 - p_c / kappa) dV = 0 for each cell c,  element.evaluate (Response.volume)
-    V(u) = V_target, if there is an s,                   cavity.cavity_volume
+    V(u) = V_target, if there is an s,                   cavity.cavity_volume; with a circulation V_target follows P
 
 with the second Piola-Kirchhoff stress S of the wall, term by term (:func:`.stress_point.evaluate`),
 
@@ -40,13 +40,14 @@ g = dV/du:
 
     K = df/du + K_e + D_e / dt - P dg/du + sum_c kappa / V_c G_c G_c^T,
     K du_0 = -r - sum_c kappa r_c G_c,    K du_s = -dr/ds,
-    ds = -(r_V + g . du_0) / (g . du_s),    du = du_0 + ds du_s,    dp_c = kappa (r_c + G_c . du / V_c).
+    ds = -(r_V + g . du_0) / (g . du_s - dV_target/ds),    du = du_0 + ds du_s,    dp_c = kappa (r_c + G_c . du / V_c).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -144,13 +145,31 @@ class Load:
         return Load(*(first + fraction * (last - first) for first, last in pairs))
 
 
+class VolumeTarget(NamedTuple):
+    """Volume that the cavity is to have, m^3, and its derivative by the pressure of the blood, m^3/Pa."""
+
+    volume: float
+    slope: float = 0.0
+
+
 @dataclass(frozen=True)
 class PreviousState:
-    """The state from which the viscous strain rate is taken, and the time since, s."""
+    """The state from which the viscous strain rate is taken, and the time since, s.
+
+    Attributes
+    ----------
+    state : State
+    time : float, s
+    prescribed_fraction : float
+        Fraction of the displacement that the support prescribes, in that state.
+    filled : callable, optional
+        Volume target for a pressure of the blood, Pa, after that time; that of the load if not given.
+    """
 
     state: State
     time: float
     prescribed_fraction: float = 0.0
+    filled: Callable[[float], VolumeTarget] | None = None
 
 
 @dataclass(frozen=True)
@@ -165,6 +184,8 @@ class Residual:
         r_c, the mean of J - 1 - p / kappa over each cell.
     volume : float, m^3
         r_V, cavity volume less its target.
+    volume_slope : float, m^3/Pa
+        Derivative of the target by the pressure of the blood.
     force_error, volume_error, volumetric_error : float
         Relative norms of the three: to the forces on the nodes, to the target and to one.
     """
@@ -172,6 +193,7 @@ class Residual:
     force: Floats
     volumetric: Floats
     volume: float
+    volume_slope: float
     force_error: float
     volume_error: float
     volumetric_error: float
@@ -273,11 +295,17 @@ class Equilibrium:
             internal += self._spring_force(surface, nodes)
         external = (state.cavity_pressure if unknown == "cavity_pressure" else load.pressure) * self._volume_gradient
         volumetric = response.volume / self.unloaded_volume - 1 - state.cell_pressure / self.law.bulk_modulus
+        target = self._volume_target(state, load, unknown)
         # V is of third degree in the positions x: V = x . dV/dx / 3 (Euler's theorem).
-        volume = float(np.sum(gradient * nodes[self.mesh.endo])) / 3 - load.volume if unknown else 0.0
+        volume = float(np.sum(gradient * nodes[self.mesh.endo])) / 3 - target.volume if unknown else 0.0
         force_scale = norm(external) or norm(response.force[:, TOTAL]) or 1.0
-        errors = norm(internal - external) / force_scale, abs(volume) / load.volume if unknown else 0.0
-        return Residual(internal - external, volumetric, volume, *errors, norm(volumetric) / np.sqrt(len(volumetric)))
+        errors = norm(internal - external) / force_scale, abs(volume) / target.volume if unknown else 0.0
+        volumetric_error = norm(volumetric) / np.sqrt(len(volumetric))
+        return Residual(internal - external, volumetric, volume, target.slope, *errors, volumetric_error)
+
+    def _volume_target(self, state: State, load: Load, unknown: Unknown) -> VolumeTarget:
+        filled = self.previous.filled if self.previous and unknown == "cavity_pressure" else None
+        return filled(state.cavity_pressure) if filled else VolumeTarget(load.volume)
 
     def _spring_force(self, surface: Springs, nodes: Floats) -> Floats:
         """K_e (u - u_rest) + D_e (u - u_previous) / dt of a surface, on the free displacements."""
@@ -338,7 +366,8 @@ class Tangent:
         condensed = equations.assembly.vector(kappa * residual.volumetric[:, None] * self._cell_gradient)
         solution, scalar = equations.solve(-residual.force - condensed), 0.0
         if self.unknown:
-            scalar = -(residual.volume + float(np.sum(self._volume_gradient * solution))) / self._compliance
+            compliance = self._compliance - residual.volume_slope
+            scalar = -(residual.volume + float(np.sum(self._volume_gradient * solution))) / compliance
             solution += scalar * self._scalar_solution
         cell_change = np.sum(self._cell_gradient * equations.assembly.of_cells(solution), axis=1)
         return Correction(solution, kappa * (residual.volumetric + cell_change / equations.unloaded_volume), scalar)

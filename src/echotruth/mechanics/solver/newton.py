@@ -8,7 +8,7 @@ factors. Load steps are halved where Newton's method fails.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from itertools import pairwise
 from math import log
@@ -16,6 +16,7 @@ from math import log
 import numpy as np
 
 from echotruth.fem.sparse import SingularMatrix
+from echotruth.loop.circulation import Circulation
 from echotruth.mechanics.solver.equilibrium import (
     Correction,
     Equilibrium,
@@ -25,6 +26,7 @@ from echotruth.mechanics.solver.equilibrium import (
     State,
     Tangent,
     Unknown,
+    VolumeTarget,
 )
 
 logger = logging.getLogger("echotruth.mechanics")
@@ -59,6 +61,8 @@ class LoadStepper:
     ----------
     state, load
         Last solved state, and the load that it balances.
+    arterial_pressure : float, Pa
+        Of the circulation, at the last solved state; not a number without one.
     max_error : float
         Largest relative residual of the state.
     factorizations : int
@@ -68,6 +72,8 @@ class LoadStepper:
     def __init__(self, equations: Equilibrium, stiffness: float) -> None:
         self.equations, self.state, self.factorizations = equations, equations.unloaded_state(stiffness), 0
         self.load = Load(0.0, equations.volume(self.state))
+        self.circulation: Circulation | None = None
+        self.arterial_pressure = float("nan")
         self.max_error = 0.0
         self._tangent: Tangent | None = None
 
@@ -91,7 +97,9 @@ class LoadStepper:
         while fraction < 1:
             target = start.toward(load, fraction + step)
             prescribed = start.toward(load, fraction).prescribed_fraction
-            self.equations.set_previous(PreviousState(self.state, step * (load.time - start.time), prescribed))
+            duration = step * (load.time - start.time)
+            filled = self._filled(target.time, duration)
+            self.equations.set_previous(PreviousState(self.state, duration, prescribed, filled))
             try:
                 self.state = self._solve(target, unknown, (*predictors, *_extrapolated(path, fraction + step)), step)
             except Diverged as failure:
@@ -100,6 +108,11 @@ class LoadStepper:
                 if step < _MIN_LOAD_STEP:
                     raise
                 continue
+            if self.circulation:
+                passed = self.circulation.exchange(
+                    self.state.cavity_pressure, self.arterial_pressure, target.time, duration
+                )
+                self.arterial_pressure = passed.arterial_pressure
             fraction, predictors = fraction + step, ()
             path.append((fraction, self.state))
             step = min(2 * step, 1 - fraction)
@@ -111,6 +124,23 @@ class LoadStepper:
         """Let the surroundings act from the last solved state on, at which they are at rest."""
         self.equations.rest_at(self.state)
         self._tangent = None
+
+    def couple(self, circulation: Circulation) -> None:
+        """Let the last solved state be that of end-diastole of a heart in a circulation, from which it goes on."""
+        self.circulation, self.arterial_pressure = circulation, circulation.arterial_pressure
+        self.state = replace(self.state, cavity_pressure=self.load.pressure)
+
+    def _filled(self, time: float, duration: float) -> Callable[[float], VolumeTarget] | None:
+        """Volume after a step that ends at a time, by the pressure, if there is a circulation."""
+        if self.circulation is None:
+            return None
+        circulation, before, arterial = self.circulation, self.equations.volume(self.state), self.arterial_pressure
+
+        def filled(pressure: float) -> VolumeTarget:
+            passed = circulation.exchange(pressure, arterial, time, duration)
+            return VolumeTarget(before + passed.volume, passed.slope)
+
+        return filled
 
     def _solve(self, load: Load, unknown: Unknown, predictors: tuple[State, ...], step: float) -> State:
         state, residual = self._best_predictor(load, unknown, predictors)

@@ -1,0 +1,115 @@
+"""Hearts in a circulation: the healthy one gives its loop back, and changed ones change as in life."""
+
+import numpy as np
+import pytest
+
+from echotruth.config import Config
+from echotruth.heart import Heart
+from echotruth.loop.cycle import read_loop
+from echotruth.mechanics.beat import beat
+from echotruth.mechanics.derived import centroid_kinematics
+from echotruth.mechanics.physiology import measured_heart
+from echotruth.mechanics.solver import circulation as solver
+from echotruth.mechanics.solver.newton import Diverged
+
+COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
+
+
+def heart(frames=20, geometry=None, pathology=None, **factors):
+    return Config(
+        geometry=COARSE | (geometry or {}),
+        pathology=pathology or {},
+        loop={"kind": "circulation", "frames": frames, "circulation": factors},
+    )
+
+
+def measured(config):
+    arrays = beat(config)
+    return arrays["mechanics"], measured_heart(arrays, config)[0]
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    return beat(heart(frames=40))
+
+
+def test_healthy_heart_gives_its_loop_back(healthy):
+    cycle, mechanics = read_loop(heart(frames=40).loop), healthy["mechanics"]
+    assert np.abs(mechanics["pressure"] - cycle.pressure).max() < 0.005 * cycle.pressure.max()
+    assert np.abs(mechanics["volume"] - cycle.volume).max() < 0.005 * np.ptp(cycle.volume)
+    assert np.isnan(mechanics["pressure_target"]).all()
+    assert np.isfinite(mechanics["arterial_pressure"]).all()
+    assert mechanics["residual"].max() < 1e-8
+
+
+def test_heart_moves_as_in_the_measured_loop(healthy):
+    config = heart(frames=40)
+    same = beat(config.model_copy(update={"loop": config.loop.model_copy(update={"kind": "measured"})}))
+    moved = same["mechanics"]["displacement"]
+    difference = np.abs(healthy["mechanics"]["displacement"] - moved).max()
+    assert difference < 0.005 * np.abs(moved).max()
+    assert np.isnan(same["mechanics"]["arterial_pressure"]).all()
+
+
+@pytest.mark.slow
+def test_changed_hearts_change_as_in_life(healthy):
+    reference = measured_heart(healthy, heart())[0]["ejection_fraction"], healthy["mechanics"]
+    fraction, curves = reference
+
+    weak, found = measured(heart(contractility=0.6))
+    assert found["ejection_fraction"] < fraction - 0.08
+    assert weak["pressure"].max() < curves["pressure"].max()
+    np.testing.assert_allclose(weak["stiffness"], curves["stiffness"])
+
+    loaded, found = measured(heart(resistance=1.5))
+    assert found["ejection_fraction"] < fraction - 0.04
+    assert loaded["pressure"].max() > 1.05 * curves["pressure"].max()
+
+    # Frank and Starling: what fills more ejects more, though not a larger part.
+    full, found = measured(heart(preload=2.0))
+    assert full["volume"][0] > 1.15 * curves["volume"][0]
+    assert np.ptp(full["volume"]) > 1.1 * np.ptp(curves["volume"])
+    assert found["ejection_fraction"] < fraction
+
+    scarred, found = measured(heart(pathology={"infarct": {"segments": [7, 8, 12, 13, 14]}}))
+    assert found["ejection_fraction"] < fraction - 0.1
+    np.testing.assert_allclose(scarred["stiffness"], curves["stiffness"])
+
+    dilated, found = measured(heart(geometry={"dilation": 1.2}, contractility=0.5))
+    assert found["ejection_fraction"] < 0.4
+    assert dilated["volume"][0] > 1.5 * curves["volume"][0]
+
+
+@pytest.mark.slow
+def test_late_wall_is_stretched_before_it_shortens():
+    """Left bundle branch block: the septum shortens at once, and stretches the lateral wall, which ends shorter of it."""
+    config = heart(frames=40, pathology={"late_activation": {"preset": "lbbb"}})
+    arrays = beat(config)
+    es = int(arrays["mechanics"]["es_frame"])
+    strain = centroid_kinematics(Heart.of(arrays, config))["strain"][..., 1]
+    segment = arrays["fibres"]["segment"]
+    septal, lateral = (strain[:, np.isin(segment, walls)].mean(axis=1) for walls in ((8, 9, 14), (11, 12, 16)))
+    assert lateral[:es].max() > 0.05
+    assert septal[:es].max() < 0.02
+    assert lateral[es] - septal[es] > 0.03
+
+
+@pytest.mark.slow
+def test_steady_beat_does_not_depend_on_how_the_arteries_are_hastened(monkeypatch):
+    hastened, _ = measured(heart(frames=12, resistance=1.3))
+    monkeypatch.setattr(solver, "STEADY", 1e-4)
+    monkeypatch.setattr(solver, "_hastened", lambda circulation, first, last: last)
+    natural, _ = measured(heart(frames=12, resistance=1.3))
+    for name in ("pressure", "volume", "arterial_pressure"):
+        assert np.abs(hastened[name] - natural[name]).max() < 0.01 * np.abs(natural[name]).max()
+
+
+def test_heart_that_is_not_steady_in_time_is_refused():
+    with pytest.raises(Diverged, match=r"not steady after 1 beats .*raise loop.circulation.beats_max"):
+        beat(heart(frames=12, resistance=1.5, beats_max=1))
+
+
+def test_bounds_of_healthy_hearts_are_not_asked_of_changed_ones(healthy):
+    assert "circumferential_strain_min" in measured_heart(healthy, heart())[1]
+    assert "circumferential_strain_min" not in measured_heart(healthy, heart(contractility=0.6))[1]
+    assert "circumferential_strain_min" not in measured_heart(healthy, heart(geometry={"hypertrophy": 1.2}))[1]
