@@ -119,7 +119,7 @@ def test_factors_change_what_they_name():
 
 
 def test_settings_without_a_circulation_are_refused():
-    with pytest.raises(ValueError, match="needs loop.kind = circulation"):
+    with pytest.raises(ValueError, match=r"needs loop.kind = circulation"):
         Loop(circulation={"resistance": 1.2})
-    with pytest.raises(ValueError, match="must be pressure_volume with loop.kind = circulation"):
+    with pytest.raises(ValueError, match=r"must be pressure_volume with loop.kind = circulation"):
         Loop(kind="circulation", prescribed="volume", file="twitch")

@@ -23,7 +23,7 @@ SHAPES = {
     },
     "pathology": {"region", "stiffness_scale", "tension_scale", "activation_delay"},
     "mechanics": {
-        *("time", "pressure", "volume", "pressure_target", "volume_target", "active_tension"),
+        *("time", "pressure", "volume", "pressure_target", "volume_target", "active_tension", "arterial_pressure"),
         *("displacement", "stiffness", "es_frame", "phase", "newton_steps", "residual"),
     },
     "kinematics": {

@@ -47,14 +47,13 @@ def test_heart_moves_as_in_the_measured_loop(healthy):
     same = beat(config.model_copy(update={"loop": config.loop.model_copy(update={"kind": "measured"})}))
     moved = same["mechanics"]["displacement"]
     difference = np.abs(healthy["mechanics"]["displacement"] - moved).max()
-    assert difference < 0.005 * np.abs(moved).max()
+    assert difference < 0.02 * np.abs(moved).max()
     assert np.isnan(same["mechanics"]["arterial_pressure"]).all()
 
 
 @pytest.mark.slow
 def test_changed_hearts_change_as_in_life(healthy):
-    reference = measured_heart(healthy, heart())[0]["ejection_fraction"], healthy["mechanics"]
-    fraction, curves = reference
+    curves, fraction = healthy["mechanics"], measured_heart(healthy, heart(40))[0]["ejection_fraction"]
 
     weak, found = measured(heart(contractility=0.6))
     assert found["ejection_fraction"] < fraction - 0.08
@@ -82,7 +81,7 @@ def test_changed_hearts_change_as_in_life(healthy):
 
 @pytest.mark.slow
 def test_late_wall_is_stretched_before_it_shortens():
-    """Left bundle branch block: the septum shortens at once, and stretches the lateral wall, which ends shorter of it."""
+    """Left bundle branch block: the septum shortens at once and stretches the lateral wall, which shortens less."""
     config = heart(frames=40, pathology={"late_activation": {"preset": "lbbb"}})
     arrays = beat(config)
     es = int(arrays["mechanics"]["es_frame"])
@@ -110,6 +109,6 @@ def test_heart_that_is_not_steady_in_time_is_refused():
 
 
 def test_bounds_of_healthy_hearts_are_not_asked_of_changed_ones(healthy):
-    assert "circumferential_strain_min" in measured_heart(healthy, heart())[1]
-    assert "circumferential_strain_min" not in measured_heart(healthy, heart(contractility=0.6))[1]
-    assert "circumferential_strain_min" not in measured_heart(healthy, heart(geometry={"hypertrophy": 1.2}))[1]
+    assert "circumferential_strain_min" in measured_heart(healthy, heart(40))[1]
+    assert "circumferential_strain_min" not in measured_heart(healthy, heart(40, contractility=0.6))[1]
+    assert "circumferential_strain_min" not in measured_heart(healthy, heart(40, geometry={"hypertrophy": 1.2}))[1]

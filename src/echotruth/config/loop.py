@@ -15,9 +15,9 @@ Factor = Annotated[FiniteFloat, Field(ge=0.05, le=20)]
 
 
 class Circulation(Section):
-    """The circulation of `kind: circulation`: a three-element Windkessel behind the aortic valve and an atrium behind the
-    mitral one. Its resistances and the atrium's pressure are those with which the healthy heart gives its measured loop
-    back; the factors change them and the muscle, as drugs and diseases do."""
+    """The circulation of `kind: circulation`: a three-element Windkessel behind the aortic valve and an atrium behind
+    the mitral one. Its resistances and the atrium's pressure are those with which the healthy heart gives its measured
+    loop back; the factors change them and the muscle, as drugs and diseases do."""
 
     contractility: Factor = 1.0
     """Factor on the active tension of the whole wall."""
@@ -30,8 +30,8 @@ class Circulation(Section):
     decay_time_periods: Positive = 2.0
     """Time in which the pressure of the healthy arteries decays, resistance times compliance, in periods of the heart
     beat. The ratio is the same in all mammals (Westerhof & Elzinga, Am J Physiol 261 (1991) R126); 2 is somewhat below
-    the 2.3 of people's mean pressure over their pulse pressure (93 and 40 mmHg), since stroke volume over pulse pressure
-    overestimates the compliance."""
+    the 2.3 of people's mean pressure over their pulse pressure (93 and 40 mmHg), because stroke volume over pulse
+    pressure overestimates the compliance."""
     characteristic_share: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.06
     """Characteristic resistance of the healthy aorta over the peripheral one; the same in all mammals (likewise)."""
     mitral_gradient_mmHg: Annotated[FiniteFloat, Field(gt=0, le=50)] = 2.5
@@ -45,7 +45,8 @@ class Loop(Section):
 
     kind: Literal["measured", "circulation"] = "measured"
     """`measured`: the heart goes through the curves of the file, whatever its disease. `circulation`: the tension that
-    takes the healthy heart - without `pathology`, `hypertrophy`, `dilation` and disarray - through them drives this heart against `circulation`, beat after beat until it is steady, and pressure and volume follow."""
+    takes the healthy heart - without `pathology`, `hypertrophy`, `dilation` and disarray - through them drives this
+    heart against `circulation`, beat after beat until it is steady, and pressure and volume follow."""
     circulation: Circulation = Circulation()
     """The circulation of `kind: circulation`."""
     prescribed: Prescribed = "pressure_volume"

@@ -26,8 +26,7 @@ class Active(Section):
     shortening_velocity_max_per_s: Annotated[FiniteFloat, Field(gt=0)] | None = 15.0
     """Velocity, in unloaded lengths per second, at which shortening muscle bears no load. `rat` 12, `human` 8. `null`:
     the tension does not depend on the velocity, as in the paper. Nor does it where `pathology.late_activation` delays
-    tissue in a measured loop, because early tissue alone cannot raise the pressure as fast as a healthy heart does; with
-    `loop.kind: circulation` it does. Muscle
+    tissue in a measured loop, because early tissue alone cannot raise the pressure as a healthy heart does. Muscle
     gives most power at about a third of it, and hearts eject near there (ter Keurs 2012, PMC3568939, whose human heart
     shortens by 1.6 per second at most): the default mouse ejects at 4.2 per second, rat at 2.6, human at 1.2."""
     hill_curvature: Annotated[FiniteFloat, Field(gt=0, le=10)] = 0.5

@@ -48,8 +48,8 @@ class LateActivation(Section):
     """Delay of the active tension by AHA segment."""
 
     preset: Literal["lbbb"] | None = None
-    """`lbbb`: left bundle branch block of a mouse; the lateral wall is 8 ms late, anterior and inferior wall 4 ms. Let it
-    beat with `loop.kind: circulation`: to follow a healthy heart's loop the tension of what is early may have to
+    """`lbbb`: left bundle branch block of a mouse; the lateral wall is 8 ms late, anterior and inferior wall 4 ms. Let
+    it beat with `loop.kind: circulation`: to follow a healthy heart's loop the tension of what is early may have to
     oscillate from frame to frame, which marks the heart as implausible (`physiology.tension_variation_max`)."""
     delay_ms: dict[Annotated[Segment, BeforeValidator(_integer)], Delay] = Field(default_factory=dict)
     """Delay of each AHA segment, instead of a preset; other segments have none."""

@@ -8,9 +8,9 @@ and an atrium of given pressure behind the mitral one:
     R_m Q_m = P_at(t) - P,    Q_m >= 0      mitral valve
     dV/dt = Q_m - Q.
 
-In time implicit Euler steps, whose dt is that of a frame or a part of it. R, R_m, the pressure P_at(t) of the atrium and
-the wave e(t) are found so that a measured loop is given back: e is what three elements leave of the measured pressure
-while the heart ejects - the reflected waves and the inertia of the blood - and stays the same in disease.
+In time implicit Euler steps, whose dt is that of a frame or a part of it. R, R_m, the pressure P_at(t) of the atrium
+and the wave e(t) are found so that a measured loop is given back: e is what three elements leave of the measured
+pressure while the heart ejects - the reflected waves and the inertia of the blood - and stays the same in disease.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.config.loop import Circulation as Settings
@@ -194,13 +195,13 @@ def _periodic(kept: float, gained: float, flow: Floats) -> Floats:
     return np.array(arterial[:-1]) + first * kept ** np.arange(len(flow))
 
 
-def _held(values: Floats, known: Floats) -> Floats:
+def _held(values: Floats, known: NDArray[np.bool_]) -> Floats:
     """Values between those known, and before and after them the first and the last."""
     frames = np.flatnonzero(known)
     return np.interp(np.arange(len(values)), frames, values[frames])
 
 
-def _between(values: Floats, known: Floats) -> Floats:
+def _between(values: Floats, known: NDArray[np.bool_]) -> Floats:
     """Values between those known of a periodic curve."""
     frames = np.flatnonzero(known)
     return np.interp(np.arange(len(values)), frames, values[frames], period=len(values))

@@ -60,7 +60,15 @@ def unsolved(config: Config, displacement: Floats, es: int, phase: NDArray[np.ui
     phase : ndarray of shape (n_frames,)
     """
     frames = len(displacement)
-    undefined = ("pressure", "volume", "pressure_target", "volume_target", "active_tension", "residual", "arterial_pressure")
+    undefined = (
+        "pressure",
+        "volume",
+        "pressure_target",
+        "volume_target",
+        "active_tension",
+        "residual",
+        "arterial_pressure",
+    )
     return {
         "time": read_loop(config.loop).time,
         **dict.fromkeys(undefined, np.full(frames, np.nan)),

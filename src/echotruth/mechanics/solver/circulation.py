@@ -1,4 +1,4 @@
-"""The heart in a circulation: its tension is given, and pressure and volume are solved, beat after beat until steady."""
+"""The heart in a circulation: its tension is given; pressure and volume are solved, beat after beat until steady."""
 
 import logging
 from collections.abc import Iterator
@@ -91,7 +91,7 @@ def _hastened(circulation: Circulation, first: float, last: float) -> float:
     """Arterial pressure, Pa, of the next beat, from those with which a beat began and ended.
 
     With the flow of that beat the arteries would end at first + (last - first) / (1 - exp(-T / R C)). A heart ejects
-    about .45 % less for each per cent of arterial pressure, so that 1 / 1.45 of the way is where flow and pressure meet.
+    about .45 % less for each per cent of arterial pressure, so that flow and pressure meet at 1 / 1.45 of the way.
     """
     decay_time = circulation.peripheral_resistance * circulation.compliance
     return first + (last - first) / (1 - exp(-circulation.period / decay_time)) / (1 + SENSITIVITY)
