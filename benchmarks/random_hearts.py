@@ -22,7 +22,7 @@ import numpy as np
 RANGES = {
     "geometry.scale": (0.88, 1.12),
     "geometry.wall_mm": (0.7, 1.3),
-    "fibres.endo_deg": (60.0, 72.0),
+    "fibres.endo_deg": (74.0, 86.0),
     "fibres.epi_deg": (-48.0, -36.0),
     "mechanics.material.stiffness_kPa": (0.5, 4.0),
     "mechanics.material.fibre": (6.0, 20.0),

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from echotruth.evaluation.strain import StrainOperator
+from echotruth.evaluation.local_fit import LocalFit
+from echotruth.evaluation.strain import MAX_SPACING, StrainOperator
 
 INNER, OUTER = 1.45e-3, 2.45e-3
 
@@ -119,3 +120,19 @@ def test_the_wall_across_a_narrow_cavity_is_no_neighbour():
     operator = StrainOperator(position, np.stack([normal, np.tile([1.0, 0.0], (len(position), 1))], 1), 0.45e-3)
     shifted = np.where(upper[:, None], [0.0, -5e-5], [0.0, 5e-5])
     assert np.abs(operator.strain(shifted[None])).max() < 1e-12
+
+
+@pytest.mark.parametrize("wall", [0.7, 1.0, 1.3])
+def test_spacing_up_to_which_borders_of_a_wall_have_strain(wall):
+    """Points of a ring of tissue, mm, on grids around the largest spacing that is advised."""
+    angle, radius = np.linspace(0, 2 * np.pi, 90), 0.45
+    border = 1.5 * np.column_stack([np.cos(angle), np.sin(angle)])
+    for factor, low, high in ((0.9, 0.9, 1.0), (1.3, 0.0, 0.02)):
+        line = np.arange(-3, 3, factor * MAX_SPACING * radius)
+        grid = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+        away = np.linalg.norm(grid, axis=1)
+        points = grid[(away > 1.5) & (away < 1.5 + wall)]
+        normals = points / np.linalg.norm(points, axis=1)[:, None]
+        fit = LocalFit(points, normals, border, border / 1.5, radius)
+        known = np.isfinite(fit(np.zeros((1, len(points), 2)))[0, :, 0, 0]).mean()
+        assert low <= known <= high

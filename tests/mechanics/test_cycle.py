@@ -13,6 +13,7 @@ from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.cycle import solve
+from echotruth.mechanics.solver.newton import Diverged
 from echotruth.mechanics.solver.wall import equilibrium, wall
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
@@ -91,3 +92,10 @@ def test_late_wall_is_stretched_first():
     early = fibre[2]
     assert early[delay == delay.max()].mean() > 0.02
     assert early[delay == 0].mean() < 0
+
+
+def test_heart_that_is_asked_for_more_than_muscle_bears_is_told_so():
+    active = {"length_dependence": 2.0}
+    config = CONFIG.model_copy(update={"loop": Loop(frames=20, esv_uL=6.0), "mechanics": Mechanics(active=active)})
+    with pytest.raises(Diverged, match=r"T_Ca has risen to \d+ kPa, which no muscle bears: let the heart eject less"):
+        solved(read_loop(config.loop), config)

@@ -117,10 +117,26 @@ def test_pixels_wider_than_speckle_are_warned_of():
     assert not concern.is_absurd and "bmode.size_px = 64" in concern.text
 
 
-@pytest.mark.parametrize("name", ["demo", "human", "learning", "sweep", "paper", "realistic", "phantoms", "benchmark"])
+@pytest.mark.parametrize(("size", "largest"), [(512, 7), (256, 3), (128, 1)])
+def test_grid_too_coarse_for_strain_is_warned_of(size, largest):
+    values = {"bmode": {"size_px": size, "downsampling": [1]}}
+    for grid in (largest, largest + 1):
+        config = validate(values | {"tracking": {"grid_px": grid}}, "x")
+        found = [concern for concern in concerns(config, estimated(config), Path("none")) if "grid_px" in concern.text]
+        assert len(found) == (grid > largest)
+    assert not found[0].is_absurd and f"use {largest} or less" in found[0].text
+
+
+@pytest.mark.parametrize("name", ["demo", "human", "learning", "sweep", "realistic", "phantoms", "benchmark"])
 def test_nothing_speaks_against_the_shipped_configurations_where_there_is_space(name, roomy_disk):
     config = load(ROOT / f"config/{name}.yaml")
     assert not concerns(config, estimated(config), Path("none"))
+
+
+def test_grid_of_the_paper_is_the_printed_one_and_warned_of(roomy_disk):
+    config = load(ROOT / "config/paper.yaml")
+    (concern,) = concerns(config, estimated(config), Path("none"))
+    assert "tracking.grid_px = 10" in concern.text and "use 7 or less" in concern.text
 
 
 def test_text_tells_time_place_jobs_and_memory(tmp_path):

@@ -27,6 +27,11 @@ from echotruth.mechanics.kinematics import IMAGE_COMPONENTS, strain
 RADIUS = 0.0375
 """Radius over the side of the image: 0.45 mm for a mouse heart, imaged in 12 mm."""
 
+MAX_SPACING = 0.4
+"""Spacing of a square grid of points, over the radius, up to which nearly all points at the borders of a wall, which
+see half a disc of others, have the neighbours that a fit needs; from 0.45 on hardly any has, and from 0.6 on no point
+in the middle of the wall."""
+
 
 @dataclass(frozen=True)
 class StrainOperator:

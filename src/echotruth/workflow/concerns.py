@@ -1,4 +1,4 @@
-"""What speaks against a run: it does not fit this machine, or its images cannot show the heart."""
+"""What speaks against a run: it does not fit this machine, or its images cannot show the heart or its strain."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import NamedTuple
 import psutil
 
 from echotruth.config import Config
+from echotruth.evaluation.strain import MAX_SPACING, RADIUS
 from echotruth.workflow.estimate import Estimate, format_bytes, free_bytes
 from echotruth.workflow.imaged_tissue import ellipsoids
 
@@ -68,6 +69,13 @@ def _of_the_images(config: Config) -> Iterator[Concern]:
         text = f"a pixel is {pixel:.2g} wavelengths wide, so that speckle is lost between pixels"
         remedy = f"use {side / (MAX_PIXEL_WAVELENGTHS * wavelength):.0f} px or more"
         yield Concern(f"bmode.size_px = {config.bmode.size_px}: {text}: {remedy}", False)
+    most = int(MAX_SPACING * RADIUS * config.bmode.size_px)
+    if config.tracking.grid_px > most >= 1:
+        apart = config.tracking.grid_px * side / config.bmode.size_px
+        text = (
+            f"points {apart:.2g} mm apart are too few through the wall for strain at its borders, which is left empty"
+        )
+        yield Concern(f"tracking.grid_px = {config.tracking.grid_px}: {text}: use {most} or less", False)
 
 
 def _of_the_file(config: Config) -> Iterator[Concern]:

@@ -47,7 +47,9 @@ REFACTOR_COST = 15
 _MAX_NEWTON_STEPS = 25
 _MIN_DAMPING = 1 / 16
 _MIN_LOAD_STEP = 1 / 128
-_REMEDY = "use a finer mesh or more frames"
+
+OVERSTRAINED = 200e3
+"""Tension, Pa, beyond what muscle bears, from which on a load step that fails asks too much of the heart."""
 
 
 class Diverged(ValueError):
@@ -125,6 +127,12 @@ class LoadStepper:
         self.equations.rest_at(self.state)
         self._tangent = None
 
+    def _remedy(self) -> str:
+        if self.state.tension < OVERSTRAINED:
+            return "use a finer mesh or more frames"
+        tension = f"T_Ca has risen to {self.state.tension / 1e3:.3g} kPa, which no muscle bears"
+        return f"{tension}: let the heart eject less or more slowly, or at a lower pressure"
+
     def couple(self, circulation: Circulation) -> None:
         """Let the last solved state be that of end-diastole of a heart in a circulation, from which it goes on."""
         self.circulation, self.arterial_pressure = circulation, circulation.arterial_pressure
@@ -155,7 +163,9 @@ class LoadStepper:
                 return state
             state, residual = self._newton(state, residual, load, unknown)
         self._tangent = None
-        raise Diverged(f"No equilibrium within {_MAX_NEWTON_STEPS} Newton steps {_at(load, unknown)}: {_REMEDY}.")
+        raise Diverged(
+            f"No equilibrium within {_MAX_NEWTON_STEPS} Newton steps {_at(load, unknown)}: {self._remedy()}."
+        )
 
     def _follows_velocity(self, load: Load) -> bool:
         """Whether the tension follows the velocity, so that a shorter step brings no state nearer."""
@@ -203,7 +213,7 @@ class LoadStepper:
                 damping /= 2
                 if damping < _MIN_DAMPING:
                     self._tangent = None
-                    raise Diverged(f"The load step did not converge {_at(load, unknown)}: {_REMEDY}.")
+                    raise Diverged(f"The load step did not converge {_at(load, unknown)}: {self._remedy()}.")
 
     def _factor(self, state: State, load: Load, unknown: Unknown) -> Tangent:
         self.factorizations += 1
