@@ -9,6 +9,7 @@ from echotruth.config import Loop
 from echotruth.config.loop import Circulation as Settings
 from echotruth.loop.circulation import Circulation, altered, calibrate
 from echotruth.loop.cycle import read_loop
+from echotruth.loop.recording import LoopError
 
 MMHG = 133.322387415
 SETTINGS = Settings()
@@ -123,3 +124,18 @@ def test_settings_without_a_circulation_are_refused():
         Loop(circulation={"resistance": 1.2})
     with pytest.raises(ValueError, match=r"must be pressure_volume with loop.kind = circulation"):
         Loop(kind="circulation", prescribed="volume", file="twitch")
+
+
+def test_loop_of_too_few_frames_is_refused_in_a_sentence():
+    for frames in range(2, 12):
+        cycle = read_loop(Loop(frames=frames))
+        try:
+            one, closed = calibrate(cycle, SETTINGS)
+        except LoopError as error:
+            assert f"mouse.csv: with {frames} frames the loop has none of" in str(error)
+            assert frames < 8
+        else:
+            volumes, _ = beat(one, cycle.pressure)
+            np.testing.assert_allclose(
+                volumes[:-1], closed.volume - closed.volume[0], atol=1e-9 * np.ptp(closed.volume)
+            )

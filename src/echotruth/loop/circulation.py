@@ -25,6 +25,7 @@ from echotruth.arrays import Floats
 from echotruth.config.loop import Circulation as Settings
 from echotruth.loop.cycle import Cycle
 from echotruth.loop.phases import EJECTION, FILLING, RELAXATION, phases
+from echotruth.loop.recording import LoopError
 
 
 class Exchange(NamedTuple):
@@ -125,11 +126,21 @@ def calibrate(cycle: Cycle, settings: Settings) -> tuple[Circulation, Cycle]:
     circulation : Circulation
     cycle : Cycle
         The same pressure; the volume stays where the valves are shut, and that of end-systole is the smallest.
+
+    Raises
+    ------
+    LoopError
+        If the loop has no frame of ejection, or none of filling.
     """
     pressure, volume = cycle.pressure, cycle.volume
     assert pressure is not None and volume is not None
     step = cycle.period / len(cycle.time)
-    volume = _with_closed_valves(pressure, volume)
+    phase = phases(pressure, volume)
+    if not (phase == EJECTION).any() or not (phase == FILLING).any():
+        what = "ejection" if not (phase == EJECTION).any() else "filling"
+        remedy = "raise loop.frames, or leave loop.kind = measured"
+        raise LoopError(f"{cycle.source}: with {len(volume)} frames the loop has none of {what}: {remedy}.")
+    volume = _with_closed_valves(volume, phase)
     flow = (volume - np.roll(volume, 1)) / step
     outflow, inflow = np.maximum(-flow, 0), np.maximum(flow, 0)
     decay_time = settings.decay_time_periods * cycle.period
@@ -166,9 +177,8 @@ def altered(circulation: Circulation, settings: Settings) -> Circulation:
     )
 
 
-def _with_closed_valves(pressure: Floats, volume: Floats) -> Floats:
+def _with_closed_valves(volume: Floats, phase: NDArray[np.uint8]) -> Floats:
     """Volume (n_frames,) that stays in the isovolumic phases, falls in ejection and rises in filling."""
-    phase = phases(pressure, volume)
     ejects, fills = phase == EJECTION, phase == FILLING
     closed = np.full(len(volume), volume[0])
     closed[ejects] = np.minimum.accumulate(np.minimum(volume[ejects], volume[0]))

@@ -93,7 +93,9 @@ def _mechanics(config: Config) -> float:
         return 2.4 + size * (5.2 + 0.17 * frames)
     # The steps that inflate the heart and carry it through the cycle depend little on the number of frames.
     step = size**1.3
-    return (88 * step + frames * (0.6 + step)) * (2 if config.geometry.given_state == "end_diastole" else 1)
+    # The healthy heart's beat, and one to five in the circulation (docs/physiology.md).
+    beats = 4 if config.loop.kind == "circulation" else 1
+    return beats * (88 * step + frames * (0.6 + step)) * (2 if config.geometry.given_state == "end_diastole" else 1)
 
 
 def _phantom(config: Config, view: str) -> float:
