@@ -29,6 +29,11 @@ CONFIG = {
     "cases": {"seed": [1]},
 }
 TWO_CASES = {"seed": [1, 2]}
+ONE_OF_EACH = {
+    "views": {"mid": {"position": 0.5}},
+    "bmode": {"size_px": 64, "downsampling": [1]},
+    "tracking": {"trackers": {"dis": {"method": "dis"}}},
+}
 
 
 def smaller(**changes):
@@ -135,12 +140,13 @@ def test_damaged_repository_that_was_healed_equals_one_made_at_once(whole, tmp_p
     assert differing(folder.make(CONFIG), whole) == []
 
 
-def test_merged_repository_equals_one_made_at_once(two, tmp_path):
-    folder = Folder(tmp_path / "echotruth")
-    first = folder.make(smaller(name="first"))
-    second = folder.make(smaller(name="second", cases={"seed": [2]}))
+def test_merged_repository_equals_one_made_at_once(tmp_path):
+    folder, small = Folder(tmp_path / "echotruth"), smaller(**ONE_OF_EACH)
+    first = folder.make(small | {"name": "first"})
+    second = folder.make(small | {"name": "second", "cases": {"seed": [2]}})
     folder.echotruth("merge", "out/tiny", str(first), str(second))
     merged = contents(folder.out)
+    two = Folder(tmp_path / "two/echotruth").make(small | {"cases": TWO_CASES})
     own = {path: hash for path, hash in contents(two).items() if "/c/" in path and not path.startswith("cases/")}
     assert {path: merged[path] for path in own} == own
 
@@ -149,5 +155,6 @@ def test_braces_in_a_configuration_are_text_and_not_wildcards(tmp_path):
     command = [sys.executable, "-c", "raise SystemExit(1)", "{input}", "{output}"]
     external = {"external": {"method": "external", "command": command}, "dis": {"method": "dis"}}
     note = {"cases": {"table": "case,seed,note\na,1,{why} {not}\n"}}
-    folder = Folder(tmp_path / "echotruth").make(smaller(tracking={"trackers": external}, **note))
+    config = smaller(**ONE_OF_EACH) | {"tracking": {"trackers": external}} | note
+    folder = Folder(tmp_path / "echotruth").make(config)
     assert (folder / "ledger/repository.json").is_file()

@@ -146,10 +146,15 @@ class Load:
 
 
 class VolumeTarget(NamedTuple):
-    """Volume that the cavity is to have, m^3, and its derivative by the pressure of the blood, m^3/Pa."""
+    """Volume that the cavity is to have, m^3, its derivative by the pressure of the blood, m^3/Pa, and the volume, m^3,
+    to which its error is relative.
+
+    A pressure far from that of the solution may ask for a negative volume.
+    """
 
     volume: float
-    slope: float = 0.0
+    slope: float
+    scale: float
 
 
 @dataclass(frozen=True)
@@ -299,13 +304,13 @@ class Equilibrium:
         # V is of third degree in the positions x: V = x . dV/dx / 3 (Euler's theorem).
         volume = float(np.sum(gradient * nodes[self.mesh.endo])) / 3 - target.volume if unknown else 0.0
         force_scale = norm(external) or norm(response.force[:, TOTAL]) or 1.0
-        errors = norm(internal - external) / force_scale, abs(volume) / target.volume if unknown else 0.0
+        errors = norm(internal - external) / force_scale, abs(volume) / target.scale if unknown else 0.0
         volumetric_error = norm(volumetric) / np.sqrt(len(volumetric))
         return Residual(internal - external, volumetric, volume, target.slope, *errors, volumetric_error)
 
     def _volume_target(self, state: State, load: Load, unknown: Unknown) -> VolumeTarget:
         filled = self.previous.filled if self.previous and unknown == "cavity_pressure" else None
-        return filled(state.cavity_pressure) if filled else VolumeTarget(load.volume)
+        return filled(state.cavity_pressure) if filled else VolumeTarget(load.volume, 0.0, load.volume)
 
     def _spring_force(self, surface: Springs, nodes: Floats) -> Floats:
         """K_e (u - u_rest) + D_e (u - u_previous) / dt of a surface, on the free displacements."""

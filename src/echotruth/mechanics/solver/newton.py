@@ -146,7 +146,7 @@ class LoadStepper:
 
         def filled(pressure: float) -> VolumeTarget:
             passed = circulation.exchange(pressure, arterial, time, duration)
-            return VolumeTarget(before + passed.volume, passed.slope)
+            return VolumeTarget(before + passed.volume, passed.slope, before)
 
         return filled
 
