@@ -140,13 +140,13 @@ def test_damaged_repository_that_was_healed_equals_one_made_at_once(whole, tmp_p
     assert differing(folder.make(CONFIG), whole) == []
 
 
-def test_merged_repository_equals_one_made_at_once(tmp_path):
+def test_merged_repository_equals_one_made_at_once(tmp_path, tmp_path_factory):
     folder, small = Folder(tmp_path / "echotruth"), smaller(**ONE_OF_EACH)
     first = folder.make(small | {"name": "first"})
     second = folder.make(small | {"name": "second", "cases": {"seed": [2]}})
     folder.echotruth("merge", "out/tiny", str(first), str(second))
     merged = contents(folder.out)
-    two = Folder(tmp_path / "two/echotruth").make(small | {"cases": TWO_CASES})
+    two = Folder(tmp_path_factory.mktemp("two") / "echotruth").make(small | {"cases": TWO_CASES})
     own = {path: hash for path, hash in contents(two).items() if "/c/" in path and not path.startswith("cases/")}
     assert {path: merged[path] for path in own} == own
 
