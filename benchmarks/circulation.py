@@ -112,14 +112,11 @@ def draw(hearts: dict[str, dict[str, np.ndarray]], period: float, path: Path) ->
             for part, (cells, (across, up)) in enumerate(slabs):
                 axis = axes[2 * row + part, column]
                 axis.scatter(-at[cells, across], at[cells, up], c=strain[cells], cmap="RdBu", norm=colours, s=5)
-                axis.set(xlim=(-2.9, 2.9), ylim=(-2.9, 2.9) if part == 0 else (-7.4, 0.3), aspect="equal")
+                axis.set(xlim=(-2.9, 2.9), ylim=(-2.9, 2.9) if part == 0 else (-7.8, 0.3), aspect="equal")
                 axis.set_axis_off()
             if row == 0:
                 axes[0, column].set_title(f"{time_ms} ms", fontsize=8)
-        label = axes[2 * row, 0].text(
-            -3.6, -2.9, name, fontsize=9, weight="bold", rotation="vertical", va="center", ha="right"
-        )
-        label.set_in_layout(False)
+        axes[2 * row, 0].text(-3.4, -2.9, name, fontsize=9, rotation="vertical", va="center", ha="right")
     bar = figure.colorbar(ScalarMappable(colours, "RdBu"), ax=axes, shrink=0.3, aspect=30)
     bar.set_label("strain along the fibres since end-diastole", fontsize=8)
     figure.savefig(path, dpi=110)
