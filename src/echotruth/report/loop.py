@@ -25,7 +25,7 @@ def draw(time: np.ndarray, es: int, tension: np.ndarray, solved: np.ndarray, tar
     tension : ndarray of shape (frame,)
         Active tension T_Ca, Pa.
     solved, target : ndarray of shape (2, frame)
-        Cavity pressure, Pa, and volume, m^3; NaN if the heart moves by a formula.
+        Cavity pressure, Pa, and volume, m^3; NaN if the heart moves by a formula, the target also in a circulation.
     """
     if not np.isfinite(solved).any():
         text = "No pressure-volume loop: the motion of this heart is prescribed (motion.kind), and nothing drives it."
@@ -50,7 +50,9 @@ def draw(time: np.ndarray, es: int, tension: np.ndarray, solved: np.ndarray, tar
 
 
 def _loop(axes: Axes, es: int, solved: np.ndarray, target: np.ndarray) -> None:
-    for curve, colour, width, label in ((target, style.TARGET, 4, "target"), (solved, style.SOLVED, 1.6, "solved")):
+    followed = bool(np.isfinite(target).all(axis=0).any())
+    curves = ((target, style.TARGET, 4, "target"), (solved, style.SOLVED, 1.6, "solved"))
+    for curve, colour, width, label in curves[0 if followed else 1 :]:
         pressure, volume = np.column_stack([curve, curve[:, :1]])
         axes.plot(volume / UL, pressure / style.MMHG, color=colour, linewidth=width, label=label)
     for frame, name, offset in ((0, "ED", (15, 0)), (es, "ES", (-13, 8))):
@@ -61,4 +63,5 @@ def _loop(axes: Axes, es: int, solved: np.ndarray, target: np.ndarray) -> None:
     axes.set(xlabel="Volume (µL)", ylabel="Pressure (mmHg)", title="Pressure-volume loop")
     axes.set_ylim(bottom=0)
     axes.margins(0.1)
-    axes.legend(loc="center")
+    if followed:
+        axes.legend(loc="center")
