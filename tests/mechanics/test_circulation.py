@@ -8,9 +8,11 @@ from echotruth.heart import Heart
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.derived import centroid_kinematics
+from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.physiology import measured_heart
 from echotruth.mechanics.solver import circulation as solver
 from echotruth.mechanics.solver.newton import Diverged
+from echotruth.mechanics.solver.wall import equilibrium, wall
 
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
 
@@ -112,3 +114,14 @@ def test_bounds_of_healthy_hearts_are_not_asked_of_changed_ones(healthy):
     assert "circumferential_strain_min" in measured_heart(healthy, heart(40))[1]
     assert "circumferential_strain_min" not in measured_heart(healthy, heart(40, contractility=0.6))[1]
     assert "circumferential_strain_min" not in measured_heart(healthy, heart(40, geometry={"hypertrophy": 1.2}))[1]
+
+
+def test_tension_of_a_late_wall_follows_the_velocity_in_a_circulation_only():
+    late = {"late_activation": {"delay_ms": {8: 5.0}}}
+    config = heart(pathology=late)
+    measured_loop = config.model_copy(update={"loop": config.loop.model_copy(update={"kind": "measured"})})
+    unloaded = wall(config, left_ventricle(config.geometry))
+    for one, velocity in ((config, 15.0), (measured_loop, np.inf)):
+        equations = equilibrium(one, unloaded)
+        assert equations.law.active.max_velocity == velocity
+        equations.close()

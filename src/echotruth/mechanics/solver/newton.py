@@ -111,10 +111,8 @@ class LoadStepper:
                     raise
                 continue
             if self.circulation:
-                passed = self.circulation.exchange(
-                    self.state.cavity_pressure, self.arterial_pressure, target.time, duration
-                )
-                self.arterial_pressure = passed.arterial_pressure
+                ended = self.state.cavity_pressure, self.arterial_pressure, target.time, duration
+                self.arterial_pressure = self.circulation.exchange(*ended).arterial_pressure
             fraction, predictors = fraction + step, ()
             path.append((fraction, self.state))
             step = min(2 * step, 1 - fraction)
