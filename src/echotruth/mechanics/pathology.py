@@ -23,7 +23,7 @@ ACTIVATION_DELAY = {
 Left bundle branch block: the wave starts in the septum and ends in the lateral wall (Auricchio et al.,
 Circulation 109 (2004) 1133). The delays are those of a wave that goes along the wall of the mouse (middle at
 1.95 mm from the axis) at an assumed 0.5 m/s: 12 ms half-way round, of which the segments next to the septum
-are a third away and the lateral ones two thirds.
+are a third away and the lateral ones two thirds. Between the middles of segments it goes on evenly.
 """
 
 _SAMPLES = np.array([(i, j, k) for i in range(5) for j in range(5 - i) for k in range(5 - i - j)]) / 4
@@ -75,7 +75,8 @@ def tissue(mesh: Mesh, depth: Floats, pathology: Pathology) -> Tissue:
     Returns
     -------
     Tissue
-        Delays are those of the segment of the cell, without a gradual change between segments.
+        The delay of a segment is that of its middle, and in between it changes linearly around the long axis, as the
+        front of a wave does; from level to level it does not. Late activation is the region of whole segments.
 
     Raises
     ------
@@ -84,18 +85,30 @@ def tissue(mesh: Mesh, depth: Floats, pathology: Pathology) -> Tissue:
     """
     infarct = pathology.infarct
     centroid = shape(_SAMPLES)[_CENTROID] @ mesh.nodes[mesh.cells]
-    delay = _delay(segment(centroid, _apex(mesh)), pathology.late_activation)
+    segments = segment(centroid, _apex(mesh))
+    delays = _segment_delays(pathology.late_activation)
     weight = _infarct_weight(mesh, depth, infarct)
-    region = np.where(delay > 0, LATE, HEALTHY)
+    region = np.where(delays[segments] > 0, LATE, HEALTHY)
     region = np.select([weight == 1, weight > 0], [INFARCT, BORDER], region).astype(np.uint8)
     stiffness, tension = (1 + (scale - 1) * weight for scale in (infarct.stiffness_scale, infarct.tension_scale))
-    return Tissue(region, stiffness, tension, delay)
+    return Tissue(region, stiffness, tension, _gradual(delays, segments, centroid))
 
 
-def _delay(segments: NDArray[np.uint8], late: LateActivation) -> Floats:
-    """Activation delay, s, of cells in the segments (n_cells,)."""
+def _segment_delays(late: LateActivation) -> Floats:
+    """Activation delay (18,), s, by the number of the AHA segment."""
     delays = ACTIVATION_DELAY[late.preset] if late.preset else late.si().delay
-    return late.scale * np.array([delays.get(number, 0.0) for number in range(18)])[segments]
+    return late.scale * np.array([delays.get(number, 0.0) for number in range(18)])
+
+
+def _gradual(delays: Floats, segments: NDArray[np.uint8], centroid: Floats) -> Floats:
+    """Delay of cells in the segments (n_cells,), linear in the azimuth between the middles of a level's segments."""
+    found = delays[segments]
+    azimuth = np.degrees(np.arctan2(centroid[:, 1], centroid[:, 0]))
+    for level in (range(1, 7), range(7, 13), range(13, 17)):
+        cells = np.isin(segments, level)
+        middles = 90.0 - np.arange(len(level)) * 360 / len(level)
+        found[cells] = np.interp(azimuth[cells], middles, delays[level], period=360)
+    return found
 
 
 def _infarct_weight(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
