@@ -32,8 +32,8 @@ class Infarct(Section):
     tension_scale: Fraction = 0.0
     """Active tension relative to healthy tissue; infarcts of sheep had none (Wenk 2011)."""
     stiffness_scale: Annotated[FiniteFloat, Field(ge=0.1, le=100)] = 20.0
-    """Stiffness relative to healthy tissue. With the default, an infarct of a third of the wall stretches by a few percent
-    when the heart ejects; in mice it shortens by 0.7 +- 4.4 % (Epstein 2002, Magn Reson Med 48, 399)."""
+    """Stiffness relative to healthy tissue. With the default, an infarct of a third of the wall stretches by a few
+    percent when the heart ejects; in mice it shortens by 0.7 +- 4.4 % (Epstein 2002, Magn Reson Med 48, 399)."""
     border_mm: Annotated[FiniteFloat, Field(ge=0)] = 0.0
     """Width of the border zone, in which both factors return linearly to 1 (Lee 2011)."""
 
