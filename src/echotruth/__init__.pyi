@@ -4,6 +4,10 @@ from .cases import expand
 from .config import Config, Probe, Rf, View
 from .config.building import configure
 from .config.loading import ConfigError
+from .echo.clip import read_clip
+from .echo.failure import EchoError
+from .echo.strain import speckle_tracking
+from .echo.wall import Wall, read_wall
 from .evaluation.curves import strain_peaks
 from .heart import Heart
 from .imaging.beamforming.scanner import Scanner
@@ -21,6 +25,7 @@ __version__: str
 __all__ = [
     "Config",
     "ConfigError",
+    "EchoError",
     "FullMatrix",
     "Heart",
     "Probe",
@@ -29,6 +34,7 @@ __all__ = [
     "Scanner",
     "TrackerFailed",
     "View",
+    "Wall",
     "beat",
     "configure",
     "evaluate",
@@ -38,6 +44,9 @@ __all__ = [
     "kinematics",
     "learning",
     "point_tracks",
+    "read_clip",
+    "read_wall",
+    "speckle_tracking",
     "strain_peaks",
     "track",
     "unpack",

@@ -1,5 +1,6 @@
 """Building a configuration in Python: from a file, another configuration or nothing, and some keys."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,7 @@ from echotruth.config import shipped
 from echotruth.config.loading import ConfigError, read_yaml, validate
 from echotruth.config.merging import KINDS, NAMED, merged, nested
 from echotruth.config.sections import Config
+from echotruth.config.tracking import External
 
 Source = Config | dict[str, Any] | str | Path | None
 
@@ -77,3 +79,36 @@ def _difference(values: dict[str, Any], default: dict[str, Any]) -> dict[str, An
         elif value != other:
             found[key] = value
     return found
+
+
+def tracker_section(config: Config, tracker: str | Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Section of a tracker that is named or given as a function.
+
+    Parameters
+    ----------
+    config : Config
+        Its trackers are known by name, and its field of view scales the default lengths of methods.
+    tracker : str or callable
+        Name of one of them, of a method, or `package.module:function`; or a function.
+    options : dict
+        Keys of the section, or keyword arguments of the function.
+
+    Returns
+    -------
+    Section
+
+    Raises
+    ------
+    ConfigError
+        If there is no such method or key.
+    """
+    if callable(tracker):
+        return External.model_construct(track=tracker, options=options)
+    known = config.tracking.trackers
+    if tracker in known:
+        given = known[tracker].model_dump() | options
+    elif ":" in tracker:
+        given = {"method": "external", "track": tracker, "options": options}
+    else:
+        given = {"method": tracker, **options}
+    return configure(config, tracking={"trackers": {"tracker": given}}).tracking.trackers["tracker"]

@@ -16,8 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from echotruth.cases import Case
 from echotruth.config import Config, Probe, View
-from echotruth.config.building import Source, configure
-from echotruth.config.tracking import External
+from echotruth.config.building import Source, configure, tracker_section
 from echotruth.evaluation.clip import Clip, tracker_seed
 from echotruth.evaluation.scoring import metrics, score, truth_at
 from echotruth.heart import Heart
@@ -217,7 +216,7 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     seed = tracker_seed(case, clip.attrs["view"])
     frames, mask, times = clip["image"].values, clip["mask"].values[0], clip["time"].values
     arguments = Clip(frames, mask, inside, points, spacing, times, seed, case.config.tracking.frame_step)
-    found = track_points(*arguments.tracker_arguments, _settings(case.config, tracker, options))
+    found = track_points(*arguments.tracker_arguments, tracker_section(case.config, tracker, options))
     displacement, quality = arguments.on_grid(*found)
     coordinates = {"axial": clip["grid_axial"].values, "lateral": clip["grid_lateral"].values}
     values = {"tracking/SIZE/TRACKER": {"displacement": displacement, "quality": quality}}
@@ -281,20 +280,6 @@ def _imaged_by(config: Config, view: str | View, probe: str | Probe | None) -> t
     if view not in config.views:
         raise ValueError(f"view = {view!r}: use one of {', '.join(config.views)}, or give a View.")
     return config, view
-
-
-def _settings(config: Config, tracker: str | Callable[..., Any], options: dict[str, Any]) -> Any:
-    """Section of a tracker, as :func:`echotruth.tracking.tracker.track` takes it."""
-    if callable(tracker):
-        return External.model_construct(track=tracker, options=options)
-    known = config.tracking.trackers
-    if tracker in known:
-        given = known[tracker].model_dump() | options
-    elif ":" in tracker:
-        given = {"method": "external", "track": tracker, "options": options}
-    else:
-        given = {"method": tracker, **options}
-    return configure(config, tracking={"trackers": {"tracker": given}}).tracking.trackers["tracker"]
 
 
 def _name(tracker: str | Callable[..., Any]) -> str:

@@ -1,0 +1,146 @@
+"""A recorded clip of one cycle, with square pixels of known size and frames of known time."""
+
+from os import PathLike
+from pathlib import Path
+
+import cv2
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from echotruth.arrays import Floats
+from echotruth.echo import files
+from echotruth.echo.failure import EchoError
+from echotruth.echo.recording import Recording
+
+SQUARE = 1e-3
+"""Relative difference of the sides of a pixel from which an image is resampled to square pixels."""
+
+
+def read_clip(
+    source: str | PathLike[str] | ArrayLike,
+    *,
+    spacing_mm: float | None = None,
+    frame_time_ms: float | None = None,
+    cycle: tuple[int, int] | None = None,
+    crop: tuple[int, int, int, int] | None = None,
+) -> xr.Dataset:
+    """Read a recorded clip.
+
+    Parameters
+    ----------
+    source : str, Path or array_like
+        DICOM, video (.mp4, .avi, .mov, .mkv), .gif, NIfTI, .npy, a folder of images, or grey levels
+        (frame, axial, lateral).
+    spacing_mm : float, optional
+        Distance of pixel centres. Default: what the file says; videos and images say nothing.
+    frame_time_ms : float, optional
+        Time from frame to frame. Default: what the file says; videos and animations are often played more slowly than
+        the heart beat, so theirs is not taken.
+    cycle : tuple of int, optional
+        First frame, at end-diastole, and the frame after the last. Default: from the first R wave to the next where
+        the file has two, else the whole clip.
+    crop : tuple of int, optional
+        Part of the image: left, top, right, bottom, px of the file's region. Default: all.
+
+    Returns
+    -------
+    Dataset
+        `image` (frame, axial, lateral), uint8, with the coordinates time (s), axial and lateral (m), and the attributes
+        `source` and `spacing` (m).
+
+    Raises
+    ------
+    EchoError
+        If it is no clip, or its spacing or frame time is neither given nor in the file.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import echotruth as et
+    >>> clip = et.read_clip(np.zeros((10, 64, 48), np.uint8), spacing_mm=0.3, frame_time_ms=20)
+    >>> clip["image"].dims, float(clip["time"][-1])
+    (('frame', 'axial', 'lateral'), 0.18)
+    """
+    is_path = isinstance(source, str | PathLike)
+    name = str(source) if is_path else "array"
+    recording = files.read(Path(source)) if is_path else files.of_array(source)  # type: ignore[arg-type]
+    time = _time(recording, frame_time_ms, name)
+    first, stop = _cycle(recording, time, cycle, name)
+    frames = _cropped(recording.frames[first:stop], crop, name)
+    frames, spacing = _square(frames, _spacing(recording, spacing_mm, name))
+    axial, lateral = (np.arange(size) * spacing for size in frames.shape[1:])
+    return xr.Dataset(
+        {"image": (("frame", "axial", "lateral"), frames, {"units": "1", "long_name": "grey level"})},
+        coords={
+            "frame": np.arange(len(frames)),
+            "time": (
+                "frame",
+                time[first:stop] - time[first],
+                {"units": "s", "long_name": "time since the first frame"},
+            ),
+            "axial": ("axial", axial, {"units": "m", "long_name": "distance from the first row"}),
+            "lateral": ("lateral", lateral, {"units": "m", "long_name": "distance from the first column"}),
+        },
+        attrs={"source": name, "spacing": spacing},
+    )
+
+
+def _time(recording: Recording, frame_time_ms: float | None, name: str) -> Floats:
+    """Times (frame,), s."""
+    if frame_time_ms is not None:
+        if not (np.isfinite(frame_time_ms) and frame_time_ms > 0):
+            raise EchoError(f"frame_time_ms = {frame_time_ms}: give a positive number, the time from frame to frame")
+        return np.arange(len(recording.frames), dtype=float) * frame_time_ms * 1e-3
+    if not len(recording.time):
+        raise EchoError(f"{name}: does not say the time from frame to frame: give frame_time_ms")
+    if not (np.diff(recording.time) > 0).all():
+        raise EchoError(f"{name}: has frames of which the times do not increase: give frame_time_ms")
+    return recording.time
+
+
+def _spacing(recording: Recording, spacing_mm: float | None, name: str) -> tuple[float, float]:
+    """Axial and lateral distance of pixel centres, m."""
+    if spacing_mm is not None:
+        if not (np.isfinite(spacing_mm) and spacing_mm > 0):
+            raise EchoError(f"spacing_mm = {spacing_mm}: give a positive number, the side of a pixel")
+        return spacing_mm * 1e-3, spacing_mm * 1e-3
+    if not recording.spacing or not min(recording.spacing) > 0:
+        raise EchoError(f"{name}: does not say the side of its pixels: give spacing_mm")
+    axial, lateral = recording.spacing
+    return axial, lateral
+
+
+def _cycle(recording: Recording, time: Floats, cycle: tuple[int, int] | None, name: str) -> tuple[int, int]:
+    """First frame of the cycle and the frame after its last."""
+    frames = len(recording.frames)
+    if cycle is None and len(recording.r_waves) > 1:
+        waves = np.searchsorted(time, recording.r_waves[:2] - 1e-9)
+        cycle = (int(waves[0]), int(waves[1]))
+        cycle = cycle if cycle[1] - cycle[0] > 1 else (0, frames)
+    first, stop = cycle or (0, frames)
+    if not 0 <= first < first + 1 < stop <= frames:
+        raise EchoError(
+            f"cycle = {first}, {stop}: {name} has {frames} frames: give two frames or more from 0 to {frames}"
+        )
+    return first, stop
+
+
+def _cropped(frames: NDArray[np.uint8], crop: tuple[int, int, int, int] | None, name: str) -> NDArray[np.uint8]:
+    """Part of the frames."""
+    if crop is None:
+        return frames
+    left, top, right, bottom = crop
+    height, width = frames.shape[1:]
+    if not (0 <= left < right <= width and 0 <= top < bottom <= height):
+        raise EchoError(f"crop = {left}, {top}, {right}, {bottom}: {name} is {width} x {height} px: stay within it")
+    return frames[:, top:bottom, left:right]
+
+
+def _square(frames: NDArray[np.uint8], spacing: tuple[float, float]) -> tuple[NDArray[np.uint8], float]:
+    """Frames with square pixels, of the smaller side, and that side, m."""
+    side = min(spacing)
+    if max(spacing) - side <= SQUARE * side:
+        return frames, side
+    height, width = (round(size * length / side) for size, length in zip(frames.shape[1:], spacing, strict=True))
+    return np.stack([cv2.resize(frame, (width, height), interpolation=cv2.INTER_LINEAR) for frame in frames]), side

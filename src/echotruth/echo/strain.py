@@ -1,0 +1,212 @@
+"""Speckle tracking of one's own echo: displacement of the wall, its strain, its segments and its global strain."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from echotruth.arrays import Floats
+from echotruth.config.building import configure, tracker_section
+from echotruth.config.defaults import REFERENCE_FIELD_OF_VIEW_MM
+from echotruth.config.tracking import Tracking
+from echotruth.echo.failure import EchoError
+from echotruth.echo.wall import LAYERS, Wall
+from echotruth.evaluation.contours import Contours
+from echotruth.evaluation.courses import motion_courses, strain_courses
+from echotruth.evaluation.displacement_error import WallPoints
+from echotruth.evaluation.strain import RADIUS, StrainOperator
+from echotruth.repository.schema import LABELS
+from echotruth.tracking.tracker import track
+
+REFERENCE_WALL_MM = 0.85
+"""Thickness of the wall of the default mouse at end-diastole in a short axis. The lengths of the trackers suit it, and
+are scaled by the thickness of the wall that is drawn: a wall ten times as thick is tracked with windows ten times as
+large."""
+
+GRID_PX, IMAGE_PX = Tracking.model_fields["grid_px"].default, 512
+"""Spacing of the points in a mouse's clip, and the side of that clip, which shows 12 mm."""
+
+MIN_WALL_PX = 6.0
+"""Thickness of the wall below which nothing can be told of its strain, px."""
+
+Tracker = str | Callable[..., Any]
+
+
+def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_dic", **options: Any) -> xr.Dataset:
+    """Track the wall of a recorded clip, and take its strain.
+
+    Parameters
+    ----------
+    clip : Dataset
+        As :func:`echotruth.read_clip` returns it: one cycle, of which frame 0 is end-diastole.
+    wall : Wall
+        Drawn in frame 0.
+    tracker : str or callable
+        A method of config/README.md (`tracking.trackers`), `package.module:function`, or a function of six arguments
+        as `et.track` takes it.
+    **options
+        Settings of the method, or keyword arguments of the function. Lengths are by default those of the method for a
+        mouse, scaled by the thickness of the wall.
+
+    Returns
+    -------
+    Dataset
+        `displacement` (frame, point, plane), m, since frame 0, and `quality` (frame, point) at `position`
+        (point, plane), m; `strain` (frame, point, wall_component), Green-Lagrange; `region_strain` of the wall and its
+        three layers and `segment_strain` of AHA segments, in two measures; `line_strain` (frame, contour), the global
+        strain of endocardial, middle and epicardial line, circumferential (GCS) or longitudinal (GLS) as the view has
+        it; `rotation` (frame,), rad; `cavity_area` (frame,), m2. Attributes: `es_frame`, the frame of the smallest
+        cavity, and `end_systole`, s; `gcs_percent` or `gls_percent`, of the middle line at end-systole;
+        `drift_percent`, the displacement left in the last frame over the largest; `tracker`, `view`. NaN where there is
+        no estimate.
+
+    Raises
+    ------
+    EchoError
+        If the wall is not within the clip, or is too thin to be tracked.
+    ConfigError
+        If there is no such method or setting.
+    TrackerFailed
+        If the tracker finds no motion.
+
+    Notes
+    -----
+    Strain is that of :mod:`echotruth.evaluation.strain`, the operator by which tracked and true strain of a repository
+    are compared.
+    """
+    frames, spacing = _frames(clip)
+    mask = wall.mask(frames.shape[1:])
+    scale = _scale(wall, spacing)
+    points = _points(mask, spacing, scale)
+    settings = _settings(tracker, options, scale)
+    displacement, quality = track(frames, points, mask, spacing, clip["time"].values, 0, settings)
+    position, moved = points * spacing, displacement * spacing
+    depth, normal = wall.depth(points)
+    tissue = _tissue(wall, points, depth, position)
+    operator = StrainOperator(position, _axes(normal), RADIUS * REFERENCE_FIELD_OF_VIEW_MM * 1e-3 * scale)
+    strain = operator.strain(moved)
+    lines = _contours(wall, spacing)
+    pieces = operator.at(lines.position.reshape(-1, 2))(moved)[:, :, 0].reshape(len(frames), -1, 2, 2)
+    curves = strain_courses(strain, tissue) | motion_courses(moved, pieces, tissue, lines)
+    curves["cavity_area"] = _area(lines.position + pieces, lines.contour == 0)
+    values = {"displacement": moved, "quality": quality, "strain": strain} | curves
+    return _dataset(values, position, tissue, clip).assign_attrs(
+        _summary(curves, moved, clip["time"].values, wall),
+        tracker=tracker if isinstance(tracker, str) else getattr(tracker, "__name__", type(tracker).__name__),
+        view=wall.view,
+        source=clip.attrs.get("source", ""),
+        spacing=spacing,
+    )
+
+
+def _frames(clip: xr.Dataset) -> tuple[NDArray[np.uint8], float]:
+    """Grey levels (frame, axial, lateral), and the side of a pixel, m."""
+    if not isinstance(clip, xr.Dataset) or "image" not in clip or "spacing" not in clip.attrs:
+        raise EchoError("clip: must be what echotruth.read_clip returns, with image, time and the attribute spacing")
+    return clip["image"].transpose("frame", "axial", "lateral").values, float(clip.attrs["spacing"])
+
+
+def _scale(wall: Wall, spacing: float) -> float:
+    """Thickness of the wall over that of a mouse's."""
+    thickness = wall.thickness()
+    if thickness < MIN_WALL_PX:
+        raise EchoError(
+            f"the wall is {thickness:.1f} px thick: a clip of which it has {MIN_WALL_PX:g} px or more is needed"
+        )
+    return thickness * spacing * 1e3 / REFERENCE_WALL_MM
+
+
+def _points(mask: NDArray[np.bool_], spacing: float, scale: float) -> Floats:
+    """Pixels of the wall on a square grid, (n, 2): lateral, axial, px."""
+    wanted = GRID_PX * REFERENCE_FIELD_OF_VIEW_MM * 1e-3 / IMAGE_PX * scale / spacing
+    step = max(1, round(wanted))
+    rows, columns = np.nonzero(mask)
+    chosen = (rows % step == step // 2) & (columns % step == step // 2)
+    return np.column_stack([columns[chosen], rows[chosen]]).astype(float)
+
+
+def _settings(tracker: Tracker, options: dict[str, Any], scale: float) -> Any:
+    """Section of a tracker, with the lengths of a method scaled."""
+    side = REFERENCE_FIELD_OF_VIEW_MM * scale
+    return tracker_section(configure(bmode={"field_of_view_mm": side}), tracker, options)
+
+
+def _tissue(wall: Wall, points: Floats, depth: Floats, position: Floats) -> WallPoints:
+    """Layers and segments of the points."""
+    layer = np.clip(np.floor(LAYERS * depth).astype(int) + 1, 1, LAYERS)
+    return WallPoints(position, layer, wall.segment(points), position.mean(axis=0), wall.plane, LAYERS)
+
+
+def _axes(normal: Floats) -> Floats:
+    """Radial and tangential directions (point, 2, 2); the tangential one turns counter-clockwise in the image."""
+    return np.stack([normal, np.column_stack([normal[:, 1], -normal[:, 0]])], axis=1)
+
+
+def _contours(wall: Wall, spacing: float) -> Contours:
+    """The three lines as pieces, without a true motion."""
+    ends = [np.stack([line[:-1], line[1:]], axis=1) * spacing for line in wall.contours()]
+    index = np.repeat(np.arange(len(ends)), [len(part) for part in ends])
+    return Contours(np.concatenate(ends), np.empty((0, len(index), 2, 2)), index)
+
+
+def _area(ends: Floats, of_endocardium: NDArray[np.bool_]) -> Floats:
+    """Area (frame,), m2, inside the endocardium, whose ends are joined; NaN where less than half of it is known."""
+    line = ends[:, of_endocardium, 0]
+    area = np.full(len(line), np.nan)
+    for frame, points in enumerate(line):
+        known = points[np.isfinite(points).all(axis=1)]
+        if len(known) >= 0.5 * len(points):
+            x, y = known.T
+            area[frame] = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    return area
+
+
+def _summary(curves: dict[str, Floats], moved: Floats, time: Floats, wall: Wall) -> dict[str, Any]:
+    """End-systole, global strain of the middle line there, and drift."""
+    area = curves["cavity_area"]
+    es = int(np.nanargmin(area)) if np.isfinite(area).any() else 0
+    length = np.sqrt(np.nanmean((moved**2).sum(-1), axis=1)) if moved.size else np.zeros(len(time))
+    name = "gcs_percent" if wall.plane == "short_axis" else "gls_percent"
+    return {
+        "es_frame": es,
+        "end_systole": float(time[es]),
+        name: 100 * float(curves["line_strain"][es, 1]),
+        "drift_percent": 100 * float(length[-1] / np.nanmax(length)) if np.nanmax(length) > 0 else 0.0,
+    }
+
+
+DIMENSIONS = {
+    "displacement": ("frame point plane", "m", "displacement since the first frame"),
+    "quality": ("frame point", "1", "probability that the displacement is right, as the tracker sees it"),
+    "strain": ("frame point wall_component", "1", "Green-Lagrange strain since the first frame"),
+    "region_strain": ("frame measure region wall_component", "1", "mean strain of the wall and of its layers"),
+    "segment_strain": ("frame measure aha wall_component", "1", "mean strain of AHA segments"),
+    "line_strain": ("frame contour", "1", "relative change of the length of a line since the first frame"),
+    "rotation": ("frame", "rad", "rotation of the wall, counter-clockwise in the image"),
+    "cavity_area": ("frame", "m2", "area inside the endocardium"),
+}
+"""Name of an array of the result: its dimensions, unit and meaning."""
+
+
+def _dataset(values: dict[str, Floats], position: Floats, tissue: WallPoints, clip: xr.Dataset) -> xr.Dataset:
+    """The result, with its dimensions, coordinates and units."""
+    found: dict[str, Any] = {
+        name: (dims.split(), values[name], {"units": units, "long_name": text})
+        for name, (dims, units, text) in DIMENSIONS.items()
+    }
+    found["position"] = (["point", "plane"], position, {"units": "m", "long_name": "position in the first frame"})
+    found["layer"] = ("point", tissue.layer, {"long_name": "layer of the wall, 1 at the endocardium"})
+    found["segment"] = ("point", tissue.segment, {"long_name": "AHA segment, 0 where unknown"})
+    return xr.Dataset(
+        found,
+        coords={
+            "frame": clip["frame"],
+            "time": clip["time"],
+            "plane": ["lateral", "axial"],
+            "region": ["wall", "endocardial", "middle", "epicardial"],
+            "aha": np.arange(1, 18),
+            **{name: list(LABELS[name]) for name in ("measure", "wall_component", "contour")},
+        },
+    )

@@ -1,0 +1,296 @@
+"""The wall of a ventricle in an image, as drawn at end-diastole: its borders, directions, layers and AHA segments."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from skimage.draw import polygon2mask
+from skimage.measure import find_contours, label
+
+from echotruth.arrays import Floats
+from echotruth.echo.failure import EchoError
+from echotruth.echo.files import of_image
+
+View = Literal["basal", "mid", "apical", "four_chamber", "two_chamber", "three_chamber", "short_axis", "long_axis"]
+"""Views: three levels of the short axis, three apical views in the usual display, and either without AHA segments."""
+
+SEPTAL_AND_FREE = {"basal": ((2, 3), (4, 5, 6, 1)), "mid": ((8, 9), (10, 11, 12, 7)), "apical": ((14,), (15, 16, 13))}
+"""AHA segments of a short axis (Cerqueira 2002, Circulation 105:539): of the septum, from the anterior insertion of the
+right ventricle to the inferior one, and of the free wall, from there on."""
+
+LEFT_AND_RIGHT = {
+    "four_chamber": ((3, 9, 14), (16, 12, 6)),
+    "two_chamber": ((4, 10, 15), (13, 7, 1)),
+    "three_chamber": ((5, 11, 16), (14, 8, 2)),
+}
+"""AHA segments of an apical view, from the base of the wall at the left of the image to that at its right."""
+
+PARTS = ("endocardium", "epicardium", "anterior_insertion", "inferior_insertion")
+"""What a file of contours may name in its column `part`."""
+
+STEP = 0.25
+"""Distance of points along a border from which directions and depth are found, px."""
+
+LAYERS = 3
+"""Layers of the wall: of the endocardium, the middle and the epicardium."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """Borders of the wall at end-diastole.
+
+    Attributes
+    ----------
+    endocardium, epicardium : ndarray of shape (n, 2), px
+        Lateral, axial; 0 is the centre of the first pixel. Closed in a short axis, where the last point is joined to
+        the first; from the base by way of the apex to the base in a long axis.
+    view : str
+        One of :data:`View`.
+    insertions : ndarray of shape (2, 2), px, optional
+        Where the right ventricle joins the wall of a short axis: anterior, inferior. Without them there are no
+        segments.
+
+    Raises
+    ------
+    EchoError
+        If the view is unknown, a border has fewer than three points, or the borders enclose no wall.
+    """
+
+    endocardium: Floats
+    epicardium: Floats
+    view: str = "short_axis"
+    insertions: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if self.view not in get_args(View):
+            raise EchoError(f"view = {self.view!r}: use one of {', '.join(get_args(View))}")
+        for name in ("endocardium", "epicardium"):
+            points = np.asarray(getattr(self, name), float)
+            if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 3 or not np.isfinite(points).all():
+                raise EchoError(
+                    f"{name}: give three points or more, (n, 2) lateral and axial in px, not {points.shape}"
+                )
+            object.__setattr__(self, name, points)
+        if self.insertions is not None:
+            object.__setattr__(self, "insertions", np.asarray(self.insertions, float).reshape(2, 2))
+
+    @property
+    def plane(self) -> str:
+        """`short_axis` or `long_axis`."""
+        return "long_axis" if self.view in (*LEFT_AND_RIGHT, "long_axis") else "short_axis"
+
+    def mask(self, shape: tuple[int, int]) -> NDArray[np.bool_]:
+        """Pixels of the wall.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Axial and lateral size of the image, px.
+
+        Returns
+        -------
+        ndarray of shape (axial, lateral), bool
+
+        Raises
+        ------
+        EchoError
+            If the borders enclose no pixel, or the endocardium is not inside the epicardium.
+        """
+        if self.plane == "long_axis":
+            # Whichever way each border was drawn, the outline goes along one and back along the other.
+            back = self._epicardium_along[::-1]
+            inside = _filled(np.concatenate([self.endocardium, back]), shape)
+        else:
+            outer, inner = _filled(self.epicardium, shape), _filled(self.endocardium, shape)
+            if (inner & ~outer).sum() > 0.05 * inner.sum():
+                raise EchoError("the endocardium is not inside the epicardium: see that they are not exchanged")
+            inside = outer & ~inner
+        if not inside.any():
+            raise EchoError("the borders enclose no pixel of the image: give them in px of the clip that is tracked")
+        return inside
+
+    def thickness(self) -> float:
+        """Mean distance of the endocardium from the epicardium, px."""
+        return float(self._trees[1].query(self._lines[0])[0].mean())
+
+    def depth(self, position: Floats) -> tuple[Floats, Floats]:
+        """Depth in the wall and the direction through it.
+
+        Parameters
+        ----------
+        position : ndarray of shape (n, 2), px
+
+        Returns
+        -------
+        depth : ndarray of shape (n,)
+            Distance from the endocardium over the sum of the distances from both borders: 0 to 1.
+        normal : ndarray of shape (n, 2)
+            Unit vectors from the nearest point of the endocardium to that of the epicardium.
+        """
+        distances, nearest = zip(*(tree.query(position) for tree in self._trees), strict=True)
+        across = self._lines[1][nearest[1]] - self._lines[0][nearest[0]]
+        length = np.linalg.norm(across, axis=1, keepdims=True)
+        total = distances[0] + distances[1]
+        return distances[0] / np.where(total > 0, total, 1), across / np.where(length > 0, length, 1)
+
+    def segment(self, position: Floats) -> NDArray[np.int64]:
+        """AHA segment of positions (n, 2), px; 0 where the view or the missing insertions do not tell."""
+        if self.plane == "long_axis":
+            return self._segment_along(position)
+        if self.view not in SEPTAL_AND_FREE or self.insertions is None:
+            return np.zeros(len(position), np.int64)
+        centre = _filled_centroid(self.endocardium)
+        anterior, inferior = (_angle(point - centre) for point in self.insertions)
+        # The septum is the shorter way round from the anterior to the inferior insertion.
+        way = 1.0 if (inferior - anterior) % (2 * np.pi) <= np.pi else -1.0
+        septum = way * (inferior - anterior) % (2 * np.pi)
+        turned = way * (_angle(position - centre) - anterior) % (2 * np.pi)
+        septal, free = SEPTAL_AND_FREE[self.view]
+        of_septum = np.floor(turned / septum * len(septal)).astype(int)
+        of_free = np.floor((turned - septum) / (2 * np.pi - septum) * len(free)).astype(int)
+        number = np.where(
+            turned < septum,
+            np.take(septal, np.clip(of_septum, 0, len(septal) - 1)),
+            np.take(free, np.clip(of_free, 0, len(free) - 1)),
+        )
+        return number.astype(np.int64)
+
+    def contours(self) -> tuple[Floats, Floats, Floats]:
+        """Endocardial, middle and epicardial line, each (n, 2), px; a closed one ends where it begins.
+
+        The middle one is half-way from the endocardium to the nearest point of the epicardium.
+        """
+        endo = self._lines[0]
+        middle = (endo + self._lines[1][self._trees[1].query(endo)[1]]) / 2
+        return endo, middle, self._lines[1]
+
+    def _segment_along(self, position: Floats) -> NDArray[np.int64]:
+        """AHA segment of an apical view: thirds of both walls, along the endocardium from its left end to its right."""
+        if self.view not in LEFT_AND_RIGHT:
+            return np.zeros(len(position), np.int64)
+        line = self._lines[0] if self._lines[0][0, 0] <= self._lines[0][-1, 0] else self._lines[0][::-1]
+        base = (line[0] + line[-1]) / 2
+        apex = int(np.argmax(np.linalg.norm(line - base, axis=1)))
+        nearest = cKDTree(line).query(position)[1]
+        left, right = LEFT_AND_RIGHT[self.view]
+        on_left = np.floor(3 * nearest / max(apex, 1)).astype(int)
+        on_right = np.floor(3 * (nearest - apex) / max(len(line) - 1 - apex, 1)).astype(int)
+        numbers = np.where(
+            nearest < apex, np.take(left, np.clip(on_left, 0, 2)), np.take(right, np.clip(on_right, 0, 2))
+        )
+        return numbers.astype(np.int64)
+
+    @property
+    def _epicardium_along(self) -> Floats:
+        """The epicardium in the direction of the endocardium."""
+        ends = self.epicardium[[0, -1]]
+        apart = np.linalg.norm(ends - self.endocardium[0], axis=1)
+        return self.epicardium if apart[0] <= apart[1] else self.epicardium[::-1]
+
+    @cached_property
+    def _lines(self) -> tuple[Floats, Floats]:
+        """Endocardium and epicardium as points at equal distances."""
+        closed = self.plane == "short_axis"
+        return _resampled(self.endocardium, closed), _resampled(self._epicardium_along, closed)
+
+    @cached_property
+    def _trees(self) -> tuple[cKDTree, cKDTree]:
+        return cKDTree(self._lines[0]), cKDTree(self._lines[1])
+
+
+def read_wall(path: str | PathLike[str], view: str) -> Wall:
+    """Read the wall that was drawn in a clip.
+
+    Parameters
+    ----------
+    path : str or Path
+        A .csv with the columns part, lateral_px and axial_px, of which part is endocardium, epicardium,
+        anterior_insertion or inferior_insertion; or an image or .npy of which the pixels of the wall are not 0, a
+        closed ring.
+    view : str
+        `basal`, `mid` or `apical` level of the short axis; `four_chamber`, `two_chamber` or `three_chamber`; or
+        `short_axis` or `long_axis`, which have no AHA segments.
+
+    Returns
+    -------
+    Wall
+
+    Raises
+    ------
+    EchoError
+        If there is no such file, it holds no wall, or there is no such view.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise EchoError(f"{file}: is not there: draw the wall, and save its borders as this file")
+    try:
+        return _of_table(file, view) if file.suffix.lower() == ".csv" else _of_mask(of_image(file), view)
+    except EchoError as error:
+        raise error if str(error).startswith(str(file)) else EchoError(f"{file}: {error}") from None
+
+
+def _of_table(file: Path, view: str) -> Wall:
+    try:
+        table = pd.read_csv(file, comment="#", skipinitialspace=True)
+    except (ValueError, OSError) as error:
+        raise EchoError(f"{file}: is no table that can be read: {' '.join(str(error).split())[:200]}") from None
+    if missing := [name for name in ("part", "lateral_px", "axial_px") if name not in table]:
+        raise EchoError(f"{file}: has no column {missing[0]}: give part, lateral_px and axial_px")
+    if unknown := sorted(set(table["part"].astype(str)) - set(PARTS)):
+        raise EchoError(f"{file}: part = {unknown[0]}: use {', '.join(PARTS)}")
+    numbers = table[["lateral_px", "axial_px"]].apply(pd.to_numeric, errors="coerce").to_numpy(float)
+    if not np.isfinite(numbers).all():
+        row = int(np.flatnonzero(~np.isfinite(numbers).all(axis=1))[0])
+        raise EchoError(f"{file}: row {row + 1} has no two numbers in lateral_px and axial_px")
+    points = {part: numbers[table["part"] == part] for part in PARTS}
+    given = [len(points[part]) for part in PARTS[2:]]
+    if given not in ([0, 0], [1, 1]):
+        raise EchoError(
+            f"{file}: has {given[0]} anterior and {given[1]} inferior insertions: give one of each, or none"
+        )
+    insertions = np.concatenate([points[part] for part in PARTS[2:]]) if sum(given) else None
+    return Wall(points["endocardium"], points["epicardium"], view, insertions)
+
+
+def _of_mask(mask: NDArray[np.bool_], view: str) -> Wall:
+    """Wall of a mask that is a ring: its borders are the outlines of the ring and of its hole."""
+    padded = np.pad(mask, 1)
+    holes = label(~padded, connectivity=1)
+    if holes.max() != 2:
+        raise EchoError("the mask is no closed ring around one cavity: give the borders as a table (.csv) instead")
+    outside = holes[0, 0]
+    cavity, whole = (holes != outside) & ~padded, holes != outside
+    inner, outer = (max(find_contours(part.astype(float), 0.5), key=len)[:-1, ::-1] - 1 for part in (cavity, whole))
+    return Wall(inner, outer, view)
+
+
+def _filled(outline: Floats, shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Pixels of an image of which the centre is inside an outline (n, 2), px."""
+    return polygon2mask(shape, outline[:, ::-1])
+
+
+def _filled_centroid(outline: Floats) -> Floats:
+    """Centroid of the area inside a closed outline (n, 2)."""
+    ahead = np.roll(outline, -1, axis=0)
+    cross = outline[:, 0] * ahead[:, 1] - ahead[:, 0] * outline[:, 1]
+    return ((outline + ahead) * cross[:, None]).sum(axis=0) / (3 * cross.sum())
+
+
+def _angle(vector: Floats) -> Floats:
+    """Angle of vectors (..., 2), rad."""
+    return np.arctan2(vector[..., 1], vector[..., 0])
+
+
+def _resampled(points: Floats, closed: bool) -> Floats:
+    """Points at equal distances along a line; a closed one ends where it begins."""
+    line = np.concatenate([points, points[:1]]) if closed else points
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    line, along = line[np.r_[True, np.diff(along) > 0]], along[np.r_[True, np.diff(along) > 0]]
+    wanted = np.linspace(0, along[-1], max(8, round(along[-1] / STEP)))
+    return np.column_stack([np.interp(wanted, along, line[:, axis]) for axis in (0, 1)])
