@@ -52,11 +52,17 @@ def read(path: Path) -> Recording:
 
 
 def _region(image: Any) -> Any:
-    """The largest two-dimensional region of an image, or None."""
+    """The largest two-dimensional region of an image, or None.
+
+    One that goes beyond the image is that of an image which was made smaller since: neither its place nor its scale
+    holds.
+    """
     regions = [
         region
         for region in getattr(image, "SequenceOfUltrasoundRegions", [])
         if getattr(region, "RegionSpatialFormat", None) == TWO_DIMENSIONAL
+        and int(region.RegionLocationMaxX1) < int(image.Columns)
+        and int(region.RegionLocationMaxY1) < int(image.Rows)
     ]
     return max(regions, key=_area, default=None)
 

@@ -72,7 +72,7 @@ def _animation(path: Path) -> Recording:
 def _video(path: Path) -> Recording:
     """Frames of a video."""
     try:
-        reader = imageio_ffmpeg.read_frames(str(path), pix_fmt="gray")
+        reader = imageio_ffmpeg.read_frames(str(path), pix_fmt="gray", bits_per_pixel=8)
         width, height = next(reader)["size"]
         frames = [np.frombuffer(frame, np.uint8).reshape(height, width) for frame in reader]
     except (OSError, RuntimeError, StopIteration):

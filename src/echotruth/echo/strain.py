@@ -13,6 +13,7 @@ from echotruth.config.defaults import REFERENCE_FIELD_OF_VIEW_MM
 from echotruth.config.tracking import Tracking
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall import LAYERS, Wall
+from echotruth.evaluation import statistics
 from echotruth.evaluation.contours import Contours
 from echotruth.evaluation.courses import motion_courses, strain_courses
 from echotruth.evaluation.displacement_error import WallPoints
@@ -30,6 +31,10 @@ GRID_PX, IMAGE_PX = Tracking.model_fields["grid_px"].default, 512
 
 MIN_WALL_PX = 6.0
 """Thickness of the wall below which nothing can be told of its strain, px."""
+
+LARGEST_FIRST, LARGEST_DRIFT, LEAST_COVERAGE = 1.05, 20.0, 90.0
+"""Largest cavity of the cycle over that of the first frame; drift, %; and share of points with an estimate at
+end-systole, %: beyond these a note says so."""
 
 Tracker = str | Callable[..., Any]
 
@@ -59,8 +64,8 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
         strain of endocardial, middle and epicardial line, circumferential (GCS) or longitudinal (GLS) as the view has
         it; `rotation` (frame,), rad; `cavity_area` (frame,), m2. Attributes: `es_frame`, the frame of the smallest
         cavity, and `end_systole`, s; `gcs_percent` or `gls_percent`, of the middle line at end-systole;
-        `drift_percent`, the displacement left in the last frame over the largest; `tracker`, `view`. NaN where there is
-        no estimate.
+        `drift_percent`, the displacement left in the last frame over the largest; `notes`, what should make one doubt,
+        a line each; `tracker`, `view`. NaN where there is no estimate.
 
     Raises
     ------
@@ -90,9 +95,12 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     lines = _contours(wall, spacing)
     pieces = operator.at(lines.position.reshape(-1, 2))(moved)[:, :, 0].reshape(len(frames), -1, 2, 2)
     curves = strain_courses(strain, tissue) | motion_courses(moved, pieces, tissue, lines)
-    curves["cavity_area"] = _area(lines.position + pieces, lines.contour == 0)
-    values = {"displacement": moved, "quality": quality, "strain": strain} | curves
-    return _dataset(values, position, tissue, clip).assign_attrs(
+    place = (lines.position + pieces)[:, :, 0]
+    curves["cavity_area"] = _area(place[:, lines.contour == 0])
+    values = {"displacement": moved, "quality": quality, "strain": strain, "line_position": place} | curves
+    data = _dataset(values, position, tissue, clip)
+    data["line_contour"] = ("line_point", lines.contour, {"long_name": "index of the contour of a point of a line"})
+    return data.assign_attrs(
         _summary(curves, moved, clip["time"].values, wall),
         tracker=tracker if isinstance(tracker, str) else getattr(tracker, "__name__", type(tracker).__name__),
         view=wall.view,
@@ -121,7 +129,7 @@ def _scale(wall: Wall, spacing: float) -> float:
 def _points(mask: NDArray[np.bool_], spacing: float, scale: float) -> Floats:
     """Pixels of the wall on a square grid, (n, 2): lateral, axial, px."""
     wanted = GRID_PX * REFERENCE_FIELD_OF_VIEW_MM * 1e-3 / IMAGE_PX * scale / spacing
-    step = max(1, round(wanted))
+    step = max(1, int(wanted))
     rows, columns = np.nonzero(mask)
     chosen = (rows % step == step // 2) & (columns % step == step // 2)
     return np.column_stack([columns[chosen], rows[chosen]]).astype(float)
@@ -151,9 +159,8 @@ def _contours(wall: Wall, spacing: float) -> Contours:
     return Contours(np.concatenate(ends), np.empty((0, len(index), 2, 2)), index)
 
 
-def _area(ends: Floats, of_endocardium: NDArray[np.bool_]) -> Floats:
-    """Area (frame,), m2, inside the endocardium, whose ends are joined; NaN where less than half of it is known."""
-    line = ends[:, of_endocardium, 0]
+def _area(line: Floats) -> Floats:
+    """Area (frame,), m2, inside a line (frame, n, 2) whose ends are joined; NaN where less than half of it is known."""
     area = np.full(len(line), np.nan)
     for frame, points in enumerate(line):
         known = points[np.isfinite(points).all(axis=1)]
@@ -167,14 +174,34 @@ def _summary(curves: dict[str, Floats], moved: Floats, time: Floats, wall: Wall)
     """End-systole, global strain of the middle line there, and drift."""
     area = curves["cavity_area"]
     es = int(np.nanargmin(area)) if np.isfinite(area).any() else 0
-    length = np.sqrt(np.nanmean((moved**2).sum(-1), axis=1)) if moved.size else np.zeros(len(time))
+    coverage = 100 * float(np.isfinite(moved[es]).all(axis=-1).mean())
+    length = np.sqrt(statistics.mean((moved**2).sum(-1)[..., None], np.ones((1, moved.shape[1]), bool))[:, 0, 0])
+    largest = float(np.nanmax(length)) if np.isfinite(length).any() else 0.0
+    drift = 100 * float(length[-1]) / largest if largest > 0 else 0.0
     name = "gcs_percent" if wall.plane == "short_axis" else "gls_percent"
     return {
         "es_frame": es,
         "end_systole": float(time[es]),
         name: 100 * float(curves["line_strain"][es, 1]),
-        "drift_percent": 100 * float(length[-1] / np.nanmax(length)) if np.nanmax(length) > 0 else 0.0,
+        "drift_percent": drift,
+        "notes": "\n".join(_notes(area, drift, coverage)),
     }
+
+
+def _notes(area: Floats, drift: float, coverage: float) -> list[str]:
+    """What should make one doubt."""
+    notes = []
+    if np.isfinite(area).any() and np.nanmax(area) > LARGEST_FIRST * area[0]:
+        frame, more = int(np.nanargmax(area)), 100 * (np.nanmax(area) / area[0] - 1)
+        notes.append(
+            f"the cavity is largest in frame {frame}, by {more:.0f} % more than in the first: begin the cycle at "
+            "end-diastole"
+        )
+    if not drift <= LARGEST_DRIFT:
+        notes.append(f"{drift:.0f} % of the largest displacement is left in the last frame: is it one whole cycle?")
+    if coverage < LEAST_COVERAGE:
+        notes.append(f"only {coverage:.0f} % of the points have an estimate at end-systole")
+    return notes
 
 
 DIMENSIONS = {
@@ -184,6 +211,7 @@ DIMENSIONS = {
     "region_strain": ("frame measure region wall_component", "1", "mean strain of the wall and of its layers"),
     "segment_strain": ("frame measure aha wall_component", "1", "mean strain of AHA segments"),
     "line_strain": ("frame contour", "1", "relative change of the length of a line since the first frame"),
+    "line_position": ("frame line_point plane", "m", "points of the endocardial, middle and epicardial line"),
     "rotation": ("frame", "rad", "rotation of the wall, counter-clockwise in the image"),
     "cavity_area": ("frame", "m2", "area inside the endocardium"),
 }

@@ -68,8 +68,7 @@ class Wall:
     insertions: Floats | None = None
 
     def __post_init__(self) -> None:
-        if self.view not in get_args(View):
-            raise EchoError(f"view = {self.view!r}: use one of {', '.join(get_args(View))}")
+        _check_view(self.view)
         for name in ("endocardium", "epicardium"):
             points = np.asarray(getattr(self, name), float)
             if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 3 or not np.isfinite(points).all():
@@ -164,11 +163,12 @@ class Wall:
     def contours(self) -> tuple[Floats, Floats, Floats]:
         """Endocardial, middle and epicardial line, each (n, 2), px; a closed one ends where it begins.
 
-        The middle one is half-way from the endocardium to the nearest point of the epicardium.
+        The middle one is half-way between points of the two borders that divide these in the same ratio.
         """
-        endo = self._lines[0]
-        middle = (endo + self._lines[1][self._trees[1].query(endo)[1]]) / 2
-        return endo, middle, self._lines[1]
+        endo, epi = self._lines
+        share = np.linspace(0, 1, len(endo))
+        opposite = np.column_stack([np.interp(share, np.linspace(0, 1, len(epi)), epi[:, axis]) for axis in (0, 1)])
+        return endo, (endo + opposite) / 2, epi
 
     def _segment_along(self, position: Floats) -> NDArray[np.int64]:
         """AHA segment of an apical view: thirds of both walls, along the endocardium from its left end to its right."""
@@ -196,8 +196,11 @@ class Wall:
     @cached_property
     def _lines(self) -> tuple[Floats, Floats]:
         """Endocardium and epicardium as points at equal distances."""
-        closed = self.plane == "short_axis"
-        return _resampled(self.endocardium, closed), _resampled(self._epicardium_along, closed)
+        if self.plane == "long_axis":
+            return _resampled(self.endocardium), _resampled(self._epicardium_along)
+        # Both run the same way round from the point at the right of the centre.
+        centre = _filled_centroid(self.endocardium)
+        return _resampled(_from_right(self.endocardium, centre)), _resampled(_from_right(self.epicardium, centre))
 
     @cached_property
     def _trees(self) -> tuple[cKDTree, cKDTree]:
@@ -227,12 +230,18 @@ def read_wall(path: str | PathLike[str], view: str) -> Wall:
         If there is no such file, it holds no wall, or there is no such view.
     """
     file = Path(path)
+    _check_view(view)
     if not file.is_file():
         raise EchoError(f"{file}: is not there: draw the wall, and save its borders as this file")
     try:
         return _of_table(file, view) if file.suffix.lower() == ".csv" else _of_mask(of_image(file), view)
     except EchoError as error:
         raise error if str(error).startswith(str(file)) else EchoError(f"{file}: {error}") from None
+
+
+def _check_view(view: str) -> None:
+    if view not in get_args(View):
+        raise EchoError(f"view = {view!r}: use one of {', '.join(get_args(View))}")
 
 
 def _of_table(file: Path, view: str) -> Wall:
@@ -287,9 +296,18 @@ def _angle(vector: Floats) -> Floats:
     return np.arctan2(vector[..., 1], vector[..., 0])
 
 
-def _resampled(points: Floats, closed: bool) -> Floats:
-    """Points at equal distances along a line; a closed one ends where it begins."""
-    line = np.concatenate([points, points[:1]]) if closed else points
+def _from_right(outline: Floats, centre: Floats) -> Floats:
+    """A closed outline clockwise in the image from where it crosses the lateral direction, where it also ends."""
+    ahead = np.roll(outline, -1, axis=0)
+    clockwise = np.sum(outline[:, 0] * ahead[:, 1] - ahead[:, 0] * outline[:, 1]) > 0
+    line = outline if clockwise else outline[::-1]
+    fine = _resampled(np.concatenate([line, line[:1]]))[:-1]
+    start = int(np.argmin(np.abs(_angle(fine - centre))))
+    return np.concatenate([fine[start:], fine[: start + 1]])
+
+
+def _resampled(line: Floats) -> Floats:
+    """Points at equal distances along a line."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     line, along = line[np.r_[True, np.diff(along) > 0]], along[np.r_[True, np.diff(along) > 0]]
     wanted = np.linspace(0, along[-1], max(8, round(along[-1] / STEP)))

@@ -1,0 +1,107 @@
+"""`echotruth track`: strain of one's own echo."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from echotruth.cli.command import fail, named
+
+VIEWS = "basal, mid or apical; four_chamber, two_chamber or three_chamber; short_axis or long_axis without segments"
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth track`."""
+    parser.add_argument("clip", nargs="+", type=Path, help="DICOM, video, .gif, NIfTI, .npy or folder of images")
+    text = (
+        "borders of the wall at end-diastole, .csv or mask (default: CLIP with the ending .wall.csv); of one clip only"
+    )
+    parser.add_argument("--wall", type=Path, help=text)
+    parser.add_argument("--view", required=True, help=f"of all clips: {VIEWS}")
+    parser.add_argument("--tracker", default="bspline_dic", help="method of tracking (default: bspline_dic)")
+    parser.add_argument("--spacing-mm", type=float, help="side of a pixel (default: what the file says)")
+    parser.add_argument("--frame-time-ms", type=float, help="time from frame to frame (default: what the file says)")
+    text = "first frame of the cycle, at end-diastole, and the frame after its last (default: from R wave to R, or all)"
+    parser.add_argument("--cycle", type=int, nargs=2, metavar=("FIRST", "STOP"), help=text)
+    sides = ("LEFT", "TOP", "RIGHT", "BOTTOM")
+    parser.add_argument("--crop", type=int, nargs=4, metavar=sides, help="part of the image, px (default: all)")
+    parser.add_argument("-o", "--output", type=Path, default=Path("strain"), help="folder (default: strain)")
+
+
+def track(arguments: argparse.Namespace) -> int:
+    """Track the wall in recorded clips, and take its strain.
+
+    Of each clip it writes a page (NAME.png) and its curves (NAME.csv), and of all together the table strain.csv, into
+    the folder. The wall is drawn at end-diastole: columns part (endocardium, epicardium, anterior_insertion,
+    inferior_insertion), lateral_px and axial_px.
+
+    examples:
+      echotruth track mouse.dcm --view mid
+      echotruth track *.dcm --view four_chamber -o strain
+      echotruth track mouse.mp4 --wall ring.png --view short_axis --spacing-mm 0.03 --frame-time-ms 4
+
+    exit status:
+      0  all clips are tracked
+      1  some are not: each is told
+      2  none is, or an option is wrong
+    """
+    from echotruth.echo.failure import EchoError
+
+    clips: list[Path] = arguments.clip
+    if arguments.wall and len(clips) > 1:
+        return fail(f"--wall {arguments.wall}: suits one clip: name those of {len(clips)} clips CLIP.wall.csv")
+    names = [_stem(path) for path in clips]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        return fail(f"{twice}: two clips have this name: track them into folders of their own (--output)")
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    rows: list[dict[str, Any]] = []
+    for number, path in enumerate(clips, 1):
+        if len(clips) > 1:
+            print(f"{number} of {len(clips)}: {path}", file=sys.stderr)
+        try:
+            rows.append(_tracked(path, arguments))
+        except (EchoError, ValueError) as error:
+            print(named(str(error)), file=sys.stderr)
+    if not rows:
+        return 2
+    _write_table(rows, arguments.output / "strain.csv")
+    return 0 if len(rows) == len(clips) else 1
+
+
+def _stem(path: Path) -> str:
+    """Name of a clip without its ending."""
+    return path.name if path.is_dir() else path.name.removesuffix(".gz").rpartition(".")[0] or path.name
+
+
+def _tracked(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
+    """Track one clip, write its page and its curves, and return its row of the table."""
+    from echotruth.echo import page
+    from echotruth.echo.clip import read_clip
+    from echotruth.echo.strain import speckle_tracking
+    from echotruth.echo.wall import read_wall
+
+    name = _stem(path)
+    wall = read_wall(arguments.wall or path.parent / f"{name}.wall.csv", arguments.view)
+    clip = read_clip(
+        path,
+        spacing_mm=arguments.spacing_mm,
+        frame_time_ms=arguments.frame_time_ms,
+        cycle=arguments.cycle,
+        crop=arguments.crop,
+    )
+    strain = speckle_tracking(clip, wall, arguments.tracker)
+    page.draw(clip, strain, arguments.output / f"{name}.png")
+    page.curves(strain).to_csv(arguments.output / f"{name}.csv", index=False, float_format="%.4f")
+    row = page.summary(strain)
+    kind = "GCS" if "gcs_percent" in strain.attrs else "GLS"
+    for note in str(strain.attrs["notes"]).splitlines():
+        print(named(f"{path}: {note}"), file=sys.stderr)
+    print(f"{path}: {kind} {strain.attrs[f'{kind.lower()}_percent']:.1f} %, {arguments.output / name}.png")
+    return row
+
+
+def _write_table(rows: list[dict[str, Any]], path: Path) -> None:
+    """Write the table of all clips."""
+    import pandas as pd
+
+    pd.DataFrame(rows).to_csv(path, index=False, float_format="%.3f")

@@ -1,0 +1,138 @@
+"""Strain of a recorded clip: that of a ring whose motion is known, at any scale, and what makes one doubt."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from contracting_ring import ENDO, EPI, FRAMES
+
+import echotruth as et
+from echotruth.cli import main
+from echotruth.echo.failure import EchoError
+
+MIDDLE = (ENDO + EPI) / 2
+
+
+def clip_of(ring, frames=slice(None), spacing_mm=0.04):
+    return et.read_clip(ring.frames[frames], spacing_mm=spacing_mm, frame_time_ms=10)
+
+
+@pytest.fixture(scope="module")
+def tracked(ring):
+    return et.speckle_tracking(clip_of(ring), ring.wall())
+
+
+def test_global_strain_rotation_and_cavity_are_those_of_the_motion(ring, tracked):
+    for contour, radius in zip(("endocardial", "middle", "epicardial"), (ENDO, MIDDLE, EPI), strict=True):
+        found = tracked["line_strain"].sel(contour=contour)
+        np.testing.assert_allclose(found, ring.line(radius), atol=0.01 if contour == "middle" else 0.02)
+    np.testing.assert_allclose(tracked["rotation"], 0, atol=0.01)
+    area = np.pi * (ENDO**2 - ring.lost) * (0.04e-3) ** 2
+    np.testing.assert_allclose(tracked["cavity_area"], area, rtol=0.03)
+    assert tracked.attrs["es_frame"] == FRAMES // 2
+    assert tracked.attrs["gcs_percent"] == pytest.approx(100 * ring.line(MIDDLE)[FRAMES // 2], abs=1)
+    assert "gls_percent" not in tracked.attrs and not tracked.attrs["notes"]
+
+
+def test_segments_of_an_even_ring_are_equal(ring, tracked):
+    strain = tracked["segment_strain"].sel(measure="engineering", wall_component="TT").isel(frame=FRAMES // 2)
+    seen = strain.dropna("aha")
+    assert seen["aha"].values.tolist() == [7, 8, 9, 10, 11, 12]
+    assert float(seen.max() - seen.min()) < 0.02
+    assert float(seen.mean()) == pytest.approx(ring.line(MIDDLE)[FRAMES // 2], abs=0.015)
+
+
+def test_size_of_the_heart_does_not_matter(ring, tracked):
+    human = et.speckle_tracking(clip_of(ring, spacing_mm=0.4), ring.wall())
+    np.testing.assert_allclose(human["line_strain"], tracked["line_strain"], atol=1e-6)
+    np.testing.assert_allclose(human["cavity_area"], 100 * tracked["cavity_area"], rtol=1e-4)
+
+
+def test_peaks_are_read_as_those_of_a_repository(tracked):
+    peaks = et.strain_peaks(tracked[["line_strain", "time"]])
+    assert float(peaks["line_strain_peak"].sel(contour="middle")) == pytest.approx(-0.10, abs=0.04)
+
+
+def test_any_tracker_will_do(ring):
+    still = et.speckle_tracking(
+        clip_of(ring), ring.wall(), lambda frames, points, *rest: np.zeros((len(frames), *points.shape))
+    )
+    np.testing.assert_allclose(still["line_strain"], 0, atol=1e-9)
+    np.testing.assert_allclose(still["cavity_area"], np.pi * ENDO**2 * (0.04e-3) ** 2, rtol=0.01)
+    dis = et.speckle_tracking(clip_of(ring), ring.wall(), "dis")
+    assert dis.attrs["gcs_percent"] == pytest.approx(100 * ring.line(MIDDLE)[FRAMES // 2], abs=2)
+
+
+def test_clip_that_begins_elsewhere_and_does_not_close_is_told(ring):
+    strain = et.speckle_tracking(clip_of(ring, slice(4, FRAMES)), ring.wall(), "dis")
+    first, second = strain.attrs["notes"].splitlines()
+    assert "the cavity is largest in frame 5" in first and "begin the cycle at end-diastole" in first
+    assert "is left in the last frame" in second
+
+
+def test_wall_too_thin_and_no_clip_are_told(ring):
+    wall = ring.wall()
+    thin = et.Wall(wall.endocardium, 79.5 + (wall.endocardium - 79.5) * 1.1)
+    with pytest.raises(EchoError, match=r"the wall is 3.6 px thick"):
+        et.speckle_tracking(clip_of(ring), thin)
+    with pytest.raises(EchoError, match=r"clip: must be what echotruth.read_clip returns"):
+        et.speckle_tracking(ring.frames, wall)
+
+
+def run(monkeypatch, capsys, *arguments):
+    monkeypatch.setattr("sys.argv", ["echotruth", "track", *map(str, arguments)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return ended.value.code, capsys.readouterr()
+
+
+def test_command_writes_page_curves_and_table_of_a_batch(ring, tmp_path, monkeypatch, capsys):
+    wall = ring.wall()
+    for name in ("one", "two", "three"):
+        np.save(tmp_path / f"{name}.npy", ring.frames)
+    rows = [("endocardium", *point) for point in wall.endocardium] + [
+        ("epicardium", *point) for point in wall.epicardium
+    ]
+    for name in ("one", "two"):
+        pd.DataFrame(rows, columns=["part", "lateral_px", "axial_px"]).to_csv(
+            tmp_path / f"{name}.wall.csv", index=False
+        )
+    clips = [tmp_path / f"{name}.npy" for name in ("one", "two", "three")]
+    options = [
+        "--view",
+        "mid",
+        "--spacing-mm",
+        "0.04",
+        "--frame-time-ms",
+        "10",
+        "--tracker",
+        "dis",
+        "-o",
+        tmp_path / "out",
+    ]
+    status, told = run(monkeypatch, capsys, *clips, *options)
+    assert status == 1
+    assert "three.wall.csv: is not there: draw the wall" in told.err
+    table = pd.read_csv(tmp_path / "out/strain.csv")
+    assert len(table) == 2 and table["gcs_percent"].iloc[0] == table["gcs_percent"].iloc[1]
+    curves = pd.read_csv(tmp_path / "out/one.csv")
+    np.testing.assert_allclose(curves["time_ms"], 10 * np.arange(FRAMES))
+    np.testing.assert_allclose(curves["gcs_middle_percent"], 100 * ring.line(MIDDLE), atol=2)
+    assert (tmp_path / "out/one.png").stat().st_size > 20_000
+
+
+def test_command_refuses_what_cannot_be(ring, tmp_path, monkeypatch, capsys):
+    np.save(tmp_path / "one.npy", ring.frames)
+    clip, wall, scale = tmp_path / "one.npy", tmp_path / "ring.npy", ("--spacing-mm", 1, "--frame-time-ms", 1)
+    np.save(wall, ring.wall().mask(ring.frames.shape[1:]))
+    for arguments, sentence in (
+        ([clip, "--view", "middle"], "view = 'middle'"),
+        ([clip, clip, "--view", "mid"], "two clips have this name"),
+        ([clip, "--view", "mid"], "one.wall.csv: is not there: draw the wall"),
+        ([clip, "--view", "mid", "--wall", wall], "one.npy: does not say the time from frame to frame"),
+        ([clip, "--view", "mid", "--wall", wall, *scale, "--tracker", "nothing"], "method = 'nothing'"),
+        ([clip, clip.with_name("two.npy"), "--view", "mid", "--wall", wall], "suits one clip"),
+    ):
+        status, told = run(monkeypatch, capsys, *arguments, "-o", tmp_path / "out")
+        assert status == 2
+        assert sentence in told.err
+        assert "Traceback" not in told.err
