@@ -11,7 +11,9 @@ from echotruth.config.realism import Tissue
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, MaterialPoints, interpolate
 from echotruth.heart import Heart
+from echotruth.imaging.medium.backscatter import FibreEcho
 from echotruth.imaging.medium.blood import Blood, Cavity, seed_blood
+from echotruth.imaging.medium.borders import Border, border_amplitude, seed_border
 from echotruth.imaging.medium.random_process import Random, ar1, brownian, diffusion_std
 from echotruth.imaging.medium.surroundings import SurroundingsMotion, outside_heart, seed_surroundings
 from echotruth.imaging.medium.wall import Scatterers, seed_wall
@@ -42,15 +44,21 @@ def seed_medium(config: Config, heart: Heart, plane: Plane, random: Random, in_b
     Returns
     -------
     dict of ndarray
-        cell, xi and amplitude of the scatterers in the wall; blood_* and surroundings_* where there are such.
+        cell, xi and amplitude of the scatterers in the wall; endocardium_*, epicardium_*, blood_* and surroundings_*
+        where there are such.
     """
     frames = [heart.positions(frame) for frame in range(len(heart.displacement))]
     wall = seed_wall(config, heart, plane, random("phantom"))
     arrays: Arrays = {"cell": wall.points.cell, "xi": wall.points.xi, "amplitude": wall.amplitude}
     arrays = _ever_in_beam(arrays, (wall.image_positions(nodes, heart.cells, plane) for nodes in frames), in_beam)
+    for name, (surface, level_dB) in _borders(config).items():
+        facets, xi = seed_border(config, heart, surface, random(name))
+        border = Border(facets, xi, border_amplitude(config, level_dB))
+        candidates: Arrays = {f"{name}_facets": facets, f"{name}_xi": xi}
+        arrays |= _ever_in_beam(candidates, (plane.to_image(border.positions(nodes)) for nodes in frames), in_beam)
     if config.realism.blood.level_dB is not None:
         blood, cavity = seed_blood(config, heart, random("blood")), Cavity(heart.endo)
-        candidates: Arrays = {"blood_cell": blood.points.cell, "blood_xi": blood.points.xi}
+        candidates = {"blood_cell": blood.points.cell, "blood_xi": blood.points.xi}
         candidates |= {"blood_jacobian_threshold": blood.jacobian_threshold, "blood_amplitude": blood.amplitude}
         carried = (interpolate(cavity.positions(nodes), cavity.cells, blood.points) for nodes in frames)
         offset = MAX_DIFFUSION * diffusion_std(read_loop(config.loop).period, *_blood_decorrelation(config))
@@ -76,10 +84,20 @@ def _moved_towards_plane(position: Floats, distance: float) -> Floats:
     return np.column_stack([position[:, :2], elevation])
 
 
+def _borders(config: Config) -> dict[str, tuple[str, float]]:
+    """Borders that echo: their surface of the mesh and their level, dB."""
+    levels = {name: getattr(config.realism.borders, f"{name}_dB") for name in BORDERS}
+    return {name: (BORDERS[name], level) for name, level in levels.items() if level is not None}
+
+
 def _blood_decorrelation(config: Config) -> tuple[float, float]:
     """Time constant of the echo of blood, s, and wavelength, m."""
     probe = config.probe.si()
     return config.realism.blood.si().decorrelation_time, probe.sound_speed / probe.frequency
+
+
+BORDERS = {"endocardium": "endo", "epicardium": "epi"}
+"""Names of the borders of the wall, and of their surfaces of the mesh."""
 
 
 class Medium:
@@ -104,6 +122,13 @@ class Medium:
         points = MaterialPoints(seeded["cell"], seeded["xi"])
         self._wall = Scatterers(points, seeded["amplitude"], config.phantom.in_plane_only)
         self._wall_amplitude = self._amplitudes(seeded["amplitude"], time, "wall", random)
+        backscatter = config.realism.backscatter
+        depends = backscatter.anisotropy_dB or backscatter.fibre_strain_dB
+        self._fibre_echo = FibreEcho(backscatter, heart, plane, points) if depends else None
+        self._borders = [
+            Border(seeded[f"{name}_facets"], seeded[f"{name}_xi"], border_amplitude(config, level_dB))
+            for name, (_, level_dB) in _borders(config).items()
+        ]
         self._blood = self._surroundings = None
         if "blood_cell" in seeded:
             points = MaterialPoints(seeded["blood_cell"], seeded["blood_xi"])
@@ -123,7 +148,10 @@ class Medium:
     def wall(self, frame: int) -> tuple[Floats, Floats, Floats]:
         """Positions in the image (n, 3), m, amplitudes (n,) and exponents (n,) of the scatterers in the wall."""
         position = self._wall.image_positions(self._heart.positions(frame), self._heart.cells, self._plane)
-        return _of_tissue(self._config.phantom, position, self._wall_amplitude(frame))
+        amplitude = self._wall_amplitude(frame)
+        if self._fibre_echo is not None:
+            amplitude = amplitude * self._fibre_echo(frame, position)
+        return _of_tissue(self._config.phantom, position, amplitude)
 
     def in_wall(self, frame: int, lateral: Floats, axial: Floats) -> NDArray[np.bool_]:
         """Whether points of the image lie in the wall in a frame; all arrays of one shape, coordinates in m."""
@@ -134,6 +162,10 @@ class Medium:
     def __call__(self, frame: int) -> tuple[Floats, Floats, Floats]:
         """Positions in the image (n, 3), m, amplitudes (n,) and exponents (n,) of all scatterers in a frame."""
         parts, realism = [self.wall(frame)], self._config.realism
+        nodes = self._heart.positions(frame)
+        for border in self._borders:
+            position = self._plane.to_image(border.positions(nodes))
+            parts.append(_of_tissue(self._config.phantom, position, border.amplitudes(nodes, self._heart.nodes)))
         if self._blood is not None:
             position, amplitude = self._blood.at(frame, self._heart, self._diffusion)
             parts.append(_of_tissue(realism.blood, self._plane.to_image(position), amplitude))

@@ -1,0 +1,63 @@
+"""Echo of muscle that depends on its fibres: on their angle to the beam, and on how much they have shortened.
+
+Muscle scatters most across its fibres and least along them: by 14.5 dB in fixed human myocardium at 5 MHz (Hoffmeister
+et al., J Acoust Soc Am 97 (1995) 1307). In every beat its echo is strongest at end-diastole and weakest at end-systole,
+by 3.5 dB in dogs (Madaras et al., Ultrason Imaging 5 (1983) 229) and 4.6 +- 0.2 dB in mice (Kovacs et al., Ultrasonic
+tissue characterization of the mouse myocardium). It changes little where muscle is ischemic (Barzilai et al., Am J
+Physiol 247 (1984) H478), and in isolated muscle where it shortens, but not where its length is held (IEEE Trans Ultrason
+Ferroelectr Freq Control 33 (1986) 347): here it follows the strain along the fibres.
+"""
+
+import numpy as np
+
+from echotruth.arrays import Floats
+from echotruth.config.realism import Backscatter
+from echotruth.fem.tetrahedra import MaterialPoints, gradient
+from echotruth.heart import Heart
+from echotruth.imaging.view import Plane
+
+
+class FibreEcho:
+    """Factors on the amplitudes of the scatterers in the wall, frame by frame.
+
+    The echo power is changed by A (sin^2 theta - 2/3) + k (lambda - 1) dB, where theta is the angle between the fibres
+    and the direction from the centre of the array, and lambda the stretch of the fibres since end-diastole. The mean of
+    the first term over all directions is 0. The forms, sin^2 and linear, are assumed.
+
+    Parameters
+    ----------
+    backscatter : Backscatter
+        A = anisotropy_dB and k = fibre_strain_dB.
+    heart : Heart
+        With the fibres of its cells.
+    plane : Plane
+    points : MaterialPoints of length n
+        The scatterers.
+    """
+
+    def __init__(self, backscatter: Backscatter, heart: Heart, plane: Plane, points: MaterialPoints) -> None:
+        self._backscatter, self._heart, self._plane, self._points = backscatter, heart, plane, points
+        self._fibre = heart.arrays["fibres"]["fibre"][points.cell]
+        self._length = np.linalg.norm(self._fibres(0), axis=1)
+
+    def __call__(self, frame: int, position: Floats) -> Floats:
+        """Factors (n,) on the amplitudes.
+
+        Parameters
+        ----------
+        frame : int
+        position : ndarray of shape (n, 3), m
+            Of the scatterers in the image; its origin is the centre of the array.
+        """
+        fibre = self._fibres(frame)
+        length = np.linalg.norm(fibre, axis=1)
+        along = np.sum((fibre @ self._plane.axes.T) * position, axis=1)
+        cosine_squared = (along / (length * np.linalg.norm(position, axis=1))) ** 2
+        power = self._backscatter.anisotropy_dB * (1 / 3 - cosine_squared)
+        power += self._backscatter.fibre_strain_dB * (length / self._length - 1)
+        return 10 ** (power / 20)
+
+    def _fibres(self, frame: int) -> Floats:
+        """F f_0 (n, 3): the fibres, as long as they are stretched since the unloaded state."""
+        deformation = gradient(self._heart.positions(frame), self._heart.nodes, self._heart.cells, self._points)
+        return np.einsum("nij,nj->ni", deformation, self._fibre)

@@ -1,0 +1,108 @@
+"""Borders of the wall: scatterers on endocardium and epicardium that echo in phase, as a mirror does.
+
+A sheet of N scatterers of equal amplitude within a beam returns N^2 times the power of one where it is perpendicular
+to the beam, and N times elsewhere, as their echoes are in phase or not: a line that is bright where the border faces the
+probe and fainter at the sides, as that of a real border, which is a rough mirror. With one scatterer per square of the
+wavelength, N is some 16 in the default mouse. They are carried by the surface; their amplitude grows with its area, so
+that the echo of a border is that of its area.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+
+from echotruth.arrays import Floats
+from echotruth.config import Config
+from echotruth.fem.tetrahedra import Integers, shape, shape_gradient
+from echotruth.heart import Heart
+
+BEAM_STD, PULSE_STD = 0.376, 0.375
+"""Standard deviation of the two-way beam at its focus, a sinc squared, over wavelength x focus / aperture; and of the
+envelope of a Gaussian pulse over 1 / bandwidth."""
+
+
+@dataclass(frozen=True)
+class Border:
+    """Scatterers on one surface of the wall.
+
+    Attributes
+    ----------
+    facets : ndarray of shape (n, 6)
+        Nodes of the quadratic triangle of each.
+    xi : ndarray of shape (n, 2)
+        Local coordinates in it.
+    amplitude : float
+        At the unloaded area of the surface, relative to the standard deviation of those of muscle.
+    """
+
+    facets: Integers
+    xi: Floats
+    amplitude: float
+
+    def positions(self, nodes: Floats) -> Floats:
+        """Positions (n, 3), m, for nodes (n_nodes, 3), m."""
+        return np.einsum("na,nai->ni", shape(self.xi), nodes[self.facets])
+
+    def amplitudes(self, nodes: Floats, unloaded: Floats) -> Floats:
+        """Amplitudes (n,) for nodes (n_nodes, 3), m, in a frame and unloaded."""
+        return self.amplitude * _area(nodes, self.facets, self.xi) / _area(unloaded, self.facets, self.xi)
+
+
+def seed_border(config: Config, heart: Heart, surface: str, random: np.random.Generator) -> tuple[Integers, Floats]:
+    """Draw scatterers uniformly over a surface of the unloaded wall.
+
+    Parameters
+    ----------
+    config : Config
+    heart : Heart
+    surface : {"endo", "epi"}
+    random : Generator
+
+    Returns
+    -------
+    facets : ndarray of shape (n, 6)
+        Nodes of the triangle of each.
+    xi : ndarray of shape (n, 2)
+    """
+    facets = heart.arrays["geometry"][surface]
+    middle = np.full((len(facets), 2), 1 / 3)
+    area = _area(heart.nodes, facets, middle) / 2
+    number = random.poisson(_density(config) * area.sum())
+    chosen = random.choice(len(facets), size=number, p=area / area.sum())
+    # The gaps of two sorted uniform numbers are uniform in a triangle.
+    xi = np.diff(np.sort(random.random((number, 2)), axis=1), prepend=0.0, axis=1)
+    return facets[chosen].astype(np.int32), xi
+
+
+def border_amplitude(config: Config, level_dB: float) -> float:
+    """Amplitude of the scatterers of a border, relative to the standard deviation of those of muscle.
+
+    With Gaussian beam and pulse of standard deviations s_x, s_y and s_z at the focus, muscle of density rho returns the
+    power rho pi s_x s_y sqrt(pi) s_z, and a sheet across the beam of areal density sigma (2 pi s_x s_y sigma a)^2.
+
+    Parameters
+    ----------
+    config : Config
+    level_dB : float
+        Echo power of a flat border across the beam at its focus over that of muscle.
+    """
+    probe, focus = config.probe.si(), config.rf.si().focus
+    wavelength = probe.sound_speed / probe.frequency
+    lateral = BEAM_STD * wavelength * focus / (probe.elements * probe.pitch)
+    elevation = BEAM_STD * wavelength * focus / probe.height
+    axial = PULSE_STD * probe.sound_speed / 2 / (probe.bandwidth * probe.frequency)
+    power = config.phantom.si().density * sqrt(pi) * axial / (4 * pi * lateral * elevation)
+    return 10 ** (level_dB / 20) * sqrt(power) / _density(config)
+
+
+def _density(config: Config) -> float:
+    """Scatterers of a border per area, 1/m^2: one per square of the wavelength."""
+    probe = config.probe.si()
+    return (probe.frequency / probe.sound_speed) ** 2
+
+
+def _area(nodes: Floats, facets: Integers, xi: Floats) -> Floats:
+    """Area per area of local coordinates (n,), m^2, at a point of each facet."""
+    tangent = np.einsum("nak,nai->nki", shape_gradient(xi), nodes[facets])
+    return np.linalg.norm(np.cross(tangent[:, 0], tangent[:, 1]), axis=1)

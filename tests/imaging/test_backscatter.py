@@ -1,0 +1,59 @@
+"""Echo of muscle by its fibres: strong across them, weak along them, weaker where they have shortened."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from echotruth.config import Config
+from echotruth.config.realism import Backscatter
+from echotruth.imaging.medium.backscatter import FibreEcho
+from echotruth.imaging.medium.wall import seed_volume
+from echotruth.imaging.view import imaging_plane
+
+CONFIG = Config.model_validate({"phantom": {"density_per_mm3": 20.0}})
+
+
+@pytest.fixture(scope="module")
+def mid(twisting_heart):
+    return imaging_plane(CONFIG.views["mid"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+
+
+@pytest.fixture(scope="module")
+def seeded(twisting_heart):
+    return seed_volume(CONFIG.phantom, twisting_heart.nodes, twisting_heart.cells, np.random.default_rng(1))
+
+
+def echo(heart, mid, seeded, direction, **levels):
+    """Factors in dB (frame, n) on the echo of muscle of which all fibres have one direction."""
+    fibre = np.tile(np.asarray(direction, float), (len(heart.cells), 1))
+    heart = replace(heart, arrays={"fibres": {"fibre": fibre}})
+    factors = FibreEcho(Backscatter(**levels), heart, mid, seeded.points)
+    positions = [seeded.image_positions(heart.positions(frame), heart.cells, mid) for frame in (0, 1)]
+    return np.stack([20 * np.log10(factors(frame, positions[frame])) for frame in (0, 1)]), positions
+
+
+def test_echo_falls_with_the_angle_between_beam_and_fibres(twisting_heart, mid, seeded):
+    """Fibres along the axial direction, and beams from the centre of the array."""
+    found, positions = echo(twisting_heart, mid, seeded, mid.axes[1], anisotropy_dB=9.0)
+    cosine = positions[0][:, 1] / np.linalg.norm(positions[0], axis=1)
+    np.testing.assert_allclose(found[0], 9.0 * (1 / 3 - cosine**2), atol=1e-9)
+    across, _ = echo(twisting_heart, mid, seeded, mid.axes[2], anisotropy_dB=9.0)
+    steep = np.abs(positions[0][:, 2]) < 0.05e-3  # in the plane, across fibres along the elevation
+    np.testing.assert_allclose(across[0][steep], 3.0, atol=0.01)
+
+
+def test_fibres_turn_with_the_tissue(twisting_heart, mid, seeded, affine):
+    matrix, _ = affine
+    found, positions = echo(twisting_heart, mid, seeded, mid.axes[1], anisotropy_dB=9.0)
+    turned = matrix @ mid.axes[1]
+    direction = positions[1] / np.linalg.norm(positions[1], axis=1, keepdims=True)
+    cosine = direction @ (mid.axes @ turned) / np.linalg.norm(turned)
+    np.testing.assert_allclose(found[1], 9.0 * (1 / 3 - cosine**2), atol=1e-6)
+
+
+def test_echo_follows_the_stretch_of_the_fibres_since_end_diastole(twisting_heart, mid, seeded, affine):
+    matrix, _ = affine
+    found, _ = echo(twisting_heart, mid, seeded, mid.axes[0], fibre_strain_dB=30.0)
+    np.testing.assert_allclose(found[0], 0, atol=1e-9)
+    np.testing.assert_allclose(found[1], 30 * (np.linalg.norm(matrix @ mid.axes[0]) - 1), atol=1e-6)
