@@ -6,7 +6,7 @@ from pathlib import Path
 
 from echotruth.cli.command import add_repeated, fail
 
-EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap", "tap_pickle", "flo", "uff", "zea")
+EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap", "flo", "uff", "zea")
 """Formats of `echotruth export`."""
 
 

@@ -150,13 +150,19 @@ class Job:
         Raises
         ------
         FileNotFoundError
-            If they are not there, or not any more.
+            If they are not there, or not any more: a damaged file is deleted, so that the next run makes it anew.
         """
         if not file.is_file():
             stage = {self.scatterers: "phantom", self.lines: "rf"}[file]
             raise FileNotFoundError(f"{file}: is not there: run the stage {stage} first")
-        with np.load(file) as opened:
-            return dict(opened)
+        try:
+            # A .npz has a CRC-32 of every array.
+            with np.load(file, allow_pickle=False) as opened:
+                return dict(opened)
+        except Exception:  # a damaged archive raises one of many errors
+            file.unlink()
+            remedy = "it is deleted, and the next run makes it anew"
+            raise FileNotFoundError(f"{file}: is not what was written: {remedy}") from None
 
     def note(self, **entries: Any) -> None:
         """Add entries to the record of this job."""
