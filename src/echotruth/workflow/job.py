@@ -23,7 +23,7 @@ from echotruth.config import View
 from echotruth.config.loading import ConfigError
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane, imaging_plane
-from echotruth.repository import ledger, packing, schema
+from echotruth.repository import ledger, packing, schema, settings
 from echotruth.repository.case_file import read_case
 from echotruth.repository.checksums import ChecksumError, checksums
 from echotruth.repository.ledger import STAGES, record_path, repository_folder
@@ -212,6 +212,7 @@ class Job:
         lease.confirm()
         place = {"case": self.case.id, "view": self.view_name, "size": self.size or None}
         made = {"seed": self.config.seed, "code": self.code, "instructions": instructions.kind()}
+        made["settings"] = settings.of_job(self.config, self.stage, self.view_name)
         ledger.commit(self.record, {"stage": self.stage} | place | made | entries)
 
 
