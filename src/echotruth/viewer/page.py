@@ -145,7 +145,7 @@ class Page:
             self._blank()
             place = f"{self.choice.case}, {self.choice.view}"
             said = str(error).partition("\n")[0] or type(error).__name__
-            self._say(f"{place} cannot be shown: {said}. Run: echotruth check {self.repository.folder}")
+            self._say(f"{place} cannot be shown: {said}. Run: echotruth check {self.repository.location}")
         finally:
             self.document.unhold()
 
