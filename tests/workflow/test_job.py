@@ -1,12 +1,15 @@
 """Files that the stages of a view pass on."""
 
+import errno
+import os
+
 import numpy as np
 import pytest
 from finished_repository import configured
 
 from echotruth.cases import expand
 from echotruth.repository.layout import lay_out
-from echotruth.workflow.job import Job
+from echotruth.workflow.job import Job, run
 
 PASSED = {"lines": np.arange(6.0).reshape(2, 3), "range": np.arange(3)}
 
@@ -56,3 +59,11 @@ def test_objects_are_not_unpickled(job):
     with pytest.raises(FileNotFoundError, match="is not what was written"):
         job.passed_on(job.lines)
     assert not job.lines.with_name("planted").exists()
+
+
+def test_disk_that_is_full_is_told_with_the_file(job):
+    def work(job):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out/small/image")
+
+    with pytest.raises(SystemExit, match="bmode: out/small/image: No space left on device: the folder must be"):
+        run(job, work)

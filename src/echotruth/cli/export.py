@@ -31,7 +31,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def export(arguments: argparse.Namespace) -> int:
     """Write clips, hearts or RF of a repository as files of other programs.
 
-    There is one file for each clip, CASE_VIEW_SIZE (docs/export.md).
+    There is one file for each clip, CASE_VIEW_SIZE.
 
     examples:
       echotruth export out/demo --format mp4 --view mid --overlay wall

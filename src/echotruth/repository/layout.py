@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from echotruth.cases import RF_INDEPENDENT, Case, table
 from echotruth.config import Config
+from echotruth.config.reading import SHORT_FLOAT
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import pixel_centres
@@ -91,6 +92,7 @@ def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 
 
 _Dumper.add_representer(str, _text)
+_Dumper.add_implicit_resolver(*SHORT_FLOAT)  # so that such a text is written in quotes
 
 
 def as_yaml(config: Config) -> str:

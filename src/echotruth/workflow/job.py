@@ -246,6 +246,9 @@ def run(job: Job, work: Work) -> None:
             job.commit(result)
     except (NotWritten, ChecksumError, FileNotFoundError) as error:
         sys.exit(f"{job.stage}: {error}")
+    except OSError as error:
+        remedy = "the folder must be writable, on a disk that has space and no errors"
+        sys.exit(f"{job.stage}: {error.filename or job.folder}: {error.strerror or error}: {remedy}")
     except CaseFailed as error:
         log.warning("failed: %s", error)
         job.commit_without_result("failed", str(error))
