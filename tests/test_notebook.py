@@ -230,6 +230,32 @@ def test_function_that_raises_is_named(clip):
         et.track(clip, broken)
 
 
+CROPPED, INFINITE = "clip's axial is not that of its image", "Frame 1 has pixels that are infinite: give numbers"
+
+
+def reverse(clip, dimension):
+    return clip.isel({dimension: slice(None, None, -1)})
+
+
+def with_pixel(clip, value):
+    """The clip with one other pixel in frame 1."""
+    image = clip["image"].astype(float)
+    image[1, 5, 7] = value
+    return clip.assign(image=image)
+
+
+def test_clip_whose_dimensions_are_in_another_order_is_tracked_as_before(clip):
+    expected = et.track(clip, "dis")
+    found = et.track(clip.transpose("lateral", "frame", "axial", ...), "dis")
+    assert np.isfinite(expected["displacement"]).any()
+    np.testing.assert_array_equal(found["displacement"], expected["displacement"])
+
+
+def test_pixels_that_are_not_known_are_told(clip):
+    with pytest.warns(UserWarning, match="1 of 3 frames have pixels that are NaN: no displacement is estimated from"):
+        et.track(with_pixel(clip, np.nan), "dis")
+
+
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [
@@ -239,6 +265,21 @@ def test_function_that_raises_is_named(clip):
         (lambda heart, clip: et.track(clip, "dis", window=3), ConfigError, "window is not a key"),
         (lambda heart, clip: et.configure(geometry={"preset": "cat"}), ConfigError, "geometry.preset = 'cat'"),
         (lambda heart, clip: et.track(clip.isel(frame=slice(1, None)), "dis"), ValueError, "has 2 of 3 frames"),
+        (lambda heart, clip: et.track(clip.isel(frame=[0, 2, 1]), "dis"), ValueError, "clip's time is not that of its"),
+        (lambda heart, clip: et.track(reverse(clip, "frame"), "dis"), ValueError, "clip's time is reversed: give all"),
+        (lambda heart, clip: et.track(reverse(clip, "axial"), "dis"), ValueError, "clip's axial is reversed: give all"),
+        (lambda heart, clip: et.track(reverse(clip, "lateral"), "dis"), ValueError, "clip's lateral is reversed"),
+        (
+            lambda heart, clip: et.track(clip.isel(axial=slice(9, 99)), "dis"),
+            ValueError,
+            "has 90 x 128 pixels: give the",
+        ),
+        (
+            lambda heart, clip: et.track(clip.isel({"axial": slice(64), "lateral": slice(64)}), "dis"),
+            ValueError,
+            CROPPED,
+        ),
+        (lambda heart, clip: et.track(with_pixel(clip, np.inf), "dis"), ValueError, INFINITE),
         (lambda heart, clip: et.track(clip.drop_attrs(), "dis"), ValueError, "lost its attribute case"),
         (lambda heart, clip: et.beat({"cases": {"seed": [1, 2]}}), ValueError, "cases sweeps seed"),
         (lambda heart, clip: et.heart_dataset(heart, "rf"), ValueError, "group = 'rf': the heart has geometry"),

@@ -7,6 +7,7 @@ import pytest
 from echotruth.config import Config, Mechanics
 from echotruth.config.loading import ConfigError, load, override
 from echotruth.materials import LAWS
+from echotruth.repository.layout import as_yaml
 
 ROOT = Path(__file__).parents[2]
 
@@ -24,8 +25,9 @@ BAD = {
     "fibres: {endo_deg: high}": "fibres.endo_deg = 'high': must be a number",
     "loop: {frames: 0}": "loop.frames = 0: should be greater than or equal to 2",
     "loop: {frames: '40'}": "loop.frames = '40': must be a whole number: write 40 without quotes",
-    "loop: {edv_uL: 1e2}": "loop.edv_uL = '1e2': must be a number: write 100.0, because YAML reads 1e2 as text",
-    "loop: {edv_uL: 1e30}": "write 1.0e+30, because YAML reads 1e30 as text",
+    "loop: {edv_uL: 1e30}": "loop.edv_uL = 1e+30: should be less than or equal to 100000000",
+    "name: 1e5": "name = 100000.0: must be text: put it in quotes",
+    "name: mine.zarr": "name = 'mine.zarr': must not end in .zarr, as the store does, which is out/NAME/",
     "name: 3": "name = 3: must be text: put it in quotes",
     "physiology: {exclude_implausible: 'true'}": "must be true or false: write true without quotes",
     "rf: {keep: channels}": "rf.keep = 'channels': must be a list, such as ['channels']",
@@ -96,6 +98,18 @@ BENCHMARKS = ["ablation", "benchmark", "benchmark_human", "benchmark_small"]
 @pytest.mark.parametrize("name", [*BENCHMARKS, "demo", "fimh25", "hearts", "paper", "realistic", "rodero", "sweep"])
 def test_shipped_configurations_are_accepted(name):
     assert load(ROOT / f"config/{name}.yaml").name == name
+
+
+@pytest.mark.parametrize("text", ["1e-6", "1E-06", "+1e-6", "1.0e-06", "0.000001"])
+def test_small_numbers_are_numbers_however_they_are_written(tmp_path, text):
+    (tmp_path / "small.yaml").write_text(f"mechanics: {{viscosity_Pa_s: {text}}}")
+    assert load(tmp_path / "small.yaml").mechanics.viscosity_Pa_s == 1e-6
+
+
+def test_text_that_looks_like_a_number_stays_one(tmp_path):
+    (tmp_path / "named.yaml").write_text("name: '1e5'")
+    (tmp_path / "again.yaml").write_text(as_yaml(load(tmp_path / "named.yaml")))
+    assert load(tmp_path / "again.yaml").name == "1e5"
 
 
 def test_dumped_configuration_reads_back_the_same(tmp_path):

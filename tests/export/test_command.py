@@ -12,6 +12,7 @@ from known_repository import SIZES
 
 from echotruth import cli
 from echotruth.cases import expand
+from echotruth.cli.export import EXPORTED
 from echotruth.export import FORMATS, OVERLAYS, Export, ExportError, Selection, destination, png
 from echotruth.repository.reader import Repository
 
@@ -25,7 +26,7 @@ def call(monkeypatch, *arguments):
 
 
 def test_command_and_page_have_all_formats():
-    assert tuple(FORMATS) == cli.export.EXPORTED
+    assert tuple(FORMATS) == EXPORTED
     page = (Path(__file__).parents[2] / "docs/export.md").read_text()
     rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
     assert re.findall(r"`(\w+)`", "".join(rows)) == list(FORMATS)

@@ -1,15 +1,11 @@
 """Point tracks as TAP-Vid has them, and flow as OpenCV reads it, of a heart that is shifted by known steps."""
 
-import pickle
-
 import cv2
 import numpy as np
 import pytest
 from known_repository import FRAMES, SHIFT, SIZES
 
-from echotruth.export import Export, Selection
 from echotruth.imaging.flow import slice_thickness
-from echotruth.repository.reader import Repository
 
 STEP = SHIFT / (FRAMES - 1)
 """Shift from frame to frame: lateral, axial, elevation, m."""
@@ -51,27 +47,6 @@ def test_point_is_occluded_where_it_is_beside_the_slice(tap, known):
     sure = np.abs(np.abs(tap["elevation_m"]) - half) > 1e-6
     np.testing.assert_array_equal(tap["occluded"][sure], beside[sure])
     assert not tap["occluded"][:, 0].any()
-
-
-def test_pickle_is_a_dictionary_of_all_clips_with_the_same_arrays(known, exported, tap, tmp_path):
-    """As `pickle.load` reads it, without echotruth's own classes and in contiguous arrays that can be written to."""
-    chosen = Selection(["heart"], ["mid", "long"], list(SIZES))
-    work = Export(Repository(known.folder), chosen, "tap_pickle", output=tmp_path)
-    (path,) = work.write(work.clips()[0])
-    assert path == tmp_path / f"{known.folder.name}.pkl"
-    text = path.read_bytes()
-    assert b"echotruth" not in text
-    videos = pickle.loads(text)
-    assert type(videos) is dict
-    assert list(videos) == [f"heart_{view}_{size}" for view in ("mid", "long") for size in SIZES]
-    first = videos[f"heart_mid_{SIZES[0]}"]
-    assert list(first) == list(tap)
-    for name, values in tap.items():
-        np.testing.assert_array_equal(first[name], values)
-        assert first[name].dtype == values.dtype
-    again = Export(Repository(known.folder), chosen, "tap_pickle", output=tmp_path / "one.pkl")
-    (again,) = again.write(work.clips()[0])
-    assert again.read_bytes() == text
 
 
 @pytest.mark.parametrize("view", ["mid", "long"])

@@ -162,7 +162,7 @@ def test_scaling_keeps_the_ejection_fraction_and_all_else():
     [
         (
             "pressure_volume",
-            "time_ms,pressure_mmHg,volume_ml",
+            "time_ms,pressure_mmHg,volume_fl_oz",
             "0,4,50",
             "no column of the volume, which loop.prescribed = press",
         ),
@@ -205,3 +205,37 @@ def test_missing_file_is_named_with_what_there_is(tmp_path):
 def test_volumes_that_do_not_eject_are_refused():
     with pytest.raises(LoopError, match="set edv_uL and esv_uL so that the heart ejects"):
         read_loop(Loop(edv_uL=15.0))
+
+
+ROWS = [(0.0, 6.0, 50.0), (20.0, 60.0, 50.0), (50.0, 100.0, 20.0), (70.0, 10.0, 20.0), (120.0, 6.0, 50.0)]
+"""Time (ms), pressure (mmHg) and volume (uL)."""
+
+
+def lines(separator, decimal, rows=ROWS):
+    return [separator.join(f"{value:.3f}".replace(".", decimal) for value in row) for row in rows]
+
+
+LABCHART = ["Interval=\t0.001 s", "TimeFormat=\tStartOfBlock", "ChannelTitle=\tLVP\tVolume", "UnitName=\tmmHg\t\u00b5L"]
+TEXTS = {
+    "semicolons": ["time_ms;pressure_mmHg;volume_uL", *lines(";", ".")],
+    "decimal commas": ["Time (ms);LVP [mmHg];LVV (uL)", *lines(";", ",")],
+    "tabs": ["t_ms\tPressure_mmHg\tvolume [\u00b5L]", *lines("\t", ",")],
+    "LabChart": [*LABCHART, *lines("\t", ".", [(time / 1e3, *others) for time, *others in ROWS])],
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_columns_as_other_programs_write_them(tmp_path, name):
+    (tmp_path / "plain.csv").write_text("\n".join(["time_ms,pressure_mmHg,volume_uL", *lines(",", ".")]))
+    (tmp_path / "other.csv").write_text("\n".join(TEXTS[name]), encoding="utf-8")
+    expected, found = (read_loop(Loop(file=str(tmp_path / file))) for file in ("plain.csv", "other.csv"))
+    assert found.period == pytest.approx(0.12)
+    np.testing.assert_allclose(found.pressure, expected.pressure)
+    np.testing.assert_allclose(found.volume, expected.volume)
+
+
+def test_loop_that_begins_elsewhere_is_told_where_end_diastole_is(tmp_path):
+    turned = [(0.0, 100.0, 20.0), (30.0, 10.0, 20.0), (70.0, 6.0, 50.0), (90.0, 60.0, 49.0), (120.0, 100.0, 20.0)]
+    (tmp_path / "late.csv").write_text("\n".join(["time_ms,pressure_mmHg,volume_uL", *lines(",", ".", turned)]))
+    with pytest.raises(LoopError, match=r"begin the loop at end-diastole, .*: row 3 has the largest volume\."):
+        read_loop(Loop(file=str(tmp_path / "late.csv")))

@@ -1,16 +1,19 @@
 """A check finds every fault of a repository, and healing it makes just what was damaged, byte for byte."""
 
+import json
+import shutil
 from pathlib import Path
-from shutil import copytree
+from shutil import copytree, rmtree
 
 import finished_repository as finished
 import numpy as np
 import pytest
 import zarr
 
+from echotruth.config import Motion, Phantom, PhaseCorrelation, Tracking
 from echotruth.repository import ledger
 from echotruth.repository.check import check
-from echotruth.repository.checksums import checksums
+from echotruth.repository.checksums import checksums, commit_beside
 from echotruth.repository.healing import heal
 from echotruth.repository.inventory import CheckError
 from echotruth.repository.ledger import record_path
@@ -231,3 +234,103 @@ def test_units_that_are_not_those_of_the_schema_are_found(folder):
     record["sha256"] |= checksums([file], folder / "small.zarr")
     ledger.commit(folder / "ledger/structure.json", record)
     assert faults(folder) == {"small.zarr/mechanics/pressure": "has units 'kPa', not 'Pa'"}
+
+
+def exchange(one: Path, other: Path) -> None:
+    contents = one.read_bytes(), other.read_bytes()
+    for path, content in zip((other, one), contents, strict=True):
+        path.write_bytes(content)
+
+
+EXCHANGED = [
+    ("bmode/64/image", "truth/64/labels"),
+    ("mechanics/volume", "evaluation/64/reference"),
+    ("fibres/xyz", "mechanics/displacement"),
+    ("geometry/node_position", "evaluation/64/one/score_units"),
+]
+
+
+@pytest.mark.parametrize("arrays", EXCHANGED)
+def test_exchanged_metadata_are_found_and_no_values_are_read_by_them(folder, arrays):
+    paths = [folder / "small.zarr" / array / "zarr.json" for array in arrays]
+    exchange(*paths)
+    assert set(faults(folder)) == {path.relative_to(folder).as_posix() for path in paths}
+
+
+@pytest.mark.parametrize("array", ["bmode/64/image", "physiology/scalars", "mechanics/pressure"])
+@pytest.mark.parametrize(
+    "edited", [{"shape": [0, 0, 0, 0]}, {"data_type": "int16"}, {"codecs": [{"name": "bytes"}]}, {"node_type": "group"}]
+)
+def test_edited_metadata_are_found_even_if_the_record_has_their_checksum(folder, array, edited):
+    path, before = folder / "small.zarr" / array / "zarr.json", finished.content(folder)
+    document = json.loads(path.read_bytes())
+    if "shape" in edited:
+        edited = {"shape": [0] * len(document["shape"])}
+    path.write_text(json.dumps(document | edited))
+    record = ledger.read(folder / "ledger/structure.json")
+    record["sha256"] |= checksums([path], folder / "small.zarr")
+    ledger.commit(folder / "ledger/structure.json", record)
+    found = check(folder)
+    assert [fault.path for fault in found.faults] == [
+        f"small.zarr/{array.rpartition('/')[0] if 'codecs' in edited else array}"
+    ]
+    heal(found)
+    run(folder)
+    assert check(folder).faults == [] and finished.content(folder) == before
+
+
+def test_edited_configuration_is_found_and_stands_alone(folder):
+    """By other settings nearly all files would be wrong, and healing would drop them."""
+    path = folder / "config.yaml"
+    text = path.read_text()
+    path.write_text(text.replace("frames: 3", "frames: 4"))
+    assert faults(folder) == {"config.yaml": "differs from what was written"}
+    assert heal(check(folder)) == (0, 0)
+    run(folder)
+    assert path.read_text() == text and check(folder).faults == []
+
+
+@pytest.mark.parametrize("name", ["cases.csv", f"cases/{CASES[1]}.json"])
+@pytest.mark.parametrize("harm", [flip, empty, delete])
+def test_damaged_table_and_configurations_of_hearts_are_found_and_written_again(folder, name, harm):
+    before = (folder / name).read_bytes()
+    harm(folder / name, np.random.default_rng(2))
+    assert set(faults(folder)) == {name}
+    heal(check(folder))
+    run(folder)
+    assert (folder / name).read_bytes() == before and check(folder).faults == []
+
+
+@pytest.mark.parametrize("harm", [flip, truncate, empty, delete])
+def test_damaged_report_and_figures_are_found_and_deleted(folder, harm):
+    files = [folder / "report.html", folder / "figures/loop.png"]
+    for file in files:
+        file.parent.mkdir(exist_ok=True)
+        file.write_bytes(b"drawn once")
+    commit_beside(folder, folder / "ledger/report.json", files)
+    assert check(folder).faults == []
+    harm(files[1], np.random.default_rng(3))
+    assert set(faults(folder)) == {"figures/loop.png"}
+    heal(check(folder))
+    assert files[0].exists() and not files[1].exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "concerned"),
+    [
+        ({"tracking": Tracking(trackers={"one": PhaseCorrelation(window_px=24)})}, ["tracking"]),
+        ({"phantom": Phantom(density_per_mm3=50)}, ["phantom", "rf", "bmode", "tracking"]),
+        ({"motion": Motion(kind="rigid")}, [*ledger.STAGES]),
+    ],
+)
+def test_results_of_other_settings_are_found_though_their_records_vouch_for_them(folder, tmp_path, changes, concerned):
+    other = finished.finish(tmp_path / "other" / "small", finished.configured(**changes))
+    for path in ["small.zarr", *(f"ledger/{stage}" for stage in ledger.STAGES)]:
+        rmtree(folder / path)
+        copytree(other / path, folder / path)
+    shutil.copy(other / "ledger/structure.json", folder / "ledger")
+    expected = {
+        path.relative_to(folder).as_posix() for stage in concerned for path in folder.glob(f"ledger/{stage}/**/*.json")
+    }
+    found = faults(folder)
+    assert set(found) == expected and set(found.values()) == {"is of other settings than those of config.yaml"}

@@ -127,3 +127,18 @@ def test_repository_of_an_empty_configuration_is_not_read_as_one_of_defaults(tmp
     (tmp_path / "config.yaml").touch()
     with pytest.raises(FileNotFoundError, match=r"config.yaml: is empty: run the repository again"):
         ledger.repository_folder(tmp_path)
+
+
+def test_every_flipped_bit_of_a_record_is_found_or_changes_nothing(tmp_path):
+    """In the name of the seal too, without which a record would be taken as it is."""
+    record = {"stage": "rf", "code": "0123456789abcdef", "sha256": {"rf/lines/c/0": "ab"}}
+    ledger.commit(tmp_path / "one.json", record)
+    whole, accepted = (tmp_path / "one.json").read_bytes(), []
+    for place in range(len(whole)):
+        for bit in range(8):
+            damaged = whole[:place] + bytes([whole[place] ^ 1 << bit]) + whole[place + 1 :]
+            try:
+                accepted.append(ledger.parse(damaged.decode()))
+            except ValueError:
+                continue
+    assert all(found == record for found in accepted)

@@ -225,3 +225,28 @@ def test_what_is_no_repository_is_refused_in_a_sentence(out, capsys):
     assert merge_repositories(out / "both", [out / "first", out / "absent"]) == 2
     assert merge_repositories(out / "first", [out / "first"]) == 2
     assert capsys.readouterr().err.count("\n") == 2
+
+
+KILLED = [
+    ["registry.txt"],
+    ["registry.txt", "views.txt", "both.zarr/cases/zarr.json", "ledger/.structure.json.host.1.partial"],
+    ["registry.txt", "views.txt", "both.zarr/zarr.json", "ledger/structure.json", "cases/heart.json", "cases.csv"],
+]
+
+
+@pytest.mark.parametrize("left", KILLED)
+def test_merge_that_was_killed_before_its_configuration_is_repeated(out, left):
+    for name in left:
+        (out / "both" / name).parent.mkdir(parents=True, exist_ok=True)
+        (out / "both" / name).write_text("")
+    assert merge_repositories(out / "both", [out / "first", out / "second"]) == 0
+    assert load(out / "both/config.yaml").cases.grid == {"seed": [1, 2, 3]}
+    assert not [fault for fault in check(out / "both").faults if not fault.path.endswith(".partial")]
+
+
+def test_folder_of_other_things_is_not_merged_into(out, capsys):
+    (out / "both").mkdir()
+    (out / "both/thesis.tex").write_text("words")
+    assert merge_repositories(out / "both", [out / "first"]) == 2
+    assert "both: is not a repository" in capsys.readouterr().err
+    assert [path.name for path in (out / "both").iterdir()] == ["thesis.tex"]

@@ -204,13 +204,14 @@ def test_a_file_that_is_damaged_here_is_told_and_its_record_does_not_go_up(bucke
     assert set(files(repository)) - set(bucket.names()) == {"ledger/bmode/1.json", "small.zarr/bmode/image/c/1"}
 
 
-def test_what_was_changed_there_is_found_when_it_is_read_back(bucket, repository):
+def test_what_was_changed_there_is_found_when_it_is_read_back_and_sent_again(bucket, repository):
     cli("upload", repository, bucket.url)
     name = "registry.txt"
     bucket.put(name, b"other", **bucket.metadata(name))  # as if the content alone had changed
     assert cli("upload", repository, bucket.url)[0] == 0
-    status, _, errors = cli("upload", repository, bucket.url, "--verify")
-    assert status == 1 and f"{bucket.url}/{name}: differs" in errors
+    status, output, _ = cli("upload", repository, bucket.url, "--verify")
+    assert status == 0 and f"{bucket.url}/{name}: differed from {repository / name}, and was sent again" in output
+    assert bucket.content() == files(repository)
 
 
 def test_another_repository_there_is_left_alone(bucket, repository):

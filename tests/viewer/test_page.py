@@ -18,7 +18,7 @@ from echotruth.repository.layout import lay_out
 from echotruth.repository.reader import Repository
 from echotruth.viewer.choice import TRUTH, Choice, asked, first
 from echotruth.viewer.page import Page
-from echotruth.viewer.server import ShowError, opened, serve
+from echotruth.viewer.server import ShowError, opened, serve, texts
 
 pytestmark = pytest.mark.slow
 
@@ -158,6 +158,12 @@ def test_folder_without_a_repository_is_refused_and_one_that_was_renamed_is_show
     shutil.rmtree(tmp_path / "renamed/known.zarr")
     with pytest.raises(ShowError, match="has no cases or no views yet: run its configuration first"):
         opened(tmp_path / "renamed")
+
+
+def test_address_that_is_no_text_shows_the_page_as_at_first(repository):
+    """%ff is not UTF-8, and no name of a case."""
+    assert asked(repository, texts({"case": [b"\xff"]})) == first(repository)
+    assert texts({"view": [b"mid"], "size": []}) == {"view": ["mid"], "size": []}
 
 
 def test_port_in_use_is_said_in_a_sentence(shown):

@@ -142,7 +142,7 @@ def test_grid_of_the_paper_is_the_printed_one_and_warned_of(roomy_disk):
 def test_text_tells_time_place_jobs_and_memory(tmp_path):
     found = estimated(load(ROOT / "config/demo.yaml"))
     text = table(found, tmp_path / "demo")
-    assert f"{found.jobs:>7}" in text and "GB for the largest job" in text and "docs/estimate.md" in text
+    assert f"{found.jobs:>7}" in text and "GB for the largest job" in text and "a core of an Intel Xeon" in text
     assert f"{found.jobs} jobs" in short(found) and "on 2 cores" in short(found)
 
 

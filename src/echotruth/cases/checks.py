@@ -191,10 +191,13 @@ def _place(heart: Combination, prefix: str, source: str) -> str:
 
 
 def _check_loop(loop: Any, place: str) -> None:
-    from echotruth.loop.cycle import LoopError, check_loop
+    from echotruth.loop.circulation import calibrate
+    from echotruth.loop.cycle import LoopError, check_loop, read_loop
 
     try:
         check_loop(loop)
+        if loop.kind == "circulation":
+            calibrate(read_loop(loop), loop.circulation)
     except LoopError as error:
         raise ConfigError(f"{place}: loop: {error}") from None
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from echotruth.section import unit_of
 
-READABLE_LENGTH = 80
+READABLE_LENGTH = 40
 """Longest readable part of an id, letters."""
 GIVEN_LENGTH = 80
 """Longest id in a table whose rows a grid or draws multiply, letters."""
@@ -20,7 +20,7 @@ GIVEN = r"[A-Za-z0-9][A-Za-z0-9_.-]*"
 def case_id(parameters: dict[str, Any]) -> str:
     """Id of a case: readable values of the swept keys in which it differs, and a hash of the exact ones.
 
-    The hash is longer if not all of the readable part fits.
+    Numbers have four digits. Keys that do not fit are left out, and then the hash is longer.
 
     >>> case_id({"fibres.endo_deg": 70.0, "seed": 2})
     'endo70_seed2_17059c'
@@ -28,9 +28,14 @@ def case_id(parameters: dict[str, Any]) -> str:
     if not parameters:
         return "heart"
     values = {key: integer_if_whole(value) for key, value in sorted(parameters.items())}
-    readable = "_".join(f"{_short_key(key)}{_short_value(value)}" for key, value in values.items())
-    digits = 6 if len(readable) <= READABLE_LENGTH else 16
-    return f"{readable[:READABLE_LENGTH]}_{sha256(json.dumps(values).encode()).hexdigest()[:digits]}"
+    parts = [f"{_short_key(key)}{_short_value(value)}" for key, value in values.items()]
+    fitting: list[str] = []
+    for part in parts:
+        if len("_".join([*fitting, part])) <= READABLE_LENGTH:
+            fitting.append(part)
+    digits = 6 if fitting == parts else 16
+    readable = fitting or [parts[0][:READABLE_LENGTH]]
+    return "_".join([*readable, sha256(json.dumps(values).encode()).hexdigest()[:digits]])
 
 
 def extended_id(given: str, parameters: dict[str, Any]) -> str:
@@ -63,4 +68,5 @@ def _short_key(key: str) -> str:
 
 
 def _short_value(value: Any) -> str:
-    return "".join(letter for letter in str(value) if letter.isalnum() or letter in ".-")
+    text = f"{value:.4g}" if isinstance(value, float) else str(value)
+    return "".join(letter for letter in text if letter.isalnum() or letter in ".-")

@@ -1,9 +1,17 @@
 """`echotruth check`: a configuration, or all files and values of a repository."""
 
-import argparse
-from pathlib import Path
+from __future__ import annotations
 
-from echotruth.cli.command import add_configuration
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from echotruth.cli.command import add_configuration, named
+
+if TYPE_CHECKING:
+    from echotruth.cases import Case
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -23,7 +31,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 def check(arguments: argparse.Namespace) -> int:
     """Check a configuration, or all files and values of a repository.
 
-    A repository is checked to the end, with one line for each fault.
+    Of a configuration, the meshes and motions that it names are read too. A repository is
+    checked to the end, with one line for each fault.
 
     examples:
       echotruth check config/demo.yaml
@@ -42,6 +51,8 @@ def check(arguments: argparse.Namespace) -> int:
     from echotruth.cli.configuration import LISTED, load_cases
 
     config, cases = load_cases(arguments.config, f"a YAML file, {LISTED}, or the folder of a repository")
+    if errors := list(_of_files(cases)):
+        sys.exit(named("\n".join(f"{arguments.config}: {error}" for error in errors)))
     print(f"{arguments.config}: valid; cases: {len(cases)}, views per case: {len(config.views)}")
     from echotruth.cli.estimation import estimated, print_concerns
     from echotruth.workflow.estimate import short
@@ -50,3 +61,24 @@ def check(arguments: argparse.Namespace) -> int:
     print(f"A run takes {short(found)}.")
     print_concerns(concerns)
     return int(any(concern.is_absurd for concern in concerns))
+
+
+def _of_files(cases: list[Case]) -> Iterator[str]:
+    """What is wrong with the meshes and motions in files, each of which is read once, as of the first case with it."""
+    first: dict[tuple[str | None, str | None], Case] = {}
+    for case in cases:
+        motion = case.config.motion
+        path = motion.file.path if motion.kind == "file" else None
+        if case.config.geometry.file or path:
+            first.setdefault((case.config.geometry.file, path), case)
+    if not first:
+        return
+    from echotruth.mechanics.geometry import GeometryError, left_ventricle
+    from echotruth.mechanics.motion_file.wall import moving_wall
+    from echotruth.mechanics.prescribed import MotionError
+
+    for (_, path), case in first.items():
+        try:
+            moving_wall(case.config) if path else left_ventricle(case.config.geometry)
+        except (GeometryError, MotionError) as error:
+            yield str(error)

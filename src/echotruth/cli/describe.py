@@ -21,7 +21,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def describe(arguments: argparse.Namespace) -> int:
     """Write a data card, a citation, Croissant and RO-Crate metadata of a repository.
 
-    They are written into its folder (docs/description.md). It needs the extra description of echotruth.
+    They are written into its folder. It needs the extra description of echotruth.
 
     examples:
       echotruth describe out/demo --license CC-BY-4.0 --author 'Doe, Jane; 0000-0002-1825-0097'

@@ -33,7 +33,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 def evaluate(arguments: argparse.Namespace) -> int:
     """Run a tracker on every clip of a repository, score it like the repository's own trackers, write the scores.
 
-    See docs/trackers.md.
+    A tracker is a function track(frames, points, mask, spacing, frame_time, seed), which returns the
+    displacement (frame, point, 2) since frame 0 in pixels, lateral and axial, of points (point, 2); or a
+    program that reads and writes the same arrays in NumPy's .npz.
 
     examples:
       echotruth evaluate out/demo --tracker mypackage.module:track

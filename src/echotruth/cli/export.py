@@ -6,7 +6,7 @@ from pathlib import Path
 
 from echotruth.cli.command import add_repeated, fail
 
-EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap", "tap_pickle", "flo", "uff", "zea")
+EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap", "flo", "uff", "zea")
 """Formats of `echotruth export`."""
 
 
@@ -31,7 +31,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def export(arguments: argparse.Namespace) -> int:
     """Write clips, hearts or RF of a repository as files of other programs.
 
-    There is one file for each clip, CASE_VIEW_SIZE (docs/export.md).
+    There is one file for each clip, CASE_VIEW_SIZE.
 
     examples:
       echotruth export out/demo --format mp4 --view mid --overlay wall

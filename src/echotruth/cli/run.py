@@ -27,7 +27,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth run`."""
     add_configuration(parser)
     parser.allow_abbrev = False  # what looks like the beginning of an option may be one of Snakemake
-    text = "upload each result when it is finished (docs/storage.md); exit status 3 if all is made but not uploaded"
+    text = "upload each result when it is finished; exit status 3 if all is made but not uploaded"
     parser.add_argument(
         "--estimate", action="store_true", help="only print what it will take: CPU time, GB, files, jobs"
     )
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     options of Snakemake that are useful here:
       --cores N             number of processor cores (default: all)
       -n                    only list the jobs
-      --profile NAME        where jobs run: default, slurm, or a folder with a profile (docs/cluster.md)
+      --profile NAME        where jobs run: default, slurm, or a folder with a config.yaml of Snakemake
       --rerun-triggers mtime  do not make again what other settings or code would change
 
     examples:

@@ -1,14 +1,13 @@
 """`echotruth show`: a repository in the browser."""
 
 import argparse
-from pathlib import Path
 
 from echotruth.cli.command import fail
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth show`."""
-    parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
+    parser.add_argument("repository", help="folder of the repository, such as out/demo, or s3://BUCKET/FOLDER")
     parser.add_argument("--port", type=int, default=0, help="port of the page (default: any that is free)")
     parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
 
@@ -16,8 +15,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 def show(arguments: argparse.Namespace) -> int:
     """Show a repository in the browser.
 
-    Clips play with true and tracked motion, strain and errors over them, and curves follow the frame
-    (docs/viewer.md). Only this machine can open the page; Ctrl-C ends it.
+    Clips play with true and tracked motion, strain and errors over them, and curves follow the frame.
+    Only this machine can open the page; Ctrl-C ends it.
 
     examples:
       echotruth show out/demo

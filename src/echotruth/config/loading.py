@@ -163,9 +163,6 @@ def _written(wanted: str, value: Any) -> str:
     text = value.strip() if isinstance(value, str) else ""
     if wanted == "int_type" and _NUMBER.fullmatch(text) and float(text).is_integer():
         return f": write {float(text):.0f} without quotes"
-    if wanted == "float_type" and _NUMBER.fullmatch(text) and "e" in text.lower():
-        number = repr(float(text))
-        return f": write {number if '.' in number else number.replace('e', '.0e')}, because YAML reads {text} as text"
     quoted = (wanted == "float_type" and _NUMBER.fullmatch(text)) or (wanted == "bool_type" and text in _BOOLEANS)
     return f": write {text} without quotes" if quoted else ""
 

@@ -56,7 +56,8 @@ class Loop(Section):
     file: str = "mouse"
     """A shipped cycle (`mouse`, `rat`, `human`; `twitch` for `prescribed: volume`) or a CSV file with columns of time
     and of the prescribed quantities, each named with its unit: time_ms or _s; pressure_mmHg, _kPa or _Pa; volume_uL,
-    _mL or _m3; tension_kPa or _Pa."""
+    _mL or _m3; tension_kPa or _Pa. `LVP [mmHg]` and the like are read too, semicolons, tabs, decimal commas, and what
+    LabChart exports as text."""
     heart_rate_per_min: Annotated[FiniteFloat, Field(ge=1, le=10_000)] | None = None
     """Heart rate; the cycle's time is scaled to it. Default: that of the file."""
     edv_uL: Volume | None = None

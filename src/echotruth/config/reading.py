@@ -1,5 +1,6 @@
 """Read YAML files; what is malformed, or too large to be a configuration, is refused before it is expanded."""
 
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from itertools import chain, islice
@@ -247,6 +248,9 @@ _Loader.yaml_implicit_resolvers = {
     first: [(tag, pattern) for tag, pattern in resolvers if not tag.endswith(":timestamp")]
     for first, resolvers in _Base.yaml_implicit_resolvers.items()
 }
+SHORT_FLOAT = ("tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$"), list("-+0123456789"))
+"""1e-6 is a number in YAML 1.2, but text in YAML 1.1, which PyYAML reads and writes."""
+_Loader.add_implicit_resolver(*SHORT_FLOAT)
 
 
 def _check_events(text: str) -> None:

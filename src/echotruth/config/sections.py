@@ -29,7 +29,7 @@ class Config(Section):
     """Configuration of a repository."""
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=60)] = "demo"
-    """Name of the repository; it is written to out/NAME."""
+    """Name of the repository, which is written to out/NAME; it does not end in .zarr, as the name of its store does."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     """Seed of all random numbers."""
     geometry: Geometry = Geometry()
@@ -52,6 +52,12 @@ class Config(Section):
     cases: Cases = Cases()
     """The hearts: values of dotted keys such as `fibres.endo_deg: [60, 70]`, of which all combinations are made, a
     table, random draws, and conditions; they multiply, 100 000 hearts at most (docs/cases.md)."""
+
+    @check
+    def _is_no_store(self) -> None:
+        if self.name.endswith(".zarr"):
+            remedy = f"must not end in .zarr, as the store does, which is out/NAME/NAME.zarr: write {self.name[:-5]}"
+            raise invalid("name", self.name, remedy)
 
     @model_validator(mode="before")
     @classmethod

@@ -24,7 +24,7 @@ def in_processes(
     Parameters
     ----------
     function : callable
-        Of one item; it and what it returns can be pickled.
+        Of one item; it, the item and what it returns can be sent to another process.
     items : sequence
     jobs : int
         Number of processes; with 1, this one.

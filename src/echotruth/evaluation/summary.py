@@ -12,6 +12,8 @@ from echotruth.cases import Case
 from echotruth.config import Config
 from echotruth.config.imaging import ALL_VIEWS
 from echotruth.evaluation.curves import strain_curves, strain_peaks, twist_of, twist_views
+from echotruth.evaluation.leaderboard import failures_of
+from echotruth.evaluation.no_estimate import reason
 from echotruth.evaluation.segment_strain import Row
 from echotruth.repository.choice import Names, Sizes, chosen, image_size
 from echotruth.repository.kept import NotEvaluated
@@ -75,9 +77,9 @@ def strain_summary(
 COLUMNS = (
     *("case", "view", "size_px", "tracker", "quantity", "unit"),
     *("tracked_es", "true_es", "tracked_peak", "true_peak", "tracked_time_to_peak_ms", "true_time_to_peak_ms"),
-    *("tracked_systolic_rate", "true_systolic_rate", "rate_unit"),
+    *("tracked_systolic_rate", "true_systolic_rate", "rate_unit", "no_estimate"),
 )
-"""Columns of the table."""
+"""Columns of the table; `no_estimate` says why the tracker has no value at end-systole, and is empty if it has one."""
 
 
 def _rows(repository: Repository, case: Case, views: list[str], sizes: list[int], trackers: list[str]) -> Iterator[Row]:
@@ -94,12 +96,23 @@ def _rows(repository: Repository, case: Case, views: list[str], sizes: list[int]
             for view, of_view in curves.items():
                 peaks = strain_peaks(of_view)
                 shown = [quantity for quantity in QUANTITIES if config.views[view].plane in quantity.planes]
-                rows += [keys | {"view": view} | _row(one.name, one.curve, one.place, peaks) for one in shown]
+                failure = failures_of(repository, case.id, view).get((tracker, size), "")
+                for one in shown:
+                    row = keys | {"view": view} | _row(one.name, one.curve, one.place, peaks)
+                    rows.append(row | {"no_estimate": _why_none(row, config, failure)})
             yield from rows
             yield from _means(rows, config, keys)
             if ends is not None and set(ends) <= set(curves):
                 twist = strain_peaks(twist_of(curves[ends[0]], curves[ends[1]]))
-                yield keys | {"view": ALL_VIEWS} | _row("twist", "twist", {}, twist)
+                row = keys | {"view": ALL_VIEWS} | _row("twist", "twist", {}, twist)
+                rotations = [one for one in rows if one["quantity"] == "rotation" and one["view"] in ends]
+                yield row | {"no_estimate": _first_reason(rotations)}
+
+
+def _why_none(row: Row, config: Config, failure: str) -> str:
+    """Why a row has no tracked value at end-systole."""
+    tracked, true = (np.array(row[f"{what}_es"], float) for what in WHAT)
+    return reason(tracked, true, config, failure, is_strain=row["quantity"] not in ANGLES)
 
 
 def _row(name: str, curve: str, place: dict[str, str | int], peaks: xr.Dataset) -> Row:
@@ -127,4 +140,9 @@ def _means(rows: list[Row], config: Config, keys: Row) -> Iterator[Row]:
                 for column in COLUMNS
                 if column.startswith(("tracked_", "true_"))
             }
-            yield of_plane[0] | keys | {"view": ALL_VIEWS} | means
+            yield of_plane[0] | keys | {"view": ALL_VIEWS} | means | {"no_estimate": _first_reason(of_plane)}
+
+
+def _first_reason(rows: list[Row]) -> str:
+    """Why what is made from some rows has no estimate."""
+    return next((str(row["no_estimate"]) for row in rows if row["no_estimate"]), "")

@@ -40,8 +40,6 @@ class Format:
         What it can be told, beside which cases, views and sizes to write.
     table : str
         Name of one more file, of all clips, that its module writes with `write_summary`; "" for none.
-    together : bool
-        Whether all clips are in one file, which its module writes with `write_together`.
     """
 
     module: str
@@ -50,7 +48,6 @@ class Format:
     holds: Literal["clip", "view", "heart"] = "clip"
     options: tuple[str, ...] = ()
     table: str = ""
-    together: bool = False
 
     def takes(self, option: str) -> bool:
         """Whether an option, or a choice of views or sizes, does something for it."""
@@ -81,7 +78,6 @@ FORMATS = {
     "matlab": Format("matlab", ".mat", ("phantom", "truth", "bmode", "tracking"), options=("trackers",)),
     "csv": Format("curves", ".csv", ("tracking",), options=("trackers",), table="summary.csv"),
     "tap": Format("tap", ".npz"),
-    "tap_pickle": Format("tap", ".pkl", together=True),
     "flo": Format("flo", ""),
     "uff": Format("uff", ".uff", (), "view"),
     "zea": Format("zea", ".hdf5", (), "view"),
@@ -180,7 +176,7 @@ class Export:
                     yield Clip(self.repository, cases[case], view, size)
 
     def write(self, clips: Sequence[Clip]) -> Iterator[Path]:
-        """Write a file or folder for each clip, view or heart, or one for all, and give its path when it is whole.
+        """Write a file or folder for each clip, view or heart, and give its path when it is whole.
 
         The table of a format is written last, unless `output` is the path of a single file.
 
@@ -192,9 +188,6 @@ class Export:
             If a file cannot be written.
         """
         form = FORMATS[self.format]
-        if form.together:
-            yield from self._write_together(clips)
-            return
         options = {"overlay": self.overlay, "rate": self.rate or FRAME_RATE, "trackers": self.trackers}
         for clip, target in zip(clips, self._targets(clips), strict=True):
             with draft(target) as path, _told(clip):
@@ -204,14 +197,6 @@ class Export:
         if form.table and clips and not self._is_file:
             with draft(self._output / form.table) as path, _told(clips[0]):
                 form.writer.write_summary(clips, path, self.trackers)
-
-    def _write_together(self, clips: Sequence[Clip]) -> Iterator[Path]:
-        """Write one file of all clips, which has the name of the repository if it has no other, and give its path."""
-        form = FORMATS[self.format]
-        target = self._output if self._is_file else self._output / f"{self.repository.config.name}{form.suffix}"
-        with draft(target) as path, _told(clips[0]):
-            form.writer.write_together(clips, path)
-        yield target
 
     @property
     def _output(self) -> Path:

@@ -1,13 +1,10 @@
-"""Point tracks in the form of TAP-Vid: arrays `video`, `points` and `occluded`, in a NumPy archive or a pickle.
+"""Point tracks in the form of TAP-Vid: arrays `video`, `points` and `occluded`, in a NumPy archive.
 
 Doersch et al., TAP-Vid: A Benchmark for Tracking Any Point in a Video, NeurIPS 2022 (arXiv:2211.03726): its files
 hold `video` (frame, height, width, 3; uint8), `points` (point, frame, 2; x, y; of the width and the height, 0 to 1) and
-`occluded` (point, frame; bool); those of its DAVIS and RGB-stacking sets are pickled dictionaries.
+`occluded` (point, frame; bool).
 """
 
-import pickle
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,32 +26,6 @@ def write(clip: Clip, path: Path) -> None:
     """
     with path.open("wb") as file:
         np.savez_compressed(file, **arrays(clip))
-
-
-def write_together(clips: Sequence[Clip], path: Path) -> None:
-    """Write a pickle of a dictionary from the name of each clip to a dictionary of its :func:`arrays`.
-
-    Parameters
-    ----------
-    clips : sequence of Clip
-    path : Path
-    """
-    with path.open("wb") as file:
-        pickler = pickle.Pickler(file, protocol=4)
-        # The pickler keeps no list of what it has written, so that only one clip at a time is in memory.
-        pickler.fast = True
-        pickler.dump(_Videos(clips))
-
-
-class _Videos:
-    """Clips that are pickled one after the other as a plain dictionary."""
-
-    def __init__(self, clips: Sequence[Clip]) -> None:
-        self.clips = clips
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        # A copy, with which goes what was read of the clip.
-        return dict, (), None, None, ((clip.name, arrays(replace(clip))) for clip in self.clips)
 
 
 def arrays(clip: Clip) -> dict[str, Any]:

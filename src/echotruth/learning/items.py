@@ -43,7 +43,7 @@ class Items(Sequence[Item]):
     Parameters
     ----------
     repository : str or Path
-        `out/NAME` or `out/NAME/NAME.zarr`.
+        `out/NAME`, `out/NAME/NAME.zarr`, or the address `s3://BUCKET/FOLDER`.
     cases : DataFrame or iterable of str, optional
         A table as :func:`echotruth.learning.cases` or :func:`echotruth.learning.split` returns it, or case ids.
         Default: all that are complete.
@@ -86,7 +86,7 @@ class Items(Sequence[Item]):
             for path in self.arrays:
                 if not self.repository.is_written(path, place.case, place.view):
                     raise ValueError(
-                        f"{self.repository.folder}: {place.case} has no {path} in the view {place.view}: "
+                        f"{self.repository.location}: {place.case} has no {path} in the view {place.view}: "
                         "finish the run, or choose cases of status complete."
                     )
         return places
@@ -147,5 +147,5 @@ def _listed(names: Any) -> list[str]:
 def _complete(repository: Repository) -> list[str]:
     found = [str(case) for case in repository.cases.query("status == 'complete'").index]
     if not found:
-        raise ValueError(f"{repository.folder}: no case is complete: finish the run, or name the cases.")
+        raise ValueError(f"{repository.location}: no case is complete: finish the run, or name the cases.")
     return found

@@ -19,7 +19,7 @@ def cases(repository: str | Path, query: str | None = None, measurements: bool =
     Parameters
     ----------
     repository : str or Path
-        `out/NAME` or `out/NAME/NAME.zarr`.
+        `out/NAME`, `out/NAME/NAME.zarr`, or the address `s3://BUCKET/FOLDER`.
     query : str, optional
         Condition on the columns, as :meth:`pandas.DataFrame.query` takes it, and on all keys, those too that are the
         same in all cases: "status == 'complete' and ejection_fraction < 0.5 and `fibres.endo_deg` > 60". Default: all

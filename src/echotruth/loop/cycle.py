@@ -218,6 +218,8 @@ def _check_end_diastole(recording: Recording) -> None:
             values, name = recording.columns[quantity], recording.names[quantity]
             first = f"the first row has {name} {values[0]:g} of {values.min():g} to {values.max():g}"
             remedy = "begin the loop at end-diastole, full, slack and before the pressure rises"
+            if quantity == "volume":
+                remedy += f": row {np.argmax(values) + 1} has the largest volume"
             raise LoopError(f"{recording.path}: {first}; {remedy}.")
 
 

@@ -1,6 +1,7 @@
 """A recorded cycle, read from a CSV file whose columns have their units in their names."""
 
 import csv
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,8 @@ COLUMNS = {
     "tension": ("kPa", "Pa"),
 }
 """Quantity to the units that its column may have."""
+
+_ABBREVIATIONS = {"t": "time", "lvp": "pressure", "lvv": "volume"}
 
 _MIN_ROWS = 4
 
@@ -54,7 +57,8 @@ def read(path: Path, purpose: str, needed: tuple[str, ...], optional: tuple[str,
     Parameters
     ----------
     path : Path
-        CSV; blank lines and lines that begin with # are skipped, the first other line names the columns.
+        CSV, with commas, or with semicolons or tabs and then also decimal commas; blank lines and lines that begin
+        with # are skipped, the first other line names the columns. Text that LabChart exports is read too.
     purpose : str
         Use of the columns, for errors.
     needed, optional : tuple of str
@@ -65,8 +69,7 @@ def read(path: Path, purpose: str, needed: tuple[str, ...], optional: tuple[str,
     LoopError
         If the file cannot be read, lacks a column or gives a quantity twice, or a cell is no number.
     """
-    lines = [(i, line) for i, line in enumerate(_text(path), 1) if line.strip() and not line.startswith("#")]
-    header = [name.strip() for name in lines[0][1].split(",")] if lines else []
+    header, rows = _table(_text(path))
     names = {quantity: _column(path, header, quantity) for quantity in (*needed, *optional)}
     for quantity in needed:
         if not names[quantity]:
@@ -74,15 +77,44 @@ def read(path: Path, purpose: str, needed: tuple[str, ...], optional: tuple[str,
             need = f"there is no column of the {quantity}, which {purpose} needs"
             raise LoopError(f"{path}: {need}; add one and name it {choice}.")
     names = {quantity: name for quantity, name in names.items() if name}
-    rows = list(csv.DictReader((line for _, line in lines[1:]), header, restval=""))
     if len(rows) < _MIN_ROWS:
         raise LoopError(f"{path}: there are {len(rows)} rows; a cycle needs {_MIN_ROWS} or more.")
-    numbered = [(f"{path}, line {number}", row) for (number, _), row in zip(lines[1:], rows, strict=True)]
     columns = {
-        quantity: np.array([_number(line, name, row[name].strip()) for line, row in numbered])
+        quantity: np.array([_number(f"{path}, line {line}", name, row.get(name, "")) for line, row in rows.items()])
         for quantity, name in names.items()
     }
     return Recording(path, names, columns)
+
+
+def _table(text: list[str]) -> tuple[list[str], dict[int, dict[str, str]]]:
+    """Names of the columns, and number of each line with its cells by these names."""
+    lines = {i: line for i, line in enumerate(text, 1) if line.strip() and not line.startswith("#")}
+    delimiter = next((mark for mark in "\t;" if mark in next(iter(lines.values()), "")), ",")
+    cells = dict(zip(lines, csv.reader(lines.values(), delimiter=delimiter), strict=True))
+    cells = {i: [cell.strip() for cell in row] for i, row in cells.items()}
+    # LabChart writes lines such as "ChannelTitle=", then rows of the time in seconds and the channels.
+    about = {row[0]: row[1:] for row in cells.values() if row and row[0].endswith("=")}
+    rows = {i: row for i, row in cells.items() if not (row and row[0].endswith("="))}
+    if "ChannelTitle=" in about:
+        units = [*about.get("UnitName=", []), *[""] * len(about["ChannelTitle="])]
+        header = ["time_s", *(f"{title} ({unit})" for title, unit in zip(about["ChannelTitle="], units, strict=False))]
+    else:
+        header = rows.pop(min(rows)) if rows else []
+    header = [_standard_name(name) for name in header]
+    if delimiter != ",":
+        rows = {i: [cell.replace(",", ".") for cell in row] for i, row in rows.items()}
+    return header, {i: dict(zip(header, row, strict=False)) for i, row in rows.items()}
+
+
+def _standard_name(name: str) -> str:
+    """Name of a column as `COLUMNS` has it, of one such as "LVP [mmHg]"; another one as it is."""
+    match = re.fullmatch(r"([^\W_]+)[\s_]*[\s_(\[]([^\W_]+)[)\]]?", name.replace("\u00b5", "u").replace("\u03bc", "u"))
+    if match is None:
+        return name
+    quantity = _ABBREVIATIONS.get(match[1].lower(), match[1].lower())
+    units = {unit.lower(): unit for unit in COLUMNS.get(quantity, ())}
+    unit = units.get(match[2].lower())
+    return name if unit is None else f"{quantity}_{unit}"
 
 
 def _text(path: Path) -> list[str]:

@@ -1,8 +1,12 @@
 """Refusal of what is no heart and no clip, with the function that makes one."""
 
+import numpy as np
 import xarray as xr
 
+from echotruth.config import Config
 from echotruth.heart import Heart
+from echotruth.imaging.bmode import pixel_centres
+from echotruth.loop.cycle import frame_times
 
 
 def check_heart(heart: object) -> None:
@@ -29,3 +33,42 @@ def check_clip(clip: object, name: str = "clip") -> None:
     if not isinstance(clip, xr.Dataset):
         clips, tracked = "a Repository has one, echotruth.image makes one", "echotruth.track makes one from a clip"
         raise TypeError(f"{name} = {clip!r:.80}: must be a Dataset: {clips if name == 'clip' else tracked}.")
+
+
+def check_whole(clip: xr.Dataset, config: Config) -> None:
+    """Check that a clip has all frames and pixels of its image, in their order.
+
+    Trackers are told of one spacing and of a wall at end-diastole, so that of a clip that was cropped, reversed or
+    resampled they would find another motion.
+
+    Parameters
+    ----------
+    clip : Dataset
+        With the coordinates frame, time, axial and lateral.
+    config : Config
+        Of the case.
+
+    Raises
+    ------
+    ValueError
+        With the coordinate that is not that of the image.
+    """
+    if clip.sizes["frame"] != config.loop.frames:
+        number = f"{clip.sizes['frame']} of {config.loop.frames} frames"
+        raise ValueError(f"The clip has {number}: track a whole cycle.")
+    sizes = clip.sizes["axial"], clip.sizes["lateral"]
+    if sizes[0] != sizes[1] or sizes[0] not in config.bmode.sizes:
+        known = ", ".join(f"{size} x {size}" for size in config.bmode.sizes)
+        raise ValueError(f"The clip has {sizes[0]} x {sizes[1]} pixels: give the whole image, {known}.")
+    axial, lateral = pixel_centres(config.bmode, sizes[0])
+    whole = {
+        "frame": np.arange(config.loop.frames),
+        "time": frame_times(config.loop),
+        "axial": axial,
+        "lateral": lateral,
+    }
+    for name, values in whole.items():
+        found = np.asarray(clip[name].values, float)
+        if not np.allclose(found, values, rtol=1e-6, atol=1e-12):
+            order = "reversed" if np.allclose(found[::-1], values, rtol=1e-6, atol=1e-12) else "not that of its image"
+            raise ValueError(f"The clip's {name} is {order}: give all frames and pixels, in the order of its image.")

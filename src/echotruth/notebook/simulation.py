@@ -27,7 +27,7 @@ from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.bounds import violated_bound
 from echotruth.mechanics.physiology import measures
-from echotruth.notebook.arguments import check_clip, check_heart
+from echotruth.notebook.arguments import check_clip, check_heart, check_whole
 from echotruth.repository.choice import image_size
 from echotruth.repository.datasets import as_stored, case_of, clip_dataset, dataset, plane_of
 from echotruth.seeds import generator
@@ -185,7 +185,8 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     TrackerFailed
         If the tracker finds no motion.
     ValueError
-        If the clip is not a whole cycle, or has lost its attributes.
+        If the clip is not a whole cycle, is cropped or reversed, has infinite pixels, or has lost its
+        attributes.
 
     Examples
     --------
@@ -207,15 +208,18 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     if missing := [name for name in ("image", "mask", "grid_mask") if name not in clip]:
         raise ValueError(f"clip: has no {missing[0]}: load it with image and mask among its variables.")
     case = case_of(clip)
-    if clip.sizes["frame"] != case.config.loop.frames:
-        number = f"{clip.sizes['frame']} of {case.config.loop.frames} frames"
-        raise ValueError(f"The clip has {number}: track a whole cycle.")
+    check_whole(clip, case.config)
     inside, size = clip["grid_mask"].values, clip.sizes["axial"]
     points = grid_points(case.config, size)[inside]
     spacing = case.config.bmode.si().field_of_view / size
     seed = tracker_seed(case, clip.attrs["view"])
-    frames, mask, times = clip["image"].values, clip["mask"].values[0], clip["time"].values
-    arguments = Clip(frames, mask, inside, points, spacing, times, seed, case.config.tracking.frame_step)
+    image, mask = (clip[name].transpose("frame", "axial", "lateral").values for name in ("image", "mask"))
+    if (unknown := np.isnan(image).any(axis=(1, 2))).any():
+        frames = f"{unknown.sum()} of {len(image)} frames have pixels that are NaN"
+        warnings.warn(f"{frames}: no displacement is estimated from these", stacklevel=2)
+    arguments = Clip(
+        image, mask[0], inside, points, spacing, clip["time"].values, seed, case.config.tracking.frame_step
+    )
     found = track_points(*arguments.tracker_arguments, tracker_section(case.config, tracker, options))
     displacement, quality = arguments.on_grid(*found)
     coordinates = {"axial": clip["grid_axial"].values, "lateral": clip["grid_lateral"].values}

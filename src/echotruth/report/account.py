@@ -5,6 +5,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from echotruth.config.imaging import ALL_VIEWS
+from echotruth.evaluation.no_estimate import FAILED
 from echotruth.repository.benchmark_files import total
 from echotruth.repository.ledger import STAGES, imaged_statuses, read
 from echotruth.repository.reader import Repository
@@ -32,7 +34,7 @@ def size_on_disk(store: Path) -> int:
 
 
 def failures(repository: Repository) -> dict[str, Any]:
-    """Hearts that are not complete and trackers that found nothing, with their reasons."""
+    """Hearts that are not complete, and what trackers did not find, with the reasons."""
     rows = repository.cases[~repository.cases["status"].isin(["complete", "retired"])]
     lost = list(islice(_lost(repository), LISTED + 1))
     return {
@@ -40,7 +42,20 @@ def failures(repository: Repository) -> dict[str, Any]:
         "more_cases": max(len(rows) - LISTED, 0),
         "trackers": lost[:LISTED],
         "more_trackers": len(lost) > LISTED,
+        "no_estimate": list(islice(_not_estimated(repository), LISTED)),
     }
+
+
+def _not_estimated(repository: Repository) -> Iterator[dict[str, str]]:
+    """What trackers have no estimate of in the first heart that is shown, with the reason; failures are told apart."""
+    table = repository.summary(cases=repository.shown[:1]) if repository.shown else None
+    if table is None or not len(table):
+        return
+    lost = table[(table["no_estimate"] != "") & (table["view"] != ALL_VIEWS)]
+    lost = lost[~lost["no_estimate"].str.startswith(FAILED)]
+    for (view, why), rows in lost.groupby(["view", "no_estimate"], sort=False):
+        quantities, trackers = (", ".join(rows[name].unique()) for name in ("quantity", "tracker"))
+        yield {"view": str(view), "quantities": quantities, "trackers": trackers, "reason": str(why)}
 
 
 def _lost(repository: Repository) -> Iterator[dict[str, str]]:

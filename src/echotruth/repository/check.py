@@ -13,6 +13,7 @@ from pathlib import Path
 from echotruth.repository.check_jobs import check_job, check_loop
 from echotruth.repository.check_structure import (
     Listed,
+    check_configuration,
     check_metadata,
     check_others,
     check_registries,
@@ -53,13 +54,18 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
         If the folder is not a repository.
     """
     repository, report = Inventory(folder), Report()
+    if edited := check_configuration(repository):
+        report.faults = edited
+        report.notes = ["nothing else was checked, because the configuration says what must be there"]
+        return report
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         structure, report.faults = check_structure(repository, pool)
         is_whole = not report.faults
-        report.faults += check_others(repository)
         if is_whole:
             report.faults += check_registries(repository)
             report.faults += check_metadata(repository)
+        repository.distrust({path for fault in report.faults for path in fault.files})
+        report.faults += check_others(repository)
         records = repository.records()
         listed: Listed = {}
         jobs = pool.map(lambda record: check_job(repository, record, quick), records)
@@ -77,7 +83,8 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
             fault for faults in pool.map(lambda one: check_loop(repository, one), solved) for fault in faults
         ]
     report.faults += unrecorded_files(repository, listed, structure)
-    report.faults.sort(key=lambda fault: fault.path)
+    # What is wrong with the metadata of an array is found by every job that has written it.
+    report.faults = sorted(dict.fromkeys(report.faults), key=lambda fault: fault.path)
     report.notes = _notes(repository, records)
     report.files += len(structure or ())
     report.jobs = len(records)

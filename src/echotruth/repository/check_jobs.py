@@ -43,6 +43,8 @@ def check_job(repository: Inventory, job: JobRecord, quick: bool) -> JobFaults:
         return JobFaults(
             [Fault(name, "is of a case or view that registry.txt or views.txt does not have", remedy, (job.path,))]
         )
+    if repository.has_other_settings(job, record.get("settings")):
+        return JobFaults([Fault(name, "is of other settings than those of config.yaml", remedy, (job.path,))])
     expected = repository.shards(job) if record["status"] == "complete" else set()
     listed = {path: hash for path, hash in record.get("sha256", {}).items() if _is_current(repository, path)}
     found = JobFaults([], len(listed), frozenset(path.partition("/c/")[0] for path in listed if path in expected))
@@ -55,11 +57,7 @@ def check_job(repository: Inventory, job: JobRecord, quick: bool) -> JobFaults:
             file = repository.store / path
             found.faults.append(Fault(repository.name(file), problem, remedy, (job.path,), (file,)))
     if not quick and not found.faults and job.case in repository.cases:
-        found.faults = [
-            _fault_of_value(repository, job, group, array, problem)
-            for group, array, problem in _check_values(repository, job, row, listed)
-            if f"{group}/{array}" not in COMPRESSED or _is_complete(repository, job.case)
-        ]
+        found.faults = list(_check_values(repository, job, row, listed))
     return found
 
 
@@ -115,23 +113,45 @@ def _is_current(repository: Inventory, path: str) -> bool:
     return group in repository.groups or schema.kind(group) not in schema.KINDS
 
 
-def _check_values(
-    repository: Inventory, job: JobRecord, row: tuple[int, ...], files: Iterable[str]
-) -> Iterator[tuple[str, str, str]]:
-    """Group, array and problem of the values of a job."""
-    config, arrays = repository.cases[job.case].config, {path.partition("/c/")[0] for path in files}
+def _check_values(repository: Inventory, job: JobRecord, row: tuple[int, ...], files: Iterable[str]) -> Iterator[Fault]:
+    """Faults of the values of a job."""
+    arrays = {path.partition("/c/")[0] for path in files}
     for group in sorted({path.rpartition("/")[0] for path in arrays}):
         names = [name for inside, _, name in (path.rpartition("/") for path in arrays) if inside == group]
         opened = {name: repository.opened.get(f"{group}/{name}") for name in names}
         if any(array is None for array in opened.values()):
             continue  # its metadata are damaged
-        found: dict[str, str] = {}  # the first problem of each array: that of the first part of its frames
-        labels = repository.pack_labels(group)
-        for first, part in _blocks(group, {name: array for name, array in opened.items() if array is not None}, row):
-            named = packing.unpack(packs_of(group), part, labels)
-            for name, problem in values.faults(group, named, first, config):
-                found.setdefault(name, problem)
-        yield from ((group, name, problem) for name, problem in found.items())
+        try:
+            found = _problems(
+                repository, job, group, {name: array for name, array in opened.items() if array is not None}, row
+            )
+        except Exception as error:  # by the metadata of other arrays, the reading fails in many ways
+            yield _fault_of_metadata(repository, group, names, error)
+            continue
+        for name, problem in found.items():
+            if f"{group}/{name}" not in COMPRESSED or _is_complete(repository, job.case):
+                yield _fault_of_value(repository, job, group, name, problem)
+
+
+def _problems(
+    repository: Inventory, job: JobRecord, group: str, opened: dict[str, zarr.Array[Any]], row: tuple[int, ...]
+) -> dict[str, str]:
+    """The first problem of each array of a group: that of the first part of its frames."""
+    found: dict[str, str] = {}
+    labels, config = repository.pack_labels(group), repository.cases[job.case].config
+    for first, part in _blocks(group, opened, row):
+        named = packing.unpack(packs_of(group), part, labels)
+        for name, problem in values.faults(group, named, first, config):
+            found.setdefault(name, problem)
+    return found
+
+
+def _fault_of_metadata(repository: Inventory, group: str, names: list[str], error: Exception) -> Fault:
+    """Arrays of a group whose metadata do not fit their files; without these, a run writes them anew."""
+    files = tuple(sorted(repository.store / group / name / "zarr.json" for name in names))
+    problem = f"has arrays that cannot be read by their zarr.json ({reason(error)})"
+    path = f"{repository.name(repository.store)}/{group}"
+    return Fault(path, problem, "echotruth run writes them again", (repository.publication_record,), files)
 
 
 def _blocks(
@@ -167,10 +187,11 @@ def check_loop(repository: Inventory, job: JobRecord) -> list[Fault]:
     curves |= {"kinematics/volume_ratio_min": "volume_ratio_min"}
     if not {*curves, "physiology/scalars"} <= set(repository.opened):
         return []
-    arrays = {name: np.asarray(repository.opened[path][row[0]]) for path, name in curves.items()}
-    scalars = {"scalars": np.asarray(repository.opened["physiology/scalars"][row[0]])}
-    found = packing.unpack(packs_of("physiology"), scalars, repository.pack_labels("physiology"))
-    return [
-        _fault_of_value(repository, job, "physiology", name, problem)
-        for name, problem in values.loop_faults(arrays, found, repository.cases[job.case].config)
-    ]
+    try:
+        arrays = {name: np.asarray(repository.opened[path][row[0]]) for path, name in curves.items()}
+        scalars = {"scalars": np.asarray(repository.opened["physiology/scalars"][row[0]])}
+        found = packing.unpack(packs_of("physiology"), scalars, repository.pack_labels("physiology"))
+        problems = list(values.loop_faults(arrays, found, repository.cases[job.case].config))
+    except Exception:  # by the metadata of other arrays, which the check of the values has told
+        return []
+    return [_fault_of_value(repository, job, "physiology", name, problem) for name, problem in problems]

@@ -61,14 +61,37 @@ def check_registries(repository: Inventory) -> Iterator[Fault]:
             yield Fault(name, problem, _REWRITTEN, (repository.publication_record,), (path,))
 
 
+def check_configuration(repository: Inventory) -> list[Fault]:
+    """The configuration, by which all the rest is checked."""
+    return [fault for fault in _beside(repository, repository.records_beside[0]) if fault.path == "config.yaml"]
+
+
 def check_others(repository: Inventory) -> Iterator[Fault]:
-    """Record of the publication."""
+    """Record of the publication, and the files beside the store: table, configurations of the hearts, and report."""
     path = repository.publication_record
     try:
         if path.is_file():
             ledger.read(path)
     except ValueError as error:
         yield Fault(repository.name(path), f"cannot be read ({reason(error)})", _REWRITTEN, (path,))
+    for record in repository.records_beside:
+        yield from _beside(repository, record)
+
+
+def _beside(repository: Inventory, record: Path) -> Iterator[Fault]:
+    """Files beside the store against the checksums in their record, which earlier versions have not written."""
+    try:
+        files = ledger.read(record)["files"] if record.is_file() else {}
+        if not are_checksums(files):
+            raise ValueError("has no checksums")
+    except (ValueError, KeyError, TypeError) as error:
+        yield Fault(repository.name(record), f"cannot be read ({reason(error)})", _REWRITTEN, (), (record,))
+        return
+    for name, checksum in files.items():
+        if problem := damage(repository.folder / name, checksum):
+            # Without its configuration the folder is no repository, and a run writes it in any case.
+            dropped = () if name == "config.yaml" else (repository.folder / name,)
+            yield Fault(name, problem, _REWRITTEN, (), dropped)
 
 
 def check_metadata(repository: Inventory) -> Iterator[Fault]:
@@ -78,9 +101,10 @@ def check_metadata(repository: Inventory) -> Iterator[Fault]:
         name = f"{repository.name(repository.store)}/{path}"
         opened = repository.opened.get(path)
         if opened is None:
-            yield Fault(name, "is not an array that can be opened", remedy, (repository.publication_record,))
+            file = repository.store / path / "zarr.json"
+            yield Fault(name, "is not an array that can be opened", remedy, (repository.publication_record,), (file,))
         elif problem := _metadata_problem(opened, array, repository):
-            yield Fault(name, problem, remedy)
+            yield Fault(name, problem, remedy, (), (repository.store / path / "zarr.json",))
     yield from _check_times(repository)
 
 

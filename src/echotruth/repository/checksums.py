@@ -1,6 +1,7 @@
 """Checksums of files: taken when they are written, kept in a record, and verified before publication.
 
-The record of a job holds those of its shards, and `ledger/structure.json` those of all other files of the store.
+The record of a job holds those of its shards, and `ledger/structure.json` those of all other files of the store. Those
+of the files beside it are in `ledger/configuration.json` and `ledger/report.json`.
 
 Beside these, every chunk in a shard carries a crc32c (see :mod:`.hierarchy`), which raises when damaged data are read.
 """
@@ -20,6 +21,26 @@ class ChecksumError(ValueError):
 def checksums(files: list[Path], root: Path) -> dict[str, str]:
     """SHA-256 of each file by its path below `root`."""
     return {file.relative_to(root).as_posix(): sha256(file.read_bytes()).hexdigest() for file in files}
+
+
+def commit_beside(folder: Path, record: Path, files: list[Path]) -> None:
+    """Record the checksums of files that stand beside the store; a record that is as it should be is left untouched.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the repository, `out/NAME`.
+    record : Path
+        Path of the record in its ledger.
+    files : list of Path
+    """
+    found = {"files": checksums(files, folder)}
+    try:
+        unchanged = ledger.read(record) == found
+    except (OSError, ValueError):
+        unchanged = False
+    if not unchanged:
+        ledger.commit(record, found)
 
 
 def damage(file: Path, expected: str) -> str:

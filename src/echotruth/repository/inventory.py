@@ -1,7 +1,7 @@
 """What a check needs to know of a repository: its configuration, records, rows and arrays."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +14,8 @@ import zarr
 from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, load
-from echotruth.repository import layout, ledger, schema
+from echotruth.loop.recording import LoopError
+from echotruth.repository import layout, ledger, schema, settings
 from echotruth.repository.array import Array
 from echotruth.repository.ledger import NOT_A_REPOSITORY, STAGES, record_paths
 
@@ -94,6 +95,7 @@ class Inventory:
         self.store = folder / f"{self.config.name}.zarr"
         self.structure_record = folder / "ledger/structure.json"
         self.publication_record = folder / "ledger/repository.json"
+        self.records_beside = [folder / "ledger/configuration.json", folder / "ledger/report.json"]
         self.groups = schema.groups(self.config)
         self.rows, self.views = ledger.rows(folder / "registry.txt"), ledger.rows(folder / "views.txt")
 
@@ -119,6 +121,28 @@ class Inventory:
             with suppress(Exception):  # damaged metadata, which is a fault of its own, fail in many ways
                 arrays[path] = zarr.open_array(self.store, path=path, mode="r")
         return arrays
+
+    @cached_property
+    def is_of_this_version(self) -> bool:
+        """Whether this version would write the same configuration: others have other keys, and other hashes of them."""
+        return (self.folder / "config.yaml").read_text(encoding="utf-8") == layout.as_yaml(self.config)
+
+    def has_other_settings(self, record: JobRecord, recorded: str | None) -> bool:
+        """Whether a job was run with other settings than the configuration has, given their hash in its record."""
+        if recorded is None or record.case not in self.cases or not self.is_of_this_version:
+            return False
+        if record.view is not None and record.view not in self.config.views:
+            return False
+        try:
+            return recorded != settings.of_job(self.cases[record.case].config, record.stage, record.view)
+        except LoopError:  # its file need not be here any more
+            return False
+
+    def distrust(self, files: Iterable[Path]) -> None:
+        """Leave out the arrays whose metadata are damaged, given the files that are."""
+        for path in self.shard_paths:
+            if self.store / path / "zarr.json" in files:
+                self.opened.pop(path, None)
 
     def pack_labels(self, group: str) -> dict[str, list[str]]:
         """Labels along the dimension of each pack of a group."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from echotruth.cases import RF_INDEPENDENT, Case, table
 from echotruth.config import Config
+from echotruth.config.reading import SHORT_FLOAT
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import pixel_centres
@@ -20,6 +21,7 @@ from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.motion_file.wall import moving_wall
 from echotruth.repository import durable, ledger, schema
 from echotruth.repository.case_file import case_path
+from echotruth.repository.checksums import commit_beside
 from echotruth.repository.store import Store
 from echotruth.tracking import grid
 
@@ -56,8 +58,9 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
     attributes = {"rf": settings, "cases": {"constants": constants(case_table)}}
     store.lay_out(arrays, sizes(mesh) | lengths, coordinates, attributes)
     texts = {case_path(folder, case.id): case.config.model_dump_json() for case in cases}
-    texts |= {folder / "cases.csv": case_table.to_csv(index=False), folder / "config.yaml": _as_yaml(config)}
+    texts |= {folder / "cases.csv": case_table.to_csv(index=False), folder / "config.yaml": as_yaml(config)}
     durable.update_all({path: text.encode() for path, text in texts.items()})
+    commit_beside(folder, folder / "ledger/configuration.json", list(texts))
 
 
 def _drop_records(folder: Path, store: Store, config: Config) -> None:
@@ -89,9 +92,11 @@ def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 
 
 _Dumper.add_representer(str, _text)
+_Dumper.add_implicit_resolver(*SHORT_FLOAT)  # so that such a text is written in quotes
 
 
-def _as_yaml(config: Config) -> str:
+def as_yaml(config: Config) -> str:
+    """Text of config.yaml."""
     return yaml.dump(config.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False, allow_unicode=True)
 
 

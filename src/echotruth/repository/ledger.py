@@ -70,9 +70,18 @@ def read(path: Path) -> dict[str, Any]:
 def parse(text: str) -> dict[str, Any]:
     """A record from the text of its file, as :func:`read` returns it."""
     record = json.loads(text)
-    if isinstance(record, dict) and (seal := record.pop("seal", None)) is not None and seal != _seal(record):
-        raise json.JSONDecodeError("the record is not what was written", text, 0)
+    if isinstance(record, dict):
+        seal = record.pop("seal", None)
+        is_other = seal is not None and seal != _seal(record)
+        if is_other or (seal is None and _has_seal_of_other_name(record)):
+            raise json.JSONDecodeError("the record is not what was written", text, 0)
     return record
+
+
+def _has_seal_of_other_name(record: dict[str, Any]) -> bool:
+    """Whether the name of the seal was damaged, so that the record seems to have none."""
+    digits = [key for key, value in record.items() if isinstance(value, str) and len(value) == 16]
+    return any(record[key] == _seal({name: record[name] for name in record if name != key}) for key in digits)
 
 
 def _seal(record: dict[str, Any]) -> str:

@@ -92,7 +92,7 @@ class Repository:
             "sizes": f"{', '.join(map(str, self.sizes))} px",
             "trackers": ", ".join(self.trackers),
             "frames": str(self.config.loop.frames),
-            "path": self._place if self._remote else str(self._folder),
+            "path": self.location,
         }
         return "\n".join([f"Repository {self.config.name}", *(f"  {name:8}  {text}" for name, text in lines.items())])
 
@@ -100,6 +100,11 @@ class Repository:
     def is_remote(self) -> bool:
         """Whether it is in object storage."""
         return self._remote is not None
+
+    @property
+    def location(self) -> str:
+        """Folder, or address in object storage."""
+        return self._place if self._remote else str(self._folder)
 
     @property
     def folder(self) -> Path:

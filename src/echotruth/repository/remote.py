@@ -61,6 +61,10 @@ class Remote:
         self.url, self._api = url.rstrip("/"), obstore
         self.store = self._asked(lambda: _store(self.url))
 
+    def __reduce__(self) -> tuple[type[Remote], tuple[str]]:
+        """Another process opens the address anew."""
+        return type(self), (self.url,)
+
     def has(self, name: str) -> bool:
         """Whether an object is there."""
         try:

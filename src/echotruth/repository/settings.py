@@ -13,16 +13,23 @@ Settings = tuple[Any, ...]
 
 def mechanics(config: Config) -> str:
     """Hash of what the motion of a heart depends on; hearts with the same one have the same motion."""
+    content = [_mesh_hash(config.geometry)]
+    if config.motion.kind == "beat":
+        content.append(settings_version(_curves(config.loop)))
+    if config.motion.kind == "file":
+        content.append(_series_hash(str(config.motion.file.path)))
+    return settings_version(*_motion(config), *content)
+
+
+def _motion(config: Config) -> Settings:
+    """What the motion of a heart depends on, besides the content of the files that it names."""
     # Only fibre disarray depends on the seed.
     seed = config.seed if config.fibres.disarray_deg else None
-    anatomy = (config.geometry.resolved(), _mesh_hash(config.geometry), config.fibres, seed, config.pathology)
+    anatomy = (config.geometry.resolved(), config.fibres, seed, config.pathology)
     if config.motion.kind == "beat":
-        return settings_version(*anatomy, config.loop, _curves(config.loop), config.mechanics)
+        return (*anatomy, config.loop, config.mechanics)
     formula = getattr(config.motion, config.motion.kind)
-    if config.motion.kind == "file":
-        formula = settings_version(formula, _series_hash(str(config.motion.file.path)))
-    amplitude = (_times(config.loop), config.motion.time_course)
-    return settings_version(*anatomy, *amplitude, formula, config.rf.focus_mm)
+    return (*anatomy, _times(config.loop), config.motion.time_course, formula, config.rf.focus_mm)
 
 
 def phantom(config: Config, view: str) -> Settings:
@@ -55,6 +62,32 @@ OF_VIEW: dict[str, Callable[[Config, str], Settings]] = {
     "tracking": tracking,
 }
 """Stages of a view -> their settings, besides what the stages before them depend on."""
+
+
+_BEFORE = {"phantom": (), "rf": (), "truth": (), "bmode": ("phantom",), "tracking": ("phantom", "truth", "bmode")}
+"""Stages of a view -> those before it, besides mechanics, whose settings it does not share."""
+
+
+def of_job(config: Config, stage: str, view: str | None) -> str:
+    """Hash of all settings on which the result of a job depends, those of the stages before it included.
+
+    It does not depend on the content of the files that a configuration names, which need not be there any more.
+
+    Parameters
+    ----------
+    config : Config
+        Of the case.
+    stage : str
+    view : str or None
+        None for the stage mechanics.
+
+    Raises
+    ------
+    LoopError
+        If a motion has the times of a loop that cannot be read.
+    """
+    stages = [] if view is None else [*_BEFORE[stage], stage]
+    return settings_version(*_motion(config), *[settings_version(*OF_VIEW[each](config, str(view))) for each in stages])
 
 
 @lru_cache(maxsize=1000)

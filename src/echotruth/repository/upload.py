@@ -85,6 +85,22 @@ class Upload:
             names = sorted(self.total.names)
             return [name for name, whole in zip(names, pool.map(self._is_same, names), strict=True) if not whole]
 
+    def send_again(self, names: list[str]) -> list[str]:
+        """Replace objects whose content is not what was sent, where the file here still is; those that still differ.
+
+        Parameters
+        ----------
+        names : list of str
+            As :meth:`differing` returns them.
+        """
+        for name in names:
+            path = self._folder / name
+            content = path.read_bytes() if path.is_file() else b""
+            # What an object carries says what was sent: a file here that is another one may be the damaged one.
+            if self._remote.checksum(name) in ("", sha256(content).hexdigest()) and content:
+                self._put(name, content)
+        return [name for name in names if not self._is_same(name)]
+
     def others(self) -> list[str]:
         """Objects there that belong to no file here, sorted."""
         return sorted(self._there - self.total.names)

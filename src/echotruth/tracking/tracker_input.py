@@ -12,7 +12,7 @@ class TrackerInput:
     Raises
     ------
     ValueError
-        If there are fewer than two frames, or points, mask, spacing or times are invalid.
+        If there are fewer than two frames, or pixels, points, mask, spacing or times are invalid.
     """
 
     frames: np.ndarray
@@ -26,6 +26,12 @@ class TrackerInput:
         frames, times = self.frames, self.frame_time
         if frames.ndim != 3 or len(frames) < 2:
             raise ValueError(f"A clip needs two or more frames, shape (frame, axial, lateral), not {frames.shape}.")
+        infinite = np.isinf(frames).any(axis=(1, 2))
+        if infinite.any():
+            frame = np.argmax(infinite)
+            raise ValueError(
+                f"Frame {frame} has pixels that are infinite: give numbers, or NaN where there is no image."
+            )
         if self.points.ndim != 2 or self.points.shape[1] != 2:
             raise ValueError(f"Points must have the shape (point, 2), not {self.points.shape}.")
         if self.mask.shape != self.shape:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from echotruth.arrays import Floats
+from echotruth.evaluation.no_estimate import reason
 from echotruth.viewer.clip import Clip
 
 LINE = "line"
@@ -57,6 +58,24 @@ def strain(clip: Clip, found: dict[str, xr.Dataset], component: str, measure: st
     shear = component == "RT" and measure == "engineering"
     factor, unit = (np.degrees(1), "°") if shear else (100, "%")
     return Plot(f"{strain_name(clip, component)} ({unit})", _tracked_and_true(found, name, factor, chosen))
+
+
+def no_estimate(clip: Clip, plot: Plot, tracker: str, failure: str) -> str:
+    """Why a tracker has no curve of strain after end-diastole; empty if it has a value in any frame.
+
+    Parameters
+    ----------
+    clip : Clip
+    plot : Plot
+        As :func:`strain` makes it.
+    tracker : str
+    failure : str
+        Why the tracker failed on the clip; "" if it did not.
+    """
+    tracked, true = plot.curves[tracker][1:], plot.curves[TRUE][1:]
+    if np.isfinite(tracked).any():
+        return ""
+    return reason(tracked, true, clip.repository.case(clip.case).config, failure)
 
 
 def rotation(clip: Clip, found: dict[str, xr.Dataset]) -> Plot:

@@ -12,6 +12,7 @@ from bokeh.document import Document
 from bokeh.layouts import column, row
 from bokeh.models import CheckboxButtonGroup, ColumnDataSource, Div, Range1d, Select, Slider, Toggle
 
+from echotruth.evaluation.leaderboard import failures_of
 from echotruth.repository.reader import Repository
 from echotruth.viewer import arrows, curves, facts, script
 from echotruth.viewer.choice import NOTHING, TRUTH, Choice, inputs
@@ -145,7 +146,7 @@ class Page:
             self._blank()
             place = f"{self.choice.case}, {self.choice.view}"
             said = str(error).partition("\n")[0] or type(error).__name__
-            self._say(f"{place} cannot be shown: {said}. Run: echotruth check {self.repository.folder}")
+            self._say(f"{place} cannot be shown: {said}. Run: echotruth check {self.repository.location}")
         finally:
             self.document.unhold()
 
@@ -252,6 +253,10 @@ class Page:
             "rotation": curves.rotation(clip, found),
             "volume": curves.volume(clip),
         }
+        for tracker in found:
+            failure = failures_of(self.repository, clip.case, clip.view).get((tracker, clip.size), "")
+            if why := curves.no_estimate(clip, plots["strain"], tracker, failure):
+                self._problems[f"{tracker} has no estimate of this strain: {why}."] = None
         for name, plot in plots.items():
             self.graphs[name].show(plot, 1e3 * clip.time, clip.es_frame)
 

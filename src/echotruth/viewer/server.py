@@ -1,7 +1,7 @@
 """The server of the viewer, on this machine alone."""
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from bokeh.application import Application
@@ -26,7 +26,7 @@ def serve(repository: str | Path, port: int = 0) -> Server:
     Parameters
     ----------
     repository : str or Path
-        `out/NAME` or `out/NAME/NAME.zarr`.
+        `out/NAME`, `out/NAME/NAME.zarr`, or the address `s3://BUCKET/FOLDER`.
     port : int
         Default: any that is free.
 
@@ -47,9 +47,8 @@ def serve(repository: str | Path, port: int = 0) -> Server:
     def page(document: Document) -> None:
         context = document.session_context
         query = context.request.arguments if context is not None and context.request is not None else {}
-        texts = {name: [value.decode() for value in values] for name, values in query.items()}
         now = opened(repository)  # a run may be going on
-        Page(now, asked(now, texts), document)
+        Page(now, asked(now, texts(query)), document)
 
     try:
         server = Server({"/": Application(FunctionHandler(page))}, port=port, address=LOCAL)
@@ -57,6 +56,11 @@ def serve(repository: str | Path, port: int = 0) -> Server:
         raise ShowError(f"port {port}: {error.strerror or error}: give another with --port, or leave it out") from None
     server.start()
     return server
+
+
+def texts(query: Mapping[str, Sequence[bytes]]) -> dict[str, list[str]]:
+    """Values of a query as text, whatever bytes an address has."""
+    return {name: [value.decode(errors="replace") for value in values] for name, values in query.items()}
 
 
 def opened(repository: str | Path) -> Repository:
@@ -68,7 +72,8 @@ def opened(repository: str | Path) -> Repository:
         If the folder holds no repository, or one without cases.
     """
     found = Repository(repository)
-    if not Path(str(found.store)).is_dir() or not found.present or not found.views:
+    laid_out = found.is_remote or Path(str(found.store)).is_dir()
+    if not laid_out or not found.present or not found.views:
         raise ShowError(f"{repository}: has no cases or no views yet: run its configuration first")
     return found
 

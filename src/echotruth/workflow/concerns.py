@@ -7,7 +7,7 @@ from typing import NamedTuple
 import psutil
 
 from echotruth.config import Config
-from echotruth.evaluation.strain import MAX_SPACING, RADIUS
+from echotruth.evaluation.strain import largest_grid
 from echotruth.workflow.estimate import Estimate, format_bytes, free_bytes
 from echotruth.workflow.imaged_tissue import ellipsoids
 
@@ -69,7 +69,7 @@ def _of_the_images(config: Config) -> Iterator[Concern]:
         text = f"a pixel is {pixel:.2g} wavelengths wide, so that speckle is lost between pixels"
         remedy = f"use {side / (MAX_PIXEL_WAVELENGTHS * wavelength):.0f} px or more"
         yield Concern(f"bmode.size_px = {config.bmode.size_px}: {text}: {remedy}", False)
-    most = int(MAX_SPACING * RADIUS * config.bmode.size_px)
+    most = largest_grid(config.bmode.size_px)
     if config.tracking.grid_px > most >= 1:
         apart = config.tracking.grid_px * side / config.bmode.size_px
         text = (

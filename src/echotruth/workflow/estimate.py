@@ -104,7 +104,7 @@ def estimate(config: Config, cases: Sequence[Case], cores: int, folder: Path) ->
         seconds = JOB_SECONDS + cost.mean_seconds(rule, configs) * speed.get(rule, 1.0)
         parts[rule] = Part(len(wanted), len(wanted - ended(folder, rule, config)), seconds)
         megabytes[rule] = max(expected_megabytes(rule, heart, *at) for heart in configs for at in places(rule, heart))
-    basis = f"jobs of {', '.join(speed)} in {folder}" if speed else "a reference (docs/estimate.md)"
+    basis = f"jobs of {', '.join(speed)} in {folder}" if speed else "a reference, a core of an Intel Xeon"
     basis += "" if len(sample) == len(cases) else f"; {len(sample)} of the hearts, evenly spaced"
     size = FIXED_BYTES + len(cases) * sum(map(_bytes, sample)) / len(sample)
     return Estimate(parts, cores, len(cases), size, number_of_files(config, len(cases)), megabytes, basis)

@@ -23,7 +23,7 @@ from echotruth.config import View
 from echotruth.config.loading import ConfigError
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane, imaging_plane
-from echotruth.repository import ledger, packing, schema
+from echotruth.repository import ledger, packing, schema, settings
 from echotruth.repository.case_file import read_case
 from echotruth.repository.checksums import ChecksumError, checksums
 from echotruth.repository.ledger import STAGES, record_path, repository_folder
@@ -150,13 +150,19 @@ class Job:
         Raises
         ------
         FileNotFoundError
-            If they are not there, or not any more.
+            If they are not there, or not any more: a damaged file is deleted, so that the next run makes it anew.
         """
         if not file.is_file():
             stage = {self.scatterers: "phantom", self.lines: "rf"}[file]
             raise FileNotFoundError(f"{file}: is not there: run the stage {stage} first")
-        with np.load(file) as opened:
-            return dict(opened)
+        try:
+            # A .npz has a CRC-32 of every array.
+            with np.load(file, allow_pickle=False) as opened:
+                return dict(opened)
+        except Exception:  # a damaged archive raises one of many errors
+            file.unlink()
+            remedy = "it is deleted, and the next run makes it anew"
+            raise FileNotFoundError(f"{file}: is not what was written: {remedy}") from None
 
     def note(self, **entries: Any) -> None:
         """Add entries to the record of this job."""
@@ -206,6 +212,7 @@ class Job:
         lease.confirm()
         place = {"case": self.case.id, "view": self.view_name, "size": self.size or None}
         made = {"seed": self.config.seed, "code": self.code, "instructions": instructions.kind()}
+        made["settings"] = settings.of_job(self.config, self.stage, self.view_name)
         ledger.commit(self.record, {"stage": self.stage} | place | made | entries)
 
 
@@ -239,6 +246,9 @@ def run(job: Job, work: Work) -> None:
             job.commit(result)
     except (NotWritten, ChecksumError, FileNotFoundError) as error:
         sys.exit(f"{job.stage}: {error}")
+    except OSError as error:
+        remedy = "the folder must be writable, on a disk that has space and no errors"
+        sys.exit(f"{job.stage}: {error.filename or job.folder}: {error.strerror or error}: {remedy}")
     except CaseFailed as error:
         log.warning("failed: %s", error)
         job.commit_without_result("failed", str(error))

@@ -40,7 +40,7 @@ def merge_repositories(into: Path, sources: list[Path]) -> int:
     try:
         if into.resolve() in [source.resolve() for source in sources]:
             raise MergeError(f"{into}: is merged with itself: name it once")
-        folders = [*([into] if into.exists() else []), *sources]
+        folders = [*([] if _is_only_begun(into) else [into]), *sources]
         config = spanning(into.resolve().name, check_sources(folders))
         for earlier, later in combinations(folders, 2):
             compare(later, earlier)
@@ -55,6 +55,12 @@ def merge_repositories(into: Path, sources: list[Path]) -> int:
         print(f"echotruth: {error}", file=sys.stderr)
         return 2
     return 0
+
+
+def _is_only_begun(into: Path) -> bool:
+    """Whether a folder is not there, or has no more than a merge leaves that was killed before its configuration."""
+    begun = {"registry.txt", "views.txt", "ledger", "cases", "cases.csv", f"{into.resolve().name}.zarr"}
+    return not into.exists() or all(path.name in begun or path.name.startswith(".") for path in into.iterdir())
 
 
 def _merge(into: Path, sources: list[Path], config: Config, run: str) -> None:

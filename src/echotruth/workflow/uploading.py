@@ -93,7 +93,7 @@ def upload_repository(folder: Path, url: str, reading_back: bool) -> int:
     url : str
         s3://BUCKET/FOLDER.
     reading_back : bool
-        Whether to read everything there and compare it with what is here.
+        Whether to read everything there and compare it with what is here; what is damaged there is sent again.
 
     Returns
     -------
@@ -106,7 +106,11 @@ def upload_repository(folder: Path, url: str, reading_back: bool) -> int:
         upload = Upload(folder, Remote(url))
         faults = list(upload.send().faults)
         if reading_back:
-            faults += [f"{url}/{name}: differs from {folder / name}" for name in upload.differing()]
+            damaged = upload.differing()
+            left = upload.send_again(damaged)
+            for name in sorted({*damaged} - {*left}):
+                print(f"{url}/{name}: differed from {folder / name}, and was sent again")
+            faults += [f"{url}/{name}: differs from {folder / name}: echotruth check {folder}" for name in left]
         others = upload.others()
     except OSError as error:
         print(f"echotruth: {error}", file=sys.stderr)

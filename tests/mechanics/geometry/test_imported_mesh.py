@@ -132,3 +132,52 @@ def test_fingerprint_is_that_of_the_content(file_heart, write_mesh):
     write_mesh(file_heart.nodes + 1, file_heart.mesh.cells)
     assert len(before) == 16 and fingerprint(Geometry(file=file)) != before
     assert fingerprint(Geometry()) == ""
+
+
+def ply(points, triangles):
+    """Text of a .ply of triangles."""
+    about = f"element vertex {len(points)}\nproperty float x\nproperty float y\nproperty float z\n"
+    about += f"element face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = [" ".join(map(str, row)) for row in [*points.tolist(), *([3, *row] for row in triangles.tolist())]]
+    return "ply\nformat ascii 1.0\n" + about + "\n".join(rows) + "\n"
+
+
+def vtk(points, cells, size=None):
+    """Text of a .vtk of tetrahedra, whose list of cells is said to hold so many numbers."""
+    size = 5 * len(cells) if size is None else size
+    rows = [f"POINTS {len(points)} double", *(" ".join(map(str, row)) for row in points.tolist())]
+    rows += [f"CELLS {len(cells)} {size}", *(" ".join(map(str, [4, *row])) for row in cells.tolist())]
+    rows += [f"CELL_TYPES {len(cells)}", *["10"] * len(cells)]
+    return "# vtk DataFile Version 3.0\nheart\nASCII\nDATASET UNSTRUCTURED_GRID\n" + "\n".join(rows) + "\n"
+
+
+@pytest.mark.parametrize("point", [-1, 200, 10**7])
+@pytest.mark.parametrize(("text", "corners"), [(ply, 3), (vtk, 4)])
+def test_cell_of_a_point_that_is_not_there(tmp_path, text, corners, point):
+    """Of the largest VTK's reader of .ply goes on to addresses that are not its own, and its process ends."""
+    points, cells = np.random.default_rng(0).random((200, 3)), np.arange(198 // corners * corners).reshape(-1, corners)
+    file = tmp_path / f"bad.{text.__name__}"
+    cells[7, 1] = point
+    file.write_text(text(points, cells))
+    named = f"cell 7 names the point {point}, and its points are 0 to 199"
+    ended = "its sizes or indices are wrong, the reader ends on them"
+    with pytest.raises(GeometryError, match=rf"bad\..* \(({named}|{ended})\): write the file again"):
+        read(Geometry(file=str(file), remesh=True))
+
+
+@pytest.mark.parametrize("size", [60, 500])
+def test_wrong_size_in_a_file(tmp_path, size):
+    file = tmp_path / "bad.vtk"
+    file.write_text(vtk(np.random.default_rng(0).random((200, 3)), np.arange(200).reshape(-1, 4), size))
+    with pytest.raises(GeometryError, match=r"bad\.vtk: cannot be read as \.vtk \(.*\): write the file again"):
+        read(Geometry(file=str(file)))
+
+
+def test_cells_with_too_few_points(file_heart, write_mesh):
+    file = Path(write_mesh(file_heart.nodes, file_heart.mesh.cells[:, :4]))
+    pyvista.read(file).save(file, binary=False)
+    text = file.read_text()
+    assert text.count(" 10 10 10") > 1
+    file.write_text(text.replace(" 10 10 10", " 10 24 10", 1))
+    with pytest.raises(GeometryError, match=r"cell \d+ has 4 points and must have 10\): write the file again"):
+        read(Geometry(file=str(file)))

@@ -36,6 +36,37 @@ def test_remeshed_ellipsoid_keeps_its_volumes(human, file_heart, write_surface, 
     assert "the new wall lies 0." in caplog.text
 
 
+def meridians(radius, length, around, rings):
+    """Half an ellipsoid whose edges run along meridians and parallels: points (n, 3) and triangles (n, 3)."""
+    angle, azimuth = np.pi / 2 * np.arange(1, rings + 1) / rings, 2 * np.pi * np.arange(around) / around
+    across, z = radius * np.sin(angle)[:, None], np.repeat(-length * np.cos(angle)[:, None], around, axis=1)
+    points = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), z], axis=-1).reshape(-1, 3)
+    first = 1 + np.arange(around)
+    triangles = [np.column_stack([np.zeros_like(first), first, np.roll(first, -1)])]
+    for ring in range(rings - 1):
+        triangles.append(between(first + ring * around, first + (ring + 1) * around))
+    return np.vstack([[[0, 0, -length]], points]), np.vstack(triangles)
+
+
+def between(one, other):
+    """Triangles between two rings of the same number of points."""
+    lower = np.column_stack([one, other, np.roll(other, -1)])
+    return np.vstack([lower, np.column_stack([one, np.roll(other, -1), np.roll(one, -1)])])
+
+
+def test_ellipsoid_whose_edges_run_along_the_lines_through_the_wall(write_surface):
+    """Lines from the long axis then meet edges and vertices alone; cavity and wall are 2 pi/3 of the products."""
+    (inside, endo), (outside, epi) = meridians(2.0, 5.0, 72, 36), meridians(3.0, 6.0, 72, 36)
+    rims = np.arange(len(inside) - 72, len(inside)), len(inside) + np.arange(len(outside) - 72, len(outside))
+    file = write_surface(np.vstack([inside, outside]), np.vstack([endo, epi + len(inside), between(*rims)]))
+    mesh = left_ventricle(Geometry(file=file, remesh=True, **FINE))
+    # The file's triangles are flat, and the cut takes 0.2 % of the length.
+    volume = 2 * np.pi / 3 * np.array([2 * 2 * 5, 3 * 3 * 6]) * 1e-9
+    found = cavity_volume(mesh.nodes, mesh.endo)
+    assert found == pytest.approx(volume[0], rel=0.015)
+    assert cell_volumes(mesh.nodes, mesh.cells).sum() + found == pytest.approx(volume[1], rel=0.015)
+
+
 @pytest.mark.slow
 def test_tetrahedra_and_surface_give_the_same_wall(human, file_heart, write_mesh, write_surface):
     nodes = 1e3 * human.nodes @ file_heart.turn + file_heart.shift

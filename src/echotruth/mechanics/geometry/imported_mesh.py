@@ -1,7 +1,6 @@
 """Reading a wall from a file: tetrahedra or a closed surface, and the arrays over them."""
 
-import logging
-import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Floats, Integers
 from echotruth.mechanics.geometry.mesh_quality import GeometryError
+from echotruth.mechanics.geometry.vtk_process import read_grids
 
 Arrays = dict[str, NDArray]
 
@@ -103,37 +103,36 @@ def read_file(source: str) -> ImportedMesh:
     GeometryError
         If the file cannot be read.
     """
-    suffix = Path(source).suffix.lower()
-    try:
-        mesh = _read_gmsh(source) if suffix == ".msh" else _read_vtk(source)
-    except GeometryError:
-        raise
-    except Exception as error:  # the libraries do not document what they raise
-        reason = (str(error).splitlines() or ["it does not begin as one"])[0].rstrip(".")
-        raise GeometryError(f"{source}: cannot be read as {suffix} ({reason}): write the file again") from None
-    if mesh is None:
-        raise GeometryError(f"{source}: is empty or cannot be read as {suffix}: write the file again")
-    return mesh
+    return read_files([source])[0]
 
 
-def _read_vtk(source: str) -> ImportedMesh | None:
-    import pyvista
+def read_files(sources: Sequence[str]) -> list[ImportedMesh]:
+    """:func:`read_file` of several files.
 
-    grid = _read_quietly(source)
-    return _of_grid(source, grid) if isinstance(grid, pyvista.DataSet) and grid.n_cells else None
+    Raises
+    ------
+    GeometryError
+        If one of them cannot be read.
+    """
+    of_vtk = [source for source in sources if Path(source).suffix.lower() != ".msh"]
+    grids = dict(zip(of_vtk, read_grids(of_vtk), strict=True)) if of_vtk else {}
+    return [_of_grid(source, grids[source]) if source in grids else _read_gmsh(source) for source in sources]
+
+
+def _unreadable(source: str, reason: str) -> GeometryError:
+    return GeometryError(f"{source}: cannot be read as {Path(source).suffix.lower()} ({reason}): write the file again")
 
 
 def _of_grid(source: str, grid: Any) -> ImportedMesh:
-    """The mesh of a data set of PyVista."""
-    import pyvista
-
-    if isinstance(grid, pyvista.PolyData):
-        grid = grid.triangulate()
-    grid = _of_fixed_order(grid.cast_to_unstructured_grid())
+    """The mesh of an unstructured grid of PyVista, or of the reason why there is none."""
+    if isinstance(grid, str):
+        raise _unreadable(source, grid)
+    grid = _of_fixed_order(grid)
     types = {int(number): _VTK_TYPES.get(int(number), f"VTK cell {number}") for number in np.unique(grid.celltypes)}
     others = sorted(set(types.values()) - {*_TETRAHEDRA, *_TRIANGLES, *_IGNORED_TYPES})
     if others:
-        raise GeometryError(f"{source}: holds cells of the kind {', '.join(others)}: split them into tetrahedra")
+        kinds_found = ", ".join(others[:3]) + (", ..." if len(others) > 3 else "")
+        raise GeometryError(f"{source}: holds cells of the kind {kinds_found}: split them into tetrahedra")
     kinds = [[number for number, name in types.items() if name in names] for names in (_TETRAHEDRA, _TRIANGLES)]
     if len(kinds[0]) > 1:
         raise GeometryError(f"{source}: holds linear and quadratic tetrahedra: write all of them in one order")
@@ -173,33 +172,18 @@ def _of_fixed_order(grid: Any) -> Any:
     return found
 
 
-def _read_quietly(source: str) -> Any:
-    """Read with VTK; its messages are raised instead of printed."""
-    import pyvista
-    from vtkmodules.vtkCommonCore import vtkLogger
-
-    verbosity, disabled = vtkLogger.GetCurrentVerbosityCutoff(), logging.root.manager.disable
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    logging.disable(logging.CRITICAL)
-    try:
-        with warnings.catch_warnings(), pyvista.VtkErrorCatcher(send_to_logging=False) as errors:
-            warnings.simplefilter("ignore")
-            grid = pyvista.read(source)
-    finally:
-        vtkLogger.SetStderrVerbosity(verbosity)
-        logging.disable(disabled)
-    if errors.events:
-        raise ValueError(errors.events[0].alert)
-    return grid
-
-
 def _read_gmsh(source: str) -> ImportedMesh:
     import pyvista
     from meshio import gmsh
 
-    mesh = gmsh.read(source)
+    try:
+        mesh = gmsh.read(source)
+        grid = pyvista.from_meshio(mesh)
+    except Exception as error:  # the library does not document what it raises
+        reason = (str(error).splitlines() or ["it does not begin as one"])[0].rstrip(".")
+        raise _unreadable(source, reason) from None
     groups = {name: int(number) for name, (number, _) in mesh.field_data.items()}
-    return replace(_of_grid(source, pyvista.from_meshio(mesh)), physical_groups=groups)
+    return replace(_of_grid(source, grid), physical_groups=groups)
 
 
 def merge_points(mesh: ImportedMesh) -> ImportedMesh:

@@ -9,6 +9,10 @@ from echotruth.fem.tetrahedra import Floats, Integers
 MERGE_DISTANCE = 1e-6
 """Distance below which two intersections are one, over the size of the surface."""
 
+EDGE_TOLERANCE = 1e-9
+"""Distance from a triangle at which a ray still meets it, over the size of the surface: rounding lets a ray through an
+edge pass between its triangles."""
+
 
 class Rays:
     """Rays through a surface of triangles.
@@ -21,16 +25,16 @@ class Rays:
 
     def __init__(self, nodes: Floats, triangles: Integers) -> None:
         import pyvista
-        from vtkmodules.vtkCommonCore import vtkPoints
-        from vtkmodules.vtkFiltersGeneral import vtkOBBTree
+        from vtkmodules.vtkCommonCore import vtkIdList, vtkPoints
+        from vtkmodules.vtkCommonDataModel import vtkStaticCellLocator
 
         # VTK's tolerances are absolute and made for sizes about one.
         self._size = float(np.ptp(nodes, axis=0).max())
         corners: Any = triangles[:, :3]  # any integers do, but the annotation asks for int64
         self._surface = pyvista.PolyData.from_regular_faces(nodes / self._size, corners)
-        self._tree, self._points = vtkOBBTree(), vtkPoints()
-        self._tree.SetDataSet(self._surface)
-        self._tree.BuildLocator()
+        self._locator, self._points, self._triangles = vtkStaticCellLocator(), vtkPoints(), vtkIdList()
+        self._locator.SetDataSet(self._surface)
+        self._locator.BuildLocator()
 
     def intersections(self, start: Floats, direction: Floats) -> list[Floats]:
         """Distances along each ray at which it meets the surface, rising.
@@ -46,7 +50,8 @@ class Rays:
         return [self._distances_along(a, d) for a, d in zip(start / self._size, direction, strict=True)]
 
     def _distances_along(self, start: Floats, direction: Floats) -> Floats:
-        self._tree.IntersectWithLine(start, start + 4 * direction, self._points, None)  # type: ignore[call-overload]  # may be None
+        ends: tuple[Any, Any] = start, start + 4 * direction  # arrays do, but the annotation asks for sequences
+        self._locator.IntersectWithLine(*ends, EDGE_TOLERANCE, self._points, self._triangles)
         hits = np.array([self._points.GetPoint(i) for i in range(self._points.GetNumberOfPoints())])
         distances = np.sort((hits.reshape(-1, 3) - start) @ direction)
         # A ray through an edge meets both of its triangles.

@@ -11,7 +11,7 @@ import numpy as np
 from echotruth.arrays import Floats
 from echotruth.config.defaults import ARRAY_SUFFIXES
 from echotruth.config.motion import FileMotion
-from echotruth.mechanics.geometry.imported_mesh import ImportedMesh, read_file
+from echotruth.mechanics.geometry.imported_mesh import ImportedMesh, read_files
 from echotruth.mechanics.geometry.mesh_quality import GeometryError
 from echotruth.mechanics.motion_file.files import series_files
 from echotruth.mechanics.motion_file.xdmf import read_xdmf
@@ -82,7 +82,7 @@ def read_series(section: FileMotion, points: Floats | None = None) -> MeshSeries
         frames, times = _mesh_frames(files, suffix, section.displacement)
     except (MotionError, GeometryError):
         raise
-    except (OSError, KeyError, ValueError, EOFError, ElementTree.ParseError) as error:
+    except Exception as error:  # the libraries do not document what they raise
         reason = (str(error).splitlines() or ["it does not begin as one"])[0].rstrip(".")
         raise MotionError(f"{source}: cannot be read as {suffix} ({reason}): write the file again.") from None
     return _stack(source, frames, np.array(times, float) if times else None, section.displacement)
@@ -90,7 +90,7 @@ def read_series(section: FileMotion, points: Floats | None = None) -> MeshSeries
 
 def _mesh_frames(files: list[Path], suffix: str, displacement: str | None) -> tuple[list[ImportedMesh], list[float]]:
     if suffix in MESH_SUFFIXES:
-        return [read_file(str(file)) for file in files], []
+        return read_files([str(file) for file in files]), []
     if suffix in PVD_SUFFIXES:
         return _pvd_frames(files[0])
     if suffix in XDMF_SUFFIXES:
@@ -109,7 +109,7 @@ def _pvd_frames(path: Path) -> tuple[list[ImportedMesh], list[float]]:
     for file in files:
         if not file.is_file():
             raise MotionError(f"{path}: names {file}, which does not exist: keep the files beside it.")
-    return [read_file(str(file)) for file in files], times
+    return read_files([str(file) for file in files]), times
 
 
 def _stack(source: str, frames: Sequence[ImportedMesh], times: Floats | None, displacement: str | None) -> MeshSeries:

@@ -72,16 +72,25 @@ class _Reader:
         kind = (topology.get("TopologyType") or topology.get("Type") or "").lower()
         if kind not in _NODES:
             raise MotionError(f"{source}: its topology is {kind or 'missing'}: write tetrahedra, linear or quadratic.")
-        cells = self._values(topology).reshape(-1, _NODES[kind]).astype(np.int32)
         nodes = self._values(geometry).astype(float)
         if nodes.ndim != 2 or nodes.shape[1] != 3:
             raise MotionError(f"{source}: its geometry has the shape {nodes.shape}: write points as XYZ.")
+        cells = self._values(topology)
+        if cells.ndim > 1 and cells.shape[1:] != (_NODES[kind],):
+            raise MotionError(
+                f"{source}: its topology has the shape {cells.shape}: write {_NODES[kind]} points a cell."
+            )
+        cells = cells.reshape(-1, _NODES[kind])
+        outside = cells[~((cells >= 0) & (cells < len(nodes)))]
+        if len(outside):
+            named = f"its topology names the point {outside[0]:g}, and its points are 0 to {len(nodes) - 1}"
+            raise MotionError(f"{source}: {named}: write the file again.")
         arrays = {
             str(attribute.get("Name")): self._values(attribute)
             for attribute in grid.findall("Attribute")
             if attribute.get("Center", "Node").lower() == "node"
         }
-        return ImportedMesh(source, nodes, cells, np.empty((0, 3), np.int32), node_arrays=arrays)
+        return ImportedMesh(source, nodes, cells.astype(np.int32), np.empty((0, 3), np.int32), node_arrays=arrays)
 
     def _own_or_shared(self, grid: Element, tag: str) -> Element:
         element = grid.find(tag)
