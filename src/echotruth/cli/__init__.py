@@ -8,7 +8,7 @@ import echotruth
 from echotruth.cli.command import Parser, add_command, did_you_mean, fail
 
 COMMANDS = (
-    *("new", "check", "cases", "run", "status", "info", "show"),
+    *("new", "check", "cases", "run", "status", "info", "show", "draw"),
     *("evaluate", "export", "describe", "merge", "upload", "validate", "completion"),
 )
 """Commands, and their modules and functions, in the order of `echotruth --help`."""
