@@ -29,6 +29,7 @@ def clip(tmp_path):
         (["KNOWN", "--cycle", "2", "1"], "cycle = 2, 1: clip.npy has 4 frames"),
         (["KNOWN", "--crop", "0", "0", "500", "10"], "crop = 0, 0, 500, 10: clip.npy is 120 x 90 px"),
         (["KNOWN", "--wall", "no.csv"], "no.csv: is not there"),
+        (["KNOWN", "--wall", "no.csv", "-o", "no.csv"], "no.csv: is not there: give a wall to be corrected"),
         (["KNOWN", "-o", "wall.png"], "wall.png: cannot hold a wall: give a file of which the name ends in .csv"),
         (["KNOWN", "-o", "bad.csv"], "bad.csv: has no column part"),
         (["KNOWN", "--port", "99999"], "--port 99999: give a number"),

@@ -191,7 +191,7 @@ function press(event) {
   canvas.focus();
   if (frame || player) return goTo(0);  // what is drawn belongs to the first frame
   const hit = pointAt(event);
-  if (event.button === 2) return change(() => remove(hit));
+  if (event.button === 2 || event.ctrlKey) return change(() => remove(hit));  // Ctrl and click, on a Mac
   kept = JSON.stringify(points);
   if (hit) [part, selected] = [hit.part, hit];
   else add(toClip(event));

@@ -95,6 +95,8 @@ class Drawing:
     def __post_init__(self) -> None:
         if self.output.suffix.lower() != ".csv" or self.output.is_dir():
             raise EchoError(f"{self.output}: cannot hold a wall: give a file of which the name ends in .csv")
+        if self.begin is not None and not self.begin.is_file():
+            raise EchoError(f"{self.begin}: is not there: give a wall to be corrected, or none to draw a new one")
         if self.begin is None and self.output.is_file():
             self.begin = self.output
         self.wall()  # so that what cannot be corrected is said at once
