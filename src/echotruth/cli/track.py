@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from echotruth.cli import recording
 from echotruth.cli.command import fail, named
 
 VIEWS = "basal, mid or apical; four_chamber, two_chamber or three_chamber; short_axis or long_axis without segments"
@@ -12,19 +13,13 @@ VIEWS = "basal, mid or apical; four_chamber, two_chamber or three_chamber; short
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth track`."""
-    parser.add_argument("clip", nargs="+", type=Path, help="DICOM, video, .gif, NIfTI, .npy or folder of images")
+    recording.add(parser, several=True)
     text = (
         "borders of the wall at end-diastole, .csv or mask (default: CLIP with the ending .wall.csv); of one clip only"
     )
     parser.add_argument("--wall", type=Path, help=text)
-    parser.add_argument("--view", required=True, help=f"of all clips: {VIEWS}")
+    parser.add_argument("--view", help=f"{VIEWS} (default: what the .csv says)")
     parser.add_argument("--tracker", default="bspline_dic", help="method of tracking (default: bspline_dic)")
-    parser.add_argument("--spacing-mm", type=float, help="side of a pixel (default: what the file says)")
-    parser.add_argument("--frame-time-ms", type=float, help="time from frame to frame (default: what the file says)")
-    text = "first frame of the cycle, at end-diastole, and the frame after its last (default: from R wave to R, or all)"
-    parser.add_argument("--cycle", type=int, nargs=2, metavar=("FIRST", "STOP"), help=text)
-    sides = ("LEFT", "TOP", "RIGHT", "BOTTOM")
-    parser.add_argument("--crop", type=int, nargs=4, metavar=sides, help="part of the image, px (default: all)")
     parser.add_argument("-o", "--output", type=Path, default=Path("strain"), help="folder (default: strain)")
 
 
@@ -32,11 +27,11 @@ def track(arguments: argparse.Namespace) -> int:
     """Track the wall in recorded clips, and take its strain.
 
     Of each clip it writes a page (NAME.png) and its curves (NAME.csv), and of all together the table strain.csv, into
-    the folder. The wall is drawn at end-diastole: columns part (endocardium, epicardium, anterior_insertion,
-    inferior_insertion), lateral_px and axial_px.
+    the folder. The wall is drawn at end-diastole: by `echotruth draw`, or by another program as a table of columns
+    part (endocardium, epicardium, anterior_insertion, inferior_insertion), lateral_px and axial_px.
 
     examples:
-      echotruth track mouse.dcm --view mid
+      echotruth track mouse.dcm
       echotruth track *.dcm --view four_chamber -o strain
       echotruth track mouse.mp4 --wall ring.png --view short_axis --spacing-mm 0.03 --frame-time-ms 4
 
@@ -75,20 +70,13 @@ def _stem(path: Path) -> str:
 
 def _tracked(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """Track one clip, write its page and its curves, and return its row of the table."""
-    from echotruth.echo import page
-    from echotruth.echo.clip import read_clip
+    from echotruth.echo import drawing, page
     from echotruth.echo.strain import speckle_tracking
     from echotruth.echo.wall import read_wall
 
     name = _stem(path)
-    wall = read_wall(arguments.wall or path.parent / f"{name}.wall.csv", arguments.view)
-    clip = read_clip(
-        path,
-        spacing_mm=arguments.spacing_mm,
-        frame_time_ms=arguments.frame_time_ms,
-        cycle=arguments.cycle,
-        crop=arguments.crop,
-    )
+    wall = read_wall(arguments.wall or drawing.default_output(path), arguments.view)
+    clip = recording.read(path, arguments)
     strain = speckle_tracking(clip, wall, arguments.tracker)
     page.draw(clip, strain, arguments.output / f"{name}.png")
     page.curves(strain).to_csv(arguments.output / f"{name}.csv", index=False, float_format="%.4f")

@@ -1,5 +1,6 @@
 """The wall of a ventricle in an image, as drawn at end-diastole: its borders, directions, layers and AHA segments."""
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -16,6 +17,7 @@ from skimage.measure import find_contours, label
 from echotruth.arrays import Floats
 from echotruth.echo.failure import EchoError
 from echotruth.echo.files import of_image
+from echotruth.repository import durable
 
 View = Literal["basal", "mid", "apical", "four_chamber", "two_chamber", "three_chamber", "short_axis", "long_axis"]
 """Views: three levels of the short axis, three apical views in the usual display, and either without AHA segments."""
@@ -33,6 +35,9 @@ LEFT_AND_RIGHT = {
 
 PARTS = ("endocardium", "epicardium", "anterior_insertion", "inferior_insertion")
 """What a file of contours may name in its column `part`."""
+
+COLUMNS = ["lateral_px", "axial_px"]
+"""Columns of such a file that say where a point is."""
 
 STEP = 0.25
 """Distance of points along a border from which directions and depth are found, px."""
@@ -207,7 +212,7 @@ class Wall:
         return cKDTree(self._lines[0]), cKDTree(self._lines[1])
 
 
-def read_wall(path: str | PathLike[str], view: str) -> Wall:
+def read_wall(path: str | PathLike[str], view: str | None = None) -> Wall:
     """Read the wall that was drawn in a clip.
 
     Parameters
@@ -216,9 +221,10 @@ def read_wall(path: str | PathLike[str], view: str) -> Wall:
         A .csv with the columns part, lateral_px and axial_px, of which part is endocardium, epicardium,
         anterior_insertion or inferior_insertion; or an image or .npy of which the pixels of the wall are not 0, a
         closed ring.
-    view : str
+    view : str, optional
         `basal`, `mid` or `apical` level of the short axis; `four_chamber`, `two_chamber` or `three_chamber`; or
-        `short_axis` or `long_axis`, which have no AHA segments.
+        `short_axis` or `long_axis`, which have no AHA segments. Default: that of the line `# view: mid` with which a
+        .csv begins.
 
     Returns
     -------
@@ -227,12 +233,16 @@ def read_wall(path: str | PathLike[str], view: str) -> Wall:
     Raises
     ------
     EchoError
-        If there is no such file, it holds no wall, or there is no such view.
+        If there is no such file, it holds no wall, there is no such view, or none is given and the file names none.
     """
     file = Path(path)
-    _check_view(view)
+    if view is not None:
+        _check_view(view)
     if not file.is_file():
         raise EchoError(f"{file}: is not there: draw the wall, and save its borders as this file")
+    view = view or named_view(file)
+    if view is None:
+        raise EchoError(f"{file}: does not name its view: give view, or let a .csv begin with a line as # view: mid")
     try:
         return _of_table(file, view) if file.suffix.lower() == ".csv" else _of_mask(of_image(file), view)
     except EchoError as error:
@@ -244,20 +254,59 @@ def _check_view(view: str) -> None:
         raise EchoError(f"view = {view!r}: use one of {', '.join(get_args(View))}")
 
 
+def named_view(file: Path) -> str | None:
+    """View that is named by the comments with which a .csv begins, or None."""
+    if file.suffix.lower() != ".csv" or not file.is_file():
+        return None
+    with file.open(encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            if not line.startswith("#"):
+                break
+            if match := re.fullmatch(r"#\s*view\s*:\s*(\S+)\s*", line):
+                return match[1]
+    return None
+
+
+def clicked_points(file: Path) -> dict[str, Floats]:
+    """Points (n, 2), px, through which each border of a .csv was drawn; none of a border where the file does not say.
+
+    Raises
+    ------
+    EchoError
+        If it is no table of borders.
+    """
+    table = _table(file)
+    clicked = table[table["clicked"] == 1] if "clicked" in table else table[:0]
+    return {part: clicked.loc[clicked["part"] == part, COLUMNS].to_numpy(float) for part in PARTS[:2]}
+
+
+def write_wall(path: str | PathLike[str], wall: Wall, clicked: dict[str, NDArray[np.bool_]] | None = None) -> None:
+    """Write a wall as the table that :func:`read_wall` reads, as a whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        A .csv; one that is there is replaced.
+    wall : Wall
+    clicked : dict, optional
+        Of the endocardium and the epicardium: whether each point was clicked, (n,), or lies on the curve between two
+        that were. Default: nothing is said of it.
+    """
+    parts = {"endocardium": wall.endocardium, "epicardium": wall.epicardium}
+    if wall.insertions is not None:
+        parts |= {"anterior_insertion": wall.insertions[:1], "inferior_insertion": wall.insertions[1:]}
+    tables = [pd.DataFrame(points, columns=COLUMNS).assign(part=part) for part, points in parts.items()]
+    table = pd.concat(tables)[["part", *COLUMNS]]
+    if clicked is not None:
+        marks = {part: np.ones(len(points), bool) for part, points in parts.items()} | clicked
+        table["clicked"] = np.concatenate([marks[part] for part in parts]).astype(int)
+    text = f"# view: {wall.view}\n" + table.to_csv(index=False, float_format="%.2f", lineterminator="\n")
+    durable.write(Path(path), text.encode())
+
+
 def _of_table(file: Path, view: str) -> Wall:
-    try:
-        table = pd.read_csv(file, comment="#", skipinitialspace=True)
-    except (ValueError, OSError) as error:
-        raise EchoError(f"{file}: is no table that can be read: {' '.join(str(error).split())[:200]}") from None
-    if missing := [name for name in ("part", "lateral_px", "axial_px") if name not in table]:
-        raise EchoError(f"{file}: has no column {missing[0]}: give part, lateral_px and axial_px")
-    if unknown := sorted(set(table["part"].astype(str)) - set(PARTS)):
-        raise EchoError(f"{file}: part = {unknown[0]}: use {', '.join(PARTS)}")
-    numbers = table[["lateral_px", "axial_px"]].apply(pd.to_numeric, errors="coerce").to_numpy(float)
-    if not np.isfinite(numbers).all():
-        row = int(np.flatnonzero(~np.isfinite(numbers).all(axis=1))[0])
-        raise EchoError(f"{file}: row {row + 1} has no two numbers in lateral_px and axial_px")
-    points = {part: numbers[table["part"] == part] for part in PARTS}
+    table = _table(file)
+    points = {part: table.loc[table["part"] == part, COLUMNS].to_numpy(float) for part in PARTS}
     given = [len(points[part]) for part in PARTS[2:]]
     if given not in ([0, 0], [1, 1]):
         raise EchoError(
@@ -265,6 +314,24 @@ def _of_table(file: Path, view: str) -> Wall:
         )
     insertions = np.concatenate([points[part] for part in PARTS[2:]]) if sum(given) else None
     return Wall(points["endocardium"], points["epicardium"], view, insertions)
+
+
+def _table(file: Path) -> pd.DataFrame:
+    """Rows of a .csv, of which each has a part and its place in numbers."""
+    try:
+        table = pd.read_csv(file, comment="#", skipinitialspace=True)
+    except (ValueError, OSError) as error:
+        raise EchoError(f"{file}: is no table that can be read: {' '.join(str(error).split())[:200]}") from None
+    if missing := [name for name in ("part", *COLUMNS) if name not in table]:
+        raise EchoError(f"{file}: has no column {missing[0]}: give part, lateral_px and axial_px")
+    if unknown := sorted(set(table["part"].astype(str)) - set(PARTS)):
+        raise EchoError(f"{file}: part = {unknown[0]}: use {', '.join(PARTS)}")
+    table[COLUMNS] = table[COLUMNS].apply(pd.to_numeric, errors="coerce").astype(float)
+    finite = np.isfinite(table[COLUMNS].to_numpy())
+    if not finite.all():
+        row = int(np.flatnonzero(~finite.all(axis=1))[0])
+        raise EchoError(f"{file}: row {row + 1} has no two numbers in lateral_px and axial_px")
+    return table
 
 
 def _of_mask(mask: NDArray[np.bool_], view: str) -> Wall:

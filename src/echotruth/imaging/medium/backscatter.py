@@ -4,8 +4,8 @@ Muscle scatters most across its fibres and least along them: by 14.5 dB in fixed
 et al., J Acoust Soc Am 97 (1995) 1307). In every beat its echo is strongest at end-diastole and weakest at end-systole,
 by 3.5 dB in dogs (Madaras et al., Ultrason Imaging 5 (1983) 229) and 4.6 +- 0.2 dB in mice (Kovacs et al., Ultrasonic
 tissue characterization of the mouse myocardium). It changes little where muscle is ischemic (Barzilai et al., Am J
-Physiol 247 (1984) H478), and in isolated muscle where it shortens, but not where its length is held (IEEE Trans Ultrason
-Ferroelectr Freq Control 33 (1986) 347): here it follows the strain along the fibres.
+Physiol 247 (1984) H478); isolated muscle changes where it shortens, but not where its length is held (IEEE Trans
+Ultrason Ferroelectr Freq Control 33 (1986) 347): here the change follows the strain along the fibres.
 """
 
 import numpy as np

@@ -1,10 +1,10 @@
 """Borders of the wall: scatterers on endocardium and epicardium that echo in phase, as a mirror does.
 
 A sheet of N scatterers of equal amplitude within a beam returns N^2 times the power of one where it is perpendicular
-to the beam, and N times elsewhere, as their echoes are in phase or not: a line that is bright where the border faces the
-probe and fainter at the sides, as that of a real border, which is a rough mirror. With one scatterer per square of the
-wavelength, N is some 16 in the default mouse. They are carried by the surface; their amplitude grows with its area, so
-that the echo of a border is that of its area.
+to the beam, and N times elsewhere, as their echoes are in phase or not: a line that is bright where the border faces
+the probe and fainter at the sides, as that of a real border, which is a rough mirror. With one scatterer per square of
+the wavelength, N is some 16 in the default mouse. They are carried by the surface; their amplitude grows with its area,
+so that the echo of a border is that of its area.
 """
 
 from dataclasses import dataclass

@@ -1,0 +1,57 @@
+"""`echotruth draw`: the wall of a ventricle, drawn in a clip in the browser."""
+
+import argparse
+from pathlib import Path
+
+from echotruth.cli import recording
+from echotruth.cli.command import fail
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth draw`."""
+    recording.add(parser)
+    text = "the wall that is written (default: that of the clip with the ending .wall.csv)"
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE.csv", help=text)
+    text = "table or mask of a wall to be corrected (default: the output, if it is there)"
+    parser.add_argument("--wall", type=Path, metavar="FILE", help=text)
+    parser.add_argument("--port", type=int, default=0, help="port of the page (default: any that is free)")
+    parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
+
+
+def draw(arguments: argparse.Namespace) -> int:
+    """Draw the wall of a ventricle in one's own echo.
+
+    A page in the browser shows the clip. Points of the endocardium and the epicardium are clicked in its first frame,
+    at end-diastole, and saved as a table that `echotruth.read_wall` reads (docs/drawing.md). Only this machine can
+    open the page; Ctrl-C ends it.
+
+    examples:
+      echotruth draw patient.dcm
+      echotruth draw mouse.avi --spacing-mm 0.05 --frame-time-ms 4 --cycle 3 31 -o mid.csv
+      echotruth draw patient.dcm --wall segmented.png -o patient.wall.csv
+
+    exit status:
+      0  the page was closed
+      2  the clip or the wall cannot be shown
+    """
+    import webbrowser
+
+    from echotruth.echo import drawing
+    from echotruth.echo.failure import EchoError
+
+    if not 0 <= arguments.port <= 65535:
+        return fail(f"--port {arguments.port}: give a number from 1 to 65535, or none for any that is free")
+    try:
+        clip = recording.read(arguments.clip, arguments)
+        output = arguments.output or drawing.default_output(arguments.clip)
+        server = drawing.DrawingServer(drawing.Drawing(clip, output, arguments.wall), arguments.port)
+    except EchoError as error:
+        return fail(str(error))
+
+    def ready() -> None:
+        print(f"{arguments.clip}: {server.address} (Ctrl-C ends it)", flush=True)
+        if not arguments.no_browser:
+            webbrowser.open(server.address)
+
+    server.run(ready)
+    return 0

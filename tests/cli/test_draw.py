@@ -1,0 +1,55 @@
+"""`echotruth draw`: what it says, and how it ends."""
+
+import re
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def clip(tmp_path):
+    """Path of a clip of four frames, which does not say its spacing."""
+    np.save(tmp_path / "clip.npy", np.zeros((4, 90, 120), np.uint8))
+    return tmp_path / "clip.npy"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["no.dcm"], "no.dcm: is not there: give the path of a clip"),
+        (["clip.npy", "--frame-time-ms", "20"], "clip.npy: does not say the side of its pixels: give --spacing-mm"),
+        (
+            ["clip.npy", "--spacing-mm", "0.3"],
+            "clip.npy: does not say the time from frame to frame: give --frame-time-ms",
+        ),
+        (["clip.npy", "--spacing-mm", "-1", "--frame-time-ms", "20"], "--spacing-mm = -1.0: give a positive number"),
+        (["KNOWN", "--cycle", "2", "1"], "cycle = 2, 1: clip.npy has 4 frames"),
+        (["KNOWN", "--crop", "0", "0", "500", "10"], "crop = 0, 0, 500, 10: clip.npy is 120 x 90 px"),
+        (["KNOWN", "--wall", "no.csv"], "no.csv: is not there"),
+        (["KNOWN", "--wall", "no.csv", "-o", "no.csv"], "no.csv: is not there: give a wall to be corrected"),
+        (["KNOWN", "-o", "wall.png"], "wall.png: cannot hold a wall: give a file of which the name ends in .csv"),
+        (["KNOWN", "-o", "bad.csv"], "bad.csv: has no column part"),
+        (["KNOWN", "--port", "99999"], "--port 99999: give a number"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told_in_one_line(call, clip, tmp_path, arguments, sentence):
+    (tmp_path / "bad.csv").write_text("a,b\n1,2\n")
+    known = ["clip.npy", "--spacing-mm", "0.3", "--frame-time-ms", "20"]
+    words = known + arguments[1:] if arguments[0] == "KNOWN" else arguments
+    status, output, errors = call("draw", *words, "--no-browser")
+    assert (status, output, errors.count("\n")) == (2, "", 1) and errors.startswith(f"echotruth: {sentence}"), errors
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_command_prints_the_address_and_ends_when_it_is_told(clip, number):
+    options = ["--spacing-mm", "0.3", "--frame-time-ms", "20", "--crop", "20", "0", "110", "90", "--no-browser"]
+    command = [sys.executable, "-m", "echotruth", "draw", str(clip), *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        line = process.stdout.readline()
+        process.send_signal(number)
+        assert process.stderr.read() == ""
+    assert process.returncode == 0
+    assert re.fullmatch(r".*clip.npy: http://127\.0\.0\.1:\d+/ \(Ctrl-C ends it\)\n", line)
