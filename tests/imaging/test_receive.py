@@ -8,7 +8,9 @@ from echotruth.config import Probe, Rf
 from echotruth.imaging.beamforming.aperture import Aperture
 from echotruth.imaging.beamforming.interpolation import PHASE_BITS
 from echotruth.imaging.beamforming.receive import BLOCK_RANGES, echo_times
+from echotruth.imaging.beamforming.resampling import LEFT_OUT
 from echotruth.imaging.beamforming.scanner import Scanner
+from echotruth.imaging.rf.probe import pulse_spectrum
 
 SPEED, LENGTH = 1540.0, 64 * 46e-6
 X = (np.arange(64) - 31.5) * 46e-6
@@ -115,7 +117,8 @@ def test_it_holds_for_other_arrays(preset):
     scanner = Scanner(probe, rf, 160 * wavelength)
     random = np.random.default_rng(3)
     shape = (len(scanner.matrix.frequency), 64, 64)
-    matrix = (random.standard_normal(shape) + 1j * random.standard_normal(shape)).astype(np.complex64)
+    pulse = pulse_spectrum(probe, scanner.matrix.frequency)[:, None, None]
+    matrix = (pulse * (random.standard_normal(shape) + 1j * random.standard_normal(shape))).astype(np.complex64)
     lines = scanner.beamform(matrix)
     position = scanner.matrix.centres
     ranges, angle = scanner.range[200:900:97], scanner.scan.angle[4]
@@ -148,7 +151,11 @@ def test_a_line_of_two_zones_is_that_of_two_foci_faded_over(matrix):
     )
     weight = np.clip((blended.range - 5.5e-3) / 2e-3, 0, 1)
     found = blended.beamform(matrix)
-    assert np.abs(found - (near + weight * (far - near))).max() < 2e-6 * np.abs(found).max()
+    error = np.abs(found - (near + weight * (far - near)))
+    # Interpolation over range rounds the kinks of the fade at the foci.
+    at_focus = np.abs(np.abs(blended.range - 6.5e-3) - 1e-3) < 0.15e-3
+    assert error[:, ~at_focus].max() < 1e-5 * np.abs(found).max()
+    assert error.max() < 2e-4 * np.abs(found).max()
 
 
 def test_times_just_before_a_sample_belong_to_the_sample_before():
@@ -168,9 +175,16 @@ def test_echoes_out_of_the_record_weigh_nothing():
     assert np.hypot(*times[-2:]) == pytest.approx([0, 0, 1, 1, 0, 0], abs=1e-6)
 
 
-def test_lines_of_a_frame_do_not_depend_on_how_many_there_are(matrix):
-    """Every other line of a frame of 129 is a line of one of 65: blocks of transmits change nothing."""
-    few, many = (Scanner(Probe(), Rf(lines=n), 10e-3).beamform(matrix) for n in (65, 129))
+@pytest.mark.parametrize("keys", [{}, {"transmit": "diverging"}, {"transmit": "synthetic_aperture"}, {"f_number": 2.0}])
+def test_lines_closer_than_echoes_change_are_those_that_would_be_focused_one_by_one(matrix, keys):
+    """Every fourth line of a frame of 257 is a line of one of 65, of which each is focused."""
+    few, many = (Scanner(Probe(), Rf(lines=n, **keys), 10e-3).beamform(matrix) for n in (65, 257))
+    assert np.linalg.norm(many[::4] - few) < 1.5 * LEFT_OUT * np.linalg.norm(few)
+
+
+def test_blocks_of_transmits_change_nothing(matrix):
+    """Every other line of a linear scan, of which all lines are focused, is a line of a scan with half as many."""
+    few, many = (Scanner(Probe(), Rf(lines=n, scan="linear"), 10e-3).beamform(matrix) for n in (65, 129))
     assert np.linalg.norm(many[::2] - few) < 1e-5 * np.linalg.norm(few)
 
 

@@ -85,6 +85,14 @@ def bspline_weights(u):
     )
 
 
+@numba.njit(cache=True)
+def bspline_slopes(u):
+    """Derivatives of :func:`bspline_weights` by the fraction u (float32)."""
+    half, three_halves, two = np.float32(0.5), np.float32(1.5), np.float32(2)
+    v = np.float32(1) - u
+    return -v * v * half, u * (three_halves * u - two), v * (two - three_halves * v), u * u * half
+
+
 @numba.njit(cache=True, nogil=True)
 def value(padded, row, column):
     """Value of a spline, from its :func:`coefficients`, at one point (float32), from 0 to the last sample."""

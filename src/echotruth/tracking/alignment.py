@@ -6,7 +6,11 @@ All run in one thread, release the GIL, and take their sums in one order.
 import numba
 import numpy as np
 
-from echotruth.tracking.cubic import bspline_weights, first_derivatives
+from echotruth.imaging import spline
+from echotruth.tracking.subset import sum_axially
+
+BLOCK = 64
+"""Points that are interpolated at a time, to stay in the first-level cache."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -25,22 +29,32 @@ def interpolate_with_gradient(padded, position):
     Grey value and its lateral and axial derivative per px, shape (points, 3).
     """
     rows, columns = padded.shape[0] - 3, padded.shape[1] - 3
-    result = np.zeros((len(position), 3))
-    for k in range(len(position)):
-        x = min(max(position[k, 0], 0.0), columns - 1.0)
-        y = min(max(position[k, 1], 0.0), rows - 1.0)
-        j, i = min(int(x), columns - 2), min(int(y), rows - 2)
-        weight_x, derivative_x = bspline_weights(x - j), first_derivatives(x - j)
-        weight_y, derivative_y = bspline_weights(y - i), first_derivatives(y - i)
-        for a in range(4):
-            value, slope = 0.0, 0.0
-            for b in range(4):
-                coefficient = padded[i + a, j + b]
-                value += weight_x[b] * coefficient
-                slope += derivative_x[b] * coefficient
-            result[k, 0] += weight_y[a] * value
-            result[k, 1] += weight_y[a] * slope
-            result[k, 2] += derivative_y[a] * value
+    flat, row_length = padded.reshape(-1), np.int32(padded.shape[1])
+    result, first = np.empty((len(position), 3)), np.empty(BLOCK, np.int32)
+    lateral, axial = np.empty(BLOCK, np.float32), np.empty(BLOCK, np.float32)
+    weights, slopes = np.empty((4, BLOCK), np.float32), np.empty((4, BLOCK), np.float32)
+    values, derivatives = np.empty(4 * BLOCK, np.float32), np.empty(4 * BLOCK, np.float32)
+    for start in range(0, len(position), BLOCK):
+        count = min(BLOCK, len(position) - start)
+        for k in range(count):
+            x = min(max(position[start + k, 0], 0.0), columns - 1.0)
+            y = min(max(position[start + k, 1], 0.0), rows - 1.0)
+            j, i = min(np.int32(x), columns - 2), min(np.int32(y), rows - 2)
+            first[k], lateral[k], axial[k] = i * row_length + j, x - j, y - i
+        for k in range(count):
+            weights[0, k], weights[1, k], weights[2, k], weights[3, k] = spline.bspline_weights(axial[k])
+            slopes[0, k], slopes[1, k], slopes[2, k], slopes[3, k] = spline.bspline_slopes(axial[k])
+        sum_axially(flat, np.uintp(row_length), first[:count], weights, values)
+        sum_axially(flat, np.uintp(row_length), first[:count], slopes, derivatives)
+        for k in range(count):
+            a, b, c, d = spline.bspline_weights(lateral[k])
+            p, q, r, s = spline.bspline_slopes(lateral[k])
+            n = 4 * k
+            result[start + k, 0] = a * values[n] + b * values[n + 1] + c * values[n + 2] + d * values[n + 3]
+            result[start + k, 1] = p * values[n] + q * values[n + 1] + r * values[n + 2] + s * values[n + 3]
+            result[start + k, 2] = (
+                a * derivatives[n] + b * derivatives[n + 1] + c * derivatives[n + 2] + d * derivatives[n + 3]
+            )
     return result
 
 

@@ -60,8 +60,8 @@ class NormalMatrix:
     energy: BendingEnergy
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """F^-1 rhs; both of shape (unknowns,)."""
-        return linalg.cho_solve_banded((self.factor, False), rhs)
+        """F^-1 rhs; both of shape (unknowns,) or (unknowns, n)."""
+        return linalg.cho_solve_banded((self.factor, False), rhs, check_finite=False)
 
     def newton_step(self, rhs: np.ndarray) -> np.ndarray:
         """S^-1 rhs, both of shape (unknowns,), by the Woodbury formula."""
@@ -72,8 +72,7 @@ class NormalMatrix:
     @cached_property
     def _free(self) -> tuple[np.ndarray, np.ndarray]:
         """R = beta F^-1 K A (A^T K A)^+, shape (unknowns, free), and (1 - (K A)^T R)^+, shape (free, free)."""
-        columns = np.ascontiguousarray(self.energy.projection.T)
-        response = self.energy_weight * np.stack([self.solve(column) for column in columns], -1)
+        response = self.energy_weight * self.solve(self.energy.projection)
         product = np.sum(self.energy.gradients[:, :, None] * response[:, None], 0)
         return response, np.linalg.pinv(np.eye(len(product)) - product, SINGULAR)
 

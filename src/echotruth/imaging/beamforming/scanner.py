@@ -6,7 +6,8 @@ from echotruth.config import Probe, Rf
 from echotruth.imaging.beamforming.aperture import Aperture
 from echotruth.imaging.beamforming.gate import echo_time_range
 from echotruth.imaging.beamforming.receive import ReceiveFocus
-from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions, scan_lines
+from echotruth.imaging.beamforming.resampling import line_resampling, range_resampling
+from echotruth.imaging.beamforming.scan import Scan, imaging_depth, sample_positions, scan_lines
 from echotruth.imaging.beamforming.synthesis import TransmitSynthesis, channel_sampling
 from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES, Zone
 from echotruth.imaging.rf.full_matrix import FullMatrix
@@ -58,14 +59,19 @@ class Scanner:
         step = p.sound_speed / (2 * p.sampling)
         self.scan = scan_lines(probe, rf)
         self.range = step * np.arange(1, int(depth / step) + 2)
-        zones = TRANSMIT_SEQUENCES[rf.transmit](probe, rf, self.scan).zones(self.range)
+        transmits = TRANSMIT_SEQUENCES[rf.transmit](probe, rf, self.scan)
+        self._over_range = range_resampling(probe, self.range)
+        self._over_lines = line_resampling(probe, rf, self.scan, transmits, self.range[-1])
+        rf = rf.model_copy(update={"lines": len(self._over_lines.samples)})
+        sampled, range_ = scan_lines(probe, rf), self._over_range.samples
+        zones = TRANSMIT_SEQUENCES[rf.transmit](probe, rf, sampled).zones(range_)
         latest = max(np.abs(zone.transmits.delay).max() for zone in zones)
         farthest = np.hypot(*sample_positions(self.scan, self.range)).max()
         self.matrix = FullMatrix(probe, farthest, latest, rf.elevation_beam)
         self._sampling = channel_sampling(self.matrix)
-        self._zones = [_ZoneBeamformer(probe, rf, self, zone) for zone in zones]
+        self._zones = [_ZoneBeamformer(probe, rf, self.matrix, sampled, range_, zone) for zone in zones]
         self.frequency = self._zones[0].synthesis.frequency
-        self._carrier = np.exp(-4j * np.pi * self.frequency / p.sound_speed * self.range).astype(np.complex64)
+        self._carrier = np.exp(-4j * np.pi * self.frequency / p.sound_speed * range_).astype(np.complex64)
 
     @property
     def angle(self) -> np.ndarray:
@@ -93,25 +99,25 @@ class Scanner:
 
     def beamform(self, matrix: np.ndarray) -> np.ndarray:
         """Lines (lines, ranges) of one frame, as :meth:`lines`, of its full matrix (bins, elements, elements)."""
-        lines = np.zeros((len(self.scan.angle), len(self.range)), np.complex64)
+        lines = np.zeros((len(self._over_lines.samples), len(self._carrier)), np.complex64)
         gated = any(beamformer.synthesis.gate for beamformer in self._zones)
         echoes = self._sampling.to_time(matrix) if gated else matrix
         for beamformer in self._zones:
             gate = beamformer.synthesis.gate
             lines[:, beamformer.zone.samples] += beamformer(gate.spectra(echoes) if gate else matrix)
         lines *= self._carrier
-        return lines
+        return self._over_range(self._over_lines(lines).T.copy()).T.copy()
 
 
 class _ZoneBeamformer:
-    """Beamforming of the samples of the lines in a focal zone, with the scan, ranges and matrix of a scanner."""
+    """Beamforming of the samples of the lines of a scan, at ranges (ranges,), m, that are in a focal zone."""
 
-    def __init__(self, probe: Probe, rf: Rf, scanner: Scanner, zone: Zone):
-        p, scan = probe.si(), scanner.scan
-        self.zone, self._range = zone, scanner.range[zone.samples]
+    def __init__(self, probe: Probe, rf: Rf, matrix: FullMatrix, scan: Scan, range_: np.ndarray, zone: Zone):
+        p = probe.si()
+        self.zone, self._range = zone, range_[zone.samples]
         self._points = sample_positions(scan, self._range)
         time_range = echo_time_range(probe, zone, self._range, self._points) if len(zone.transmits.foci) else None
-        self.synthesis = TransmitSynthesis(scanner.matrix, p.frequency, zone.transmits, time_range)
+        self.synthesis = TransmitSynthesis(matrix, p.frequency, zone.transmits, time_range)
         self._start_path = p.sound_speed * self.synthesis.start
         self._receive = ReceiveFocus(
             Aperture(probe, rf),

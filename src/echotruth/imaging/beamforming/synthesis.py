@@ -16,13 +16,11 @@ from echotruth.imaging.beamforming import interpolation
 from echotruth.imaging.beamforming.gate import Gate, Sampling
 from echotruth.imaging.beamforming.transmit import Transmits
 from echotruth.imaging.rf.full_matrix import FullMatrix
-from echotruth.imaging.rf.product import HEIGHT, padded, product
+from echotruth.imaging.rf.product import HEIGHT, ROW_PADDING, padded, product
 from echotruth.threads import share
 
 BLOCK_TRANSMITS = 128
 """Transmits synthesised at a time. Memory is this * elements * samples * 8 bytes, 31 MB for the default array."""
-ROW_PADDING = 16
-"""Numbers added to the rows of matrices, so that neighbouring rows do not compete for the same lines of the cache."""
 TILE_BINS = 16
 """Frequencies that one thread takes at a time: two cache lines of a spectrum. The phases of all but the first follow by
 multiplication and need not be kept."""

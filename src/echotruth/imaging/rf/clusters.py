@@ -20,20 +20,25 @@ from scipy import linalg
 
 from echotruth.arrays import Floats
 from echotruth.imaging.rf.kernel import Band
-from echotruth.imaging.rf.product import HEIGHT, padded, product
+from echotruth.imaging.rf.product import HEIGHT, ROW_PADDING, padded, product
 from echotruth.imaging.rf.shadow import Rib
 from echotruth.threads import share
 
-SIZE = 3.0
-"""Width of a cluster in the sine of the angle, in wavelengths over half the array; and its depth in 1/range, in
-wavelengths over the square of that."""
+SIZE, MIN_SIZE = 0.12, 3.0
+"""Width of a cluster in the sine of the angle, in wavelengths over the pitch; at least so many wavelengths over half
+the array. Wider clusters are fewer, which saves time in expanding them, and have larger skeletons, which cost time for
+every scatterer."""
+ELONGATION = 2.0
+"""Depth of a cluster in 1/range, in its width over half the array: at the ends of the array, delays then change as much
+over its depth as over its width."""
 EXTRA_ELEMENTS = 4
 """Skeleton elements in addition to those that the tolerance requires; their errors average out."""
 RIDGE = 4.0
 """Assumed error of an element, over the tolerance; it regularises the interpolation weights."""
-SAMPLES, SHADOW_SAMPLES = 6, 12
-"""Angles, and ranges, at which the echoes of a cluster are sampled, without and with a rib. The edge of the shadow
-falls on another part of the array for each: with 12 it moves by less than an element from one to the next."""
+SAMPLES, SHADOW_SAMPLES = (4, 1.5), (10, 1.5)
+"""Angles, and ranges, at which the echoes of a cluster are sampled, and more of them for each cycle by which its delays
+differ at the ends of the array; without and with a rib. The edge of the shadow falls on another part of the array for
+each."""
 SHADOW_DEPTH = 2.0
 """Range, in depths of the rib, from which on the edge of the shadow moves slower over the array than the scatterers
 do; nearer, every element is its own skeleton."""
@@ -80,8 +85,12 @@ class Clusters:
     def __init__(self, centres: Floats, sound_speed: float, band: Band, max_range: float, tolerance: float) -> None:
         self._centres, self._speed, self._band, self._tolerance = centres, sound_speed, band, tolerance
         half_aperture = (centres[-1] - centres[0]) / 2
-        size = SIZE * sound_speed / (band.frequency @ band.weight) / half_aperture
-        self._step = np.array([size, size / half_aperture])
+        wavelength = sound_speed / (band.frequency @ band.weight)
+        size = wavelength * max(SIZE / (centres[1] - centres[0]), MIN_SIZE / half_aperture)
+        self._step, self._cycles = (
+            np.array([size, ELONGATION * size / half_aperture]),
+            size * half_aperture / wavelength,
+        )
         self._min_curvature = 1 / max_range
         # Nearer than half an array every element is its own skeleton.
         self._rows = int(np.ceil((1 / half_aperture - self._min_curvature) / self._step[1]))
@@ -115,7 +124,8 @@ class Clusters:
             elements = len(self._centres)
             return Cluster(np.arange(elements), np.eye(elements), np.zeros(elements))
         row, sector = divmod(number, self._sectors)
-        samples = SHADOW_SAMPLES if self._rib else SAMPLES
+        least, more = SHADOW_SAMPLES if self._rib else SAMPLES
+        samples = int(least + more * self._cycles)
         node = -np.cos(np.pi * (np.arange(samples) + 0.5) / samples)
         curvature, sine = np.meshgrid(
             self._min_curvature + (row + 0.5 + node / 2) * self._step[1],
@@ -170,7 +180,7 @@ class Expansion:
         sizes = [padded(len(cluster.skeleton), HEIGHT) for cluster in clusters]
         self._elements = len(clusters[0].delay)
         self._first = np.concatenate([[0], np.cumsum(sizes)])
-        self._weights = np.zeros((self._first[-1], padded(self._elements)), np.float32)
+        self._weights = np.zeros((self._first[-1], padded(self._elements) + ROW_PADDING), np.float32)
         self._skeleton = np.full(self._first[-1], -1)
         for first, cluster in zip(self._first, clusters, strict=False):
             rows = slice(first, first + len(cluster.skeleton))
@@ -197,7 +207,7 @@ class Expansion:
 def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
     """Write the echoes of all pairs of elements, summed over clusters.
 
-    A cluster of skeleton echoes M, weights W and phasors z = exp(-2 pi i f delay) adds C^T M' C, with C = W diag(z) and
+    A cluster of skeleton echoes M, weights W and phasors z = exp(-2 pi i f delay) adds diag(z) W^T M' W diag(z), with
     M' = M without the delays.
 
     Parameters
@@ -209,37 +219,31 @@ def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
     skeleton
         Number of the element of every row, -1 where it is only there to fill, shape (rows,).
     weights
-        Shape (rows, width), float32, as many columns as elements or more.
+        Shape (rows, width + ROW_PADDING), float32.
     phasor
-        Real and imaginary part of z for each cluster, shape (bins, clusters, 2, width), float32.
+        Real and imaginary part of z for each cluster, shape (bins, clusters, 2, width), float32; as many columns as
+        elements or more.
     matrix
         Written: shape (bins, elements, elements), complex64.
     bins
         First bin to be written, and the one after the last.
     """
-    width, count = weights.shape[1], matrix.shape[1]
+    width, count = phasor.shape[3], matrix.shape[1]
+    echoes = np.empty((2, width, width), np.float32)
     for f in range(*bins):
-        real, imaginary = np.empty((width, width), np.float32), np.empty((width, width), np.float32)
-        pair = 0
+        total, pair = np.zeros((2, width, width), np.float32), 0
         for k in range(len(first) - 1):
             own, size = weights[first[k] : first[k + 1]], first[k + 1] - first[k]
             c, s = phasor[f, k, 0], phasor[f, k, 1]
-            a, b = np.zeros((size, size), np.float32), np.zeros((size, size), np.float32)
-            pair += remove_delay(spectra[f, pair:], skeleton[first[k] : first[k + 1]], c, s, a, b)
-            half, carry = np.empty((2, size, width), np.float32), np.empty((2 * size, width), np.float32)
-            product(a, own, half[0])
-            product(b, own, half[1])
-            # The rows of C, real parts before imaginary ones, are multiplied by those of M' C and of i M' C.
-            echoes = np.empty((2, 2 * size, width), np.float32)
-            for n in range(size):
-                scale(own[n], c, s, carry[n], carry[size + n])
-                rotate(half[0, n], half[1, n], c, s, echoes[0, n], echoes[1, n])
-                times_i(echoes[0, n], echoes[1, n], echoes[0, size + n], echoes[1, size + n])
-            product(carry, echoes[0], real, True, k > 0)
-            product(carry, echoes[1], imaginary, True, k > 0)
+            few, half = np.zeros((2, size, size), np.float32), np.empty((size, weights.shape[1]), np.float32)
+            pair += remove_delay(spectra[f, pair:], skeleton[first[k] : first[k + 1]], c, s, few[0], few[1])
+            for part in range(2):
+                product(few[part], own, half)
+                product(own, half, echoes[part], True)
+            add_delayed(echoes, c, s, total)
         for i in range(count):
             for j in range(i, count):
-                matrix[f, i, j] = complex(real[i, j], imaginary[i, j])
+                matrix[f, i, j] = complex(total[0, i, j], total[1, i, j])
                 matrix[f, j, i] = matrix[f, i, j]
 
 
@@ -263,25 +267,18 @@ def remove_delay(spectra, skeleton, c, s, real, imaginary):
 
 
 @numba.njit(cache=True)
-def scale(weights, c, s, real, imaginary):
-    """Write weights (c + i s)."""
-    for j in range(len(c)):
-        real[j] = weights[j] * c[j]
-    for j in range(len(c)):
-        imaginary[j] = weights[j] * s[j]
+def add_delayed(echoes, c, s, total):
+    """Add E_ij z_i z_j, z = c + i s, to the upper triangle of a total; E and it (2, n, n): real and imaginary parts."""
+    for i in range(len(c)):
+        real, imaginary = total[0, i, i:], total[1, i, i:]
+        add_turned(echoes[0, i, i:], echoes[1, i, i:], c[i:], s[i:], c[i], s[i], real, imaginary)
 
 
 @numba.njit(cache=True)
-def rotate(a, b, c, s, real, imaginary):
-    """Write (a + i b) (c + i s)."""
+def add_turned(a, b, c, s, p, q, real, imaginary):
+    """Add (a + i b) (c + i s) (p + i q), p and q being numbers, to real + i imaginary."""
+    # Loops over few arrays each, from 0 on, which compilers vectorise.
     for j in range(len(c)):
-        real[j] = a[j] * c[j] - b[j] * s[j]
+        real[j] += a[j] * (c[j] * p - s[j] * q) - b[j] * (c[j] * q + s[j] * p)
     for j in range(len(c)):
-        imaginary[j] = a[j] * s[j] + b[j] * c[j]
-
-
-@numba.njit(cache=True)
-def times_i(real, imaginary, out_real, out_imaginary):
-    """Write i (real + i imaginary)."""
-    for j in range(len(real)):
-        out_real[j], out_imaginary[j] = -imaginary[j], real[j]
+        imaginary[j] += a[j] * (c[j] * q + s[j] * p) + b[j] * (c[j] * p - s[j] * q)

@@ -10,10 +10,12 @@ from numba.core import cgutils
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-from echotruth.imaging.rf.vectors import LANES, VECTOR, Vectors
+from echotruth.imaging.rf.vectors import Vectors
 
 HEIGHT, WIDTH = 4, 16
-"""Rows and columns of a tile."""
+"""Rows and columns of a tile; a row is one vector."""
+ROW_PADDING = 16
+"""Numbers added to the rows of matrices, so that neighbouring rows do not compete for the same lines of the cache."""
 
 
 def padded(count, multiple=WIDTH):
@@ -30,26 +32,20 @@ def multiply_tile(typing_context, weights, rows, i, n, out, accumulate):
 
     def generate(context, builder, signature, arguments):
         weights, rows, i, n, out, accumulate = arguments
-        vectors = Vectors(context, builder)
-        parts, zero = range(WIDTH // LANES), ir.Constant(VECTOR, [0.0] * LANES)
-        targets, sums = [], []
-        for height in range(HEIGHT):
-            target = vectors.row_address(matrix, out, builder.add(i, ir.Constant(i.type, height)), n)
-            targets.append(target)
-            values = [builder.select(accumulate, vectors.load(target, part), zero) for part in parts]
-            sums.append([cgutils.alloca_once_value(builder, value) for value in values])
+        vectors = Vectors(context, builder, WIDTH)
+        zero = ir.Constant(vectors.kind, [0.0] * WIDTH)
+        lines = [builder.add(i, ir.Constant(i.type, height)) for height in range(HEIGHT)]
+        targets = [vectors.row_address(matrix, out, line, n) for line in lines]
+        values = [builder.select(accumulate, vectors.load(target), zero) for target in targets]
+        totals = [cgutils.alloca_once_value(builder, value) for value in values]
         count = builder.extract_value(context.make_array(matrix)(context, builder, rows).shape, 0)
         with cgutils.for_range(builder, count) as loop:
-            row = vectors.row_address(matrix, rows, loop.index, n)
-            weight = vectors.element_address(matrix, weights, loop.index, i)
-            right = [vectors.load(row, part) for part in parts]
-            for height in range(HEIGHT):
-                left = vectors.broadcast(builder.load(builder.gep(weight, [ir.Constant(ir.IntType(64), height)])))
-                for part, total in enumerate(sums[height]):
-                    builder.store(vectors.fma(left, right[part], builder.load(total)), total)
-        for target, totals in zip(targets, sums, strict=True):
-            for part, total in enumerate(totals):
-                vectors.store(builder.load(total), target, part)
+            right = vectors.load(vectors.row_address(matrix, rows, loop.index, n))
+            for line, total in zip(lines, totals, strict=True):
+                left = builder.load(vectors.element_address(matrix, weights, loop.index, line))
+                builder.store(vectors.fma(vectors.broadcast(left), right, builder.load(total)), total)
+        for target, total in zip(targets, totals, strict=True):
+            vectors.store(builder.load(total), target)
         return context.get_dummy_value()
 
     return types.void(matrix, matrix, types.intp, types.intp, matrix, types.boolean), generate

@@ -6,20 +6,22 @@ from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
 LANES = 8
-"""Numbers in a vector."""
-VECTOR = ir.VectorType(ir.FloatType(), LANES)
+"""Numbers in a vector, if nothing else is said."""
 
 
 class Vectors:
-    """Instructions of a builder on vectors and on numba's arrays."""
+    """Instructions of a builder on vectors of some lanes and on numba's arrays.
 
-    def __init__(self, context, builder):
-        self._context, self._builder = context, builder
+    Where the processor has no vectors so long, the compiler takes several; the numbers are the same.
+    """
+
+    def __init__(self, context, builder, lanes=LANES):
+        self._context, self._builder, self.kind = context, builder, ir.VectorType(ir.FloatType(), lanes)
 
     def address(self, kind, array, index):
-        """Address of LANES neighbours in an array of one dimension, as a vector."""
+        """Address of neighbours in an array of one dimension, as a vector."""
         data = self._context.make_array(kind)(self._context, self._builder, array).data
-        return self._builder.bitcast(self._builder.gep(data, [index]), VECTOR.as_pointer())
+        return self._builder.bitcast(self._builder.gep(data, [index]), self.kind.as_pointer())
 
     def load(self, address, offset=0):
         """The vector that lies so many vectors after an address."""
@@ -37,22 +39,22 @@ class Vectors:
         return self._builder.gep(matrix.data, [self._builder.add(self._builder.mul(width, row), column)])
 
     def row_address(self, kind, array, row, column):
-        """Address of LANES neighbours in a row of a matrix, as a vector."""
+        """Address of neighbours in a row of a matrix, as a vector."""
         address = self.element_address(kind, array, row, column)
-        return self._builder.bitcast(address, ir.VectorType(address.type.pointee, LANES).as_pointer())
+        return self._builder.bitcast(address, ir.VectorType(address.type.pointee, self.kind.count).as_pointer())
 
     def broadcast(self, scalar):
-        """A vector of LANES times a scalar of any type."""
-        undefined = ir.Constant(ir.VectorType(scalar.type, LANES), ir.Undefined)
+        """A vector of a scalar of any type, repeated."""
+        undefined = ir.Constant(ir.VectorType(scalar.type, self.kind.count), ir.Undefined)
         one = self._builder.insert_element(undefined, scalar, _integer(32, 0))
         return self._builder.shuffle_vector(
-            one, undefined, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+            one, undefined, ir.Constant(ir.VectorType(ir.IntType(32), self.kind.count), [0] * self.kind.count)
         )
 
     def fma(self, a, b, c):
         """a b + c, rounded once: the result must not depend on how a compiler joins sums and products."""
-        function = ir.FunctionType(VECTOR, [VECTOR] * 3)
-        fma = get_or_insert_function(self._builder.module, function, f"llvm.fma.v{LANES}f32")
+        function = ir.FunctionType(self.kind, [self.kind] * 3)
+        fma = get_or_insert_function(self._builder.module, function, f"llvm.fma.v{self.kind.count}f32")
         return self._builder.call(fma, [a, b, c])
 
     def polynomial(self, address, first, count, variable):
