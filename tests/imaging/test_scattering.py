@@ -20,9 +20,9 @@ def plane():
     return FullMatrix(PROBE, DEPTH, elevation=False)
 
 
-def sector(number, elevation=0.0):
+def sector(number, elevation=0.0, seed=0):
     """Positions (m) and amplitudes of scatterers at random in a sector."""
-    random = np.random.default_rng(0)
+    random = np.random.default_rng(seed)
     angle, range_ = np.radians(random.uniform(-32, 32, number)), random.uniform(3e-3, 10e-3, number)
     beside = random.uniform(-elevation, elevation, number)
     return np.stack([range_ * np.sin(angle), range_ * np.cos(angle), beside], axis=1), random.standard_normal(number)
@@ -49,14 +49,16 @@ def test_in_the_plane_tissues_with_different_powers_add_up_to_the_exact_sum(plan
 
 @pytest.mark.slow
 def test_under_the_lens_tissues_with_different_powers_add_up_to_the_exact_sum():
-    matrix = FullMatrix(PROBE, DEPTH)
-    position, amplitude = sector(60, elevation=0.7e-3)
-    inside = matrix.in_beam(position)
-    scatterers, exponent = (position[inside], amplitude[inside]), np.resize(TISSUES, inside.sum())
-    exact = exact_matrix(PROBE, *scatterers, matrix.frequency[::24], exponent=exponent)
-    assert (
-        relative(matrix(*scatterers, exponent)[::24], exact) < 0.0155
-    )  # 1.5 %; the clusters alone change 0.0002 of it
+    """Over four draws: one of 60 scatterers errs by 1.4 to 2.2 %, by where they are."""
+    matrix, errors, sums = FullMatrix(PROBE, DEPTH), [], []
+    for seed in range(4):
+        position, amplitude = sector(60, elevation=0.7e-3, seed=seed)
+        inside = matrix.in_beam(position)
+        scatterers, exponent = (position[inside], amplitude[inside]), np.resize(TISSUES, inside.sum())
+        exact = exact_matrix(PROBE, *scatterers, matrix.frequency[::24], exponent=exponent)
+        errors.append(np.linalg.norm(matrix(*scatterers, exponent)[::24] - exact))
+        sums.append(np.linalg.norm(exact))
+    assert np.linalg.norm(errors) < 0.016 * np.linalg.norm(sums)
 
 
 def raw_moment(order, mean, variance):
