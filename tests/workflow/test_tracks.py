@@ -31,7 +31,7 @@ def codes(monkeypatch):
     [
         ("trackers.bspline_dic", {"bspline_dic"}),
         ("evidence", {"bspline_dic"}),
-        ("subset", {"affine_dic"}),
+        ("subset", {"affine_dic", "bspline_dic"}),  # both sum B-splines along the columns
         ("trackers.window_deformation", {"window_deformation", "affine_dic"}),  # a grid of windows starts affine_dic
         ("trackers.ilk", {"ilk"}),
         ("quality", set(METHODS)),

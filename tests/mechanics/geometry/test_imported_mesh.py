@@ -169,7 +169,9 @@ def test_cell_of_a_point_that_is_not_there(tmp_path, text, corners, point):
 def test_wrong_size_in_a_file(tmp_path, size):
     file = tmp_path / "bad.vtk"
     file.write_text(vtk(np.random.default_rng(0).random((200, 3)), np.arange(200).reshape(-1, 4), size))
-    with pytest.raises(GeometryError, match=r"bad\.vtk: cannot be read as \.vtk \(.*\): write the file again"):
+    # VTK reads on beyond the data: whether it stops or finds kinds of cells there is chance.
+    told = r"bad\.vtk: (cannot be read as \.vtk \(.*\): write the file again|holds cells of the kind .*: split them)"
+    with pytest.raises(GeometryError, match=told):
         read(Geometry(file=str(file)))
 
 

@@ -87,6 +87,7 @@ def active_stress(c: float, previous_c: float, rate: float, law: ActiveLaw) -> t
     force, slope = 1.0, 0.0
     if rate > 0:
         force, slope = force_velocity((stretch - sqrt(previous_c)) * rate, law)
-    isometric = (1 + law.length_dependence * (stretch - 1)) * stretch**-law.power
-    growth = law.length_dependence * stretch**-law.power - law.power * isometric / stretch
+    per_area = 1 / c if law.power == 2 else stretch**-law.power  # a power takes as long as all else here
+    isometric = (1 + law.length_dependence * (stretch - 1)) * per_area
+    growth = law.length_dependence * per_area - law.power * isometric / stretch
     return force * isometric, (force * growth + slope * rate * isometric) / stretch
