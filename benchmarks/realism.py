@@ -99,9 +99,11 @@ def heart(arrays: dict[str, np.ndarray]) -> tuple[Heart, np.ndarray]:
     course = CubicSpline(np.append(time, period), np.concatenate([displacement, displacement[:1]]), bc_type="periodic")
     times = np.arange(FRAMES) * period / FRAMES
     es = int(np.abs(times - time[arrays["mechanics/es_frame"]]).argmin())
-    mesh = arrays["geometry/node_position"], arrays["geometry/cell"].astype(np.int32)
+    mesh = arrays["geometry/node_position"], arrays["geometry/cell_node"].astype(np.int32)
     depth, endo = arrays["fibres/wall_depth"], arrays["geometry/endo"].astype(np.int32)
-    return Heart(*mesh, course(times), depth, endo, 6, es), times
+    groups = {"geometry": ("endo", "epi"), "fibres": ("fibre",)}
+    of = {group: {name: arrays[f"{group}/{name}"] for name in names} for group, names in groups.items()}
+    return Heart(*mesh, course(times), depth, endo, 6, es, arrays=of), times
 
 
 def beat_of_default(file: Path) -> dict[str, np.ndarray]:

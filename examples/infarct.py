@@ -5,7 +5,7 @@ import echotruth as et
 heart = et.beat(
     {
         "geometry": {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1},
-        "loop": {"frames": 10},
+        "loop": {"kind": "circulation", "frames": 10},
         "pathology": {"infarct": {"segments": [7, 12]}},
     }
 )

@@ -14,7 +14,7 @@ from echotruth.config import Bmode, Geometry, Rf, Tracking, View
 PAGES = Path(__file__).parents[2] / "docs/library"
 CONFIGURATIONS = {"Config", "Probe", "Rf", "View"}
 """Sections of a configuration, whose keys are in its own reference."""
-NO_EXAMPLE = {"Item", "ConfigError", "TrackerFailed"}
+NO_EXAMPLE = {"Item", "ConfigError", "EchoError", "TrackerFailed"}
 PUBLIC = {name: getattr(et, name) for name in et.__all__ if name not in ("learning", *CONFIGURATIONS, *NO_EXAMPLE)}
 PUBLIC |= {f"learning.{name}": getattr(et.learning, name) for name in et.learning.__all__ if name not in NO_EXAMPLE}
 

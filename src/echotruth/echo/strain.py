@@ -76,6 +76,18 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     TrackerFailed
         If the tracker finds no motion.
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import echotruth as et
+    >>> speckle = np.random.default_rng(0).integers(0, 255, (1, 128, 128), np.uint8)
+    >>> clip = et.read_clip(np.tile(speckle, (4, 1, 1)), spacing_mm=0.1, frame_time_ms=5)  # nothing moves
+    >>> angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    >>> circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    >>> strain = et.speckle_tracking(clip, et.Wall(64 + 20 * circle, 64 + 35 * circle, "mid"), "dis")
+    >>> bool(abs(strain.attrs["gcs_percent"]) < 0.1)
+    True
+
     Notes
     -----
     Strain is that of :mod:`echotruth.evaluation.strain`, the operator by which tracked and true strain of a repository

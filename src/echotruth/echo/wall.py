@@ -65,6 +65,16 @@ class Wall:
     ------
     EchoError
         If the view is unknown, a border has fewer than three points, or the borders enclose no wall.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import echotruth as et
+    >>> angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    >>> circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    >>> wall = et.Wall(64 + 20 * circle, 64 + 35 * circle, "mid")
+    >>> round(wall.thickness()), wall.plane
+    (15, 'short_axis')
     """
 
     endocardium: Floats
@@ -234,6 +244,15 @@ def read_wall(path: str | PathLike[str], view: str | None = None) -> Wall:
     ------
     EchoError
         If there is no such file, it holds no wall, there is no such view, or none is given and the file names none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import echotruth as et
+    >>> axial, lateral = np.indices((128, 128)) - 63.5
+    >>> np.save("ring.npy", abs(np.hypot(axial, lateral) - 30) < 8)  # a mask; `echotruth draw` makes a table
+    >>> round(et.read_wall("ring.npy", "mid").thickness())
+    16
     """
     file = Path(path)
     if view is not None:
