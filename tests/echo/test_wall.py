@@ -67,8 +67,12 @@ def test_table_and_mask_give_the_same_wall(ring, tmp_path):
     np.testing.assert_array_equal(read.mask((SIDE, SIDE)), wall.mask((SIDE, SIDE)))
     np.testing.assert_allclose(read.insertions, wall.insertions)
     Image.fromarray(wall.mask((SIDE, SIDE)).astype(np.uint8) * 255).save(tmp_path / "ring.png")
-    traced = et.read_wall(tmp_path / "ring.png", "short_axis").mask((SIDE, SIDE))
-    assert (traced ^ wall.mask((SIDE, SIDE))).sum() < 0.02 * traced.sum()
+    traced = et.read_wall(tmp_path / "ring.png", "short_axis")
+    apart = traced.mask((SIDE, SIDE)) ^ wall.mask((SIDE, SIDE))
+    assert apart.sum() < 0.02 * wall.mask((SIDE, SIDE)).sum()
+    for line, radius in zip(traced.contours(), (ENDO, (ENDO + EPI) / 2, EPI), strict=True):
+        length = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
+        assert length == pytest.approx(2 * np.pi * radius, rel=0.01)  # not along the edges of pixels
 
 
 @pytest.mark.parametrize(

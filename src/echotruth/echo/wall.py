@@ -10,6 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 from skimage.draw import polygon2mask
 from skimage.measure import find_contours, label
@@ -38,6 +39,9 @@ PARTS = ("endocardium", "epicardium", "anterior_insertion", "inferior_insertion"
 
 COLUMNS = ["lateral_px", "axial_px"]
 """Columns of such a file that say where a point is."""
+
+MASK_BLUR_PX = 2.0
+"""Standard deviation of the blur of a mask before its borders are traced, px."""
 
 STEP = 0.25
 """Distance of points along a border from which directions and depth are found, px."""
@@ -355,13 +359,16 @@ def _table(file: Path) -> pd.DataFrame:
 
 def _of_mask(mask: NDArray[np.bool_], view: str) -> Wall:
     """Wall of a mask that is a ring: its borders are the outlines of the ring and of its hole."""
-    padded = np.pad(mask, 1)
+    margin = round(4 * MASK_BLUR_PX)
+    padded = np.pad(mask, margin)
     holes = label(~padded, connectivity=1)
     if holes.max() != 2:
         raise EchoError("the mask is no closed ring around one cavity: give the borders as a table (.csv) instead")
     outside = holes[0, 0]
     cavity, whole = (holes != outside) & ~padded, holes != outside
-    inner, outer = (max(find_contours(part.astype(float), 0.5), key=len)[:-1, ::-1] - 1 for part in (cavity, whole))
+    # Outlines along the edges of pixels would be some 5 % too long.
+    smooth = (gaussian_filter(part.astype(float), MASK_BLUR_PX) for part in (cavity, whole))
+    inner, outer = (max(find_contours(part, 0.5), key=len)[:-1, ::-1] - margin for part in smooth)
     return Wall(inner, outer, view)
 
 
