@@ -113,7 +113,7 @@ def test_repository_that_grew_step_by_step_equals_one_made_at_once(whole, tmp_pa
     assert differing(folder, whole) == []
 
 
-@pytest.mark.parametrize("stage", ["rf", "bmode", "tracking"])
+@pytest.mark.parametrize("stage", ["rf", "tracking"])
 def test_run_killed_while_a_stage_is_made_and_continued_gives_the_same_bytes(whole, tmp_path, stage):
     folder = Folder(tmp_path / "echotruth")
     run = folder.start(*COMMAND, "run", "tiny.yaml", "--cores", "1", "repository")
@@ -131,7 +131,7 @@ def test_run_killed_while_a_repository_grows_and_continued_gives_the_same_bytes(
     assert differing(folder.make(CONFIG), whole) == []
 
 
-@pytest.mark.parametrize("group", ["tracking", "bmode", "mechanics"])
+@pytest.mark.parametrize("group", ["tracking", "mechanics"])
 def test_damaged_repository_that_was_healed_equals_one_made_at_once(whole, tmp_path, group):
     folder = copied(whole, Folder(tmp_path / "echotruth"))
     shard = min(path for path in (folder.out / "tiny.zarr" / group).rglob("c/0/**/0") if path.is_file())
