@@ -40,21 +40,23 @@ def track(arguments: argparse.Namespace) -> int:
       1  some are not: each is told
       2  none is, or an option is wrong
     """
+    from echotruth.echo.drawing import default_output
     from echotruth.echo.failure import EchoError
 
     clips: list[Path] = arguments.clip
     if arguments.wall and len(clips) > 1:
         return fail(f"--wall {arguments.wall}: suits one clip: name those of {len(clips)} clips CLIP.wall.csv")
-    names = [_stem(path) for path in clips]
+    walls = [arguments.wall or default_output(path) for path in clips]
+    names = [default_output(path).name.removesuffix(".wall.csv") for path in clips]
     if twice := next((name for name in names if names.count(name) > 1), None):
         return fail(f"{twice}: two clips have this name: track them into folders of their own (--output)")
     arguments.output.mkdir(parents=True, exist_ok=True)
     rows: list[dict[str, Any]] = []
-    for number, path in enumerate(clips, 1):
+    for number, (path, wall, name) in enumerate(zip(clips, walls, names, strict=True), 1):
         if len(clips) > 1:
             print(f"{number} of {len(clips)}: {path}", file=sys.stderr)
         try:
-            rows.append(_tracked(path, arguments))
+            rows.append(_tracked(path, wall, name, arguments))
         except (EchoError, ValueError) as error:
             print(named(str(error)), file=sys.stderr)
     if not rows:
@@ -63,28 +65,22 @@ def track(arguments: argparse.Namespace) -> int:
     return 0 if len(rows) == len(clips) else 1
 
 
-def _stem(path: Path) -> str:
-    """Name of a clip without its ending."""
-    return path.name if path.is_dir() else path.name.removesuffix(".gz").rpartition(".")[0] or path.name
-
-
-def _tracked(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
-    """Track one clip, write its page and its curves, and return its row of the table."""
-    from echotruth.echo import drawing, page
+def _tracked(path: Path, drawn: Path, name: str, arguments: argparse.Namespace) -> dict[str, Any]:
+    """Track one clip in the wall that was drawn, write its page and its curves, and return its row of the table."""
+    from echotruth.echo import page
     from echotruth.echo.strain import speckle_tracking
     from echotruth.echo.wall import read_wall
 
-    name = _stem(path)
-    wall = read_wall(arguments.wall or drawing.default_output(path), arguments.view)
+    wall = read_wall(drawn, arguments.view)
     clip = recording.read(path, arguments)
     strain = speckle_tracking(clip, wall, arguments.tracker)
     page.draw(clip, strain, arguments.output / f"{name}.png")
     page.curves(strain).to_csv(arguments.output / f"{name}.csv", index=False, float_format="%.4f")
     row = page.summary(strain)
-    kind = "GCS" if "gcs_percent" in strain.attrs else "GLS"
+    kind, value = page.global_strain(strain)
     for note in str(strain.attrs["notes"]).splitlines():
         print(named(f"{path}: {note}"), file=sys.stderr)
-    print(f"{path}: {kind} {strain.attrs[f'{kind.lower()}_percent']:.1f} %, {arguments.output / name}.png")
+    print(f"{path}: {kind} {value:.1f} %, {arguments.output / name}.png")
     return row
 
 

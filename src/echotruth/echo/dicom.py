@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.echo.failure import EchoError, optional
+from echotruth.echo.failure import EchoError, one_line, optional
 from echotruth.echo.recording import Recording, grey
 
 TWO_DIMENSIONAL, CENTIMETRES = 1, 3
@@ -38,8 +38,7 @@ def read(path: Path) -> Recording:
         image = pydicom.dcmread(path)
         pixels = np.asarray(image.pixel_array)
     except Exception as error:  # pydicom has no common type for what is wrong with a file
-        reason = " ".join(str(error).split())[:200]
-        raise EchoError(f"{path}: is no DICOM clip that can be decoded: {reason}") from None
+        raise EchoError(f"{path}: is no DICOM clip that can be decoded: {one_line(error)}") from None
     colours = int(getattr(image, "SamplesPerPixel", 1)) > 1
     if pixels.ndim != 3 + colours:
         raise EchoError(f"{path}: holds one image: give a clip of two or more frames")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence, UnidentifiedImageError
 
 from echotruth.echo import dicom
-from echotruth.echo.failure import EchoError, optional
+from echotruth.echo.failure import EchoError, one_line, optional
 from echotruth.echo.recording import Recording, grey
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -87,7 +87,7 @@ def _nifti(path: Path) -> Recording:
         image = nibabel.load(path)
         pixels = np.asarray(image.dataobj)
     except Exception as error:  # nibabel has no common type for what is wrong with a file
-        raise EchoError(f"{path}: is no NIfTI file that can be read: {' '.join(str(error).split())[:200]}") from None
+        raise EchoError(f"{path}: is no NIfTI file that can be read: {one_line(error)}") from None
     sizes, units = [float(size) for size in image.header.get_zooms()], image.header.get_xyzt_units()
     if pixels.ndim == 4 and pixels.shape[2] == 1:
         pixels, sizes = pixels[:, :, 0], [*sizes[:2], *sizes[3:]]

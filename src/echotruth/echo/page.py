@@ -13,6 +13,12 @@ COLOURS = ("#f5b942", "#5ec8d8", "#e0607e")
 """Of the endocardial, middle and epicardial line."""
 
 
+def global_strain(strain: xr.Dataset) -> tuple[str, float]:
+    """Name of the global strain that a tracked view shows, GCS or GLS, and its value at end-systole, %."""
+    name = "GCS" if "gcs_percent" in strain.attrs else "GLS"
+    return name, strain.attrs[f"{name.lower()}_percent"]
+
+
 def curves(strain: xr.Dataset) -> pd.DataFrame:
     """Curves of a tracked clip as a table.
 
@@ -29,7 +35,7 @@ def curves(strain: xr.Dataset) -> pd.DataFrame:
         and `segment_7_percent` and so on, the circumferential or longitudinal strain of the AHA segments that are seen.
         Strains are engineering strains.
     """
-    name = "gcs" if "gcs_percent" in strain.attrs else "gls"
+    name = global_strain(strain)[0].lower()
     engineering = strain.sel(measure="engineering")
     columns = {"time_ms": 1e3 * strain["time"].values}
     for contour in strain["contour"].values:
@@ -102,7 +108,7 @@ def draw(clip: xr.Dataset, strain: xr.Dataset, path: Path) -> None:
     lines, segments = figure.add_subplot(panels[1, :3]), figure.add_subplot(panels[1, 3:])
     _curves(lines, table, [name for name in table if name.startswith(("gcs", "gls"))], strain, COLOURS)
     _curves(segments, table, [name for name in table if name.startswith("segment")], strain)
-    lines.set_ylabel("GCS (%)" if "gcs_percent" in strain.attrs else "GLS (%)")
+    lines.set_ylabel(f"{global_strain(strain)[0]} (%)")
     segments.set_ylabel("strain of AHA segments (%)")
     if strain.attrs["notes"]:
         figure.supxlabel(strain.attrs["notes"], fontsize=9, color="#b3261e")
@@ -112,8 +118,7 @@ def draw(clip: xr.Dataset, strain: xr.Dataset, path: Path) -> None:
 def _title(strain: xr.Dataset) -> str:
     """One line: the clip, its global strain, and how far to trust it."""
     row = summary(strain)
-    name = "GCS" if "gcs_percent" in strain.attrs else "GLS"
-    value, where = strain.attrs[f"{name.lower()}_percent"], f"{row['end_systole_ms']:.0f} ms"
+    (name, value), where = global_strain(strain), f"{row['end_systole_ms']:.0f} ms"
     first = f"{Path(str(row['source'])).name}, {row['view']}: {name} {value:.1f} % at end-systole ({where})"
     rest = f"drift {row['drift_percent']:.0f} % of the largest displacement, quality {row['quality']:.2f}"
     return f"{first}; {row['tracker']}, {rest}"

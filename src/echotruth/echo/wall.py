@@ -16,7 +16,7 @@ from skimage.draw import polygon2mask
 from skimage.measure import find_contours, label
 
 from echotruth.arrays import Floats
-from echotruth.echo.failure import EchoError
+from echotruth.echo.failure import EchoError, one_line
 from echotruth.echo.files import of_image
 from echotruth.repository import durable
 
@@ -344,7 +344,7 @@ def _table(file: Path) -> pd.DataFrame:
     try:
         table = pd.read_csv(file, comment="#", skipinitialspace=True)
     except (ValueError, OSError) as error:
-        raise EchoError(f"{file}: is no table that can be read: {' '.join(str(error).split())[:200]}") from None
+        raise EchoError(f"{file}: is no table that can be read: {one_line(error)}") from None
     if missing := [name for name in ("part", *COLUMNS) if name not in table]:
         raise EchoError(f"{file}: has no column {missing[0]}: give part, lateral_px and axial_px")
     if unknown := sorted(set(table["part"].astype(str)) - set(PARTS)):

@@ -24,6 +24,9 @@ Arrays = dict[str, NDArray[Any]]
 InBeam = Callable[[Floats], NDArray[np.bool_]]
 """Positions in the image (n, 3), m, to whether they are within the beam, (n,)."""
 
+BORDERS = {"endocardium": "endo", "epicardium": "epi"}
+"""Names of the borders of the wall, and of their surfaces of the mesh."""
+
 MAX_DIFFUSION = 5
 """Offset that blood is assumed not to exceed over a cycle, in standard deviations."""
 
@@ -94,10 +97,6 @@ def _blood_decorrelation(config: Config) -> tuple[float, float]:
     """Time constant of the echo of blood, s, and wavelength, m."""
     probe = config.probe.si()
     return config.realism.blood.si().decorrelation_time, probe.sound_speed / probe.frequency
-
-
-BORDERS = {"endocardium": "endo", "epicardium": "epi"}
-"""Names of the borders of the wall, and of their surfaces of the mesh."""
 
 
 class Medium:
