@@ -1,10 +1,8 @@
 """The page on which a wall is drawn, in a browser: a ring that is clicked is the ring that is saved."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
+from served_page import served_page
 
 import echotruth as et
 from echotruth.echo.wall import clicked_points, write_wall
@@ -39,14 +37,9 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def address(folder):
-    options = ["--spacing-mm", "0.3", "--frame-time-ms", "20", "--no-browser"]
-    command = [sys.executable, "-m", "echotruth", "draw", str(folder / "clip.npy"), *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            yield process.stdout.readline().split()[1]
-        finally:
-            process.terminate()
-    assert process.returncode == 0
+    options = ["--spacing-mm", "0.3", "--frame-time-ms", "20"]
+    with served_page("draw", str(folder / "clip.npy"), *options) as address:
+        yield address
 
 
 @pytest.fixture

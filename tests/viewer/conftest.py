@@ -1,9 +1,7 @@
 """The repository that the viewer shows, and its page."""
 
-import subprocess
-import sys
-
 import pytest
+from served_page import served_page
 from shown_repository import Shown, shown_repository
 
 from echotruth.repository.reader import Repository
@@ -22,13 +20,8 @@ def repository(shown) -> Repository:
 @pytest.fixture(scope="module")
 def address(shown):
     """Address of the page, as `echotruth show` prints it."""
-    command = [sys.executable, "-m", "echotruth", "show", str(shown.folder), "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            yield process.stdout.readline().split()[1]
-        finally:
-            process.terminate()
-    assert process.returncode == 0
+    with served_page("show", str(shown.folder)) as address:
+        yield address
 
 
 @pytest.fixture(scope="module")

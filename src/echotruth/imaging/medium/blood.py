@@ -14,7 +14,7 @@ from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, Integers, MaterialPoints, interpolate, jacobian
 from echotruth.heart import Heart
 from echotruth.imaging.medium.random_process import RandomProcess
-from echotruth.imaging.medium.wall import cube_to_tetrahedron, max_jacobian
+from echotruth.imaging.medium.wall import cube_to_simplex, max_jacobian
 from echotruth.mechanics.geometry.boundary import triangle_edges
 
 
@@ -122,6 +122,6 @@ def seed_blood(config: Config, heart: Heart, random: np.random.Generator) -> Blo
     bound = np.max([max_jacobian(cavity.positions(heart.positions(k)), cavity.cells) for k in frames], axis=0)
     number = random.poisson(blood.density * config.phantom.si().density * bound.sum() / 6)
     cell = random.choice(len(bound), size=number, p=bound / bound.sum()).astype(np.int32)
-    points = MaterialPoints(cell, cube_to_tetrahedron(random.random((number, 3))))
+    points = MaterialPoints(cell, cube_to_simplex(random.random((number, 3))))
     jacobian_threshold = random.random(number) * bound[cell]
     return Blood(points, jacobian_threshold, blood.amplitude_std * random.standard_normal(number))

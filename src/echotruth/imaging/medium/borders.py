@@ -16,6 +16,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.fem.tetrahedra import Integers, shape, shape_gradient
 from echotruth.heart import Heart
+from echotruth.imaging.medium.wall import cube_to_simplex
 
 BEAM_STD, PULSE_STD = 0.376, 0.375
 """Standard deviation of the two-way beam at its focus, a sinc squared, over wavelength x focus / aperture; and of the
@@ -70,9 +71,7 @@ def seed_border(config: Config, heart: Heart, surface: str, random: np.random.Ge
     area = _area(heart.nodes, facets, middle) / 2
     number = random.poisson(_density(config) * area.sum())
     chosen = random.choice(len(facets), size=number, p=area / area.sum())
-    # The gaps of two sorted uniform numbers are uniform in a triangle.
-    xi = np.diff(np.sort(random.random((number, 2)), axis=1), prepend=0.0, axis=1)
-    return facets[chosen].astype(np.int32), xi
+    return facets[chosen].astype(np.int32), cube_to_simplex(random.random((number, 2)))
 
 
 def border_amplitude(config: Config, level_dB: float) -> float:

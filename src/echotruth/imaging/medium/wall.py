@@ -77,7 +77,7 @@ def seed_volume(phantom: Phantom, nodes: Floats, cells: NDArray[np.int32], rando
     bound = max_jacobian(nodes, cells)
     candidates = random.poisson(phantom.si().density * bound.sum() / 6)
     cell = random.choice(len(cells), size=candidates, p=bound / bound.sum()).astype(np.int32)
-    points = MaterialPoints(cell, cube_to_tetrahedron(random.random((candidates, 3))))
+    points = MaterialPoints(cell, cube_to_simplex(random.random((candidates, 3))))
     # Elements are curved: rejection by the local Jacobian makes the density uniform within each.
     accepted = random.random(candidates) * bound[cell] < np.linalg.det(jacobian(nodes, cells, points))
     points = MaterialPoints(points.cell[accepted], points.xi[accepted])
@@ -113,8 +113,11 @@ def seed_section(config: Config, heart: Heart, plane: Plane, random: np.random.G
     return Scatterers(points, random.standard_normal(len(points)), in_plane_only=True)
 
 
-def cube_to_tetrahedron(cube: Floats) -> Floats:
-    """Map uniform points of the unit cube to uniform points of the unit tetrahedron: the gaps of sorted coordinates."""
+def cube_to_simplex(cube: Floats) -> Floats:
+    """Map uniform points of the unit cube, or square, to uniform ones of the unit tetrahedron, or triangle.
+
+    They are the gaps of sorted coordinates.
+    """
     return np.diff(np.sort(cube, axis=1), prepend=0.0, axis=1)
 
 
