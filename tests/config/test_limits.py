@@ -99,6 +99,16 @@ MALFORMED = {
     "a line break in a key": ('"a\\nb": 1', "a\\nb is not a key"),
     "a line break in a name": ('views: {"mid\\n": {}}', "use letters, digits and underscores only"),
     "a section that is a number": ("bmode: 3", "bmode = 3: must be a mapping of keys to values"),
+    "gains without ranges": ("bmode: {time_gain: {gain_dB: [1]}}", "must have one gain for each of the 0 ranges"),
+    "ranges that decrease": (
+        "bmode: {time_gain: {range_mm: [3, 2], gain_dB: [0, 1]}}",
+        "bmode.time_gain.range_mm = [3.0, 2.0]: every range must be larger than the one before it",
+    ),
+    "a gain that leaves no image": ("bmode: {gain_dB: -55}", "must lie within dynamic_range_dB = 55"),
+    "persistence without end": (
+        "bmode: {persistence: 1}",
+        "bmode.persistence = 1: should be less than or equal to 0.95",
+    ),
     "a short list": ("motion: {affine: {gradient: [[1]]}}", "gradient.0 = [1]: must have 3 entries or more"),
 }
 

@@ -8,10 +8,16 @@ from echotruth.imaging.beamforming.scan import Linear, Sector
 from echotruth.imaging.bmode import (
     ScanConversion,
     bmode_clip,
+    clip_gain,
     downsample,
+    eight_bit,
+    enhance_edges,
     envelope,
     envelope_images,
+    largest_clip,
+    line_loss,
     log_compress,
+    persist,
     pixel_centres,
     time_gain_compensation,
 )
@@ -30,13 +36,19 @@ def test_envelope_is_the_magnitude():
 
 def test_log_compression_by_hand():
     levels = np.array([1, 10 ** (-27.5 / 20), 10 ** (-55 / 20), 1e-6, 0])
-    assert log_compress(7 * levels, 55).tolist() == [255, 128, 0, 0, 0]
-    assert log_compress(np.array([2.0, 1.0]), 60).tolist() == [255, round(255 * (1 - 6.0206 / 60))]
+    assert np.allclose(log_compress(7 * levels, 55), [1, 0.5, 0, 0, 0])
+    assert np.allclose(log_compress(np.array([2.0, 1.0]), 60), [1, 1 - 6.0206 / 60])
 
 
 def test_one_reference_serves_the_whole_clip():
     images = np.array([[[1.0]], [[0.1]]])
-    assert log_compress(images, 40).ravel().tolist() == [255, 128]
+    assert np.allclose(log_compress(images, 40).ravel(), [1, 0.5])
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(10, [1, 1, 0.75, 0.5]), (-10, [0.75, 0.75, 0.25, 0])])
+def test_gain_saturates_the_bright_or_loses_the_dark(gain, expected):
+    """At 40 dB, echoes at 0, 0, -20 and -30 dB."""
+    assert np.allclose(log_compress(np.array([1, 1, 0.1, 10**-1.5]), 40, gain), expected)
 
 
 @pytest.mark.parametrize("value", [0.0, np.nan])
@@ -149,3 +161,108 @@ def test_clip_holds_every_size():
     assert all(frames.dtype == np.uint8 for frames in images.values())
     assert images[128].max() == 255
     assert (images[32] == downsample(images[128], 4)).all()
+
+
+def noise_lines(frames):
+    random = np.random.default_rng(2)
+    shape = (frames, len(ANGLE), len(RANGE))
+    return (random.standard_normal(shape) + 1j * random.standard_normal(shape)).astype(np.complex64)
+
+
+def test_by_default_a_scanner_does_nothing_but_compress():
+    """The formula as it was before anything could follow it, to the byte."""
+    lines = noise_lines(2)
+    images = envelope_images(lines, SECTOR, RANGE, BMODE)
+    decibels = 20 * np.log10(np.maximum(images / images.max(), 10 ** (-55 / 20)))
+    gain = clip_gain(Probe(), BMODE, len(ANGLE), RANGE, np.random.default_rng(0))
+    clip = largest_clip(lines, SECTOR, RANGE, BMODE, gain)
+    assert (clip == np.rint(255 * (1 + decibels / 55)).astype(np.uint8)).all()
+
+
+def test_time_gain_curve_is_linear_in_decibels_between_its_points():
+    bmode = Bmode(time_gain={"range_mm": [2, 6, 10], "gain_dB": [-12, 0, 6]}, tgc_dB_per_cm_MHz=0.2)
+    range_ = np.array([1, 2, 4, 8, 12]) * 1e-3
+    on_top = time_gain_compensation(Probe(), Bmode(tgc_dB_per_cm_MHz=0.2), range_)
+    gain = time_gain_compensation(Probe(), bmode, range_) / on_top
+    assert np.allclose(20 * np.log10(gain), [-12, -12, -6, 3, 6], atol=1e-4)
+
+
+def test_lines_drop_out_smoothly_and_in_half_of_the_scan():
+    bmode = Bmode(dropout={"loss_dB": 10, "width": 0.1})
+    losses = np.stack([-20 * np.log10(line_loss(bmode, 193, np.random.default_rng(seed))) for seed in range(400)])
+    assert losses.min() >= 0
+    assert (losses > 1e-6).mean() == pytest.approx(0.5, abs=0.02)
+    # The positive part of a normal variable has a mean square of a half.
+    assert np.sqrt((losses**2).mean()) == pytest.approx(10 / np.sqrt(2), rel=0.05)
+    # The slope of a process with this correlation has a deviation of 1 / width.
+    assert np.sqrt(((np.diff(losses) * 192) ** 2).mean()) == pytest.approx(10 / 0.1 / np.sqrt(2), rel=0.05)
+
+
+def test_dropout_does_not_depend_on_the_number_of_lines_and_keeps_the_time_gain():
+    bmode = Bmode(dropout={"loss_dB": 10}, tgc_dB_per_cm_MHz=0.2)
+    fine, coarse = (clip_gain(Probe(), bmode, lines, RANGE, np.random.default_rng(5)) for lines in (257, 65))
+    assert np.allclose(fine[::4], coarse, rtol=1e-5)
+    assert np.allclose(fine / line_loss(bmode, 257, np.random.default_rng(5))[:, None], fine.max(axis=0), rtol=1e-4)
+
+
+def test_persistence_is_the_average_over_all_that_was_before_in_a_cycle_without_end():
+    levels = np.random.default_rng(3).random((5, 4, 3)).astype(np.float32)
+    weight = 0.7
+    past = np.tile(levels, (40, 1, 1)).astype(float)
+    shown = past[0]
+    for level in past:
+        shown = (1 - weight) * level + weight * shown
+    assert np.allclose(persist(levels, weight)[-1], shown, atol=1e-6)
+    turned = persist(np.roll(levels, 2, axis=0), weight)
+    assert np.allclose(turned, np.roll(persist(levels, weight), 2, axis=0), atol=1e-6)
+    assert np.allclose(persist(levels, weight).mean(axis=0), levels.mean(axis=0), atol=1e-6)
+    assert np.allclose(persist(levels[:1], weight), levels[:1], atol=1e-6)
+
+
+def test_persistence_lags_by_the_frames_that_the_schema_names():
+    """The centre of a Gaussian that passes a pixel at frame 20 passes w / (1 - w) frames later."""
+    frames = np.arange(60)
+    passing = np.exp(-(((frames - 20) / 4) ** 2))[:, None, None]
+    shown = persist(passing, 0.6)[:, 0, 0]
+    assert (shown * frames).sum() / shown.sum() == pytest.approx(20 + 0.6 / 0.4, abs=0.01)
+
+
+def test_edges_are_enhanced_within_the_scan_alone():
+    inside = np.zeros((60, 60), bool)
+    inside[10:50, 10:50] = True
+    flat = np.where(inside, 0.5, 0.0)
+    assert np.allclose(enhance_edges(flat, inside, 2.0, 3.0), flat)
+    step = np.where(inside, np.where(np.arange(60) < 30, 0.3, 0.7), 0.0)
+    sharp = enhance_edges(step, inside, 1.0, 2.0)
+    assert np.allclose(sharp[30, [12, 47]], [0.3, 0.7], atol=1e-6)
+    # Half a pixel beside a step of 0.4 its Gaussian mean is 0.2 erf(0.5 / (2 sqrt 2)) from the middle.
+    assert sharp[30, [29, 30]] == pytest.approx([0.1 + 0.0395, 0.9 - 0.0395], abs=2e-3)
+    assert (sharp[~inside] == 0).all()
+
+
+def test_grey_maps_keep_black_and_white_and_what_is_beyond():
+    levels = np.array([-0.2, 0, 0.25, 0.5, 1, 1.3])
+    assert eight_bit(levels, Bmode()).tolist() == [0, 0, 64, 128, 255, 255]
+    # 3 / 16 - 2 / 64 = 0.156
+    assert eight_bit(levels, Bmode(grey_map="s_curve")).tolist() == [0, 0, 40, 128, 255, 255]
+    assert eight_bit(levels, Bmode(grey_gamma=2.0)).tolist() == [0, 0, 16, 64, 255, 255]
+
+
+def test_persistence_acts_on_compressed_images_and_the_grey_map_comes_last():
+    lines = noise_lines(3)
+    images = envelope_images(lines, SECTOR, RANGE, BMODE)
+    levels = np.maximum(1 + (20 * np.log10(np.maximum(images / images.max(), 1e-9)) + 6) / 55, 0).clip(0, 1)
+    # Three frames in a circle, each with half of the one before: weights 4 / 7, 2 / 7, 1 / 7.
+    shown = (4 * levels + 2 * np.roll(levels, 1, axis=0) + np.roll(levels, 2, axis=0)) / 7
+    keys = {"persistence": 0.5, "grey_map": "s_curve", "gain_dB": 6.0}
+    clip = largest_clip(lines, SECTOR, RANGE, BMODE.model_copy(update=keys))
+    assert np.abs(clip - 255 * (3 * shown**2 - 2 * shown**3)).max() < 0.51
+
+
+def test_edges_of_a_clip_are_enhanced_within_the_sector():
+    lines = noise_lines(1)
+    sharp = largest_clip(lines, SECTOR, RANGE, BMODE.model_copy(update={"edge_enhancement": 1.0}))[0]
+    axial, lateral = pixel_grid(128)
+    inside = np.abs(np.arctan2(lateral, axial)) < np.radians(32)
+    assert sharp[inside].std() > 1.2 * largest_clip(lines, SECTOR, RANGE, BMODE)[0][inside].std()
+    assert (sharp[~inside] == 0).all()

@@ -3,7 +3,7 @@
 import numpy as np
 
 from echotruth.imaging.beamforming.scan import scan_lines
-from echotruth.imaging.bmode import downsample, largest_clip, time_gain_compensation
+from echotruth.imaging.bmode import clip_gain, downsample, largest_clip
 from echotruth.workflow.job import Job, Result, main
 
 
@@ -13,7 +13,7 @@ def work(job: Job) -> Result:
         image = downsample(job.read(f"bmode/{largest}", "image")["image"], largest // job.size)
         return {f"bmode/{job.size}": {"image": image}}
     lines, depth = kept_lines(job) if "lines" in config.rf.keep else passed_lines(job)
-    gain = time_gain_compensation(config.probe, config.bmode, depth)
+    gain = clip_gain(config.probe, config.bmode, lines.shape[1], depth, job.random_of("dropout"))
     image = largest_clip(lines, scan_lines(config.probe, config.rf), depth, config.bmode, gain)
     return {f"bmode/{job.size}": {"image": image}}
 

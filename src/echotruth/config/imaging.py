@@ -1,5 +1,6 @@
 """Sections `views`, `phantom`, `rf` and `bmode`."""
 
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat
@@ -116,6 +117,8 @@ class Rf(Section):
 
 
 Divisor = Annotated[int, Field(ge=1, le=64)]
+Gain = Annotated[FiniteFloat, Field(ge=-60, le=60)]
+Length = Annotated[FiniteFloat, Field(ge=0, le=1000)]
 
 
 def _as_tuple(value: Any) -> Any:
@@ -123,8 +126,37 @@ def _as_tuple(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
+class TimeGain(Section):
+    """Curve of gain over range, as the sliders of a scanner set it, on top of `bmode.tgc_dB_per_cm_MHz`."""
+
+    range_mm: Annotated[list[Length], Field(max_length=64)] = Field(default=[])
+    """Ranges from the array, increasing; the gain is linear between them and constant before the first and after the
+    last."""
+    gain_dB: Annotated[list[Gain], Field(max_length=64)] = Field(default=[])
+    """Gain at each of the ranges."""
+
+    @check
+    def _check_points(self) -> None:
+        if len(self.gain_dB) != len(self.range_mm):
+            remedy = f"must have one gain for each of the {len(self.range_mm)} ranges in range_mm"
+            raise invalid("gain_dB", self.gain_dB, remedy)
+        if any(next_ <= each for each, next_ in pairwise(self.range_mm)):
+            raise invalid("range_mm", self.range_mm, "every range must be larger than the one before it")
+
+
+class Dropout(Section):
+    """Loss of scan lines over the whole range, as of poor contact or lung beside the window of the probe."""
+
+    loss_dB: Annotated[FiniteFloat, Field(ge=0, le=60)] = 0.0
+    """Size of the loss: that of a line is this times the positive part of a smooth random function of unit variance,
+    the same in all frames of a view; half of the lines have none. 0 for no loss."""
+    width: Annotated[FiniteFloat, Field(ge=0.02, le=1)] = 0.1
+    """Distance over which the loss changes, as a fraction of the scan: standard deviation of its Gaussian
+    correlation."""
+
+
 class Bmode(Section):
-    """Conversion of RF to 8-bit images."""
+    """Conversion of RF to 8-bit images: gain, log compression, and what a scanner does to images after it."""
 
     field_of_view_mm: Annotated[FiniteFloat, Field(gt=0, le=1000)] = 12.0
     """Side of the square image; the array is in the middle of its upper edge. Default: from `probe.preset`."""
@@ -137,6 +169,26 @@ class Bmode(Section):
     tgc_dB_per_cm_MHz: Annotated[FiniteFloat, Field(ge=0, le=3)] | None = None
     """Time gain compensation: attenuation on each way that the gain compensates, at the centre frequency. Default:
     `probe.attenuation_dB_per_cm_MHz`."""
+    time_gain: TimeGain = TimeGain()
+    """Curve of gain over range, as the sliders of a scanner set it, on top of `bmode.tgc_dB_per_cm_MHz`."""
+    dropout: Dropout = Dropout()
+    """Loss of scan lines over the whole range, as of poor contact or lung beside the window of the probe."""
+    gain_dB: Gain = 0.0
+    """Gain of the compressed images: at 0 the brightest echo of the clip is just white. Above, all echoes down to this
+    far below it are white; below, as much is lost at the dark end."""
+    persistence: Annotated[FiniteFloat, Field(ge=0, le=0.95)] = 0.0
+    """Weight of the image before in every image shown, the rest being the new one; 0 for none. The clip is taken as one
+    cycle that repeats. Speckle and borders lag behind the tissue by persistence / (1 - persistence) frames."""
+    edge_enhancement: Annotated[FiniteFloat, Field(ge=0, le=5)] = 0.0
+    """Unsharp mask: the difference of the compressed image from its smooth version, times this, is added to it; 0 for
+    none."""
+    edge_width_px: Annotated[FiniteFloat, Field(ge=0.5, le=64)] = 2.0
+    """Standard deviation of the Gaussian that makes the smooth version, px of the largest image."""
+    grey_map: Literal["linear", "s_curve"] = "linear"
+    """Grey level u of the compressed images, from 0 to 1, as shown. `linear`: u. `s_curve`: 3 u^2 - 2 u^3, steep at
+    middle levels and flat at both ends."""
+    grey_gamma: Annotated[FiniteFloat, Field(ge=0.2, le=5)] = 1.0
+    """Power to which the grey level is raised after `grey_map`; above 1 middle levels become darker."""
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -151,6 +203,14 @@ class Bmode(Section):
                 raise invalid("downsampling", list(self.downsampling), remedy)
         if len(set(self.downsampling)) < len(self.downsampling):
             raise invalid("downsampling", list(self.downsampling), "entries must differ")
+
+    @check
+    def _check_gain(self) -> None:
+        if abs(self.gain_dB) >= self.dynamic_range_dB:
+            remedy = (
+                f"must lie within dynamic_range_dB = {self.dynamic_range_dB:g}, or the image is all black or all white"
+            )
+            raise invalid("gain_dB", self.gain_dB, remedy)
 
 
 def standard_views() -> dict[str, View]:

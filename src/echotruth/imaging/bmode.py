@@ -1,14 +1,19 @@
 """B-mode: from lines to 8-bit images on the square field of view.
 
 The envelope is interpolated before it is compressed, which keeps the statistics of the speckle, and compressed relative
-to one reference for the whole clip, so that brightness means the same in every frame.
+to one reference for the whole clip, so that brightness means the same in every frame. What a scanner does to compressed
+images comes last, before they are rounded to eight bits: persistence, edge enhancement, grey map.
 """
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from echotruth.config import Bmode, Probe
 from echotruth.imaging import spline
 from echotruth.imaging.beamforming.scan import Scan
+
+DROPOUT_WAVES = 64
+"""Waves of which the random function of :func:`line_loss` is the sum."""
 
 
 def time_gain_compensation(probe: Probe, bmode: Bmode, range_: np.ndarray) -> np.ndarray:
@@ -17,18 +22,61 @@ def time_gain_compensation(probe: Probe, bmode: Bmode, range_: np.ndarray) -> np
     Parameters
     ----------
     probe, bmode
-        The attenuation a of the tissue, unless `bmode.tgc_dB_per_cm_MHz` is set in its place.
+        The attenuation a of the tissue, unless `bmode.tgc_dB_per_cm_MHz` is set in its place, and the curve
+        `bmode.time_gain`, which multiplies the gain.
     range_
         Shape (ranges,), m.
     """
-    p, tgc = probe.si(), bmode.si().tgc
-    attenuation = p.attenuation if tgc is None else tgc
+    p, b = probe.si(), bmode.si()
+    attenuation = p.attenuation if b.tgc is None else b.tgc
     with np.errstate(over="ignore"):
-        return np.exp(2 * attenuation * p.frequency * range_).astype(np.float32)
+        gain = np.exp(2 * attenuation * p.frequency * range_)
+        if b.time_gain.range:
+            gain *= 10 ** (np.interp(range_, b.time_gain.range, b.time_gain.gain) / 20)
+        return gain.astype(np.float32)
+
+
+def line_loss(bmode: Bmode, lines: int, random: np.random.Generator) -> np.ndarray:
+    """Gain of every scan line, at most 1, shape (lines,), 1, float32; see `bmode.dropout`.
+
+    The loss in dB is the positive part of a random function of the place of the line in the scan: a sum of cosines of
+    random phase, whose wave numbers are normally distributed, so that its correlation is Gaussian (Rahimi & Recht 2007,
+    Random features for large-scale kernel machines). The number of lines does not change it.
+    """
+    wave_number = random.standard_normal(DROPOUT_WAVES) / bmode.dropout.width
+    phase = random.uniform(0, 2 * np.pi, DROPOUT_WAVES)
+    waves = np.cos(np.linspace(0, 1, lines)[:, None] * wave_number + phase)
+    loss = bmode.dropout.loss_dB * np.maximum(np.sqrt(2 / DROPOUT_WAVES) * waves.sum(axis=1), 0)
+    return (10 ** (-loss / 20)).astype(np.float32)
+
+
+def clip_gain(probe: Probe, bmode: Bmode, lines: int, range_: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Gain of the envelope before it is compressed.
+
+    Parameters
+    ----------
+    probe, bmode
+        As of :func:`time_gain_compensation`.
+    lines
+        Number of scan lines.
+    range_
+        Shape (ranges,), m.
+    random
+        For :func:`line_loss`.
+
+    Returns
+    -------
+    Shape (ranges,), or (lines, ranges) if scan lines drop out, 1, float32.
+    """
+    gain = time_gain_compensation(probe, bmode, range_)
+    return line_loss(bmode, lines, random)[:, None] * gain if bmode.dropout.loss_dB else gain
 
 
 def envelope(lines: np.ndarray, gain: np.ndarray | float = 1.0) -> np.ndarray:
-    """Envelope, float32, of demodulated or analytic lines (..., ranges), complex64, times a gain (ranges,)."""
+    """Envelope, float32, of demodulated or analytic lines (..., lines, ranges), complex64, times a gain.
+
+    The gain is that of :func:`clip_gain`, (ranges,) or (lines, ranges).
+    """
     return np.abs(lines) * np.asarray(gain, np.float32)
 
 
@@ -53,6 +101,11 @@ class ScanConversion:
         Ranges of the samples, shape (ranges,), m, evenly spaced.
     bmode
         Field of view and size of the image.
+
+    Attributes
+    ----------
+    inside : ndarray of shape (axial, lateral), bool
+        Pixels within the scan.
     """
 
     def __init__(self, scan: Scan, range_: np.ndarray, bmode: Bmode):
@@ -61,7 +114,7 @@ class ScanConversion:
         line, pixel_range = scan.to_scan_coordinates(lateral, axial)
         sample = (pixel_range - range_[0]) / (range_[1] - range_[0])
         inside = (line >= 0) & (line <= len(scan.angle) - 1) & (sample >= 0) & (sample <= len(range_) - 1)
-        self._inside = np.flatnonzero(inside)
+        self.inside, self._inside = inside, np.flatnonzero(inside)
         self._line, self._sample = line[inside].astype(np.float32), sample[inside].astype(np.float32)
 
     def __call__(self, envelopes: np.ndarray) -> np.ndarray:
@@ -74,26 +127,89 @@ class ScanConversion:
         return image
 
 
-def log_compress(images: np.ndarray, dynamic_range_dB: float) -> np.ndarray:
-    """Eight-bit images 255 (1 + 20 log10(envelope / maximum) / dynamic range) of a clip.
+def log_compress(images: np.ndarray, dynamic_range_dB: float, gain_dB: float = 0.0) -> np.ndarray:
+    """Grey levels 1 + (20 log10(envelope / maximum) + gain) / dynamic range of a clip, limited to 0 and 1.
 
     Parameters
     ----------
     images
-        Envelopes, any shape. The maximum of the whole clip becomes 255.
+        Envelopes, any shape. Without gain the maximum of the whole clip becomes 1.
     dynamic_range_dB
-        Envelopes this far below the maximum, and lower ones, become 0.
+        Envelopes this far below the level that is white, and lower ones, become 0.
+    gain_dB
+        Envelopes this far below the maximum, and higher ones, become 1.
 
     Returns
     -------
-    Same shape, uint8.
+    Same shape, float32 if the envelopes are.
     """
     reference = images.max()
     if not reference > 0 or not np.isfinite(reference):
         raise ValueError("The clip holds no echo: its envelope is zero or not finite.")
     floor = 10 ** (-dynamic_range_dB / 20)
-    level = 20 * np.log10(np.maximum(images / reference, floor))
-    return np.rint(255 * (1 + level / dynamic_range_dB)).astype(np.uint8)
+    relative = np.clip(images / reference * 10 ** (gain_dB / 20), floor, 1)
+    return np.maximum(1 + 20 * np.log10(relative) / dynamic_range_dB, 0)
+
+
+def persist(levels: np.ndarray, weight: float) -> np.ndarray:
+    """Images of which each is averaged with those before it, in a cycle that repeats.
+
+    y[k] = (1 - w) x[k] + w y[k - 1], where y[-1] is the last image of the same cycle. If the first image began without
+    a past, it alone would have no lag, and the last one would not lead back to it.
+
+    Parameters
+    ----------
+    levels
+        Grey levels x (frames, axial, lateral).
+    weight
+        Weight w of the image before, from 0 to below 1.
+
+    Returns
+    -------
+    y, same shape and type.
+    """
+    shown, before = np.empty_like(levels), np.zeros_like(levels[0])
+    for frame, level in enumerate(levels):
+        before = shown[frame] = (1 - weight) * level + weight * before
+    # So far the cycle began in the dark. What the last image would have left over fades through all of them.
+    last = before / (1 - weight ** len(levels))
+    for frame in range(len(levels)):
+        shown[frame] += weight ** (frame + 1) * last
+    return shown
+
+
+def enhance_edges(level: np.ndarray, inside: np.ndarray, amount: float, width_px: float) -> np.ndarray:
+    """Unsharp mask within the scan: x + a (x - smooth x).
+
+    Parameters
+    ----------
+    level
+        Grey levels x (axial, lateral).
+    inside
+        Pixels of the scan (axial, lateral), bool. The smooth image is the Gaussian mean over these alone, so that the
+        edge of the scan is no edge of the image; others stay what they are.
+    amount
+        Factor a.
+    width_px
+        Standard deviation of the Gaussian, px.
+
+    Returns
+    -------
+    Same shape and type.
+    """
+    weight = gaussian_filter(inside.astype(level.dtype), width_px)
+    smooth = gaussian_filter(np.where(inside, level, 0), width_px) / np.where(inside, weight, 1)
+    return np.where(inside, level + amount * (level - smooth), level)
+
+
+def eight_bit(levels: np.ndarray, bmode: Bmode) -> np.ndarray:
+    """Grey levels, limited to 0 and 1, through `bmode.grey_map` and `grey_gamma`, as uint8 of the same shape."""
+    shown = np.clip(levels, 0, 1)
+    if bmode.grey_map == "s_curve":
+        shown = shown**2 * (3 - 2 * shown)
+    if bmode.grey_gamma != 1:
+        shown = shown**bmode.grey_gamma
+    return np.rint(255 * shown).astype(np.uint8)
 
 
 def downsample(images: np.ndarray, divisor: int) -> np.ndarray:
@@ -129,7 +245,7 @@ def envelope_images(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bm
     bmode
         Field of view and size of the image.
     gain
-        Over range, shape (ranges,), 1; see :func:`time_gain_compensation`.
+        Shape (ranges,) or (lines, ranges), 1; see :func:`clip_gain`.
 
     Returns
     -------
@@ -152,4 +268,12 @@ def bmode_clip(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, 
 
 def largest_clip(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, gain=1.0) -> np.ndarray:
     """B-mode clip of the largest image size (frames, size, size), uint8; parameters as of :func:`envelope_images`."""
-    return log_compress(envelope_images(lines, scan, range_, bmode, gain), bmode.dynamic_range_dB)
+    images = envelope_images(lines, scan, range_, bmode, gain)
+    levels = log_compress(images, bmode.dynamic_range_dB, bmode.gain_dB)
+    if bmode.persistence:
+        levels = persist(levels, bmode.persistence)
+    if bmode.edge_enhancement:
+        inside = ScanConversion(scan, range_, bmode).inside
+        edge = bmode.edge_enhancement, bmode.edge_width_px
+        levels = np.stack([enhance_edges(level, inside, *edge) for level in levels])
+    return eight_bit(levels, bmode)

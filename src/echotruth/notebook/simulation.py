@@ -20,7 +20,7 @@ from echotruth.config.building import Source, configure, tracker_section
 from echotruth.evaluation.clip import Clip, tracker_seed
 from echotruth.evaluation.scoring import metrics, score, truth_at
 from echotruth.heart import Heart
-from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
+from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
@@ -141,10 +141,11 @@ def image(
     config, name = _imaged_by(heart.config, view, probe)
     size = image_size(config, size)
     case, plane = Case("heart", {}, config), imaging_plane(config.views[name], config.rf, heart.endo_at_ed)
-    sequence = Sequence(config, heart, plane, partial(generator, case, name))
+    random = partial(generator, case, name)
+    sequence = Sequence(config, heart, plane, random)
     with _progress_line("image", progress):
         lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range
-    gain = time_gain_compensation(config.probe, config.bmode, range_)
+    gain = clip_gain(config.probe, config.bmode, config.rf.lines, range_, random("dropout"))
     values = {
         f"bmode/{size}": {"image": bmode_clip(lines, sequence.scanner.scan, range_, config.bmode, gain)[size]},
         f"truth/{size}": pixel_truth(heart, plane, *pixel_centres(config.bmode, size)),
