@@ -19,12 +19,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from echo_statistics import peak
 
 from echotruth.config import Config, Rf
 from echotruth.config.loading import load
 from echotruth.fem.location import locate
 from echotruth.heart import Heart
-from echotruth.imaging.bmode import bmode_clip, pixel_centres
+from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.view import Plane, imaging_plane
 
@@ -35,8 +36,8 @@ EVERY = 6
 """A pair of frames is imaged every so many."""
 SIZE = 256
 """Pixels along a side, 47 um each. Our cavity is 6.8 mm long and the real one 79 mm: its pixels would be 44 um."""
-WINDOWS, SEARCH = (24, 48), 8
-"""Sides of the windows, and how far they are sought to every side, px."""
+WINDOWS = (24, 48)
+"""Sides of the windows, px."""
 DARK = 4
 """Grey levels, of 255, up to which a pixel is dark."""
 REAL = {"septum": (302, 190, 245), "lateral": (400, 220, 310), "blood": (345, 195, 240)}
@@ -46,16 +47,6 @@ REAL_SECTOR = (17, 339, 42.0, 40, 380)
 
 Measures = dict[str, float]
 Places = dict[str, list[tuple[int, int]]]
-
-
-def peak(before: np.ndarray, after: np.ndarray, place: tuple[int, int], side: int) -> float:
-    """Largest normalised correlation of a window of one frame with windows near it in the next."""
-    from skimage.feature import match_template
-
-    row, column = (middle - side // 2 for middle in place)
-    window = before[row : row + side, column : column + side].astype(float)
-    near = after[row - SEARCH : row + side + SEARCH, column - SEARCH : column + side + SEARCH].astype(float)
-    return float(match_template(near, window).max()) if window.std() > 0 else np.nan
 
 
 def correlations(pairs: list[tuple[np.ndarray, np.ndarray]], places: Places) -> Measures:
@@ -126,7 +117,8 @@ def pictures(config: Config, beating: Heart, time: np.ndarray, where: Plane) -> 
     """Lines of two frames in a row, and so on through the cycle: (2, lines, ranges)."""
     sequence = Sequence(config, beating, where, random, time)
     scanner, acquire = sequence.scanner, sequence.acquisition(sequence.scatterers())
-    show = partial(bmode_clip, scan=scanner.scan, range_=scanner.range, bmode=config.bmode)
+    gain = time_gain_compensation(config.probe, config.bmode, scanner.range)
+    show = partial(bmode_clip, scan=scanner.scan, range_=scanner.range, bmode=config.bmode, gain=gain)
     lines = [scanner.beamform(acquire(k + more)) for k in range(0, FRAMES - 1, EVERY) for more in (0, 1)]
     yield from show(np.stack(lines))[SIZE]
 
