@@ -57,6 +57,13 @@ def test_configurations_on_a_page_are_valid(name):
             et.configure(keys)
 
 
+def test_hearts_can_be_drawn_as_the_page_on_realistic_images_says():
+    (block,) = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs/realism.md").read_text(), re.DOTALL)
+    cases = et.expand(et.configure(yaml.safe_load(block)))
+    assert len(cases) == 64
+    assert len({case.config.bmode.gain_dB for case in cases}) == 64
+
+
 def test_table_of_a_loop_on_the_page_is_one_that_is_read(tmp_path):
     (block,) = re.findall(r"```text\n(time_ms.*?)```", (ROOT / "docs/own_heart.md").read_text(), re.DOTALL)
     rest = "".join(
