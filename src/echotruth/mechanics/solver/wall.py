@@ -36,7 +36,7 @@ class Wall:
 
 
 def wall(config: Config, mesh: Mesh) -> Wall:
-    """Wall of a mesh with the pathology of a configuration.
+    """Wall of a mesh with the tissue of a configuration.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def wall(config: Config, mesh: Mesh) -> Wall:
         If no cell of the mesh has the pathology.
     """
     depth = fibres.wall_depth(mesh)
-    return Wall(mesh, depth, tissue(mesh, depth, config.pathology))
+    return Wall(mesh, depth, tissue(mesh, depth, config.pathology, config.mechanics.regional))
 
 
 def equilibrium(config: Config, wall: Wall) -> Equilibrium:
