@@ -84,7 +84,7 @@ FORMATS = {
 }
 """What can be written, by the name of the format."""
 
-OVERLAYS = ("wall", "segments", "displacement")
+OVERLAYS = ("wall", "segments", "displacement", "scale")
 """What can be drawn over the images."""
 
 
@@ -116,7 +116,7 @@ class Export:
     selection : Selection
     format : str
         One of :data:`FORMATS`.
-    overlay : sequence of {"wall", "segments", "displacement"}
+    overlay : sequence of {"wall", "segments", "displacement", "scale"}
         What to draw over the images of mp4, gif and png.
     rate : float
         Frames per second of mp4 and gif.
