@@ -15,7 +15,8 @@ from .imaging.rf.full_matrix import FullMatrix
 from .notebook.datasets import heart_dataset
 from .notebook.kinematics import kinematics
 from .notebook.point_tracks import point_tracks
-from .notebook.simulation import beat, evaluate, image, track
+from .notebook.sensitivities import sensitivities
+from .notebook.simulation import beat, evaluate, image, systole, track
 from .repository.reader import Repository
 from .repository.unpacking import unpack
 from .tracking.failure import TrackerFailed
@@ -46,8 +47,10 @@ __all__ = [
     "point_tracks",
     "read_clip",
     "read_wall",
+    "sensitivities",
     "speckle_tracking",
     "strain_peaks",
+    "systole",
     "track",
     "unpack",
 ]
