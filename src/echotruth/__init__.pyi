@@ -17,7 +17,8 @@ from .notebook.kinematics import kinematics
 from .notebook.point_tracks import point_tracks
 from .notebook.sensitivities import sensitivities
 from .notebook.simulation import beat, evaluate, image, systole, track
-from .repository.reader import Repository
+from .repository.fetching import fetch
+from .repository.reader import Repository, sample
 from .repository.unpacking import unpack
 from .tracking.failure import TrackerFailed
 
@@ -40,6 +41,7 @@ __all__ = [
     "configure",
     "evaluate",
     "expand",
+    "fetch",
     "heart_dataset",
     "image",
     "kinematics",
@@ -47,6 +49,7 @@ __all__ = [
     "point_tracks",
     "read_clip",
     "read_wall",
+    "sample",
     "sensitivities",
     "speckle_tracking",
     "strain_peaks",

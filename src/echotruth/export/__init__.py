@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Literal
 
+from echotruth.config import shipped
 from echotruth.export.clip import Clip
 from echotruth.export.destination import draft
 from echotruth.export.error import ExportError
@@ -121,7 +122,8 @@ class Export:
     rate : float
         Frames per second of mp4 and gif.
     output : Path, optional
-        Folder; for a single file also its path. Default: `export/FORMAT` in the folder of the repository.
+        Folder; for a single file also its path. Default: `export/FORMAT` in the folder of the repository, for that
+        which comes with the package in `out/sample`.
     """
 
     repository: Repository
@@ -201,7 +203,8 @@ class Export:
     @property
     def _output(self) -> Path:
         """Folder of the files, or path of a single file."""
-        return self.output or self.repository.folder / "export" / self.format
+        home = Path("out") / shipped.SAMPLE if self.repository.is_sample else self.repository.folder
+        return self.output or home / "export" / self.format
 
     @property
     def _is_file(self) -> bool:
