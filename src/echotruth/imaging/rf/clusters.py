@@ -31,6 +31,8 @@ every scatterer."""
 ELONGATION = 2.0
 """Depth of a cluster in 1/range, in its width over half the array: at the ends of the array, delays then change as much
 over its depth as over its width."""
+NEAREST = 4.0
+"""Half the array over the least range of a cluster; nearer, amplitudes too change much from element to element."""
 EXTRA_ELEMENTS = 4
 """Skeleton elements in addition to those that the tolerance requires; their errors average out."""
 RIDGE = 4.0
@@ -92,8 +94,8 @@ class Clusters:
             size * half_aperture / wavelength,
         )
         self._min_curvature = 1 / max_range
-        # Nearer than half an array every element is its own skeleton.
-        self._rows = int(np.ceil((1 / half_aperture - self._min_curvature) / self._step[1]))
+        # Nearer than that every element is its own skeleton.
+        self._rows = int(np.ceil((NEAREST / half_aperture - self._min_curvature) / self._step[1]))
         self._sectors = int(np.ceil(2 / size))
         self._clusters: dict[int, Cluster] = {}
 
@@ -189,23 +191,23 @@ class Expansion:
         self._phasor = np.zeros((len(frequency), len(clusters), 2, padded(self._elements)), np.float32)
         self._phasor[..., : self._elements] = np.stack([np.cos(phase), np.sin(phase)], axis=2)
 
-    def __call__(self, spectra: NDArray[np.complex64]) -> NDArray[np.complex64]:
-        """Spectra of the echoes of all pairs (bins, elements, elements).
+    def __call__(self, spectra: NDArray[np.complex64], matrix: NDArray[np.complex64]) -> None:
+        """Add the echoes of all pairs.
 
         Parameters
         ----------
         spectra : ndarray of shape (bins, pairs), complex64
             Spectra of the pairs of skeleton elements, cluster by cluster.
+        matrix : ndarray of shape (bins, elements, elements), complex64
+            Added to.
         """
-        matrix = np.empty((len(spectra), self._elements, self._elements), np.complex64)
         loop = partial(expand, spectra, self._first, self._skeleton, self._weights, self._phasor, matrix)
         share(loop, len(spectra))
-        return matrix
 
 
 @numba.njit(nogil=True, cache=True)
 def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
-    """Write the echoes of all pairs of elements, summed over clusters.
+    """Add the echoes of all pairs of elements, summed over clusters.
 
     A cluster of skeleton echoes M, weights W and phasors z = exp(-2 pi i f delay) adds diag(z) W^T M' W diag(z), with
     M' = M without the delays.
@@ -224,9 +226,9 @@ def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
         Real and imaginary part of z for each cluster, shape (bins, clusters, 2, width), float32; as many columns as
         elements or more.
     matrix
-        Written: shape (bins, elements, elements), complex64.
+        Added to: shape (bins, elements, elements), complex64.
     bins
-        First bin to be written, and the one after the last.
+        First bin to be added to, and the one after the last.
     """
     width, count = phasor.shape[3], matrix.shape[1]
     echoes = np.empty((2, width, width), np.float32)
@@ -243,7 +245,7 @@ def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
             add_delayed(echoes, c, s, total)
         for i in range(count):
             for j in range(i, count):
-                matrix[f, i, j] = complex(total[0, i, j], total[1, i, j])
+                matrix[f, i, j] += np.complex64(complex(total[0, i, j], total[1, i, j]))
                 matrix[f, j, i] = matrix[f, i, j]
 
 
