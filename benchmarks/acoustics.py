@@ -217,11 +217,12 @@ def arrays(bench: Bench) -> Result:
     """CPU seconds of matrix and beamforming, and greatest memory, by the elements of the mouse's array."""
     rows = []
     for elements in LENGTHS:
+        given = {"array": MOUSE, "scatterers": FRAME, "lines": LINES, "probe": {"elements": elements}}
         with bench.side() as side:
-            given = {"array": MOUSE, "scatterers": FRAME, "lines": LINES, "probe": {"elements": elements}}
-            idle, found = side("peak"), side("frame", repeats=1, **given)["seconds"]
+            idle, _ = side("peak"), side("lines", **given)
+            peak, found = side("peak"), side("frame", repeats=1, **given)["seconds"]
             seconds = [found[part]["cpu"] for part in ("matrix", "channels and receive focus")]
-            rows.append([elements, *seconds, idle, side("peak")])
+            rows.append([elements, *seconds, idle, peak])
         _tell(f"{rows[-1]}")
     return {"scatterers": FRAME, "lines": LINES, "rows": rows}
 

@@ -42,6 +42,15 @@ def frame(
     return {"seconds": _medians(turns), "threads": numba.get_num_threads(), "size_px": bmode.size_px}
 
 
+def lines(array: str, scatterers: int, probe: dict[str, Any], **changes: Any) -> int:
+    """Image a frame as a user does, and give the number of its lines."""
+    setup = ARRAYS[array]
+    rf, bmode = scan(setup, **changes)
+    return len(
+        Scanner(setup.probe(**probe), rf, imaging_depth(rf, bmode)).lines(*setup.scatterers(scatterers, thick=True))
+    )
+
+
 def _parts(
     scanner: Scanner, channels: TransmitSynthesis, phantom: tuple[np.ndarray, np.ndarray], bmode: Bmode
 ) -> Clock:

@@ -125,6 +125,7 @@ if __name__ == "__main__":
             "exactness": acoustics_exact.exactness,
             "errors": acoustics_exact.errors,
             "frame": acoustics_frame.frame,
+            "lines": acoustics_frame.lines,
             "transmits": acoustics_frame.transmits,
             "floor": acoustics_floor.rates,
         }

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Probe
-from echotruth.imaging.rf.clusters import Clusters, Expansion
+from echotruth.imaging.rf.clusters import Clusters, add_expanded
 from echotruth.imaging.rf.kernel import Band, Grid
 from echotruth.imaging.rf.probe import element_centres, pulse_band, pulse_spectrum
 
@@ -81,5 +81,5 @@ def test_the_expansion_of_clusters_is_the_sum_of_their_weighted_and_delayed_echo
         carry = phasor[:, None] * cluster.weights * phasor[:, cluster.skeleton, None].conj()
         exact = exact + np.einsum("kfi,kfg,kgj->kij", carry, echoes, carry)
     matrix = np.zeros((4, elements, elements), np.complex64)
-    Expansion(chosen, frequency)(np.concatenate(spectra, axis=1).astype(np.complex64), matrix)
+    add_expanded(matrix, chosen, frequency, np.concatenate(spectra, axis=1).astype(np.complex64))
     assert np.linalg.norm(matrix - exact) < 1e-6 * np.linalg.norm(exact)

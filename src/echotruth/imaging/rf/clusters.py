@@ -169,40 +169,30 @@ def _decomposition(echoes: Floats, tolerance: float) -> tuple[NDArray[np.int64],
     return rows, linalg.solve(product[np.ix_(rows, rows)] + ridge, product[rows], assume_a="pos")
 
 
-class Expansion:
-    """Expands the echoes between the skeleton elements of some clusters to all pairs of elements.
+def add_expanded(
+    matrix: NDArray[np.complex64], clusters: list[Cluster], frequency: Floats, spectra: NDArray[np.complex64]
+) -> None:
+    """Add the echoes of all pairs of elements, from those between the skeleton elements of some clusters.
 
     Parameters
     ----------
+    matrix : ndarray of shape (bins, elements, elements), complex64
+        Added to.
     clusters : list of Cluster
     frequency : ndarray of shape (bins,), Hz
+    spectra : ndarray of shape (bins, pairs), complex64
+        Spectra of the pairs of skeleton elements, cluster by cluster.
     """
-
-    def __init__(self, clusters: list[Cluster], frequency: Floats) -> None:
-        sizes = [padded(len(cluster.skeleton), HEIGHT) for cluster in clusters]
-        self._elements = len(clusters[0].delay)
-        self._first = np.concatenate([[0], np.cumsum(sizes)])
-        self._weights = np.zeros((self._first[-1], padded(self._elements) + ROW_PADDING), np.float32)
-        self._skeleton = np.full(self._first[-1], -1)
-        for first, cluster in zip(self._first, clusters, strict=False):
-            rows = slice(first, first + len(cluster.skeleton))
-            self._weights[rows, : self._elements], self._skeleton[rows] = cluster.weights, cluster.skeleton
-        phase = -2 * np.pi * np.multiply.outer(frequency, np.stack([cluster.delay for cluster in clusters]))
-        self._phasor = np.zeros((len(frequency), len(clusters), 2, padded(self._elements)), np.float32)
-        self._phasor[..., : self._elements] = np.stack([np.cos(phase), np.sin(phase)], axis=2)
-
-    def __call__(self, spectra: NDArray[np.complex64], matrix: NDArray[np.complex64]) -> None:
-        """Add the echoes of all pairs.
-
-        Parameters
-        ----------
-        spectra : ndarray of shape (bins, pairs), complex64
-            Spectra of the pairs of skeleton elements, cluster by cluster.
-        matrix : ndarray of shape (bins, elements, elements), complex64
-            Added to.
-        """
-        loop = partial(expand, spectra, self._first, self._skeleton, self._weights, self._phasor, matrix)
-        share(loop, len(spectra))
+    first = np.cumsum([0] + [padded(len(cluster.skeleton), HEIGHT) for cluster in clusters])
+    elements, skeleton = matrix.shape[1], np.full(first[-1], -1)
+    weights = np.zeros((first[-1], padded(elements) + ROW_PADDING), np.float32)
+    for start, cluster in zip(first, clusters, strict=False):
+        rows = slice(start, start + len(cluster.skeleton))
+        weights[rows, :elements], skeleton[rows] = cluster.weights, cluster.skeleton
+    phase = -2 * np.pi * np.multiply.outer(frequency, np.stack([cluster.delay for cluster in clusters]))
+    phasor = np.zeros((len(frequency), len(clusters), 2, padded(elements)), np.float32)
+    phasor[..., :elements] = np.stack([np.cos(phase), np.sin(phase)], axis=2)
+    share(partial(expand, spectra, first, skeleton, weights, phasor, matrix), len(spectra))
 
 
 @numba.njit(nogil=True, cache=True)

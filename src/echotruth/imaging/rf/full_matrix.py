@@ -28,7 +28,7 @@ from scipy import fft
 from echotruth.config import Probe
 from echotruth.imaging.rf import directivity, kernel, spreading
 from echotruth.imaging.rf.attenuation import separable_damping
-from echotruth.imaging.rf.clusters import Clusters, Expansion
+from echotruth.imaging.rf.clusters import Clusters, add_expanded
 from echotruth.imaging.rf.elevation import MAX_BLOCKS, Lens, subaperture_bounds
 from echotruth.imaging.rf.kernel import NODES, TAPS, Band, Grid, stack_real_imaginary
 from echotruth.imaging.rf.lens_kernels import group_blocks, lens_kernels
@@ -253,10 +253,9 @@ class FullMatrix:
         for number in np.unique(numbers):
             own, cluster = numbers == number, self._clusters[number]
             clusters.append(cluster)
-            scatterers = position[own], amplitude[own], powers[own]
-            spectra.append(self._skeleton_spectra(cluster.skeleton, *scatterers))
+            spectra.append(self._skeleton_spectra(cluster.skeleton, position[own], amplitude[own], powers[own]))
             if sum(each.nbytes for each in spectra) > EXPANDED or number == numbers.max():
-                Expansion(clusters, self.frequency)(np.concatenate(spectra, axis=1), matrix)
+                add_expanded(matrix, clusters, self.frequency, np.concatenate(spectra, axis=1))
                 clusters, spectra = [], []
         return matrix
 
