@@ -59,6 +59,19 @@ ELEMENTS = (16, 32, 64, 128)
 OF_ELEMENTS = {"ours": 20000, "PyMUST": 1000, "eSDIva": 1000, "eSDIva, matrix": 100}
 """Party to the scatterers with which the number of elements is varied."""
 
+SCANS: dict[str, tuple[int, dict[str, Any]]] = {
+    "1 diverging wave": (1, {"transmit": "diverging", "transmits": 1}),
+    "5": (5, {"transmit": "diverging", "transmits": 5}),
+    "11": (11, {"transmit": "diverging", "transmits": 11}),
+    "31": (31, {"transmit": "diverging", "transmits": 31}),
+    "192 focused lines": (192, {"transmit": "focused", "lines": 192}),
+}
+"""Scans of a frame: how many transmits, and how ours are made."""
+OURS = {"ours": {"elevation_beam": False}, "ours, elevation": {}}
+PEERS = tuple(party for party in SPEED if party not in (*OURS, "eSDIva, matrix"))
+LENGTHS = (32, 64, 128, 256)
+"""Elements of the arrays of which whole frames are made."""
+
 FEW = 3
 """Turns of which growth is the median."""
 
@@ -172,6 +185,48 @@ def frame(bench: Bench) -> Result:
     return {"rows": rows}
 
 
+def scans(bench: Bench) -> Result:
+    """Seconds of a B-mode frame by the scan: ours from scatterers to uint8, the peers' RF alone; and the errors."""
+    answer: Result = {"scatterers": IMAGED, "transmits": {name: number for name, (number, _) in SCANS.items()}}
+    with bench.side() as side:
+        for array in (MOUSE, HUMAN):
+            ours: dict[tuple[str, str], list[float]] = {}
+            peers: dict[str, list[float]] = {}
+            for _ in range(FEW):
+                for party, options in OURS.items():
+                    for name, (_, scan) in SCANS.items():
+                        row = side("frame", array=array, scatterers=IMAGED, repeats=1, **options, **scan)
+                        ours.setdefault((party, name), []).append(_whole(row["seconds"]))
+                for party in PEERS:
+                    given = {"array": array, "scatterers": SPEED[party], "thick": party in THICK}
+                    spent = side("turn", party=party, **given)["cpu"]
+                    peers.setdefault(party, []).append(spent / SPEED[party] * IMAGED)
+            rows = {party: {name: median(ours[party, name]) for name in SCANS} for party in OURS}
+            for party in PEERS:
+                rows[party] = {name: number * median(peers[party]) for name, (number, _) in SCANS.items()}
+            answer[array] = {"seconds": rows, "errors": side("errors", array=array)}
+            _tell(f"{array}: {answer[array]}")
+    return answer
+
+
+def _whole(spent: Result) -> float:
+    return sum(spent[part]["cpu"] for part in ("matrix", "channels and receive focus", "image"))
+
+
+def arrays(bench: Bench) -> Result:
+    """CPU seconds of matrix and beamforming, and greatest memory, by the elements of the mouse's array."""
+    rows = []
+    for elements in LENGTHS:
+        given = {"array": MOUSE, "scatterers": FRAME, "lines": LINES, "probe": {"elements": elements}}
+        with bench.side() as side:
+            idle, _ = side("peak"), side("lines", **given)
+            peak, found = side("peak"), side("frame", repeats=1, **given)["seconds"]
+            seconds = [found[part]["cpu"] for part in ("matrix", "channels and receive focus")]
+            rows.append([elements, *seconds, idle, peak])
+        _tell(f"{rows[-1]}")
+    return {"scatterers": FRAME, "lines": LINES, "rows": rows}
+
+
 def floor(bench: Bench) -> Result:
     """What the machine allows, beside what a pair takes."""
     with bench.side() as side:
@@ -193,7 +248,8 @@ def exactness(bench: Bench) -> Result:
 
 
 PARTS: dict[str, Callable[[Bench], Result]] = {
-    part.__name__: part for part in (speed, transmits, frame, growth, memory, floor, agreement, exactness)
+    part.__name__: part
+    for part in (scans, speed, transmits, frame, arrays, growth, memory, floor, agreement, exactness)
 }
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
-from acoustics_agreement import FINE, likeness
+from acoustics_agreement import FEW, FINE, likeness
 from acoustics_arrays import ARRAYS, Array, Floats, delays
-from acoustics_peers import Pymust
+from acoustics_peers import PATCHES, Esdiva, Pymust
 from exact_sum import Spectra, exact_matrix, one_way
 
 from echotruth.config import Probe
@@ -50,20 +51,50 @@ def exactness(array: str) -> list[list[Any]]:
             difference = ours(position, amplitude)[::EVERY] - sums
             error = float(np.linalg.norm(difference) / np.linalg.norm(sums))
             rows.append([name, "slab" if options["elevation"] else "plane", attenuation, error])
-    return rows + [pymust(setup, twice) for twice in (False, True)]
+    slab = {"thick": True, "elevation": True} | FINE
+    rows.append(["PyMUST", "slab", 0.0, pymust(setup, **slab)])
+    rows.append(["PyMUST, the elevation delay twice in the sum", "slab", 0.0, pymust(setup, twice=True, **slab)])
+    return rows
 
 
-def pymust(array: Array, twice: bool) -> list[Any]:
-    """Row of PyMUST through the slab, against the exact sum or that of :func:`with_delay_twice`."""
-    probe = array.probe()
-    position, amplitude = array.scatterers(SCATTERERS, thick=True)
-    ours, delay = FullMatrix(probe, array.far), delays(probe, (0.0, probe.si().elevation_focus))
+def errors(array: str) -> dict[str, list[float | None]]:
+    """Party to its error in the plane, elements being points in elevation, and through the slab under the lens."""
+    setup = ARRAYS[array]
+    ours = {name: error for name, _, attenuation, error in exactness(array) if not attenuation}
+    found: dict[str, list[float | None]] = {
+        "ours": [ours["ours"], None],
+        "ours, elevation": [ours["ours"], ours["ours, elevation"]],
+        "eSDIva": [esdiva(setup, 1, thick=False), None],
+        "eSDIva, elevation": [esdiva(setup, PATCHES, thick=False), esdiva(setup, PATCHES, thick=True)],
+    }
+    for name, options in {"PyMUST": FINE, "PyMUST as it comes": {}}.items():
+        found[name] = [pymust(setup, **options), None]
+        thick = {"elevation": True} | options
+        found[f"{name}, elevation"] = [pymust(setup, **thick), pymust(setup, thick=True, **thick)]
+    return found
+
+
+def esdiva(array: Array, patches: int, *, thick: bool) -> float:
+    """Relative L2 error of eSDIva's matrix."""
+    probe = (array.probe if thick else array.thin)()
+    position, amplitude = array.scatterers(FEW, thick=thick)
+    ours = FullMatrix(probe, array.far, elevation=thick)
+    frequency = ours.frequency[::EVERY]
+    theirs = Esdiva(probe, ours.sampling, patches).spectra(position, amplitude, frequency)
+    theirs = theirs * pulse_spectrum(probe, frequency)[:, None, None]
+    return likeness(exact_matrix(probe, position, amplitude, frequency, elevation=thick), theirs)["error"]
+
+
+def pymust(array: Array, *, thick: bool = False, twice: bool = False, **options: Any) -> float:
+    """Relative L2 error of PyMUST against the exact sum or that of :func:`with_delay_twice`."""
+    probe = (array.probe if thick else array.thin)()
+    position, amplitude = array.scatterers(SCATTERERS, thick=thick)
+    ours, delay = FullMatrix(probe, array.far, elevation=thick), delays(probe, (0.0, probe.si().elevation_focus))
     bins = ours.first_bin + np.arange(0, len(ours.frequency), EVERY)
     step = ours.sampling / ours.samples
-    theirs = Pymust(probe, elevation=True, **FINE).spectra(position, amplitude, delay, bins, step)
+    theirs = Pymust(probe, **options).spectra(position, amplitude, delay, bins, step)
     theirs = theirs * pulse_spectrum(probe, bins * step)[:, None]
     phase = np.exp(-2j * np.pi * np.outer(bins * step, delay))
-    exact = (with_delay_twice if twice else exact_matrix)(probe, position, amplitude, bins * step)
-    sums = np.einsum("fij,fi->fj", exact, phase)
-    name = "PyMUST, the elevation delay twice in the sum" if twice else "PyMUST"
-    return [name, "slab", 0.0, likeness(sums, theirs)["error"]]
+    exact = with_delay_twice if twice else partial(exact_matrix, elevation=thick)
+    sums = np.einsum("fij,fi->fj", exact(probe, position, amplitude, bins * step), phase)
+    return likeness(sums, theirs)["error"]

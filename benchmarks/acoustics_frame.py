@@ -27,17 +27,28 @@ def scan(array: Array, **changes: Any) -> tuple[Rf, Bmode]:
     return rf, Bmode(field_of_view_mm=1e3 * array.far)
 
 
-def frame(array: str, scatterers: int, lines: int, repeats: int) -> dict[str, Any]:
-    """Seconds of the parts of a frame of focused lines, from scatterers to uint8; medians."""
+def frame(
+    array: str, scatterers: int, repeats: int, probe: dict[str, Any] | None = None, **changes: Any
+) -> dict[str, Any]:
+    """Seconds of the parts of a frame, from scatterers to uint8; medians; `probe` and `changes` replace keys."""
     setup = ARRAYS[array]
-    rf, bmode = scan(setup, lines=lines)
-    scanner = Scanner(setup.probe(), rf, imaging_depth(rf, bmode))
+    array_, (rf, bmode) = setup.probe(**(probe or {})), scan(setup, **changes)
+    scanner = Scanner(array_, rf, imaging_depth(rf, bmode))
     channels = TransmitSynthesis(
-        scanner.matrix, setup.probe().si().frequency, TRANSMIT_SEQUENCES[rf.transmit](setup.probe(), rf, scanner.scan)
+        scanner.matrix, array_.si().frequency, TRANSMIT_SEQUENCES[rf.transmit](array_, rf, scanner.scan)
     )
     phantom = setup.scatterers(scatterers, thick=True)
     turns = [_parts(scanner, channels, phantom, bmode).seconds for _ in range(repeats + 1)][1:]
     return {"seconds": _medians(turns), "threads": numba.get_num_threads(), "size_px": bmode.size_px}
+
+
+def lines(array: str, scatterers: int, probe: dict[str, Any], **changes: Any) -> int:
+    """Image a frame as a user does, and give the number of its lines."""
+    setup = ARRAYS[array]
+    rf, bmode = scan(setup, **changes)
+    return len(
+        Scanner(setup.probe(**probe), rf, imaging_depth(rf, bmode)).lines(*setup.scatterers(scatterers, thick=True))
+    )
 
 
 def _parts(

@@ -28,6 +28,9 @@ NEPER_DB = 8.69
 WIDEST = 190.0
 """Bandwidth, %, of PyMUST's pulse where that is divided out: frequencies at which it is faint are not computed."""
 
+PATCHES = 8
+"""Parts in elevation of an element of eSDIva with its lens."""
+
 TRUNCATION = 5.0
 """Half the length of eSDIva's sampled pulse, in standard deviations of its envelope."""
 

@@ -18,9 +18,11 @@ MATRIX = ("ours", "ours, elevation", "eSDIva, matrix")
 def write(results: Result, folder: Path) -> None:
     """Write `acoustics.md` and the charts for the parts that were run."""
     sections = {
+        "scans": scans,
         "speed": speed,
         "transmits": transmits,
         "frame": frame,
+        "arrays": arrays,
         "growth": growth,
         "memory": memory,
         "floor": floor,
@@ -31,6 +33,39 @@ def write(results: Result, folder: Path) -> None:
     (folder / "acoustics.md").write_text(page("RF against PyMUST and eSDIva", remark, sections, results))
     if "growth" in results:
         acoustics_chart.growth(results["growth"], folder / "acoustics.png")
+
+
+def scans(found: Result) -> Lines:
+    """Whole frames by the scan, with the errors."""
+    names = list(found["transmits"])
+    text = [f"## A B-mode frame of {found['scatterers']} scatterers, seconds, and the error against the exact sum", ""]
+    for array, sides in ((name, found[name]) for name in found if name not in ("scatterers", "transmits")):
+        cells = []
+        for party, row in sides["seconds"].items():
+            ours = sides["seconds"]["ours, elevation" if party.endswith("elevation") else "ours"]
+            times = ["" if party.startswith("ours") else f" ({row[name] / ours[name]:.3g} x)" for name in names]
+            spent = [f"{row[name]:.3g}{ratio}" for name, ratio in zip(names, times, strict=True)]
+            wrong = ["" if error is None else f"{error:.1e}" for error in sides["errors"][party]]
+            cells.append([party, *spent, *wrong])
+        text += [*table([array, *names, "error, plane", "error, lens and slab"], cells), ""]
+    return [
+        *text,
+        "Ours are whole: RF, beamforming, 512 px image. The peers' are RF alone, of fewer scatterers, taken as often",
+        "as there are transmits and scatterers. Errors are relative L2 of the RF, after the best common factor for the",
+        "peers: in the plane of elements that are points in elevation, and under the lens. PyMUST in two dimensions",
+        "has another law of distance, and each peer a lens of its own, which is most of its error there.",
+    ]
+
+
+def arrays(found: Result) -> Lines:
+    """Frames by the number of elements."""
+    cells = [
+        [elements, f"{matrix:.2f}", f"{beamformed:.2f}", f"{peak:.0f}", f"{peak - idle:.0f}"]
+        for elements, matrix, beamformed, idle, peak in found["rows"]
+    ]
+    head = ["elements", "matrix, s", "beamforming, s", "peak resident MiB", "over that of the imported packages"]
+    title = f"## Elements of the mouse's array: {found['scatterers']} scatterers, {found['lines']} focused lines"
+    return [title, "", *table(head, cells)]
 
 
 def speed(found: Result) -> Lines:

@@ -15,15 +15,12 @@ import acoustics_exact
 import acoustics_floor
 import acoustics_frame
 from acoustics_arrays import ARRAYS, Array, Floats, delays
-from acoustics_peers import Esdiva, Pymust
+from acoustics_peers import PATCHES, Esdiva, Pymust
 from worker import Clock, serve
 
 from echotruth.imaging.rf.full_matrix import FullMatrix
 
 Run = Callable[[Floats, Floats], Any]
-
-PATCHES = 8
-"""Parts in elevation of an element of eSDIva with its lens."""
 
 ELEMENTS = 64
 PAIRED, TURNS = (20000, 60000), 5
@@ -126,7 +123,9 @@ if __name__ == "__main__":
             "versions": versions,
             "agreement": acoustics_agreement.agreement,
             "exactness": acoustics_exact.exactness,
+            "errors": acoustics_exact.errors,
             "frame": acoustics_frame.frame,
+            "lines": acoustics_frame.lines,
             "transmits": acoustics_frame.transmits,
             "floor": acoustics_floor.rates,
         }

@@ -33,7 +33,8 @@ def test_scan_of_a_preset_has_ten_scatterers_in_its_resolution_cell(name):
     probe, focus = config.probe.si(), config.rf.si().focus
     wavelength = probe.sound_speed / probe.frequency
     axial = 4 * log(2) / (pi * probe.bandwidth * probe.frequency) * probe.sound_speed / 2
-    lateral = 1.38 * wavelength * focus / (probe.elements * probe.pitch)
+    length = probe.elements * probe.pitch
+    lateral = 1.38 * wavelength * max(focus / length, config.rf.f_number)
     elevation = 0.886 * wavelength * probe.elevation_focus / probe.height
     assert config.phantom.si().density * axial * lateral * elevation > 10
 
@@ -42,7 +43,8 @@ def test_scan_of_a_preset_has_ten_scatterers_in_its_resolution_cell(name):
 def test_focal_zones_of_a_preset_lie_within_each_others_depth_of_field(name):
     config = configured(probe={"preset": name})
     probe, rf = config.probe.si(), config.rf.si()
-    depth = 7 * probe.sound_speed / probe.frequency * (rf.focus / (probe.elements * probe.pitch)) ** 2
+    f_number = max(rf.focus / (probe.elements * probe.pitch), config.rf.f_number)
+    depth = 7 * probe.sound_speed / probe.frequency * f_number**2
     assert depth / 3 < rf.focal_spacing < depth
 
 

@@ -34,6 +34,22 @@ def test_human_array_is_the_p4_2v():
     assert probe.elements == 64
 
 
+@pytest.mark.parametrize(
+    "preset, elements, frequency, length",
+    [("human_3MHz", 80, 3e6, 20.3e-3), ("mouse_linear_40MHz", 256, 40e6, 14.1e-3)],
+)
+def test_array_is_as_long_as_its_maker_says(preset, elements, frequency, length):
+    probe = Probe(preset=preset).si()
+    assert (probe.elements, probe.frequency) == (elements, frequency)
+    assert probe.elements * probe.pitch == pytest.approx(length, rel=2e-3)
+
+
+def test_lines_of_the_linear_array_are_parallel_unless_they_are_told_otherwise():
+    linear = {"probe": {"preset": "mouse_linear_40MHz"}}
+    assert (validate(linear, "a.yaml").rf.scan, validate(linear, "a.yaml").rf.f_number) == ("linear", 2)
+    assert validate(linear | {"rf": {"scan": "sector"}}, "a.yaml").rf.scan == "sector"
+
+
 def test_a_key_given_stands_on_top_of_the_preset():
     probe = Probe(preset="human_2_7MHz", elements=96)
     assert (probe.elements, probe.pitch_um) == (96, 300)
@@ -55,7 +71,9 @@ def test_band_above_the_nyquist_frequency_is_refused(keys):
 
 
 def test_unknown_array_is_refused_with_those_there_are():
-    with pytest.raises(ConfigError, match=r"probe\.preset = 'mouse': should be 'mouse_25MHz', .* or 'human_2_7MHz'"):
+    with pytest.raises(
+        ConfigError, match=r"probe\.preset = 'mouse': should be 'mouse_25MHz', .* or 'mouse_linear_40MHz'"
+    ):
         validate({"probe": {"preset": "mouse"}}, "a.yaml")
 
 

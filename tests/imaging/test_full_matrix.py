@@ -7,6 +7,7 @@ import pytest
 from benchmarks.exact_sum import exact_matrix
 from echotruth.config import Probe
 from echotruth.config.realism import Shadow
+from echotruth.imaging.rf import full_matrix
 from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
 from echotruth.imaging.rf.shadow import Rib
 
@@ -46,10 +47,31 @@ def test_in_the_plane_the_rf_is_the_exact_sum_with_directivity_and_attenuation(a
     assert error(probe, *sector(60)) < PLANE_ACCURACY
 
 
+def test_nearer_than_half_of_a_long_array_the_rf_is_the_exact_sum_too():
+    """Echoes of few elements determine those of all there too; angles differ, so that directivities fit less well."""
+    position, amplitude = sector(6, nearest=1.5e-3, farthest=2.9e-3)
+    assert error(Probe(elements=128), position, amplitude) < 10 * PLANE_ACCURACY
+
+
+def test_the_memory_of_the_spectra_of_clusters_is_bounded(monkeypatch):
+    """Expanded one after the other, the clusters give the sum that they give together."""
+    position, amplitude = sector(30)
+    matrix = FullMatrix(Probe(elements=16), DEPTH, elevation=False)
+    together = matrix(position, amplitude)
+    monkeypatch.setattr(full_matrix, "EXPANDED", 0)
+    np.testing.assert_allclose(matrix(position, amplitude), together, atol=1e-5 * np.abs(together).max())
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "preset, scale, half_angle",
-    [("mouse_30MHz", 1, 24), ("mouse_40MHz", 1, 24), ("rat_15MHz", 2, 32), ("human_2_7MHz", 12, 32)],
+    [
+        ("mouse_30MHz", 1, 24),
+        ("mouse_40MHz", 1, 24),
+        ("rat_15MHz", 2, 32),
+        ("human_2_7MHz", 12, 32),
+        ("human_3MHz", 12, 32),
+    ],
 )
 def test_other_arrays_come_as_near_to_the_exact_sum(preset, scale, half_angle):
     """Elements of 0.88 wavelengths only within 24 degrees: further out their echoes are longer than a kernel."""

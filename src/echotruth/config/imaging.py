@@ -68,7 +68,7 @@ class Rf(Section):
     `probe.preset`."""
     scan: Literal["sector", "linear"] = "sector"
     """`sector`: lines from the centre of the array at equal angles. `linear`: parallel lines perpendicular to the
-    array."""
+    array. Default: `linear` for `mouse_linear_40MHz`."""
     lines: Annotated[int, Field(ge=16, le=2048)] = 192
     """Scan lines. With the default there are five per beam width, and interpolation between them loses less than 1 % of
     the envelope."""
@@ -80,7 +80,7 @@ class Rf(Section):
     """`focused`: one focused beam per line. Otherwise plane waves, diverging waves or single elements, and each line is
     the coherent compound of all transmits."""
     transmits: Annotated[int, Field(ge=1, le=512)] = 11
-    """Plane, diverging: number of waves."""
+    """Plane, diverging: number of waves; 5, 11 and 31 are usual."""
     angle_span_deg: Annotated[FiniteFloat, Field(ge=0, le=120)] = 40.0
     """Plane, diverging: angle between the first and the last wave; a single wave is not steered."""
     virtual_source_mm: Positive | None = None
@@ -89,7 +89,8 @@ class Rf(Section):
     apodization: Literal["hann", "none"] = "hann"
     """Apodization on receive and, if focused or synthetic aperture, on transmit."""
     f_number: Annotated[FiniteFloat, Field(ge=0, le=20)] = 0.0
-    """Smallest F-number, on receive and focused transmit; 0 uses the whole array at every range."""
+    """Smallest F-number, on receive and focused transmit; 0 uses the whole array at every range. Default: 2 for
+    `mouse_linear_40MHz`."""
     elevation_beam: bool = True
     """Include scatterers off the imaging plane, with the lens's elevation beam; `false` makes the elements infinitely
     tall. The error of the RF against the exact sum (relative, L2) is 1.5 % beyond one aperture, or beyond two with the

@@ -1,4 +1,4 @@
-"""Presets of phased arrays, and of the scan, the density of scatterers and the image that suit each.
+"""Presets of arrays, and of the scan, the density of scatterers and the image that suit each.
 
 mouse_25MHz
     Pitch 0.75 wavelengths: steered by 20 degrees, the highest lobe is 36 dB below the main one. Beam and pulse (-6 dB,
@@ -15,6 +15,14 @@ rat_15MHz
 human_2_7MHz
     Frequency, bandwidth, elements and lengths of the cardiac phased array P4-2v, as the simulator PyMUST gives them
     (Garcia, Comput Methods Programs Biomed 218 (2022) 106726).
+human_3MHz
+    Elements, length (20.3 mm) and the middle of the band (1 to 5 MHz) of the cardiac phased array S5-1, as its maker
+    (Philips) gives them. The pitch follows, and is half a wavelength. Bandwidth, height and elevation focus are our
+    choice.
+mouse_linear_40MHz
+    Elements, centre frequency and length (14.1 mm) of the linear array MS550D for mice, as its maker (FUJIFILM
+    VisualSonics) gives them. The pitch follows; it is 1.4 wavelengths, so that lines are not steered, and an F-number
+    of two keeps the elements that see a point far from their axis out of its line.
 
 Element width and height and elevation focus of the arrays for rodents are our choice; a bandwidth of one half is usual
 at these frequencies.
@@ -45,7 +53,11 @@ _ARRAYS = {
     "mouse_40MHz": (64, 40.0, 0.5, 38.0, 34.0, 1.0, 6.5, 9500.0, 6.5, 5, 1.0, 64.0, 12.0),
     "rat_15MHz": (64, 15.0, 0.5, 77.0, 68.0, 1.67, 10.8, 620.0, 10.8, 5, 1.7, 64.0, 20.0),
     "human_2_7MHz": (64, 2.72, 0.74, 300.0, 250.0, 14.0, 60.0, 5.0, 70.0, 3, 25.0, 75.0, 150.0),
+    "human_3MHz": (80, 3.0, 0.8, 254.0, 224.0, 13.0, 70.0, 7.0, 70.0, 3, 21.0, 75.0, 150.0),
+    "mouse_linear_40MHz": (256, 40.0, 0.5, 55.0, 50.0, 1.0, 6.5, 13000.0, 6.5, 5, 0.8, 64.0, 12.0),
 }
+_LINEAR = {"mouse_linear_40MHz": {"rf.scan": "linear", "rf.f_number": 2.0}}
+"""Arrays whose lines are parallel."""
 
 
 def _columns(keys: tuple[str, ...]) -> dict[str, dict[str, Any]]:
@@ -55,7 +67,7 @@ def _columns(keys: tuple[str, ...]) -> dict[str, dict[str, Any]]:
 
 ARRAY_PRESETS = _columns(_PROBE)
 """Name of an array -> values of the section `probe`."""
-ARRAY_DEFAULTS = _columns(_SCAN)
+ARRAY_DEFAULTS = {name: values | _LINEAR.get(name, {}) for name, values in _columns(_SCAN).items()}
 """Name of an array -> default of dotted keys."""
 if TYPE_CHECKING:
     ArrayName = str

@@ -73,9 +73,14 @@ class Sequence:
         """
         acquire, frames, lines = self.acquisition(scatterers), len(self._heart.displacement), []
         for frame in range(frames):
-            matrix = acquire(frame)
-            if recorder:
-                recorder.add(frame, matrix)
-            lines.append(self.scanner.beamform(matrix))
+            # The matrix has no name here, so that its memory is free for beamforming.
+            lines.append(self.scanner.beamform(_recorded(acquire(frame), frame, recorder)))
             logger.info("frame %d of %d", frame + 1, frames)
         return np.stack(lines)
+
+
+def _recorded(matrix: NDArray[np.complex64], frame: int, recorder: RfRecorder | None) -> NDArray[np.complex64]:
+    """The full matrix of a frame, once a recorder has it too."""
+    if recorder:
+        recorder.add(frame, matrix)
+    return matrix

@@ -197,4 +197,5 @@ def _compressor(array: Array) -> BloscCodec | ZstdCodec:
     if array.dtype in ("string", "bool", "uint8"):
         return ZstdCodec(level=3)
     # In one block the bytes of a whole chunk are side by side, which takes 4 % less than blocks of Blosc's own choice.
-    return BloscCodec(cname="zstd", clevel=5, shuffle="shuffle", blocksize=2**21)
+    # Level 5 takes 7 % less than level 2, and five times as long.
+    return BloscCodec(cname="zstd", clevel=2, shuffle="shuffle", blocksize=2**21)

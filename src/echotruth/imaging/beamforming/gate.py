@@ -21,6 +21,8 @@ TAPER_SAMPLES = 36
 """Samples over which a gate falls off at either end."""
 SHARPNESS = 9.0
 """Sharpness of the window whose integral is the taper (see :func:`~echotruth.imaging.rf.kernel.window`)."""
+ELEMENTS = 16
+"""Elements of which the echoes to all others are transformed at a time."""
 BAND_MARGIN = 0.08
 """Width of the spectrum of a gate that is kept beyond the band at either end, over the sampling rate; the error is then
 below 1e-5, for echoes that fill their band, too."""
@@ -48,9 +50,17 @@ class Sampling:
 
     def to_time(self, matrix: np.ndarray) -> np.ndarray:
         """Echoes of all pairs (samples, elements, elements), complex64, of a matrix (bins, elements, elements)."""
-        spectra = np.zeros((self.samples, *matrix.shape[1:]), np.complex64)
-        spectra[self.bins] = matrix * np.float32(self.scale)
-        return fft.ifft(spectra, axis=0, overwrite_x=True, workers=numba.get_num_threads())
+        echoes = np.empty((self.samples, *matrix.shape[1:]), np.complex64)
+        for some in _elements(matrix):
+            spectra = np.zeros((self.samples, *matrix[0, some].shape), np.complex64)
+            spectra[self.bins] = matrix[:, some] * np.float32(self.scale)
+            echoes[:, some] = fft.ifft(spectra, axis=0, overwrite_x=True, workers=numba.get_num_threads())
+        return echoes
+
+
+def _elements(echoes: np.ndarray) -> list[slice]:
+    """Elements (the second axis) whose echoes are transformed at a time, so that little memory is taken beside."""
+    return [slice(first, first + ELEMENTS) for first in range(0, echoes.shape[1], ELEMENTS)]
 
 
 class Gate:
@@ -94,9 +104,12 @@ class Gate:
 
     def spectra(self, echoes: np.ndarray) -> np.ndarray:
         """Spectra (bins, elements, elements) of the gate, of the echoes in time (samples, elements, elements)."""
-        gated = echoes[self._indices]
-        gated *= self._taper
-        return fft.fft(gated, axis=0, overwrite_x=True, workers=numba.get_num_threads())[self.bins]
+        spectra = np.empty((len(self.bins), *echoes.shape[1:]), np.complex64)
+        for some in _elements(echoes):
+            gated = echoes[:, some][self._indices]
+            gated *= self._taper
+            spectra[:, some] = fft.fft(gated, axis=0, overwrite_x=True, workers=numba.get_num_threads())[self.bins]
+        return spectra
 
 
 def echo_time_range(probe: Probe, zone: Zone, range_: np.ndarray, points: tuple) -> tuple[float, float]:

@@ -100,10 +100,11 @@ class Scanner:
     def beamform(self, matrix: np.ndarray) -> np.ndarray:
         """Lines (lines, ranges) of one frame, as :meth:`lines`, of its full matrix (bins, elements, elements)."""
         lines = np.zeros((len(self._over_lines.samples), len(self._carrier)), np.complex64)
-        gated = any(beamformer.synthesis.gate for beamformer in self._zones)
-        echoes = self._sampling.to_time(matrix) if gated else matrix
-        for beamformer in self._zones:
-            gate = beamformer.synthesis.gate
+        gates = [beamformer.synthesis.gate for beamformer in self._zones]
+        echoes = self._sampling.to_time(matrix) if any(gates) else matrix
+        # That of a long array takes hundreds of MB, which are free for the gates unless a caller keeps it.
+        matrix = np.empty(0) if all(gates) else matrix
+        for gate, beamformer in zip(gates, self._zones, strict=True):
             lines[:, beamformer.zone.samples] += beamformer(gate.spectra(echoes) if gate else matrix)
         lines *= self._carrier
         return self._over_range(self._over_lines(lines).T.copy()).T.copy()

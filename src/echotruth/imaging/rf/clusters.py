@@ -31,6 +31,8 @@ every scatterer."""
 ELONGATION = 2.0
 """Depth of a cluster in 1/range, in its width over half the array: at the ends of the array, delays then change as much
 over its depth as over its width."""
+NEAREST = 4.0
+"""Half the array over the least range of a cluster; nearer, amplitudes too change much from element to element."""
 EXTRA_ELEMENTS = 4
 """Skeleton elements in addition to those that the tolerance requires; their errors average out."""
 RIDGE = 4.0
@@ -92,8 +94,8 @@ class Clusters:
             size * half_aperture / wavelength,
         )
         self._min_curvature = 1 / max_range
-        # Nearer than half an array every element is its own skeleton.
-        self._rows = int(np.ceil((1 / half_aperture - self._min_curvature) / self._step[1]))
+        # Nearer than that every element is its own skeleton.
+        self._rows = int(np.ceil((NEAREST / half_aperture - self._min_curvature) / self._step[1]))
         self._sectors = int(np.ceil(2 / size))
         self._clusters: dict[int, Cluster] = {}
 
@@ -167,45 +169,35 @@ def _decomposition(echoes: Floats, tolerance: float) -> tuple[NDArray[np.int64],
     return rows, linalg.solve(product[np.ix_(rows, rows)] + ridge, product[rows], assume_a="pos")
 
 
-class Expansion:
-    """Expands the echoes between the skeleton elements of some clusters to all pairs of elements.
+def add_expanded(
+    matrix: NDArray[np.complex64], clusters: list[Cluster], frequency: Floats, spectra: NDArray[np.complex64]
+) -> None:
+    """Add the echoes of all pairs of elements, from those between the skeleton elements of some clusters.
 
     Parameters
     ----------
+    matrix : ndarray of shape (bins, elements, elements), complex64
+        Added to.
     clusters : list of Cluster
     frequency : ndarray of shape (bins,), Hz
+    spectra : ndarray of shape (bins, pairs), complex64
+        Spectra of the pairs of skeleton elements, cluster by cluster.
     """
-
-    def __init__(self, clusters: list[Cluster], frequency: Floats) -> None:
-        sizes = [padded(len(cluster.skeleton), HEIGHT) for cluster in clusters]
-        self._elements = len(clusters[0].delay)
-        self._first = np.concatenate([[0], np.cumsum(sizes)])
-        self._weights = np.zeros((self._first[-1], padded(self._elements) + ROW_PADDING), np.float32)
-        self._skeleton = np.full(self._first[-1], -1)
-        for first, cluster in zip(self._first, clusters, strict=False):
-            rows = slice(first, first + len(cluster.skeleton))
-            self._weights[rows, : self._elements], self._skeleton[rows] = cluster.weights, cluster.skeleton
-        phase = -2 * np.pi * np.multiply.outer(frequency, np.stack([cluster.delay for cluster in clusters]))
-        self._phasor = np.zeros((len(frequency), len(clusters), 2, padded(self._elements)), np.float32)
-        self._phasor[..., : self._elements] = np.stack([np.cos(phase), np.sin(phase)], axis=2)
-
-    def __call__(self, spectra: NDArray[np.complex64]) -> NDArray[np.complex64]:
-        """Spectra of the echoes of all pairs (bins, elements, elements).
-
-        Parameters
-        ----------
-        spectra : ndarray of shape (bins, pairs), complex64
-            Spectra of the pairs of skeleton elements, cluster by cluster.
-        """
-        matrix = np.empty((len(spectra), self._elements, self._elements), np.complex64)
-        loop = partial(expand, spectra, self._first, self._skeleton, self._weights, self._phasor, matrix)
-        share(loop, len(spectra))
-        return matrix
+    first = np.cumsum([0] + [padded(len(cluster.skeleton), HEIGHT) for cluster in clusters])
+    elements, skeleton = matrix.shape[1], np.full(first[-1], -1)
+    weights = np.zeros((first[-1], padded(elements) + ROW_PADDING), np.float32)
+    for start, cluster in zip(first, clusters, strict=False):
+        rows = slice(start, start + len(cluster.skeleton))
+        weights[rows, :elements], skeleton[rows] = cluster.weights, cluster.skeleton
+    phase = -2 * np.pi * np.multiply.outer(frequency, np.stack([cluster.delay for cluster in clusters]))
+    phasor = np.zeros((len(frequency), len(clusters), 2, padded(elements)), np.float32)
+    phasor[..., :elements] = np.stack([np.cos(phase), np.sin(phase)], axis=2)
+    share(partial(expand, spectra, first, skeleton, weights, phasor, matrix), len(spectra))
 
 
 @numba.njit(nogil=True, cache=True)
 def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
-    """Write the echoes of all pairs of elements, summed over clusters.
+    """Add the echoes of all pairs of elements, summed over clusters.
 
     A cluster of skeleton echoes M, weights W and phasors z = exp(-2 pi i f delay) adds diag(z) W^T M' W diag(z), with
     M' = M without the delays.
@@ -224,9 +216,9 @@ def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
         Real and imaginary part of z for each cluster, shape (bins, clusters, 2, width), float32; as many columns as
         elements or more.
     matrix
-        Written: shape (bins, elements, elements), complex64.
+        Added to: shape (bins, elements, elements), complex64.
     bins
-        First bin to be written, and the one after the last.
+        First bin to be added to, and the one after the last.
     """
     width, count = phasor.shape[3], matrix.shape[1]
     echoes = np.empty((2, width, width), np.float32)
@@ -243,7 +235,7 @@ def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
             add_delayed(echoes, c, s, total)
         for i in range(count):
             for j in range(i, count):
-                matrix[f, i, j] = complex(total[0, i, j], total[1, i, j])
+                matrix[f, i, j] += np.complex64(complex(total[0, i, j], total[1, i, j]))
                 matrix[f, j, i] = matrix[f, i, j]
 
 

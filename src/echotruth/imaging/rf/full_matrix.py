@@ -12,7 +12,7 @@ each exponent by a filter that contains the power of the frequency. By reciproci
 are computed, and of those only the ones between a few elements, from which all others follow for scatterers that are
 close together (:mod:`~echotruth.imaging.rf.clusters`).
 
-With n elements the memory is 8 n^2 bytes a frequency of the matrix, about as much again while it is made, and a few MB
+With n elements the memory is 8 n^2 bytes a frequency of the matrix, some 500 MB while it is made at most, and a few MB
 for tables: 50 MB for the default array, however many scatterers there are.
 """
 
@@ -28,7 +28,7 @@ from scipy import fft
 from echotruth.config import Probe
 from echotruth.imaging.rf import directivity, kernel, spreading
 from echotruth.imaging.rf.attenuation import separable_damping
-from echotruth.imaging.rf.clusters import Clusters, Expansion
+from echotruth.imaging.rf.clusters import Clusters, add_expanded
 from echotruth.imaging.rf.elevation import MAX_BLOCKS, Lens, subaperture_bounds
 from echotruth.imaging.rf.kernel import NODES, TAPS, Band, Grid, stack_real_imaginary
 from echotruth.imaging.rf.lens_kernels import group_blocks, lens_kernels
@@ -53,6 +53,8 @@ MAX_NARROW_WIDTH = 0.75
 MAX_BAND, SHARPNESS = (0.32, 0.41), (20.0, 15.0)
 """Greatest frequency of the pulse over the sampling frequency of the grid, and sharpness of the window: without and
 with the lens."""
+EXPANDED = 1 << 28
+"""Bytes of the spectra of clusters from which on they are expanded, so that memory does not grow with the clusters."""
 CLUSTER_TOLERANCE = (1e-6, 1e-3)
 """Relative error of the cluster interpolation, without and with the lens; negligible beside the other errors."""
 
@@ -246,15 +248,16 @@ class FullMatrix:
         position, amplitude = position[inside], amplitude[inside].astype(np.float32)
         powers = np.broadcast_to(exponent, inside.shape)[inside]
         numbers = self._clusters.numbers(position)
+        matrix = np.zeros((len(self.frequency), *[len(self.centres)] * 2), np.complex64)
         clusters, spectra = [], []
         for number in np.unique(numbers):
             own, cluster = numbers == number, self._clusters[number]
             clusters.append(cluster)
-            scatterers = position[own], amplitude[own], powers[own]
-            spectra.append(self._skeleton_spectra(cluster.skeleton, *scatterers))
-        if not clusters:
-            return np.zeros((len(self.frequency), *[len(self.centres)] * 2), np.complex64)
-        return Expansion(clusters, self.frequency)(np.concatenate(spectra, axis=1))
+            spectra.append(self._skeleton_spectra(cluster.skeleton, position[own], amplitude[own], powers[own]))
+            if sum(each.nbytes for each in spectra) > EXPANDED or number == numbers.max():
+                add_expanded(matrix, clusters, self.frequency, np.concatenate(spectra, axis=1))
+                clusters, spectra = [], []
+        return matrix
 
     def _skeleton_spectra(
         self, elements: np.ndarray, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray

@@ -17,8 +17,9 @@ from echotruth.mechanics.solver.active_stress import active_stress
 PASSIVE, ACTIVE, VOLUMETRIC, TOTAL = range(4)
 """Parts: for a stiffness, an active tension and a pressure of one, and the total."""
 
-COMPILED: dict[str, Any] = {"cache": True, "error_model": "numpy"}
-"""Options of the compiled functions. No contraction to FMA: code from the cache would be contracted differently."""
+COMPILED: dict[str, Any] = {"cache": True, "error_model": "numpy", "forceinline": True}
+"""Options of the compiled functions. No contraction to FMA: code from the cache would be contracted differently.
+Inlined, because a call counts the references to each array passed to it, which takes as long as the arithmetic."""
 
 
 class Point(NamedTuple):
