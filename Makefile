@@ -6,7 +6,7 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo benchmark test test-all test-integration docs reference validation lock clean
+.PHONY: demo benchmark test test-all test-integration docs reference sample validation lock clean
 
 demo: .venv/ready
 	$(BIN)/echotruth run config/demo.yaml
@@ -50,6 +50,17 @@ docs: .venv-integration/ready  ## the site, in out/site
 
 reference: .venv/ready  ## generated pages: schema and tables
 	$(BIN)/python docs/reference.py
+
+# A merge takes over what the ledger vouches for, and compares every file with it; logs, scratch files and leases stay behind.
+SAMPLE := src/echotruth/shipped/sample
+sample: .venv/ready config/sample.yaml  ## the repository that comes with the package
+	rm -rf out/sample out/shipped
+	$(BIN)/echotruth run config/sample.yaml
+	$(BIN)/echotruth merge out/shipped/sample out/sample
+	rm -rf out/shipped/sample/.??* $(SAMPLE)
+	mkdir -p $(dir $(SAMPLE))
+	mv out/shipped/sample $(SAMPLE)
+	$(BIN)/echotruth check $(SAMPLE)
 
 validation: .venv/ready  ## docs/validation.md; takes half an hour on one core
 	$(BIN)/echotruth validate

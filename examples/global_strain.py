@@ -1,5 +1,6 @@
 """Read a repository: mean longitudinal strain of the wall and ejection fraction of every heart in it.
 
+python examples/global_strain.py            # of the hearts that come with the package
 python examples/global_strain.py out/demo
 """
 
@@ -7,7 +8,7 @@ import sys
 
 import echotruth as et
 
-tree = et.Repository(sys.argv[1] if len(sys.argv) > 1 else "out/demo").tree
+tree = et.Repository(sys.argv[1] if len(sys.argv) > 1 else "sample").tree
 measures = et.unpack(tree["physiology"].to_dataset(), "longitudinal_strain", "ejection_fraction")
 table = measures.to_dataframe()
 print((100 * table).round(1).to_string())

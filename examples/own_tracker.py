@@ -1,19 +1,10 @@
-"""Score two trackers on a body that is shifted: one of echotruth, and a function of one's own."""
+"""Score two trackers on a heart that comes with the package: one of echotruth, and a function of one's own."""
 
 import numpy as np
 
 import echotruth as et
 
-heart = et.beat(
-    {
-        "geometry": {"shape": "tube", "endo_length_mm": 3, "base_mm": 1, "circumferential_elements": 24,
-                     "longitudinal_elements": 4, "transmural_elements": 2},
-        "motion": {"kind": "rigid", "rigid": {"lateral_um": 60.0, "axial_um": 40.0}},
-        "loop": {"frames": 4},
-        "bmode": {"size_px": 256, "downsampling": (1,)},
-    }
-)  # fmt: skip
-clip = et.image(heart, "mid")
+heart, clip = et.sample().heart("healthy"), et.sample().clip("healthy", "long_axis")
 
 
 def at_rest(frames, points, mask, spacing, frame_time, seed):

@@ -54,6 +54,12 @@ def test_tracker_finds_the_motion_that_one_at_rest_misses():
     assert dis < 25
 
 
+def test_example_of_a_repository_shows_that_an_infarct_lowers_strain_and_ejection_fraction(monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["global_strain.py"])
+    healthy, infarct = run("global_strain")["table"].to_numpy()
+    assert (np.abs(healthy) > np.abs(infarct)).all()
+
+
 def test_example_of_a_repository_says_how_to_get_one(monkeypatch):
     monkeypatch.setattr(sys, "argv", ["global_strain.py", "out/none"])
     with pytest.raises(FileNotFoundError, match="give the folder that a run made"):

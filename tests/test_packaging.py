@@ -49,13 +49,16 @@ def test_wheel_made_from_the_sdist_has_every_file_of_the_package(wheel):
     assert files(ROOT / "src/echotruth") - files(wheel / "echotruth") == set()
 
 
-def test_sdist_has_tests_and_docs_and_no_data(sdist):
+def test_sdist_has_tests_and_docs_and_no_data_but_the_sample(sdist):
     found = files(sdist)
     assert {"LICENSE", "README.md", "CITATION.cff", "requirements.lock", "docs/schema.md", "config/demo.yaml"} <= found
     assert files(ROOT / "tests") <= {name.removeprefix("tests/") for name in found if name.startswith("tests/")}
     assert {name.split("/")[0] for name in found if name.startswith(".")} <= {".ci", ".gitignore"}
-    assert not [name for name in found if name.startswith("out/") or ".zarr/" in name]
-    assert sum((sdist / name).stat().st_size for name in found) < 20e6
+    others = [
+        name for name in found if not name.startswith("src/echotruth/shipped/sample/")
+    ]  # it has a bound of its own
+    assert not [name for name in others if name.startswith("out/") or ".zarr/" in name]
+    assert sum((sdist / name).stat().st_size for name in others) < 20e6
 
 
 def run(wheel: Path, folder: Path, *arguments: str) -> str:
@@ -70,6 +73,13 @@ def run(wheel: Path, folder: Path, *arguments: str) -> str:
 def test_command_works_from_the_wheel_in_an_empty_folder(wheel, tmp_path):
     (tmp_path / "mine.yaml").write_text("name: mine\n")
     assert "mine.yaml: valid" in run(wheel, tmp_path, "check", "mine.yaml")
+
+
+def test_sample_is_read_from_the_wheel(wheel, tmp_path):
+    output = run(wheel, tmp_path, "info", "sample")
+    assert str(wheel / "echotruth/shipped/sample") in output and "2 complete" in output
+    assert "no faults" in run(wheel, tmp_path, "check", "sample", "--quick")
+    assert not any(tmp_path.iterdir())
 
 
 def test_shipped_configurations_are_found_in_the_wheel(wheel, tmp_path):

@@ -1,5 +1,6 @@
 """PyTorch data sets hold the items of the sequences, in any number of workers; without PyTorch a sentence says so."""
 
+import doctest
 import subprocess
 import sys
 
@@ -31,6 +32,10 @@ def et_torch():
 def repository(tmp_path_factory):
     pytest.importorskip("torch")
     return made(tmp_path_factory.mktemp("torch") / "small")
+
+
+def test_example_of_the_module_runs_on_the_repository_that_is_shipped(et_torch):
+    assert doctest.testmod(et_torch).failed == 0
 
 
 KINDS = ("Clips", "FlowPairs", "PointTracks", "Segmentation", "Strain", "Diagnosis")

@@ -15,8 +15,10 @@ from .imaging.rf.full_matrix import FullMatrix
 from .notebook.datasets import heart_dataset
 from .notebook.kinematics import kinematics
 from .notebook.point_tracks import point_tracks
-from .notebook.simulation import beat, evaluate, image, track
-from .repository.reader import Repository
+from .notebook.sensitivities import sensitivities
+from .notebook.simulation import beat, evaluate, image, systole, track
+from .repository.fetching import fetch
+from .repository.reader import Repository, sample
 from .repository.unpacking import unpack
 from .tracking.failure import TrackerFailed
 
@@ -39,6 +41,7 @@ __all__ = [
     "configure",
     "evaluate",
     "expand",
+    "fetch",
     "heart_dataset",
     "image",
     "kinematics",
@@ -46,8 +49,11 @@ __all__ = [
     "point_tracks",
     "read_clip",
     "read_wall",
+    "sample",
+    "sensitivities",
     "speckle_tracking",
     "strain_peaks",
+    "systole",
     "track",
     "unpack",
 ]

@@ -2,10 +2,10 @@
 
 >>> from echotruth import learning
 >>> from echotruth.torch import FlowPairs, loader
->>> parts = learning.split(learning.cases("out/demo"), {"train": 0.8, "test": 0.2})  # doctest: +SKIP
->>> batch = next(iter(loader(FlowPairs("out/demo", parts["train"], size=128), 8)))  # doctest: +SKIP
->>> batch["image"].shape, batch["flow"].shape  # doctest: +SKIP
-(torch.Size([8, 2, 128, 128]), torch.Size([8, 2, 128, 128]))
+>>> parts = learning.split(learning.cases("sample"), {"train": 0.5, "test": 0.5})
+>>> batch = next(iter(loader(FlowPairs("sample", parts["train"]), 8)))
+>>> batch["image"].shape, batch["flow"].shape
+(torch.Size([8, 2, 256, 256]), torch.Size([8, 2, 256, 256]))
 """
 
 from typing import Any

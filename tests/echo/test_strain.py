@@ -1,5 +1,7 @@
 """Strain of a recorded clip: that of a ring whose motion is known, at any scale, and what makes one doubt."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,6 +10,7 @@ from contracting_ring import ENDO, EPI, FRAMES
 import echotruth as et
 from echotruth.cli import main
 from echotruth.echo.failure import EchoError
+from echotruth.echo.wall import write_wall
 
 MIDDLE = (ENDO + EPI) / 2
 
@@ -83,6 +86,15 @@ def run(monkeypatch, capsys, *arguments):
     with pytest.raises(SystemExit) as ended:
         main()
     return ended.value.code, capsys.readouterr()
+
+
+def test_wall_drawn_in_another_part_of_the_recording_is_refused(ring, tmp_path):
+    clip, wall = clip_of(ring), ring.wall()
+    assert clip.attrs["part"] == "from frame 0, column 0 and row 0 on"
+    write_wall(tmp_path / "wall.csv", replace(wall, part="from frame 3, column 8 and row 0 on"))
+    drawn = et.read_wall(tmp_path / "wall.csv")
+    with pytest.raises(et.EchoError, match=r"drawn in the clip from frame 3, .* this clip is from frame 0, .*: give"):
+        et.speckle_tracking(clip, drawn, "dis")
 
 
 def test_command_writes_page_curves_and_table_of_a_batch(ring, tmp_path, monkeypatch, capsys):

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from echotruth.config import Rf, View
+from echotruth.aha import segment
+from echotruth.config import Config, Rf, View
+from echotruth.echo.wall import LEFT_AND_RIGHT, SEPTAL_AND_FREE
 from echotruth.imaging.view import imaging_plane
 
 ENDO = np.array([[0, 0, -6e-3], [1e-3, 0, 0], [-1e-3, 0, -1e-3]])
@@ -74,3 +76,21 @@ def test_foreshortened_long_axis_holds_the_middle_of_the_base_and_passes_the_ape
     in_front = plane.to_heart(np.array([0, apex[1], 0]))
     assert np.allclose(in_front - [0, 0, -length], length * np.sin(tilt) * plane.axes[2], atol=1e-12)
     assert (in_front - [0, 0, -length]) @ np.array(side) > 0
+
+
+def test_views_of_an_echo_show_the_segments_that_they_do_in_life():
+    """Long axes have the walls at the left and at the right that the AHA names, short axes one level each."""
+    views = Config(views={"preset": "echo"}).views
+    assert set(views) == {*LEFT_AND_RIGHT, *SEPTAL_AND_FREE}
+    levels = -6e-3 * np.array([1, 3, 5]) / 6
+    for name, sides in LEFT_AND_RIGHT.items():
+        plane, middle = imaging_plane(views[name], Rf(), ENDO), np.array([0, 0, -3e-3])
+        depth = plane.to_image(middle)[1]
+        for lateral, expected in zip((-3e-3, 3e-3), sides, strict=True):
+            wall = plane.to_heart(np.array([[lateral, depth + z - middle[2], 0] for z in levels]))
+            assert sorted(segment(wall, -6e-3)) == sorted(expected), name
+    for name, walls in SEPTAL_AND_FREE.items():
+        around = np.arange(0, 2 * np.pi, 0.1)
+        height = np.full_like(around, views[name].position * -6e-3)
+        ring = np.column_stack([3e-3 * np.cos(around), 3e-3 * np.sin(around), height])
+        assert set(segment(ring, -6e-3)) == {*walls[0], *walls[1]}

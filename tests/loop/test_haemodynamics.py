@@ -5,8 +5,8 @@ import pytest
 
 from echotruth.config import Loop
 from echotruth.loop.cycle import read_loop
-from echotruth.loop.haemodynamics import intervals, pressure_rates
-from echotruth.loop.phases import phases
+from echotruth.loop.haemodynamics import filling_ratio, intervals, pressure_rates
+from echotruth.loop.phases import EJECTION, FILLING, phases
 
 PERIOD = 0.12
 KNOWN = [(8.2, 55.3, 16.1), (9.5, 49.0, 25.5), (6.0, 60.0, 12.0), (10.9, 45.7, 13.3)]
@@ -110,3 +110,21 @@ def test_shipped_loops_have_the_times_and_rates_that_they_state(name, known, dpd
     np.testing.assert_allclose(np.array(found) * 1e3, known, atol=frame / 3)
     assert rates.dpdt_max / 133.322 == pytest.approx(dpdt_mmHg_per_s, rel=0.02)
     assert rates.tau * 1e3 == pytest.approx(tau_ms, rel=0.03)
+
+
+@pytest.mark.parametrize(("ratio", "apart"), [(1.6, 0.26), (0.7, 0.26), (1.2, 0.2)])
+def test_two_waves_of_filling_have_the_ratio_of_their_heights(ratio, apart):
+    time = np.arange(60) / 60
+    waves = [height * np.exp(-(((time - centre) / 0.06) ** 2)) for height, centre in ((ratio, 0.62), (1, 0.62 + apart))]
+    ejection = np.exp(-(((time - 0.2) / 0.06) ** 2))
+    rate = sum(waves) - ejection * sum(waves).sum() / ejection.sum()
+    phase = np.where(time > 0.42, FILLING, EJECTION)
+    assert filling_ratio(time, 1 + np.cumsum(rate) / 60, phase) == pytest.approx(ratio, rel=0.05)
+
+
+def test_fused_waves_of_filling_and_few_frames_have_no_ratio():
+    time, frames = np.arange(60) / 60, slice(None, None, 12)
+    wave = np.exp(-(((time - 0.7) / 0.1) ** 2))
+    volume, phase = 1 + np.cumsum(wave - wave.mean()) / 60, np.where(time > 0.45, FILLING, EJECTION)
+    assert np.isnan(filling_ratio(time, volume, phase))
+    assert np.isnan(filling_ratio(time[frames], volume[frames], phase[frames]))

@@ -1,10 +1,11 @@
-"""Disease is where it was asked for, of the size asked for, and fades as asked for."""
+"""Disease is where it was asked for, of the size asked for, and fades as asked for; so do regional factors."""
 
 import numpy as np
 import pytest
 
 from echotruth.config import Geometry, Pathology
 from echotruth.config.pathology import Infarct, LateActivation
+from echotruth.config.regional import Regional
 from echotruth.fem.volume import cell_volumes
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.pathology import PathologyError, infarct_centre, tissue
@@ -25,10 +26,13 @@ class Hemisphere:
         self.centre = corners.mean(axis=1)
 
     def with_(self, **infarct):
-        return tissue(self.mesh, self.depth, Pathology(infarct=Infarct(**infarct)))
+        return self.tissue(Pathology(infarct=Infarct(**infarct)))
 
     def late(self, **late):
-        return tissue(self.mesh, self.depth, Pathology(late_activation=LateActivation(**late)))
+        return self.tissue(Pathology(late_activation=LateActivation(**late)))
+
+    def tissue(self, pathology=Pathology(), **regional):  # noqa: B008, a default section does not change
+        return tissue(self.mesh, self.depth, pathology, Regional(**regional))
 
 
 @pytest.fixture(scope="module")
@@ -122,11 +126,25 @@ def test_left_bundle_branch_block_goes_from_the_septum_to_the_lateral_wall(hemis
     assert not late.activation_delay[above & (azimuth < 28)].any()
 
 
+def test_regional_factors_are_those_of_the_middles_of_segments_and_multiply_those_of_a_scar(hemisphere):
+    healthy = hemisphere.tissue(contractility={"10": 0.5}, stiffness={10: 3.0})
+    azimuth = np.degrees(np.arctan2(hemisphere.centre[:, 1], hemisphere.centre[:, 0]))
+    third = -hemisphere.centre[:, 2] / (2e-3 / 3)
+    inside = (third > 1.02) & (third < 1.98)
+    weight = np.clip(1 - np.abs(azimuth + 90) / 60, 0, 1)  # segment 10 is inferior, at -90 deg
+    np.testing.assert_allclose(healthy.tension_scale[inside], 1 - 0.5 * weight[inside], atol=2e-3)
+    np.testing.assert_allclose(healthy.stiffness_scale[inside], 1 + 2 * weight[inside], atol=8e-3)
+    assert np.all(healthy.tension_scale[third < 0.98] == 1) and not healthy.region.any()
+    scarred = hemisphere.tissue(Pathology(infarct=Infarct(segments=[10], tension_scale=0.2)), contractility={10: 0.5})
+    infarct = scarred.region == 1
+    np.testing.assert_allclose(scarred.tension_scale[infarct], 0.2 * healthy.tension_scale[infarct])
+
+
 def test_an_infarct_goes_before_its_border_and_that_before_lateness(hemisphere):
     both = Pathology(
         infarct=Infarct(segments=[5], border_mm=0.3), late_activation=LateActivation(delay_ms={5: 9.0, 6: 9.0})
     )
-    ill = tissue(hemisphere.mesh, hemisphere.depth, both)
+    ill = hemisphere.tissue(both)
     assert set(ill.region) == {0, 1, 2, 3}
     assert ill.activation_delay[ill.region == 1].max() == pytest.approx(9e-3)
     assert np.all(ill.tension_scale[ill.region == 3] == 1)

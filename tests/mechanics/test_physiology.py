@@ -29,6 +29,7 @@ WELL = {
     "longitudinal_strain": np.array(-0.1),
     "gls": np.array(-0.17),
     "tei_index": np.array(0.42),
+    "filling_ratio": np.array(1.4),
     "ejection_fraction": np.array(0.64),
     "volume_ratio_min": np.array(0.32),
     "loop_error": np.array(1e-8),
@@ -194,7 +195,7 @@ def test_a_prescribed_motion_has_what_it_moves_by_and_no_pressures_or_phases(kin
     assert set(found) == {array.name for array in named("physiology")}
     without = {name for name, value in found.items() if np.isnan(value).any()}
     of_phases = {"twist_ivc", "strain_ivc", "layer_strain_ivc", "ivc_time", "ejection_time", "ivr_time", "tei_index"}
-    of_phases |= {"level_strain_ivc", "level_fibre_strain_ivc", "untwist_ivr"}
+    of_phases |= {"level_strain_ivc", "level_fibre_strain_ivc", "untwist_ivr", "filling_ratio"}
     of_pressures = {"dpdt_max", "dpdt_min", "tau", "ejection_fraction", "tension_min", "tension_es"}
     # Thin layers have no point, and where nothing shortens its spread is none.
     assert without == of_phases | of_pressures | {"layer_strain_es", "fibre_strain_spread"} & without
@@ -456,3 +457,26 @@ def test_a_heart_whose_fibres_make_it_lengthen_is_implausible_even_if_diseased()
     case = beat(override(Config(geometry=COARSE, loop={"frames": 10}), FREE_HEART | fibres))
     reason = violated_bound(judged(case), Physiology(), healthy=False)
     assert reason.startswith("the mean longitudinal strain at end-systole is 0.0")
+
+
+@pytest.mark.slow
+def test_the_walls_of_a_normal_heart_shorten_as_those_of_people():
+    """Lateral wall most, septum and inferior wall least; the mean as without (docs/physiology.md)."""
+    counts = {"circumferential_elements": 12, "longitudinal_elements": 8, "transmural_elements": 2}
+    found = {}
+    for preset in (None, "normal"):
+        regional = {"regional": {"preset": preset}}
+        heart = beat(Config(geometry=counts, loop={"frames": 10}, mechanics=regional))
+        shortening = heart["kinematics"]["strain"][int(heart["mechanics"]["es_frame"])][:, 1]
+        walls = {
+            "anterior": (1, 7, 13),
+            "septum": (2, 3, 8, 9, 14),
+            "inferior": (4, 10, 15),
+            "lateral": (5, 6, 11, 12, 16),
+        }
+        segment = heart["fibres"]["segment"]
+        found[preset] = np.array([shortening[np.isin(segment, numbers)].mean() for numbers in walls.values()])
+    even, normal = found[None], found["normal"]
+    assert np.ptp(even) < 0.003
+    assert normal.mean() == pytest.approx(even.mean(), abs=0.003)
+    np.testing.assert_allclose(normal / normal.mean(), [1.05, 0.91, 0.91, 1.13], atol=0.03)

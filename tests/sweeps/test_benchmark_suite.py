@@ -11,9 +11,9 @@ from echotruth.repository.settings import motions
 
 ROOT = Path(__file__).parents[2]
 SUITES = {
-    "benchmark": "echotruth-benchmark-1",
-    "benchmark_human": "echotruth-benchmark-1",
-    "benchmark_small": "echotruth-benchmark-1-small",
+    "benchmark": "echotruth-benchmark-2",
+    "benchmark_human": "echotruth-benchmark-2",
+    "benchmark_small": "echotruth-benchmark-2-small",
 }
 GROUPS = {"healthy", "infarct", "late_activation", "hypertrophy", "dilation"}
 

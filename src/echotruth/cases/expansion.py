@@ -13,13 +13,25 @@ from echotruth.cases.checks import check_condition_key, check_files, check_ids, 
 from echotruth.cases.conditions import Condition, ConditionError
 from echotruth.cases.sections import Sweep
 from echotruth.config import Config
+from echotruth.config.building import Source, configure
 from echotruth.config.loading import ConfigError
 from echotruth.config.reading import Errors
 from echotruth.config.table import LABEL
 
 
-def expand(config: Config, source: str = "configuration") -> list[Case]:
+def expand(config: Source, source: str = "configuration") -> list[Case]:
     """Cases of a configuration, in the order of the rows, then of the grid, then of the draws.
+
+    Parameters
+    ----------
+    config : Config, dict, str or Path
+        Anything that :func:`echotruth.configure` accepts.
+    source : str
+        What errors call the configuration.
+
+    Returns
+    -------
+    list of Case
 
     Raises
     ------
@@ -33,7 +45,7 @@ def expand(config: Config, source: str = "configuration") -> list[Case]:
     >>> [case.id for case in et.expand(config)]
     ['wall0.9_b94424', 'wall0.9_seed2_74e3c3', 'wall1.1_e79e50', 'wall1.1_seed2_7c0d55']
     """
-    errors = Errors()
+    config, errors = config if isinstance(config, Config) else configure(config), Errors()
     hearts = list(_hearts(config, source, errors))
     errors.raise_all(source)
     if not hearts:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echotruth.cli.command import add_configuration, named
+from echotruth.cli.command import fail, named
 
 if TYPE_CHECKING:
     from echotruth.cases import Case
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth check`."""
     text = "YAML file, a name of `echotruth new --list`, or folder of a repository, such as out/demo"
-    add_configuration(parser, text, metavar="path")
+    parser.add_argument("path", type=_path, help=f"{text}; sample is the repository of that name")
     parser.add_argument(
         "--heal",
         action="store_true",
@@ -38,22 +38,21 @@ def check(arguments: argparse.Namespace) -> int:
       echotruth check config/demo.yaml
       echotruth check out/demo
       echotruth check out/demo --heal
+      echotruth check sample
 
     exit status:
       0  nothing is wrong (jobs not run yet are no damage)
       1  the configuration is not valid, a run would refuse it, or something is damaged
       2  it cannot be checked
     """
-    if arguments.heal or Path(arguments.config).is_dir():
-        from echotruth.workflow.integrity import check_repository
-
-        return check_repository(Path(arguments.config), arguments.heal, arguments.quick)
+    if arguments.heal or Path(arguments.path).is_dir():
+        return _check_repository(Path(arguments.path), arguments.heal, arguments.quick)
     from echotruth.cli.configuration import LISTED, load_cases
 
-    config, cases = load_cases(arguments.config, f"a YAML file, {LISTED}, or the folder of a repository")
+    config, cases = load_cases(arguments.path, f"a YAML file, {LISTED}, or the folder of a repository")
     if errors := list(_of_files(cases)):
-        sys.exit(named("\n".join(f"{arguments.config}: {error}" for error in errors)))
-    print(f"{arguments.config}: valid; cases: {len(cases)}, views per case: {len(config.views)}")
+        sys.exit(named("\n".join(f"{arguments.path}: {error}" for error in errors)))
+    print(f"{arguments.path}: valid; cases: {len(cases)}, views per case: {len(config.views)}")
     from echotruth.cli.estimation import estimated, print_concerns
     from echotruth.workflow.estimate import short
 
@@ -61,6 +60,22 @@ def check(arguments: argparse.Namespace) -> int:
     print(f"A run takes {short(found)}.")
     print_concerns(concerns)
     return int(any(concern.is_absurd for concern in concerns))
+
+
+def _path(path: str) -> str:
+    """The path itself, or that of the shipped repository or configuration of this name."""
+    from echotruth.config import shipped
+
+    return shipped.found(str(shipped.repository(path)))
+
+
+def _check_repository(folder: Path, healing: bool, quick: bool) -> int:
+    from echotruth.config import shipped
+    from echotruth.workflow.integrity import check_repository
+
+    if healing and shipped.is_sample(folder):
+        return fail(f"{folder}: {shipped.NOT_WRITTEN}")
+    return check_repository(folder, healing, quick)
 
 
 def _of_files(cases: list[Case]) -> Iterator[str]:

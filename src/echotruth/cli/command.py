@@ -71,10 +71,10 @@ def add_command(commands: Commands, act: Act) -> argparse.ArgumentParser:
     return parser
 
 
-def add_configuration(parser: argparse.ArgumentParser, text: str = "", metavar: str | None = None) -> None:
+def add_configuration(parser: argparse.ArgumentParser) -> None:
     """Add the argument that is the file of a configuration, or the name of a shipped one."""
-    text = text or "YAML file, or a name of `echotruth new --list`, such as demo"
-    parser.add_argument("config", metavar=metavar, type=_configuration, help=text)
+    text = "YAML file, or a name of `echotruth new --list`, such as demo"
+    parser.add_argument("config", type=_configuration, help=text)
 
 
 def _configuration(path: str) -> str:

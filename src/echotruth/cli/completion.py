@@ -6,7 +6,7 @@ from pathlib import Path
 
 SHELLS = ("bash", "zsh")
 
-PATHS = ("config", "output", "repository", "folder")
+PATHS = ("config", "output", "path", "repository", "folder")
 """Arguments that are text and name a file or a folder."""
 
 

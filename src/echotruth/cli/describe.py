@@ -10,6 +10,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth describe`."""
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     parser.add_argument("-o", "--output", type=Path, help="folder for the documents (default: that of the repository)")
+    add_attribution(parser)
+
+
+def add_attribution(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say what is to be said of a repository beyond its content."""
     parser.add_argument("--license", help="identifier of SPDX, such as CC-BY-4.0, or an address (default: none)")
     text = "'Family, Given; ORCID; affiliation; its web address', or a group as 'Name; web address'; can be repeated"
     parser.add_argument("--author", action="append", default=[], help=text)

@@ -20,7 +20,11 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("view", str, "name of the view; can be repeated (default: all)"),
         ("size", int, "image size, px; can be repeated (default: the largest)"),
         ("tracker", str, "tracker for matlab and csv; can be repeated (default: all)"),
-        ("overlay", str, "wall, segments or displacement over mp4, gif and png; can be repeated (default: none)"),
+        (
+            "overlay",
+            str,
+            "wall, segments, displacement or scale over mp4, gif and png; can be repeated (default: none)",
+        ),
     )
     parser.add_argument("--rate", type=float, help="frames per second of mp4 and gif (default: 20)")
     parser.add_argument(

@@ -31,6 +31,7 @@ def info(arguments: argparse.Namespace) -> int:
     examples:
       echotruth info
       echotruth info out/demo
+      echotruth info sample
 
     exit status:
       0  it is printed
@@ -39,13 +40,14 @@ def info(arguments: argparse.Namespace) -> int:
     if arguments.repository is None:
         _print(_installation())
         return 0
+    from echotruth.config import shipped
     from echotruth.config.loading import ConfigError
     from echotruth.repository.ledger import repository_folder
     from echotruth.repository.reader import Repository
 
     place = arguments.repository
     try:
-        found = Repository(repository_folder(place))
+        found = Repository(repository_folder(shipped.repository(place)))
         _print(_repository(found))
     except (FileNotFoundError, ConfigError) as error:
         return fail(str(error))

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from echotruth.cli.command import fail
+
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth merge`."""
@@ -17,11 +19,15 @@ def merge(arguments: argparse.Namespace) -> int:
 
     examples:
       echotruth merge out/both out/first out/second
+      echotruth merge out/mine sample
 
     exit status:
       0  all hearts are taken over
       2  they cannot be merged
     """
+    from echotruth.config import shipped
     from echotruth.workflow.merging import merge_repositories
 
-    return merge_repositories(arguments.into, arguments.sources)
+    if shipped.is_sample(arguments.into):
+        return fail(f"{arguments.into}: {shipped.NOT_WRITTEN}")
+    return merge_repositories(arguments.into, [Path(shipped.repository(source)) for source in arguments.sources])

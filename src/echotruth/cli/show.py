@@ -7,7 +7,7 @@ from echotruth.cli.command import fail
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth show`."""
-    parser.add_argument("repository", help="folder of the repository, such as out/demo, or s3://BUCKET/FOLDER")
+    parser.add_argument("repository", help="folder of the repository, such as out/demo, s3://BUCKET/FOLDER, or sample")
     parser.add_argument("--port", type=int, default=0, help="port of the page (default: any that is free)")
     parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
 
@@ -19,6 +19,7 @@ def show(arguments: argparse.Namespace) -> int:
     Only this machine can open the page; Ctrl-C ends it.
 
     examples:
+      echotruth show sample
       echotruth show out/demo
       echotruth show out/demo --port 5006 --no-browser
 

@@ -64,8 +64,10 @@ def status(arguments: argparse.Namespace) -> int:
 
 
 def _found(path: Path) -> Status:
+    from echotruth.config import shipped
     from echotruth.workflow.status import status_before, status_of
 
+    path = Path(shipped.repository(path))
     if path.suffix not in (".yaml", ".yml") or not path.is_file():
         return status_of(path.parent if path.suffix == ".zarr" else path)
     from echotruth.cli.configuration import load_cases

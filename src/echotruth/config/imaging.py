@@ -4,7 +4,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat
 
-from echotruth.section import Fraction, Positive, Section, check, invalid
+from echotruth.config.limits import MAX_VIEWS
+from echotruth.section import Fraction, Name, Positive, Section, check, invalid
 
 
 class View(Section):
@@ -153,11 +154,47 @@ class Bmode(Section):
             raise invalid("downsampling", list(self.downsampling), "entries must differ")
 
 
-def standard_views() -> dict[str, View]:
-    """Three short-axis planes and a long-axis plane, as in the paper."""
-    return {
+VIEWS: dict[str, dict[str, View]] = {
+    "paper": {
         "base": View(position=0.2),
         "mid": View(position=0.5),
         "apex": View(position=0.8),
         "long_axis": View(plane="long_axis"),
-    }
+    },
+    "echo": {
+        "basal": View(position=0.25),
+        "mid": View(position=0.5),
+        "apical": View(position=0.8),
+        "four_chamber": View(plane="long_axis", rotation_deg=-30),
+        "two_chamber": View(plane="long_axis", rotation_deg=-90),
+        "three_chamber": View(plane="long_axis", rotation_deg=-150),
+    },
+}
+"""Views of each `views.preset`: the paper's, and those of an echo, whose long axes go through the middles of AHA
+segments in the usual display - the inferoseptal, the inferior and the inferolateral wall at the left - so that together
+they show all of a bullseye. The basal plane is low enough for the base not to pass it as it descends."""
+
+
+def named_views(value: Any) -> Any:
+    """Views of a section `views`, in which those of its `preset`, if it has one, are named."""
+    preset = value.get("preset") if isinstance(value, dict) else None
+    if not isinstance(preset, str):
+        return value
+    if preset not in VIEWS:
+        raise invalid("preset", preset, f"must be one of {', '.join(VIEWS)}")
+    return VIEWS[preset] | {name: view for name, view in value.items() if name != "preset"}
+
+
+def _with_preset(schema: dict[str, Any]) -> None:
+    """Let editors know the key `preset`, which is no view."""
+    planes = schema.pop("patternProperties")
+    schema["patternProperties"] = {f"^(?!preset$){name.lstrip('^')}": plane for name, plane in planes.items()}
+    schema["properties"] = {"preset": {"enum": list(VIEWS)}}
+
+
+Views = Annotated[
+    dict[Name, View],
+    Field(min_length=1, max_length=MAX_VIEWS, json_schema_extra=_with_preset),
+    BeforeValidator(named_views),
+]
+"""Imaging planes by name, or a preset of them."""

@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
+from echotruth.config.regional import Regional
 from echotruth.materials import DEFAULT, LAWS, AnyLaw
 from echotruth.section import Fraction, Section
 
@@ -63,6 +64,8 @@ class Mechanics(Section):
     """Passive law of the wall."""
     active: Active = Active()
     """Active stress of the wall."""
+    regional: Regional = Regional()
+    """Muscle that differs from segment to segment, of a healthy heart too, unlike `pathology`."""
     bulk_modulus_kPa: Annotated[FiniteFloat, Field(ge=100)] = 20_000.0
     """Penalty on volume change of each element; at 2000 kPa the wall loses 1 % of its volume in systole."""
     pointwise_bulk_ratio: Annotated[FiniteFloat, Field(ge=0, le=1000)] = 300.0

@@ -1,18 +1,12 @@
 """Section `pathology`: infarct and late activation."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, FiniteFloat
+from pydantic import Field, FiniteFloat
 
+from echotruth.config.regional import Segment, SegmentKey
 from echotruth.section import Fraction, Positive, Section, check, invalid
 
-
-def _integer(key: Any) -> Any:
-    """Convert a key that is text to a number: JSON has only text as keys."""
-    return int(key) if isinstance(key, str) and key.isdecimal() else key
-
-
-Segment = Annotated[int, Field(ge=1, le=17)]
 Delay = Annotated[FiniteFloat, Field(ge=0, le=1000)]
 
 
@@ -52,7 +46,7 @@ class LateActivation(Section):
     """`lbbb`: left bundle branch block of a mouse; the lateral wall is 8 ms late, anterior and inferior wall 4 ms. Let
     it beat with `loop.kind: circulation`: to follow a healthy heart's loop the tension of what is early may have to
     oscillate from frame to frame, which marks the heart as implausible (`physiology.tension_variation_max`)."""
-    delay_ms: dict[Annotated[Segment, BeforeValidator(_integer)], Delay] = Field(default_factory=dict)
+    delay_ms: dict[SegmentKey, Delay] = Field(default_factory=dict)
     """Delay of the middle of each AHA segment, instead of a preset; other segments have none, and between the middles
     of the segments of a level it changes linearly."""
     scale: Annotated[FiniteFloat, Field(ge=0, le=100)] = 1.0

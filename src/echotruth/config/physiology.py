@@ -104,6 +104,12 @@ class Physiology(Section):
     10.1007/s00392-023-02269-2)."""
     tei_index_max: Annotated[FiniteFloat, Field(ge=0)] | None = 0.8
     """Largest Tei index; 0.7 in mice and rats after an infarction (the same studies)."""
+    filling_ratio_min: Annotated[FiniteFloat, Field(ge=0)] | None = 0.7
+    """Smallest ratio of early filling to that by the atrium, E/A, of the rates of volume; that of velocities is 0.8 to
+    2 in people whose relaxation is healthy (Nagueh 2016, J Am Soc Echocardiogr 29, 277). Hearts whose waves are fused
+    have none."""
+    filling_ratio_max: Annotated[FiniteFloat, Field(ge=0)] | None = 3.0
+    """Largest ratio E/A."""
 
     @check
     def _check_order(self) -> None:

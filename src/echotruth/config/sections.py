@@ -9,8 +9,7 @@ from echotruth.config.cases import Cases
 from echotruth.config.defaults import apply_presets
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
-from echotruth.config.imaging import ALL_VIEWS, Bmode, Phantom, Rf, View, standard_views
-from echotruth.config.limits import MAX_VIEWS
+from echotruth.config.imaging import ALL_VIEWS, VIEWS, Bmode, Phantom, Rf, Views
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
 from echotruth.config.motion import Motion
@@ -19,7 +18,7 @@ from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
 from echotruth.config.realism import Realism
 from echotruth.config.tracking import PhaseCorrelation, Tracking
-from echotruth.section import Name, Section, check, invalid
+from echotruth.section import Section, check, invalid
 
 _TRACKER_LENGTHS = ("window_mm", "windows_mm", "subset_mm", "knots_mm")
 """Keys of trackers that must not exceed the image."""
@@ -39,10 +38,9 @@ class Config(Section):
     mechanics: Mechanics = Mechanics()
     motion: Motion = Motion()
     physiology: Physiology = Physiology()
-    views: Annotated[dict[Name, View], Field(min_length=1, max_length=MAX_VIEWS)] = Field(
-        default_factory=standard_views
-    )
-    """Imaging planes by name."""
+    views: Views = Field(default_factory=lambda: dict(VIEWS["paper"]))
+    """Imaging planes by name, or `preset: echo`: four-, two- and three-chamber view and three short axes; planes beside
+    a preset are added to it. Default: the preset `paper`, three short axes and a long axis."""
     phantom: Phantom = Phantom()
     probe: Probe = Probe()
     rf: Rf = Rf()

@@ -1,4 +1,6 @@
-"""What comes with the package: the workflow, and the configurations of the folder config; both travel in the wheel."""
+"""What comes with the package: the workflow, the configurations of the folder config, and a repository as a sample; all
+travel in the wheel.
+"""
 
 import re
 import textwrap
@@ -9,6 +11,11 @@ from pathlib import Path
 _PLACES = (Path(__file__).parents[1] / "shipped", Path(__file__).parents[3])
 ROOT = next((place for place in _PLACES if (place / "Snakefile").is_file()), _PLACES[0])
 """Folder of what is shipped: `shipped` in an installed package (pyproject.toml), or the checkout."""
+
+SAMPLE = "sample"
+"""Name of the repository that is shipped, which the configuration of that name makes."""
+NOT_WRITTEN = "comes with the package and is not written to: echotruth merge out/mine sample makes a copy of your own"
+"""What an error says of the shipped repository, whose name or path stands before it."""
 
 
 def folder() -> Path:
@@ -29,6 +36,21 @@ def path_of(name: str) -> Path:
 def found(path: str) -> str:
     """The path itself, or the file of a shipped configuration if nothing has this path and it is the name of one."""
     return str(path_of(path)) if path in names() and not Path(path).exists() else path
+
+
+def sample() -> Path:
+    """Folder of the shipped repository."""
+    return _PLACES[0] / SAMPLE
+
+
+def repository(path: str | Path) -> str | Path:
+    """The path itself, or the folder of the shipped repository if nothing has this path and it is its name."""
+    return sample() if str(path) == SAMPLE and not Path(path).exists() else path
+
+
+def is_sample(folder: Path) -> bool:
+    """Whether a folder is that of the shipped repository, in which nothing is written."""
+    return folder.resolve() == sample().resolve()
 
 
 def meant(path: Path) -> str:

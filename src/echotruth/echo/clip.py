@@ -47,7 +47,7 @@ def read_clip(
     -------
     Dataset
         `image` (frame, axial, lateral), uint8, with the coordinates time (s), axial and lateral (m), and the attributes
-        `source` and `spacing` (m).
+        `source`, `spacing` (m) and `part`: the first frame and pixel of the file that it holds.
 
     Raises
     ------
@@ -67,7 +67,9 @@ def read_clip(
     recording = files.read(Path(source)) if is_path else files.of_array(source)  # type: ignore[arg-type]
     time = _time(recording, frame_time_ms, name)
     first, stop = _cycle(recording, time, cycle, name)
-    frames = _cropped(recording.frames[first:stop], crop, name)
+    height, width = recording.frames.shape[1:]
+    left, top, right, bottom = crop or (0, 0, width, height)
+    frames = _cropped(recording.frames[first:stop], (left, top, right, bottom), name)
     frames, spacing = _square(frames, _spacing(recording, spacing_mm, name))
     axial, lateral = (np.arange(size) * spacing for size in frames.shape[1:])
     return xr.Dataset(
@@ -82,7 +84,11 @@ def read_clip(
             "axial": ("axial", axial, {"units": "m", "long_name": "distance from the first row"}),
             "lateral": ("lateral", lateral, {"units": "m", "long_name": "distance from the first column"}),
         },
-        attrs={"source": name, "spacing": spacing},
+        attrs={
+            "source": name,
+            "spacing": spacing,
+            "part": f"from frame {first}, column {left} and row {top} on",
+        },
     )
 
 
@@ -126,10 +132,8 @@ def _cycle(recording: Recording, time: Floats, cycle: tuple[int, int] | None, na
     return first, stop
 
 
-def _cropped(frames: NDArray[np.uint8], crop: tuple[int, int, int, int] | None, name: str) -> NDArray[np.uint8]:
+def _cropped(frames: NDArray[np.uint8], crop: tuple[int, int, int, int], name: str) -> NDArray[np.uint8]:
     """Part of the frames."""
-    if crop is None:
-        return frames
     left, top, right, bottom = crop
     height, width = frames.shape[1:]
     if not (0 <= left < right <= width and 0 <= top < bottom <= height):

@@ -21,7 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from echotruth.arrays import Floats
 from echotruth.echo.failure import EchoError
-from echotruth.echo.wall import PARTS, View, Wall, clicked_points, named_view, read_wall, write_wall
+from echotruth.echo.wall import PARTS, View, Wall, clicked_points, read_wall, said, write_wall
 
 LOCAL = "127.0.0.1"
 
@@ -112,7 +112,7 @@ class Drawing:
         if self.begin is None or (self.begin == self.output and not self.output.exists()):  # removed since it was saved
             return None
         # The page asks for the view of a file that names none.
-        return read_wall(self.begin, named_view(self.begin) or "short_axis")
+        return read_wall(self.begin, said(self.begin, "view") or "short_axis")
 
     def _clicked(self) -> dict[str, list[list[float]]]:
         """Points that were clicked, of the borders of which the file says them."""
@@ -186,7 +186,7 @@ class Drawing:
         insertions = None if None in given else np.array(given)
         if insertions is not None:
             self._check_near("insertions", insertions)
-        return Wall(borders[0], borders[1], drawn.view, insertions)
+        return Wall(borders[0], borders[1], drawn.view, insertions, self.clip.attrs.get("part", ""))
 
     def _check_near(self, name: str, points: Floats) -> None:
         """Refuse points farther from the image than its size, which no curve that was clicked in it has."""

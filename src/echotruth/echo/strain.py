@@ -70,7 +70,7 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     Raises
     ------
     EchoError
-        If the wall is not within the clip, or is too thin to be tracked.
+        If the wall is not within the clip, is too thin to be tracked, or was drawn on other frames or pixels.
     ConfigError
         If there is no such method or setting.
     TrackerFailed
@@ -94,6 +94,7 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     are compared.
     """
     frames, spacing = _frames(clip)
+    _check_part(clip, wall)
     mask = wall.mask(frames.shape[1:])
     scale = _scale(wall, spacing)
     points = _points(mask, spacing, scale)
@@ -126,6 +127,14 @@ def _frames(clip: xr.Dataset) -> tuple[NDArray[np.uint8], float]:
     if not isinstance(clip, xr.Dataset) or "image" not in clip or "spacing" not in clip.attrs:
         raise EchoError("clip: must be what echotruth.read_clip returns, with image, time and the attribute spacing")
     return clip["image"].transpose("frame", "axial", "lateral").values, float(clip.attrs["spacing"])
+
+
+def _check_part(clip: xr.Dataset, wall: Wall) -> None:
+    part = clip.attrs.get("part", "")
+    if part and wall.part and part != wall.part:
+        raise EchoError(
+            f"the wall was drawn in the clip {wall.part}, and this clip is {part}: give the same cycle and crop"
+        )
 
 
 def _scale(wall: Wall, spacing: float) -> float:

@@ -64,6 +64,9 @@ class Wall:
     insertions : ndarray of shape (2, 2), px, optional
         Where the right ventricle joins the wall of a short axis: anterior, inferior. Without them there are no
         segments.
+    part : str
+        First frame and pixel of the clip in which it was drawn, as its attribute `part` says; "" where that is not
+        known.
 
     Raises
     ------
@@ -85,6 +88,7 @@ class Wall:
     epicardium: Floats
     view: str = "short_axis"
     insertions: Floats | None = None
+    part: str = ""
 
     def __post_init__(self) -> None:
         _check_view(self.view)
@@ -263,7 +267,7 @@ def read_wall(path: str | PathLike[str], view: str | None = None) -> Wall:
         _check_view(view)
     if not file.is_file():
         raise EchoError(f"{file}: is not there: draw the wall, and save its borders as this file")
-    view = view or named_view(file)
+    view = view or said(file, "view")
     if view is None:
         raise EchoError(f"{file}: does not name its view: give view, or let a .csv begin with a line as # view: mid")
     try:
@@ -277,15 +281,15 @@ def _check_view(view: str) -> None:
         raise EchoError(f"view = {view!r}: use one of {', '.join(get_args(View))}")
 
 
-def named_view(file: Path) -> str | None:
-    """View that is named by the comments with which a .csv begins, or None."""
+def said(file: Path, what: str) -> str | None:
+    """What the comments with which a .csv begins say of its `view` or of the `part` of the clip, or None."""
     if file.suffix.lower() != ".csv" or not file.is_file():
         return None
     with file.open(encoding="utf-8", errors="replace") as lines:
         for line in lines:
             if not line.startswith("#"):
                 break
-            if match := re.fullmatch(r"#\s*view\s*:\s*(\S+)\s*", line):
+            if match := re.fullmatch(rf"#\s*{what}\s*:\s*(\S.*?)\s*", line):
                 return match[1]
     return None
 
@@ -323,7 +327,8 @@ def write_wall(path: str | PathLike[str], wall: Wall, clicked: dict[str, NDArray
     if clicked is not None:
         marks = {part: np.ones(len(points), bool) for part, points in parts.items()} | clicked
         table["clicked"] = np.concatenate([marks[part] for part in parts]).astype(int)
-    text = f"# view: {wall.view}\n" + table.to_csv(index=False, float_format="%.2f", lineterminator="\n")
+    head = f"# view: {wall.view}\n" + (f"# part: {wall.part}\n" if wall.part else "")
+    text = head + table.to_csv(index=False, float_format="%.2f", lineterminator="\n")
     durable.write(Path(path), text.encode())
 
 
@@ -336,7 +341,7 @@ def _of_table(file: Path, view: str) -> Wall:
             f"{file}: has {given[0]} anterior and {given[1]} inferior insertions: give one of each, or none"
         )
     insertions = np.concatenate([points[part] for part in PARTS[2:]]) if sum(given) else None
-    return Wall(points["endocardium"], points["epicardium"], view, insertions)
+    return Wall(points["endocardium"], points["epicardium"], view, insertions, said(file, "part") or "")
 
 
 def _table(file: Path) -> pd.DataFrame:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from echotruth.config import shipped
 from echotruth.config.loading import validate
 from echotruth.evaluation import kept
 from echotruth.evaluation.clip import Clip, read_clips
@@ -114,6 +115,8 @@ class EvaluationRun:
 
     def check_writable(self) -> None:
         """Make the folder of the scores, and the arrays to be kept; EvaluationError if they cannot be written there."""
+        if self.repository.is_sample:
+            raise EvaluationError(f"{shipped.SAMPLE}: {shipped.NOT_WRITTEN}")
         with self._writing():
             self.file.parent.mkdir(exist_ok=True)
             with TemporaryFile(dir=self.file.parent):

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Literal
 
+from echotruth.config import shipped
 from echotruth.export.clip import Clip
 from echotruth.export.destination import draft
 from echotruth.export.error import ExportError
@@ -84,7 +85,7 @@ FORMATS = {
 }
 """What can be written, by the name of the format."""
 
-OVERLAYS = ("wall", "segments", "displacement")
+OVERLAYS = ("wall", "segments", "displacement", "scale")
 """What can be drawn over the images."""
 
 
@@ -116,12 +117,13 @@ class Export:
     selection : Selection
     format : str
         One of :data:`FORMATS`.
-    overlay : sequence of {"wall", "segments", "displacement"}
+    overlay : sequence of {"wall", "segments", "displacement", "scale"}
         What to draw over the images of mp4, gif and png.
     rate : float
         Frames per second of mp4 and gif.
     output : Path, optional
-        Folder; for a single file also its path. Default: `export/FORMAT` in the folder of the repository.
+        Folder; for a single file also its path. Default: `export/FORMAT` in the folder of the repository, for that
+        which comes with the package in `out/sample`.
     """
 
     repository: Repository
@@ -201,7 +203,8 @@ class Export:
     @property
     def _output(self) -> Path:
         """Folder of the files, or path of a single file."""
-        return self.output or self.repository.folder / "export" / self.format
+        home = Path("out") / shipped.SAMPLE if self.repository.is_sample else self.repository.folder
+        return self.output or home / "export" / self.format
 
     @property
     def _is_file(self) -> bool:

@@ -20,6 +20,12 @@ OPACITY = 0.35
 ARROWS_ALONG_SIDE = 28
 """Arrows along the side of an image that is all wall."""
 
+SCALE = "#f2f2f2"
+"""Colour of the depth scale, the time and the line of the beat."""
+
+DEPTHS = 8
+"""Marks of the depth scale, at most."""
+
 _SHIFT = 4
 """Binary digits of a fraction of a pixel in OpenCV's coordinates."""
 
@@ -32,9 +38,10 @@ def pictures(clip: Clip, overlay: Sequence[str]) -> Pictures:
     Parameters
     ----------
     clip : Clip
-    overlay : sequence of {"wall", "segments", "displacement"}
+    overlay : sequence of {"wall", "segments", "displacement", "scale"}
         The border of the wall; the AHA segments in colour; arrows from where points of the tissue were at
-        end-diastole to where they are.
+        end-diastole to where they are; a depth scale, the time since end-diastole, and a line of the beat, with a
+        spike at end-diastole, a mark at end-systole and a dot that runs along it.
 
     Returns
     -------
@@ -74,7 +81,43 @@ def _displacement(clip: Clip, frames: Pictures) -> None:
             cv2.circle(frame, end, _thickness(clip) << _SHIFT, _rgb(MOTION), -1, cv2.LINE_AA, _SHIFT)
 
 
-DRAWINGS = {"segments": _segments, "wall": _wall, "displacement": _displacement}
+def _scale(clip: Clip, frames: Pictures) -> None:
+    """Draw the depth scale at the right, and the time and the line of the beat at the bottom."""
+    size, margin, thickness = clip.size, round(0.03 * clip.size), _thickness(clip)
+    step = _round_step(size * clip.spacing / DEPTHS)
+    depths = np.arange(step, size * clip.spacing, step)
+    period, es = clip.time[-1] + clip.frame_time, clip.time[clip.heart.es]
+    left, right, row = margin, size - 1 - margin, size - 1 - margin
+    for frame, time in zip(frames, clip.time, strict=True):
+        for number, depth in enumerate(depths, start=1):
+            start, at = clip.axial[0] - clip.spacing / 2, right - margin * (2 if number % 5 == 0 else 1)
+            level = round((depth - start) / clip.spacing - 0.5)
+            cv2.line(frame, (at, level), (right, level), _rgb(SCALE), thickness)
+        cv2.line(frame, (left, row), (size // 2, row), _rgb(SCALE), thickness)
+        for moment, height in ((0.0, 3 * margin), (es, margin)):
+            column = round(left + moment / period * (size // 2 - left))
+            cv2.line(frame, (column, row), (column, row - height), _rgb(SCALE), thickness)
+        column = round(left + time / period * (size // 2 - left))
+        cv2.circle(frame, (column, row), 2 * thickness, _rgb(MOTION), -1, cv2.LINE_AA)
+        _write(frame, f"{1e3 * time:.0f} ms", (left + margin, row - 2 * margin))
+        _write(frame, f"{1e3 * step:g} mm", (0, 2 * margin), right)
+
+
+def _round_step(least: float) -> float:
+    """The smallest of 1, 2 and 5 times a power of ten that is not below a length, m."""
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9)))
+
+
+def _write(frame: Pictures, text: str, corner: tuple[int, int], right: int | None = None) -> None:
+    """Write a text with its lower left corner at (column, row), or its right end at a column."""
+    scale = max(0.3, frame.shape[0] / 1000)
+    if right is not None:
+        corner = right - cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)[0][0], corner[1]
+    cv2.putText(frame, text, corner, cv2.FONT_HERSHEY_SIMPLEX, scale, _rgb(SCALE), 1, cv2.LINE_AA)
+
+
+DRAWINGS = {"segments": _segments, "wall": _wall, "displacement": _displacement, "scale": _scale}
 """Name of an overlay to the function that draws it, those below first."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -64,6 +65,29 @@ class Cycle:
         """End-diastolic volume, m^3, if volumes are prescribed."""
         assert self.volume is not None
         return float(self.volume[0])
+
+    @property
+    def systole(self) -> list[int]:
+        """Frames from end-diastole to end-systole.
+
+        Raises
+        ------
+        LoopError
+            Unless pressure and volume are prescribed.
+        """
+        if self.pressure is None or self.volume is None:
+            raise LoopError(f"{self.source}: has no pressure or no volume, and so no end-systole: use pressure_volume")
+        return list(range(es_frame(self.pressure, self.volume) + 1))
+
+    def at(self, frames: Sequence[int]) -> Cycle:
+        """The cycle in some of its frames, of which the first is end-diastole."""
+        chosen = list(frames)
+        pressure, volume, tension = (None if curve is None else curve[chosen] for curve in self._curves)
+        return replace(self, time=self.time[chosen], pressure=pressure, volume=volume, tension=tension)
+
+    @property
+    def _curves(self) -> tuple[Floats | None, ...]:
+        return self.pressure, self.volume, self.tension
 
     def filled(self, factor: float) -> Cycle:
         """The cycle with its pressures times a factor."""

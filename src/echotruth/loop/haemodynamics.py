@@ -1,4 +1,4 @@
-"""Times of the valves and of the phases, Tei index, dP/dt and tau, from the curves of pressure and volume."""
+"""Times of the valves and of the phases, Tei index, E/A, dP/dt and tau, from the curves of pressure and volume."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ _RESOLVED_SHARE = 0.5
 """Two frames up to this volume show when a valve moves; with fewer, its time is not known."""
 _PARABOLA = 3
 """Points of a parabola: with fewer frames up to `_MAX_SHARE`, frames after them are taken too."""
+_WAVE = 0.05
+"""Part of the largest rate of filling by which a wave rises above what is around it."""
 _FIT_POINTS = 50
 """Points of the curve of pressure to which the exponential is fitted."""
 
@@ -101,6 +103,37 @@ def _onset(time: Floats, passed: Floats, candidates: NDArray[np.bool_]) -> float
     root = np.sqrt(np.maximum(passed[frames], 0.0))
     parabola = np.polynomial.Polynomial.fit(root, time[frames], min(2, len(frames) - 1))
     return float(min(parabola(0.0), time[frames[0]]))
+
+
+def filling_ratio(time: Floats, volume: Floats, phase: NDArray[np.uint8]) -> float:
+    """Largest rate of early filling over that of filling by the atrium, E/A, of the spline through the volumes.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_frames,), s
+        Since end-diastole, at equal steps.
+    volume : ndarray of shape (n_frames,), m^3
+    phase : ndarray of shape (n_frames,)
+        As :func:`.phases.phases` returns it.
+
+    Returns
+    -------
+    float
+        Of the two waves that stand out most; not a number where they are fused, as they are in hearts that beat fast.
+    """
+    from scipy.interpolate import CubicSpline
+    from scipy.signal import find_peaks
+
+    filling = np.flatnonzero(phase == FILLING)
+    if not np.isfinite(volume).all() or len(filling) < 2 * _PARABOLA:
+        return np.nan
+    closed = np.append(time, 2 * time[-1] - time[-2]), np.append(volume, volume[0])
+    rate = CubicSpline(*closed, bc_type="periodic").derivative()(np.linspace(time[filling[0]], closed[0][-1], 500))
+    waves, found = find_peaks(rate, prominence=_WAVE * rate.max())
+    if len(waves) < 2:
+        return np.nan
+    early, atrial = np.sort(waves[np.argsort(found["prominences"])[-2:]])
+    return float(rate[early] / rate[atrial])
 
 
 class PressureRates(NamedTuple):

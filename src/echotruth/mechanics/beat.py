@@ -1,18 +1,20 @@
 """Simulation of one heart over one cycle: geometry, fibres, mechanics and kinematics."""
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.config import Config
+from echotruth.config import Config, Pathology
 from echotruth.loop import phases
 from echotruth.loop.circulation import altered, calibrate
 from echotruth.loop.cycle import Cycle, read_loop
+from echotruth.loop.recording import LoopError
 from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
 from echotruth.mechanics.history import Arrays, collect_outputs
-from echotruth.mechanics.pathology import healthy_heart
+from echotruth.mechanics.pathology import BORDER, INFARCT, healthy_heart, tissue
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.circulation import steady_beat
@@ -23,13 +25,16 @@ from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 logger = logging.getLogger("echotruth.mechanics")
 
 
-def beat(config: Config) -> dict[str, Arrays]:
+def beat(config: Config, frames: Sequence[int] | None = None) -> dict[str, Arrays]:
     """Solve one cycle of the heart of a configuration.
 
     Parameters
     ----------
     config : Config
         Only the seed and the sections geometry, fibres, pathology, loop and mechanics are used.
+    frames : sequence of int, optional
+        Frames of the cycle that are solved, from 0, end-diastole, on; the others are passed over in larger steps of
+        time. Default: all.
 
     Returns
     -------
@@ -43,15 +48,30 @@ def beat(config: Config) -> dict[str, Arrays]:
     GeometryError, FibreError, PathologyError, LoopError, Diverged
         With one sentence, if the heart or the loop is invalid, or there is no equilibrium.
     """
-    cycle = read_loop(config.loop)
+    whole = cycle = read_loop(config.loop)
+    if frames is not None:
+        check_frames(config, frames)
+        cycle = whole.at(frames)
     unloaded = unloaded_wall(config, cycle)
     solved = (_circulate if config.loop.kind == "circulation" else _solve)(config, unloaded, cycle)
+    return outputs(config, unloaded, solved, whole, frames)
+
+
+def outputs(
+    config: Config, unloaded: Wall, solved: SolvedCycle, whole: Cycle, frames: Sequence[int] | None = None
+) -> dict[str, Arrays]:
+    """Groups of a heart that was solved in some frames of a whole cycle, or in all; as of :func:`beat`."""
+    if frames is None:
+        frames, phase = range(len(whole.time)), phases.phases(solved.pressure, solved.volume)
+    else:
+        assert whole.pressure is not None and whole.volume is not None
+        phase = phases.phases(whole.pressure, whole.volume)[list(frames)]
     mechanics = vars(solved) | {
-        "time": cycle.time,
-        "displacement": _held(config, unloaded, solved),
+        "time": whole.time[list(frames)],
+        "displacement": held(config, unloaded, solved.displacement),
         "stiffness": np.array(solved.stiffness),
         "es_frame": np.array(phases.es_frame(solved.pressure, solved.volume)),
-        "phase": phases.phases(solved.pressure, solved.volume),
+        "phase": phase,
     }
     return collect_outputs(config, unloaded, mechanics)
 
@@ -78,6 +98,20 @@ def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
     return wall(config, mesh)
 
 
+def check_frames(config: Config, frames: Sequence[int]) -> None:
+    """Refuse frames that cannot be solved without those between them."""
+    loop, late = config.loop, config.pathology.late_activation
+    if not (len(frames) > 1 and frames[0] == 0 and np.all(np.diff(frames) > 0) and frames[-1] < loop.frames):
+        raise LoopError(f"frames = {list(frames)}: give 0 and frames after it, in their order, below {loop.frames}")
+    if config.motion.kind != "beat":
+        raise LoopError(f"motion.kind = {config.motion.kind}: only a beat can be solved in some of its frames")
+    if loop.kind != "measured" or loop.prescribed != "pressure_volume":
+        given = f"kind = {loop.kind}" if loop.kind != "measured" else f"prescribed = {loop.prescribed}"
+        raise LoopError(f"loop.{given}: only a measured pressure-volume loop can be solved in some of its frames")
+    if late.preset is not None or late.delay_ms:
+        raise LoopError("pathology.late_activation: late tissue needs every frame: leave it out, or solve all frames")
+
+
 def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     """Drive a heart by the tension of the healthy one, in the circulation that gives the healthy one its loop."""
     settings, healthy = config.loop.circulation, healthy_heart(config)
@@ -90,41 +124,41 @@ def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     equations = equilibrium(config, unloaded)
     try:
         stepper = filled_to_end_diastole(equations, cycle.filled(settings.preload), measured.stiffness)
-        frames = steady_beat(stepper, circulation, twitch, _activation(unloaded, cycle), settings.beats_max)
+        frames = steady_beat(stepper, circulation, twitch, activation(unloaded, cycle), settings.beats_max)
         return solved_cycle(equations, replace(cycle, pressure=None, volume=None), frames)
     finally:
         equations.close()
 
 
-def _activation(unloaded: Wall, cycle: Cycle) -> Activation:
-    tissue = unloaded.tissue
-    return Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
+def activation(unloaded: Wall, cycle: Cycle) -> Activation:
+    cells = unloaded.tissue
+    return Activation(cells.tension_scale, cells.activation_delay, cycle.period / len(cycle.time))
 
 
 def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     stiffness = config.mechanics.material.si().stiffness
-    if stiffness is None and np.any(unloaded.tissue.stiffness_scale != 1):
+    if stiffness is None and np.isin(unloaded.tissue.region, (INFARCT, BORDER)).any():
         stiffness = _healthy_stiffness(config, unloaded, cycle)
     equations = equilibrium(config, unloaded)
     try:
-        return solve(equations, cycle, _activation(unloaded, cycle), stiffness)
+        return solve(equations, cycle, activation(unloaded, cycle), stiffness)
     finally:
         equations.close()
 
 
 def _healthy_stiffness(config: Config, unloaded: Wall, cycle: Cycle) -> float:
     """C, Pa, of the heart without its scar, so that the tissue around a scar stays what it was."""
-    tissue = replace(unloaded.tissue, stiffness_scale=np.ones(len(unloaded.mesh.cells)))
-    equations = equilibrium(config, replace(unloaded, tissue=tissue))
+    healthy = tissue(unloaded.mesh, unloaded.depth, Pathology(), config.mechanics.regional)
+    equations = equilibrium(config, replace(unloaded, tissue=healthy))
     try:
         return filled_to_end_diastole(equations, cycle).state.stiffness
     finally:
         equations.close()
 
 
-def _held(config: Config, unloaded: Wall, solved: SolvedCycle) -> Floats:
+def held(config: Config, unloaded: Wall, displacement: Floats) -> Floats:
     """Displacements (n_frames, n_nodes, 3), m, with what `mechanics.hold` names in place along the axis since ED."""
     if config.mechanics.hold == "base":
-        return solved.displacement
-    axial = solved.displacement[:, epicardial_apex(unloaded.mesh), 2]
-    return solved.displacement - (axial - axial[0])[:, None, None] * [0.0, 0.0, 1.0]
+        return displacement
+    axial = displacement[:, epicardial_apex(unloaded.mesh), 2]
+    return displacement - (axial - axial[0])[:, None, None] * [0.0, 0.0, 1.0]

@@ -114,6 +114,7 @@ BOUNDS = (
     *_range("gls", "", "the global longitudinal strain", itemgetter("gls"), True),
     *_range("torsional_shear", "", f"the mean shear strain E_CL {_ES}", _at("strain_es", CL), True),
     *_range("tei_index", "", "the Tei index", itemgetter("tei_index"), True),
+    *_range("filling_ratio", "", "the ratio E/A of the rates of filling", itemgetter("filling_ratio"), True),
 )
 """Order of checks: accuracy of the solution, what no heart does, what no healthy heart does."""
 

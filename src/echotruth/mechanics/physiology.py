@@ -8,7 +8,7 @@ from echotruth.config import Config
 from echotruth.config.loop import Circulation
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.loop.cycle import read_loop
-from echotruth.loop.haemodynamics import intervals, pressure_rates
+from echotruth.loop.haemodynamics import filling_ratio, intervals, pressure_rates
 from echotruth.loop.phases import CONTRACTION, FILLING, RELAXATION
 from echotruth.mechanics.bounds import CC, LL, bounded
 from echotruth.mechanics.contours import MID_SLICE, global_longitudinal_strain, wall_thickness
@@ -182,6 +182,7 @@ def _times(mechanics: Arrays) -> Arrays:
         "ejection_time": phases.ejection,
         "ivr_time": phases.ivr,
         "tei_index": phases.tei,
+        "filling_ratio": filling_ratio(time, mechanics["volume"], mechanics["phase"]),
         **rates._asdict(),
     }
     return {name: np.asarray(number) for name, number in numbers.items()}

@@ -16,10 +16,16 @@ def check_heart(heart: object) -> None:
     ------
     TypeError
         If it is something else, such as the path of a repository.
+    ValueError
+        If it was solved in some of its frames only.
     """
     if not isinstance(heart, Heart):
         made = "a Repository has one, echotruth.beat makes one"
         raise TypeError(f"heart = {heart!r:.80}: must be a Heart: {made}.")
+    solved = len(heart.displacement)
+    if heart.config is not None and solved < heart.config.loop.frames:
+        of = f"{solved} of {heart.config.loop.frames} frames"
+        raise ValueError(f"The heart has {of}, of which only its arrays can be used: beat it without `frames`.")
 
 
 def check_clip(clip: object, name: str = "clip") -> None:

@@ -3,7 +3,7 @@
 import logging
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
@@ -24,6 +24,8 @@ from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compens
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
+from echotruth.loop.cycle import read_loop
+from echotruth.mechanics.beat import beat as mechanics_beat
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.bounds import violated_bound
 from echotruth.mechanics.physiology import measures
@@ -35,7 +37,7 @@ from echotruth.tracking.point_grid import grid_points
 from echotruth.tracking.tracker import track as track_points
 
 
-def beat(config: Source = None, progress: bool = True) -> Heart:
+def beat(config: Source = None, progress: bool = True, *, frames: Iterable[int] | None = None) -> Heart:
     """Move a heart through one cycle: its beat, or a prescribed motion.
 
     Parameters
@@ -44,13 +46,17 @@ def beat(config: Source = None, progress: bool = True) -> Heart:
         Anything that :func:`echotruth.configure` accepts.
     progress : bool
         Whether a line on stderr says how far it is, where a person watches.
+    frames : sequence of int, optional
+        Frames of the cycle that are solved, from 0, end-diastole, on; the others are passed over in larger steps of
+        time. :func:`echotruth.systole` names those that give the strain of end-systole in half the time.
 
     Returns
     -------
     Heart
         Its `arrays` hold the groups geometry, fibres, pathology, mechanics, kinematics and physiology (docs/schema.md);
         `echotruth.heart_dataset` gives them dimensions and units. A heart that violates a bound of the section
-        physiology is returned with a warning.
+        physiology is returned with a warning. With `frames` there is no physiology, which is that of a whole cycle, and
+        the heart is not imaged.
 
     Raises
     ------
@@ -72,7 +78,9 @@ def beat(config: Source = None, progress: bool = True) -> Heart:
         keys = ", ".join(settings.cases.keys)
         raise ValueError(f"cases sweeps {keys}: beat one, as echotruth.expand(config)[0].config")
     with _progress_line("beat", progress):
-        arrays = simulate(settings)
+        arrays = simulate(settings) if frames is None else mechanics_beat(settings, list(frames))
+    if frames is not None:
+        return Heart.of(arrays, settings)
     depth = arrays["fibres"]["wall_depth"]
     arrays["physiology"] = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"], depth)
     healthy = not arrays["pathology"]["region"].any()
@@ -81,6 +89,30 @@ def beat(config: Source = None, progress: bool = True) -> Heart:
     if reason and settings.motion.kind == "beat":
         warnings.warn(f"implausible heart: {reason}", stacklevel=2)
     return Heart.of(arrays, settings)
+
+
+def systole(config: Source = None) -> list[int]:
+    """Frames of a loop from end-diastole to end-systole, for :func:`echotruth.beat`.
+
+    Parameters
+    ----------
+    config : Config, dict, str or Path, optional
+        Anything that :func:`echotruth.configure` accepts.
+
+    Returns
+    -------
+    list of int
+        Without diastole a heart takes about half the time, and its end-systole is that of the whole cycle.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> frames = et.systole()
+    >>> frames[0], frames[-1]
+    (0, 21)
+    """
+    cycle = read_loop((config if isinstance(config, Config) else configure(config)).loop)
+    return cycle.systole
 
 
 def image(

@@ -13,14 +13,12 @@ import zarr
 from numpy.typing import NDArray
 
 from echotruth.cases import Case, all_cases, find_case
-from echotruth.config import Config
+from echotruth.config import Config, shipped
 from echotruth.config.loading import load, validate
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
 from echotruth.repository import estimates, ledger, packing, schema
 from echotruth.repository.choice import Names, Sizes, chosen, image_size, main_view, require_known
-from echotruth.repository.datasets import clip_dataset
-from echotruth.repository.derived import stored_names
 from echotruth.repository.ledger import STAGES, imaged_statuses, repository_folder
 from echotruth.repository.remote import Remote, hierarchy, is_url
 from echotruth.repository.store import NotWritten
@@ -45,7 +43,8 @@ class Repository:
     Parameters
     ----------
     repository : str or Path
-        `out/NAME`, `out/NAME/NAME.zarr`, or the address `s3://BUCKET/FOLDER` to which it was uploaded.
+        `out/NAME`, `out/NAME/NAME.zarr`, the address `s3://BUCKET/FOLDER` to which it was uploaded, or `sample`, which
+        is the one that :func:`echotruth.sample` opens unless something in the working folder has this name.
 
     Raises
     ------
@@ -70,7 +69,7 @@ class Repository:
             self._place = str(repository).rstrip("/")
             self._remote, self.store = hierarchy(self._place)
         else:
-            self._place = str(repository_folder(repository))
+            self._place = str(repository_folder(shipped.repository(repository)))
             self._folder = Path(self._place).absolute()  # whoever reads may change to another folder meanwhile
 
     def _forget(self) -> None:
@@ -112,6 +111,11 @@ class Repository:
         if self._remote:
             raise FileNotFoundError(f"{self._place}: is an address and not a folder: download it, and give the folder")
         return self._folder
+
+    @property
+    def is_sample(self) -> bool:
+        """Whether it is the one that comes with the package, in whose folder nothing is written."""
+        return not self._remote and shipped.is_sample(self._folder)
 
     @cached_property
     def store(self) -> Path | ObjectStore:
@@ -231,6 +235,10 @@ class Repository:
         >>> clip["flow"].dims, clip["flow"].units
         (('frame', 'to', 'axial', 'lateral', 'vector'), 'm')
         """
+        # Here and not above: what they import takes longer than opening a repository.
+        from echotruth.repository.datasets import clip_dataset
+        from echotruth.repository.derived import stored_names
+
         found, view, size = self.case(case), self.view(view), image_size(self.config, size)
         arrays = {f"{stage}/{size}": schema.SIZED[stage] for stage in ("bmode", "truth")}
         wanted = stored_names(variables, {array.name for group in arrays.values() for array in group})
@@ -635,3 +643,27 @@ class Repository:
                 errors="replace"
             )
         return ""
+
+
+def sample() -> Repository:
+    """Open the repository that comes with the package: a healthy mouse heart, and one with an infarct.
+
+    Each is seen in short and long axis at 256 px, with the truth at every pixel, and followed by two trackers. The
+    configuration `sample` makes it.
+
+    Returns
+    -------
+    Repository
+        Its folder is part of the package; `echotruth merge out/mine sample` makes a copy that can be written.
+
+    Examples
+    --------
+    >>> import echotruth as et
+    >>> hearts = et.sample()
+    >>> list(hearts.cases["diagnosis"]), hearts.views, hearts.sizes
+    (['healthy', 'infarct'], ['mid', 'long_axis'], [256])
+    >>> clip = hearts.clip("infarct", "mid")
+    >>> clip["displacement"].dims, clip["displacement"].units
+    (('frame', 'axial', 'lateral', 'vector'), 'm')
+    """
+    return Repository(shipped.sample())

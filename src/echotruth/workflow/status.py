@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from echotruth.config import Config
+from echotruth.config import Config, shipped
 from echotruth.config.loading import ConfigError, load
 from echotruth.repository import ledger
 from echotruth.repository.case_file import read_case
@@ -152,7 +152,8 @@ def _parts(
     running = Counter(job.rule for job in progress.running if lives)
     failed = Counter(job.rule for job in progress.failed)
     parts = {}
-    for rule in RULES if cases else ():
+    rules = [rule for rule in RULES if rule != "report" or not shipped.is_sample(folder)]  # its page is not shipped
+    for rule in rules if cases else ():
         wanted = jobs(rule, config, cases)
         numbers = len(wanted), len(wanted & ended(folder, rule, config)), running[rule], failed[rule]
         parts[rule] = dict(zip(COLUMNS, (*numbers, max(0, numbers[0] - sum(numbers[1:]))), strict=True))

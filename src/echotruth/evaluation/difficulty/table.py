@@ -57,5 +57,6 @@ def _kept(repository: Repository, case: str, view: str) -> list[Row]:
     # JSON has no NaN.
     content = [{n: None if isinstance(v, float) and isnan(v) else v for n, v in row.items()} for row in rows]
     with suppress(OSError):  # a repository that cannot be written can be read
-        durable.write(path, json.dumps({"key": key, "rows": content}).encode())
+        if not repository.is_sample:
+            durable.write(path, json.dumps({"key": key, "rows": content}).encode())
     return rows

@@ -46,6 +46,7 @@ g = dV/du:
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from typing import Literal, NamedTuple
 
@@ -229,6 +230,8 @@ class Equilibrium:
         Factor of the stiffness of each cell.
     springs : tuple of Springs, optional
         Surroundings of the heart.
+    exact : bool
+        Whether corrections are exact and not only good enough for Newton's method.
     """
 
     def __init__(
@@ -239,6 +242,7 @@ class Equilibrium:
         support: Support,
         stiffness_scale: Floats | None = None,
         springs: tuple[Springs, ...] = (),
+        exact: bool = False,
     ):
         self.mesh, self.law, self.support, self.springs = mesh, law, support, springs
         self.assembly = Assembly(mesh, support, tuple(surface.group for surface in springs))
@@ -246,11 +250,18 @@ class Equilibrium:
         self.unloaded_volume = np.sum(self.elements.weight, axis=1)
         self.stiffness_scale = np.ones(len(mesh.cells)) if stiffness_scale is None else stiffness_scale
         self._response = element.allocate_response(len(mesh.cells), with_tangent=True)
-        self._solver = factorization(single=True)
+        self._solver = factorization(single=not exact)
         self.previous: PreviousState | None = None
         self._end_diastole: Floats | None = None
         self._previous_nodes, self._rate = mesh.nodes, 0.0
         self._previous_c = np.zeros((*self.elements.weight.shape, 6))
+
+    def changed(self, law: element.WallLaw, stiffness_scale: Floats, springs: tuple[Springs, ...]) -> Equilibrium:
+        """The equations with other laws, stiffness and surroundings, before end-diastole; they share what is large."""
+        other = copy(self)
+        other.law, other.stiffness_scale, other.springs = law, stiffness_scale, springs
+        other._previous_c, other._end_diastole = np.zeros_like(self._previous_c), None
+        return other
 
     def set_previous(self, previous: PreviousState) -> None:
         """Set the previous state; without time since, nothing depends on velocities."""

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from itertools import pairwise
 from math import log
+from typing import NamedTuple
 
 import numpy as np
 
@@ -56,6 +57,28 @@ class Diverged(ValueError):
     """Raised if no equilibrium of the heart is found."""
 
 
+class Step(NamedTuple):
+    """A solved step of the load.
+
+    Attributes
+    ----------
+    start, end : Load
+        Loads between which the heart is stepped.
+    begun, ended : float
+        Fractions of the way from one to the other at which the step begins and ends.
+    unknown : Unknown
+    before, after : State
+    """
+
+    start: Load
+    end: Load
+    begun: float
+    ended: float
+    unknown: Unknown
+    before: State
+    after: State
+
+
 class LoadStepper:
     """Steps a heart from load to load.
 
@@ -69,6 +92,8 @@ class LoadStepper:
         Largest relative residual of the state.
     factorizations : int
         Number of factorizations so far.
+    on_step : callable, optional
+        Called with every :class:`Step` that is solved.
     """
 
     def __init__(self, equations: Equilibrium, stiffness: float) -> None:
@@ -77,6 +102,7 @@ class LoadStepper:
         self.circulation: Circulation | None = None
         self.arterial_pressure = float("nan")
         self.max_error = 0.0
+        self.on_step: Callable[[Step], None] | None = None
         self._tangent: Tangent | None = None
 
     def advance(self, load: Load, unknown: Unknown, predictors: tuple[State, ...] = ()) -> State:
@@ -100,7 +126,7 @@ class LoadStepper:
             target = start.toward(load, fraction + step)
             prescribed = start.toward(load, fraction).prescribed_fraction
             duration = step * (load.time - start.time)
-            filled = self._filled(target.time, duration)
+            filled, before = self._filled(target.time, duration), self.state
             self.equations.set_previous(PreviousState(self.state, duration, prescribed, filled))
             try:
                 self.state = self._solve(target, unknown, (*predictors, *_extrapolated(path, fraction + step)), step)
@@ -113,6 +139,8 @@ class LoadStepper:
             if self.circulation:
                 ended = self.state.cavity_pressure, self.arterial_pressure, target.time, duration
                 self.arterial_pressure = self.circulation.exchange(*ended).arterial_pressure
+            if self.on_step:
+                self.on_step(Step(start, load, fraction, fraction + step, unknown, before, self.state))
             fraction, predictors = fraction + step, ()
             path.append((fraction, self.state))
             step = min(2 * step, 1 - fraction)

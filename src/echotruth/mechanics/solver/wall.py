@@ -36,7 +36,7 @@ class Wall:
 
 
 def wall(config: Config, mesh: Mesh) -> Wall:
-    """Wall of a mesh with the pathology of a configuration.
+    """Wall of a mesh with the tissue of a configuration.
 
     Raises
     ------
@@ -44,11 +44,11 @@ def wall(config: Config, mesh: Mesh) -> Wall:
         If no cell of the mesh has the pathology.
     """
     depth = fibres.wall_depth(mesh)
-    return Wall(mesh, depth, tissue(mesh, depth, config.pathology))
+    return Wall(mesh, depth, tissue(mesh, depth, config.pathology, config.mechanics.regional))
 
 
-def equilibrium(config: Config, wall: Wall) -> Equilibrium:
-    """Equations of a wall, with the fibres, laws and support of a configuration.
+def equilibrium(config: Config, wall: Wall, exact: bool = False) -> Equilibrium:
+    """Equations of a wall, with the fibres, laws and support of a configuration; `exact` as of :class:`Equilibrium`.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def equilibrium(config: Config, wall: Wall) -> Equilibrium:
     if config.loop.kind == "measured" and wall.tissue.activation_delay.any():
         # What is early alone cannot raise the pressure as fast as a healthy loop does, if it weakens as it shortens.
         law = law._replace(active=law.active._replace(max_velocity=np.inf))
-    return Equilibrium(wall.mesh, frames, law, support, wall.tissue.stiffness_scale, springs)
+    return Equilibrium(wall.mesh, frames, law, support, wall.tissue.stiffness_scale, springs, exact)
 
 
 def wall_law(section: Mechanics) -> element.WallLaw:

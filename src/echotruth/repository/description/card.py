@@ -1,6 +1,7 @@
 """README.md of a repository: its data card; its words are in README.md.jinja."""
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 from echotruth.cases.labels import diagnosis
@@ -17,7 +18,9 @@ LISTED = 20
 """Hearts, failures and values that are listed one by one; the others are in the tables."""
 
 
-def card(facts: Facts, said: dict[str, Any], made: list[StoredFile]) -> bytes:
+def card(
+    facts: Facts, said: dict[str, Any], made: list[StoredFile], release: Sequence[dict[str, Any]] | None = None
+) -> bytes:
     """Data card of a repository.
 
     Parameters
@@ -27,6 +30,9 @@ def card(facts: Facts, said: dict[str, Any], made: list[StoredFile]) -> bytes:
         Statements on the repository.
     made : list of StoredFile
         Tables that are written beside the card.
+    release : sequence of dict, optional
+        Parts in which the repository is given away, each with `part`, `bytes`, `sha256` and `holds`. Default: the card
+        stands in the folder of the repository.
     """
     cases = facts.repository.cases
     parts: dict[str, list[int]] = {}
@@ -45,6 +51,7 @@ def card(facts: Facts, said: dict[str, Any], made: list[StoredFile]) -> bytes:
         labels=list(dict.fromkeys(name for case in cases.values() for name in case.labels)),
         incomplete=[(case, *each) for case, each in facts.outcomes.items() if each[0] != "complete"],
         parts=sorted(parts.items()),
+        release=release,
         beside=[*facts.tables, *made],
         bibtex=bibtex(facts, said["title"]),
     )

@@ -7,6 +7,7 @@ social impact, personal information, synthetic data, and what the data were deri
 """
 
 import json
+from collections.abc import Sequence
 from io import BytesIO
 from typing import Any
 
@@ -26,7 +27,9 @@ KINDS = {"b": mlc.DataType.BOOL, "i": mlc.DataType.INTEGER, "u": mlc.DataType.IN
 """Kind of a type of NumPy -> type of Croissant; others are text."""
 
 
-def croissant(facts: Facts, said: dict[str, Any], made: list[StoredFile], clips: bytes) -> bytes:
+def croissant(
+    facts: Facts, said: dict[str, Any], made: list[StoredFile], clips: bytes, archives: Sequence[StoredFile] = ()
+) -> bytes:
     """croissant.json of a repository.
 
     Parameters
@@ -38,6 +41,8 @@ def croissant(facts: Facts, said: dict[str, Any], made: list[StoredFile], clips:
         Files that are written with it.
     clips : bytes
         Content of the table of clips, one of them.
+    archives : sequence of StoredFile, optional
+        Archives that hold the store, in a folder with the name of the repository. Default: the store lies beside.
     """
     attribution = facts.attribution
     licence = attribution.licence
@@ -59,7 +64,7 @@ def croissant(facts: Facts, said: dict[str, Any], made: list[StoredFile], clips:
         in_language=["en"],
         data_limitations=[*said["limits"], *(f"Not for: {text}" for text in said["misuses"])],
         **said["responsibility"],
-        distribution=_distribution(facts, said, made),
+        distribution=[*_tables(facts, said, made), *_store(facts, archives)],
         record_sets=_record_sets(facts, said, clips),
         extra_properties=_others(facts, said),
     )
@@ -92,8 +97,9 @@ def _creator(author: Author) -> mlc.Person | mlc.Organization:
     return kind(id=author.id, name=author.name, url=None if author.id.startswith("#") else author.id)
 
 
-def _distribution(facts: Facts, said: dict[str, Any], made: list[StoredFile]) -> list[mlc.FileObject | mlc.FileSet]:
-    files = [
+def _tables(facts: Facts, said: dict[str, Any], made: list[StoredFile]) -> list[mlc.FileObject]:
+    """Files beside the store."""
+    return [
         mlc.FileObject(
             id=file.path,
             name=file.name,
@@ -105,8 +111,30 @@ def _distribution(facts: Facts, said: dict[str, Any], made: list[StoredFile]) ->
         )
         for file in (*facts.tables, *made)
     ]
-    kind = ["application/x-zarr"]
-    return [*files, mlc.FileSet(id="store", name=facts.store, includes=[f"{facts.store}/*"], encoding_formats=kind)]
+
+
+def _store(facts: Facts, archives: Sequence[StoredFile]) -> list[mlc.FileObject | mlc.FileSet]:
+    """The store, and the archives that hold it."""
+    holders = [
+        mlc.FileObject(
+            id=file.path,
+            name=file.name,
+            content_url=file.path,
+            content_size=f"{file.size} B",
+            encoding_formats=["application/zip"],
+            sha256=file.sha256,
+        )
+        for file in archives
+    ]
+    within = f"{facts.name}/{facts.store}" if archives else facts.store
+    store = mlc.FileSet(
+        id="store",
+        name=facts.store,
+        includes=[f"{within}/*"],
+        encoding_formats=["application/x-zarr"],
+        contained_in=[holder.id for holder in holders] or None,
+    )
+    return [*holders, store]
 
 
 def _record_sets(facts: Facts, said: dict[str, Any], clips: bytes) -> list[mlc.RecordSet]:

@@ -1,0 +1,56 @@
+"""`echotruth release`: the files of a repository that one would upload."""
+
+import argparse
+from pathlib import Path
+
+from echotruth.cli.command import fail
+from echotruth.cli.describe import add_attribution
+from echotruth.cli.run import count
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `echotruth release`."""
+    parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
+    parser.add_argument("--to", type=Path, help="folder for the files (default: REPOSITORY-release)")
+    parser.add_argument(
+        "--part-mb", type=count, default=2000, metavar="N", help="largest size of a part, MB (default: %(default)s)"
+    )
+    add_attribution(parser)
+
+
+def release(arguments: argparse.Namespace) -> int:
+    """Write the files that one would upload to give a repository away.
+
+    These are archives of whole hearts, of a stated size, a registry of their checksums for pooch, a data
+    card that Hugging Face reads, .zenodo.json, Croissant, a citation, the clips as NumPy archives and an
+    evaluator of trackers in one file. echotruth.fetch reads them from wherever they are. It needs the
+    extra description of echotruth.
+
+    examples:
+      echotruth release out/demo --license CC-BY-4.0 --author 'Doe, Jane; 0000-0002-1825-0097'
+      echotruth release out/demo --to demo-1.0.0 --part-mb 500
+
+    exit status:
+      0  all files are written
+      2  it cannot be released
+    """
+    from echotruth.config import shipped
+    from echotruth.config.loading import ConfigError
+    from echotruth.release import ReleaseError
+    from echotruth.release import release as write
+    from echotruth.repository.description import DescriptionError, attribution
+    from echotruth.repository.reader import Repository
+    from echotruth.workflow import lease
+
+    try:
+        given = attribution(arguments.author, arguments.license, arguments.url, arguments.release, arguments.date)
+        repository = Repository(shipped.repository(arguments.repository))
+        lease.follow(repository.folder)
+        name = f"{repository.config.name}-release"
+        folder = arguments.to or (Path("out") if repository.is_sample else repository.folder.parent) / name
+        files = write(repository, folder, given, arguments.part_mb * 10**6)
+    except (ReleaseError, DescriptionError, ConfigError, FileNotFoundError, lease.LeaseError) as error:
+        return fail(str(error))
+    for path in files:
+        print(path)
+    return 0

@@ -1,0 +1,138 @@
+"""Derivatives of a beating heart by keys of its configuration."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from echotruth.arrays import Floats
+from echotruth.config import Config, Pathology
+from echotruth.loop.cycle import read_loop
+from echotruth.mechanics import fibres, kinematics
+from echotruth.mechanics.beat import activation, check_frames, held, outputs, unloaded_wall
+from echotruth.mechanics.history import Arrays
+from echotruth.mechanics.pathology import PathologyError, tissue
+from echotruth.mechanics.solver.cycle import filled_to_end_diastole, solved_cycle, solved_frames
+from echotruth.mechanics.solver.newton import Step
+from echotruth.mechanics.solver.sensitivity import Derivative, Variant, derivatives
+from echotruth.mechanics.solver.surroundings import surroundings
+from echotruth.mechanics.solver.wall import Wall, equilibrium, wall_law
+
+
+def sensitivities(
+    config: Config, changed: Mapping[str, tuple[Config, float]], frames: Sequence[int]
+) -> tuple[dict[str, Arrays], dict[str, Arrays]]:
+    """Beat a heart, and take the derivatives of its motion.
+
+    Parameters
+    ----------
+    config : Config
+        Without pathology, in a measured loop.
+    changed : mapping
+        Name of a parameter to the configuration in which it is changed by a little, and that change, in its unit.
+    frames : sequence of int
+        As :func:`.beat.beat` takes them.
+
+    Returns
+    -------
+    heart : dict of dict of ndarray
+        As :func:`.beat.beat` returns it.
+    derivatives : dict of dict of ndarray
+        Of each parameter: `node_position` (node, 3) of the unloaded wall, `displacement` (frame, node, 3), m, `strain`
+        (frame, cell, 6) since ED, `volume` (frame,), m^3, `active_tension` (frame,) and `stiffness`, Pa; each per unit
+        of the parameter.
+
+    Raises
+    ------
+    GeometryError, FibreError, LoopError, Diverged
+        As :func:`.beat.beat`.
+    PathologyError
+        If the heart has a pathology.
+    """
+    check_frames(config, frames)
+    if config.pathology != Pathology():
+        raise PathologyError(
+            "pathology: derivatives are taken of hearts without it: give scars as factors of mechanics.regional"
+        )
+    whole, stiffness = read_loop(config.loop), config.mechanics.material.si().stiffness
+    cycle = whole.at(frames)
+    unloaded, steps = unloaded_wall(config, cycle), list[Step]()
+    equations, exact = equilibrium(config, unloaded), equilibrium(config, unloaded, exact=True)
+    try:
+        stepper = filled_to_end_diastole(equations, cycle, stiffness)
+        stepper.on_step = steps.append
+        # A heart of given C keeps the ejection fraction of its loop.
+        loop = cycle if stiffness is None else cycle.scaled(stepper.load.volume / cycle.edv)
+        solved = solved_cycle(equations, loop, list(solved_frames(stepper, loop, activation(unloaded, loop))))
+        heart = _Heart(config, unloaded, Variant(exact, cycle, unloaded.tissue.tension_scale))
+        walls = [heart.wall(other) for other, _ in changed.values()]
+        pairs = zip(walls, changed.values(), strict=True)
+        variants = [heart.variant(other, wall, change, frames) for wall, (other, change) in pairs]
+        found = derivatives(heart.variant_0, steps, "stiffness" if stiffness is None else None, variants)
+    finally:
+        equations.close()
+        exact.close()
+    arrays = outputs(config, unloaded, solved, whole, frames)
+    parts = zip(changed, walls, found, (change for _, change in changed.values()), strict=True)
+    return arrays, {name: heart.arrays(arrays, wall, derivative, change) for name, wall, derivative, change in parts}
+
+
+@dataclass(frozen=True)
+class _Heart:
+    """A heart, from which others differ by a little.
+
+    Attributes
+    ----------
+    config : Config
+    unloaded : Wall
+    variant_0 : Variant
+        The heart itself.
+    """
+
+    config: Config
+    unloaded: Wall
+    variant_0: Variant
+
+    def wall(self, other: Config) -> Wall:
+        """Wall of another configuration; it has the mesh of this one if the geometry is the same."""
+        if other.geometry != self.config.geometry:
+            return unloaded_wall(other, read_loop(other.loop))
+        mesh, depth = self.unloaded.mesh, self.unloaded.depth
+        return Wall(mesh, depth, tissue(mesh, depth, other.pathology, other.mechanics.regional))
+
+    def variant(self, other: Config, wall: Wall, change: float, frames: Sequence[int]) -> Variant:
+        """The heart of another configuration."""
+        same = other.geometry == self.config.geometry and other.fibres == self.config.fibres
+        section, scale = other.mechanics, wall.tissue.stiffness_scale
+        equations = (
+            self.variant_0.equations.changed(wall_law(section), scale, surroundings(wall.mesh, section))
+            if same
+            else equilibrium(other, wall)
+        )
+        cycle, given = read_loop(other.loop).at(frames), section.material.si().stiffness
+        return Variant(equations, cycle, wall.tissue.tension_scale, change, given)
+
+    def arrays(self, arrays: dict[str, Arrays], wall: Wall, derivative: Derivative, change: float) -> Arrays:
+        """Derivatives of the arrays of this heart, of which another wall is changed by so much."""
+        displacement = arrays["mechanics"]["displacement"]
+        moved = [self.variant_0.equations.assembly.displacement(state.solution) for state in derivative.states]
+        taken = held(self.config, self.unloaded, np.array(moved))
+        strains = [
+            _strain(self.unloaded, displacement),
+            _strain(wall, displacement + change * taken),
+        ]
+        return {
+            "node_position": (wall.mesh.nodes - self.unloaded.mesh.nodes) / change,
+            "displacement": taken,
+            "strain": (strains[1] - strains[0]) / change,
+            "volume": derivative.volume,
+            "active_tension": np.array([state.tension for state in derivative.states]),
+            "stiffness": np.array(derivative.states[0].stiffness),
+        }
+
+
+def _strain(wall: Wall, displacement: Floats) -> Floats:
+    """Strain since ED of the centroids of the cells, (frame, cell, 6)."""
+    axes = fibres.wall_axes(wall.mesh, wall.depth, fibres.CENTROID)[:, 0]
+    gradient = kinematics.deformation_gradient(wall.mesh, displacement)[:, :, 0]
+    return kinematics.strain_since_ed(gradient, axes)

@@ -1,0 +1,100 @@
+"""Derivatives of the motion are those of hearts that were solved with other parameters."""
+
+import numpy as np
+import pytest
+
+import echotruth as et
+from echotruth.config.loading import ConfigError
+from echotruth.mechanics.pathology import PathologyError
+
+COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
+# Changes so small that no step of the load is halved in one heart and not in the next.
+HEART = et.configure(geometry=COARSE | {"wall_mm": 1.0}, loop={"frames": 24, "esp_mmHg": 100.0})
+FILLED = et.configure(HEART, **{"mechanics.material.stiffness_kPa": 1.2})
+SEGMENT = "mechanics.regional.contractility.8"
+
+
+def differences(config, key, value, step, frames):
+    """Central differences of displacement, strain, tension, C and volume."""
+    arrays = [et.beat(et.configure(config, **{key: value + sign * step}), frames=frames).arrays for sign in (1, -1)]
+    names = {"mechanics": ("displacement", "active_tension", "stiffness", "volume"), "kinematics": ("strain",)}
+    return {
+        name: (arrays[0][group][name].astype(float) - arrays[1][group][name]) / (2 * step)
+        for group, inside in names.items()
+        for name in inside
+    }
+
+
+def check(config, key, value, step, rtol):
+    heart, by = et.sensitivities(config, key)
+    frames = by["frame"].values.tolist()
+    for name, expected in differences(config, key, value, step, frames).items():
+        found = by[name].sel(parameter=key).values
+        size = np.linalg.norm(heart.arrays["mechanics"]["volume"]) if name == "volume" else np.linalg.norm(expected)
+        assert np.linalg.norm(found - expected) <= rtol * size + 1e-12, name
+
+
+def test_contractility_of_a_segment():
+    check(HEART, SEGMENT, 1.0, 2e-3, 2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("config", "key", "value", "step"),
+    [
+        (HEART, "mechanics.regional.stiffness.8", 1.0, 2e-3),
+        (HEART, "mechanics.active.sheet_share", 0.35, 5e-4),
+        (HEART, "fibres.endo_deg", 80.0, 0.05),
+        (HEART, "geometry.wall_mm", 1.0, 5e-4),
+        (HEART, "loop.esp_mmHg", 100.0, 0.1),
+        (FILLED, "mechanics.material.stiffness_kPa", 1.2, 1e-3),
+    ],
+)
+def test_laws_fibres_shape_loop_and_stiffness(config, key, value, step):
+    check(config, key, value, step, 2e-3)
+
+
+def test_systole_alone_ends_as_the_whole_cycle_does():
+    few = et.configure(HEART, loop={"frames": 10})
+    whole, systole = et.beat(few), et.beat(few, frames=et.systole(few))
+    assert len(systole.displacement) == whole.es + 1 and systole.es == whole.es
+    np.testing.assert_array_equal(systole.displacement, whole.displacement[: whole.es + 1])
+    with pytest.raises(ValueError, match=r"6 of 10 frames, of which only its arrays can be used"):
+        et.image(systole)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ([], "parameters: name one key or more"),
+        ("fibres.x", r"fibres.x: is no key by which a beat changes: give one of geometry, fibres, loop, mechanics"),
+        ("probe.pitch_um", "probe.pitch_um: is no key by which a beat changes"),
+        ("fibres", "fibres: is no key|fibres: no derivative can be taken"),
+        ("loop.edv_uL", "loop.edv_uL = None: no derivative can be taken by it: give it a value"),
+        ("mechanics.regional.contractility.18", "is no key by which a beat changes"),
+        ("mechanics.hold", "mechanics.hold = apex: no derivative can be taken by it: give a key"),
+    ],
+)
+def test_what_is_no_parameter_is_refused(parameters, message):
+    with pytest.raises(ConfigError, match=message):
+        et.sensitivities(HEART, parameters)
+
+
+@pytest.mark.parametrize(
+    ("keys", "frames", "error", "message"),
+    [
+        (
+            {"pathology.infarct.segments": [7]},
+            None,
+            PathologyError,
+            "pathology: derivatives are taken of hearts without",
+        ),
+        ({"loop.kind": "circulation"}, None, ValueError, "loop.kind = circulation: only a measured"),
+        ({"motion.kind": "rigid"}, None, ValueError, "motion.kind = rigid: only a beat"),
+        ({}, [1, 2], ValueError, r"frames = \[1, 2\]: give 0 and frames after it, in their order, below 24"),
+        ({}, [0, 30], ValueError, r"frames = \[0, 30\]: give 0"),
+    ],
+)
+def test_hearts_of_which_no_derivative_can_be_taken_are_refused(keys, frames, error, message):
+    with pytest.raises(error, match=message):
+        et.sensitivities(et.configure(HEART, **keys), SEGMENT, frames)
