@@ -26,9 +26,7 @@ def test_scatterers_are_spread_evenly_over_the_surface(heart):
     facets, xi = seed_border(CONFIG, heart, "epi", np.random.default_rng(2))
     position = Border(facets, xi, 1.0).positions(heart.nodes)
     probe = CONFIG.probe.si()
-    expected = (
-        np.pi * (3e-3 * probe.frequency / probe.sound_speed) ** 2
-    )  # half a sphere, one per two square wavelengths
+    expected = 2 * np.pi * (3e-3 * probe.frequency / probe.sound_speed) ** 2  # half a sphere, one per square wavelength
     assert abs(len(facets) - expected) < 5 * np.sqrt(expected) + 0.01 * expected
     np.testing.assert_allclose(np.linalg.norm(position, axis=1), 3e-3, rtol=2e-3)
     # The height of points that are even on a sphere is even.
@@ -62,7 +60,7 @@ def test_flat_border_across_the_beam_has_its_level_and_a_tilted_one_has_not():
 
     amplitude = border_amplitude(CONFIG, 10.0)
     probe = CONFIG.probe.si()
-    count = random.poisson((probe.frequency / probe.sound_speed) ** 2 * 2 * half[0] * half[2])
+    count = random.poisson((probe.frequency / probe.sound_speed) ** 2 * 4 * half[0] * half[2])
     sheet = random.uniform(-1, 1, (count, 3)) * [half[0], 0, half[2]]
     levels = []
     for tilt in (0.0, 25.0):

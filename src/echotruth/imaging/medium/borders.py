@@ -2,9 +2,9 @@
 
 A sheet of N scatterers of equal amplitude within a beam returns N^2 times the power of one where it is perpendicular
 to the beam, and N times elsewhere, as their echoes are in phase or not: a line that is bright where the border faces
-the probe and fainter at the sides, as that of a real border, which is a rough mirror. With one scatterer per two
-squares of the wavelength, N is some 8 in the default mouse. They are carried by the surface; their amplitude grows with
-its area, so that the echo of a border is that of its area.
+the probe and fainter at the sides, as that of a real border, which is a rough mirror. With one scatterer per square of
+the wavelength, N is some 16 in the default mouse. They are carried by the surface; their amplitude grows with its area,
+so that the echo of a border is that of its area.
 """
 
 from dataclasses import dataclass
@@ -96,9 +96,9 @@ def border_amplitude(config: Config, level_dB: float) -> float:
 
 
 def _density(config: Config) -> float:
-    """Scatterers of a border per area, 1/m^2: one per two squares of the wavelength."""
+    """Scatterers of a border per area, 1/m^2: one per square of the wavelength."""
     probe = config.probe.si()
-    return (probe.frequency / probe.sound_speed) ** 2 / 2
+    return (probe.frequency / probe.sound_speed) ** 2
 
 
 def _area(nodes: Floats, facets: Integers, xi: Floats) -> Floats:
