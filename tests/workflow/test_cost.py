@@ -17,7 +17,8 @@ from echotruth.workflow.jobs import places
 
 ROOT = Path(__file__).parents[2]
 MEASURED = json.loads((Path(__file__).parent / "measured_costs.json").read_text())
-"""CPU time without compilation of the stages of runs of the workflow, on one core of an AMD EPYC."""
+"""CPU time without compilation of the stages of runs of the workflow, on one core of an AMD EPYC. Scatterers and echoes
+of the realistic ones were measured again on the reference machine, and multiplied by `EPYC`."""
 EPYC = 1.7
 """Time on that machine, with the code of then, over that on the reference machine."""
 STAGES = {

@@ -47,12 +47,34 @@ class Blood(Tissue):
 
 
 class Surroundings(Tissue):
-    """Tissue around the heart."""
+    """Tissue around the heart. `density` is that at `rf.focus_mm` in the imaging plane; elsewhere there are as many
+    scatterers in a resolution cell as there."""
 
     start_mm: Positive = 2.0
     """Range from the array at which the tissue begins."""
     motion_decay_mm: Length = 1.0
     """Distance from the epicardium over which its motion falls to 1/e of that of the epicardium; 0 for no motion."""
+
+
+class Neighbours(Section):
+    """What lies around the wall of the left ventricle and in its cavity, in proportion to it. No part of the truth.
+    Levels are mean echo powers relative to muscle; null leaves a neighbour out."""
+
+    chambers_dB: Level | None = None
+    """Walls of the right ventricle and of both atria, whose cavities have the level of `blood`."""
+    lung_dB: Level | None = None
+    """Lung behind the free wall, at the epicardium, from which on it fades."""
+    chest_wall_dB: Level | None = None
+    """Brightest layers of the chest wall, between `surroundings.start_mm` and the heart."""
+    leaflets_dB: Level | None = None
+    """Mitral leaflets, which are open while the cavity fills."""
+    papillary_muscles_dB: Level | None = None
+    """Two papillary muscles, which move with the endocardium; 0 for the echo of muscle."""
+
+    @property
+    def around(self) -> dict[str, float | None]:
+        """Levels, dB, of those that are tissues of the surroundings, by key."""
+        return {key: getattr(self, key) for key in ("chambers_dB", "lung_dB", "chest_wall_dB")}
 
 
 class Noise(Section):
@@ -121,6 +143,8 @@ class Realism(Section):
     """Scatterers in the cavity, up to the plane of the base."""
     surroundings: Surroundings = Surroundings()
     """Tissue around the heart."""
+    neighbours: Neighbours = Neighbours()
+    """What lies around the wall of the left ventricle and in its cavity, in proportion to it."""
     noise: Noise = Noise()
     """Noise of the receiver."""
     haze: Haze = Haze()

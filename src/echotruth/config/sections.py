@@ -131,14 +131,25 @@ class Config(Section):
 
     @check
     def _check_tissues(self) -> None:
-        for name, tissue in {"blood": self.realism.blood, "surroundings": self.realism.surroundings}.items():
-            key, level = f"realism.{name}.level_dB", tissue.level_dB
+        realism = self.realism
+        levels = {f"{name}.level_dB": getattr(realism, name).level_dB for name in ("blood", "surroundings")}
+        levels |= {f"neighbours.{name}": level for name, level in realism.neighbours.model_dump().items()}
+        for name, level in levels.items():
+            key = f"realism.{name}"
             if self.phantom.in_plane_only and level is not None:
                 remedy = "must be null if phantom.in_plane_only is true, because it fills a volume"
                 raise invalid(key, level, remedy)
             if self.geometry.shape == "tube" and level is not None:
                 remedy = "must be null if geometry.shape is tube, because an open tube has no closed cavity"
                 raise invalid(key, level, remedy)
+
+    @check
+    def _check_neighbours(self) -> None:
+        realism = self.realism
+        for name, level in realism.neighbours.around.items():
+            if level is not None and realism.surroundings.level_dB is None:
+                remedy = "needs realism.surroundings.level_dB, the echo power of what lies between the neighbours"
+                raise invalid(f"realism.neighbours.{name}", level, remedy)
 
     @check
     def _check_width(self) -> None:

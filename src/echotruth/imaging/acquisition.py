@@ -57,12 +57,8 @@ class Acquisition:
         """Record of scatterers, their positions (n, 3), m, amplitudes (n,) and exponents (n,), without noise."""
         if self._filter is None:
             return self._matrix(position, amplitude, exponent)
-        exponent = np.broadcast_to(exponent, amplitude.shape)
         near = np.linalg.norm(position, axis=1) < self._haze_range
-        record = self._matrix(position[near], amplitude[near], exponent[near])
-        record *= self._filter.astype(np.complex64)[:, None, None]
-        record += self._matrix(position[~near], amplitude[~near], exponent[~near])
-        return record
+        return self._matrix(position, amplitude, exponent, (near, self._filter))
 
     def unit_noise(self, frame: int) -> np.ndarray:
         """Noise of variance 1 in the records of all pairs in a frame, at the frequencies of the matrix.

@@ -110,7 +110,8 @@ def _rf(config: Config, view: str) -> float:
     waves = rf.lines * rf.focal_zones if rf.transmit == "focused" else 8 * (rf.transmits + rf.lines)
     heart, around = scatterers(config, view)
     # Many of those around the heart, and at the apex, are so near the array that every pair of elements is computed.
-    echoes = (1.3 if config.views[view].plane == "long_axis" else 1.0) * heart + 1.3 * around
+    # What is around the heart fills the scan, whose sectors take time each.
+    echoes = (1.3 if config.views[view].plane == "long_axis" else 1.0) * heart + 2.1 * around + 42_000 * (around > 0)
     echoes *= sqrt(elements) * (lens_size(config) ** 1.5 if rf.elevation_beam else 0.55)
     lines = (130_000 if "channels" in rf.keep else 17_000) * elements**2 + 67 * elements * waves
     return 130_000 + 330 * elements * waves + config.loop.frames * (echoes + lines)

@@ -1,6 +1,6 @@
 """How much tissue a view images: the wall in its plane, and what scatters within its beam, of the ideal ellipsoid."""
 
-from math import asin, pi, sqrt
+from math import asin, pi, radians, sqrt
 from typing import NamedTuple
 
 from echotruth.config import Config
@@ -14,8 +14,6 @@ LOWEST_FREQUENCY = 0.6
 MOTION = 1.65
 """Scatterers that are in the beam in any frame over those at end-diastole: the tissue moves, and the edge of the beam
 is blurred."""
-OFF_FOCUS = 0.4
-"""Mean distance of a point of the sector from the focus of the lens, over the range of the focus."""
 
 
 class Ellipsoid(NamedTuple):
@@ -77,10 +75,19 @@ def scatterers(config: Config, view: str) -> tuple[float, float]:
     heart = (wall + blood) * _thickness(config, distance / config.probe.elevation_focus_mm)
     around = 0.0
     if realism.surroundings.level_dB is not None:
-        area = max(0.0, config.bmode.field_of_view_mm**2 - cavity - wall)
-        around = realism.surroundings.density * area * _thickness(config, OFF_FOCUS)
-    density = MOTION * config.phantom.density_per_mm3
-    return density * heart, density * around
+        around = realism.surroundings.density * _surroundings_mm3(config)
+    density = config.phantom.density_per_mm3
+    return MOTION * density * heart, density * around
+
+
+def _surroundings_mm3(config: Config) -> float:
+    """Volume that the surroundings would fill at their density at the focus, mm3: equal parts of range have as many."""
+    rf, probe, side = config.rf, config.probe, config.bmode.field_of_view_mm
+    width = radians(rf.sector_deg) * rf.focus_mm if rf.scan == "sector" else rf.width_mm or side
+    wavelength = probe.sound_speed_m_per_s / probe.frequency_MHz / 1e3
+    rays = probe.height_mm / 2 * abs(1 - rf.focus_mm / probe.elevation_focus_mm)
+    # The integral of a Gaussian with half the beam's half thickness, cut at that half thickness.
+    return width * side * 1.2 * (rays + wavelength * rf.focus_mm / probe.height_mm)
 
 
 def wall_scatterers(config: Config) -> float:

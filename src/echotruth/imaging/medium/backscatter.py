@@ -12,7 +12,7 @@ import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.config.realism import Backscatter
-from echotruth.fem.tetrahedra import MaterialPoints, gradient
+from echotruth.fem.tetrahedra import MaterialPoints, jacobian, shape_gradient
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
 
@@ -36,8 +36,10 @@ class FibreEcho:
     """
 
     def __init__(self, backscatter: Backscatter, heart: Heart, plane: Plane, points: MaterialPoints) -> None:
-        self._backscatter, self._heart, self._plane, self._points = backscatter, heart, plane, points
-        self._fibre = heart.arrays["fibres"]["fibre"][points.cell]
+        self._backscatter, self._heart, self._plane, self._cell = backscatter, heart, plane, points.cell
+        fibre = heart.arrays["fibres"]["fibre"][points.cell]
+        local = np.linalg.solve(jacobian(heart.nodes, heart.cells, points), fibre[..., None])
+        self._derivative = (shape_gradient(points.xi) @ local)[..., 0]
         self._length = np.linalg.norm(self._fibres(0), axis=1)
 
     def __call__(self, frame: int, position: Floats) -> Floats:
@@ -58,6 +60,9 @@ class FibreEcho:
         return 10 ** (power / 20)
 
     def _fibres(self, frame: int) -> Floats:
-        """F f_0 (n, 3): the fibres, as long as they are stretched since the unloaded state."""
-        deformation = gradient(self._heart.positions(frame), self._heart.nodes, self._heart.cells, self._points)
-        return np.einsum("nij,nj->ni", deformation, self._fibre)
+        """F f_0 (n, 3): the fibres, as long as they are stretched since the unloaded state.
+
+        It is the derivative of the position along the unloaded fibre, a sum over the nodes of the cell.
+        """
+        nodes = self._heart.positions(frame)[self._heart.cells[self._cell]]
+        return (self._derivative[:, None] @ nodes)[:, 0]

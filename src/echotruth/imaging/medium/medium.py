@@ -11,11 +11,14 @@ from echotruth.config.realism import Tissue
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, MaterialPoints, interpolate
 from echotruth.heart import Heart
+from echotruth.imaging.medium.anatomy import CAVITIES
 from echotruth.imaging.medium.backscatter import FibreEcho
 from echotruth.imaging.medium.blood import Blood, Cavity, seed_blood
 from echotruth.imaging.medium.borders import Border, border_amplitude, seed_border
+from echotruth.imaging.medium.mitral_valve import Leaflets, seed_leaflets
+from echotruth.imaging.medium.papillary_muscles import PapillaryMuscles, seed_papillary_muscles
 from echotruth.imaging.medium.random_process import Random, ar1, brownian, diffusion_std
-from echotruth.imaging.medium.surroundings import SurroundingsMotion, outside_heart, seed_surroundings
+from echotruth.imaging.medium.surroundings import AroundHeart, exponents, seed_surroundings
 from echotruth.imaging.medium.wall import Scatterers, seed_wall
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import read_loop
@@ -26,6 +29,9 @@ InBeam = Callable[[Floats], NDArray[np.bool_]]
 
 BORDERS = {"endocardium": "endo", "epicardium": "epi"}
 """Names of the borders of the wall, and of their surfaces of the mesh."""
+
+IN_CAVITY: dict[str, Any] = {"leaflets": Leaflets, "papillary_muscles": PapillaryMuscles}
+"""Names of the bodies in the cavity, and their classes."""
 
 MAX_DIFFUSION = 5
 """Offset that blood is assumed not to exceed over a cycle, in standard deviations."""
@@ -47,8 +53,9 @@ def seed_medium(config: Config, heart: Heart, plane: Plane, random: Random, in_b
     Returns
     -------
     dict of ndarray
-        cell, xi and amplitude of the scatterers in the wall; endocardium_*, epicardium_*, blood_* and surroundings_*
-        where there are such.
+        cell, xi and amplitude of the scatterers in the wall; endocardium_*, epicardium_*, blood_*, surroundings_*,
+        leaflets_* and
+        papillary_muscles_* where there are such.
     """
     frames = [heart.positions(frame) for frame in range(len(heart.displacement))]
     wall = seed_wall(config, heart, plane, random("phantom"))
@@ -68,10 +75,15 @@ def seed_medium(config: Config, heart: Heart, plane: Plane, random: Random, in_b
         nearest = (_moved_towards_plane(plane.to_image(position), offset) for position in carried)
         arrays |= _ever_in_beam(candidates, nearest, in_beam)
     if config.realism.surroundings.level_dB is not None:
-        position, amplitude = seed_surroundings(config, heart, plane, random("surroundings"))
-        motion = SurroundingsMotion(heart, position, config.realism.surroundings.si().motion_decay)
-        candidates = {"surroundings_position": position, "surroundings_amplitude": amplitude}
-        arrays |= _ever_in_beam(candidates, (plane.to_image(motion(k)) for k in range(len(frames))), in_beam)
+        drawn = seed_surroundings(config, heart, plane, random("surroundings"))
+        around = AroundHeart(config, heart, plane, drawn["position"], drawn["tissue"])
+        candidates = {f"surroundings_{name}": values for name, values in drawn.items()}
+        arrays |= _ever_in_beam(candidates, map(around.positions, range(len(frames))), in_beam)
+    for name, seed in _in_cavity(config).items():
+        drawn = seed(config, heart, random(name))
+        body = IN_CAVITY[name](heart, **drawn)
+        candidates = {f"{name}_{key}": values for key, values in drawn.items()}
+        arrays |= _ever_in_beam(candidates, (plane.to_image(body.positions(k)) for k in range(len(frames))), in_beam)
     return arrays
 
 
@@ -91,6 +103,12 @@ def _borders(config: Config) -> dict[str, tuple[str, float]]:
     """Borders that echo: their surface of the mesh and their level, dB."""
     levels = {name: getattr(config.realism.borders, f"{name}_dB") for name in BORDERS}
     return {name: (BORDERS[name], level) for name, level in levels.items() if level is not None}
+
+
+def _in_cavity(config: Config) -> dict[str, Callable[..., Arrays]]:
+    """Bodies in the cavity that echo: functions that draw their scatterers."""
+    seeds: dict[str, Callable[..., Arrays]] = {"leaflets": seed_leaflets, "papillary_muscles": seed_papillary_muscles}
+    return {name: seed for name, seed in seeds.items() if getattr(config.realism.neighbours, f"{name}_dB") is not None}
 
 
 def _blood_decorrelation(config: Config) -> tuple[float, float]:
@@ -128,16 +146,34 @@ class Medium:
             Border(seeded[f"{name}_facets"], seeded[f"{name}_xi"], border_amplitude(config, level_dB))
             for name, (_, level_dB) in _borders(config).items()
         ]
-        self._blood = self._surroundings = None
+        self._blood: Blood | None = None
+        self._surroundings: AroundHeart | None = None
         if "blood_cell" in seeded:
             points = MaterialPoints(seeded["blood_cell"], seeded["blood_xi"])
             self._blood = Blood(points, seeded["blood_jacobian_threshold"], seeded["blood_amplitude"])
             self._diffusion = brownian(len(points), time, *_blood_decorrelation(config), random)
         if "surroundings_position" in seeded:
-            decay_length = config.realism.surroundings.si().motion_decay
-            self._surroundings = SurroundingsMotion(heart, seeded["surroundings_position"], decay_length)
-            amplitude = seeded["surroundings_amplitude"]
-            self._surroundings_amplitude = self._amplitudes(amplitude, time, "surroundings", random)
+            tissue = seeded["surroundings_tissue"]
+            self._surroundings = AroundHeart(config, heart, plane, seeded["surroundings_position"], tissue)
+            self._surroundings_exponent = exponents(config, tissue)
+            self._surroundings_amplitude = self._amplitudes_around(seeded, time, random)
+        self._bodies = [
+            IN_CAVITY[name](heart, **_named(name, seeded)) for name in IN_CAVITY if f"{name}_amplitude" in seeded
+        ]
+
+    def _amplitudes_around(self, seeded: Arrays, time: Floats, random: Random) -> Callable[[int], Floats]:
+        """Amplitudes by frame of what is around the heart: blood changes as that in the cavity."""
+        amplitude, blood = seeded["surroundings_amplitude"], np.isin(seeded["surroundings_tissue"], CAVITIES)
+        sign, strength = np.sign(amplitude), np.abs(amplitude)
+        fading = self._amplitudes(sign[~blood], time, "surroundings", random)
+        flowing = ar1(sign[blood], time, self._config.realism.blood.si().decorrelation_time, "chambers", random)
+
+        def of_frame(frame: int) -> Floats:
+            signs = np.empty_like(sign)
+            signs[~blood], signs[blood] = fading(frame), flowing(frame)
+            return strength * signs
+
+        return of_frame
 
     def _amplitudes(self, amplitude: Floats, time: Floats, name: str, random: Random) -> Callable[[int], Floats]:
         """Amplitudes by frame: constant, or decorrelating."""
@@ -169,13 +205,22 @@ class Medium:
             position, amplitude = self._blood.at(frame, self._heart, self._diffusion)
             parts.append(_of_tissue(realism.blood, self._plane.to_image(position), amplitude))
         if self._surroundings is not None:
-            position, amplitude = self._surroundings(frame), self._surroundings_amplitude(frame)
-            present = outside_heart(self._heart, frame, position)
-            present &= self._plane.to_image(position)[:, 1] > 0
+            position = self._surroundings.positions(frame)
+            present = self._surroundings.present(frame, position)
+            amplitude = self._surroundings_amplitude(frame)[present]
+            parts.append((position[present], amplitude, self._surroundings_exponent[present]))
+        for body in self._bodies:
+            position = body.positions(frame)
+            present = locate(nodes, self._heart.cells, position).cell < 0
             position = self._plane.to_image(position[present])
-            parts.append(_of_tissue(realism.surroundings, position, amplitude[present]))
-        positions, amplitudes, exponents = map(np.concatenate, zip(*parts, strict=True))
-        return positions, amplitudes, exponents
+            parts.append(_of_tissue(self._config.phantom, position, body.amplitude[present]))
+        together = tuple(map(np.concatenate, zip(*parts, strict=True)))
+        return together[0], together[1], together[2]
+
+
+def _named(name: str, seeded: Arrays) -> Arrays:
+    """Arrays whose names begin with that of a kind of scatterers, without it."""
+    return {key.removeprefix(f"{name}_"): values for key, values in seeded.items() if key.startswith(f"{name}_")}
 
 
 def _of_tissue(tissue: Phantom | Tissue, position: Floats, amplitude: Floats) -> tuple[Floats, Floats, Floats]:

@@ -227,7 +227,13 @@ class FullMatrix:
         sine = np.abs(position[:, 0]) / np.linalg.norm(position, axis=1)
         return np.rint(sine * (directivity.ANGLES - 1)).astype(np.int64)
 
-    def __call__(self, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray | float = 0.0) -> np.ndarray:
+    def __call__(
+        self,
+        position: np.ndarray,
+        amplitude: np.ndarray,
+        exponent: np.ndarray | float = 0.0,
+        filtered: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> np.ndarray:
         """Spectra of the echoes of all pairs at `frequency`.
 
         Parameters
@@ -238,6 +244,8 @@ class FullMatrix:
         exponent : ndarray of shape (scatterers,), or float
             Power of the frequency that the amplitude follows; 0 for scattering that is the same at all frequencies. Few
             different values, because the echoes of each are transformed apart.
+        filtered : tuple of ndarray of shape (scatterers,) and (bins,), optional
+            Which scatterers (bool) have echoes that pass a filter, and its transfer function.
 
         Returns
         -------
@@ -247,13 +255,21 @@ class FullMatrix:
         inside = self.in_beam(position)
         position, amplitude = position[inside], amplitude[inside].astype(np.float32)
         powers = np.broadcast_to(exponent, inside.shape)[inside]
+        passes, transfer = (np.zeros(len(inside), bool), np.ones(1)) if filtered is None else filtered
+        passes, transfers = passes[inside], (np.ones(1, np.float32), transfer.astype(np.complex64))
         numbers = self._clusters.numbers(position)
         matrix = np.zeros((len(self.frequency), *[len(self.centres)] * 2), np.complex64)
         clusters, spectra = [], []
         for number in np.unique(numbers):
             own, cluster = numbers == number, self._clusters[number]
             clusters.append(cluster)
-            spectra.append(self._skeleton_spectra(cluster.skeleton, position[own], amplitude[own], powers[own]))
+            parts = ((own & (passes == which), transfers[int(which)]) for which in np.unique(passes[own]))
+            echoes = (
+                self._skeleton_spectra(cluster.skeleton, position[part], amplitude[part], powers[part])
+                * transfer[:, None]
+                for part, transfer in parts
+            )
+            spectra.append(reduce(np.add, echoes))
             if sum(each.nbytes for each in spectra) > EXPANDED or number == numbers.max():
                 add_expanded(matrix, clusters, self.frequency, np.concatenate(spectra, axis=1))
                 clusters, spectra = [], []

@@ -1,0 +1,177 @@
+"""What lies around the left ventricle and in its cavity: where it is, how loud, and how it moves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from echotruth.config import Config
+from echotruth.fem.location import locate
+from echotruth.imaging.medium.anatomy import Anatomy, Neighbour
+from echotruth.imaging.medium.blood import Cavity
+from echotruth.imaging.medium.filling import emptied, opening, volumes
+from echotruth.imaging.medium.medium import Medium, seed_medium
+from echotruth.imaging.medium.mitral_valve import Leaflets, seed_leaflets
+from echotruth.imaging.medium.papillary_muscles import PapillaryMuscles, seed_papillary_muscles
+from echotruth.imaging.medium.surroundings import AroundHeart, seed_surroundings
+from echotruth.imaging.view import imaging_plane
+
+LEVELS = {"chambers_dB": 0.0, "lung_dB": 2.0, "chest_wall_dB": 3.0, "leaflets_dB": 4.0, "papillary_muscles_dB": 0.0}
+REALISM = {
+    "blood": {"level_dB": -25.0},
+    "surroundings": {"level_dB": -20.0, "density": 0.3},
+    "neighbours": LEVELS,
+}
+CONFIG = Config.model_validate({"phantom": {"density_per_mm3": 1500.0}, "realism": REALISM})
+EJECTED = np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.6, 0.2, 0.1])
+"""Course of a cycle: isovolumic, ejection, isovolumic, filling."""
+
+
+def random(name):
+    return np.random.default_rng(list(name.encode()))
+
+
+@pytest.fixture(scope="module")
+def heart(twisting_heart, coarse_mesh):
+    """A ventricle that narrows by a fifth, and whose base descends by 0.5 mm, as it empties."""
+    narrows = coarse_mesh.nodes * [-0.2, -0.2, 0] + [0, 0, -0.5e-3]
+    displacement = EJECTED[:, None, None] * narrows
+    arrays = {"geometry": {"endo": coarse_mesh.endo, "epi": coarse_mesh.epi}}
+    return replace(twisting_heart, displacement=displacement, es=3, arrays=arrays)
+
+
+@pytest.fixture(scope="module", params=["mid", "long_axis"])
+def plane(request, heart):
+    return imaging_plane(CONFIG.views[request.param], CONFIG.rf, heart.endo_at_ed)
+
+
+@pytest.fixture(scope="module")
+def seeded(heart, plane):
+    return seed_surroundings(CONFIG, heart, plane, random("surroundings"))
+
+
+def power_dB(seeded, plane, box, volume):
+    """Echo power in a box of the image (lateral, axial), relative to muscle, and its standard error, dB."""
+    lateral, axial, elevation = plane.to_image(seeded["position"]).T
+    inside = box(lateral, axial) & (np.abs(elevation) < 0.15e-3)
+    power = seeded["amplitude"][inside] ** 2
+    relative = power.sum() / volume / CONFIG.phantom.si().density
+    return 10 * np.log10(relative), 10 / np.log(10) * np.sqrt((power**2).sum()) / power.sum()
+
+
+def test_the_right_ventricle_is_a_cavity_of_blood_on_the_septal_side(heart):
+    mid = imaging_plane(CONFIG.views["mid"], CONFIG.rf, heart.endo_at_ed)
+    seeded = seed_surroundings(CONFIG, heart, mid, random("surroundings"))
+    # The septum is at the left; its epicardium is 2.4 mm from the long axis, which is 6.5 mm deep.
+    found, error = power_dB(
+        seeded, mid, lambda x, z: (np.abs(x + 3.1e-3) < 0.4e-3) & (np.abs(z - 6.5e-3) < 0.4e-3), 0.8e-3**2 * 0.3e-3
+    )
+    assert found == pytest.approx(-25, abs=4 * error + 0.3)
+    opposite = mid.to_heart(np.array([[3.1e-3, 6.5e-3, 0.0]]))
+    anatomy = Anatomy(heart)
+    assert anatomy.chambers(opposite, anatomy.place(opposite)) == Neighbour.CONNECTIVE
+
+
+def test_walls_of_chambers_have_their_level(seeded, heart, plane):
+    walls = np.isin(seeded["tissue"], (Neighbour.RIGHT_FREE_WALL, Neighbour.ATRIAL_WALL))
+    near = np.abs(plane.to_image(seeded["position"])[:, 2]) < 0.15e-3
+    assert (walls & near).sum() > 20
+    # Power of a scatterer over that of one of the connective tissue beside it, which has the same density.
+    range_ = np.linalg.norm(plane.to_image(seeded["position"])[:, :2], axis=1)
+    scaled = seeded["amplitude"] ** 2 / range_
+    rest = seeded["tissue"] == Neighbour.CONNECTIVE
+    middle = np.abs(range_ - 6.5e-3) < 1.5e-3
+    ratio = scaled[walls & near & middle].mean() / scaled[rest & near & middle & (scaled > 0)].min()
+    assert 10 * np.log10(ratio) == pytest.approx(20, abs=4)
+
+
+def test_the_medium_has_nothing_of_them_in_the_wall_nor_in_the_cavity(heart, plane):
+    seeded = seed_medium(CONFIG, heart, plane, random, lambda position: np.ones(len(position), bool))
+    medium = Medium(CONFIG, heart, plane, time=np.arange(8) * 15e-3, seeded=seeded, random=random)
+    around = AroundHeart(CONFIG, heart, plane, seeded["surroundings_position"], seeded["surroundings_tissue"])
+    for frame in (0, 3, 6):
+        nodes, cavity = heart.positions(frame), Cavity(heart.endo)
+        position = around.positions(frame)
+        position = plane.to_heart(position[around.present(frame, position)])
+        assert len(position) > 1000
+        assert (locate(nodes, heart.cells, position).cell < 0).all()
+        assert (locate(cavity.positions(nodes), cavity.cells, position).cell < 0).all()
+        others = plane.to_heart(medium(frame)[0][len(seeded["cell"]) :])
+        assert (locate(nodes, heart.cells, others).cell < 0).all()
+
+
+def test_neighbours_leave_the_wall_and_its_bytes_as_they_are(heart, plane):
+    def made(**realism):
+        config = Config.model_validate({"phantom": {"density_per_mm3": 100.0}, "realism": realism})
+        seeded = seed_medium(config, heart, plane, random, lambda position: np.ones(len(position), bool))
+        return Medium(config, heart, plane, time=np.arange(8) * 15e-3, seeded=seeded, random=random)(3)
+
+    alone, together, again = made(), made(**REALISM), made(**REALISM)
+    for bare, full, same in zip(alone, together, again, strict=True):
+        assert full[: len(bare)].tobytes() == bare.tobytes()
+        assert full.tobytes() == same.tobytes() and len(full) > len(bare)
+
+
+def test_the_free_wall_moves_inwards_and_the_chest_wall_stays(heart):
+    mid = imaging_plane(CONFIG.views["mid"], CONFIG.rf, heart.endo_at_ed)
+    seeded = seed_surroundings(CONFIG, heart, mid, random("surroundings"))
+    around = AroundHeart(CONFIG, heart, mid, seeded["position"], seeded["tissue"])
+    start, end = around.positions(0), around.positions(3)
+    free = (seeded["tissue"] == Neighbour.RIGHT_FREE_WALL) & (np.abs(start[:, 1] - 6.5e-3) < 0.5e-3)
+    free &= start[:, 0] < -2.6e-3
+    septum, height = 0.2 * 2.33e-3, (3.4 / 7.6) / 0.85
+    # Two fifths of its width, which falls from 0.75 of 2.5 mm at the base, besides the motion of the septum.
+    expected = septum + 0.4 * 0.75 * 2.5e-3 * (1 - height**2)
+    assert free.sum() > 20 and (end - start)[free, 0].mean() == pytest.approx(expected, rel=0.1)
+    chest = seeded["tissue"] == Neighbour.CHEST_WALL
+    assert chest.sum() > 100 and np.array_equal(start[chest], end[chest])
+    assert np.array_equal(start[:, 2], end[:, 2])
+
+
+def test_the_valve_is_open_while_the_cavity_fills(heart):
+    volume = volumes(heart)
+    np.testing.assert_allclose(volume / volume[0], (1 - 0.2 * EJECTED) ** 2, rtol=1e-9)
+    assert emptied(volume)[3] == 1 and emptied(volume)[0] == 0
+    open_ = opening(volume)
+    assert (open_[[0, 1, 2, 3]] == 0).all() and (open_[[4, 5]] == 1).all() and 0 < open_[6] < 1
+    assert (opening(np.full(8, 30e-9)) == 0).all()
+
+
+def test_leaflets_meet_below_the_base_when_shut_and_point_into_the_cavity_when_open(heart):
+    along = np.zeros(4)
+    place = np.column_stack([along, [1, 1, -1, -1], [0, 1, 0, 1], along])
+    leaflets = Leaflets(heart, place, np.ones(4))
+    rim = heart.positions(0)[Cavity(heart.endo).rim]
+    shut, open_ = leaflets.positions(1), leaflets.positions(4)
+    radius = np.hypot(*rim[:, :2].T).mean()
+    assert shut[1, 0] == pytest.approx(shut[3, 0]) == pytest.approx(-radius / 3)
+    assert (shut[[1, 3], 2] < rim[:, 2].mean()).all()
+    np.testing.assert_allclose(shut[[0, 2], 0], [radius, -radius])
+    base = heart.positions(4)[Cavity(heart.endo).rim][:, 2].mean()
+    assert base - open_[1, 2] > 0.8 * (4 / 3) * 0.8 * radius
+    assert open_[1, 0] - open_[3, 0] > radius  # the way is free
+
+
+def test_leaflets_and_papillary_muscles_have_their_level(heart):
+    muscles = seed_papillary_muscles(CONFIG, heart, random("papillary_muscles"))
+    leaflets = seed_leaflets(CONFIG, heart, random("leaflets"))
+    for drawn, level in ((muscles, 0.0), (leaflets, 4.0)):
+        assert len(drawn["amplitude"]) > 500
+        assert 10 * np.log10((drawn["amplitude"] ** 2).mean()) == pytest.approx(level, abs=0.8)
+    # As dense as muscle: in a box within the body.
+    one = muscles["position"][muscles["muscle"] == 0]
+    box = (np.abs(one - one.mean(axis=0)) < 0.08e-3).all(axis=1).sum()
+    expected = CONFIG.phantom.si().density * 0.16e-3**3
+    assert abs(box - expected) < 4 * np.sqrt(expected)
+
+
+def test_papillary_muscles_lie_in_the_cavity_and_ride_with_its_wall(heart):
+    muscles = seed_papillary_muscles(CONFIG, heart, random("papillary_muscles"))
+    body, cavity = PapillaryMuscles(heart, **muscles), Cavity(heart.endo)
+    assert (locate(cavity.positions(heart.positions(0)), cavity.cells, body.positions(0)).cell >= 0).all()
+    moved = body.positions(3) - body.positions(0)
+    assert np.ptp(moved[muscles["muscle"] == 1], axis=0).max() < 1e-12
+    # Towards the axis, by a fifth of its distance at the endocardium.
+    azimuth = 7 * np.pi / 4
+    inwards = -moved[muscles["muscle"] == 1].mean(axis=0)[:2] @ [np.cos(azimuth), np.sin(azimuth)]
+    assert inwards == pytest.approx(0.2 * 1.3e-3, rel=0.15)
