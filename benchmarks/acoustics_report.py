@@ -53,7 +53,7 @@ def scans(found: Result) -> Lines:
         "Ours are whole: RF, beamforming, 512 px image. The peers' are RF alone, of fewer scatterers, taken as often",
         "as there are transmits and scatterers. Errors are relative L2 of the RF, after the best common factor for the",
         "peers: in the plane of elements that are points in elevation, and under the lens. PyMUST in two dimensions",
-        "has another law of distance, and each peer a lens of its own, which is most of its error there.",
+        "has another law of distance, and each peer a lens of its own.",
     ]
 
 
