@@ -16,10 +16,10 @@ human_2_7MHz
     Frequency, bandwidth, elements and lengths of the cardiac phased array P4-2v, as the simulator PyMUST gives them
     (Garcia, Comput Methods Programs Biomed 218 (2022) 106726).
 human_3MHz
-    80 elements at half a wavelength, as cardiac phased arrays of clinics have some 64 to 128; all numbers are our choice.
+    80 elements at half a wavelength, as cardiac phased arrays of clinics have some 64 to 128; all numbers are ours.
 mouse_linear_40MHz
-    256 elements at 1.4 wavelengths, as linear arrays of scanners for mice are; all numbers are our choice. Its lines are
-    not steered, and an F-number of two keeps the elements that see a point far from their axis out of its line.
+    256 elements at 1.4 wavelengths, as linear arrays of scanners for mice are; all numbers are ours. Its lines are not
+    steered, and an F-number of two keeps the elements that see a point far from their axis out of its line.
 
 Element width and height and elevation focus of the arrays for rodents are our choice; a bandwidth of one half is usual
 at these frequencies.
