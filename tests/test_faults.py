@@ -80,7 +80,6 @@ def damage(path: Path) -> None:
     "name, stages",
     [
         ("tracking/64/one/quality/c/0/1/0/0/0", {"tracking"}),
-        ("truth/64/strain/c/0/1/0/0/0/0", {"truth", "tracking"}),
         ("phantom/origin/c/0/0/0", {"phantom", "rf", "bmode", "tracking"}),
     ],
 )

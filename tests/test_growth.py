@@ -76,14 +76,6 @@ def whole(tmp_path_factory):
     return Folder(tmp_path_factory.mktemp("whole") / "echotruth").make(CONFIG)
 
 
-# The first tracker and a view are added in the tests that are killed on the way.
-@pytest.mark.parametrize("lacking", ["a tracker", "a size"])
-def test_repository_that_got_what_it_lacked_equals_one_made_at_once(whole, tmp_path, lacking):
-    grown = Folder(tmp_path / "echotruth")
-    grown.make(BEFORE[lacking])
-    assert differing(grown.make(CONFIG), whole) == []
-
-
 @pytest.fixture(scope="module")
 def two(tmp_path_factory):
     """A repository of two cases that was made at once."""
@@ -113,28 +105,26 @@ def test_repository_that_grew_step_by_step_equals_one_made_at_once(whole, tmp_pa
     assert differing(folder, whole) == []
 
 
-@pytest.mark.parametrize("stage", ["rf", "tracking"])
-def test_run_killed_while_a_stage_is_made_and_continued_gives_the_same_bytes(whole, tmp_path, stage):
+# benchmarks/endurance.py kills at all stages.
+def test_run_killed_while_a_stage_is_made_and_continued_gives_the_same_bytes(whole, tmp_path):
     folder = Folder(tmp_path / "echotruth")
     run = folder.start(*COMMAND, "run", "tiny.yaml", "--cores", "1", "repository")
-    folder.kill_when(run, lambda: folder.has(f"ledger/{stage}/**/*.json"))
+    folder.kill_when(run, lambda: folder.has("ledger/rf/**/*.json"))
     assert differing(folder.make(CONFIG), whole) == []
     assert not (folder.out / "scratch").exists()
 
 
-@pytest.mark.parametrize("lacking", ["the first tracker", "a view"])
-def test_run_killed_while_a_repository_grows_and_continued_gives_the_same_bytes(whole, tmp_path, lacking):
+def test_run_killed_while_a_repository_grows_and_continued_gives_the_same_bytes(whole, tmp_path):
     folder = Folder(tmp_path / "echotruth")
-    folder.make(BEFORE[lacking])
+    folder.make(BEFORE["a view"])
     run = folder.start(*COMMAND, "run", folder.write(text(CONFIG)), "--cores", "1", "repository")
     folder.kill_when(run, lambda: not folder.has("ledger/repository.json"))
     assert differing(folder.make(CONFIG), whole) == []
 
 
-@pytest.mark.parametrize("group", ["tracking", "mechanics"])
-def test_damaged_repository_that_was_healed_equals_one_made_at_once(whole, tmp_path, group):
+def test_damaged_repository_that_was_healed_equals_one_made_at_once(whole, tmp_path):
     folder = copied(whole, Folder(tmp_path / "echotruth"))
-    shard = min(path for path in (folder.out / "tiny.zarr" / group).rglob("c/0/**/0") if path.is_file())
+    shard = min(path for path in (folder.out / "tiny.zarr/mechanics").rglob("c/0/**/0") if path.is_file())
     shard.write_bytes(shard.read_bytes()[:-1])
     folder.echotruth("check", "out/tiny", "--heal", status=1)
     assert differing(folder.make(CONFIG), whole) == []

@@ -53,7 +53,7 @@ def test_sdist_has_tests_and_docs_and_no_data_but_the_sample(sdist):
     found = files(sdist)
     assert {"LICENSE", "README.md", "CITATION.cff", "requirements.lock", "docs/schema.md", "config/demo.yaml"} <= found
     assert files(ROOT / "tests") <= {name.removeprefix("tests/") for name in found if name.startswith("tests/")}
-    assert {name.split("/")[0] for name in found if name.startswith(".")} <= {".ci", ".gitignore"}
+    assert {name.split("/")[0] for name in found if name.startswith(".")} <= {".ci", ".dockerignore", ".gitignore"}
     others = [
         name for name in found if not name.startswith("src/echotruth/shipped/sample/")
     ]  # it has a bound of its own

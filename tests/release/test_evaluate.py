@@ -36,7 +36,7 @@ def tracked(tracker):
     """What a tracker found at the points of that clip, px."""
     found = et.sample().tracks("infarct", "mid", trackers=[tracker])["displacement"].isel(tracker=0)
     inside = np.isfinite(et.sample().tracks("infarct", "mid")["true_displacement"].values[0, ..., 0])
-    return found.values[:, inside] / (15e-3 / 256)
+    return found.values[:, inside] / (et.sample().config.bmode.si().field_of_view / 256)
 
 
 @pytest.mark.parametrize("tracker", ["dis", "bspline_dic"])
