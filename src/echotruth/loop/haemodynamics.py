@@ -121,14 +121,13 @@ def filling_ratio(time: Floats, volume: Floats, phase: NDArray[np.uint8]) -> flo
     float
         Of the two waves that stand out most; not a number where they are fused, as they are in hearts that beat fast.
     """
-    from scipy.interpolate import CubicSpline
     from scipy.signal import find_peaks
 
     filling = np.flatnonzero(phase == FILLING)
     if not np.isfinite(volume).all() or len(filling) < 2 * _PARABOLA:
         return np.nan
-    closed = np.append(time, 2 * time[-1] - time[-2]), np.append(volume, volume[0])
-    rate = CubicSpline(*closed, bc_type="periodic").derivative()(np.linspace(time[filling[0]], closed[0][-1], 500))
+    curve = _periodic_spline(time, volume)
+    rate = curve.derivative()(np.linspace(time[filling[0]], curve.x[-1], 500))
     waves, found = find_peaks(rate, prominence=_WAVE * rate.max())
     if len(waves) < 2:
         return np.nan
@@ -171,18 +170,22 @@ def pressure_rates(time: Floats, pressure: Floats, mitral_opening: float) -> Pre
     PressureRates
         Not a number without pressures; `tau` also where there is no relaxation between the two times.
     """
-    from scipy.interpolate import CubicSpline
-
     if not np.isfinite(pressure).all() or len(time) < _PARABOLA:
         return PressureRates(np.nan, np.nan, np.nan)
-    closed = np.append(time, 2 * time[-1] - time[-2]), np.append(pressure, pressure[0])
-    curve = CubicSpline(*closed, bc_type="periodic")
+    curve = _periodic_spline(time, pressure)
     rate = curve.derivative()
     # The extremes of the parabolas between the frames lie where the second derivative vanishes, or at a frame.
     extreme = np.append(time, curve.derivative(2).roots(extrapolate=False))
     rates = rate(extreme)
     span = extreme[np.argmin(rates)], mitral_opening
     return PressureRates(float(rates.max()), float(rates.min()), _time_constant(curve, span))
+
+
+def _periodic_spline(time: Floats, values: Floats) -> CubicSpline:
+    """Cubic spline through the values (n_frames,) of a cycle that closes, at equal steps of time (n_frames,), s."""
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(np.append(time, 2 * time[-1] - time[-2]), np.append(values, values[0]), bc_type="periodic")
 
 
 def _time_constant(curve: CubicSpline, span: tuple[float, float]) -> float:
