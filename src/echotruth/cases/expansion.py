@@ -45,7 +45,7 @@ def expand(config: Source, source: str = "configuration") -> list[Case]:
     >>> [case.id for case in et.expand(config)]
     ['wall0.9_b94424', 'wall0.9_seed2_74e3c3', 'wall1.1_e79e50', 'wall1.1_seed2_7c0d55']
     """
-    config, errors = config if isinstance(config, Config) else configure(config), Errors()
+    config, errors = configure(config), Errors()
     hearts = list(_hearts(config, source, errors))
     errors.raise_all(source)
     if not hearts:

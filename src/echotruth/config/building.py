@@ -40,6 +40,8 @@ def configure(source: Source = None, **keys: Any) -> Config:
     >>> et.configure(geometry={"preset": "rat"}).probe.preset
     'rat_15MHz'
     """
+    if isinstance(source, Config) and not keys:
+        return source  # it does not change, and was validated
     if isinstance(source, Config):
         values, name = _given(source), source.name
     elif isinstance(source, str | Path):

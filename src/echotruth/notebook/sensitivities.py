@@ -75,7 +75,7 @@ def sensitivities(
     >>> bool((shortening.sel(parameter="mechanics.regional.contractility.8") < 0).mean() > 0.9)
     True
     """
-    settings = config if isinstance(config, Config) else configure(config)
+    settings = configure(config)
     names = [parameters] if isinstance(parameters, str) else list(parameters)
     if not names:
         raise ConfigError("parameters: name one key or more, such as fibres.endo_deg")

@@ -73,7 +73,7 @@ def beat(config: Source = None, progress: bool = True, *, frames: Iterable[int] 
     >>> round(1e9 * float(heart.arrays["mechanics"]["volume"][0]))  # uL at end-diastole
     50
     """
-    settings = config if isinstance(config, Config) else configure(config)
+    settings = configure(config)
     if settings.cases:
         keys = ", ".join(settings.cases.keys)
         raise ValueError(f"cases sweeps {keys}: beat one, as echotruth.expand(config)[0].config")
@@ -111,8 +111,7 @@ def systole(config: Source = None) -> list[int]:
     >>> frames[0], frames[-1]
     (0, 21)
     """
-    cycle = read_loop((config if isinstance(config, Config) else configure(config)).loop)
-    return cycle.systole
+    return read_loop(configure(config).loop).systole
 
 
 def image(
