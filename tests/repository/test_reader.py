@@ -124,9 +124,9 @@ def test_what_there_is_not_is_refused_in_one_sentence(repository, what):
 
 
 def test_heart_that_is_not_made_is_refused_in_one_sentence(several):
-    with pytest.raises(NotWritten, match=r"small: geometry/\w+ has no data of heart: run it to its end$"):
+    with pytest.raises(NotWritten, match=r"small: geometry/\w+ has no data of heart: run it to its end, or fetch"):
         several.heart("heart")
-    with pytest.raises(ValueError, match=r"small has no truth of heart mid yet: run it to its end$"):
+    with pytest.raises(ValueError, match=r"small has no truth of heart mid yet: run it to its end, or fetch"):
         several.difficulty("heart", "mid")
 
 

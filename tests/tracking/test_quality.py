@@ -1,6 +1,9 @@
 """Quality as a probability: against simulated errors, and in its limits."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from scipy import stats
 
 from echotruth.config.tracking import METHODS, Dis, External, PhaseCorrelation
@@ -44,6 +47,15 @@ def test_one_way_alone_has_no_disagreement_and_a_lost_way_has_no_certainty():
     alone, none = MODEL.probability(path(0.1), (256, 256)), MODEL.probability(path(0.1, 0.0), (256, 256))
     assert alone[1, 0] == none[1, 0]
     assert MODEL.probability(path(np.inf), (256, 256))[1, 0] == 0
+
+
+def test_point_that_is_not_seen_is_as_sure_as_its_displacement_is_small():
+    model = replace(MODEL, unseen=0.2)
+    seen, hidden = path(0.1, 0.1), replace(path(0.1, 0.1), unseen=np.array([[0.0], [1.0]]))
+    expected = -2 * np.log(1 - MODEL.probability(seen, (256, 256))[1, 0])
+    found = -2 * np.log(1 - model.probability(hidden, (256, 256))[1, 0])
+    assert 1 / found == pytest.approx(1 / expected + (0.2 * 5) ** 2, rel=1e-9)
+    assert model.probability(seen, (256, 256))[1, 0] == MODEL.probability(seen, (256, 256))[1, 0]
 
 
 def test_lost_point_has_no_quality():

@@ -523,7 +523,7 @@ class Repository:
             path = ledger.record_path(Path(self._place), stage, case, view, size)
             return f"{path} is damaged: run echotruth check {self._place} --heal, and the configuration again"
         if not record:
-            return f"{self._place} has no {stage} of {what} yet: run it to its end"
+            return f"{self._place} has no {stage} of {what} yet: run it to its end, or fetch this heart too"
         if record.get("status") != "complete":
             return f"{what} of {self._place} is {record.get('status')}: {record.get('reason')}"
         return ""
@@ -576,7 +576,8 @@ class Repository:
             path = f"{group}/{array.name}"
             if not (store or self.is_written(path, case, view)):
                 what = " ".join(filter(None, [case, view]))
-                raise NotWritten(f"{self._place}: {path} has no data of {what}: run it to its end")
+                remedy = "run it to its end, or fetch this heart too"
+                raise NotWritten(f"{self._place}: {path} has no data of {what}: {remedy}")
             found[array.name] = self.read(path, *place[: array.leading], store=store)
         labels = {
             pack.dimension: self.labels(f"{group}/{pack.dimension}", store)

@@ -57,12 +57,16 @@ class Path:
         Variance of the displacement by the correlations of all steps, up to a factor (see :func:`variance`).
     disagreement : ndarray of shape (frame, n)
         Distance of the displacements forwards and backwards, px; NaN where there is only one of them.
+    unseen : ndarray of shape (frame, n), optional
+        From 0 to 1: how far the image shows no tissue at the point, which then moves with what is around it. None of a
+        tracker that does not tell.
     """
 
     displacement: np.ndarray
     correlation: np.ndarray
     variance: np.ndarray
     disagreement: np.ndarray
+    unseen: np.ndarray | None = None
 
 
 def accumulate(

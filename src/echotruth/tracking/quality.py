@@ -26,10 +26,13 @@ class ErrorModel:
     :class:`echotruth.tracking.accumulation.Path`, the disagreement d and the tracked displacement u, is
 
         s^2 = constant^2 + (pixel h)^2 + (correlation^2 + (pixel_correlation h)^2) V + (disagreement d)^2 + (motion u)^2
+            + (unseen q u)^2,
+
+    where q, from 0 to 1, is how far the point is not seen in the image.
 
     Attributes
     ----------
-    constant, pixel, correlation, pixel_correlation, disagreement, motion : float
+    constant, pixel, correlation, pixel_correlation, disagreement, motion, unseen : float
         See above.
     """
 
@@ -39,6 +42,7 @@ class ErrorModel:
     pixel_correlation: float
     disagreement: float
     motion: float
+    unseen: float = 0.0
 
     def probability(self, path: Path, shape: tuple[int, ...]) -> np.ndarray:
         """Probability that points are within 1/256 of the side of the image of their true places.
@@ -57,6 +61,8 @@ class ErrorModel:
         side = 1 / (IMAGE_FRACTION * max(shape))  # of a pixel
         displacement = np.hypot(*np.moveaxis(path.displacement, -1, 0))
         expected = self.variance(side, path.variance, side * path.disagreement, side * displacement)
+        if path.unseen is not None:
+            expected += (self.unseen * path.unseen * side * displacement) ** 2
         probability = within(1.0, expected)
         probability[0] = 1.0
         probability[~np.isfinite(path.displacement).all(-1)] = np.nan
@@ -95,7 +101,7 @@ ERRORS = {
     "dis": ErrorModel(0.28, 0.386, 0.309, 0.205, 0.15, 0.0712),
     "dis_fine": ErrorModel(0.292, 0.255, 0.294, 0.0, 0.196, 0.0516),
     "ilk": ErrorModel(0.475, 0.0, 0.11, 0.173, 0.0, 0.0771),
-    "bspline_dic": ErrorModel(0.358, 0.0652, 0.0459, 0.0429, 0.25, 0.0221),
+    "bspline_dic": ErrorModel(0.358, 0.0652, 0.0459, 0.0429, 0.25, 0.0221, 0.104),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`."""
 

@@ -109,6 +109,7 @@ class WallRegion:
         smoothness: float | None,
         tolerance: float,
         iterations: int = MAX_ITERATIONS,
+        seen: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Displacement U that minimises sum w (I(X + U) - T)^2 plus the weighted bending energy of U - U_previous.
 
@@ -131,6 +132,8 @@ class WallRegion:
             Residual, in standard deviations, at which the weight w of a pixel is 1/4.
         iterations : int
             Number of iterations at most.
+        seen : ndarray of shape (pixel,), optional
+            How far the pixels show tissue, from 0 to 1. Default: all do.
 
         Returns
         -------
@@ -145,7 +148,7 @@ class WallRegion:
         for iteration in range(iterations):
             warped = alignment.interpolate_with_gradient(image, position)
             residual = warped[:, 0] - template
-            match = Match(template, residual, warped[:, 1:], geman_mcclure(residual, tolerance))
+            match = Match(template, residual, warped[:, 1:], geman_mcclure(residual, tolerance, seen))
             if (
                 normal is None
                 or iteration % MATRIX_REUSE == 0
@@ -256,10 +259,15 @@ def _factor(band: np.ndarray, scale: float, energy_weight: float, energy: Bendin
     return NormalMatrix(linalg.cholesky_banded(band.T), energy_weight, energy)
 
 
-def geman_mcclure(residual: np.ndarray, tolerance: float) -> np.ndarray:
-    """Robust weights 1 / (1 + (r / (tolerance sigma))^2)^2 (Geman and McClure), sigma from the median of |r|."""
-    scale = tolerance * MAD_TO_STD * np.median(np.abs(residual[::MEDIAN_STRIDE]))
-    return 1 / (1 + (residual / (scale or 1.0)) ** 2) ** 2
+def geman_mcclure(residual: np.ndarray, tolerance: float, seen: np.ndarray | None = None) -> np.ndarray:
+    """Robust weights 1 / (1 + (r / (tolerance sigma))^2)^2 (Geman and McClure), sigma from the median of |r|.
+
+    Residuals of pixels that are not seen have no weight, and no part in the median; all of them are of shape (pixel,).
+    """
+    known = residual if seen is None else residual[seen > 0]
+    scale = tolerance * MAD_TO_STD * np.median(np.abs(known[::MEDIAN_STRIDE])) if known.size else 0.0
+    weight = 1 / (1 + (residual / (scale or 1.0)) ** 2) ** 2
+    return weight if seen is None else weight * seen
 
 
 def wall_region(mask: np.ndarray, knot_spacing: float, margin: float, transmural_scale: float) -> WallRegion:

@@ -24,14 +24,16 @@ whose first sum is :func:`.alignment.add_normal_matrix`, and whose solution is :
 
 Image and template are blurred at first, so that a motion beyond the size of a speckle is found; the start is
 `WallTracker._predict`, by a dense flow. The gain is made even, so that tissue in a shadow counts like the rest. A
-template is kept until its correlation with the tissue falls below `template_update_ncc`. That the cycle closes is no
-term of J: if it does (:mod:`.closure`), the clip is tracked from end-diastole both forwards and backwards, and
-:func:`combine` takes the mean of the two with weights from their variances.
+template is kept until its correlation with the tissue falls below `template_update_ncc`. Where tissue is not seen, as
+in a shadow that shows noise alone (:mod:`.visibility`), the clip is tracked once more without the pixels there: the
+energy carries the motion of the tissue around into it. That the cycle closes is no term of J: if it does
+(:mod:`.closure`), the clip is tracked from end-diastole both forwards and backwards, and :func:`combine` takes the mean
+of the two with weights from their variances.
 """
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
@@ -49,6 +51,7 @@ from echotruth.tracking.ncc import NormalizedCrossCorrelation
 from echotruth.tracking.region import WallRegion, wall_region
 from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.trackers.dis import MIN_IMAGE_SIDE, optical_flow
+from echotruth.tracking.visibility import Visibility, visibility
 
 MIN_KNOT_SPACING = 5.0
 """px; closer knots have more unknowns than the image has information."""
@@ -59,6 +62,14 @@ COARSE_BLUR = 0.25
 twice the size of a speckle. The next speckle, a false match, then lies no longer between start and solution."""
 COARSE_ITERATIONS = 6
 """Iterations with blurred images at most: their solution is a start."""
+LIKENESS_RADIUS = 0.5
+"""Half-width of the windows in which it is judged whether tissue is seen, over the knot spacing."""
+LIKENESS_STRIDE = 4
+"""Every n-th pixel is the centre of such a window."""
+BLOCKS_PER_KNOT = 4
+"""Blocks of the image over which that is averaged, per knot spacing; what is not seen is wider by a knot spacing."""
+LEAST_UNSEEN = 0.01
+"""Share of the wall at end-diastole below which a clip is taken to be seen everywhere."""
 MIN_COARSE_BLUR = 2.0
 """px; where that blur is less, pixels are as large as speckle, and an alignment begins with the images as they are."""
 NCC_EXPONENT = 8
@@ -78,11 +89,14 @@ class WallTrajectory:
         Variance of the displacement, px^2 up to a factor; infinite in frames without texture.
     ncc : ndarray of shape (frame, n)
         Correlation of image and template around each point; NaN where one of them has no texture.
+    likeness : list of (ndarray of shape (k, 2), ndarray of shape (k,))
+        Of every frame but the first: displaced pixels, px, and the correlation of image and template around each.
     """
 
     coefficients: np.ndarray
     variance: np.ndarray
     ncc: np.ndarray
+    likeness: list[tuple[np.ndarray, np.ndarray]]
 
 
 def track(clip: TrackerInput, settings: BsplineDic) -> Path:
@@ -98,6 +112,13 @@ def track(clip: TrackerInput, settings: BsplineDic) -> Path:
     coarse_blur = COARSE_BLUR * knot_spacing
     ncc = NormalizedCrossCorrelation(
         region.positions, region.inside, clip.points, 2 * knot_spacing, values.dynamic_range
+    )
+    pixels = NormalizedCrossCorrelation(
+        region.positions,
+        np.ones(len(region.positions), bool),
+        region.positions[::LIKENESS_STRIDE],
+        LIKENESS_RADIUS * knot_spacing,
+        values.dynamic_range,
     )
     block = max(1, min(int(knot_spacing / FLOW_PIXELS_PER_KNOT), min(mask.shape) // MIN_IMAGE_SIDE))
 
@@ -115,10 +136,18 @@ def track(clip: TrackerInput, settings: BsplineDic) -> Path:
         resolved = images if coarse_blur >= MIN_COARSE_BLUR else []
         blurred = list(threads.map(partial(gaussian, deviation=coarse_blur), resolved))
         coarse = np.array(coarse) / (np.max(coarse) or 1)
-        tracker = WallTracker(region, ncc, coarse, block, images, blurred, amplitudes, settings)
-        orders = bidirectional.forward_backward(len(clip.frames))
-        trajectories = list(threads.map(tracker.track, orders if settings.reference == "bidirectional" else orders[:1]))
-    return combine(region, clip.points, trajectories[0], trajectories[-1])
+        tracker = WallTracker(region, ncc, pixels, coarse, block, images, blurred, amplitudes, settings)
+        orders = bidirectional.forward_backward(len(clip.frames))[: 2 if settings.reference == "bidirectional" else 1]
+        trajectories = list(threads.map(tracker.track, orders))
+        likeness = [match for trajectory in trajectories for match in trajectory.likeness]
+        visible = visibility(likeness, mask.shape, knot_spacing / BLOCKS_PER_KNOT, BLOCKS_PER_KNOT)
+        in_wall = region.positions[region.inside]
+        if 1 - visible.at(in_wall).mean() < LEAST_UNSEEN:
+            return combine(region, clip.points, trajectories[0], trajectories[-1])
+        trajectories = list(threads.map(replace(tracker, visible=visible).track, orders))
+    path = combine(region, clip.points, trajectories[0], trajectories[-1])
+    position = clip.points + np.nan_to_num(path.displacement)
+    return replace(path, unseen=1 - visible.at(position.reshape(-1, 2)).reshape(path.correlation.shape))
 
 
 def gaussian(image: np.ndarray, deviation: float) -> np.ndarray:
@@ -143,11 +172,14 @@ class Template:
         Image at the displaced pixels, and its lateral and axial derivative per px.
     blurred : ndarray of shape (pixel,) or None
         Blurred image there; None if none is used.
+    seen : ndarray of shape (pixel,) or None
+        How far tissue is seen there, from 0 to 1; None if it is everywhere.
     """
 
     frame: int
     warped: np.ndarray
     blurred: np.ndarray | None
+    seen: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -157,8 +189,8 @@ class WallTracker:
     Attributes
     ----------
     region : WallRegion
-    ncc : NormalizedCrossCorrelation
-        Of the pixels of the region.
+    ncc, pixels : NormalizedCrossCorrelation
+        Around the points, and around pixels of the region.
     coarse : ndarray of shape (frame, rows, columns)
         Block means of the amplitudes over their maximum, for the dense flow.
     block : int
@@ -170,16 +202,20 @@ class WallTracker:
     amplitudes : sequence of ndarray
         Blurred amplitudes as they are (axial, lateral): they tell whether a place has texture.
     settings : BsplineDic
+    visible : Visibility, optional
+        Where tissue is seen; pixels elsewhere have no weight. None: everywhere.
     """
 
     region: WallRegion
     ncc: NormalizedCrossCorrelation
+    pixels: NormalizedCrossCorrelation
     coarse: np.ndarray
     block: int
     images: list[np.ndarray]
     blurred: list[np.ndarray]
     amplitudes: Sequence[np.ndarray]
     settings: BsplineDic
+    visible: Visibility | None = None
 
     def track(self, order: Sequence[int]) -> WallTrajectory:
         """Track the wall through the frames in an order that begins with end-diastole."""
@@ -188,6 +224,7 @@ class WallTracker:
         template = latest = self._template(0, coefficients[0], warped)
         amplitude = {0: self._amplitude(0, coefficients[0])}
         ncc = [self.ncc.at_points(amplitude[0], amplitude[0])] * len(order)
+        likeness = []
         for before, now in pairwise(order):
             start = self._predict(now, before, coefficients[before], template)
             fitted, warped = self._align(now, template, start, coefficients[before])
@@ -199,15 +236,22 @@ class WallTracker:
             variance[now] = variance[template.frame] + self._variance(template, warped)
             amplitude[now] = self._amplitude(now, fitted)
             ncc[now] = self.ncc.at_points(amplitude[template.frame], amplitude[now])
+            alike = self.pixels.at_points(template.warped[:, 0], warped[:, 0])
+            likeness.append((self.region.displaced(fitted)[::LIKENESS_STRIDE], alike))
             if np.isfinite(variance[now]):
                 latest = self._template(now, fitted, warped)
-        return WallTrajectory(coefficients, variance, np.array(ncc))
+        return WallTrajectory(coefficients, variance, np.array(ncc), likeness)
 
     def _template(self, frame: int, coefficients: np.ndarray, warped: np.ndarray) -> Template:
+        seen = self._seen(coefficients)
         if not self.blurred:
-            return Template(frame, warped, None)
+            return Template(frame, warped, None, seen)
         blurred = interpolate_with_gradient(self.blurred[frame], self.region.displaced(coefficients))
-        return Template(frame, warped, blurred[:, 0])
+        return Template(frame, warped, blurred[:, 0], seen)
+
+    def _seen(self, coefficients: np.ndarray) -> np.ndarray | None:
+        """How far the tissue of each pixel is seen where it is displaced to; None if all is seen everywhere."""
+        return None if self.visible is None else self.visible.at(self.region.displaced(coefficients))
 
     def _amplitude(self, frame: int, coefficients: np.ndarray) -> np.ndarray:
         """Amplitudes (pixel,) of a frame at the displaced pixels; outside the image those of its border."""
@@ -229,11 +273,14 @@ class WallTracker:
     def _align(self, frame: int, template: Template, start: np.ndarray, previous: np.ndarray):
         """Align a frame with a template, blurred at first; see :meth:`WallRegion.align`."""
         how = self.settings.smoothness, self.settings.tolerance
+        seen = None if template.seen is None else self._seen(start) * template.seen
+        if seen is not None and not seen.any():
+            seen = None
         if template.blurred is not None:
             image = self.blurred[frame]
-            coarse, _ = self.region.align(image, template.blurred, start, previous, *how, COARSE_ITERATIONS)
+            coarse, _ = self.region.align(image, template.blurred, start, previous, *how, COARSE_ITERATIONS, seen)
             start = self._best(frame, template, start, coarse)
-        return self.region.align(self.images[frame], template.warped[:, 0], start, previous, *how)
+        return self.region.align(self.images[frame], template.warped[:, 0], start, previous, *how, seen=seen)
 
     def _predict(self, now: int, before: int, coefficients: np.ndarray, template: Template) -> np.ndarray:
         """Coefficients advanced by the dense flow, or unchanged if they then match the template better."""
