@@ -194,12 +194,11 @@ def test_change_runs_again_what_depends_on_it_and_nothing_else(made, old, new, j
     assert made.planned(CONFIG.replace(old, new)) == jobs
 
 
+# tests/test_growth.py makes lost tracks again, and the record of the repository.
 @pytest.mark.parametrize(("record", "jobs"), [
     ("rf/*/mid", {"phantom": 1, "rf": 1, "bmode": 1, "tracking": 1, **END}),
     ("truth/*/mid/128", {"truth": 1, "tracking": 1, **END}),
     ("bmode/*/mid/128", {"bmode": 1, "tracking": 1, **END}),
-    ("tracking/*/mid/128", {"tracking": 1, **END}),
-    ("repository", END),
 ])  # fmt: skip
 def test_record_that_is_lost_is_made_again_with_what_follows_it(made, record, jobs):
     path = next(made.out.glob(f"ledger/{record}.json"))
