@@ -23,9 +23,9 @@ test test-all: .venv/ready
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(CHOICE)
 
-# tests/cluster takes longest, and so comes first; tests/docs builds the site.
+# Modules with tests that .venv skips. tests/cluster takes longest, and so comes first; tests/docs/test_site.py builds the site.
 INTEGRATION := tests/cluster tests/test_torch.py tests/learning/test_baselines.py tests/description tests/repository/test_upload.py \
-	tests/repository/test_export.py tests/repository/test_tensorstore.py tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs
+	tests/repository/test_export.py tests/repository/test_tensorstore.py tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs/test_site.py
 
 test-integration: .venv-integration/ready
 	.venv-integration/bin/python -m pytest -n 2 --dist loadscope $(INTEGRATION)

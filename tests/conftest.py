@@ -12,11 +12,15 @@ from echotruth.heart import Heart
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 
+LONGEST = ("test_growth", "test_workflow", "test_blocks", "test_snakemake", "test_circulation", "test_checks")
+"""Modules that take half a minute and more, longest first."""
+
 
 def pytest_collection_modifyitems(items):
     """Modules that take longest go first, so that no worker waits for one at the end."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: (item.path.stem != "test_workflow", item.path not in slow))
+    rank = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: (rank.get(item.path.stem, len(LONGEST)), item.path not in slow))
 
 
 QUIET = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")

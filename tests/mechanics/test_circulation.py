@@ -84,7 +84,7 @@ def test_changed_hearts_change_as_in_life(healthy):
 @pytest.mark.slow
 def test_late_wall_is_stretched_before_it_shortens():
     """Left bundle branch block: the septum shortens at once and stretches the lateral wall, which shortens less."""
-    config = heart(frames=40, pathology={"late_activation": {"preset": "lbbb"}})
+    config = heart(frames=20, pathology={"late_activation": {"preset": "lbbb"}})
     arrays = beat(config)
     es = int(arrays["mechanics"]["es_frame"])
     strain = centroid_kinematics(Heart.of(arrays, config))["strain"][..., 1]
@@ -98,7 +98,7 @@ def test_late_wall_is_stretched_before_it_shortens():
 @pytest.mark.slow
 def test_steady_beat_does_not_depend_on_how_the_arteries_are_hastened(monkeypatch):
     hastened, _ = measured(heart(frames=12, resistance=1.15))
-    monkeypatch.setattr(solver, "STEADY", 1e-4)
+    monkeypatch.setattr(solver, "STEADY", 5e-4)
     monkeypatch.setattr(solver, "_hastened", lambda circulation, first, last: last)
     natural, _ = measured(heart(frames=12, resistance=1.15))
     for name in ("pressure", "volume", "arterial_pressure"):

@@ -9,7 +9,7 @@ from echotruth.mechanics.pathology import PathologyError
 
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
 # Changes so small that no step of the load is halved in one heart and not in the next.
-HEART = et.configure(geometry=COARSE | {"wall_mm": 1.0}, loop={"frames": 24, "esp_mmHg": 100.0})
+HEART = et.configure(geometry=COARSE | {"wall_mm": 1.0}, loop={"frames": 12, "esp_mmHg": 100.0})
 FILLED = et.configure(HEART, **{"mechanics.material.stiffness_kPa": 1.2})
 SEGMENT = "mechanics.regional.contractility.8"
 
@@ -91,7 +91,7 @@ def test_what_is_no_parameter_is_refused(parameters, message):
         ),
         ({"loop.kind": "circulation"}, None, ValueError, "loop.kind = circulation: only a measured"),
         ({"motion.kind": "rigid"}, None, ValueError, "motion.kind = rigid: only a beat"),
-        ({}, [1, 2], ValueError, r"frames = \[1, 2\]: give 0 and frames after it, in their order, below 24"),
+        ({}, [1, 2], ValueError, r"frames = \[1, 2\]: give 0 and frames after it, in their order, below 12"),
         ({}, [0, 30], ValueError, r"frames = \[0, 30\]: give 0"),
     ],
 )

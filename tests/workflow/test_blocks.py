@@ -1,4 +1,4 @@
-"""A sweep that is made in blocks of hearts is the one that is made at once, byte for byte."""
+"""A sweep that is made in blocks of hearts is the one that is made at once, byte for byte, and is continued so."""
 
 import json
 import re
@@ -8,6 +8,7 @@ import pytest
 from rigid_hearts import CONFIG
 from workspace import Workspace, differing, planned
 
+import echotruth as et
 from echotruth.config.loading import ConfigError
 from echotruth.workflow.blocks import Block
 from echotruth.workflow.plan import Plan
@@ -45,6 +46,22 @@ def test_block_is_read():
 
 THREE = re.sub(r"cases: .*\n", "cases: {fibres.endo_deg: [60, 65, 70]}\n", CONFIG)
 """Three hearts, none of which shares the motion of another."""
+SWEEP = re.sub(r"cases: .*\n", """\
+cases:
+  file: hearts.csv
+  draw: {number: 1, seed: 3, keys: {seed: {integers: [1, 1000]}}}
+  where: fibres.endo_deg > 50
+""", CONFIG)  # fmt: skip
+TABLE = "case,fibres.endo_deg,label.group,note\na,60,sham,\nb,40,MI,is left out\nc,70,MI,last\n"
+MORE = TABLE.replace("c,70", "d,65,MI,\nc,70")
+"""Another heart, between those that were made."""
+
+
+def sweep(folder: Path) -> Workspace:
+    """Folder with the configuration of two hearts, and with their table."""
+    made = Workspace(folder, SWEEP)
+    (folder / "hearts.csv").write_text(TABLE)
+    return made
 
 
 def test_mark_of_a_block_changes_with_whatever_makes_its_hearts_again():
@@ -67,7 +84,7 @@ def test_mark_of_a_block_changes_with_whatever_makes_its_hearts_again():
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory) -> Workspace:
     """The sweep in one plan."""
-    made = Workspace(tmp_path_factory.mktemp("whole") / "echotruth", THREE)
+    made = sweep(tmp_path_factory.mktemp("whole") / "echotruth")
     made.echotruth("run", "tiny.yaml", "--cores", "2", "repository")
     return made
 
@@ -75,7 +92,7 @@ def whole(tmp_path_factory) -> Workspace:
 @pytest.fixture(scope="module")
 def blocks(tmp_path_factory) -> Workspace:
     """The sweep in blocks of one heart, two at once."""
-    made = Workspace(tmp_path_factory.mktemp("blocks") / "echotruth", THREE)
+    made = sweep(tmp_path_factory.mktemp("blocks") / "echotruth")
     in_blocks(made, "--blocks-at-once", "2")
     return made
 
@@ -91,13 +108,8 @@ def in_blocks(workspace: Workspace, *options: str) -> dict[str, dict[str, int]]:
 @pytest.mark.slow
 def test_blocks_make_the_bytes_of_one_plan(whole, blocks):
     assert differing(blocks.out, whole.out) == []
-    assert len(list(blocks.out.glob("blocks/*.made"))) == 3
+    assert len(list(blocks.out.glob("blocks/*.made"))) == 2
     assert not (blocks.out / "scratch").exists()
-
-
-@pytest.mark.slow
-def test_second_run_plans_no_block_and_makes_nothing(blocks):
-    assert in_blocks(blocks) == {"snakemake_0": {}}
 
 
 @pytest.mark.slow
@@ -110,7 +122,6 @@ def test_lost_record_is_made_again_in_its_block(whole, blocks):
     (jobs,) = made.values()
     assert jobs.pop("bmode") == 1 and "mechanics" not in jobs
     assert differing(blocks.out, whole.out) == []
-    assert in_blocks(blocks) == {"snakemake_0": {}}
 
 
 def cases(workspace: Workspace) -> list[str]:
@@ -121,6 +132,32 @@ def cases(workspace: Workspace) -> list[str]:
 def test_repository_follows_a_block_that_was_made_by_a_run_that_was_interrupted(blocks):
     (blocks.out / "ledger/repository.json").unlink()  # as every job does before it commits
     assert in_blocks(blocks) == {"snakemake_0": {"repository": 1}}
+
+
+def times(workspace: Workspace, pattern: str) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in workspace.out.glob(pattern)}
+
+
+@pytest.mark.slow
+def test_sweep_is_continued_with_another_row_and_read_without_its_table(blocks):
+    marks, records = times(blocks, "blocks/*.made"), times(blocks, "ledger/*/*/**/*.json")
+    (blocks.folder / "hearts.csv").write_text(MORE)
+    assert blocks.planned()["rf"] == 1
+    in_blocks(blocks)
+    assert len(list(blocks.out.glob("blocks/*.made"))) == 3
+    assert times(blocks, "blocks/*.made").items() >= marks.items(), "what was made is not planned again"
+    more = times(blocks, "ledger/*/*/**/*.json")
+    assert len(more) > len(records) and more.items() >= records.items()
+
+    for name in ("hearts.csv", "tiny.yaml"):
+        (blocks.folder / name).unlink()
+    table = et.Repository(blocks.out).tree["cases"].to_dataset().to_dataframe().sort_index()
+    assert [case.partition("_")[0] for case in table.index] == ["a", "c", "d"]
+    assert list(table["label.group"]) == ["sham", "MI", "MI"] and set(table["status"]) == {"complete"}
+    assert et.Repository(blocks.out).heart(table.index[2]).config.fibres.endo_deg == 65
+    assert et.Repository(blocks.out).clip(table.index[2])["image"].shape == (4, 128, 128)
+    blocks.echotruth("run", "out/tiny/config.yaml", "--cores", "1", "--hearts-per-block", "1", "repository")
+    assert times(blocks, "ledger/*/*/**/*.json") == more
 
 
 @pytest.mark.slow
