@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -143,7 +144,7 @@ class Medium:
         backscatter = config.realism.backscatter
         depends = backscatter.anisotropy_dB or backscatter.fibre_strain_dB
         self._fibre_echo = FibreEcho(backscatter, heart, plane, points) if depends else None
-        self._variation = self._varied(interpolate(heart.nodes, heart.cells, points), random)
+        self._variation = self._varied(partial(interpolate, heart.nodes, heart.cells, points), random)
         self._borders = self._seeded_borders(seeded, random)
         self._blood: Blood | None = None
         self._surroundings: AroundHeart | None = None
@@ -160,16 +161,16 @@ class Medium:
             IN_CAVITY[name](heart, **_named(name, seeded)) for name in IN_CAVITY if f"{name}_amplitude" in seeded
         ]
 
-    def _varied(self, position: Floats, random: Random) -> Floats | float:
-        """Factors (n,) on the amplitudes of muscle and borders at positions (n, 3), m, in the unloaded wall, or one."""
+    def _varied(self, unloaded: Callable[[], Floats], random: Random) -> Floats | float:
+        """Factors (n,) on the amplitudes of muscle or a border, whose unloaded positions are (n, 3), m; or one."""
         backscatter = self._config.realism.backscatter
-        return variation(backscatter, position, random("variation")) if backscatter.variation_dB else 1.0
+        return variation(backscatter, unloaded(), random("variation")) if backscatter.variation_dB else 1.0
 
     def _seeded_borders(self, seeded: Arrays, random: Random) -> list[Border]:
         borders = []
         for name, (_, level_dB) in _borders(self._config).items():
             border = Border(seeded[f"{name}_facets"], seeded[f"{name}_xi"], border_amplitude(self._config, level_dB))
-            varied = self._varied(border.positions(self._heart.nodes), random)
+            varied = self._varied(partial(border.positions, self._heart.nodes), random)
             borders.append(replace(border, amplitude=border.amplitude * varied))
         return borders
 
