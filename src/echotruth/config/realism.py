@@ -148,7 +148,7 @@ def _preset(scale: float, times_ms: tuple[float, float]) -> dict[str, Any]:
         "borders": {"endocardium_dB": 10.0, "epicardium_dB": 13.0},
         "decorrelation": {"time_ms": times_ms[0]},
         "blood": {"level_dB": -19.0, "density": 0.15, "decorrelation_time_ms": times_ms[1]},
-        "surroundings": {"level_dB": -11.0, "density": 0.15, "start_mm": 2 * scale, "motion_decay_mm": scale},
+        "surroundings": {"level_dB": -11.0, "density": 0.15, "start_mm": scale, "motion_decay_mm": scale},
         "neighbours": {
             "chambers_dB": 0.0,
             "lung_dB": -1.0,
