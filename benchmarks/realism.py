@@ -82,7 +82,7 @@ def measure_real(file: Path) -> Measures:
 
 
 def heart(arrays: dict[str, np.ndarray]) -> tuple[Heart, np.ndarray]:
-    """The default heart at `FRAMES` times of a cycle, by periodic cubic splines, and the times, s."""
+    """A heart at `FRAMES` times of a cycle, by periodic cubic splines, and the times, s."""
     from scipy.interpolate import CubicSpline
 
     time, displacement = arrays["mechanics/time"], arrays["mechanics/displacement"]
@@ -97,12 +97,12 @@ def heart(arrays: dict[str, np.ndarray]) -> tuple[Heart, np.ndarray]:
     return Heart(*mesh, course(times), depth, endo, 6, es, arrays=of), times
 
 
-def beat_of_default(file: Path) -> dict[str, np.ndarray]:
-    """Arrays of the default heart's beat, by `group/name`, solved where the file is not there."""
+def beat_of(config: Config, file: Path) -> dict[str, np.ndarray]:
+    """Arrays of a heart's beat, by `group/name`, solved where the file is not there."""
     if not file.exists():
         from echotruth.mechanics.beat import beat
 
-        result = beat(Config())
+        result = beat(config)
         np.savez(file, **{f"{group}/{name}": value for group, of in result.items() for name, value in of.items()})
     with np.load(file) as arrays:
         return {name: arrays[name] for name in arrays.files}
@@ -178,7 +178,7 @@ def main() -> None:
     results = json.loads(file.read_text()) if file.exists() else {}
     if given.clip:
         results["real, apical view"] = measure_real(given.clip)
-    beating, time = heart(beat_of_default(given.beat))
+    beating, time = heart(beat_of(Config(), given.beat))
     configs = {"realistic": load(HERE.parent / "config/realistic.yaml"), "as printed": Config(rf=Rf(focal_zones=1))}
     for name, config in configs.items():
         keep = partial(np.save, given.pictures / f"{name}.npy") if given.pictures else lambda frames: None

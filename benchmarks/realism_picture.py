@@ -1,4 +1,4 @@
-"""Picture of docs/realism.md: a mouse imaged ideally and realistically, and a human echo, in one grey map.
+"""Picture of docs/realism.md: a mouse imaged ideally and realistically, a human heart, and a human echo.
 
     python benchmarks/realism_picture.py    # five minutes on one core
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +41,7 @@ def images(heart: Heart, view: str) -> list[np.ndarray]:
     return list(bmode_clip(lines, scanner.scan, scanner.range, config.bmode, gain)[SIDE])
 
 
-def human() -> list[np.ndarray]:
+def real() -> list[np.ndarray]:
     """Two frames of the human echo, cut to the heart and enlarged to SIDE."""
     import cv2
     from pydicom import examples
@@ -54,11 +55,14 @@ def main() -> None:
     from PIL import Image
 
     size = {"bmode": {"size_px": SIDE, "downsampling": [1]}}
-    ideal = et.beat(et.configure("demo", **size))
-    realistic = replace(ideal, config=et.configure("realistic", **size))
-    rows = [[*images(ideal, view), *images(realistic, view)] for view in ("mid", "long_axis")]
-    for row, real in zip(rows, human(), strict=True):
-        row.append(real)
+    coarse = {"circumferential_elements": 12, "longitudinal_elements": 8, "transmural_elements": 2}
+    mouse = et.beat(et.configure("demo", geometry=coarse, realism={"preset": "none"}, **size), progress=False)
+    human = et.beat(et.configure("realistic_human", geometry=coarse, **size), progress=False)
+    realistic = replace(mouse, config=et.configure(mouse.config, realism={"preset": "mouse"}))
+    hearts, rows = (mouse, realistic, human), []
+    for views, echo in zip((("mid",) * 3, ("long_axis", "long_axis", "four_chamber")), real(), strict=True):
+        shown = [images(heart, view) for heart, view in zip(hearts, views, strict=True)]
+        rows.append([*chain(*shown), echo])
     picture = np.vstack([np.hstack(row) for row in rows])
     Image.fromarray(picture).save(OUT, optimize=True)
 

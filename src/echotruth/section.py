@@ -163,6 +163,10 @@ class Section(BaseModel):
             values[key.removesuffix(f"_{unit}")] = value
         return SimpleNamespace(**values)
 
+    def given(self) -> dict[str, Any]:
+        """Keys and values from which the section can be made again with some of them changed."""
+        return self.model_dump()
+
     def resolved(self) -> Section:
         """The section with every value filled in that follows from a preset."""
         return self

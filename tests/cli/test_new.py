@@ -8,6 +8,7 @@ import yaml
 from echotruth.cases import expand
 from echotruth.config import Config, Geometry, Loop, Rf, shipped
 from echotruth.config.allowed import allowed
+from echotruth.config.building import configure
 from echotruth.config.commented import FIRST, commented
 from echotruth.config.loading import load, validate
 from echotruth.section import Section
@@ -113,9 +114,11 @@ def test_file_is_written_under_its_name_and_never_replaced(call, tmp_path):
     assert (tmp_path / "patient.yaml").read_text() == "seed: 3"
 
 
-def test_default_preset_is_the_default_heart(call, tmp_path):
+def test_default_preset_is_the_default_heart_as_a_scanner_shows_it(call, tmp_path):
     assert call("new")[0] == 0
-    assert load(tmp_path / "mouse.yaml").model_copy(update={"name": "demo"}) == Config()
+    written = load(tmp_path / "mouse.yaml")
+    assert written.realism.preset == "mouse"
+    assert configure(written, name="demo", realism={"preset": "none"}) == Config()
 
 
 def test_table_of_a_preset_is_written_beside_it(call, tmp_path, monkeypatch):

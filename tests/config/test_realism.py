@@ -2,8 +2,11 @@
 
 import pytest
 
+from echotruth.cases import expand
 from echotruth.config import Config
+from echotruth.config.building import configure
 from echotruth.config.loading import ConfigError, load
+from echotruth.config.realism import Realism
 
 
 def test_nothing_is_on_by_default():
@@ -44,11 +47,39 @@ def test_the_power_in_a_volume_does_not_depend_on_the_density(density):
     assert blood.amplitude_std**2 * density == pytest.approx(0.01)
 
 
-def test_the_realistic_preset_is_the_demo_with_all_of_it_on():
-    preset = load("config/realistic.yaml")
-    demo = load("config/demo.yaml")
-    off = Config().realism
-    assert all(getattr(preset.realism, name) != getattr(off, name) for name in type(off).model_fields)
-    assert preset.rf == demo.rf.model_copy(update={"focal_zones": 1})
-    same = {"realism": off, "name": demo.name, "rf": demo.rf, "loop": demo.loop, "tracking": demo.tracking}
-    assert preset.model_copy(update=same) == demo
+@pytest.mark.parametrize("name", ["realistic", "realistic_human"])
+def test_realistic_configuration_is_ideal_without_one_key(name):
+    realistic = configure(name)
+    off = configure(realistic, realism={"preset": "none"})
+    species = realistic.realism.preset
+    assert off == configure(geometry={"preset": species}, views=off.views, name=name) and off.realism == Realism()
+    assert realistic.probe.bandwidth < off.probe.bandwidth
+    # A longer pulse, and as many scatterers in it.
+    density = realistic.phantom.density_per_mm3 / off.phantom.density_per_mm3
+    assert density == pytest.approx(realistic.probe.bandwidth / off.probe.bandwidth)
+
+
+def test_preset_of_realism_fills_in_all_keys_but_those_that_are_given():
+    given = {"preset": "mouse", "blood": {"level_dB": None}, "haze": {"level_dB": -30.0}}
+    found, preset = Realism.model_validate(given), Realism(preset="mouse")
+    assert found.blood.level_dB is None and found.blood.density == preset.blood.density
+    assert found.haze.level_dB == -30 and found.neighbours == preset.neighbours
+    # A configuration that is written out keeps its values, and another preset brings its own.
+    config = Config(realism=found)
+    assert Config.model_validate(config.model_dump()) == config
+    human = configure(config, realism={"preset": "human"}).realism
+    assert human.surroundings == Realism(preset="human").surroundings
+    assert human.blood.level_dB is None and human.haze.level_dB == -30
+
+
+def test_cases_change_the_preset_of_realism():
+    keys = {"realism.preset": ["none", "mouse"], "realism.noise.snr_dB": [None, 20.0]}
+    realisms = [case.config.realism for case in expand(configure(cases=keys))]
+    assert [each.blood.level_dB for each in realisms] == [None] * 2 + [Realism(preset="mouse").blood.level_dB] * 2
+    assert [each.noise.snr_dB for each in realisms] == [None, 20.0] * 2
+
+
+def test_smoothing_of_realistic_images_follows_their_size():
+    small, large = (configure("realistic", bmode={"size_px": size}).bmode for size in (256, 512))
+    assert large.edge_width_px == pytest.approx(2 * small.edge_width_px, rel=0.01)
+    assert configure("realistic", bmode={"edge_width_px": 5.0}).bmode.edge_width_px == 5

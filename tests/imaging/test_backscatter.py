@@ -7,7 +7,10 @@ import pytest
 
 from echotruth.config import Config
 from echotruth.config.realism import Backscatter
-from echotruth.imaging.medium.backscatter import FibreEcho
+from echotruth.fem.tetrahedra import MaterialPoints, interpolate
+from echotruth.imaging.medium.backscatter import FibreEcho, variation
+from echotruth.imaging.medium.borders import Border
+from echotruth.imaging.medium.medium import Medium, seed_medium
 from echotruth.imaging.medium.wall import seed_volume
 from echotruth.imaging.view import imaging_plane
 
@@ -57,3 +60,41 @@ def test_echo_follows_the_stretch_of_the_fibres_since_end_diastole(twisting_hear
     found, _ = echo(twisting_heart, mid, seeded, mid.axes[0], fibre_strain_dB=30.0)
     np.testing.assert_allclose(found[0], 0, atol=1e-9)
     np.testing.assert_allclose(found[1], 30 * (np.linalg.norm(matrix @ mid.axes[0]) - 1), atol=1e-6)
+
+
+def test_variation_keeps_the_mean_power_and_has_the_given_spread_and_length():
+    """In a large cube, of which pairs of points lie one length apart, where a Gaussian correlation is exp(-1/2)."""
+    backscatter = Backscatter(variation_dB=3.0, variation_length_mm=0.5)
+    random = np.random.default_rng(1)
+    position = random.uniform(0, 0.1, (20_000, 3))
+    together = np.vstack([position, position + [0.5e-3, 0, 0]])
+    level = 20 * np.log10(variation(backscatter, together, random))
+    one, other = level[: len(position)], level[len(position) :]
+    assert np.mean(10 ** (one / 10)) == pytest.approx(1, abs=0.05)
+    assert np.std(one) == pytest.approx(3, rel=0.05)
+    assert np.corrcoef(one, other)[0, 1] == pytest.approx(np.exp(-0.5), abs=0.1)
+
+
+def test_variation_is_that_of_the_material_in_muscle_and_borders(twisting_heart, coarse_mesh, mid):
+    heart = replace(twisting_heart, arrays={"geometry": {"endo": coarse_mesh.endo, "epi": coarse_mesh.epi}})
+
+    def random(name):
+        return np.random.default_rng(list(name.encode()))
+
+    def amplitudes(std):
+        realism = {"backscatter": {"variation_dB": std}, "borders": {"endocardium_dB": 10.0, "epicardium_dB": 10.0}}
+        config = Config.model_validate({"phantom": {"density_per_mm3": 20.0}, "realism": realism})
+        seeded = seed_medium(config, heart, mid, random, lambda position: np.ones(len(position), bool))
+        medium = Medium(config, heart, mid, time=np.arange(2) * 0.01, seeded=seeded, random=random)
+        return [medium(frame)[1] for frame in (0, 1)], seeded
+
+    (bare, seeded), (varied, _) = amplitudes(0.0), amplitudes(3.0)
+    points = MaterialPoints(seeded["cell"], seeded["xi"])
+    position = interpolate(heart.nodes, heart.cells, points)
+    for name in ("endo", "epi"):
+        facets, xi = (seeded[f"{name}cardium_{key}"] for key in ("facets", "xi"))
+        position = np.vstack([position, Border(facets, xi, 1.0).positions(heart.nodes)])
+    wanted = variation(Backscatter(variation_dB=3.0), position, random("variation"))
+    assert (20 * np.log10(wanted)).std() > 1 and len(position) > len(points) + 100
+    for frame in (0, 1):
+        np.testing.assert_allclose(varied[frame] / bare[frame], wanted, rtol=1e-9)

@@ -240,6 +240,19 @@ def test_edges_are_enhanced_within_the_scan_alone():
     assert (sharp[~inside] == 0).all()
 
 
+def test_negative_enhancement_smooths_within_the_scan_alone():
+    inside = np.zeros((60, 60), bool)
+    inside[10:50, 10:50] = True
+    noise = np.where(inside, np.random.default_rng(1).random((60, 60)), 0.0)
+    smooth = enhance_edges(noise, inside, -1.0, 2.0)
+    # White noise averaged by a Gaussian of standard deviation s keeps 1 / (4 pi s^2) of its variance.
+    middle = np.s_[16:44, 16:44]
+    assert smooth[middle].std() == pytest.approx(noise[middle].std() / np.sqrt(16 * np.pi), rel=0.25)
+    assert smooth[middle].mean() == pytest.approx(noise[middle].mean(), abs=0.02)
+    half = enhance_edges(noise, inside, -0.5, 2.0)
+    assert np.allclose(half, (noise + smooth) / 2) and (half[~inside] == 0).all()
+
+
 def test_grey_maps_keep_black_and_white_and_what_is_beyond():
     levels = np.array([-0.2, 0, 0.25, 0.5, 1, 1.3])
     assert eight_bit(levels, Bmode()).tolist() == [0, 0, 64, 128, 255, 255]

@@ -7,6 +7,7 @@ import pytest
 
 from echotruth.cases import diagnosis, expand
 from echotruth.config.loading import load
+from echotruth.config.realism import Neighbours
 from echotruth.repository.settings import motions
 
 ROOT = Path(__file__).parents[2]
@@ -52,7 +53,12 @@ def test_every_heart_has_ideal_acoustics_and_realistic_ones_have_what_clips_have
     for case in suite[1]:
         realism = case.config.realism
         levels = realism.blood.level_dB, realism.noise.snr_dB, realism.haze.level_dB, realism.decorrelation.time_ms
+        levels += realism.surroundings.level_dB, *realism.borders.model_dump().values()
+        levels += tuple(realism.neighbours.model_dump().values())
         assert all((level is None) == (case.labels["acoustics"] == "ideal") for level in levels), case.id
+        backscatter = realism.backscatter
+        depends = [backscatter.anisotropy_dB > 0, backscatter.fibre_strain_dB > 0]
+        assert depends == [case.labels["acoustics"] == "realistic"] * 2, case.id
     plain = table[table["variation"] == "none"]
     assert not plain.duplicated(["heart", "acoustics"]).any()
     assert set(plain[plain["acoustics"] == "ideal"]["heart"]) == set(table["heart"])
@@ -112,11 +118,12 @@ def differences(one, other, key=""):
 def test_ablation_has_hearts_of_develop_with_one_thing_taken_from_their_acoustics(monkeypatch):
     monkeypatch.chdir(ROOT)
     whole = {case.id: case for case in expand(load("config/benchmark.yaml"))}
+    neighbours = {f"realism.neighbours.{key}" for key in Neighbours.model_fields}
     taken = {
         "five_foci": {"rf.focal_zones"},
         "no_rib": {"realism.shadow.side"},
         "no_decorrelation": {"realism.decorrelation.time_ms"},
-        "no_surroundings": {"realism.blood.level_dB", "realism.surroundings.level_dB"},
+        "no_surroundings": {"realism.blood.level_dB", "realism.surroundings.level_dB", *neighbours},
         "no_noise": {"realism.noise.snr_dB", "realism.haze.level_dB"},
         "no_through_plane": {"phantom.in_plane_only"},
     }

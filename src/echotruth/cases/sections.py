@@ -129,7 +129,7 @@ def _replaced(base: Any, changes: dict[str, Any]) -> Any:
     keys = {key.partition(".")[2]: value for key, value in changes.items()}
     if isinstance(base, dict):
         return base | {name: _replaced(base[name], own) for name, own in _by_section(keys).items()}
-    return type(base).model_validate(replace_values(base.model_dump(), keys))
+    return type(base).model_validate(replace_values(base.given(), keys))
 
 
 def _differs(base: Any, section: Any, changes: dict[str, Any], key: str) -> bool:

@@ -23,7 +23,13 @@ FIRST = (
     *("geometry.file", "fibres.endo_deg", "fibres.epi_deg", "pathology.infarct.segments", "loop.file"),
     *("loop.heart_rate_per_min", "loop.edv_uL", "loop.esv_uL", "loop.frames", "mechanics.material.stiffness_kPa"),
     *("motion.kind", "views", "probe.preset", "probe.elements", "rf.lines", "rf.focal_zones", "rf.keep"),
-    *("realism.blood.level_dB", "realism.surroundings.level_dB", "realism.noise.snr_dB", "bmode.field_of_view_mm"),
+    *(
+        "realism.preset",
+        "realism.blood.level_dB",
+        "realism.surroundings.level_dB",
+        "realism.noise.snr_dB",
+        "bmode.field_of_view_mm",
+    ),
     *("bmode.size_px", "bmode.downsampling", "tracking.grid_px", "tracking.trackers", "cases"),
 )
 """Keys that most people want to see first; what is said of them is in the models."""

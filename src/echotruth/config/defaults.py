@@ -6,7 +6,7 @@ from typing import Any
 
 from echotruth.config.merging import merged, nested
 from echotruth.config.tracking import DEFAULT, METHODS, default_trackers, name_of
-from echotruth.config.transducers import ARRAY_DEFAULTS
+from echotruth.config.transducers import ARRAY_DEFAULTS, ARRAY_PRESETS
 
 HEART_DEFAULTS: dict[str, dict[str, Any]] = {
     "mouse": {"loop.file": "mouse", "probe.preset": "mouse_25MHz"},
@@ -37,6 +37,19 @@ HEART_DEFAULTS: dict[str, dict[str, Any]] = {
 }
 """`geometry.preset` -> default of dotted keys."""
 
+REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.2}
+"""`realism.preset` -> default of the bandwidth, and of the density of scatterers, of which a longer pulse needs fewer,
+over those of the array."""
+REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 250}
+"""`realism.preset` -> default of `bmode.edge_width_px` over the side of the image."""
+REALISM_IMAGE: dict[str, float] = {
+    "bmode.dynamic_range_dB": 50.0,
+    "bmode.gain_dB": -12.0,
+    "bmode.grey_gamma": 1.3,
+    "bmode.edge_enhancement": -0.65,
+}
+"""Defaults of dotted keys with any `realism.preset`."""
+
 ARRAY_SUFFIXES = (".npy", ".npz")
 """Files of positions without a mesh."""
 
@@ -60,9 +73,28 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
         A new mapping with the defaults added.
     """
     values = _fill(values, HEART_DEFAULTS.get(_preset(values, "geometry"), HEART_DEFAULTS["mouse"]))
+    values = _fill(values, _scanner(values))
     values = _fill(values, ARRAY_DEFAULTS.get(_preset(values, "probe"), {}))
     values = _fill(values, _mesh_of_motion(values.get("motion")))
     return _scale_trackers(values, _length_scale(values))
+
+
+def _scanner(values: dict[str, Any]) -> dict[str, Any]:
+    """Defaults of dotted keys by which a scanner makes realistic images: its image, and a narrow band.
+
+    The density of scatterers suits that band; a bandwidth that is given leaves both as they are.
+    """
+    name, array = _preset(values, "realism"), _preset(values, "probe")
+    if name not in REALISM_BANDWIDTHS:
+        return {}
+    size = _value(values.get("bmode", {}), "size_px") or 512
+    width = REALISM_SMOOTHING[name] * size if isinstance(size, int | float) else 2.0
+    found = REALISM_IMAGE | {"bmode.edge_width_px": round(max(width, 0.5), 3)}
+    if array not in ARRAY_PRESETS or _value(values.get("probe", {}), "bandwidth") is not None:
+        return found
+    share, density = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3"
+    bandwidth = round(share * ARRAY_PRESETS[array]["bandwidth"], 3)
+    return found | {"probe.bandwidth": bandwidth, density: round(share * ARRAY_DEFAULTS[array][density], 3)}
 
 
 def _mesh_of_motion(motion: Any) -> dict[str, Any]:

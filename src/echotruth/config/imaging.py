@@ -181,9 +181,9 @@ class Bmode(Section):
     persistence: Annotated[FiniteFloat, Field(ge=0, le=0.95)] = 0.0
     """Weight of the image before in every image shown, the rest being the new one; 0 for none. The clip is taken as one
     cycle that repeats. Speckle and borders lag behind the tissue by persistence / (1 - persistence) frames."""
-    edge_enhancement: Annotated[FiniteFloat, Field(ge=0, le=5)] = 0.0
+    edge_enhancement: Annotated[FiniteFloat, Field(ge=-1, le=5)] = 0.0
     """Unsharp mask: the difference of the compressed image from its smooth version, times this, is added to it; 0 for
-    none."""
+    none. A negative one smooths, as scanners do to reduce speckle: with -1 the smooth version is shown."""
     edge_width_px: Annotated[FiniteFloat, Field(ge=0.5, le=64)] = 2.0
     """Standard deviation of the Gaussian that makes the smooth version, px of the largest image."""
     grey_map: Literal["linear", "s_curve"] = "linear"

@@ -1,11 +1,12 @@
 """Section `realism`: blood, surroundings, noise and artefacts of real clips; all are off by default."""
 
 from math import sqrt
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, FiniteFloat
+from pydantic import Field, FiniteFloat, model_validator
 
 from echotruth.config.imaging import ScatteringExponent
+from echotruth.config.merging import merged
 from echotruth.section import Positive, Section
 
 Level = Annotated[FiniteFloat, Field(ge=-80, le=20)]
@@ -119,6 +120,11 @@ class Backscatter(Section):
     fibre_strain_dB: Annotated[FiniteFloat, Field(ge=0, le=200)] = 0.0
     """Change of the echo power per unit of strain along the fibres since end-diastole: with 30, muscle that has
     shortened by 15 % echoes 4.5 dB less, as the muscle of mice does at end-systole (Kovacs 2003)."""
+    variation_dB: Annotated[FiniteFloat, Field(ge=0, le=20)] = 0.0
+    """Standard deviation of a random change of the echo power of muscle and borders from place to place, which moves
+    with them; 0 for none."""
+    variation_length_mm: Positive = 1.0
+    """Distance over which that changes: standard deviation of its Gaussian correlation."""
 
 
 class Borders(Section):
@@ -130,9 +136,46 @@ class Borders(Section):
     """That of epicardium and pericardium."""
 
 
+def _preset(scale: float, times_ms: tuple[float, float]) -> dict[str, Any]:
+    """Keys of a preset: lengths are those of a mouse times `scale`, times those of tissue and of blood."""
+    return {
+        "backscatter": {
+            "anisotropy_dB": 8.0,
+            "fibre_strain_dB": 30.0,
+            "variation_dB": 3.0,
+            "variation_length_mm": scale,
+        },
+        "borders": {"endocardium_dB": 10.0, "epicardium_dB": 13.0},
+        "decorrelation": {"time_ms": times_ms[0]},
+        "blood": {"level_dB": -19.0, "density": 0.15, "decorrelation_time_ms": times_ms[1]},
+        "surroundings": {"level_dB": -11.0, "density": 0.15, "start_mm": scale, "motion_decay_mm": scale},
+        "neighbours": {
+            "chambers_dB": 0.0,
+            "lung_dB": -1.0,
+            "chest_wall_dB": -1.0,
+            "leaflets_dB": 4.0,
+            "papillary_muscles_dB": 0.0,
+        },
+        "noise": {"snr_dB": 40.0},
+        "haze": {"level_dB": -16.0, "max_source_range_mm": 4 * scale, "mean_extra_range_mm": 2 * scale},
+    }
+
+
+REALISM_PRESETS: dict[str, dict[str, Any]] = {
+    "none": {},
+    "mouse": _preset(1.0, (500.0, 14.0)),
+    "human": _preset(12.5, (350.0, 98.0)),
+}
+"""Values of keys of each `realism.preset`; docs/realism.md says what they were fitted to."""
+
+
 class Realism(Section):
     """Properties of real images that the paper's phantom does not have; all are off by default."""
 
+    preset: Literal["none", "mouse", "human"] = "none"
+    """Levels, lengths and times of the keys below that are not given: as in clips of such hearts, or all off. With
+    `mouse` and `human` the defaults of `probe.bandwidth`, `phantom.density_per_mm3` and of gain, smoothing and grey map
+    in `bmode` change too, but not where `cases` change this key from heart to heart."""
     backscatter: Backscatter = Backscatter()
     """Echo of muscle that depends on its fibres; its mean over all directions at end-diastole stays what it was."""
     borders: Borders = Borders()
@@ -151,3 +194,25 @@ class Realism(Section):
     """Reverberation: near echoes are repeated later and out of focus."""
     shadow: Shadow = Shadow()
     """Acoustic shadow of a rib, which blocks part of the array."""
+
+    def given(self) -> dict[str, Any]:
+        """Keys and values, without those that they have by `preset`, so that another one can replace it."""
+        by_preset = type(self)(preset=self.preset).model_dump()
+        return {"preset": self.preset} | _without(self.model_dump(), by_preset)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_from_preset(cls, values: Any) -> Any:
+        preset = values.get("preset") if isinstance(values, dict) else None
+        return merged(REALISM_PRESETS.get(preset, {}), values) if isinstance(preset, str) else values
+
+
+def _without(values: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:
+    """Values of nested keys that differ from others; sections stay, if with fewer keys."""
+    found = {}
+    for key, value in values.items():
+        if isinstance(value, dict):
+            found[key] = _without(value, others[key])
+        elif value != others[key]:
+            found[key] = value
+    return found

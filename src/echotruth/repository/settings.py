@@ -35,7 +35,8 @@ def _motion(config: Config) -> Settings:
 def phantom(config: Config, view: str) -> Settings:
     """What the scatterers of a view depend on, and their echoes."""
     depth = config.bmode.field_of_view_mm
-    return config.seed, config.views[view], config.phantom, config.probe.resolved(), config.rf, config.realism, depth
+    levels = config.realism.model_dump(mode="json", exclude={"preset"})
+    return config.seed, config.views[view], config.phantom, config.probe.resolved(), config.rf, levels, depth
 
 
 def truth(config: Config, view: str) -> Settings:

@@ -42,6 +42,8 @@ CHEST_WALL_SHARE = 0.8
 STRATA = ((0.0, 0.0), (0.1, -14.0), (0.3, -2.0), (0.36, -10.0), (0.62, 0.0), (0.68, -12.0), (0.92, -1.0))
 """Layers of the chest wall: depth at which each begins, over that of the chest wall, and level relative to the
 brightest, dB; skin, fat, fascia, muscle, fascia, muscle, pleura. By eye."""
+UNDULATION = ((2.3, 0.045, 0.4), (0.9, 0.025, 2.1), (0.41, 0.012, 5.0))
+"""Waves of the layers of the chest wall: length and amplitude over its depth, and phase, rad; by eye."""
 SUBDIVISIONS = 6
 """Parts of the edge of a facet between points at which the epicardium is sampled."""
 
@@ -174,10 +176,15 @@ def chest_wall_depth(heart: Heart, plane: Plane, start: float) -> float:
     return start + CHEST_WALL_SHARE * max(0.0, float(np.hypot(*epicardium[:, :2].T).min()) - start)
 
 
-def strata_dB(share: Floats) -> Floats:
-    """Level of the chest wall relative to its brightest layers, dB, at shares (n,) of its depth."""
+def strata_dB(share: Floats, along: Floats) -> Floats:
+    """Level of the chest wall relative to its brightest layers, dB, at shares (n,) of its depth.
+
+    The layers undulate along the array, at distances (n,) from its middle over the depth of the chest wall.
+    """
     begins, level = np.array(STRATA).T
-    return level[np.searchsorted(begins, share, "right") - 1]
+    for length, amplitude, phase in UNDULATION:
+        share = share + amplitude * np.sin(2 * pi * along / length + phase)
+    return level[np.searchsorted(begins, np.clip(share, 0, 1), "right") - 1]
 
 
 def sampled(nodes: Floats, facets: NDArray[np.int32]) -> Floats:

@@ -8,6 +8,8 @@ Physiol 247 (1984) H478); isolated muscle changes where it shortens, but not whe
 Ultrason Ferroelectr Freq Control 33 (1986) 347): here the change follows the strain along the fibres.
 """
 
+from math import log, sqrt
+
 import numpy as np
 
 from echotruth.arrays import Floats
@@ -15,6 +17,24 @@ from echotruth.config.realism import Backscatter
 from echotruth.fem.tetrahedra import MaterialPoints, jacobian, shape_gradient
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
+
+WAVES = 64
+"""Waves of which the random function of :func:`variation` is the sum."""
+
+
+def variation(backscatter: Backscatter, position: Floats, random: np.random.Generator) -> Floats:
+    """Factors (n,) on the amplitudes of scatterers at positions (n, 3), m, in the unloaded wall.
+
+    Some parts of it are brighter and some fainter. Their level in dB is a normally distributed random function of
+    position: a sum of cosines whose wave vectors are normally distributed, so that its correlation is Gaussian (Rahimi
+    & Recht 2007, Random features for large-scale kernel machines). The mean power is that without it.
+    """
+    std, level = backscatter.variation_dB, np.zeros(len(position))
+    wave_vectors = random.standard_normal((WAVES, 3)) / backscatter.si().variation_length
+    for wave_vector, phase in zip(wave_vectors, random.uniform(0, 2 * np.pi, WAVES), strict=True):
+        level += std * sqrt(2 / WAVES) * np.cos(position @ wave_vector + phase)
+    mean_dB = std**2 * log(10) / 20
+    return 10 ** ((level - mean_dB) / 20)
 
 
 class FibreEcho:

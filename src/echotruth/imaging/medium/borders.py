@@ -33,13 +33,13 @@ class Border:
         Nodes of the quadratic triangle of each.
     xi : ndarray of shape (n, 2)
         Local coordinates in it.
-    amplitude : float
+    amplitude : float or ndarray of shape (n,)
         At the unloaded area of the surface, relative to the standard deviation of those of muscle.
     """
 
     facets: Integers
     xi: Floats
-    amplitude: float
+    amplitude: float | Floats
 
     def positions(self, nodes: Floats) -> Floats:
         """Positions (n, 3), m, for nodes (n_nodes, 3), m."""

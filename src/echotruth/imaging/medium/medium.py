@@ -1,6 +1,8 @@
 """The medium: all scatterers in the frames of one view."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,7 @@ from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, MaterialPoints, interpolate
 from echotruth.heart import Heart
 from echotruth.imaging.medium.anatomy import CAVITIES
-from echotruth.imaging.medium.backscatter import FibreEcho
+from echotruth.imaging.medium.backscatter import FibreEcho, variation
 from echotruth.imaging.medium.blood import Blood, Cavity, seed_blood
 from echotruth.imaging.medium.borders import Border, border_amplitude, seed_border
 from echotruth.imaging.medium.mitral_valve import Leaflets, seed_leaflets
@@ -142,10 +144,8 @@ class Medium:
         backscatter = config.realism.backscatter
         depends = backscatter.anisotropy_dB or backscatter.fibre_strain_dB
         self._fibre_echo = FibreEcho(backscatter, heart, plane, points) if depends else None
-        self._borders = [
-            Border(seeded[f"{name}_facets"], seeded[f"{name}_xi"], border_amplitude(config, level_dB))
-            for name, (_, level_dB) in _borders(config).items()
-        ]
+        self._variation = self._varied(partial(interpolate, heart.nodes, heart.cells, points), random)
+        self._borders = self._seeded_borders(seeded, random)
         self._blood: Blood | None = None
         self._surroundings: AroundHeart | None = None
         if "blood_cell" in seeded:
@@ -160,6 +160,19 @@ class Medium:
         self._bodies = [
             IN_CAVITY[name](heart, **_named(name, seeded)) for name in IN_CAVITY if f"{name}_amplitude" in seeded
         ]
+
+    def _varied(self, unloaded: Callable[[], Floats], random: Random) -> Floats | float:
+        """Factors (n,) on the amplitudes of muscle or a border, whose unloaded positions are (n, 3), m; or one."""
+        backscatter = self._config.realism.backscatter
+        return variation(backscatter, unloaded(), random("variation")) if backscatter.variation_dB else 1.0
+
+    def _seeded_borders(self, seeded: Arrays, random: Random) -> list[Border]:
+        borders = []
+        for name, (_, level_dB) in _borders(self._config).items():
+            border = Border(seeded[f"{name}_facets"], seeded[f"{name}_xi"], border_amplitude(self._config, level_dB))
+            varied = self._varied(partial(border.positions, self._heart.nodes), random)
+            borders.append(replace(border, amplitude=border.amplitude * varied))
+        return borders
 
     def _amplitudes_around(self, seeded: Arrays, time: Floats, random: Random) -> Callable[[int], Floats]:
         """Amplitudes by frame of what is around the heart: blood changes as that in the cavity."""
@@ -183,7 +196,7 @@ class Medium:
     def wall(self, frame: int) -> tuple[Floats, Floats, Floats]:
         """Positions in the image (n, 3), m, amplitudes (n,) and exponents (n,) of the scatterers in the wall."""
         position = self._wall.image_positions(self._heart.positions(frame), self._heart.cells, self._plane)
-        amplitude = self._wall_amplitude(frame)
+        amplitude = self._wall_amplitude(frame) * self._variation
         if self._fibre_echo is not None:
             amplitude = amplitude * self._fibre_echo(frame, position)
         return _of_tissue(self._config.phantom, position, amplitude)

@@ -233,11 +233,11 @@ def tissues(config: Config, heart: Heart, plane: Plane, position: Floats) -> tup
         tissue[chambers > 0], level[chambers > 0] = chambers[chambers > 0], levels[chambers > 0]
     if realism.neighbours.chest_wall_dB is not None:
         start = realism.surroundings.si().start
-        depth, axial = chest_wall_depth(heart, plane, start), plane.to_image(position)[:, 1]
-        near = axial < depth
+        depth, (lateral, axial, _) = chest_wall_depth(heart, plane, start), plane.to_image(position).T
+        near, thickness = axial < depth, max(depth - start, 1e-12)
         tissue[near] = Neighbour.CHEST_WALL
-        share = np.clip((axial[near] - start) / max(depth - start, 1e-12), 0, 1)
-        level[near] = realism.neighbours.chest_wall_dB + strata_dB(share)
+        strata = strata_dB((axial[near] - start) / thickness, lateral[near] / thickness)
+        level[near] = realism.neighbours.chest_wall_dB + strata
     return tissue, 10 ** (level / 10)
 
 
