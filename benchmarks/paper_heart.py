@@ -152,7 +152,7 @@ class Heart:
 
     def scores(self, view: str, tracker: str, size: int) -> xr.Dataset:
         """Scores of one clip."""
-        return et.unpack(self.group("evaluation")[["scores"]].sel(view=view, tracker=tracker, size=size))
+        return et.unpack(self.group(f"evaluation/{size}/{tracker}")[["scores"]].sel(view=view))
 
     def circumferential(
         self, view: str, size: int, tracker: str | None = None, centred: bool = False
@@ -236,7 +236,7 @@ class Heart:
     def segments(self, tracker: str) -> tuple[np.ndarray, np.ndarray]:
         """True and tracked circumferential displacement of the AHA segments in the largest images, m, (17,) each."""
         names = "true_segment_displacement", "tracked_segment_displacement"
-        scores = self.group("evaluation").sel(view=list(SLICES), tracker=tracker, size=self.sizes[0])
+        scores = self.group(f"evaluation/{self.sizes[0]}/{tracker}").sel(view=list(SLICES))
         data = et.unpack(scores, *names).sel(polar="tangential")
         # A segment at a boundary may be visible in two planes; their mean is shown.
         true, tracked = (data[name].mean("view").values for name in names)

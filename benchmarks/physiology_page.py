@@ -19,6 +19,9 @@ INTRODUCTION = """# Search for the motion of an animal's heart
 Coarse hearts (6 x 8 x 2 elements), each beaten through the loop of its species with levers drawn at random
 (`python benchmarks/physiology.py`). [docs/physiology.md](../../docs/physiology.md) says what was chosen and why.
 The misfit is the root mean square distance from the targets, in standard deviations as published.
+
+The hearts of the search and those chosen from them are of an earlier mechanics, in which the tension did not depend on
+the velocity of the fibres; *mesh that ships* and *finer mesh* are the default heart.
 """
 
 EFFECTS = {
@@ -179,17 +182,22 @@ def write(folder: Path, results: Path) -> None:
         within = sum(not missed(row) for row in search)
         text.append(f"{within} of {len(search)} hearts are within all that is asked.\n")
         chosen = levers[:1] or confirmed
-        columns = {"paper's": paper, "chosen, search mesh": levers, "mesh that ships": confirmed, "finer mesh": fine}
+        columns = {
+            "paper's": paper,
+            "chosen then, search mesh": levers,
+            "mesh that ships": confirmed,
+            "finer mesh": fine,
+        }
         text.append(asked_table(species, {name: rows[0] for name, rows in columns.items() if rows}))
         text.append("\n### What each means does\n\nChange over the range, by a linear fit over all hearts.\n")
         text.append(effects_table(search))
         if len(levers) > 2 * len(LEVERS):
             draw_levers(levers).savefig(results / f"physiology_{species}_levers.png", dpi=100)
-            text.append(f"\nVaried alone around the chosen heart:\n\n![levers](physiology_{species}_levers.png)")
+            text.append(f"\nVaried alone around the heart chosen then:\n\n![levers](physiology_{species}_levers.png)")
         if chosen:
             draw_fronts(search, chosen[0], species).savefig(results / f"physiology_{species}_fronts.png", dpi=100)
             text.append(
-                "\n### Fronts\n\nAll hearts of the search; bands: measured mean and deviation; star: chosen.\n\n"
+                "\n### Fronts\n\nAll hearts of the search; bands: measured mean and deviation; star: chosen then.\n\n"
                 f"![fronts](physiology_{species}_fronts.png)"
             )
         text.append("\n### The ten nearest of the search\n\n" + best_table(search, 10) + "\n")

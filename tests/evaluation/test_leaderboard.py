@@ -133,6 +133,11 @@ def test_rows_are_of_the_hearts_that_count(tmp_path):
     assert table["e_cc_rms_pp"].isna().tolist() == [False, False, True, True] * 2
 
 
+def test_a_repository_whose_hearts_are_not_finished_has_no_rows(tmp_path):
+    table = rows(board(tmp_path, ""))
+    assert table.empty and list(table.columns) == ["case", "view", "size_px", "tracker", "failure"]
+
+
 def test_scores_of_a_view_are_found_by_its_name(tmp_path):
     """Whatever the order in the store, and beside views that have left the configuration."""
     views = {"former": [0.9, 0.9], "long_axis": [0.2, 0.4], "mid": [0.1, 0.2]}

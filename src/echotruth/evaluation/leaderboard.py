@@ -52,7 +52,7 @@ def rows(repository: Repository) -> pd.DataFrame:
     -------
     DataFrame
         Columns of `KEYS`, those of :func:`echotruth.evaluation.scoring.metrics`, and `failure`: why the tracker failed,
-        or "".
+        or "". Without a heart there are no rows, and no columns of metrics.
 
     Raises
     ------
@@ -61,7 +61,8 @@ def rows(repository: Repository) -> pd.DataFrame:
     """
     clips = ((case, view) for case in repository.shown for view in repository.views)
     found = [row for clip in clips for row in _builtin_rows(repository, *clip)]
-    builtin = pd.DataFrame(sorted(found, key=lambda row: repository.sizes.index(row["size_px"])))
+    ordered = sorted(found, key=lambda row: repository.sizes.index(row["size_px"]))
+    builtin = pd.DataFrame(ordered, columns=None if found else [*KEYS, "failure"])
     clip, tables = ["case", "view", "size_px"], [builtin]
     known = pd.MultiIndex.from_frame(builtin[clip])
     for file in _files_of_guests(repository):
