@@ -43,6 +43,15 @@ def test_gif_and_video(made, tmp_path):
 
 
 @pytest.mark.slow
+def test_what_is_grey_stays_grey_in_a_gif(made, tmp_path):
+    frames = clip.render(made, 240)
+    picture = Image.open(clip.gif(tmp_path / "clip.gif", frames))
+    picture.seek(2)
+    shown, grey = np.asarray(picture.convert("RGB")), np.ptp(frames[2], axis=-1) == 0
+    assert np.ptp(shown[grey], axis=-1).max() == 0
+    assert np.abs(shown.astype(int) - frames[2])[~grey].mean() < 12
+
+
 def test_gif_of_noise_stays_small(tmp_path):
     frames = np.random.default_rng(0).integers(0, 256, (40, 400, 400, 1)).astype(np.uint8).repeat(3, -1)
     assert clip.gif(tmp_path / "clip.gif", frames).stat().st_size < 1.3 * clip.MAX_GIF_BYTES
