@@ -12,6 +12,8 @@ from .evaluation.curves import strain_peaks
 from .heart import Heart
 from .imaging.beamforming.scanner import Scanner
 from .imaging.rf.full_matrix import FullMatrix
+from .inference.estimate import infer
+from .inference.observation import observe
 from .notebook.datasets import heart_dataset
 from .notebook.kinematics import kinematics
 from .notebook.point_tracks import point_tracks
@@ -44,8 +46,10 @@ __all__ = [
     "fetch",
     "heart_dataset",
     "image",
+    "infer",
     "kinematics",
     "learning",
+    "observe",
     "point_tracks",
     "read_clip",
     "read_wall",

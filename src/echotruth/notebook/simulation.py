@@ -77,7 +77,7 @@ def beat(config: Source = None, progress: bool = True, *, frames: Iterable[int] 
     if settings.cases:
         keys = ", ".join(settings.cases.keys)
         raise ValueError(f"cases sweeps {keys}: beat one, as echotruth.expand(config)[0].config")
-    with _progress_line("beat", progress):
+    with progress_line("beat", progress):
         arrays = simulate(settings) if frames is None else mechanics_beat(settings, list(frames))
     if frames is not None:
         return Heart.of(arrays, settings)
@@ -174,7 +174,7 @@ def image(
     case, plane = Case("heart", {}, config), imaging_plane(config.views[name], config.rf, heart.endo_at_ed)
     random = partial(generator, case, name)
     sequence = Sequence(config, heart, plane, random)
-    with _progress_line("image", progress):
+    with progress_line("image", progress):
         lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range
     gain = clip_gain(config.probe, config.bmode, config.rf.lines, range_, random("dropout"))
     values = {
@@ -323,7 +323,7 @@ def _name(tracker: str | Callable[..., Any]) -> str:
 
 
 @contextmanager
-def _progress_line(what: str, progress: bool) -> Iterator[None]:
+def progress_line(what: str, progress: bool) -> Iterator[None]:
     """Show what the package logs on one line of stderr, where a person watches; BLAS runs on one thread.
 
     Its sums depend on the number of threads, and the bytes must not.

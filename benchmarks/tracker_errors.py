@@ -1,0 +1,66 @@
+"""Table of the errors of trackers at end-systole, by which parameters of hearts are inferred.
+
+    python benchmarks/tracker_errors.py out/benchmark                  # the table of the package
+    python benchmarks/tracker_errors.py out/mine --all -o errors.csv   # one of hearts and trackers of your own
+
+Only hearts whose label `split` is `develop` count, and only clips without a variation (label `variation` none); with
+--all those of every finished case. Rows of other hearts stay in a table that is there.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+import echotruth as et
+from echotruth.arrays import Floats
+from echotruth.cases import Case
+from echotruth.inference import tracker_errors
+from echotruth.inference.observation import ObservationError, heart_name, seen_of
+
+
+def chosen(case: Case, every: bool) -> bool:
+    """Whether the errors of a case are learned."""
+    labels = case.labels
+    return every or (labels.get("split") == "develop" and labels.get("variation", "none") == "none")
+
+
+def errors(repository: et.Repository, every: bool) -> Iterator[tuple[str, int, str, str, str, Floats, Floats]]:
+    """What was tracked and is true in the segments of the views of each case, tracker and size."""
+    for case in repository.every.values():
+        if not chosen(case, every):
+            continue
+        kind, heart = tracker_errors.acoustics(case.config), heart_name(repository, case)
+        for tracker in repository.trackers:
+            for size in repository.sizes:
+                try:
+                    for seen in seen_of(repository, case, tracker, size):
+                        if seen.segments:
+                            yield tracker, size, kind, seen.quantity, heart, seen.tracked, seen.true
+                except ObservationError as error:
+                    print(f"left out: {error}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("repositories", type=Path, nargs="+")
+    parser.add_argument("--all", action="store_true", help="every case, and not those to develop on alone")
+    parser.add_argument("-o", "--output", type=Path, default=tracker_errors.SHIPPED)
+    arguments = parser.parse_args()
+    rows: list[Any] = []
+    for place in arguments.repositories:
+        rows += errors(et.Repository(place), arguments.all)
+    table = tracker_errors.table_of(rows)
+    if arguments.output.is_file():
+        old, keys = tracker_errors.read(arguments.output), [*tracker_errors.KEYS, "heart"]
+        table = pd.concat([old, table]).drop_duplicates(keys, keep="last").sort_values(keys)
+    table.to_csv(arguments.output, index=False, float_format="%.6f")
+    print(f"{arguments.output}: {table['heart'].nunique()} hearts, {len(table)} rows")
+
+
+if __name__ == "__main__":
+    main()

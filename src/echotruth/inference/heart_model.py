@@ -1,0 +1,174 @@
+"""The heart that is inferred: from parameters to what is observed, and the derivatives, by its finite elements."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from echotruth.arrays import Floats
+from echotruth.config import Config, Pathology
+from echotruth.config.building import configure
+from echotruth.config.loop import Loop
+from echotruth.config.regional import Regional
+from echotruth.heart import Heart
+from echotruth.inference.imaged_wall import ImagedWall
+from echotruth.inference.observation import ObservationError
+from echotruth.inference.parameters import Parameter, slopes
+from echotruth.loop.cycle import read_loop
+from echotruth.loop.recording import LoopError
+from echotruth.notebook.sensitivities import sensitivities
+from echotruth.section import UNITS
+
+STEP = 1e-3
+"""Change of a parameter, over the standard deviation of its prior, by which observations are differenced."""
+
+MESH_KEYS = tuple(f"geometry.{name}_elements" for name in ("circumferential", "longitudinal", "transmural"))
+
+
+def model_config(observed: xr.Dataset, mesh: tuple[int, int, int] | None, folder: Path) -> Config:
+    """Configuration of the model of an observed heart.
+
+    It has the geometry and the laws of the observed heart, the fibres and the shares of the tension of its species, no
+    disease and no segment that differs, and goes through the observed loop.
+
+    Parameters
+    ----------
+    observed : Dataset
+        As :func:`.observation.observe` returns it.
+    mesh : tuple of int, optional
+        Elements around, along and through the wall; those of the observed heart if not given.
+    folder : Path
+        Where the loop is written.
+    """
+    given = configure(json.loads(observed.attrs["config"]))
+    species = configure(geometry={"preset": given.geometry.preset})
+    if mesh is not None and given.geometry.file is None:
+        if len(mesh) != len(MESH_KEYS):
+            raise ObservationError(f"mesh = {mesh}: give the elements around, along and through the wall")
+        given = configure(given, **dict(zip(MESH_KEYS, mesh, strict=True)))
+    shares = {name: getattr(species.mechanics.active, name) for name in ("sheet_share", "normal_share")}
+    mechanics = given.mechanics.model_copy(
+        update={"regional": Regional(), "active": given.mechanics.active.model_copy(update=shares)}
+    )
+    sections = {
+        "geometry": given.geometry,
+        "fibres": given.fibres if given.fibres.source == "file" else species.fibres,
+        "pathology": Pathology(),
+        "loop": _measured(observed, given, folder),
+        "mechanics": mechanics,
+    }
+    return given.model_copy(update=sections)
+
+
+def _measured(observed: xr.Dataset, given: Config, folder: Path) -> Loop:
+    """Measured loop of the pressure and the volume that were observed, with the four values that have errors."""
+    name = f"the loop of {observed.attrs['case']}"
+    if missing := [curve for curve in ("pressure", "volume") if curve not in observed]:
+        raise ObservationError(f"{name}: has no {missing[0]}: both are needed to know the tension of the muscle")
+    pressure, volume = (observed[curve].values.astype(float) for curve in ("pressure", "volume"))
+    if not (np.isfinite(pressure).all() and np.isfinite(volume).all()):
+        raise ObservationError(f"{name}: a pressure or volume is not finite: give all frames of a cycle")
+    path, period = folder / "loop.csv", read_loop(given.loop).period
+    loop = Loop(file=str(path), frames=len(pressure))
+    try:
+        _write_loop(path, period, pressure, volume)
+        cycle = read_loop(loop)
+        end = cycle.systole[-1]
+    except LoopError as error:
+        raise ObservationError(str(error).replace(str(path), name)) from None
+    mmHg, uL = UNITS["mmHg"], UNITS["uL"]
+    return loop.model_copy(
+        update={
+            "edp_mmHg": float(pressure[0] / mmHg),
+            "esp_mmHg": float(pressure[end] / mmHg),
+            "edv_uL": float(volume[0] / uL),
+            "esv_uL": float(volume.min() / uL),
+        }
+    )
+
+
+def _write_loop(path: Path, period: float, pressure: Floats, volume: Floats) -> None:
+    """Write a cycle (n_frames,) as a file that closes, without the suction of diastole, which tells nothing here."""
+    frames = len(pressure)
+    end = int(np.argmin(volume))
+    pressure = np.where(np.arange(frames) > end, np.maximum(pressure, 1e-2 * pressure[0]), pressure)
+    columns = [period * np.arange(frames + 1) / frames, *(np.append(curve, curve[0]) for curve in (pressure, volume))]
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["time_s", "pressure_Pa", "volume_m3"])
+        writer.writerows(np.column_stack(columns).tolist())
+
+
+@dataclass
+class HeartModel:
+    """What a heart of given parameters shows.
+
+    Attributes
+    ----------
+    config : Config
+        As :func:`model_config` makes it.
+    parameters : sequence of Parameter
+    view : sequence of str
+        View of each observation.
+    aha : sequence of int
+        Its segment, 0 for rotation.
+    muscle : dict
+        Of the parameters that were tried, by their bytes: logarithms of C and of the active tension at end-systole, Pa,
+        and their derivatives by the parameters, ((2,), (2, p)).
+    """
+
+    config: Config
+    parameters: Sequence[Parameter]
+    view: Sequence[str]
+    aha: Sequence[int]
+    muscle: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._frames = read_loop(self.config.loop).systole
+
+    def at(self, scaled: Floats) -> Config:
+        """Configuration of parameters (p,) on their scales."""
+        values = {p.key: p.value(x) for p, x in zip(self.parameters, scaled, strict=True)}
+        return configure(self.config, **values)
+
+    def __call__(self, scaled: Floats) -> tuple[Floats, Floats]:
+        """Observations (n,) of parameters (p,) on their scales, and their derivatives by these, (n, p)."""
+        heart, by = sensitivities(self.at(scaled), [p.key for p in self.parameters], self._frames)
+        moved = by["node_position"].values[:, None] + by["displacement"].values[:, [0, -1]]
+        at_ed, at_es = heart.positions(0), heart.positions(-1)
+        slope = slopes(self.parameters, scaled)
+        steps = np.array([STEP * p.sd for p in self.parameters]) * slope
+        predicted, jacobian = np.full(len(self.aha), np.nan), np.full((len(self.aha), len(self.parameters)), np.nan)
+        for view in dict.fromkeys(self.view):
+            wall_seen = ImagedWall.of(heart, self.config, view)
+            base = wall_seen.seen(heart, at_ed, at_es)
+            rows = [row for row, name in enumerate(self.view) if name == view]
+            of = [self.aha[row] for row in rows]
+            predicted[rows] = base[of]
+            for column, (change, step) in enumerate(zip(moved, steps, strict=True)):
+                changed = wall_seen.seen(heart, at_ed + step * change[0], at_es + step * change[1])
+                jacobian[rows, column] = (changed - base)[of] / step * slope[column]
+        if not np.isfinite(predicted).all():
+            row = int(np.argmax(~np.isfinite(predicted)))
+            raise ObservationError(
+                f"{self.view[row]}: the model shows no segment {self.aha[row]} there: use a finer mesh"
+            )
+        self.muscle[scaled.tobytes()] = _muscle(heart, by, slope)
+        return predicted, jacobian
+
+
+def _muscle(heart: Heart, by: xr.Dataset, slope: Floats) -> tuple[Floats, Floats]:
+    """Logarithms of C and of T at end-systole, and their derivatives by parameters on their scales."""
+    arrays = heart.arrays["mechanics"]
+    values = np.array([float(arrays["stiffness"]), float(arrays["active_tension"][-1])])
+    if not np.all(values > 0):
+        remedy = "the pressures and volumes of the loop contradict each other"
+        raise ObservationError(f"the muscle of the model would have to push at end-systole: {remedy}")
+    derivatives = np.stack([by["stiffness"].values, by["active_tension"].values[:, -1]])
+    return np.log(values), derivatives * slope / values[:, None]

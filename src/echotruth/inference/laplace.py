@@ -1,0 +1,190 @@
+"""Mode of a posterior by Gauss-Newton steps, and Laplace's approximation of its spread.
+
+Observations y = g(q) + e with e of covariance C, and a prior of mean m and standard deviations s, give the mode
+
+    q* = argmin J(q),    J(q) = (y - g)^T C^-1 (y - g) + sum(((q - m) / s)^2),
+
+within bounds. With the Jacobian G = dg/dq there, the posterior is taken to be normal with the covariance
+
+    (G^T C^-1 G + diag(s)^-2)^-1,
+
+which is exact if g is linear and no bound is reached (Tarantola, Inverse Problem Theory, SIAM 2005, section 3.2).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import lsq_linear
+from scipy.stats import chi2
+
+from echotruth.arrays import Floats
+
+logger = logging.getLogger("echotruth.inference")
+
+Model = Callable[[Floats], tuple[Floats, Floats]]
+"""From parameters (p,) to what they predict (n,), and its Jacobian (n, p)."""
+
+MAX_STEPS = 8
+CLOSE = 0.1
+"""Step, over the posterior standard deviation of each parameter, below which the mode is found."""
+MAX_HALVINGS = 4
+
+
+class NoMode(RuntimeError):
+    """Raised if no step from the mean of the prior lowers the misfit."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Independent normal distributions, cut off at bounds.
+
+    Attributes
+    ----------
+    mean, sd, lower, upper : ndarray of shape (p,)
+        In the unit of each parameter; `sd` is positive.
+    """
+
+    mean: Floats
+    sd: Floats
+    lower: Floats
+    upper: Floats
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Mode and spread of the parameters.
+
+    Attributes
+    ----------
+    mean : ndarray of shape (p,)
+        The mode.
+    covariance : ndarray of shape (p, p)
+    predicted : ndarray of shape (n,)
+        Observations of the mode.
+    jacobian : ndarray of shape (n, p)
+    misfit : float
+        Probability that errors of the given covariance leave residuals as large as these or larger.
+    steps : int
+        Number of Gauss-Newton steps.
+    converged : bool
+        Whether the last step was below `CLOSE`; else the point is the best that was found.
+    """
+
+    mean: Floats
+    covariance: Floats
+    predicted: Floats
+    jacobian: Floats
+    misfit: float
+    steps: int
+    converged: bool
+
+
+def posterior(model: Model, observed: Floats, covariance: Floats, prior: Prior) -> Posterior:
+    """Find the mode of a posterior and its spread.
+
+    Parameters
+    ----------
+    model : callable
+    observed : ndarray of shape (n,)
+    covariance : ndarray of shape (n, n)
+        Of the errors of the observations; positive definite.
+    prior : Prior
+
+    Returns
+    -------
+    Posterior
+
+    Raises
+    ------
+    NoMode
+        If no step from the mean of the prior lowers the misfit.
+    """
+    problem = _Problem(model, observed, cholesky(covariance, lower=True), prior)
+    point, converged, steps = problem.at(prior.mean), False, 0
+    while not converged and steps < MAX_STEPS:
+        change = problem.step(point)
+        spread = np.sqrt(np.diag(problem.covariance(point)))
+        logger.info("step %d: misfit %.1f, next step %.2f sd", steps, point.cost, np.max(np.abs(change) / spread))
+        if np.all(np.abs(change) <= CLOSE * spread):
+            converged = True
+            break
+        lower = problem.lowered(point, change)
+        if lower is None and not steps:
+            said = "the observations contradict the model or the prior"
+            raise NoMode(f"no step lowers the misfit of {point.cost:.1f}: {said}")
+        if lower is None:
+            break
+        point, steps = lower, steps + 1
+    found, residual = problem.covariance(point), observed - point.predicted
+    misfit = _misfit(residual, covariance, point.jacobian, prior.sd)
+    return Posterior(point.values, found, point.predicted, point.jacobian, misfit, steps, converged)
+
+
+@dataclass(frozen=True)
+class _Point:
+    values: Floats
+    predicted: Floats
+    jacobian: Floats
+    cost: float
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """The least-squares problem; `root` is the lower Cholesky factor of the covariance of the errors."""
+
+    model: Model
+    observed: Floats
+    root: Floats
+    prior: Prior
+
+    def at(self, values: Floats) -> _Point:
+        """The model and J at parameters."""
+        predicted, jacobian = self.model(values)
+        whitened = solve_triangular(self.root, self.observed - predicted, lower=True)
+        cost = np.sum(whitened**2) + np.sum(((values - self.prior.mean) / self.prior.sd) ** 2)
+        return _Point(values, predicted, jacobian, float(cost))
+
+    def step(self, point: _Point) -> Floats:
+        """Step to the mode of the problem that is linear about a point, within the bounds."""
+        matrix = np.vstack([solve_triangular(self.root, point.jacobian, lower=True), np.diag(1 / self.prior.sd)])
+        residual = solve_triangular(self.root, self.observed - point.predicted, lower=True)
+        right = np.concatenate([residual, (self.prior.mean - point.values) / self.prior.sd])
+        # In standard deviations of the prior, so that the least squares are well scaled.
+        bounds = [(limit - point.values) / self.prior.sd for limit in (self.prior.lower, self.prior.upper)]
+        return np.asarray(lsq_linear(matrix * self.prior.sd, right, bounds, method="bvls").x) * self.prior.sd
+
+    def covariance(self, point: _Point) -> Floats:
+        """Covariance (p, p) of the posterior that is normal about a point."""
+        scaled = solve_triangular(self.root, point.jacobian * self.prior.sd, lower=True)
+        inner = np.linalg.inv(scaled.T @ scaled + np.eye(len(self.prior.sd)))
+        return inner * np.outer(self.prior.sd, self.prior.sd)
+
+    def lowered(self, point: _Point, change: Floats) -> _Point | None:
+        """A point with a lower J, along a step that is halved until there is one; None if there is none."""
+        for halving in range(MAX_HALVINGS + 1):
+            try:
+                trial = self.at(point.values + change / 2**halving)
+            except (ValueError, RuntimeError) as error:
+                logger.info("half the step: %s", error)
+                continue
+            if trial.cost < point.cost:
+                return trial
+        return None
+
+
+def _misfit(residual: Floats, covariance: Floats, jacobian: Floats, sd: Floats) -> float:
+    """Probability of larger residuals than those of the mode.
+
+    Those of a linear problem have the covariance C S^-1 C with S = C + G diag(s)^2 G^T, so that r^T C^-1 r is a sum of
+    squares of standard normal numbers, each times an eigenvalue of S^-1 C; its distribution is taken to be that of a
+    scaled chi-squared number of the same mean and variance (Satterthwaite 1946, Biometrics Bulletin 2:110).
+    """
+    sum_ = covariance + (jacobian * sd**2) @ jacobian.T
+    weight = np.linalg.eigvals(np.linalg.solve(sum_, covariance)).real
+    scale, degrees = np.sum(weight**2) / np.sum(weight), np.sum(weight) ** 2 / np.sum(weight**2)
+    return float(chi2.sf(residual @ np.linalg.solve(covariance, residual) / scale, degrees))

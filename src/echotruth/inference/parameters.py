@@ -1,0 +1,131 @@
+"""Parameters of a heart that are inferred: their priors, and the scale on which these are normal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from echotruth.arrays import Floats
+from echotruth.config import Config
+from echotruth.inference.laplace import Prior
+from echotruth.inference.segment_means import SEGMENTS
+
+CONTRACTILITY, STIFFNESS = "mechanics.regional.contractility", "mechanics.regional.stiffness"
+
+FACTOR_LIMITS = (0.05, 20.0)
+"""Those of the keys of `mechanics.regional`."""
+
+EDP_SD_MMHG, ESP_SD_MMHG = 0.5, 4.0
+"""Standard deviation of measured pressures."""
+EDV_SD, EJECTION_FRACTION_SD = 0.02, 0.02
+"""Standard deviation of the end-diastolic volume over it, and of the ejection fraction."""
+
+Given = Mapping[str, tuple[float, float] | None]
+
+
+class PriorError(ValueError):
+    """Raised if a prior cannot be used."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A key of the configuration and its prior.
+
+    Attributes
+    ----------
+    key : str
+    mean, sd : float
+        Of the value of the key or, on a logarithmic scale, of its logarithm.
+    limits : tuple of float
+        Smallest and largest value of the key.
+    logarithmic : bool
+    """
+
+    key: str
+    mean: float
+    sd: float
+    limits: tuple[float, float]
+    logarithmic: bool = False
+
+    def value(self, scaled: float) -> float:
+        """Value of the key."""
+        value = float(np.exp(scaled)) if self.logarithmic else float(scaled)
+        return min(max(value, self.limits[0]), self.limits[1])
+
+
+def parameters(config: Config, given: Given) -> list[Parameter]:
+    """Parameters of a model and their priors.
+
+    Parameters
+    ----------
+    config : Config
+        Of the model; its values are the means of the priors of fibres, shares and loop.
+    given : mapping
+        Dotted key to the mean and standard deviation of its value instead, or to None for what is not inferred; a key
+        of `mechanics.regional` without a segment stands for all of them.
+
+    Raises
+    ------
+    PriorError
+        If a key is none of these, or a number cannot be used.
+    """
+    active, fibres, loop = config.mechanics.active, config.fibres, config.loop
+    assert loop.edv_uL and loop.esv_uL and loop.edp_mmHg and loop.esp_mmHg
+    positive, angle = (1e-6, np.inf), (-90.0, 90.0)
+    found = [
+        *(Parameter(f"{CONTRACTILITY}.{number}", 1.0, 0.5, FACTOR_LIMITS) for number in SEGMENTS),
+        *(Parameter(f"{STIFFNESS}.{number}", 0.0, 1.0, FACTOR_LIMITS, logarithmic=True) for number in SEGMENTS),
+        Parameter("mechanics.active.sheet_share", active.sheet_share, 0.1, (0.0, 1.0)),
+        Parameter("mechanics.active.normal_share", active.normal_share, 0.1, (0.0, 1.0)),
+        Parameter("fibres.endo_deg", fibres.endo_deg, 8.0, angle),
+        Parameter("fibres.epi_deg", fibres.epi_deg, 8.0, angle),
+        Parameter("loop.edp_mmHg", loop.edp_mmHg, EDP_SD_MMHG, positive),
+        Parameter("loop.esp_mmHg", loop.esp_mmHg, ESP_SD_MMHG, positive),
+        Parameter("loop.edv_uL", loop.edv_uL, EDV_SD * loop.edv_uL, positive),
+        Parameter("loop.esv_uL", loop.esv_uL, EJECTION_FRACTION_SD * loop.edv_uL, positive),
+    ]
+    keys = {parameter.key for parameter in found}
+    for key in given:
+        if key not in keys | {CONTRACTILITY, STIFFNESS}:
+            shown = ", ".join([f"{CONTRACTILITY}.N", f"{STIFFNESS}.N", *(p.key for p in found[2 * len(SEGMENTS) :])])
+            raise PriorError(f"prior: {key} is not inferred: the keys are {shown}")
+    chosen = [_with(parameter, given) for parameter in found]
+    free = [parameter for parameter in chosen if parameter is not None]
+    if not free:
+        raise PriorError("prior: leaves nothing to infer: give a mean and a standard deviation of one key")
+    return free
+
+
+def _with(parameter: Parameter, given: Given) -> Parameter | None:
+    """A parameter with the prior that is given of it, or of all segments."""
+    section = parameter.key.rpartition(".")[0]
+    named = parameter.key if parameter.key in given else section
+    if named not in given:
+        return parameter
+    if (pair := given[named]) is None:
+        return None
+    try:
+        mean, sd = (float(number) for number in pair)
+    except (TypeError, ValueError):
+        raise PriorError(f"prior: {named} = {pair!r}: give a mean and a standard deviation, or None") from None
+    low, high = parameter.limits
+    if not (low <= mean <= high and np.isfinite(mean) and 0 < sd < np.inf):
+        remedy = f"give a mean from {low:g} to {high:g} and a positive standard deviation"
+        raise PriorError(f"prior: {named} = ({mean:g}, {sd:g}): {remedy}")
+    if parameter.logarithmic:
+        mean, sd = float(np.log(mean)), sd / mean
+    return Parameter(parameter.key, mean, sd, parameter.limits, parameter.logarithmic)
+
+
+def prior_of(parameters: Sequence[Parameter]) -> Prior:
+    """The prior of parameters, on their scales."""
+    limits = np.array([np.log(p.limits) if p.logarithmic else p.limits for p in parameters], float)
+    mean, sd = (np.array([getattr(p, name) for p in parameters], float) for name in ("mean", "sd"))
+    return Prior(mean, sd, limits[:, 0], limits[:, 1])
+
+
+def slopes(parameters: Sequence[Parameter], scaled: Floats) -> Floats:
+    """Derivative of the value of each key by its scale, (p,)."""
+    return np.array([p.value(x) if p.logarithmic else 1.0 for p, x in zip(parameters, scaled, strict=True)])

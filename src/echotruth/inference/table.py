@@ -1,0 +1,97 @@
+"""Rows of the table of what was inferred of the hearts of a repository, beside what is true."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from echotruth.cases import Case
+from echotruth.heart import Heart
+from echotruth.inference.estimate import MATERIAL, TENSION, infer
+from echotruth.inference.observation import observe
+from echotruth.inference.segment_means import means_of_cells
+from echotruth.repository.reader import Repository
+from echotruth.section import UNITS, value_of
+
+COLUMNS = (
+    *("case", "tracker", "size_px", "parameter", "unit", "mean", "sd", "lower", "upper"),
+    *("prior_mean", "prior_sd", "identifiable", "true", "misfit_probability", "misfit", "converged"),
+)
+"""Columns of the table; `lower` and `upper` are the ends of the 90 % interval."""
+
+
+def rows(
+    repository: Repository, tracker: str | None, case: str, size: int | None, errors: Path | None
+) -> list[dict[str, Any]]:
+    """Infer one heart of a repository.
+
+    Parameters, errors
+        Those of :func:`.observation.observe` and :func:`.estimate.infer`.
+
+    Returns
+    -------
+    list of dict
+        Of each parameter its values in the order of `COLUMNS`.
+    """
+    return rows_of(infer(observe(repository, tracker, case, size, errors)), truth(repository, case))
+
+
+def rows_of(found: xr.Dataset, true: dict[str, float]) -> list[dict[str, Any]]:
+    """Rows of what :func:`.estimate.infer` returns, beside the true values by the name of the parameter."""
+    table = found.drop_dims("observation").to_dataframe().reset_index()
+    about = {name: found.attrs[name] for name in COLUMNS if name in found.attrs}
+    table = table.assign(**about, true=[true.get(name, np.nan) for name in table["parameter"]])
+    table[["misfit", "converged"]] = table[["misfit", "converged"]].astype(bool)
+    return [{name: row[name] for name in COLUMNS} for row in table.to_dict("records")]
+
+
+def columns(table: list[dict[str, Any]]) -> pd.DataFrame:
+    """Table of rows."""
+    return pd.DataFrame(table, columns=list(COLUMNS))
+
+
+def truth(repository: Repository, case: str) -> dict[str, float]:
+    """True values of the parameters of a heart that beat, by their names."""
+    heart, found = repository.heart(case), repository.case(case)
+    return _of_muscle(heart) | _of_keys(found, heart)
+
+
+def _of_muscle(heart: Heart) -> dict[str, float]:
+    """Contractility and stiffness of segments, relative to the wall, C and the active tension at end-systole."""
+    arrays, mechanics = heart.arrays["pathology"], heart.arrays["mechanics"]
+    segments = heart.arrays["fibres"]["segment"].astype(int)
+    tension, volume = means_of_cells(heart.nodes, heart.cells, segments, arrays["tension_scale"])
+    stiffness, _ = means_of_cells(heart.nodes, heart.cells, segments, arrays["stiffness_scale"])
+    shown, share = np.flatnonzero(volume), volume / volume.sum()
+    tension_mean = float(share[shown] @ tension[shown])
+    stiffness_mean = float(np.exp(share[shown] @ np.log(stiffness[shown])))
+    found = {f"contractility.{place + 1}": tension[place] / tension_mean for place in shown}
+    found |= {f"stiffness.{place + 1}": stiffness[place] / stiffness_mean for place in shown}
+    tension_es = float(mechanics["active_tension"][heart.es])
+    kPa = UNITS["kPa"]
+    found |= {
+        MATERIAL: float(mechanics["stiffness"]) * stiffness_mean / kPa,
+        TENSION: tension_es * tension_mean / kPa,
+    }
+    return {name: float(value) for name, value in found.items()}
+
+
+def _of_keys(case: Case, heart: Heart) -> dict[str, float]:
+    """Values of keys of the configuration, and of the loop at end-diastole and end-systole."""
+    pressure, volume = heart.arrays["mechanics"]["pressure"], heart.arrays["mechanics"]["volume"]
+    mmHg, uL = UNITS["mmHg"], UNITS["uL"]
+    found = {
+        "loop.edp_mmHg": pressure[0] / mmHg,
+        "loop.esp_mmHg": pressure[heart.es] / mmHg,
+        "loop.edv_uL": volume[0] / uL,
+        "loop.esv_uL": volume.min() / uL,
+    }
+    shares = ("mechanics.active.sheet_share", "mechanics.active.normal_share")
+    keys = shares if case.config.fibres.source == "file" else (*shares, "fibres.endo_deg", "fibres.epi_deg")
+    return {name: float(value) for name, value in found.items()} | {
+        name: float(value_of(case.config, name)) for name in keys
+    }

@@ -1,0 +1,38 @@
+"""`echotruth infer`."""
+
+import pandas as pd
+import pytest
+
+from echotruth.inference import table
+
+
+def test_command_writes_the_table_after_each_heart_and_goes_on_after_one_that_fails(call, tmp_path, monkeypatch):
+    def rows(_, tracker, case, *__):
+        if case == "infarct":
+            raise ValueError("infarct: dis saw no segment")
+        return [dict.fromkeys(table.COLUMNS, 1.0) | {"case": case, "tracker": tracker}]
+
+    monkeypatch.setattr(table, "rows", rows)
+    status, output, errors = call("infer", "sample", "--tracker", "dis", "-o", "found.csv")
+    assert status == 1 and "found.csv" in output
+    assert "echotruth: infarct: dis saw no segment" in errors
+    written = pd.read_csv(tmp_path / "found.csv")
+    assert list(written.columns) == list(table.COLUMNS) and list(written["case"]) == ["healthy"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["sample"], "is part of the package: name a file by --output"),
+        (["nowhere"], "nowhere"),
+        (["sample", "-o", "no/folder.csv"], "there is no folder no"),
+        (["sample", "-o", "a.csv", "--case", "healty"], "healty"),
+        (["sample", "-o", "a.csv", "--tracker", "dos"], "dos"),
+        (["sample", "-o", "a.csv", "--size", "17"], "17"),
+        (["sample", "-o", "a.csv", "--errors", "none.csv"], "there is no such table of errors"),
+    ],
+)
+def test_command_refuses_in_a_line_and_writes_nothing(call, tmp_path, arguments, said):
+    status, _, errors = call("infer", *arguments)
+    assert status == 2 and said in errors and "Traceback" not in errors
+    assert not list(tmp_path.glob("*.csv"))

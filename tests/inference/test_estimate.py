@@ -1,0 +1,137 @@
+"""Muscle that is known, inferred from the motion of a heart of another mesh; and what cannot be inferred."""
+
+import numpy as np
+import pytest
+
+import echotruth as et
+from echotruth.config.loading import ConfigError
+from echotruth.inference import estimate, observation
+from echotruth.inference.estimate import infer
+from echotruth.inference.imaged_wall import ImagedWall, quantity
+from echotruth.inference.observation import ObservationError, Seen
+from echotruth.inference.parameters import PriorError
+from echotruth.inference.segment_means import SegmentMeans
+from echotruth.inference.tracker_errors import TrackerError
+from echotruth.loop.cycle import read_loop
+
+TRUE = {"7": 0.9, "8": 0.4, "9": 0.5, "10": 0.9, "11": 1.4, "12": 1.2}
+ERROR = 0.002
+"""Standard deviation that the exact strain is said to have."""
+KNOWN = dict.fromkeys(
+    (
+        *("mechanics.regional.stiffness", "mechanics.active.sheet_share", "mechanics.active.normal_share"),
+        *("fibres.endo_deg", "fibres.epi_deg"),
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def heart():
+    mesh = {"circumferential_elements": 18, "longitudinal_elements": 6, "transmural_elements": 1}
+    config = et.configure(
+        geometry=mesh, loop={"frames": 8}, mechanics={"regional": {"contractility": TRUE}}, tracking={"grid_px": 8}
+    )
+    return et.beat(config, frames=et.systole(config))
+
+
+@pytest.fixture(scope="module")
+def observed(heart):
+    """Its exact motion."""
+    rows = []
+    for view, segments in (("mid", range(7, 13)), ("long_axis", (3, 6, 9, 12, 14, 16))):
+        wall = ImagedWall.of(heart, heart.config, view)
+        exact = wall.seen(heart, heart.positions(0), heart.positions(-1))[list(segments)]
+        rows.append(
+            (Seen(quantity(wall.kind), view, list(segments), exact, exact), TrackerError(0.0, 0.0, ERROR**2, 0.0, 99))
+        )
+    cycle = read_loop(heart.config.loop)
+    loop = {"pressure": cycle.pressure, "volume": cycle.volume}
+    return observation.dataset(rows, heart.config.model_dump_json(), loop, {"case": "known"})
+
+
+def chosen(observed, kept):
+    return observed.isel(observation=kept, other=kept)
+
+
+@pytest.fixture(scope="module")
+def found(observed):
+    return infer(observed, KNOWN, mesh=(12, 6, 1))
+
+
+@pytest.mark.slow
+def test_contractility_of_segments_is_found_from_the_motion_of_a_heart_of_another_mesh(heart, found):
+    factors = np.array([float(TRUE.get(str(number), 1.0)) for number in range(1, 18)])
+    means = SegmentMeans.of(heart.config)
+    true = dict(zip(means.number.tolist(), means.relative(factors)[0], strict=True))
+    seen = [f"contractility.{number}" for number in range(7, 13)]
+    rows = found.sel(parameter=seen)
+    due = np.array([true[number] for number in range(7, 13)])
+    assert np.sqrt(np.mean((rows["mean"].values - due) ** 2)) < 0.04
+    assert np.all((rows["lower"] <= due) & (due <= rows["upper"]))
+    assert rows["identifiable"].all()
+    assert not found.attrs["misfit"] and found.attrs["converged"]
+
+
+@pytest.mark.slow
+def test_what_no_view_shows_keeps_its_prior(found):
+    unseen = found.sel(parameter=["contractility.1", "contractility.4", "loop.edp_mmHg"])
+    assert not unseen["identifiable"].any()
+    assert (unseen["sd"] / unseen["prior_sd"] > 0.8).all()
+
+
+@pytest.mark.slow
+def test_interval_widens_where_no_view_shows_the_segment_any_more(observed, found):
+    without = infer(chosen(observed, np.flatnonzero(observed["view"] != "mid")), KNOWN, mesh=(12, 6, 1))
+    seen, unseen = (result.sel(parameter="contractility.8") for result in (found, without))
+    assert unseen["sd"] > 2 * seen["sd"]
+    assert seen["identifiable"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda seen: chosen(seen, []), "holds no observation"),
+        (lambda seen: seen.drop_vars("volume"), "the loop of known: has no volume"),
+        (lambda seen: seen.assign(pressure=seen["pressure"] * np.nan), "pressure or volume is not finite"),
+        (lambda seen: seen.assign(volume=seen["volume"] * 0 + 5e-8), "the loop of known: volume"),
+        (lambda seen: seen.assign(value=seen["value"].where(seen["aha"] != 8)), "is not finite: leave it out"),
+        (lambda seen: seen.assign(covariance=seen["covariance"] * 0), "not positive definite"),
+        (lambda seen: seen.isel(observation=[0, 1]), "choose by isel"),
+        (lambda seen: seen.drop_attrs(), "lost its attribute config"),
+        (lambda seen: seen.drop_vars("value"), "has no value"),
+    ],
+)
+def test_observations_that_cannot_be_used_are_refused_in_a_sentence(observed, change, said):
+    with pytest.raises(ObservationError, match=said):
+        infer(change(observed))
+
+
+@pytest.mark.parametrize(
+    ("prior", "said"),
+    [
+        ({"fibres.endo": (80, 8)}, "fibres.endo is not inferred: the keys are .*fibres.endo_deg"),
+        ({"fibres.endo_deg": (95, 8)}, "give a mean from -90 to 90"),
+        ({"fibres.endo_deg": (80, 0)}, "positive standard deviation"),
+        ({"fibres.endo_deg": 80}, "give a mean and a standard deviation, or None"),
+        ({"mechanics.regional.contractility": (0.01, 0.1)}, "give a mean from 0.05 to 20"),
+    ],
+)
+def test_priors_that_cannot_be_used_are_refused_in_a_sentence(observed, prior, said):
+    with pytest.raises(PriorError, match=said):
+        infer(observed, prior)
+
+
+def test_what_is_no_observation_or_no_mesh_is_refused(observed):
+    with pytest.raises(TypeError, match=r"echotruth\.observe makes one"):
+        infer("out/demo")
+    with pytest.raises(ConfigError, match="circumferential_elements"):
+        infer(observed, mesh=(13, 6, 1))
+    with pytest.raises(ObservationError, match="around, along and through"):
+        infer(observed, mesh=(12, 6))
+
+
+@pytest.mark.parametrize(("mean", "lower"), [(0.45, 0.0), (0.69, 0.0), (0.71, 0.51)])
+def test_interval_of_a_segment_that_may_be_a_stiff_scar_holds_none_at_all(mean, lower):
+    row = {"mean": mean, "lower": mean - 0.2, "upper": mean + 0.2}
+    assert estimate._down_to_scar(row)["lower"] == pytest.approx(lower)
+    assert row["lower"] == pytest.approx(mean - 0.2)

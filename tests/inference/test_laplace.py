@@ -1,0 +1,80 @@
+"""The mode and the spread of posteriors that are known."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.stats import kstest
+
+from echotruth.inference.laplace import NoMode, Prior, posterior
+
+FREE = {"lower": np.full(3, -np.inf), "upper": np.full(3, np.inf)}
+PRIOR = Prior(mean=np.array([1.0, -2.0, 30.0]), sd=np.array([0.5, 0.1, 8.0]), **FREE)
+MATRIX = np.random.default_rng(1).normal(size=(5, 3)) / PRIOR.sd
+COVARIANCE = 0.3 * np.eye(5) + 0.2
+
+
+def linear(values):
+    return MATRIX @ values + 4, MATRIX
+
+
+def test_posterior_of_a_linear_problem_is_that_of_conditioned_normal_numbers():
+    observed = np.array([1.0, 5.0, -2.0, 0.5, 3.0])
+    found = posterior(linear, observed, COVARIANCE, PRIOR)
+    # Conditioning of the joint normal distribution, without a least-squares problem.
+    prior = np.diag(PRIOR.sd**2)
+    gain = prior @ MATRIX.T @ np.linalg.inv(MATRIX @ prior @ MATRIX.T + COVARIANCE)
+    np.testing.assert_allclose(found.mean, PRIOR.mean + gain @ (observed - linear(PRIOR.mean)[0]), rtol=1e-9)
+    np.testing.assert_allclose(found.covariance, prior - gain @ MATRIX @ prior, rtol=1e-7, atol=1e-12)
+    assert found.converged and found.steps == 1
+
+
+def test_probability_of_the_residuals_is_uniform_where_the_model_is_true():
+    random, probability = np.random.default_rng(2), []
+    for _ in range(300):
+        values = PRIOR.mean + PRIOR.sd * random.normal(size=3)
+        observed = linear(values)[0] + np.linalg.cholesky(COVARIANCE) @ random.normal(size=5)
+        probability.append(posterior(linear, observed, COVARIANCE, PRIOR).misfit)
+    assert kstest(probability, "uniform").pvalue > 0.01
+    wrong = posterior(linear, linear(PRIOR.mean)[0] + [9, -9, 9, -9, 9], COVARIANCE, PRIOR)
+    assert wrong.misfit < 1e-3
+
+
+def curved(values):
+    inner = MATRIX @ values / 20
+    return np.exp(inner), np.exp(inner)[:, None] * MATRIX / 20
+
+
+@pytest.mark.parametrize("upper", [np.inf, 1.1])
+def test_mode_of_a_curved_problem_is_that_of_another_minimiser_within_the_bounds(upper):
+    prior = Prior(PRIOR.mean, PRIOR.sd, FREE["lower"], np.array([upper, np.inf, np.inf]))
+    observed, inverse = curved(np.array([1.6, -2.1, 25.0]))[0], np.linalg.inv(1e-2 * COVARIANCE)
+
+    def cost(values):
+        residual = observed - curved(values)[0]
+        return residual @ inverse @ residual + np.sum(((values - prior.mean) / prior.sd) ** 2)
+
+    bounds = [(None, limit) for limit in (upper, None, None)]
+    best = minimize(cost, prior.mean, bounds=bounds, options={"ftol": 1e-14, "gtol": 1e-10})
+    found = posterior(curved, observed, 1e-2 * COVARIANCE, prior)
+    assert found.converged
+    assert np.all(np.abs(found.mean - best.x) < 0.1 * np.sqrt(np.diag(found.covariance)))
+    assert found.mean[0] <= upper
+
+
+def test_step_into_what_the_model_cannot_do_is_halved():
+    def narrow(values):
+        if values[0] > 1.3:
+            raise ValueError("there is no such heart")
+        return linear(values)
+
+    observed = linear(PRIOR.mean + [0.4, 0.0, 0.0])[0]
+    free = posterior(linear, observed, 1e-3 * COVARIANCE, PRIOR)
+    assert free.mean[0] > 1.3
+    found = posterior(narrow, observed, 1e-3 * COVARIANCE, PRIOR)
+    assert PRIOR.mean[0] < found.mean[0] <= 1.3
+    assert not found.converged
+
+
+def test_derivatives_of_the_wrong_sign_lead_nowhere():
+    with pytest.raises(NoMode, match="no step lowers the misfit"):
+        posterior(lambda values: (linear(values)[0], -MATRIX), np.ones(5), COVARIANCE, PRIOR)
