@@ -1,4 +1,5 @@
-# make demo, make benchmark and make test set up .venv from requirements.lock first; make test-all runs the slow tests too. Make
+# make demo, make benchmark and make test set up .venv from requirements.lock first, uncompiled: Python compiles what is imported, a fifth
+# of it. make test-all runs the slow tests too. Make
 # test-integration runs the tests that need PyTorch, an S3 server, SLURM, validators of other formats, other simulators or Sphinx,
 # in an environment of their own; make docs builds the site there.
 
@@ -32,17 +33,17 @@ test-integration: .venv-integration/ready
 
 .venv-integration/ready: .venv/ready integration.lock
 	$(BIN)/python -m venv --clear .venv-integration
-	.venv-integration/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r integration.lock
-	.venv-integration/bin/python -m pip install --quiet --disable-pip-version-check "torch==2.13.0"
-	.venv-integration/bin/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .
+	.venv-integration/bin/python -m pip install --quiet --no-compile --disable-pip-version-check --require-hashes --no-deps -r integration.lock
+	.venv-integration/bin/python -m pip install --quiet --no-compile --disable-pip-version-check "torch==2.13.0"
+	.venv-integration/bin/python -m pip install --quiet --no-compile --disable-pip-version-check --no-build-isolation --no-deps -e .
 	touch $@
 
 .venv/ready: requirements.lock pyproject.toml
 	@test -n "$(PYTHON)" || { echo "echotruth needs Python 3.11, 3.12 or 3.13: install one, or give its path: make PYTHON=/path/to/python"; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null || { echo "echotruth needs Python 3.11, 3.12 or 3.13, but $(PYTHON) is another version: give the path of one: make PYTHON=/path/to/python"; exit 1; }
 	$(PYTHON) -m venv --clear .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --require-hashes --no-deps -r requirements.lock
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --no-build-isolation --no-deps -e .
 	touch $@
 
 docs: .venv-integration/ready  ## the site, in out/site
