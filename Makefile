@@ -1,7 +1,6 @@
-# make demo, make benchmark and make test set up .venv from requirements.lock first, uncompiled: Python compiles what is imported, a fifth
-# of it. make test-all runs the slow tests too. Make
-# test-integration runs the tests that need PyTorch, an S3 server, SLURM, validators of other formats, other simulators or Sphinx,
-# in an environment of their own; make docs builds the site there.
+# make demo, make benchmark and make test set up .venv from requirements.lock first, uncompiled: Python compiles what is imported.
+# make test-all runs the slow tests too. Make test-integration runs the tests that need PyTorch, an S3 server, SLURM, validators of
+# other formats, other simulators or Sphinx, in an environment of their own; make docs builds the site there.
 
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
