@@ -90,7 +90,8 @@ class WallTrajectory:
     ncc : ndarray of shape (frame, n)
         Correlation of image and template around each point; NaN where one of them has no texture.
     likeness : list of (ndarray of shape (k, 2), ndarray of shape (k,))
-        Of every frame but the first: displaced pixels, px, and the correlation of image and template around each.
+        Of every frame but the first: displaced pixels, px, and the correlation of image and template around each;
+        empty where it is known already what is seen.
     """
 
     coefficients: np.ndarray
@@ -236,8 +237,9 @@ class WallTracker:
             variance[now] = variance[template.frame] + self._variance(template, warped)
             amplitude[now] = self._amplitude(now, fitted)
             ncc[now] = self.ncc.at_points(amplitude[template.frame], amplitude[now])
-            alike = self.pixels.at_points(template.warped[:, 0], warped[:, 0])
-            likeness.append((self.region.displaced(fitted)[::LIKENESS_STRIDE], alike))
+            if self.visible is None:
+                alike = self.pixels.at_points(template.warped[:, 0], warped[:, 0])
+                likeness.append((self.region.displaced(fitted)[::LIKENESS_STRIDE], alike))
             if np.isfinite(variance[now]):
                 latest = self._template(now, fitted, warped)
         return WallTrajectory(coefficients, variance, np.array(ncc), likeness)
