@@ -165,7 +165,8 @@ class Section(BaseModel):
 
     def given(self) -> dict[str, Any]:
         """Keys and values from which the section can be made again with some of them changed."""
-        return self.model_dump()
+        sections = {key: value for key in type(self).model_fields if isinstance(value := getattr(self, key), Section)}
+        return self.model_dump() | {key: section.given() for key, section in sections.items()}
 
     def resolved(self) -> Section:
         """The section with every value filled in that follows from a preset."""

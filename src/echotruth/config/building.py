@@ -6,7 +6,7 @@ from typing import Any
 
 from echotruth.config import shipped
 from echotruth.config.loading import ConfigError, read_yaml, validate
-from echotruth.config.merging import KINDS, NAMED, merged, nested
+from echotruth.config.merging import difference, merged, nested
 from echotruth.config.sections import Config
 from echotruth.config.tracking import External
 
@@ -64,23 +64,9 @@ def _given(config: Config) -> dict[str, Any]:
     # What a preset is by default follows another preset.
     follows = validate({"geometry": presets["geometry"]}, "presets").probe.preset == config.probe.preset
     default = validate(presets, "presets").model_dump()
-    found = _difference(config.model_dump(), default)
+    found = difference(config.model_dump(), default)
     found |= {name: presets[name] | found.get(name, {}) for name in ("geometry", "realism")}
     return found if follows else found | {"probe": presets["probe"] | found.get("probe", {})}
-
-
-def _difference(values: dict[str, Any], default: dict[str, Any]) -> dict[str, Any]:
-    found = {}
-    for key, value in values.items():
-        other = default.get(key)
-        if isinstance(value, dict) and isinstance(other, dict) and key not in NAMED:
-            if any(value.get(kind) != other.get(kind) for kind in KINDS):
-                found[key] = value
-            elif inner := _difference(value, other):
-                found[key] = inner
-        elif value != other:
-            found[key] = value
-    return found
 
 
 def tracker_section(config: Config, tracker: str | Callable[..., Any], options: dict[str, Any]) -> Any:

@@ -51,8 +51,7 @@ def validate(values: dict[str, Any], source: str) -> Config:
 
 def override(config: Config, changes: dict[str, Any], source: str = "cases") -> Config:
     """Configuration with the values of some dotted keys (such as `fibres.endo_deg`) replaced."""
-    values = config.model_dump() | {"realism": config.realism.given()}
-    return validate(replace_values(values, changes), source)
+    return validate(replace_values(config.given(), changes), source)
 
 
 def replace_values(values: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

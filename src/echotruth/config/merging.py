@@ -1,4 +1,4 @@
-"""Merging of sections before they are validated: of what is given with defaults, or with other keys."""
+"""Merging of sections before validation: of what is given with defaults or other keys, and what differs from them."""
 
 from typing import Any
 
@@ -24,5 +24,20 @@ def merged(values: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
         if merges and all(old.get(kind) == value.get(kind, old.get(kind)) for kind in KINDS):
             found[key] = merged(old, value)
         else:
+            found[key] = value
+    return found
+
+
+def difference(values: dict[str, Any], default: dict[str, Any]) -> dict[str, Any]:
+    """Keys of values that differ from the default, section by section; a section of another kind is whole."""
+    found = {}
+    for key, value in values.items():
+        other = default.get(key)
+        if isinstance(value, dict) and isinstance(other, dict) and key not in NAMED:
+            if any(value.get(kind) != other.get(kind) for kind in KINDS):
+                found[key] = value
+            elif inner := difference(value, other):
+                found[key] = inner
+        elif value != other:
             found[key] = value
     return found

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, FiniteFloat, model_validator
 
 from echotruth.config.imaging import ScatteringExponent
-from echotruth.config.merging import merged
+from echotruth.config.merging import difference, merged
 from echotruth.section import Positive, Section
 
 Level = Annotated[FiniteFloat, Field(ge=-80, le=20)]
@@ -197,22 +197,12 @@ class Realism(Section):
 
     def given(self) -> dict[str, Any]:
         """Keys and values, without those that they have by `preset`, so that another one can replace it."""
-        by_preset = type(self)(preset=self.preset).model_dump()
-        return {"preset": self.preset} | _without(self.model_dump(), by_preset)
+        values, by_preset = self.model_dump(), type(self)(preset=self.preset).model_dump()
+        sections: dict[str, Any] = {name: {} for name, value in values.items() if isinstance(value, dict)}
+        return {"preset": self.preset} | sections | difference(values, by_preset)
 
     @model_validator(mode="before")
     @classmethod
     def _fill_from_preset(cls, values: Any) -> Any:
         preset = values.get("preset") if isinstance(values, dict) else None
         return merged(REALISM_PRESETS.get(preset, {}), values) if isinstance(preset, str) else values
-
-
-def _without(values: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:
-    """Values of nested keys that differ from others; sections stay, if with fewer keys."""
-    found = {}
-    for key, value in values.items():
-        if isinstance(value, dict):
-            found[key] = _without(value, others[key])
-        elif value != others[key]:
-            found[key] = value
-    return found
