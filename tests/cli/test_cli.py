@@ -3,34 +3,14 @@
 import io
 import subprocess
 import sys
-from contextlib import chdir, redirect_stderr, redirect_stdout
-from pathlib import Path
-from unittest.mock import patch
 
 import pandas as pd
 import pytest
+from cli.command_line import ROOT, run_cli
 
 import echotruth
 from echotruth.cases import expand
-from echotruth.cli import main
 from echotruth.config.loading import load
-
-ROOT = Path(__file__).parents[2]
-
-
-def run_cli(*arguments, cwd=ROOT):
-    """Status, output and errors of the command, run in this process."""
-    output, errors, status = io.StringIO(), io.StringIO(), 0
-    with chdir(cwd), redirect_stdout(output), redirect_stderr(errors):
-        try:
-            with patch("sys.argv", ["echotruth", *map(str, arguments)]):
-                main()
-        except SystemExit as exit_:
-            status = exit_.code
-            if isinstance(status, str):  # as the interpreter does it
-                print(status, file=sys.stderr)
-                status = 1
-    return status or 0, output.getvalue(), errors.getvalue()
 
 
 def run_process(*arguments, cwd=ROOT):

@@ -4,7 +4,7 @@ from contextlib import chdir
 from unittest.mock import patch
 
 import pytest
-from cli.test_cli import run_cli
+from cli.command_line import run_cli
 
 from echotruth.cases import expand
 from echotruth.cli.estimation import estimated
