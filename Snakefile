@@ -55,6 +55,7 @@ include: "rules/rf.smk"
 include: "rules/truth.smk"
 include: "rules/bmode.smk"
 include: "rules/tracking.smk"
+include: "rules/inference.smk"
 include: "rules/repository.smk"
 include: "rules/report.smk"
 

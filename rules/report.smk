@@ -3,6 +3,11 @@
 FIGURES = ["loop", "strain", "physiology", "population", "curves", "segments", "bullseye", "error", "leaderboard"]
 FIGURES += ["heart", "resolutions", "views"]
 
+TABLES = []
+if PLAN.config.inference.tracker:
+    FIGURES += ["inference"]
+    TABLES += [f"{OUT}/inference.csv"]
+
 
 rule report:
     input:
@@ -14,6 +19,7 @@ rule report:
         report(f"{OUT}/figures/clip.gif", category="clip"),
         f"{OUT}/figures/clip.mp4",
         f"{OUT}/figures/leaderboard.csv",
+        *TABLES,
         f"{OUT}/report.html",
     params:
         code=PLAN.code("report"),

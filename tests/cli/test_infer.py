@@ -3,7 +3,9 @@
 import pandas as pd
 import pytest
 
+import echotruth as et
 from echotruth.inference import table
+from echotruth.repository.layout import as_yaml
 
 
 def test_command_writes_the_table_after_each_heart_and_goes_on_after_one_that_fails(call, tmp_path, monkeypatch):
@@ -18,6 +20,15 @@ def test_command_writes_the_table_after_each_heart_and_goes_on_after_one_that_fa
     assert "echotruth: infarct: dis saw no segment" in errors
     written = pd.read_csv(tmp_path / "found.csv")
     assert list(written.columns) == list(table.COLUMNS) and list(written["case"]) == ["healthy"]
+
+
+def test_table_that_a_run_made_is_not_replaced(call, tmp_path):
+    config = et.configure(tracking={"trackers": {"dis": {"method": "dis"}}}, inference={"tracker": "dis"})
+    (tmp_path / "small").mkdir()
+    (tmp_path / "small/registry.txt").write_text("heart\n")
+    (tmp_path / "small/config.yaml").write_text(as_yaml(config))
+    status, _, errors = call("infer", "small")
+    assert status == 2 and "inference.csv: is what the run inferred: name another file by --output" in errors
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 
 import echotruth as et
 from echotruth.config.loading import ConfigError
-from echotruth.inference import estimate, observation
+from echotruth.inference import observation
 from echotruth.inference.estimate import infer
 from echotruth.inference.imaged_wall import ImagedWall, quantity
 from echotruth.inference.observation import ObservationError, Seen
@@ -62,7 +62,8 @@ def found(observed):
 def test_contractility_of_segments_is_found_from_the_motion_of_a_heart_of_another_mesh(heart, found):
     factors = np.array([float(TRUE.get(str(number), 1.0)) for number in range(1, 18)])
     means = SegmentMeans.of(heart.config)
-    true = dict(zip(means.number.tolist(), means.relative(factors)[0], strict=True))
+    of_segments = means.means(factors[None])[0]
+    true = dict(zip(means.number.tolist(), of_segments / (means.share @ of_segments), strict=True))
     seen = [f"contractility.{number}" for number in range(7, 13)]
     rows = found.sel(parameter=seen)
     due = np.array([true[number] for number in range(7, 13)])
@@ -128,10 +129,3 @@ def test_what_is_no_observation_or_no_mesh_is_refused(observed):
         infer(observed, mesh=(13, 6, 1))
     with pytest.raises(ObservationError, match="around, along and through"):
         infer(observed, mesh=(12, 6))
-
-
-@pytest.mark.parametrize(("mean", "lower"), [(0.45, 0.0), (0.69, 0.0), (0.71, 0.51)])
-def test_interval_of_a_segment_that_may_be_a_stiff_scar_holds_none_at_all(mean, lower):
-    row = {"mean": mean, "lower": mean - 0.2, "upper": mean + 0.2}
-    assert estimate._down_to_scar(row)["lower"] == pytest.approx(lower)
-    assert row["lower"] == pytest.approx(mean - 0.2)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from scipy.stats import kstest
+from scipy.stats import kstest, multivariate_normal
 
 from echotruth.inference.laplace import NoMode, Prior, posterior
 
@@ -37,6 +37,23 @@ def test_probability_of_the_residuals_is_uniform_where_the_model_is_true():
     assert kstest(probability, "uniform").pvalue > 0.01
     wrong = posterior(linear, linear(PRIOR.mean)[0] + [9, -9, 9, -9, 9], COVARIANCE, PRIOR)
     assert wrong.misfit < 1e-3
+
+
+def test_evidence_is_the_density_of_what_was_observed():
+    observed = np.array([1.0, 5.0, -2.0, 0.5, 3.0])
+    found = posterior(linear, observed, COVARIANCE, PRIOR)
+    # The observations of a linear model are normal themselves; the constant is that of errors alone.
+    spread = MATRIX @ np.diag(PRIOR.sd**2) @ MATRIX.T + COVARIANCE
+    due = multivariate_normal(linear(PRIOR.mean)[0], spread).logpdf(observed)
+    due -= multivariate_normal(np.zeros(5), COVARIANCE).logpdf(np.zeros(5))
+    assert found.log_evidence == pytest.approx(due, abs=1e-6)
+
+
+def test_search_that_begins_elsewhere_ends_in_the_same_mode():
+    observed = curved(np.array([1.6, -2.1, 25.0]))[0]
+    one, other = (posterior(curved, observed, 1e-2 * COVARIANCE, PRIOR, start) for start in (None, PRIOR.mean * 0.9))
+    assert np.all(np.abs(one.mean - other.mean) < 0.1 * np.sqrt(np.diag(one.covariance)))
+    assert one.log_evidence == pytest.approx(other.log_evidence, abs=0.05)
 
 
 def curved(values):

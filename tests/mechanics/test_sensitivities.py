@@ -5,12 +5,13 @@ import pytest
 
 import echotruth as et
 from echotruth.config.loading import ConfigError
-from echotruth.mechanics.pathology import PathologyError
+from echotruth.loop.cycle import read_loop
 
 COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
 # Changes so small that no step of the load is halved in one heart and not in the next.
 HEART = et.configure(geometry=COARSE | {"wall_mm": 1.0}, loop={"frames": 12, "esp_mmHg": 100.0})
 FILLED = et.configure(HEART, **{"mechanics.material.stiffness_kPa": 1.2})
+INFARCT = et.configure(HEART, pathology={"infarct": {"segments": [8, 9], "tension_scale": 0.1}})
 SEGMENT = "mechanics.regional.contractility.8"
 
 
@@ -54,6 +55,27 @@ def test_laws_fibres_shape_loop_and_stiffness(config, key, value, step):
     check(config, key, value, step, 2e-3)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("key", "value", "step"),
+    [("pathology.infarct.tension_scale", 0.1, 5e-3), ("pathology.infarct.stiffness_scale", 20.0, 0.2)],
+)
+def test_heart_with_a_scar_fills_to_its_loop_as_its_derivatives_say(key, value, step):
+    """Differences are those of hearts that were solved likewise: C of `beat` is that of the heart without the scar."""
+    heart, by = et.sensitivities(INFARCT, key)
+    cycle = read_loop(INFARCT.loop)
+    volume = heart.arrays["mechanics"]["volume"]
+    np.testing.assert_allclose(volume, cycle.volume[: len(volume)], rtol=1e-4)
+    others = [
+        et.sensitivities(et.configure(INFARCT, **{key: value + sign * step}), SEGMENT)[0].arrays["mechanics"]
+        for sign in (1, -1)
+    ]
+    for name in ("displacement", "active_tension", "stiffness"):
+        expected = (others[0][name].astype(float) - others[1][name]) / (2 * step)
+        found = by[name].sel(parameter=key).values
+        assert np.linalg.norm(found - expected) <= 5e-3 * np.linalg.norm(expected), name
+
+
 def test_systole_alone_ends_as_the_whole_cycle_does():
     few = et.configure(HEART, loop={"frames": 10})
     whole, systole = et.beat(few), et.beat(few, frames=et.systole(few))
@@ -67,7 +89,10 @@ def test_systole_alone_ends_as_the_whole_cycle_does():
     ("parameters", "message"),
     [
         ([], "parameters: name one key or more"),
-        ("fibres.x", r"fibres.x: is no key by which a beat changes: give one of geometry, fibres, loop, mechanics"),
+        (
+            "fibres.x",
+            r"fibres.x: is no key by which a beat changes: give one of geometry, fibres, pathology, loop, mechanics",
+        ),
         ("probe.pitch_um", "probe.pitch_um: is no key by which a beat changes"),
         ("fibres", "fibres: is no key|fibres: no derivative can be taken"),
         ("loop.edv_uL", "loop.edv_uL = None: no derivative can be taken by it: give it a value"),
@@ -83,12 +108,7 @@ def test_what_is_no_parameter_is_refused(parameters, message):
 @pytest.mark.parametrize(
     ("keys", "frames", "error", "message"),
     [
-        (
-            {"pathology.infarct.segments": [7]},
-            None,
-            PathologyError,
-            "pathology: derivatives are taken of hearts without",
-        ),
+        ({"pathology.late_activation.preset": "lbbb"}, None, ValueError, "late tissue needs every frame"),
         ({"loop.kind": "circulation"}, None, ValueError, "loop.kind = circulation: only a measured"),
         ({"motion.kind": "rigid"}, None, ValueError, "motion.kind = rigid: only a beat"),
         ({}, [1, 2], ValueError, r"frames = \[1, 2\]: give 0 and frames after it, in their order, below 12"),

@@ -320,12 +320,12 @@ def test_damaged_report_and_figures_are_found_and_deleted(folder, harm):
     [
         ({"tracking": Tracking(trackers={"one": PhaseCorrelation(window_px=24)})}, ["tracking"]),
         ({"phantom": Phantom(density_per_mm3=50)}, ["phantom", "rf", "bmode", "tracking"]),
-        ({"motion": Motion(kind="rigid")}, [*ledger.STAGES]),
+        ({"motion": Motion(kind="rigid")}, [*ledger.stages(CONFIG)]),
     ],
 )
 def test_results_of_other_settings_are_found_though_their_records_vouch_for_them(folder, tmp_path, changes, concerned):
     other = finished.finish(tmp_path / "other" / "small", finished.configured(**changes))
-    for path in ["small.zarr", *(f"ledger/{stage}" for stage in ledger.STAGES)]:
+    for path in ["small.zarr", *(f"ledger/{stage}" for stage in ledger.stages(CONFIG))]:
         rmtree(folder / path)
         copytree(other / path, folder / path)
     shutil.copy(other / "ledger/structure.json", folder / "ledger")

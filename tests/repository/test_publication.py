@@ -14,7 +14,7 @@ from echotruth.config import Bmode, Cases, Config, Geometry, Loop, PhaseCorrelat
 from echotruth.repository import ledger, schema
 from echotruth.repository.checksums import ChecksumError
 from echotruth.repository.layout import lay_out
-from echotruth.repository.ledger import STAGES
+from echotruth.repository.ledger import stages
 from echotruth.repository.publication import publish
 from echotruth.repository.store import Store
 from echotruth.workflow.job import Job
@@ -61,7 +61,7 @@ def test_whole_repository_is_verified_and_opens(folder):
     assert (summary["complete"], summary["implausible"], summary["failed"]) == (2, 0, 0)
     tree = xr.open_datatree(folder / "small.zarr")
     assert list(tree["cases/status"].values) == ["complete", "complete"]
-    assert set(tree.attrs["code"]) == set(STAGES)
+    assert set(tree.attrs["code"]) == set(stages(CONFIG))
 
 
 def test_every_file_of_the_hierarchy_is_verified(folder):

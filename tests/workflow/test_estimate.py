@@ -13,7 +13,7 @@ from echotruth.config.loading import load, validate
 from echotruth.workflow import cost
 from echotruth.workflow.concerns import concerns
 from echotruth.workflow.estimate import Estimate, estimate, format_bytes, short, table
-from echotruth.workflow.jobs import RULES, ended, jobs, places
+from echotruth.workflow.jobs import ended, jobs, places, rules
 
 ROOT = Path(__file__).parents[2]
 
@@ -37,7 +37,7 @@ def test_after_the_first_heart_the_rest_takes_what_it_took(tmp_path):
     config = load(ROOT / "config/sweep.yaml")
     first, *_ = expand(config)
     before = estimated(config)
-    for rule in RULES[:6]:
+    for rule in rules(config)[:6]:
         for view, size in places(rule, config):
             job = "/".join(str(part) for part in (rule, first.id, view, size) if part)
             write_benchmark(tmp_path, job, 3 * cost.seconds(rule, first.config, view, size))
@@ -50,7 +50,7 @@ def test_jobs_with_a_record_are_not_left(tmp_path):
     config = validate({"cases": {"seed": [1, 2]}}, "x")
     cases = [case.id for case in expand(config)]
     assert estimated(config, folder=tmp_path).seconds_left == estimated(config).seconds
-    for rule in RULES:
+    for rule in rules(config):
         finish(tmp_path, rule, config, cases)
         assert ended(tmp_path, rule, config) == jobs(rule, config, cases)
     assert estimated(config, folder=tmp_path).seconds_left == 0

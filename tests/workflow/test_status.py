@@ -17,7 +17,7 @@ from echotruth.repository import ledger
 from echotruth.repository.case_file import case_path
 from echotruth.repository.ledger import record_path
 from echotruth.workflow import lease
-from echotruth.workflow.jobs import RULES
+from echotruth.workflow.jobs import rules
 from echotruth.workflow.status import MAX_SHOWN, STATES, StatusError, status_before, status_of, text
 from echotruth.workflow.summary import NO_HEART, unfinished
 from echotruth.workflow.summary import finished as finished_text
@@ -39,7 +39,7 @@ def folder(tmp_path):
     (folder / "cases").mkdir()
     for case in expand(CONFIG):
         case_path(folder, case.id).write_text(case.config.model_dump_json())
-    for rule in RULES:
+    for rule in rules(CONFIG):
         finish(folder, rule, CONFIG, CASES)
     return folder
 

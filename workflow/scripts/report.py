@@ -6,6 +6,7 @@ from pathlib import Path
 
 from echotruth.report import page
 from echotruth.report.figures import Figures
+from echotruth.repository import inferred
 from echotruth.repository.checksums import commit_beside
 from echotruth.repository.reader import Repository
 
@@ -18,5 +19,6 @@ except FileNotFoundError as error:
     sys.exit(f"report: {error}")
 Figures(repository, repository.folder / "figures").draw()
 page.write(repository)
-drawn = [repository.folder / "report.html", *sorted((repository.folder / "figures").glob("[!.]*"))]
+tables = [repository.folder / inferred.FILE] if repository.config.inference.tracker else []
+drawn = [repository.folder / "report.html", *tables, *sorted((repository.folder / "figures").glob("[!.]*"))]
 commit_beside(repository.folder, repository.folder / "ledger/report.json", drawn)

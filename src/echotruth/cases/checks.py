@@ -16,8 +16,8 @@ from echotruth.config.table import LABEL
 from echotruth.section import dotted_values, value_of
 
 NOT_SWEPT = (
-    *("name", "cases", "views", "tracking", "geometry.shape", "fibres.layers", "loop.frames", "rf.keep"),
-    *("bmode.field_of_view_mm", "bmode.size_px", "bmode.downsampling"),
+    *("name", "cases", "views", "tracking", "inference", "geometry.shape", "fibres.layers", "loop.frames"),
+    *("rf.keep", "bmode.field_of_view_mm", "bmode.size_px", "bmode.downsampling"),
 )
 """Keys that cannot be swept (nor can `geometry.*_elements`), because they set the sizes of arrays over all cases."""
 

@@ -21,8 +21,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 def infer(arguments: argparse.Namespace) -> int:
     """Infer the contractility of segments, with intervals, from what a tracker saw of the hearts of a repository.
 
-    The table has a row for each heart and parameter: most probable value, standard deviation and 90 % interval, those
-    of the prior, whether the observations tell anything of it, and its true value. A heart takes a minute or two.
+    The table has a row for each heart and parameter: mean, standard deviation and 90 % interval, those of the prior,
+    whether the observations tell anything of it, the probability of a scar, and its true value. A heart takes one to
+    three minutes; the key inference.tracker makes it a stage of a run, which keeps the draws and does nothing twice.
 
     examples:
       echotruth infer out/benchmark --tracker bspline_dic --case infarct_inferior_ideal
@@ -34,6 +35,7 @@ def infer(arguments: argparse.Namespace) -> int:
       2  none is, or an option is wrong
     """
     from echotruth.inference.table import columns, rows
+    from echotruth.repository.inferred import FILE
     from echotruth.repository.reader import Repository
 
     table: list[dict[str, object]] = []
@@ -42,8 +44,10 @@ def infer(arguments: argparse.Namespace) -> int:
         repository = Repository(arguments.repository)
         if repository.is_sample and arguments.output is None:
             return fail(f"{arguments.repository}: is part of the package: name a file by --output")
+        if repository.config.inference.tracker and arguments.output is None:
+            return fail(f"{repository.folder / FILE}: is what the run inferred: name another file by --output")
         cases = arguments.case or repository.shown
-        output = arguments.output or repository.folder / "inference.csv"
+        output = arguments.output or repository.folder / FILE
         if not output.parent.is_dir():
             return fail(f"--output {output}: there is no folder {output.parent}: make it, or name another")
         for number, case in enumerate(cases, 1):

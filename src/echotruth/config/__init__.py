@@ -4,6 +4,7 @@ from echotruth.config.cases import Cases
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import Bmode, Phantom, Rf, View
+from echotruth.config.inference import Inference
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Active, Mechanics
 from echotruth.config.motion import Motion
@@ -21,6 +22,7 @@ __all__ = [
     "Config",
     "Fibres",
     "Geometry",
+    "Inference",
     "Loop",
     "Mechanics",
     "Motion",

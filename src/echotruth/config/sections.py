@@ -10,6 +10,7 @@ from echotruth.config.defaults import apply_presets
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import ALL_VIEWS, VIEWS, Bmode, Phantom, Rf, Views
+from echotruth.config.inference import Inference
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
 from echotruth.config.motion import Motion
@@ -47,6 +48,7 @@ class Config(Section):
     realism: Realism = Realism()
     bmode: Bmode = Bmode()
     tracking: Tracking = Tracking()
+    inference: Inference = Inference()
     cases: Cases = Cases()
     """The hearts: values of dotted keys such as `fibres.endo_deg: [60, 70]`, of which all combinations are made, a
     table, random draws, and conditions; they multiply, 100 000 hearts at most (docs/cases.md)."""
@@ -89,6 +91,22 @@ class Config(Section):
             length = getattr(tracker, key)
             if max(length if isinstance(length, list) else [length or 0]) > side:
                 raise invalid(f"{path}.{key}", length, f"must not exceed bmode.field_of_view_mm = {side:g}")
+
+    @check
+    def _check_inference(self) -> None:
+        inference = self.inference
+        if inference.tracker is None:
+            return
+        if inference.tracker not in self.tracking.trackers:
+            raise invalid("inference.tracker", inference.tracker, f"use one of {', '.join(self.tracking.trackers)}")
+        if inference.size_px not in (None, *self.bmode.sizes):
+            sizes = ", ".join(map(str, self.bmode.sizes))
+            raise invalid("inference.size_px", inference.size_px, f"is no image size: use one of {sizes}")
+        if self.motion.kind != "beat":
+            remedy = (
+                f"needs a loop of pressure and volume, which motion.kind = {self.motion.kind} has not: leave it out"
+            )
+            raise invalid("inference.tracker", inference.tracker, remedy)
 
     @check
     def _check_view_names(self) -> None:

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.stats import norm
+from numpy.typing import NDArray
 
 import echotruth
 from echotruth.arrays import Floats
-from echotruth.inference.heart_model import HeartModel, model_config
-from echotruth.inference.laplace import Posterior, posterior
+from echotruth.inference.draws import MATERIAL, TENSION, of_posterior, of_prior
+from echotruth.inference.heart_model import model_config
+from echotruth.inference.modes import Mode, modes
 from echotruth.inference.observation import ObservationError
-from echotruth.inference.parameters import CONTRACTILITY, STIFFNESS, Given, Parameter, parameters, prior_of
+from echotruth.inference.parameters import Given
 from echotruth.inference.segment_means import SEGMENTS, SegmentMeans
 from echotruth.notebook.simulation import progress_line
-from echotruth.section import UNITS
+from echotruth.repository.inferred import MISFIT, unit
 
 MESH = (12, 8, 2)
 """Elements around, along and through the wall of the model."""
@@ -31,15 +30,8 @@ COVERED = 0.9
 IDENTIFIABLE = 0.8
 """Standard deviation of the posterior over that of the prior, above which the observations tell next to nothing."""
 
-MISFIT = 0.01
-"""Probability of residuals as large, below which the model is said not to fit."""
-
-SCAR_LIKE = 0.5
-"""Contractility, over the mean of the wall, at which a stiff scar is found: one that does not contract at all and is 20
-times as stiff was found at 0.36 to 0.59, like a soft segment that contracts so much, since both hardly shorten."""
-
-MATERIAL, TENSION = "mechanics.material.stiffness_kPa", "active_tension_kPa"
-"""C, and the active tension at end-systole, mean of the muscle, which follow from the parameters."""
+POSITIVE = ("stiffness.", MATERIAL, TENSION)
+"""Beginnings of the names of what is positive, and has a prior on a logarithmic scale."""
 
 
 def infer(
@@ -50,8 +42,9 @@ def infer(
 ) -> xr.Dataset:
     """Infer the contractility of segments, and what else motion depends on, from what a tracker saw.
 
-    The finite elements themselves are the model; Gauss-Newton steps find the most probable parameters, and Laplace's
-    approximation their intervals (docs/inference.md). A minute or two.
+    The finite elements themselves are the model; Gauss-Newton steps find the most probable parameters of a wall without
+    a scar and of such as have one, and Laplace's approximation their intervals and weights (docs/inference.md). One to
+    three minutes.
 
     Parameters
     ----------
@@ -69,11 +62,13 @@ def infer(
     Returns
     -------
     Dataset
-        By `parameter`, in its `unit`: `mean`, the most probable value, `sd`, `lower` and `upper` of the 90 % interval,
-        `prior_mean`, `prior_sd`, and `identifiable`, whether the standard deviation is at most 0.8 of the prior's.
-        Parameters `contractility.N` and `stiffness.N` are means over the muscle of AHA segments, relative to the
-        mean of the whole wall (the geometric one of stiffness); an interval of contractility that goes below 0.5
-        reaches down to 0 unless the stiffness is known (docs/inference.md). By `observation`: `observed`, `predicted`,
+        By `parameter`, in its `unit`: `mean`, `sd`, `lower` and `upper` of the 90 % interval, `prior_mean`, `prior_sd`,
+        and `identifiable`, whether the standard deviation (of stiffness and tension: of its logarithm) is at most 0.8
+        of the prior's. Parameters `contractility.N` and `stiffness.N` are means over the muscle of AHA segments,
+        relative to the mean of the whole wall (the geometric one of stiffness). They are of the draws `posterior` and
+        `prior` (draw, parameter); `scar` (draw, aha) tells in which of the first a segment is a scar,
+        `scar_probability` (aha) in how many, NaN of a segment that no view shows, and `replicated` (draw, observation)
+        what would be seen, with errors. By `observation`: `observed`, `predicted` of the most probable heart,
         `residual` and `sd_error`. Attributes: `misfit_probability` of residuals as large, `misfit` if it is below 0.01,
         `converged`, `steps`, `case`, `tracker`, `size_px` and the `config` of the most probable heart.
 
@@ -97,10 +92,8 @@ def infer(
     check(observed)
     with TemporaryDirectory() as folder, progress_line("infer", progress):
         config = model_config(observed, mesh, Path(folder))
-        free = parameters(config, prior or {})
-        model = HeartModel(config, free, observed["view"].values.tolist(), observed["aha"].values.tolist())
-        found = posterior(model, observed["value"].values, observed["covariance"].values, prior_of(free))
-        return _Result(free, model, found, SegmentMeans.of(config)).dataset(observed)
+        segments = SegmentMeans.of(config)
+        return _dataset(observed, modes(config, prior or {}, observed, segments), segments)
 
 
 def check(observed: xr.Dataset) -> None:
@@ -140,141 +133,53 @@ def _check_values(value: Floats, covariance: Floats) -> None:
         raise ObservationError("observed: the covariance is not positive definite: each value needs an error")
 
 
-@dataclass(frozen=True)
-class _Result:
-    """What was found, on the scales of the parameters."""
-
-    free: Sequence[Parameter]
-    model: HeartModel
-    found: Posterior
-    segments: SegmentMeans
-
-    def dataset(self, observed: xr.Dataset) -> xr.Dataset:
-        """The result as :func:`infer` returns it."""
-        rows = [*self._keys(), *self._segments(), *self._muscle()]
-        columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        names, unit = columns.pop("parameter"), columns.pop("unit")
-        sd = np.sqrt(np.diag(observed["covariance"].values))
-        value = observed["value"].values
-        seen = {"observed": value, "predicted": self.found.predicted, "residual": value - self.found.predicted}
-        arrays: dict[str, Any] = {name: ("parameter", values) for name, values in columns.items()}
-        arrays |= {name: ("observation", values) for name, values in (seen | {"sd_error": sd}).items()}
-        labels = {name: ("observation", observed[name].values) for name in ("quantity", "view", "aha")}
-        about = {name: value for name, value in observed.attrs.items() if name != "config"}
-        about |= {
-            "misfit_probability": self.found.misfit,
-            "misfit": int(self.found.misfit < MISFIT),
-            "converged": int(self.found.converged),
-            "steps": self.found.steps,
-            "version": echotruth.__version__,
-            "config": self.model.at(self.found.mean).model_dump_json(),
-        }
-        return xr.Dataset(arrays, {"parameter": names, "unit": ("parameter", unit), **labels}, about)
-
-    def _keys(self) -> list[dict[str, Any]]:
-        """Rows of the keys, without those of segments."""
-        rows, spread = [], np.sqrt(np.diag(self.found.covariance))
-        for parameter, mean, sd in zip(self.free, self.found.mean, spread, strict=True):
-            if not parameter.key.startswith((CONTRACTILITY, STIFFNESS)):
-                unit = parameter.key.rpartition("_")[2]
-                shown = unit if unit in UNITS else "1"
-                rows.append(_row(parameter.key, shown, (mean, sd), (parameter.mean, parameter.sd), parameter.limits))
-        return rows
-
-    def _segments(self) -> list[dict[str, Any]]:
-        """Rows of contractility and stiffness, mean of segments relative to the whole wall."""
-        rows, keys = [], {parameter.key for parameter in self.free}
-        for section, relative, logarithmic in (
-            (CONTRACTILITY, self.segments.relative, False),
-            (STIFFNESS, self.segments.log_relative, True),
-        ):
-            if not any(parameter.key.startswith(section) for parameter in self.free):
-                continue
-            pairs = []
-            for scaled, covariance in ((self.found.mean, self.found.covariance), self._prior):
-                factors, selected = self._factors(section, scaled)
-                values, slope = relative(factors)
-                pairs.append((values, _spread(slope @ selected, covariance)))
-            for number, mean, sd, *before in zip(self.segments.number, *pairs[0], *pairs[1], strict=True):
-                name = f"{section.rpartition('.')[2]}.{number}"
-                row = _row(name, "1", (mean, sd), (before[0], before[1]), (0.0, np.inf), logarithmic)
-                scarred = section == CONTRACTILITY and f"{STIFFNESS}.{number}" in keys
-                rows.append(_down_to_scar(row) if scarred else row)
-        return rows
-
-    def _muscle(self) -> list[dict[str, Any]]:
-        """Rows of C and of the active tension at end-systole, those of the mean of the wall."""
-        pairs = []
-        for scaled, covariance in ((self.found.mean, self.found.covariance), self._prior):
-            values, slopes = self.model.muscle[scaled.tobytes()]
-            for place, (section, level) in enumerate(
-                ((STIFFNESS, self.segments.log_geometric_mean), (CONTRACTILITY, self.segments.log_mean))
-            ):
-                factors, selected = self._factors(section, scaled)
-                mean, slope = level(factors)
-                values, slopes = values + mean * _unit(place), slopes + np.outer(_unit(place), slope @ selected)
-            pairs.append((values - np.log(UNITS["kPa"]), _spread(slopes, covariance)))
-        (after, after_sd), (before, before_sd) = pairs
-        return [
-            _row(name, "kPa", (after[i], after_sd[i]), (before[i], before_sd[i]), (0.0, np.inf), True)
-            for i, name in enumerate((MATERIAL, TENSION))
-        ]
-
-    @property
-    def _prior(self) -> tuple[Floats, Floats]:
-        """Mean and covariance of the prior."""
-        prior = prior_of(self.free)
-        return prior.mean, np.diag(prior.sd**2)
-
-    def _factors(self, section: str, scaled: Floats) -> tuple[Floats, Floats]:
-        """Factors of the keys of all segments (17,), 1 where one is not inferred, and derivatives by the parameters."""
-        factors, selected = np.ones(len(SEGMENTS)), np.zeros((len(SEGMENTS), len(self.free)))
-        for column, parameter in enumerate(self.free):
-            if parameter.key.startswith(section):
-                place = int(parameter.key.rpartition(".")[2]) - 1
-                factors[place] = parameter.value(scaled[column])
-                selected[place, column] = factors[place] if parameter.logarithmic else 1.0
-        return factors, selected
+def _dataset(observed: xr.Dataset, found: list[Mode], segments: SegmentMeans) -> xr.Dataset:
+    """What was found, as :func:`infer` returns it."""
+    best, value = max(found, key=lambda mode: mode.log_weight), observed["value"].values
+    draws, replicated = of_posterior(found, segments, observed["covariance"].values)
+    before = of_prior(found[0], segments)
+    names = list(draws.values)
+    posterior, prior = (np.stack([one.values[name] for name in names], axis=1) for one in (draws, before))
+    seen = {"observed": value, "predicted": best.found.predicted, "residual": value - best.found.predicted}
+    seen["sd_error"] = np.sqrt(np.diag(observed["covariance"].values))
+    arrays: dict[str, Any] = {name: ("parameter", values) for name, values in _summary(names, posterior, prior).items()}
+    arrays |= {name: ("observation", values) for name, values in seen.items()}
+    arrays |= {
+        "posterior": (("draw", "parameter"), posterior),
+        "prior": (("draw", "parameter"), prior),
+        "replicated": (("draw", "observation"), replicated),
+        "scar": (("draw", "aha"), draws.scar),
+        "scar_probability": ("aha", np.where(np.isin(SEGMENTS, found[0].model.aha), draws.scar.mean(axis=0), np.nan)),
+    }
+    labels: dict[str, Any] = {name: ("observation", observed[name].values) for name in ("quantity", "view")}
+    labels |= {"segment": ("observation", observed["aha"].values), "unit": ("parameter", [unit(one) for one in names])}
+    about = {name: value for name, value in observed.attrs.items() if name != "config"}
+    about |= {
+        "misfit_probability": best.found.misfit,
+        "misfit": int(best.found.misfit < MISFIT),
+        "converged": int(all(mode.found.converged for mode in found)),
+        "steps": sum(mode.found.steps for mode in found),
+        "version": echotruth.__version__,
+        "config": best.model.at(best.found.mean).model_dump_json(),
+    }
+    return xr.Dataset(arrays, {"parameter": names, "aha": list(SEGMENTS), **labels}, about)
 
 
-def _down_to_scar(row: dict[str, Any]) -> dict[str, Any]:
-    """Row of contractility whose interval reaches down to none at all, if it holds that at which a stiff scar is found.
-
-    Laplace's approximation is that of the soft segment, and does not see the other one.
-    """
-    return row | {"lower": 0.0} if row["lower"] < SCAR_LIKE else row
-
-
-def _spread(slope: Floats, covariance: Floats) -> Floats:
-    """Standard deviations of linear functions (q, p) of parameters of a covariance."""
-    return np.sqrt(np.einsum("qp,pr,qr->q", slope, covariance, slope))
-
-
-def _unit(place: int) -> Floats:
-    return np.eye(2)[place]
-
-
-def _row(
-    name: str,
-    unit: str,
-    after: tuple[float, float],
-    before: tuple[float, float],
-    limits: tuple[float, float],
-    logarithmic: bool = False,
-) -> dict[str, Any]:
-    """Row of a parameter, given mean and standard deviation on its scale, and the limits of its value."""
-    reach = float(norm.ppf((1 + COVERED) / 2))
-    (mean, sd), (first, first_sd) = after, before
-    interval = np.array([mean - reach * sd, mean, mean + reach * sd, first])
-    lower, middle, upper, prior_mean = np.clip(np.exp(interval) if logarithmic else interval, *limits)
+def _summary(names: list[str], posterior: Floats, prior: Floats) -> dict[str, NDArray[Any]]:
+    """Summaries (parameter,) of draws (draw, parameter)."""
+    lower, upper = np.quantile(posterior, [(1 - COVERED) / 2, (1 + COVERED) / 2], axis=0)
+    logarithmic = np.array([name.startswith(POSITIVE) for name in names])
+    # Of a positive factor its logarithm is normal, whose spread tells what was learned.
+    spread, before = (
+        np.where(logarithmic, np.std(np.log(np.where(logarithmic, draws, 1.0)), axis=0), np.std(draws, axis=0))
+        for draws in (posterior, prior)
+    )
     return {
-        "parameter": name,
-        "unit": unit,
-        "mean": middle,
-        "sd": sd * middle if logarithmic else sd,
+        "mean": posterior.mean(axis=0),
+        "sd": posterior.std(axis=0),
         "lower": lower,
         "upper": upper,
-        "prior_mean": prior_mean,
-        "prior_sd": first_sd * prior_mean if logarithmic else first_sd,
-        "identifiable": bool(sd <= IDENTIFIABLE * first_sd),
+        "prior_mean": prior.mean(axis=0),
+        "prior_sd": prior.std(axis=0),
+        "identifiable": spread <= IDENTIFIABLE * before,
     }

@@ -105,6 +105,11 @@ def _write_loop(path: Path, period: float, pressure: Floats, volume: Floats) -> 
         writer.writerows(np.column_stack(columns).tolist())
 
 
+def with_scar(config: Config, scarred: Sequence[int]) -> Config:
+    """Configuration of a model in which some AHA segments are a scar."""
+    return configure(config, pathology={"infarct": {"segments": list(scarred)}})
+
+
 @dataclass
 class HeartModel:
     """What a heart of given parameters shows.

@@ -9,6 +9,10 @@ within bounds. With the Jacobian G = dg/dq there, the posterior is taken to be n
     (G^T C^-1 G + diag(s)^-2)^-1,
 
 which is exact if g is linear and no bound is reached (Tarantola, Inverse Problem Theory, SIAM 2005, section 3.2).
+Models that explain the same observations are compared by their evidence (MacKay, Information Theory, Inference, and
+Learning Algorithms, Cambridge 2003, chapter 28), but for a constant that they share
+
+    log Z = -J(q*) / 2 - log det(I + diag(s) G^T C^-1 G diag(s)) / 2.
 """
 
 from __future__ import annotations
@@ -67,6 +71,8 @@ class Posterior:
     predicted : ndarray of shape (n,)
         Observations of the mode.
     jacobian : ndarray of shape (n, p)
+    log_evidence : float
+        log Z.
     misfit : float
         Probability that errors of the given covariance leave residuals as large as these or larger.
     steps : int
@@ -79,12 +85,15 @@ class Posterior:
     covariance: Floats
     predicted: Floats
     jacobian: Floats
+    log_evidence: float
     misfit: float
     steps: int
     converged: bool
 
 
-def posterior(model: Model, observed: Floats, covariance: Floats, prior: Prior) -> Posterior:
+def posterior(
+    model: Model, observed: Floats, covariance: Floats, prior: Prior, start: Floats | None = None
+) -> Posterior:
     """Find the mode of a posterior and its spread.
 
     Parameters
@@ -94,6 +103,8 @@ def posterior(model: Model, observed: Floats, covariance: Floats, prior: Prior) 
     covariance : ndarray of shape (n, n)
         Of the errors of the observations; positive definite.
     prior : Prior
+    start : ndarray of shape (p,), optional
+        Where the search begins. Default: the mean of the prior.
 
     Returns
     -------
@@ -102,10 +113,10 @@ def posterior(model: Model, observed: Floats, covariance: Floats, prior: Prior) 
     Raises
     ------
     NoMode
-        If no step from the mean of the prior lowers the misfit.
+        If no step from the start lowers the misfit.
     """
     problem = _Problem(model, observed, cholesky(covariance, lower=True), prior)
-    point, converged, steps = problem.at(prior.mean), False, 0
+    point, converged, steps = problem.at(prior.mean if start is None else start), False, 0
     while not converged and steps < MAX_STEPS:
         change = problem.step(point)
         spread = np.sqrt(np.diag(problem.covariance(point)))
@@ -122,7 +133,8 @@ def posterior(model: Model, observed: Floats, covariance: Floats, prior: Prior) 
         point, steps = lower, steps + 1
     found, residual = problem.covariance(point), observed - point.predicted
     misfit = _misfit(residual, covariance, point.jacobian, prior.sd)
-    return Posterior(point.values, found, point.predicted, point.jacobian, misfit, steps, converged)
+    evidence = problem.log_evidence(point)
+    return Posterior(point.values, found, point.predicted, point.jacobian, evidence, misfit, steps, converged)
 
 
 @dataclass(frozen=True)
@@ -160,9 +172,16 @@ class _Problem:
 
     def covariance(self, point: _Point) -> Floats:
         """Covariance (p, p) of the posterior that is normal about a point."""
+        return np.linalg.inv(self._curvature(point)) * np.outer(self.prior.sd, self.prior.sd)
+
+    def log_evidence(self, point: _Point) -> float:
+        """log Z of the posterior that is normal about a point."""
+        return -0.5 * (point.cost + float(np.linalg.slogdet(self._curvature(point))[1]))
+
+    def _curvature(self, point: _Point) -> Floats:
+        """Half the second derivatives of J (p, p) by parameters in standard deviations of the prior."""
         scaled = solve_triangular(self.root, point.jacobian * self.prior.sd, lower=True)
-        inner = np.linalg.inv(scaled.T @ scaled + np.eye(len(self.prior.sd)))
-        return inner * np.outer(self.prior.sd, self.prior.sd)
+        return np.asarray(scaled.T @ scaled + np.eye(len(self.prior.sd)))
 
     def lowered(self, point: _Point, change: Floats) -> _Point | None:
         """A point with a lower J, along a step that is halved until there is one; None if there is none."""

@@ -13,6 +13,7 @@ from echotruth.inference.laplace import Prior
 from echotruth.inference.segment_means import SEGMENTS
 
 CONTRACTILITY, STIFFNESS = "mechanics.regional.contractility", "mechanics.regional.stiffness"
+SCAR_CONTRACTILITY, SCAR_STIFFNESS = "pathology.infarct.tension_scale", "pathology.infarct.stiffness_scale"
 
 FACTOR_LIMITS = (0.05, 20.0)
 """Those of the keys of `mechanics.regional`."""
@@ -49,10 +50,13 @@ class Parameter:
     limits: tuple[float, float]
     logarithmic: bool = False
 
+    def values(self, scaled: Floats) -> Floats:
+        """Values of the key, of an array on its scale."""
+        return np.clip(np.exp(scaled) if self.logarithmic else scaled, *self.limits)
+
     def value(self, scaled: float) -> float:
         """Value of the key."""
-        value = float(np.exp(scaled)) if self.logarithmic else float(scaled)
-        return min(max(value, self.limits[0]), self.limits[1])
+        return float(self.values(np.asarray(scaled)))
 
 
 def parameters(config: Config, given: Given) -> list[Parameter]:
@@ -117,6 +121,37 @@ def _with(parameter: Parameter, given: Given) -> Parameter | None:
     if parameter.logarithmic:
         mean, sd = float(np.log(mean)), sd / mean
     return Parameter(parameter.key, mean, sd, parameter.limits, parameter.logarithmic)
+
+
+def scar_parameters(free: Sequence[Parameter], scarred: Sequence[int]) -> list[Parameter]:
+    """Parameters of a heart in which some AHA segments are a scar, in place of those of these segments.
+
+    A scar does not contract, or little, and is about 20 times as stiff: the means are the defaults of `pathology`.
+    """
+    replaced = {f"{section}.{number}" for section in (CONTRACTILITY, STIFFNESS) for number in scarred}
+    return [
+        *(parameter for parameter in free if parameter.key not in replaced),
+        Parameter(SCAR_CONTRACTILITY, 0.0, 0.15, (0.0, 1.0)),
+        Parameter(SCAR_STIFFNESS, float(np.log(20.0)), 0.5, (1.0, 100.0), logarithmic=True),
+    ]
+
+
+def factors(free: Sequence[Parameter], scaled: Floats, section: str) -> Floats:
+    """Factors of all segments (n, 17) of `mechanics.regional`, 1 where one is not inferred.
+
+    Parameters
+    ----------
+    free : sequence of Parameter
+    scaled : ndarray of shape (n, p)
+        Parameters on their scales.
+    section : str
+        :data:`CONTRACTILITY` or :data:`STIFFNESS`.
+    """
+    found = np.ones((len(scaled), len(SEGMENTS)))
+    for column, parameter in enumerate(free):
+        if parameter.key.startswith(section):
+            found[:, int(parameter.key.rpartition(".")[2]) - 1] = parameter.values(scaled[:, column])
+    return found
 
 
 def prior_of(parameters: Sequence[Parameter]) -> Prior:

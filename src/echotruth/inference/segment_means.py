@@ -57,31 +57,13 @@ class SegmentMeans:
         return cls(np.stack(columns, axis=1)[shown], volume[shown], (shown + 1).astype(np.int32))
 
     @property
-    def _share(self) -> Floats:
+    def share(self) -> Floats:
+        """Share of each segment in the muscle of the wall, (n,)."""
         return self.volume / self.volume.sum()
 
-    def relative(self, factors: Floats) -> tuple[Floats, Floats]:
-        """Means of segments (n,) over that of the wall, and their derivatives by the factors, (n, 17)."""
-        means = self.weights @ factors
-        wall_mean = self._share @ means
-        ratio = means / wall_mean
-        return ratio, (self.weights - np.outer(ratio, self._share @ self.weights)) / wall_mean
-
-    def log_relative(self, factors: Floats) -> tuple[Floats, Floats]:
-        """Logarithms of the means of segments (n,) over their geometric mean, and derivatives by the factors."""
-        means = self.weights @ factors
-        slope = self.weights / means[:, None]
-        return np.log(means) - self._share @ np.log(means), slope - self._share @ slope
-
-    def log_mean(self, factors: Floats) -> tuple[float, Floats]:
-        """Logarithm of the mean of the wall, and its derivative by the factors, (17,)."""
-        slope = self._share @ self.weights
-        return float(np.log(slope @ factors)), slope / (slope @ factors)
-
-    def log_geometric_mean(self, factors: Floats) -> tuple[float, Floats]:
-        """Logarithm of the geometric mean of the segments, and its derivative by the factors, (17,)."""
-        means = self.weights @ factors
-        return float(self._share @ np.log(means)), (self._share / means) @ self.weights
+    def means(self, factors: Floats) -> Floats:
+        """Means over segments (draws, n) of factors (draws, 17) at their middles."""
+        return factors @ self.weights.T
 
 
 def means_of_cells(nodes: Floats, cells: Integers, segments: Integers, values: Floats) -> tuple[Floats, Floats]:

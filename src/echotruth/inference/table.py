@@ -11,17 +11,13 @@ import xarray as xr
 
 from echotruth.cases import Case
 from echotruth.heart import Heart
-from echotruth.inference.estimate import MATERIAL, TENSION, infer
+from echotruth.inference.draws import MATERIAL, TENSION
+from echotruth.inference.estimate import infer
 from echotruth.inference.observation import observe
 from echotruth.inference.segment_means import means_of_cells
+from echotruth.repository.inferred import COLUMNS
 from echotruth.repository.reader import Repository
 from echotruth.section import UNITS, value_of
-
-COLUMNS = (
-    *("case", "tracker", "size_px", "parameter", "unit", "mean", "sd", "lower", "upper"),
-    *("prior_mean", "prior_sd", "identifiable", "true", "misfit_probability", "misfit", "converged"),
-)
-"""Columns of the table; `lower` and `upper` are the ends of the 90 % interval."""
 
 
 def rows(
@@ -42,9 +38,17 @@ def rows(
 
 def rows_of(found: xr.Dataset, true: dict[str, float]) -> list[dict[str, Any]]:
     """Rows of what :func:`.estimate.infer` returns, beside the true values by the name of the parameter."""
-    table = found.drop_dims("observation").to_dataframe().reset_index()
+    table = found.drop_dims(["observation", "draw", "aha"]).to_dataframe().reset_index()
     about = {name: found.attrs[name] for name in COLUMNS if name in found.attrs}
-    table = table.assign(**about, true=[true.get(name, np.nan) for name in table["parameter"]])
+    scars = {
+        f"contractility.{number}": float(found["scar_probability"].sel(aha=number)) for number in found["aha"].values
+    }
+    names = table["parameter"]
+    table = table.assign(
+        **about,
+        true=[true.get(name, np.nan) for name in names],
+        scar_probability=[scars.get(name, np.nan) for name in names],
+    )
     table[["misfit", "converged"]] = table[["misfit", "converged"]].astype(bool)
     return [{name: row[name] for name in COLUMNS} for row in table.to_dict("records")]
 

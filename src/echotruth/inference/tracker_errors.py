@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -159,3 +160,28 @@ def table_of(rows: Iterable[tuple[str, int, str, str, str, Floats, Floats]]) -> 
         error, freedom = tracked - true, int(len(true) > 1)
         found.append((*about, len(true), np.std(tracked, ddof=freedom), np.mean(error), np.std(error, ddof=freedom)))
     return pd.DataFrame(found, columns=COLUMNS).sort_values([*KEYS, "heart"], ignore_index=True)
+
+
+def version(configs: Iterable[Config]) -> str:
+    """Hash of the table from which the hearts of a repository are inferred.
+
+    Raises
+    ------
+    NoErrors
+        If the table cannot be read, or does not know the tracker on images like those of one of the hearts.
+    """
+    kept = {(config.inference, config.bmode.sizes[0], acoustics(config), _quantities(config)) for config in configs}
+    digest = sha256()
+    for inference, largest, kind, quantities in sorted(kept, key=str):
+        table = read(Path(inference.errors) if inference.errors else None)
+        for quantity in quantities:
+            error_of(table, str(inference.tracker), inference.size_px or largest, kind, quantity, "")
+        digest.update(table.to_csv().encode())
+    return digest.hexdigest()[:16]
+
+
+def _quantities(config: Config) -> tuple[str, ...]:
+    """What the views of a configuration show."""
+    planes = {view.plane for view in config.views.values()}
+    of = {"short_axis": ("circumferential", "rotation"), "long_axis": ("longitudinal",)}
+    return tuple(quantity for plane in sorted(planes) for quantity in of[plane])

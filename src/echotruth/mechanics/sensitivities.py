@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.config import Config, Pathology
+from echotruth.config import Config
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics import fibres, kinematics
 from echotruth.mechanics.beat import activation, check_frames, held, outputs, unloaded_wall
 from echotruth.mechanics.history import Arrays
-from echotruth.mechanics.pathology import PathologyError, tissue
+from echotruth.mechanics.pathology import tissue
 from echotruth.mechanics.solver.cycle import filled_to_end_diastole, solved_cycle, solved_frames
 from echotruth.mechanics.solver.newton import Step
 from echotruth.mechanics.solver.sensitivity import Derivative, Variant, derivatives
@@ -24,10 +24,12 @@ def sensitivities(
 ) -> tuple[dict[str, Arrays], dict[str, Arrays]]:
     """Beat a heart, and take the derivatives of its motion.
 
+    Where C is not given it is that with which the heart fills to the volume of its loop, its scar included.
+
     Parameters
     ----------
     config : Config
-        Without pathology, in a measured loop.
+        Without late activation, in a measured loop.
     changed : mapping
         Name of a parameter to the configuration in which it is changed by a little, and that change, in its unit.
     frames : sequence of int
@@ -36,7 +38,7 @@ def sensitivities(
     Returns
     -------
     heart : dict of dict of ndarray
-        As :func:`.beat.beat` returns it.
+        As :func:`.beat.beat` returns it, but for C of a heart with a scar.
     derivatives : dict of dict of ndarray
         Of each parameter: `node_position` (node, 3) of the unloaded wall, `displacement` (frame, node, 3), m, `strain`
         (frame, cell, 6) since ED, `volume` (frame,), m^3, `active_tension` (frame,) and `stiffness`, Pa; each per unit
@@ -44,16 +46,10 @@ def sensitivities(
 
     Raises
     ------
-    GeometryError, FibreError, LoopError, Diverged
+    GeometryError, FibreError, PathologyError, LoopError, Diverged
         As :func:`.beat.beat`.
-    PathologyError
-        If the heart has a pathology.
     """
     check_frames(config, frames)
-    if config.pathology != Pathology():
-        raise PathologyError(
-            "pathology: derivatives are taken of hearts without it: give scars as factors of mechanics.regional"
-        )
     whole, stiffness = read_loop(config.loop), config.mechanics.material.si().stiffness
     cycle = whole.at(frames)
     unloaded, steps = unloaded_wall(config, cycle), list[Step]()

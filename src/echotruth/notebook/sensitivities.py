@@ -18,7 +18,7 @@ CHANGE = 1e-6
 """Change of a parameter over its size, by which residuals are differenced. The penalty on volume makes them curved:
 with 1e-4 the derivative of C by the thickness of the wall is 1.5 % off."""
 
-SECTIONS = ("geometry", "fibres", "loop", "mechanics")
+SECTIONS = ("geometry", "fibres", "pathology", "loop", "mechanics")
 """Sections on which a beat depends."""
 
 DIMENSIONS = {
@@ -37,12 +37,14 @@ def sensitivities(
 ) -> tuple[Heart, xr.Dataset]:
     """Beat a heart, and take the derivatives of its motion by keys of its configuration.
 
-    The tangent that the solver factors gives them; one takes a few hundredths of the time of the beat.
+    The tangent that the solver factors gives them; one takes a few hundredths of the time of the beat. Unless
+    `mechanics.material.stiffness_kPa` gives C, that of a heart with a scar is the one with which it fills to the volume
+    of its loop, as a heart that was measured does; :func:`echotruth.beat` takes that of the heart without its scar.
 
     Parameters
     ----------
     config : Config, dict, str or Path
-        Anything that :func:`echotruth.configure` accepts: a heart without pathology, in a measured loop.
+        Anything that :func:`echotruth.configure` accepts: a heart without late activation, in a measured loop.
     parameters : str or iterable of str
         Dotted keys of which the value is a number: `mechanics.active.sheet_share`, `fibres.epi_deg`, `loop.esp_mmHg`,
         `mechanics.regional.contractility.8` of an AHA segment, and so on.
@@ -63,7 +65,7 @@ def sensitivities(
     ConfigError
         If a parameter is no key, or its value is no number.
     GeometryError, FibreError, PathologyError, LoopError, Diverged
-        As :func:`echotruth.beat`; if the heart has a pathology.
+        As :func:`echotruth.beat`.
 
     Examples
     --------

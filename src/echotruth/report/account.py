@@ -5,8 +5,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from echotruth.config.imaging import ALL_VIEWS
 from echotruth.evaluation.no_estimate import FAILED
+from echotruth.repository import inferred
 from echotruth.repository.benchmark_files import total
 from echotruth.repository.ledger import STAGES, imaged_statuses, read
 from echotruth.repository.reader import Repository
@@ -43,6 +46,40 @@ def failures(repository: Repository) -> dict[str, Any]:
         "trackers": lost[:LISTED],
         "more_trackers": len(lost) > LISTED,
         "no_estimate": list(islice(_not_estimated(repository), LISTED)),
+    }
+
+
+def inference(repository: Repository) -> dict[str, Any] | None:
+    """What was inferred of the muscle of hearts, and of which it was not, with the reasons; None if none was to be."""
+    if not repository.config.inference.tracker:
+        return None
+    table = inferred.table(repository)
+    found = [_inferred(case, rows) for case, rows in islice(table.groupby("case", sort=False), LISTED)]
+    failed = [(case, repository.problem(case, None, "inference")) for case in repository.shown]
+    case = repository.shown[0] if (table["case"] == repository.shown[0]).any() else str(table["case"].min())
+    of_wall = ~table["parameter"].str.startswith(("contractility.", "stiffness."))
+    return {
+        "case": case,
+        "hearts": found,
+        "more_hearts": table["case"].nunique() - len(found),
+        "failed": [{"case": case, "reason": reason} for case, reason in failed if reason][:LISTED],
+        "parameters": table[(table["case"] == case) & of_wall].to_dict("records"),
+    }
+
+
+def _inferred(case: str, rows: pd.DataFrame) -> dict[str, Any]:
+    """What was inferred of one heart, in a row."""
+    muscle = rows[rows["parameter"].str.startswith("contractility.")]
+    seen = muscle[muscle["identifiable"]]
+    weakest = seen.sort_values("mean").head(1).to_dict("records")
+    return {
+        "case": case,
+        "misfit": bool(rows["misfit"].any()),
+        "converged": bool(rows["converged"].all()),
+        "identifiable": len(seen),
+        "weakest": weakest[0] | {"segment": weakest[0]["parameter"].rpartition(".")[2]} if weakest else None,
+        "error": float(((seen["mean"] - seen["true"]) ** 2).mean() ** 0.5) if len(seen) else None,
+        "covered": int(((seen["lower"] <= seen["true"]) & (seen["true"] <= seen["upper"])).sum()),
     }
 
 

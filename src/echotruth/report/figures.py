@@ -22,6 +22,7 @@ from echotruth.report import (
     curves,
     error,
     heart,
+    inference,
     leaderboard,
     loop,
     physiology,
@@ -34,16 +35,16 @@ from echotruth.report import (
 from echotruth.report.clips import ARROW_SPACING, with_motion
 from echotruth.report.comparison import Comparison
 from echotruth.report.hearts import measures
-from echotruth.repository import estimates
+from echotruth.repository import estimates, inferred
 from echotruth.repository.choice import main_view
 from echotruth.repository.reader import Repository
-from echotruth.repository.schema import LABELS
+from echotruth.repository.schema import LABELS, observations
 
 NAMES = (
     *("loop", "strain", "physiology", "population", "curves", "segments", "bullseye", "error", "leaderboard"),
     *("heart", "clip", "resolutions", "views"),
 )
-"""Figures, in the order in which they are drawn."""
+"""Figures, in the order in which they are drawn; `inference` follows if a tracker is named to infer from."""
 
 NONE_COMPLETE = "No heart is complete, so that there is nothing to show. The reasons are in the report."
 """In place of figures."""
@@ -65,12 +66,16 @@ class Figures:
         self.sizes, self.view = repository.sizes, main_view(self.config)
 
     def draw(self) -> None:
-        """Draw all figures, and write the leaderboard as a table.
+        """Draw all figures, and write the leaderboard, and what was inferred, as tables.
 
         If no heart is complete, a sentence stands in place of every figure.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        for name in NAMES:
+        infers = self.config.inference.tracker is not None
+        if infers:
+            table = inferred.table(self.repository)
+            table.to_csv(self.repository.folder / inferred.FILE, index=False, float_format="%.6g")
+        for name in (*NAMES, "inference") if infers else NAMES:
             figure = getattr(self, name)() if self.case else style.sentence(NONE_COMPLETE)
             if figure is not None:
                 style.save(figure, self.folder / name)
@@ -184,6 +189,20 @@ class Figures:
         """The leaderboard as a table and as a figure."""
         self.standings.round(4).to_csv(self.folder / "leaderboard.csv", index=False)
         return leaderboard.draw(self.standings, best(self.standings))
+
+    def inference(self) -> Figure:
+        """What was inferred of the muscle of a heart from what a tracker saw."""
+        hearts = inferred.hearts(self.repository)
+        if not hearts:
+            return style.sentence("Nothing was inferred of any heart. The reasons are in the report.")
+        case = self.case if self.case in hearts else hearts[0]
+        fit = self.repository.arrays("inference/fit", case)
+        groups = {
+            name: self.repository.arrays(f"inference/{name}", case) for name in ("observed_data", "constant_data")
+        }
+        seen = groups["observed_data"]["value"], groups["constant_data"]["covariance"]
+        true = groups["constant_data"]["true_value"]
+        return inference.draw(fit, inference.Seen(observations(self.config), *seen, true, fit["predicted"]))
 
     def bullseye(self) -> Figure:
         """Strain of the segments at end-systole, true and of the best tracker."""

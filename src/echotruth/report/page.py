@@ -70,6 +70,7 @@ def _context(repository: Repository) -> dict[str, Any]:
         "tally": {name: cases[name].value_counts().sort_index().to_dict() for name in ("status", "diagnosis")},
         "measures": list(MEASURES),
         "hearts": subjects(repository, view, config.bmode.sizes[-1]) if shown else [],
+        "inferred": account.inference(repository) if shown else None,
         "failures": account.failures(repository),
         "stages": account.stages(folder),
         "configuration": (folder / "config.yaml").read_text(encoding="utf-8"),

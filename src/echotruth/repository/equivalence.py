@@ -19,6 +19,7 @@ TOLERANCE = {
     "rf": 1e-4,
     "bmode": 1e-4,
     "tracking": 1e-3,
+    "inference": 1e-2,
 }
 """Stage -> largest difference over the largest number of an array, of a pack over the largest in the same unit; some
 ten times and more what was measured."""

@@ -64,7 +64,10 @@ def lay_out(folder: Path, config: Config, cases: list[Case]) -> None:
 
 
 def _drop_records(folder: Path, store: Store, config: Config) -> None:
-    """Drop the records of image sizes that left the configuration, whose arrays are about to be removed."""
+    """Drop the records of image sizes and of inference that left the configuration, whose arrays are to be removed."""
+    if not config.inference.tracker:
+        for record in folder.glob("ledger/inference/*.json"):
+            record.unlink(missing_ok=True)
     left = {path.name for path in store.path.glob("*/[0-9]*")} - {str(size) for size in config.bmode.sizes}
     for size in left:
         for record in folder.glob(f"ledger/*/*/*/{size}.json"):
@@ -162,6 +165,12 @@ def labels(config: Config, rows: list[str], times: ArrayLike, views: list[str] |
         "layer": layers,
         "region": [0, *layers],
         "aha": np.arange(1, 18),
+        "chain": np.arange(schema.CHAINS),
+        "draw": np.arange(schema.DRAWS),
+        "observation": schema.observations(config),
+        "observation_units": schema.units_of_observations(config),
+        "other": schema.observations(config),
+        "parameter_units": [schema.unit_in_store(name) for name in schema.LABELS["parameter"]],
     }
     coordinates = schema.LABELS | common
     packs = ((group, pack.labels(coordinates)) for group in schema.groups(config) for pack in schema.packs_of(group))

@@ -17,11 +17,17 @@ STAGES: dict[str, tuple[str, ...]] = {
     "truth": ("case", "view", "size"),
     "bmode": ("case", "view", "size"),
     "tracking": ("case", "view", "size"),
+    "inference": ("case",),
 }
 """Stages in the order of their jobs -> what their jobs are for: a heart, a view of it, or an image size of a view."""
 
 NOT_A_REPOSITORY = "is not a repository: give the folder that a run made, such as out/demo"
 """What an error says of a folder, whose path stands before it."""
+
+
+def stages(config: Config) -> dict[str, tuple[str, ...]]:
+    """The :data:`STAGES` that a configuration has: without a tracker to infer from, there is no inference."""
+    return {name: of for name, of in STAGES.items() if name != "inference" or config.inference.tracker}
 
 
 def imaged_statuses(exclude_implausible: bool) -> tuple[str, ...]:
@@ -47,7 +53,7 @@ def record_paths(folder: Path, case: str, config: Config) -> list[Path]:
         Its views and image sizes are those of all cases.
     """
     values: dict[str, Sequence[Any]] = {"case": [case], "view": [*config.views], "size": config.bmode.sizes}
-    places = {stage: product(*(values[name] for name in names)) for stage, names in STAGES.items()}
+    places = {stage: product(*(values[name] for name in names)) for stage, names in stages(config).items()}
     return [record_path(folder, stage, *place) for stage, found in places.items() for place in found]
 
 

@@ -51,6 +51,12 @@ SIZED = {kind.partition("/")[0]: arrays for kind, arrays in KINDS.items() if kin
 TRACKED = {kind.partition("/")[0]: arrays for kind, arrays in KINDS.items() if kind.endswith("/TRACKER")}
 """Groups that exist once per image size and tracker: `tracking/512/dis`."""
 
+INFERENCE = {kind: arrays for kind, arrays in KINDS.items() if kind.startswith("inference/")}
+"""Groups that exist once if a tracker is named to infer from, those of ArviZ's InferenceData among them."""
+
+CHAINS, DRAWS = 1, 512
+"""Of what is inferred; draws do not depend on each other, so that one chain has them all."""
+
 PACKS = {
     kind: tuple(Pack(array, _LISTED[kind, array.name]) for array in arrays if (kind, array.name) in _LISTED)
     for kind, arrays in KINDS.items()
@@ -63,6 +69,8 @@ LABELS = {row["array"]: tuple(row["labels"].split()) for row in _ROWS if row["la
 
 def kind(group: str) -> str:
     """Kind of a group: of `tracking/512/dis`, `tracking/SIZE/TRACKER`."""
+    if group in INFERENCE:
+        return group
     stage, *rest = group.split("/")
     return "/".join([stage, *("SIZE", "TRACKER")[: len(rest)]])
 
@@ -81,10 +89,15 @@ def parameters(columns: dict[str, NDArray[Any]]) -> tuple[Array, ...]:
     """Arrays of the group `cases` for the columns of the table of cases."""
     types = {"f": "float64", "i": "int64", "b": "bool"}
     arrays = [
-        Array(key, ("case",), types.get(values.dtype.kind, "string"), _UNITS.get(unit_of(key), "1"), key)
+        Array(key, ("case",), types.get(values.dtype.kind, "string"), unit_in_store(key), key)
         for key, values in ((name.removeprefix("cases:"), values) for name, values in columns.items())
     ]
     return (*CASES, *arrays)
+
+
+def unit_in_store(key: str) -> str:
+    """Unit of a key, as UDUNITS writes it."""
+    return _UNITS.get(unit_of(key), "1")
 
 
 _UNITS = {unit: unit for unit in ("um", "mm", "uL", "ms", "mmHg", "kPa", "MHz", "dB")}
@@ -98,7 +111,24 @@ def groups(config: Config) -> dict[str, tuple[Array, ...]]:
     every |= {f"{name}/{size}": arrays for name, arrays in SIZED.items() for size in sizes}
     every |= {f"{name}/{size}/{one}": arrays for name, arrays in TRACKED.items() for size in sizes for one in trackers}
     every |= {"rf": rf_arrays(config)} if config.rf.keep else {}
+    every |= INFERENCE if config.inference.tracker else {}
     return {path: rounding.of(arrays, config) for path, arrays in every.items()}
+
+
+def observations(config: Config) -> list[str]:
+    """Labels of what may be seen at end-systole: strain along the wall of segments 1..16, and rotation in a short axis,
+    as `mid 7` and `mid rotation`."""
+    places = [*range(1, 17), "rotation"]
+    return [
+        f"{name} {place}"
+        for name, view in config.views.items()
+        for place in (places if view.plane == "short_axis" else places[:-1])
+    ]
+
+
+def units_of_observations(config: Config) -> list[str]:
+    """Units of what may be seen, in the order of its labels."""
+    return ["rad" if label.endswith("rotation") else "1" for label in observations(config)]
 
 
 def rf_arrays(config: Config) -> tuple[Array, ...]:
@@ -122,6 +152,8 @@ def written_by(stage: str, config: Config, size: int | None = None) -> list[str]
     if stage == "tracking":
         of_trackers = [f"{name}/{px}/{one}" for name in TRACKED for px in sizes for one in config.tracking.trackers]
         return [f"evaluation/{px}" for px in sizes] + of_trackers
+    if stage == "inference":
+        return [*INFERENCE] if config.inference.tracker else []
     if stage in SIZED:
         return [f"{stage}/{px}" for px in sizes]
     return [stage] if stage in SINGLE or (stage == "rf" and config.rf.keep) else []

@@ -55,6 +55,11 @@ def tracking(config: Config, view: str) -> Settings:
     return config.seed, config.tracking
 
 
+def inference(config: Config) -> Settings:
+    """What is inferred from what a tracker saw of a heart depends on, besides the heart and the content of a table."""
+    return (config.inference,)
+
+
 OF_VIEW: dict[str, Callable[[Config, str], Settings]] = {
     "phantom": phantom,
     "rf": phantom,
@@ -80,15 +85,19 @@ def of_job(config: Config, stage: str, view: str | None) -> str:
         Of the case.
     stage : str
     view : str or None
-        None for the stage mechanics.
+        None for the stages of a heart: mechanics, and inference, which depends on all views.
 
     Raises
     ------
     LoopError
         If a motion has the times of a loop that cannot be read.
     """
-    stages = [] if view is None else [*_BEFORE[stage], stage]
-    return settings_version(*_motion(config), *[settings_version(*OF_VIEW[each](config, str(view))) for each in stages])
+    if stage == "inference":
+        views, stages, own = list(config.views), list(OF_VIEW), inference(config)
+    else:
+        views, stages, own = [] if view is None else [view], [*_BEFORE.get(stage, ()), stage], ()
+    of_views = [settings_version(*OF_VIEW[each](config, name)) for name in views for each in stages]
+    return settings_version(*_motion(config), *of_views, *own)
 
 
 @lru_cache(maxsize=1000)

@@ -20,7 +20,7 @@ START_CPU_SECONDS = 0.6
 """CPU time of a process before its work, s, without compilation, which only the first jobs do."""
 REFERENCE = {
     **{"mechanics": 0.235, "phantom": 0.22, "rf": 5.9, "truth": 5.4, "bmode": 0.05, "tracking": 1.0},
-    **{"repository": 0.03, "report": 8.0},
+    **{"inference": 1.0, "repository": 0.03, "report": 8.0},
 }
 """CPU time of a unit of each rule, s, on one core of an Intel Xeon (model 167) that made `config/demo.yaml`."""
 TRACKERS = {
@@ -159,6 +159,7 @@ UNITS: dict[str, Callable[[Config, str, int], float]] = {
     "truth": lambda config, view, size: config.loop.frames * wall_pixels(config, view, size) / 1e6,
     "bmode": lambda config, _, size: config.loop.frames * size**2 / 1e6,
     "tracking": _tracking,
+    "inference": lambda config, *_: 40 + config.loop.frames,
     "repository": lambda config, *_: 30 + config.cases.number * len(config.views),
     "report": lambda *_: 1.0,
 }

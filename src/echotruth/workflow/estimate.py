@@ -9,9 +9,9 @@ from typing import NamedTuple
 from echotruth.cases import Case
 from echotruth.config import Config
 from echotruth.repository import schema
-from echotruth.repository.ledger import STAGES
+from echotruth.repository.ledger import stages
 from echotruth.workflow import cost
-from echotruth.workflow.jobs import FINAL_RULES, RULES, ended, jobs, places
+from echotruth.workflow.jobs import FINAL_RULES, ended, jobs, places, rules
 from echotruth.workflow.progress import format_duration
 from echotruth.workflow.resources import expected_megabytes
 
@@ -98,7 +98,7 @@ def estimate(config: Config, cases: Sequence[Case], cores: int, folder: Path) ->
     sample = [case.config for case in cases[:: ceil(len(cases) / MAX_SAMPLED)]]
     speed = cost.speed(folder, {case.id: case.config for case in cases})
     parts, megabytes = {}, {}
-    for rule in RULES:
+    for rule in rules(config):
         wanted = jobs(rule, config, [case.id for case in cases])
         configs = [config] if rule in FINAL_RULES else sample
         seconds = JOB_SECONDS + cost.mean_seconds(rule, configs) * speed.get(rule, 1.0)
@@ -115,7 +115,8 @@ def number_of_files(config: Config, hearts: int) -> int:
     views = len(config.views)
     arrays = [array for group, of in schema.groups(config).items() if group != "cases" for array in of]
     of_heart, of_view = (sum(array.leading == number for array in arrays) for number in (1, 2))
-    of_jobs = 1 + 3 * sum(len(places(rule, config)) for rule in STAGES)  # configuration; record, log and benchmark
+    jobs_of_heart = sum(len(places(rule, config)) for rule in stages(config))
+    of_jobs = 1 + 3 * jobs_of_heart  # configuration; record, log and benchmark
     return FIXED_FILES + hearts * (of_heart + views * of_view + of_jobs)
 
 

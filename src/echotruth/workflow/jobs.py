@@ -5,14 +5,17 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from echotruth.config import Config
-from echotruth.repository.ledger import STAGES
+from echotruth.repository.ledger import STAGES, stages
 
 FINAL_RULES = ("repository", "report")
 """What is made once, after all hearts."""
-RULES = (*STAGES, *FINAL_RULES)
-"""Rules in the order of their jobs."""
 TARGETS = ("all", "hearts", "store", *FINAL_RULES)
 """Rules that can be asked for by their names: they are for all hearts."""
+
+
+def rules(config: Config) -> list[str]:
+    """Rules that have jobs by a configuration, in the order of these."""
+    return [*stages(config), *FINAL_RULES]
 
 
 def places(rule: str, config: Config) -> list[tuple[str, int]]:

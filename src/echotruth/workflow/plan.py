@@ -55,6 +55,7 @@ class Plan:
         self.config: Config = validate(given, source)
         self.folder = Path("out") / self.config.name
         self._every = {case.id: case for case in expand(self.config, source)}
+        self._errors = self._error_version(source)
         self._motions = settings.motions({id: case.config for id, case in self._every.items()})
         self._same = first_with_same(self._motions, ledger.rows(self.folder / "registry.txt"))
         self._choose(Block.parse(block, source))
@@ -72,7 +73,7 @@ class Plan:
     @property
     def mark(self) -> Path:
         """File that says that the hearts of this plan were made, with these settings and this code."""
-        code = [self.code(stage) for stage in ledger.STAGES]
+        code = [self.code(stage) for stage in ledger.stages(self.config)]
         hearts = [[id, case.parameters, self._motions[id]] for id, case in self.cases.items()]
         common = self.config.model_copy(update={"cases": Cases()})
         return self.folder / "blocks" / f"{settings_version(common, code, hearts)}.made"
@@ -107,12 +108,25 @@ class Plan:
         """Hash of the settings of a stage, besides those of the stages before it; as a function of wildcards."""
         if stage == "mechanics":
             return lambda wildcards: self._motions[wildcards.case]
+        if stage == "inference":
+            return lambda wildcards: settings_version(*settings.inference(self.config), self._errors)
         if stage == "repository":
             return lambda wildcards: settings_version(self.config, list(self._every))
         return lambda wildcards: self._settings(stage, wildcards.case, wildcards.view)
 
     def _settings(self, stage: str, case: str, view: str) -> str:
         return settings_version(*settings.OF_VIEW[stage](self._every[case].config, view))
+
+    def _error_version(self, source: str) -> str:
+        """Hash of the errors of the tracker from which is inferred; ConfigError if they are not known."""
+        if not self.config.inference.tracker:
+            return ""
+        from echotruth.inference.tracker_errors import NoErrors, version
+
+        try:
+            return version(case.config for case in self._every.values())
+        except NoErrors as error:
+            raise ConfigError(f"{source}: inference: {error}") from None
 
     def same_motion(self, wildcards: Wildcards) -> list[str]:
         """Record of the heart from which a heart takes over its motion, if there is one."""
@@ -122,6 +136,11 @@ class Plan:
     def excluded(self, wildcards: Wildcards) -> str:
         """Why a heart is not imaged; empty if it is. Other bounds run again only what they decide otherwise."""
         return excluded(self.folder, wildcards.case, self._every[wildcards.case].config)
+
+    def tracked(self, wildcards: Wildcards) -> list[str]:
+        """Records of what was tracked in the views of a heart, in the images from which is inferred."""
+        size = self.config.inference.size_px or self.config.bmode.sizes[0]
+        return [str(record_path(self.folder, "tracking", wildcards.case, view, size)) for view in self.config.views]
 
     def bmode_source(self, wildcards: Wildcards) -> list[str]:
         """What a clip is made from: lines, kept or not, or the largest clip."""

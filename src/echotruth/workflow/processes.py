@@ -11,7 +11,7 @@ from echotruth.config import shipped
 from echotruth.repository.provenance import code_version
 from echotruth.workflow import instructions
 
-SCRIPTS_THAT_COMPILE = ("mechanics", "phantom", "rf", "truth", "bmode", "tracking", "report")
+SCRIPTS_THAT_COMPILE = ("mechanics", "phantom", "rf", "truth", "bmode", "tracking", "inference", "report")
 """Scripts that call compiled functions."""
 
 

@@ -5,7 +5,7 @@ from math import ceil
 from pathlib import Path
 
 from echotruth.config import Config
-from echotruth.repository.ledger import STAGES
+from echotruth.repository.ledger import stages
 from echotruth.workflow.jobs import TARGETS, ended, jobs
 from echotruth.workflow.plan import Plan
 from echotruth.workflow.snakemake_process import Snakemake
@@ -51,7 +51,7 @@ class Running:
     def waiting(self) -> dict[str, int]:
         """Rule -> number of its jobs without a record, if there are several blocks: the last ones are planned late."""
         cases, config = self._plan.cases, self._plan.config
-        rules = STAGES if self._count > 1 else ()
+        rules = stages(config) if self._count > 1 else ()
         return {rule: len(jobs(rule, config, cases) - ended(self._folder, rule, config)) for rule in rules}
 
     def _snakemake(self, number: int, targets: list[str]) -> Snakemake:

@@ -17,7 +17,7 @@ from echotruth.repository.case_file import read_case
 from echotruth.repository.ledger import NOT_A_REPOSITORY, record_path
 from echotruth.repository.verdict import Verdict, verdict
 from echotruth.workflow import cost, lease
-from echotruth.workflow.jobs import RULES, ended, jobs
+from echotruth.workflow.jobs import ended, jobs, rules
 from echotruth.workflow.progress import Progress, RunLog, format_duration
 
 Status = dict[str, Any]
@@ -136,7 +136,7 @@ def verdict_of(folder: Path, case: str) -> Verdict | None:
 def _progress(folder: Path, config: Config, cases: list[str], holder: lease.Holder | None) -> Progress:
     """Progress of the run that holds the lease, or held it last, as far as its logs tell."""
     speed = cost.speed(folder, dict.fromkeys(cases, config))
-    progress = Progress({rule: cost.mean_seconds(rule, [config]) * speed.get(rule, 1.0) for rule in RULES})
+    progress = Progress({rule: cost.mean_seconds(rule, [config]) * speed.get(rule, 1.0) for rule in rules(config)})
     for log in sorted((folder / "logs").glob("snakemake*.log")):
         # One that was not written since the lease was taken is of an earlier run.
         if holder and log.stat().st_mtime >= time.mktime(time.strptime(holder.since, "%Y-%m-%d %H:%M:%S")):
@@ -152,8 +152,8 @@ def _parts(
     running = Counter(job.rule for job in progress.running if lives)
     failed = Counter(job.rule for job in progress.failed)
     parts = {}
-    rules = [rule for rule in RULES if rule != "report" or not shipped.is_sample(folder)]  # its page is not shipped
-    for rule in rules if cases else ():
+    has_report = not shipped.is_sample(folder)  # its page is not shipped
+    for rule in [rule for rule in rules(config) if rule != "report" or has_report] if cases else ():
         wanted = jobs(rule, config, cases)
         numbers = len(wanted), len(wanted & ended(folder, rule, config)), running[rule], failed[rule]
         parts[rule] = dict(zip(COLUMNS, (*numbers, max(0, numbers[0] - sum(numbers[1:]))), strict=True))

@@ -1,0 +1,25 @@
+"""Section `inference`: the muscle that is inferred from what a tracker saw."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from echotruth.section import Name, Section, check, invalid
+
+
+class Inference(Section):
+    """Contractility of segments, and what else motion depends on, inferred from what a tracker saw (docs/inference.md).
+    Nothing is inferred unless a tracker is named."""
+
+    tracker: Name | None = None
+    """One of `tracking.trackers`; its error must be known."""
+    size_px: Annotated[int, Field(ge=1)] | None = None
+    """Side of the images in which it tracked. Default: the largest."""
+    errors: str | None = None
+    """Table of the errors of trackers, .csv, that `benchmarks/tracker_errors.py` makes. Default: the package's."""
+
+    @check
+    def _has_tracker(self) -> None:
+        for key in ("size_px", "errors"):
+            if self.tracker is None and getattr(self, key) is not None:
+                raise invalid(key, getattr(self, key), "needs inference.tracker: name it, or leave this out")

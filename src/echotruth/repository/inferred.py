@@ -1,0 +1,87 @@
+"""What was inferred of the hearts of a repository: the group `inference/fit` as a table."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from echotruth.repository import schema
+from echotruth.section import UNITS
+
+if TYPE_CHECKING:
+    from echotruth.repository.reader import Repository
+
+COLUMNS = (
+    *("case", "tracker", "size_px", "parameter", "unit", "mean", "sd", "lower", "upper"),
+    *(
+        "prior_mean",
+        "prior_sd",
+        "identifiable",
+        "scar_probability",
+        "true",
+        "misfit_probability",
+        "misfit",
+        "converged",
+    ),
+)
+"""Columns of the table; `lower` and `upper` are the ends of the 90 % interval."""
+
+MISFIT = 0.01
+"""Probability of residuals as large, below which the model is said not to fit."""
+
+FILE = "inference.csv"
+"""Name of the table in the folder of a repository."""
+
+
+def unit(parameter: str) -> str:
+    """Unit of a parameter, by its name; 1 if it has none."""
+    found = parameter.rpartition("_")[2]
+    return found if found in UNITS else "1"
+
+
+def hearts(repository: Repository) -> list[str]:
+    """Cases of which the muscle was inferred."""
+    if not repository.config.inference.tracker:
+        return []
+    return [case for case in repository.present if not repository.problem(case, None, "inference")]
+
+
+def table(repository: Repository) -> pd.DataFrame:
+    """Table of all that was inferred of the hearts of a repository: a row for each heart and parameter."""
+    section = repository.config.inference
+    about = {"tracker": section.tracker, "size_px": section.size_px or repository.sizes[0]}
+    fits = {case: repository.arrays("inference/fit", case) for case in hearts(repository)}
+    rows = [{"case": case} | row for case, fit in fits.items() for row in _rows(fit)]
+    found = pd.DataFrame(rows).assign(**about) if rows else pd.DataFrame()
+    return found.reindex(columns=list(COLUMNS))
+
+
+def _rows(fit: dict[str, Any]) -> list[dict[str, Any]]:
+    """Rows of the parameters of one heart that were inferred."""
+    probability = float(fit["misfit_probability"])
+    about = {
+        "misfit_probability": probability,
+        "misfit": probability < MISFIT,
+        "converged": bool(fit["converged"]),
+    }
+    names = ("mean", "sd", "lower", "upper", "prior_mean", "prior_sd", "true")
+    return [
+        {
+            "parameter": name,
+            "unit": unit(name),
+            "identifiable": bool(fit["identifiable"][place]),
+            "scar_probability": _of_segment(name, fit["scar_probability"]),
+            **{column: float(fit[column][place]) for column in names},
+            **about,
+        }
+        for place, name in enumerate(schema.LABELS["parameter"])
+        if np.isfinite(fit["mean"][place])
+    ]
+
+
+def _of_segment(name: str, values: Any) -> float:
+    """Value of the segment of a contractility; NaN of another parameter."""
+    section, _, number = name.rpartition(".")
+    return float(values[int(number) - 1]) if section == "contractility" else np.nan

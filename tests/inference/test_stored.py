@@ -1,0 +1,118 @@
+"""What is inferred, as the store has it, and the stage that makes it."""
+
+import csv
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import echotruth as et
+from echotruth.cases import expand
+from echotruth.config.loading import ConfigError, validate
+from echotruth.inference import tracker_errors
+from echotruth.inference.stored import groups
+from echotruth.repository import ledger, schema
+from echotruth.workflow.plan import Plan
+
+VIEWS = {"mid": {"position": 0.5}, "long": {"plane": "long_axis", "rotation_deg": 30.0}}
+CONFIG = et.configure(views=VIEWS, tracking={"trackers": {"dis": {"method": "dis"}}}, inference={"tracker": "dis"})
+NAMES = ["fibres.epi_deg", "contractility.8", "contractility.2"]
+
+
+def found():
+    """What was inferred from rotation, and from strain of two segments, in an order of their own."""
+    random = np.random.default_rng(1)
+    number = schema.DRAWS
+    arrays = {name: ("parameter", np.array([-40.0, 0.3, 0.9])) for name in ("mean", "lower", "upper", "prior_mean")}
+    arrays |= {name: ("parameter", np.array([5.0, 0.1, 0.2])) for name in ("sd", "prior_sd")}
+    arrays |= {
+        "identifiable": ("parameter", [True, True, False]),
+        "posterior": (("draw", "parameter"), random.normal(size=(number, 3))),
+        "prior": (("draw", "parameter"), random.normal(size=(number, 3))),
+        "replicated": (("draw", "observation"), random.normal(size=(number, 3))),
+        "scar": (("draw", "aha"), random.random((number, 17)) < 0.3),
+        "scar_probability": ("aha", np.linspace(0, 1, 17)),
+        "observed": ("observation", np.array([0.1, -0.2, -0.3])),
+        "predicted": ("observation", np.array([0.11, -0.21, -0.31])),
+    }
+    labels = {"view": ("observation", ["mid", "long", "mid"]), "segment": ("observation", [0, 8, 8])}
+    about = {"misfit_probability": 0.4, "converged": 1}
+    return xr.Dataset(arrays, {"parameter": NAMES, **labels}, about)
+
+
+def test_values_stand_at_their_labels_and_what_was_not_seen_is_no_number():
+    given, covariance = found(), np.diag([1.0, 4.0, 9.0]) + 0.1
+    observed = xr.Dataset({"covariance": (("observation", "other"), covariance)})
+    made = groups(given, observed, {"mid 8": -0.28}, {"contractility.8": 0.0}, SimpleNamespace(config=CONFIG))
+    assert set(made) == set(schema.INFERENCE)
+    for group, arrays in made.items():
+        assert set(arrays) == {array.name for array in schema.named(group)}
+    parameters, seen = list(schema.LABELS["parameter"]), schema.observations(CONFIG)
+    posterior = made["inference/posterior"]["value"]
+    assert posterior.shape == (1, schema.DRAWS, len(parameters))
+    for place, name in enumerate(NAMES):
+        np.testing.assert_array_equal(posterior[0, :, parameters.index(name)], given["posterior"].values[:, place])
+    assert np.isfinite(posterior).all((0, 1)).sum() == len(NAMES)
+    at = [seen.index(label) for label in ("mid rotation", "long 8", "mid 8")]
+    assert len(seen) == 16 + 1 + 16
+    value = made["inference/observed_data"]["value"]
+    np.testing.assert_array_equal(value[at], [0.1, -0.2, -0.3])
+    assert np.isfinite(value).sum() == 3
+    stored = made["inference/constant_data"]["covariance"]
+    np.testing.assert_array_equal(stored[np.ix_(at, at)], covariance)
+    assert np.isfinite(stored).sum() == 9
+    assert made["inference/constant_data"]["true_value"][at[2]] == -0.28
+    fit = made["inference/fit"]
+    assert fit["true"][parameters.index("contractility.8")] == 0 and fit["predicted"][at[1]] == -0.21
+    assert float(fit["identifiable"][parameters.index("contractility.2")]) == 0
+
+
+def plan(tmp_path, monkeypatch, **inference):
+    monkeypatch.chdir(tmp_path)
+    values = CONFIG.model_dump(mode="json") | {"cases": {"seed": [1, 2]}}
+    return Plan(values | {"inference": inference})
+
+
+def test_rule_takes_what_was_tracked_in_all_views_of_the_images_that_are_named(tmp_path, monkeypatch):
+    made = plan(tmp_path, monkeypatch, tracker="dis", size_px=256)
+    case = next(iter(made.cases))
+    wanted = [str(ledger.record_path(made.folder, "tracking", case, view, 256)) for view in VIEWS]
+    assert made.tracked(SimpleNamespace(case=case)) == wanted
+    records = made.records(SimpleNamespace())
+    assert [path for path in records if "/inference/" in path] == [
+        str(ledger.record_path(made.folder, "inference", one)) for one in made.cases
+    ]
+    without = plan(tmp_path, monkeypatch)
+    assert not [path for path in without.records(SimpleNamespace()) if "/inference/" in path]
+
+
+def test_other_errors_of_the_tracker_are_other_settings(tmp_path, monkeypatch):
+    table = tmp_path / "mine.csv"
+    rows = list(csv.reader(tracker_errors.SHIPPED.open(encoding="utf-8")))
+    versions = []
+    for scale in ("1", "2"):
+        rows[1][-1] = scale
+        with table.open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file).writerows(rows)
+        made = plan(tmp_path, monkeypatch, tracker="dis", size_px=256, errors=str(table))
+        versions.append(made.settings("inference")(SimpleNamespace()))
+    assert versions[0] != versions[1]
+
+
+@pytest.mark.parametrize(
+    ("inference", "said"),
+    [
+        ({"tracker": "dis", "size_px": 512}, "inference: tracker: the error of dis at 512 px with ideal acoustics"),
+        ({"tracker": "dis", "errors": "none.csv"}, "inference: none.csv: there is no such table of errors"),
+    ],
+)
+def test_tracker_whose_error_is_not_known_is_refused_before_the_run(tmp_path, monkeypatch, inference, said):
+    with pytest.raises(ConfigError, match=said):
+        plan(tmp_path, monkeypatch, **inference)
+
+
+def test_hearts_of_a_sweep_are_inferred_alike():
+    with pytest.raises(ConfigError, match=r"inference\.tracker"):
+        swept = CONFIG.model_dump(mode="json") | {"cases": {"inference.tracker": ["dis"]}}
+        expand(validate(swept, "a.yaml"), "a.yaml")

@@ -1,0 +1,194 @@
+"""What is inferred, in the store: of a repository whose jobs are all done, with draws that are known."""
+
+import runpy
+
+import finished_repository as finished
+import numpy as np
+import pytest
+import xarray as xr
+
+from echotruth.cases import expand
+from echotruth.config import Inference, Motion, PhaseCorrelation, Tracking
+from echotruth.config.loading import ConfigError, validate
+from echotruth.release.parts import heart_files
+from echotruth.report import account
+from echotruth.report import inference as drawing
+from echotruth.repository import inferred, ledger, schema, settings
+from echotruth.repository.check import check
+from echotruth.repository.inventory import Inventory
+from echotruth.repository.layout import lay_out
+from echotruth.repository.merge import take_over
+from echotruth.repository.publication import publish
+from echotruth.repository.reader import Repository
+from echotruth.workflow.job import Job, run
+from echotruth.workflow.processes import script
+
+CONFIG = finished.configured(motion=Motion(), inference=Inference(tracker="one"))
+CASES = [case.id for case in expand(CONFIG)]
+SEEN = schema.observations(CONFIG)
+
+
+def result(job):
+    arrays = finished.result(job)
+    if job.stage == "inference":
+        names = schema.LABELS["parameter"]
+        places = {name: place for place, name in enumerate(names)}
+        draws = np.random.default_rng(job.row).normal(1, 0.1, (1, schema.DRAWS, len(names)))
+        draws[..., places["fibres.endo_deg"]] = np.nan  # is not inferred if fibres are read from a file
+        scar = np.zeros((1, schema.DRAWS, 17))
+        scar[:, : schema.DRAWS // 2, 7] = 1
+        arrays["inference/posterior"] = {"value": draws, "scar": scar}
+        arrays["inference/fit"] |= {
+            "mean": draws.mean((0, 1)),
+            "scar_probability": scar.mean((0, 1)),
+            "identifiable": np.arange(len(names)) % 2,
+            "misfit_probability": np.array([0.5, 0.001][job.row % 2]),
+            "converged": np.array(1.0),
+        }
+        seen = np.full(len(SEEN), np.nan)
+        seen[SEEN.index("mid 7")] = -0.12
+        arrays["inference/observed_data"] = {"value": seen}
+    return arrays
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return finished.finish(tmp_path_factory.mktemp("done") / "small", CONFIG, result)
+
+
+def test_xarray_opens_the_groups_of_inference_data(folder):
+    tree = xr.open_datatree(folder / "small.zarr", group="inference", engine="zarr")
+    assert {*tree.children} == {
+        *("posterior", "prior", "observed_data", "posterior_predictive", "constant_data", "fit"),
+    }
+    posterior = tree["posterior"].to_dataset().sel(case=CASES[1])
+    assert posterior["value"].dims == ("chain", "draw", "parameter") and posterior.sizes["draw"] == schema.DRAWS
+    due = np.random.default_rng(1).normal(1, 0.1, (1, schema.DRAWS, posterior.sizes["parameter"]))[0, :, 2]
+    np.testing.assert_allclose(posterior["value"].isel(chain=0).sel(parameter="contractility.3"), due, rtol=1e-6)
+    assert posterior["parameter_units"].sel(parameter="loop.esp_mmHg").item() == "mmHg"
+    seen = tree["observed_data"].to_dataset().sel(case=CASES[0])["value"]
+    assert seen.sel(observation="mid 7").item() == -0.12 and int(seen.notnull().sum()) == 1
+
+
+def test_whole_repository_has_no_faults_and_is_of_one_job_more_a_heart(folder):
+    report = check(folder)
+    known = [fault for fault in report.faults if "inference" in str(fault)]
+    assert known == [] and report.jobs == len(CASES) * (2 + 5 * len(CONFIG.views))
+
+
+def test_damage_to_what_was_inferred_is_found_and_made_again(folder, tmp_path):
+    from shutil import copytree
+
+    copy = copytree(folder, tmp_path / "small")
+    shards = (copy / "small.zarr/inference/posterior/value/c/0").rglob("*")
+    next(path for path in shards if path.is_file()).unlink()
+    assert [fault.records for fault in check(copy).faults if "inference" in str(fault)] == [
+        (ledger.record_path(copy, "inference", CASES[0]),)
+    ]
+
+
+def test_settings_are_those_of_the_section_and_of_all_that_was_tracked():
+    trackers = {name: PhaseCorrelation(window_px=16) for name in ("one", "two")}
+    others = [
+        finished.configured(motion=Motion(), tracking=Tracking(trackers=trackers), inference=Inference(tracker="two")),
+        finished.configured(motion=Motion(), tracking=Tracking(trackers=trackers), inference=Inference(tracker="one")),
+        finished.configured(motion=Motion(), views=("mid",), inference=Inference(tracker="one")),
+        finished.configured(motion=Motion(), inference=Inference(tracker="one", size_px=finished.SIZE)),
+    ]
+    hashes = [settings.of_job(config, "inference", None) for config in (CONFIG, *others)]
+    assert len(set(hashes)) == len(hashes)
+    assert len({settings.of_job(config, "mechanics", None) for config in (CONFIG, *others)}) == 1
+
+
+def test_table_has_a_row_for_each_heart_and_parameter_that_was_inferred(folder):
+    table = inferred.table(Repository(folder))
+    assert list(table.columns) == list(inferred.COLUMNS)
+    assert list(table["case"].unique()) == CASES and set(table["tracker"]) == {"one"}
+    assert len(table) == len(CASES) * (len(schema.LABELS["parameter"]) - 1)
+    rows = table[table["case"] == CASES[0]].set_index("parameter")
+    assert (
+        rows.loc["contractility.8", "scar_probability"] == 0.5 and rows.loc["contractility.7", "scar_probability"] == 0
+    )
+    assert np.isnan(rows.loc["stiffness.8", "scar_probability"])
+    assert rows.loc["loop.edv_uL", "unit"] == "uL" and rows.loc["contractility.1", "unit"] == "1"
+    assert list(table.groupby("case", sort=False)["misfit"].first()) == [False, True]
+
+
+def test_without_a_tracker_there_is_no_group_no_job_and_no_stage():
+    without = finished.configured()
+    assert not [group for group in schema.groups(without) if group.startswith("inference")]
+    assert schema.written_by("inference", without) == [] and "inference" not in ledger.stages(without)
+
+
+def test_tracker_that_leaves_takes_what_was_inferred_with_it(folder, tmp_path):
+    from shutil import copytree
+
+    copy = copytree(folder, tmp_path / "small")
+    finished.remake(copy, finished.configured(motion=Motion()))
+    assert not (copy / "small.zarr/inference").exists() and inferred.table(Repository(copy)).empty
+    assert [fault for fault in check(copy).faults if "inference" in str(fault)] == []
+
+
+def test_parts_of_a_release_have_what_was_inferred(folder):
+    names = {name for _, jobs in heart_files(Inventory(folder)) for files in jobs for name in files}
+    assert f"small/ledger/inference/{CASES[0]}.json" in names
+    assert any(name.startswith("small/small.zarr/inference/posterior/value/c/1/") for name in names)
+
+
+def test_another_repository_takes_it_over(folder, tmp_path):
+    target = tmp_path / "small"
+    lay_out(target, CONFIG, list(expand(CONFIG)))
+    taken, known = take_over(folder, target)
+    assert known == 0 and {record.case for record in taken if record.stage == "inference"} == set(CASES)
+    publish(target)
+    assert inferred.table(Repository(target)).equals(inferred.table(Repository(folder)))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"inference": {"tracker": "dos"}}, "inference.tracker = 'dos': use one of"),
+        (
+            {"inference": {"tracker": "dis", "size_px": 100}},
+            "inference.size_px = 100: is no image size: use one of 512",
+        ),
+        ({"inference": {"size_px": 512}}, "inference.size_px = 512: needs inference.tracker"),
+        ({"inference": {"errors": "a.csv"}}, "inference.errors = 'a.csv': needs inference.tracker"),
+        ({"inference": {"tracker": "dis"}, "motion": {"kind": "rigid"}}, "motion.kind = rigid has not"),
+        ({"cases": {"inference.tracker": ["dis", "ilk"]}}, "inference.tracker"),
+    ],
+)
+def test_settings_that_cannot_be_inferred_from_are_refused_in_a_sentence(given, said):
+    with pytest.raises(ConfigError, match=said):
+        expand(validate({"tracking": {"trackers": {"dis": {"method": "dis"}}}} | given, "a.yaml"), "a.yaml")
+
+
+def test_heart_of_which_nothing_can_be_inferred_is_told_and_the_others_stay(folder, tmp_path):
+    from shutil import copytree
+
+    copy = copytree(folder, tmp_path / "small")
+    job = Job(copy, "inference", CASES[0], code="1")
+    run(job, runpy.run_path(script("inference"))["work"])  # the error of this tracker is not known
+    record = ledger.read(ledger.record_path(copy, "inference", CASES[0]))
+    assert record["status"] == "failed" and record["reason"].startswith("tracker: the error of one at 64 px")
+    publish(copy)
+    repository = Repository(copy)
+    assert inferred.hearts(repository) == CASES[1:]
+    assert [fault for fault in check(copy).faults if "inference" in str(fault)] == []
+    told = account.inference(repository)
+    assert [one["case"] for one in told["failed"]] == CASES[:1] and [one["case"] for one in told["hearts"]] == CASES[1:]
+    assert told["hearts"][0]["misfit"] and told["case"] == CASES[1]
+
+
+def test_figure_has_the_inferred_numbers_and_hatches_what_is_not_identifiable(folder):
+    repository = Repository(folder)
+    fit = repository.arrays("inference/fit", CASES[0])
+    seen = repository.arrays("inference/observed_data", CASES[0])["value"]
+    given = drawing.Seen(SEEN, seen, np.eye(len(SEEN)) * 1e-4, seen, seen)
+    figure = drawing.draw(fit, given)
+    discs = [axes for part in figure.subfigs for axes in part.axes if axes.get_title()]
+    texts = [{text.get_text() for text in axes.texts} for axes in discs]
+    names = list(schema.LABELS["parameter"])
+    known = [number for number in range(1, 18) if fit["identifiable"][names.index(f"contractility.{number}")]]
+    assert len(known) == 8 and sum(patch.get_hatch() is not None for patch in discs[0].patches) == 17 - len(known)
+    assert f"{fit['mean'][names.index('contractility.2')]:.2f}" in texts[0] and "0.50" in texts[2]
