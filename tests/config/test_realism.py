@@ -81,5 +81,6 @@ def test_cases_change_the_preset_of_realism():
 
 def test_smoothing_of_realistic_images_follows_their_size():
     small, large = (configure("realistic", bmode={"size_px": size}).bmode for size in (256, 512))
-    assert large.edge_width_px == pytest.approx(2 * small.edge_width_px, rel=0.01)
-    assert configure("realistic", bmode={"edge_width_px": 5.0}).bmode.edge_width_px == 5
+    assert large.smoothing == small.smoothing > 0
+    assert large.smoothing_width_px == pytest.approx(2 * small.smoothing_width_px, rel=0.01)
+    assert configure("realistic", bmode={"smoothing_width_px": 5.0}).bmode.smoothing_width_px == 5
