@@ -13,6 +13,9 @@ from echotruth.export.clip import Clip
 from echotruth.export.overlay import pictures
 from echotruth.imaging.labels import TissueLabel
 from echotruth.repository.check import check
+from echotruth.viewer import clip as viewer
+from echotruth.viewer.points import Points
+from echotruth.viewer.tint import tint
 from workflow.scripts import truth
 
 NONE, MOUSE = 0, 1
@@ -51,6 +54,15 @@ def test_segmentation_and_clips_have_them(folder):
     expected = et.Repository(folder).clip(items[-1]["case"], "mid")["tissue"].values
     np.testing.assert_array_equal(items[-1]["label"], expected[-1])
     np.testing.assert_array_equal(clips[MOUSE]["tissue"], expected)
+
+
+def test_the_viewer_names_and_colours_them(folder):
+    repository = et.Repository(folder)
+    shown = viewer.Clip(repository, repository.cases.index[MOUSE], "mid", 32)
+    colours = tint(shown, Points(shown), "tissue", "", None)
+    np.testing.assert_array_equal(colours.index, shown.tissue())
+    assert colours.names[TissueLabel.RIGHT_VENTRICLE] == "right ventricle"
+    assert len(set(colours.palette)) == len(colours.names) == max(TissueLabel)
 
 
 def test_they_are_drawn_over_images(folder):

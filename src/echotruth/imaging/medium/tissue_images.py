@@ -31,7 +31,7 @@ Labels = NDArray[np.uint8]
 KNOTS = 65
 """Points along each side of the image at which the motion of what is around the heart is computed."""
 ITERATIONS = 12
-"""Of X <- x - u(X). The tissue stretches by less than half over any distance, so that 12 of them leave 1/4000."""
+"""Of X <- x - u(X). Where u changes by less than half of any distance, 12 of them leave 1/4000 of it."""
 
 
 class TissueImages:
