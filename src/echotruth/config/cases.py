@@ -105,7 +105,7 @@ ACOUSTICS: dict[str, dict[str, Any]] = {
     "bmode.dropout.loss_dB": {"uniform": [0, 10]},
 }
 """Distributions of `cases.draw.preset: acoustics`; docs/realism.md says where each range is from."""
-DRAW_PRESETS = {"none": {}, "acoustics": ACOUSTICS}
+DRAW_PRESETS: dict[str, dict[str, Any]] = {"none": {}, "acoustics": ACOUSTICS}
 
 
 class Draw(Section):
@@ -129,8 +129,9 @@ class Draw(Section):
     @model_validator(mode="before")
     @classmethod
     def _add_preset(cls, values: Any) -> Any:
-        keys = values.get("keys", {}) if isinstance(values, dict) else None
-        preset = DRAW_PRESETS.get(str(values.get("preset")), {}) if isinstance(keys, dict) else {}
+        if not isinstance(values, dict) or not isinstance(keys := values.get("keys", {}), dict):
+            return values
+        preset: dict[str, Any] = DRAW_PRESETS.get(str(values.get("preset")), {})
         return values | {"keys": preset | keys} if preset else values
 
 
