@@ -25,22 +25,26 @@ FRACTIONS = {"train": 0.7, "test": 0.3}
 class UNet(nn.Module):
     """A U-Net (Ronneberger 2015, doi:10.1007/978-3-319-24574-4_28) of three levels, small enough for a processor."""
 
-    def __init__(self, channels=(12, 24, 48)):
+    def __init__(self, channels=(12, 24, 48), labels=1):
         super().__init__()
         ends = (1, *channels)
         self.down = nn.ModuleList(block(a, b) for a, b in pairwise(ends))
         self.up = nn.ModuleList(block(a + b, a) for a, b in list(pairwise(channels))[::-1])
-        self.last = nn.Conv2d(channels[0], 1, 1)
+        self.last = nn.Conv2d(channels[0], labels, 1)
 
     def forward(self, image):
         """Logit of the wall (batch, axial, lateral) in images (batch, 1, axial, lateral)."""
+        return self.labels(image)[:, 0]
+
+    def labels(self, image):
+        """Logits of all labels (batch, label, axial, lateral)."""
         passed, x = [], image
         for level, layer in enumerate(self.down):
             x = layer(nn.functional.max_pool2d(x, 2) if level else x)
             passed.append(x)
         for layer, skipped in zip(self.up, passed[-2::-1], strict=True):
             x = layer(torch.cat([nn.functional.interpolate(x, scale_factor=2), skipped], 1))
-        return self.last(x)[:, 0]
+        return self.last(x)
 
 
 def block(before, after):

@@ -42,7 +42,7 @@ VALUES = {
     "kinematics": {"volume_ratio_min": 1, "volume_ratio_mean": 1},
     "physiology": {"volume_ratio_min": 1},
     "phantom": {"axes": np.eye(3)},
-    "truth": {"labels": np.reshape([1, 1, 0], (3, 1, 1)), "flow": FLOW},
+    "truth": {"labels": np.reshape([1, 1, 0], (3, 1, 1)), "tissue": 2, "flow": FLOW},
     "evaluation": {"wall_axes": np.eye(2)},
 }
 """Values that are not 0: of a heart that does not move, and fills its images."""

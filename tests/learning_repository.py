@@ -29,10 +29,10 @@ def made(folder: Path) -> Path:
 
 def make(folder: Path, config: Config) -> Path:
     """A repository whose hearts, images and truth are those of its configuration."""
-    return finish(folder, config, _result)
+    return finish(folder, config, of_job)
 
 
-def _result(job: Job):
+def of_job(job: Job):
     """Arrays of a job, as the workflow stores them."""
     heart, config = _beat(job.folder, job.case.id), job.config
     if job.stage == "mechanics":

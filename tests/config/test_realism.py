@@ -81,5 +81,18 @@ def test_cases_change_the_preset_of_realism():
 
 def test_smoothing_of_realistic_images_follows_their_size():
     small, large = (configure("realistic", bmode={"size_px": size}).bmode for size in (256, 512))
-    assert large.edge_width_px == pytest.approx(2 * small.edge_width_px, rel=0.01)
-    assert configure("realistic", bmode={"edge_width_px": 5.0}).bmode.edge_width_px == 5
+    assert large.smoothing == small.smoothing > 0
+    assert large.smoothing_width_px == pytest.approx(2 * small.smoothing_width_px, rel=0.01)
+    assert configure("realistic", bmode={"smoothing_width_px": 5.0}).bmode.smoothing_width_px == 5
+
+
+def test_acoustics_are_drawn_by_one_key_and_given_ranges_take_precedence():
+    given = {"bmode.gain_dB": {"uniform": [1, 2]}, "seed": {"integers": [1, 1000]}}
+    cases = {"draw": {"number": 4, "preset": "acoustics", "keys": given}}
+    config = configure("realistic", cases=cases)
+    draws = [case.config for case in expand(config)]
+    assert len({each.realism.blood.level_dB for each in draws}) == len({each.seed for each in draws}) == 4
+    assert all(1 <= each.bmode.gain_dB <= 2 for each in draws)
+    # What is stored with a repository draws the same again.
+    again = configure(config.model_dump())
+    assert [case.id for case in expand(again)] == [case.id for case in expand(config)]

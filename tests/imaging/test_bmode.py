@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from echotruth.config import Bmode, Probe
 from echotruth.imaging.beamforming.scan import Linear, Sector
@@ -19,6 +20,7 @@ from echotruth.imaging.bmode import (
     log_compress,
     persist,
     pixel_centres,
+    smooth,
     time_gain_compensation,
 )
 
@@ -240,17 +242,17 @@ def test_edges_are_enhanced_within_the_scan_alone():
     assert (sharp[~inside] == 0).all()
 
 
-def test_negative_enhancement_smooths_within_the_scan_alone():
+def test_smoothing_is_within_the_scan_alone():
     inside = np.zeros((60, 60), bool)
     inside[10:50, 10:50] = True
     noise = np.where(inside, np.random.default_rng(1).random((60, 60)), 0.0)
-    smooth = enhance_edges(noise, inside, -1.0, 2.0)
+    mean = smooth(noise, inside, 1.0, 2.0)
     # White noise averaged by a Gaussian of standard deviation s keeps 1 / (4 pi s^2) of its variance.
     middle = np.s_[16:44, 16:44]
-    assert smooth[middle].std() == pytest.approx(noise[middle].std() / np.sqrt(16 * np.pi), rel=0.25)
-    assert smooth[middle].mean() == pytest.approx(noise[middle].mean(), abs=0.02)
-    half = enhance_edges(noise, inside, -0.5, 2.0)
-    assert np.allclose(half, (noise + smooth) / 2) and (half[~inside] == 0).all()
+    assert mean[middle].std() == pytest.approx(noise[middle].std() / np.sqrt(16 * np.pi), rel=0.25)
+    assert mean[middle].mean() == pytest.approx(noise[middle].mean(), abs=0.02)
+    half = smooth(noise, inside, 0.5, 2.0)
+    assert np.allclose(half, (noise + mean) / 2) and (half[~inside] == 0).all()
 
 
 def test_grey_maps_keep_black_and_white_and_what_is_beyond():
@@ -270,6 +272,18 @@ def test_persistence_acts_on_compressed_images_and_the_grey_map_comes_last():
     keys = {"persistence": 0.5, "grey_map": "s_curve", "gain_dB": 6.0}
     clip = largest_clip(lines, SECTOR, RANGE, BMODE.model_copy(update=keys))
     assert np.abs(clip - 255 * (3 * shown**2 - 2 * shown**3)).max() < 0.51
+
+
+def test_a_clip_is_smoothed_before_its_edges_are_enhanced():
+    """Both are convolutions far from the edge of the scan: an unsharp mask of a mean is a difference of Gaussians."""
+    lines = noise_lines(1)
+    keys = {"smoothing": 1.0, "smoothing_width_px": 3.0, "edge_enhancement": 2.0, "edge_width_px": 4.0}
+    images = envelope_images(lines, SECTOR, RANGE, BMODE)
+    level = log_compress(images, BMODE.dynamic_range_dB)[0].astype(float)
+    narrow, wide = (gaussian_filter(level, width) for width in (3.0, 5.0))
+    clip = largest_clip(lines, SECTOR, RANGE, BMODE.model_copy(update=keys))[0]
+    middle = np.s_[50:90, 54:74]
+    assert np.abs(clip - 255 * (3 * narrow - 2 * wide).clip(0, 1))[middle].max() < 1.5
 
 
 def test_edges_of_a_clip_are_enhanced_within_the_sector():

@@ -7,7 +7,8 @@ import pytest
 
 from echotruth.config import Config
 from echotruth.fem.location import locate
-from echotruth.imaging.medium.anatomy import Anatomy, Neighbour
+from echotruth.imaging.labels import TissueLabel
+from echotruth.imaging.medium.anatomy import Anatomy
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.filling import emptied, opening, volumes
 from echotruth.imaging.medium.medium import Medium, seed_medium
@@ -69,17 +70,37 @@ def test_the_right_ventricle_is_a_cavity_of_blood_on_the_septal_side(heart):
     assert found == pytest.approx(-25, abs=4 * error + 0.3)
     opposite = mid.to_heart(np.array([[3.1e-3, 6.5e-3, 0.0]]))
     anatomy = Anatomy(heart)
-    assert anatomy.chambers(opposite, anatomy.place(opposite)) == Neighbour.CONNECTIVE
+    assert anatomy.chambers(opposite, anatomy.place(opposite)) == TissueLabel.OTHER
+
+
+def test_the_nearest_point_of_a_sphere_is_on_the_ray_from_its_centre(half_sphere, twisting_heart):
+    displacement = np.zeros((1, *half_sphere.nodes.shape))
+    arrays = {"geometry": {"endo": half_sphere.endo, "epi": half_sphere.epi}}
+    heart = replace(
+        twisting_heart,
+        nodes=half_sphere.nodes,
+        cells=half_sphere.cells,
+        displacement=displacement,
+        endo=half_sphere.endo,
+        arrays=arrays,
+    )
+    angle, height = np.random.default_rng(1).uniform([0, -0.9], [2 * np.pi, -0.1], (500, 2)).T
+    ray = np.column_stack([np.cos(angle) * np.sqrt(1 - height**2), np.sin(angle) * np.sqrt(1 - height**2), height])
+    for distance in (0.3e-3, 1.5e-3, 4e-3):
+        place = Anatomy(heart).place((3e-3 + distance) * ray)
+        # The mesh is a sphere within 2 um, and its normals are off by up to 0.015.
+        assert np.abs(place.distance - distance).max() < 2e-6
+        assert np.linalg.norm(place.outward - ray, axis=1).max() < 0.02
 
 
 def test_walls_of_chambers_have_their_level(seeded, heart, plane):
-    walls = np.isin(seeded["tissue"], (Neighbour.RIGHT_FREE_WALL, Neighbour.ATRIAL_WALL))
+    walls = np.isin(seeded["tissue"], (TissueLabel.RIGHT_FREE_WALL, TissueLabel.ATRIAL_WALL))
     near = np.abs(plane.to_image(seeded["position"])[:, 2]) < 0.15e-3
     assert (walls & near).sum() > 20
     # Power of a scatterer over that of one of the connective tissue beside it, which has the same density.
     range_ = np.linalg.norm(plane.to_image(seeded["position"])[:, :2], axis=1)
     scaled = seeded["amplitude"] ** 2 / range_
-    rest = seeded["tissue"] == Neighbour.CONNECTIVE
+    rest = seeded["tissue"] == TissueLabel.OTHER
     middle = np.abs(range_ - 6.5e-3) < 1.5e-3
     ratio = scaled[walls & near & middle].mean() / scaled[rest & near & middle & (scaled > 0)].min()
     assert 10 * np.log10(ratio) == pytest.approx(20, abs=4)
@@ -117,13 +138,13 @@ def test_the_free_wall_moves_inwards_and_the_chest_wall_stays(heart):
     seeded = seed_surroundings(CONFIG, heart, mid, random("surroundings"))
     around = AroundHeart(CONFIG, heart, mid, seeded["position"], seeded["tissue"])
     start, end = around.positions(0), around.positions(3)
-    free = (seeded["tissue"] == Neighbour.RIGHT_FREE_WALL) & (np.abs(start[:, 1] - 6.5e-3) < 0.5e-3)
+    free = (seeded["tissue"] == TissueLabel.RIGHT_FREE_WALL) & (np.abs(start[:, 1] - 6.5e-3) < 0.5e-3)
     free &= start[:, 0] < -2.6e-3
     septum, height = 0.2 * 2.33e-3, (3.4 / 7.6) / 0.85
     # Two fifths of its width, which falls from 0.75 of 2.5 mm at the base, besides the motion of the septum.
     expected = septum + 0.4 * 0.75 * 2.5e-3 * (1 - height**2)
     assert free.sum() > 20 and (end - start)[free, 0].mean() == pytest.approx(expected, rel=0.1)
-    chest = seeded["tissue"] == Neighbour.CHEST_WALL
+    chest = seeded["tissue"] == TissueLabel.CHEST_WALL
     assert chest.sum() > 100 and np.array_equal(start[chest], end[chest])
     assert np.array_equal(start[:, 2], end[:, 2])
 

@@ -23,7 +23,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         (
             "overlay",
             str,
-            "wall, segments, displacement or scale over mp4, gif and png; can be repeated (default: none)",
+            "wall, segments, tissue, displacement or scale over mp4, gif and png; can be repeated (default: none)",
         ),
     )
     parser.add_argument("--rate", type=float, help="frames per second of mp4 and gif (default: 20)")

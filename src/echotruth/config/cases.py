@@ -83,9 +83,38 @@ class Distribution(Section):
             raise invalid("weights", self.weights, "must have a positive entry and a finite sum")
 
 
+ACOUSTICS: dict[str, dict[str, Any]] = {
+    "probe.attenuation_dB_per_cm_MHz": {"uniform": [0.4, 0.65]},
+    "bmode.tgc_dB_per_cm_MHz": {"uniform": [0.4, 0.65]},
+    "realism.backscatter.anisotropy_dB": {"uniform": [0, 14.5]},
+    "realism.backscatter.fibre_strain_dB": {"uniform": [0, 40]},
+    "realism.borders.endocardium_dB": {"uniform": [5, 18]},
+    "realism.borders.epicardium_dB": {"uniform": [8, 25]},
+    "realism.blood.level_dB": {"uniform": [-30, -14]},
+    "realism.surroundings.level_dB": {"uniform": [-25, -5]},
+    "realism.noise.snr_dB": {"uniform": [25, 55]},
+    "realism.haze.level_dB": {"uniform": [-30, -12]},
+    "realism.shadow.side": {"choice": ["none", "left", "right"], "weights": [2, 1, 1]},
+    "realism.shadow.edge_deg": {"uniform": [5, 25]},
+    "bmode.dynamic_range_dB": {"uniform": [45, 70]},
+    "bmode.gain_dB": {"uniform": [-16, 6]},
+    "bmode.grey_map": {"choice": ["linear", "s_curve"]},
+    "bmode.grey_gamma": {"uniform": [0.7, 1.5]},
+    "bmode.smoothing": {"uniform": [0, 0.8]},
+    "bmode.edge_enhancement": {"uniform": [0, 1]},
+    "bmode.dropout.loss_dB": {"uniform": [0, 10]},
+}
+"""Distributions of `cases.draw.preset: acoustics`; docs/realism.md says where each range is from."""
+DRAW_PRESETS: dict[str, dict[str, Any]] = {"none": {}, "acoustics": ACOUSTICS}
+
+
 class Draw(Section):
     """Hearts drawn at random: each has one value of every key in `keys`."""
 
+    preset: Literal["none", "acoustics"] = "none"
+    """Keys that are drawn beside those in `keys`. `acoustics`: levels of tissues, noise and artefacts, attenuation,
+    gain and grey map, each over its published or chosen range (docs/realism.md), so that the looks of a training set
+    differ; use it with a `realism.preset`."""
     number: Annotated[int, Field(ge=1, le=MAX_CASES)]
     """Number of hearts (of each row of the table and each combination of the grid). With `sobol` and `random` a larger
     number adds hearts, and those that were there stay; with `latin_hypercube` it changes all of them."""
@@ -95,7 +124,15 @@ class Draw(Section):
     """`sobol`: quasi-random, the most even in all keys together; `latin_hypercube`: even in each key alone; `random`:
     independent."""
     keys: Annotated[dict[str, Distribution], Field(min_length=1, max_length=MAX_DRAWN_KEYS)]
-    """Distribution of each dotted key."""
+    """Distribution of each dotted key; those given take precedence over those of `preset`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _add_preset(cls, values: Any) -> Any:
+        if not isinstance(values, dict) or not isinstance(keys := values.get("keys", {}), dict):
+            return values
+        preset: dict[str, Any] = DRAW_PRESETS.get(str(values.get("preset")), {})
+        return values | {"keys": preset | keys} if preset else values
 
 
 def _as_list(value: Any) -> Any:

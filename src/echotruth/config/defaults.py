@@ -41,12 +41,12 @@ REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.2}
 """`realism.preset` -> default of the bandwidth, and of the density of scatterers, of which a longer pulse needs fewer,
 over those of the array."""
 REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 250}
-"""`realism.preset` -> default of `bmode.edge_width_px` over the side of the image."""
+"""`realism.preset` -> default of `bmode.smoothing_width_px` over the side of the image."""
 REALISM_IMAGE: dict[str, float] = {
     "bmode.dynamic_range_dB": 50.0,
     "bmode.gain_dB": -12.0,
     "bmode.grey_gamma": 1.3,
-    "bmode.edge_enhancement": -0.65,
+    "bmode.smoothing": 0.65,
 }
 """Defaults of dotted keys with any `realism.preset`."""
 
@@ -89,7 +89,7 @@ def _scanner(values: dict[str, Any]) -> dict[str, Any]:
         return {}
     size = _value(values.get("bmode", {}), "size_px") or 512
     width = REALISM_SMOOTHING[name] * size if isinstance(size, int | float) else 2.0
-    found = REALISM_IMAGE | {"bmode.edge_width_px": round(max(width, 0.5), 3)}
+    found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)}
     if array not in ARRAY_PRESETS or _value(values.get("probe", {}), "bandwidth") is not None:
         return found
     share, density = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3"

@@ -121,6 +121,7 @@ class Rf(Section):
 Divisor = Annotated[int, Field(ge=1, le=64)]
 Gain = Annotated[FiniteFloat, Field(ge=-60, le=60)]
 Length = Annotated[FiniteFloat, Field(ge=0, le=1000)]
+FilterWidth = Annotated[FiniteFloat, Field(ge=0.5, le=64)]
 
 
 def _as_tuple(value: Any) -> Any:
@@ -181,11 +182,16 @@ class Bmode(Section):
     persistence: Annotated[FiniteFloat, Field(ge=0, le=0.95)] = 0.0
     """Weight of the image before in every image shown, the rest being the new one; 0 for none. The clip is taken as one
     cycle that repeats. Speckle and borders lag behind the tissue by persistence / (1 - persistence) frames."""
-    edge_enhancement: Annotated[FiniteFloat, Field(ge=-1, le=5)] = 0.0
-    """Unsharp mask: the difference of the compressed image from its smooth version, times this, is added to it; 0 for
-    none. A negative one smooths, as scanners do to reduce speckle: with -1 the smooth version is shown."""
-    edge_width_px: Annotated[FiniteFloat, Field(ge=0.5, le=64)] = 2.0
-    """Standard deviation of the Gaussian that makes the smooth version, px of the largest image."""
+    smoothing: Fraction = 0.0
+    """Share of a Gaussian mean of the compressed image in the image shown, the rest being the image itself, as scanners
+    smooth to reduce speckle; 0 for none, 1 for the mean alone."""
+    smoothing_width_px: FilterWidth = 2.0
+    """Standard deviation of the Gaussian of `smoothing`, px of the largest image."""
+    edge_enhancement: Annotated[FiniteFloat, Field(ge=0, le=5)] = 0.0
+    """Unsharp mask, after `smoothing`: the difference of the image from its Gaussian mean, times this, is added to it;
+    0 for none."""
+    edge_width_px: FilterWidth = 2.0
+    """Standard deviation of the Gaussian of `edge_enhancement`, px of the largest image."""
     grey_map: Literal["linear", "s_curve"] = "linear"
     """Grey level u of the compressed images, from 0 to 1, as shown. `linear`: u. `s_curve`: 3 u^2 - 2 u^3, steep at
     middle levels and flat at both ends."""

@@ -73,6 +73,11 @@ class Neighbours(Section):
     """Two papillary muscles, which move with the endocardium; 0 for the echo of muscle."""
 
     @property
+    def any(self) -> bool:
+        """Whether there is any."""
+        return any(level is not None for level in self.model_dump().values())
+
+    @property
     def around(self) -> dict[str, float | None]:
         """Levels, dB, of those that are tissues of the surroundings, by key."""
         return {key: getattr(self, key) for key in ("chambers_dB", "lung_dB", "chest_wall_dB")}

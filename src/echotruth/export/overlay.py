@@ -5,17 +5,19 @@ from collections.abc import Sequence
 import cv2
 import matplotlib
 import numpy as np
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_rgb, to_rgba_array
 from numpy.typing import NDArray
 
+from echotruth.arrays import Floats
 from echotruth.export.clip import Clip
 from echotruth.report.clip import MOTION
+from echotruth.report.style import tissue_colours
 
 WALL = "#4cc9f0"
 """Colour of the border of the wall."""
 
 OPACITY = 0.35
-"""Of the colours of the segments."""
+"""Of the colours of segments and tissues."""
 
 ARROWS_ALONG_SIDE = 28
 """Arrows along the side of an image that is all wall."""
@@ -38,10 +40,10 @@ def pictures(clip: Clip, overlay: Sequence[str]) -> Pictures:
     Parameters
     ----------
     clip : Clip
-    overlay : sequence of {"wall", "segments", "displacement", "scale"}
-        The border of the wall; the AHA segments in colour; arrows from where points of the tissue were at
-        end-diastole to where they are; a depth scale, the time since end-diastole, and a line of the beat, with a
-        spike at end-diastole, a mark at end-systole and a dot that runs along it.
+    overlay : sequence of {"wall", "segments", "tissue", "displacement", "scale"}
+        The border of the wall; the AHA segments in colour; all tissues in colour; arrows from where points of the
+        tissue were at end-diastole to where they are; a depth scale, the time since end-diastole, and a line of the
+        beat, with a spike at end-diastole, a mark at end-systole and a dot that runs along it.
 
     Returns
     -------
@@ -57,9 +59,18 @@ def pictures(clip: Clip, overlay: Sequence[str]) -> Pictures:
 
 def _segments(clip: Clip, frames: Pictures) -> None:
     """Colour the segments, those of AHA next to each other differently."""
-    segment = clip.truth("segment")["segment"].values
-    colours = np.vstack([np.zeros(3), matplotlib.colormaps["tab10"](np.arange(1, 18) * 3 % 10)[:, :3]]) * 255
-    for frame, numbers in zip(frames, segment, strict=True):
+    _tint(frames, clip.truth("segment")["segment"].values, matplotlib.colormaps["tab10"](np.arange(1, 18) * 3 % 10))
+
+
+def _tissue(clip: Clip, frames: Pictures) -> None:
+    """Colour the tissues."""
+    _tint(frames, clip.truth("tissue")["tissue"].values, to_rgba_array(tissue_colours()))
+
+
+def _tint(frames: Pictures, labels: Pictures, palette: Floats) -> None:
+    """Lay the colours (n, 4) of the numbers from 1 on over images."""
+    colours = np.vstack([np.zeros(3), palette[:, :3]]) * 255
+    for frame, numbers in zip(frames, labels, strict=True):
         tinted = (1 - OPACITY) * frame + OPACITY * colours[numbers]
         frame[:] = np.where(numbers[..., None] > 0, np.round(tinted), frame)
 
@@ -117,7 +128,7 @@ def _write(frame: Pictures, text: str, corner: tuple[int, int], right: int | Non
     cv2.putText(frame, text, corner, cv2.FONT_HERSHEY_SIMPLEX, scale, _rgb(SCALE), 1, cv2.LINE_AA)
 
 
-DRAWINGS = {"segments": _segments, "wall": _wall, "displacement": _displacement, "scale": _scale}
+DRAWINGS = {"segments": _segments, "tissue": _tissue, "wall": _wall, "displacement": _displacement, "scale": _scale}
 """Name of an overlay to the function that draws it, those below first."""
 
 

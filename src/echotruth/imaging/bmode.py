@@ -2,7 +2,7 @@
 
 The envelope is interpolated before it is compressed, which keeps the statistics of the speckle, and compressed relative
 to one reference for the whole clip, so that brightness means the same in every frame. What a scanner does to compressed
-images comes last, before they are rounded to eight bits: persistence, edge enhancement, grey map.
+images comes last, before they are rounded to eight bits: persistence, smoothing, edge enhancement, grey map.
 """
 
 import numpy as np
@@ -178,18 +178,18 @@ def persist(levels: np.ndarray, weight: float) -> np.ndarray:
     return shown
 
 
-def enhance_edges(level: np.ndarray, inside: np.ndarray, amount: float, width_px: float) -> np.ndarray:
-    """Unsharp mask within the scan: x + a (x - smooth x).
+def smooth(level: np.ndarray, inside: np.ndarray, share: float, width_px: float) -> np.ndarray:
+    """Mixture (1 - s) x + s (Gaussian mean of x) within the scan, which reduces speckle.
 
     Parameters
     ----------
     level
         Grey levels x (axial, lateral).
     inside
-        Pixels of the scan (axial, lateral), bool. The smooth image is the Gaussian mean over these alone, so that the
-        edge of the scan is no edge of the image; others stay what they are.
-    amount
-        Factor a.
+        Pixels of the scan (axial, lateral), bool. The mean is that over these alone, so that the edge of the scan is no
+        edge of the image; others stay what they are.
+    share
+        Share s of the mean, 0 to 1.
     width_px
         Standard deviation of the Gaussian, px.
 
@@ -197,9 +197,30 @@ def enhance_edges(level: np.ndarray, inside: np.ndarray, amount: float, width_px
     -------
     Same shape and type.
     """
+    return np.where(inside, level - share * _detail(level, inside, width_px), level)
+
+
+def enhance_edges(level: np.ndarray, inside: np.ndarray, amount: float, width_px: float) -> np.ndarray:
+    """Unsharp mask within the scan: x + a (x - Gaussian mean of x).
+
+    Parameters
+    ----------
+    level, inside, width_px
+        As of :func:`smooth`.
+    amount
+        Factor a, 0 or more.
+
+    Returns
+    -------
+    Same shape and type.
+    """
+    return np.where(inside, level + amount * _detail(level, inside, width_px), level)
+
+
+def _detail(level: np.ndarray, inside: np.ndarray, width_px: float) -> np.ndarray:
+    """Difference of an image from its Gaussian mean over the pixels of the scan; parameters as of :func:`smooth`."""
     weight = gaussian_filter(inside.astype(level.dtype), width_px)
-    smooth = gaussian_filter(np.where(inside, level, 0), width_px) / np.where(inside, weight, 1)
-    return np.where(inside, level + amount * (level - smooth), level)
+    return level - gaussian_filter(np.where(inside, level, 0), width_px) / np.where(inside, weight, 1)
 
 
 def eight_bit(levels: np.ndarray, bmode: Bmode) -> np.ndarray:
@@ -272,8 +293,16 @@ def largest_clip(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode
     levels = log_compress(images, bmode.dynamic_range_dB, bmode.gain_dB)
     if bmode.persistence:
         levels = persist(levels, bmode.persistence)
-    if bmode.edge_enhancement:
+    if bmode.smoothing or bmode.edge_enhancement:
         inside = ScanConversion(scan, range_, bmode).inside
-        edge = bmode.edge_enhancement, bmode.edge_width_px
-        levels = np.stack([enhance_edges(level, inside, *edge) for level in levels])
+        levels = np.stack([_filtered(level, inside, bmode) for level in levels])
     return eight_bit(levels, bmode)
+
+
+def _filtered(level: np.ndarray, inside: np.ndarray, bmode: Bmode) -> np.ndarray:
+    """Grey levels (axial, lateral), smoothed and then with enhanced edges, as asked for."""
+    if bmode.smoothing:
+        level = smooth(level, inside, bmode.smoothing, bmode.smoothing_width_px)
+    if bmode.edge_enhancement:
+        level = enhance_edges(level, inside, bmode.edge_enhancement, bmode.edge_width_px)
+    return level

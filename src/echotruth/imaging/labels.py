@@ -1,9 +1,11 @@
-"""Labels of the tissue at a pixel: layer, segment and region of disease, packed into one array.
+"""Labels of the tissue at a pixel: layer, segment and region of disease, packed into one array; and which tissue it is.
 
-:mod:`echotruth.imaging.truth` finds them, the segment by :func:`echotruth.aha.segment`.
+:mod:`echotruth.imaging.truth` finds those of the wall, the segment by :func:`echotruth.aha.segment`, and
+:mod:`echotruth.imaging.medium.tissue_images` those of its neighbours.
 """
 
 from collections.abc import Mapping
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,23 @@ from numpy.typing import NDArray
 
 LABELS = ("layer", "segment", "region")
 """In their order along the dimension `label`."""
+
+
+class TissueLabel(IntEnum):
+    """Tissues in realistic images; the first four are numbered as in CAMUS, the usual set of clinical clips."""
+
+    OTHER = 0
+    CAVITY = 1
+    WALL = 2
+    LEFT_ATRIUM = 3
+    RIGHT_VENTRICLE = 4
+    RIGHT_ATRIUM = 5
+    RIGHT_FREE_WALL = 6
+    ATRIAL_WALL = 7
+    MITRAL_LEAFLET = 8
+    PAPILLARY_MUSCLE = 9
+    LUNG = 10
+    CHEST_WALL = 11
 
 
 def pack(labels: Mapping[str, NDArray[np.generic]]) -> NDArray[np.generic]:

@@ -12,7 +12,7 @@ from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import MaterialPoints, gradient, interpolate, straight_triangles
 from echotruth.heart import Heart
 from echotruth.imaging.flow import flow
-from echotruth.imaging.labels import pack
+from echotruth.imaging.labels import TissueLabel, pack
 from echotruth.imaging.view import Plane
 from echotruth.mechanics import kinematics
 from echotruth.mechanics.fibres import axes_from_normal, layer, unit
@@ -21,9 +21,15 @@ IMAGE_AXES = {"short_axis": (0, 1, 2), "long_axis": (0, 2, 1)}
 """Kind of plane to the indices of R, C, L in the order radial, tangential in the image, through-plane."""
 
 
-def pixel_truth(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> dict[str, NDArray[np.generic]]:
+TissueImage = Callable[[int], NDArray[np.uint8]]
+"""A frame to the labels of the tissue at every pixel outside the wall, (n_axial, n_lateral)."""
+
+
+def pixel_truth(
+    heart: Heart, plane: Plane, axial: Floats, lateral: Floats, tissue: TissueImage | None = None
+) -> dict[str, NDArray[np.generic]]:
     """All arrays of :class:`PixelTruth`, whose parameters these are."""
-    return dict(PixelTruth(heart, plane, axial, lateral))
+    return dict(PixelTruth(heart, plane, axial, lateral, tissue))
 
 
 class PixelTruth(Mapping[str, NDArray[np.generic]]):
@@ -33,7 +39,8 @@ class PixelTruth(Mapping[str, NDArray[np.generic]]):
     n_lateral, 6; RR, CC, LL, RC, RL, CL) since end-diastole, wall_depth (frame, n_axial, n_lateral), labels (frame, 3,
     n_axial, n_lateral; see :mod:`echotruth.imaging.labels`), and flow (frame, 2, n_axial, n_lateral, 3; m) to the
     previous and to the next frame (see :func:`echotruth.imaging.flow.flow`); in single precision. Outside the wall, and
-    in flow to where there is no frame: NaN or 0.
+    in flow to where there is no frame: NaN or 0. With `tissue` there is also the tissue (frame, n_axial, n_lateral), a
+    :class:`echotruth.imaging.labels.TissueLabel`, outside the wall too.
 
     Parameters
     ----------
@@ -41,9 +48,14 @@ class PixelTruth(Mapping[str, NDArray[np.generic]]):
     plane : Plane
     axial, lateral : ndarray of shape (n_axial,), (n_lateral,), m
         Pixel centres.
+    tissue : callable, optional
+        As :class:`echotruth.imaging.medium.tissue_images.TissueImages`.
     """
 
-    def __init__(self, heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> None:
+    def __init__(
+        self, heart: Heart, plane: Plane, axial: Floats, lateral: Floats, tissue: TissueImage | None = None
+    ) -> None:
+        self._tissue_image = tissue
         self._heart, self._axes, self._shape = heart, plane.axes, (len(axial), len(lateral))
         pixels, frames = _pixels(plane, axial, lateral), range(len(heart.displacement))
         self._tissue = [_locate_in_wall(heart, frame, pixels) for frame in frames]
@@ -57,12 +69,16 @@ class PixelTruth(Mapping[str, NDArray[np.generic]]):
         """Number of dimensions of the values before that of the pixels, and the values at the tissue of a frame."""
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._fields)
+        yield from self._fields
+        if self._tissue_image is not None:
+            yield "tissue"
 
     def __len__(self) -> int:
-        return len(self._fields)
+        return len(list(iter(self)))
 
     def __getitem__(self, name: str) -> NDArray[np.generic]:
+        if name == "tissue" and self._tissue_image is not None:
+            return self._tissues(self._tissue_image)
         before, values_at = self._fields[name]
         images: NDArray[np.generic] = np.empty(0)
         for frame, (inside, points) in enumerate(self._tissue):
@@ -73,6 +89,13 @@ class PixelTruth(Mapping[str, NDArray[np.generic]]):
             images[frame][(slice(None),) * before + (inside,)] = values
         at = 1 + before
         return images.reshape(*images.shape[:at], *self._shape, *images.shape[at + 1 :])
+
+    def _tissues(self, image: TissueImage) -> NDArray[np.uint8]:
+        """Tissue at every pixel, (frame, n_axial, n_lateral), with the wall where the other arrays have it."""
+        images = np.stack([image(frame) for frame in range(len(self._tissue))])
+        for labels, (inside, _) in zip(images, self._tissue, strict=True):
+            labels.reshape(-1)[inside] = TissueLabel.WALL
+        return images
 
 
 def wall_mask(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ import numpy as np
 from echotruth.learning.items import Item, Items, Place
 from echotruth.repository.choice import Names
 
-TRUTH = ("displacement", "strain", "wall_depth", "labels", "flow")
+TRUTH = ("displacement", "strain", "wall_depth", "labels", "tissue", "flow")
 """Arrays of the truth, in the group truth/SIZE of docs/schema.md."""
 
 VECTORS = {"displacement", "strain", "flow"}
@@ -20,14 +20,14 @@ class Clips(Items):
 
     An item has `image` (frame, axial, lateral; 0 to 1), `time` (frame; s), and of the truth what is asked for, with
     vectors and components before the pixels: displacement (frame, 3, axial, lateral; m) and strain (frame, 6, axial,
-    lateral) since end-diastole, wall_depth and labels (docs/schema.md), flow (frame, 2, 3, axial, lateral; m).
+    lateral) since end-diastole, wall_depth, labels and tissue (docs/schema.md), flow (frame, 2, 3, axial, lateral; m).
 
     Parameters
     ----------
     repository, cases, views, size
         See :class:`Items`.
     truth : iterable of str
-        Any of displacement, strain, wall_depth, labels, flow.
+        Any of displacement, strain, wall_depth, labels, tissue, flow; tissue of realistic clips with neighbours.
 
     Examples
     --------

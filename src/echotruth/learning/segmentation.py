@@ -4,12 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.imaging.labels import LABELS
 from echotruth.learning.items import Item, Items, Place
 from echotruth.repository.choice import Names, require_known
 
-TARGETS = ("wall", "layer", "segment", "region")
+TARGETS = ("wall", "layer", "segment", "region", "tissue")
 
 
 class Segmentation(Items):
@@ -21,9 +22,10 @@ class Segmentation(Items):
     ----------
     repository, cases, views, size
         See :class:`Items`.
-    target : {"wall", "layer", "segment", "region"}
+    target : {"wall", "layer", "segment", "region", "tissue"}
         What the label is: wall 1 and the rest 0; transmural layer, 1 at the endocardium, or AHA segment, 0 outside; or
-        region of disease, 0 healthy or outside (docs/schema.md).
+        region of disease, 0 healthy or outside; or the tissue, in realistic clips with neighbours: 1 cavity, 2 wall,
+        3 left atrium, and others (docs/schema.md).
 
     Examples
     --------
@@ -46,15 +48,17 @@ class Segmentation(Items):
 
     @property
     def arrays(self) -> tuple[str, ...]:
-        return (*super().arrays, f"truth/{self.size}/labels")
+        return (*super().arrays, f"truth/{self.size}/{'tissue' if self.target == 'tissue' else 'labels'}")
 
     @property
     def per_clip(self) -> int:
         return self.frames
 
     def item(self, place: Place, within: int) -> Item:
-        name = "layer" if self.target == "wall" else self.target
-        label = self.truth(place, "labels", within, LABELS.index(name))
-        if self.target == "wall":
-            label = (label > 0).astype(np.uint8)
-        return {"image": self.image(place, within)[None], "label": label, "frame": within}
+        return {"image": self.image(place, within)[None], "label": self._label(place, within), "frame": within}
+
+    def _label(self, place: Place, within: int) -> NDArray[np.uint8]:
+        if self.target == "tissue":
+            return self.truth(place, "tissue", within)
+        label = self.truth(place, "labels", within, LABELS.index("layer" if self.target == "wall" else self.target))
+        return (label > 0).astype(np.uint8) if self.target == "wall" else label

@@ -21,6 +21,7 @@ from echotruth.evaluation.clip import Clip, tracker_seed
 from echotruth.evaluation.scoring import metrics, score, truth_at
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
+from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
@@ -177,9 +178,11 @@ def image(
     with progress_line("image", progress):
         lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range
     gain = clip_gain(config.probe, config.bmode, config.rf.lines, range_, random("dropout"))
+    pixels = pixel_centres(config.bmode, size)
+    tissue = TissueImages(config, heart, plane, *pixels) if config.realism.neighbours.any else None
     values = {
         f"bmode/{size}": {"image": bmode_clip(lines, sequence.scanner.scan, range_, config.bmode, gain)[size]},
-        f"truth/{size}": pixel_truth(heart, plane, *pixel_centres(config.bmode, size)),
+        f"truth/{size}": pixel_truth(heart, plane, *pixels, tissue),
     }
     clip = clip_dataset(heart, case, name, plane, as_stored(case, values))
     if keep_lines:

@@ -41,7 +41,15 @@ def phantom(config: Config, view: str) -> Settings:
 
 def truth(config: Config, view: str) -> Settings:
     """What the truth of a view depends on."""
-    return config.views[view], config.rf.focus_mm, config.bmode.field_of_view_mm, config.bmode.size_px
+    settings = config.views[view], config.rf.focus_mm, config.bmode.field_of_view_mm, config.bmode.size_px
+    return (*settings, *_neighbours(config)) if config.realism.neighbours.any else settings
+
+
+def _neighbours(config: Config) -> Settings:
+    """What the labels of the neighbours depend on, besides the heart and the view."""
+    present = [level is not None for level in config.realism.neighbours.model_dump().values()]
+    surroundings = config.realism.surroundings
+    return present, surroundings.start_mm, surroundings.motion_decay_mm, config.probe.resolved(), config.rf
 
 
 def bmode(config: Config, view: str) -> Settings:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.config import Config
-from echotruth.imaging.labels import unpack
+from echotruth.imaging.labels import TissueLabel, unpack
 from echotruth.repository import rounding, schema
 
 Arrays = dict[str, NDArray[Any]]
@@ -53,6 +53,7 @@ RANGES = {
     "layer": Range(1),
     "segment": Range(0, 17),
     "region": Range(0, 3),
+    "tissue": Range(0, max(TissueLabel)),
     "phase": Range(0, 3),
 }
 """What the values of an array may be, by the column `values` of arrays.csv."""
@@ -168,6 +169,8 @@ def _truth(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, st
     for name, highest in {"layer": config.fibres.layers, "segment": 17, "region": 3}.items():
         if label[name].max(initial=0) > highest:
             yield "labels", f"has a {name} of {label[name].max()}, above {highest}"
+    if "tissue" in arrays and bool(((arrays["tissue"] == TissueLabel.WALL) != mask).any()):
+        yield "tissue", "is not the wall in a pixel of the wall, or is it outside"
     if bool((np.isfinite(arrays["flow"]).all(-1) != _has_flow(mask, first, config.loop.frames)).any()):
         yield "flow", "is not a number in a pixel of the wall from which there is a frame, or is one elsewhere"
     yield from _still_at_ed("displacement", arrays, first)

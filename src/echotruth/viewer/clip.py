@@ -15,7 +15,11 @@ from echotruth.repository import estimates, schema
 from echotruth.repository.reader import Repository
 
 Floats32 = NDArray[np.float32]
-PARTS = {"images": "bmode/{size}/image", "truth": "truth/{size}/displacement"}
+PARTS = {
+    "images": "bmode/{size}/image",
+    "truth": "truth/{size}/displacement",
+    "tissue": "truth/{size}/tissue",
+}
 """Part of a clip to the array by which it is known to be written."""
 ESTIMATES = {"tracking": "displacement", "evaluation": "true_displacement"}
 """Part of what was tracked to the array by which it is known to be written."""
@@ -115,6 +119,10 @@ class Clip:
     def label(self, name: str) -> NDArray[np.uint8]:
         """Layer, segment or region of disease at every pixel, (frame, axial, lateral); 0 outside the wall."""
         return self.read(f"truth/{self.size}/labels", slice(None), LABELS.index(name))
+
+    def tissue(self) -> NDArray[np.uint8]:
+        """Tissue at every pixel, (frame, axial, lateral); 0 where it has no name."""
+        return self.read(f"truth/{self.size}/tissue")
 
     def wall_depth(self) -> Floats32:
         """Wall depth at every pixel, (frame, axial, lateral), NaN outside the wall."""

@@ -10,7 +10,8 @@ from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 
 from echotruth.aha import SEGMENT_NAMES
-from echotruth.report.style import layer_colours
+from echotruth.imaging.labels import TissueLabel
+from echotruth.report.style import layer_colours, tissue_colours
 from echotruth.viewer.clip import Clip
 from echotruth.viewer.points import Points
 
@@ -25,14 +26,18 @@ COLOURS = {
     "region": "regions of disease",
     "wall_depth": "wall depth",
     "flow": "speed of the tissue",
+    "tissue": "tissues",
 }
 """What the colour can show, and its name."""
 NEEDS = {
     "none": (),
     **dict.fromkeys(("strain", "layer", "segment", "region", "wall_depth", "flow"), ("truth",)),
+    "tissue": ("tissue",),
     **dict.fromkeys(("tracked_strain", "strain_error", "displacement_error"), ("tracking", "evaluation")),
 }
 """Parts of a clip that a colour is made of."""
+LABELLED = ("layer", "segment", "region", "tissue")
+"""Colours of what has a number and a name."""
 ENTRIES = 255
 """Of a palette: entry 0 of an image of indices is transparent."""
 DIVERGING, SEQUENTIAL = "RdBu_r", "viridis"
@@ -87,7 +92,7 @@ def tint(clip: Clip, points: Points, colour: str, component: str, tracker: str |
         return None
     if colour in ("tracked_strain", "strain_error", "displacement_error"):
         return _of_points(points, colour, component, tracker)
-    if colour in ("layer", "segment", "region"):
+    if colour in LABELLED:
         return _labels(clip, colour)
     if colour == "strain":
         values = 100 * clip.strain(component)
@@ -142,6 +147,9 @@ def _at_pixels(points: Points, values: NDArray[np.float64]) -> NDArray[np.float3
 
 def _labels(clip: Clip, name: str) -> Tint:
     """Colours of numbered parts of the wall."""
+    if name == "tissue":
+        names = {int(one): one.name.lower().replace("_", " ") for one in TissueLabel if one}
+        return Tint(clip.tissue(), tissue_colours(), 0.5, len(names) + 0.5, "Tissue", names)
     label = clip.label(name)
     if name == "segment":
         return _segments(label)

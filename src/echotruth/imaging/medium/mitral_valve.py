@@ -9,6 +9,7 @@ angles and the thickness were chosen by eye. There are no chordae.
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.config import Config
@@ -24,6 +25,49 @@ THICKNESS = 0.08
 """Thickness over the radius of the rim: 1.7 mm in the human preset."""
 
 
+class MitralValve:
+    """Where the two leaflets are.
+
+    Attributes
+    ----------
+    opening : ndarray of shape (frame,)
+        As of :func:`echotruth.imaging.medium.filling.opening`.
+
+    Parameters
+    ----------
+    heart : Heart
+    """
+
+    def __init__(self, heart: Heart) -> None:
+        self._heart, self.opening = heart, opening(volumes(heart))
+
+    def hinge(self, frame: int) -> tuple[Floats, float, float]:
+        """Centre (3,), m, and radius, m, of the rim, and angle of the leaflets below the base, rad, in a frame."""
+        centre, radius = rim(self._heart.positions(frame), self._heart.endo)
+        return centre, radius, SHUT + (OPEN - SHUT) * float(self.opening[frame])
+
+    @property
+    def box(self) -> tuple[Floats, Floats]:
+        """Lowest and highest coordinates, (3,), m, in the heart frame, that the leaflets reach in any frame."""
+        hinges = [self.hinge(frame)[:2] for frame in range(len(self.opening))]
+        reach = max((radius for _, radius in hinges)) * (1 + THICKNESS - MEETING)
+        centres = np.stack([centre for centre, _ in hinges])
+        return centres.min(axis=0) - reach, centres.max(axis=0) + reach
+
+    def contains(self, frame: int, position: Floats) -> NDArray[np.bool_]:
+        """Whether positions (n, 3), m, in the heart frame are in a leaflet in a frame, (n,)."""
+        centre, radius, angle = self.hinge(frame)
+        x, along, z = ((position - centre) / radius).T
+        inside = np.zeros(len(position), bool)
+        chord = np.sqrt(np.maximum(1 - along**2, 0))
+        for side in (-1, 1):
+            inward = chord - side * x
+            length = inward * np.cos(angle) - z * np.sin(angle)
+            across = inward * np.sin(angle) + z * np.cos(angle)
+            inside |= (length > 0) & (length < _length(side, chord)) & (np.abs(across) < THICKNESS / 2)
+        return inside
+
+
 class Leaflets:
     """Scatterers in the leaflets.
 
@@ -37,20 +81,22 @@ class Leaflets:
     """
 
     def __init__(self, heart: Heart, place: Floats, amplitude: Floats) -> None:
-        self._heart, self._place, self.amplitude = heart, place, amplitude
-        self.opening = opening(volumes(heart))
+        self._valve, self._place, self.amplitude = MitralValve(heart), place, amplitude
 
     def positions(self, frame: int) -> Floats:
         """Positions in a frame, (n, 3), m, in the heart frame."""
-        centre, radius = rim(self._heart.positions(frame), self._heart.endo)
+        centre, radius, angle = self._valve.hinge(frame)
         along, side, share, across = self._place.T
         chord = np.sqrt(1 - along**2)
-        angle = SHUT + (OPEN - SHUT) * self.opening[frame]
-        # Shut, the leaflets are as long as it takes to meet.
-        length = (1 - side * MEETING) * chord / np.cos(SHUT) * share
+        length = _length(side, chord) * share
         x = side * (chord - length * np.cos(angle) - across * np.sin(angle))
         z = -length * np.sin(angle) + across * np.cos(angle)
         return centre + radius * np.column_stack([x, along, z])
+
+
+def _length(side: Floats | int, chord: Floats) -> Floats:
+    """Length of the leaflets over the radius of the rim: shut, they are as long as it takes to meet."""
+    return (1 - side * MEETING) * chord / np.cos(SHUT)
 
 
 def seed_leaflets(config: Config, heart: Heart, random: np.random.Generator) -> dict[str, Floats]:

@@ -42,15 +42,50 @@ class PapillaryMuscles:
 
     def __init__(self, heart: Heart, position: Floats, muscle: NDArray[np.uint8], amplitude: Floats) -> None:
         self._position, self._muscle, self.amplitude = position, muscle, amplitude
-        endo = np.unique(heart.endo)
-        start, moved = heart.positions(0)[endo], (heart.displacement - heart.displacement[0])[:, endo]
-        distance = [np.linalg.norm(start - _root(heart, azimuth), axis=1) for azimuth in AZIMUTHS]
-        near = [np.argsort(of_root, kind="stable")[:NEAREST] for of_root in distance]
-        self._displacement = np.stack([moved[:, nodes].mean(axis=1) for nodes in near], axis=1)
+        self._displacement = np.stack([_displacement(heart, azimuth) for azimuth in AZIMUTHS], axis=1)
 
     def positions(self, frame: int) -> Floats:
         """Positions in a frame, (n, 3), m, in the heart frame."""
         return self._position + self._displacement[frame, self._muscle]
+
+
+class PapillaryMuscle:
+    """Where one of the muscles is.
+
+    Parameters
+    ----------
+    heart : Heart
+    azimuth : float, rad
+        One of `AZIMUTHS`.
+    """
+
+    def __init__(self, heart: Heart, azimuth: float) -> None:
+        self._body, self._displacement = _body(heart, azimuth), _displacement(heart, azimuth)
+        self._cavity = Cavity(heart.endo)
+        self._start = self._cavity.positions(heart.positions(0))
+
+    @property
+    def box(self) -> tuple[Floats, Floats]:
+        """Lowest and highest coordinates, (3,), m, in the heart frame, that the muscle reaches in any frame."""
+        middle, _, half = self._body
+        moved = middle + self._displacement
+        return moved.min(axis=0) - half.max(), moved.max(axis=0) + half.max()
+
+    def contains(self, frame: int, position: Floats) -> NDArray[np.bool_]:
+        """Whether positions (n, 3), m, in the heart frame are in the muscle in a frame, (n,)."""
+        middle, axes, half = self._body
+        at_ed = position - self._displacement[frame]
+        inside = np.linalg.norm((at_ed - middle) @ axes.T / half, axis=1) < 1
+        inside[inside] = locate(self._start, self._cavity.cells, at_ed[inside]).cell >= 0
+        return inside
+
+
+def _displacement(heart: Heart, azimuth: float) -> Floats:
+    """Displacement of a muscle since end-diastole, (frame, 3), m: the mean of the endocardium at its root."""
+    endo = np.unique(heart.endo)
+    start, moved = heart.positions(0)[endo], (heart.displacement - heart.displacement[0])[:, endo]
+    distance = np.linalg.norm(start - _root(heart, azimuth), axis=1)
+    return moved[:, np.argsort(distance, kind="stable")[:NEAREST]].mean(axis=1)
 
 
 def seed_papillary_muscles(config: Config, heart: Heart, random: np.random.Generator) -> dict[str, NDArray[Any]]:

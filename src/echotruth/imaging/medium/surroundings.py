@@ -10,13 +10,14 @@ from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats
 from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scan import Sector, imaging_depth, scan_lines
+from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.anatomy import (
     CAVITIES,
+    FOLLOWING_BASE,
     LUNG_FADING_DB,
     RIGHT_SHORTENING,
     WALLS,
     Anatomy,
-    Neighbour,
     Place,
     chest_wall_depth,
     strata_dB,
@@ -37,6 +38,8 @@ DRAWN, SHOWN = 1.3, 1.01
 that of the lines. Echoes are made by sectors of the scan, so that more of them would cost time."""
 LUNG_SIDE = 0.5
 """Share of lung in the mixture beside a free wall along the beam."""
+LUNG_SHARE = 1 / 3
+"""Share of lung from which on the mixture is called lung."""
 
 
 class SurroundingsMotion:
@@ -81,9 +84,9 @@ class SurroundingsMotion:
         place = anatomy.place(self._position)
         share = np.exp(-np.maximum(place.distance - place.gap - place.wall, 0) / decay_length)
         inward = -RIGHT_SHORTENING * (share * np.minimum(place.distance, place.gap))[:, None] * place.outward
-        atrial = np.isin(tissue, (Neighbour.ATRIUM, Neighbour.ATRIAL_WALL))
+        atrial = np.isin(tissue, FOLLOWING_BASE)
         share[atrial] = anatomy.atrial_share(place)[atrial]
-        at_rest = tissue == Neighbour.CHEST_WALL
+        at_rest = tissue == TissueLabel.CHEST_WALL
         share[at_rest] = 0
         inward[atrial | at_rest] = 0
         return share[:, None], inward
@@ -110,7 +113,7 @@ class AroundHeart:
     position : ndarray of shape (n, 3), m
         Scatterers at end-diastole, in the heart frame.
     tissue : ndarray of shape (n,), uint8
-        A :class:`echotruth.imaging.medium.anatomy.Neighbour`.
+        A :class:`echotruth.imaging.labels.TissueLabel`.
     """
 
     def __init__(self, config: Config, heart: Heart, plane: Plane, position: Floats, tissue: NDArray[np.uint8]) -> None:
@@ -179,7 +182,7 @@ def seed_surroundings(config: Config, heart: Heart, plane: Plane, random: np.ran
     dict of ndarray
         position (n, 3), m, at end-diastole in the heart frame: in the scan from `start_mm` to the imaging depth, and in
         the beam in elevation; those inside the heart are hidden until it moves away. amplitude (n,), and tissue (n,),
-        uint8, a :class:`echotruth.imaging.medium.anatomy.Neighbour`.
+        uint8, a :class:`echotruth.imaging.labels.TissueLabel`.
     """
     position, density = _drawn_evenly(config, random)
     in_heart = plane.to_heart(position)
@@ -235,7 +238,7 @@ def tissues(config: Config, heart: Heart, plane: Plane, position: Floats) -> tup
         start = realism.surroundings.si().start
         depth, (lateral, axial, _) = chest_wall_depth(heart, plane, start), plane.to_image(position).T
         near, thickness = axial < depth, max(depth - start, 1e-12)
-        tissue[near] = Neighbour.CHEST_WALL
+        tissue[near] = TissueLabel.CHEST_WALL
         strata = strata_dB((axial[near] - start) / thickness, lateral[near] / thickness)
         level[near] = realism.neighbours.chest_wall_dB + strata
     return tissue, 10 ** (level / 10)
@@ -253,7 +256,7 @@ def _set_lung(config: Config, plane: Plane, of: tuple[NDArray[np.uint8], Floats]
     behind = np.clip(LUNG_SIDE + place.outward @ plane.axes[1], 0, 1) * (place.gap == 0)
     lung = 10 ** ((lung_dB - LUNG_FADING_DB * place.distance / radius) / 10)
     power = behind * lung + (1 - behind) * 10 ** (level / 10)
-    tissue[behind > 0.5] = Neighbour.LUNG
+    tissue[behind > LUNG_SHARE] = TissueLabel.LUNG
     level[:] = 10 * np.log10(np.maximum(power, 1e-30))
 
 

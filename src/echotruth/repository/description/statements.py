@@ -64,7 +64,7 @@ def _realism(config: Config) -> dict[str, bool]:
     return {
         "blood": realism.blood.level_dB is not None,
         "surrounding tissue": realism.surroundings.level_dB is not None,
-        "neighbours of the left ventricle": any(v is not None for v in realism.neighbours.model_dump().values()),
+        "neighbours of the left ventricle": realism.neighbours.any,
         "noise": realism.noise.snr_dB is not None,
         "haze": realism.haze.level_dB is not None,
         "rib shadow": realism.shadow.side != "none",
