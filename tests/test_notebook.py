@@ -261,8 +261,8 @@ def test_repeated_frame_and_lengths_for_another_heart_are_told(clip):
     image[1] = image[0]
     with pytest.warns(UserWarning, match="1 of 3 frames show the same image as the one before"):
         et.track(clip.assign(image=image), "dis")
-    with pytest.warns(UserWarning, match="subset_mm = 9 suits a wall 7.7 mm thick, and this one has"):
-        et.track(clip, "affine_dic", subset_mm=9)
+    with pytest.warns(UserWarning, match="subset_mm = 0.1 suits a wall 0.085 mm thick, and this one has"):
+        et.track(clip, "affine_dic", subset_mm=0.1)
 
 
 @pytest.mark.parametrize(
