@@ -256,6 +256,15 @@ def test_pixels_that_are_not_known_are_told(clip):
         et.track(with_pixel(clip, np.nan), "dis")
 
 
+def test_repeated_frame_and_lengths_for_another_heart_are_told(clip):
+    image = clip["image"].copy()
+    image[1] = image[0]
+    with pytest.warns(UserWarning, match="1 of 3 frames show the same image as the one before"):
+        et.track(clip.assign(image=image), "dis")
+    with pytest.warns(UserWarning, match="subset_mm = 0.1 suits a wall 0.085 mm thick, and this one has"):
+        et.track(clip, "affine_dic", subset_mm=0.1)
+
+
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [

@@ -113,9 +113,19 @@ def test_region_beyond_the_image_has_lost_its_scale(tmp_path):
     assert et.read_clip(path, spacing_mm=0.5)["image"].shape == FILM.shape
 
 
+def test_scale_that_is_empty_is_told(tmp_path):
+    broken = region((8, 4, 39, 23), (0.04, 0.02))
+    broken.PhysicalDeltaX = None
+    path = written(tmp_path / "empty.dcm", FILM, FrameTime=20, SequenceOfUltrasoundRegions=[broken])
+    with pytest.raises(EchoError, match=r"empty.dcm: is a damaged DICOM clip: its region, scale or times cannot be"):
+        et.read_clip(path)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
+        ("huge.gif", b"GIF89a" + b"\xff\xff\xff\xff" + bytes(3), "is no animation that can be read"),
+        ("header.npy", b"\x93NUMPY\x01\x00\x10\x00{'descr': (((    \n", "is no array that numpy.load reads"),
         ("missing.dcm", None, "is not there"),
         ("bad.dcm", b"no dicom", "is no DICOM clip that can be decoded"),
         ("bad.mp4", b"no video", "is no video that can be read"),

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import imageio_ffmpeg
 import numpy as np
 import pandas as pd
 import pytest
@@ -72,11 +73,41 @@ def test_clip_that_begins_elsewhere_and_does_not_close_is_told(ring):
     assert "is left in the last frame" in second
 
 
+def test_video_of_which_every_image_comes_twice_is_told(ring, tmp_path):
+    path = tmp_path / "twice.mp4"
+    size = ring.frames.shape[1:]
+    video = imageio_ffmpeg.write_frames(str(path), size, pix_fmt_in="gray", fps=20, macro_block_size=1)
+    video.send(None)
+    for frame in np.repeat(ring.frames, 2, axis=0):
+        video.send(np.ascontiguousarray(frame))
+    video.close()
+    clip = et.read_clip(path, spacing_mm=0.04, frame_time_ms=5)
+    notes = et.speckle_tracking(clip, ring.wall(), "dis").attrs["notes"]
+    assert notes.startswith("every image comes twice: take one frame of each pair")
+
+
+@pytest.mark.parametrize(("spacing_mm", "frame_time_ms"), [(0.4, 10), (0.04, 100)])
+def test_wall_that_does_not_go_with_its_cycle_is_told(ring, spacing_mm, frame_time_ms):
+    clip = et.read_clip(ring.frames, spacing_mm=spacing_mm, frame_time_ms=frame_time_ms)
+    notes = et.speckle_tracking(clip, ring.wall(), "dis").attrs["notes"]
+    assert f"does not go with a cycle of {FRAMES * frame_time_ms} ms" in notes and "is it one cycle?" in notes
+    human = et.read_clip(ring.frames, spacing_mm=0.4, frame_time_ms=90)
+    assert not et.speckle_tracking(human, ring.wall(), "dis").attrs["notes"]
+
+
+def test_lengths_of_a_mouse_in_a_human_heart_are_told(ring):
+    human = et.read_clip(ring.frames, spacing_mm=0.4, frame_time_ms=90)
+    notes = et.speckle_tracking(human, ring.wall(), "bspline_dic", knots_mm=0.4).attrs["notes"]
+    assert notes.startswith("knots_mm = 0.4 suits a wall 0.85 mm thick, and this one has 9.7 mm: give about 4.6")
+
+
 def test_wall_too_thin_and_no_clip_are_told(ring):
     wall = ring.wall()
     thin = et.Wall(wall.endocardium, 79.5 + (wall.endocardium - 79.5) * 1.1)
     with pytest.raises(EchoError, match=r"the wall is 3.6 px thick"):
         et.speckle_tracking(clip_of(ring), thin)
+    with pytest.raises(EchoError, match=r"the wall is 0.096 mm thick, .* can be tracked: is the side of a pixel"):
+        et.speckle_tracking(clip_of(ring, spacing_mm=0.004), wall)
     with pytest.raises(EchoError, match=r"clip: must be what echotruth.read_clip returns"):
         et.speckle_tracking(ring.frames, wall)
 

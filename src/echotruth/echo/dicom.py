@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.echo.failure import EchoError, one_line, optional
@@ -42,6 +43,15 @@ def read(path: Path) -> Recording:
     colours = int(getattr(image, "SamplesPerPixel", 1)) > 1
     if pixels.ndim != 3 + colours:
         raise EchoError(f"{path}: holds one image: give a clip of two or more frames")
+    try:
+        return _recording(image, pixels)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        what = f"its region, scale or times cannot be read: {one_line(error)}"
+        raise EchoError(f"{path}: is a damaged DICOM clip: {what}") from None
+
+
+def _recording(image: Any, pixels: NDArray[Any]) -> Recording:
+    """The largest region of the pixels (frame, axial, lateral), or with colours last, with its scale and times."""
     region = _region(image)
     if region is not None:
         top, left = int(region.RegionLocationMinY0), int(region.RegionLocationMinX0)

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from tokenize import TokenError
 
 import imageio_ffmpeg
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageSequence, UnidentifiedImageError
+from PIL import Image, ImageSequence
 
 from echotruth.echo import dicom
 from echotruth.echo.failure import EchoError, one_line, optional
@@ -14,6 +15,8 @@ from echotruth.echo.recording import Recording, grey
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 """Endings of the images of a folder, of which each is a frame, in the order of their names."""
+UNREADABLE = (OSError, ValueError, SyntaxError, EOFError, LookupError, TokenError, Image.DecompressionBombError)
+"""What Pillow and NumPy raise for files that are damaged, hold something else, or images of an impossible size."""
 
 
 def read(path: Path) -> Recording:
@@ -51,7 +54,7 @@ def _folder(path: Path) -> Recording:
     for file in files:
         try:
             images.append(np.asarray(Image.open(file).convert("RGB")))
-        except (OSError, UnidentifiedImageError):
+        except UNREADABLE:
             raise EchoError(f"{file}: is no image that can be read") from None
         if images[-1].shape != images[0].shape:
             sizes = "{1} x {0}".format(*images[-1].shape), "{1} x {0}".format(*images[0].shape)
@@ -64,7 +67,7 @@ def _animation(path: Path) -> Recording:
     try:
         with Image.open(path) as file:
             frames = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(file)]
-    except (OSError, UnidentifiedImageError):
+    except UNREADABLE:
         raise EchoError(f"{path}: is no animation that can be read") from None
     return Recording(grey(np.stack(frames)))
 
@@ -75,8 +78,10 @@ def _video(path: Path) -> Recording:
         reader = imageio_ffmpeg.read_frames(str(path), pix_fmt="gray", bits_per_pixel=8)
         width, height = next(reader)["size"]
         frames = [np.frombuffer(frame, np.uint8).reshape(height, width) for frame in reader]
-    except (OSError, RuntimeError, StopIteration):
-        raise EchoError(f"{path}: is no video that can be read") from None
+    except (OSError, RuntimeError, StopIteration, ValueError):
+        frames = []
+    if not frames:
+        raise EchoError(f"{path}: is no video that can be read")
     return Recording(np.stack(frames))
 
 
@@ -103,7 +108,7 @@ def _array(path: Path) -> Recording:
     """Frames of a NumPy file, (frame, axial, lateral)."""
     try:
         pixels = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError):
+    except UNREADABLE:
         raise EchoError(f"{path}: is no array that numpy.load reads") from None
     return of_array(pixels, str(path))
 
@@ -119,7 +124,7 @@ def of_image(path: Path) -> NDArray[np.bool_]:
     try:
         is_array = path.suffix.lower() == ".npy"
         pixels = np.load(path, allow_pickle=False) if is_array else np.asarray(Image.open(path).convert("L"))
-    except (OSError, ValueError, EOFError, UnidentifiedImageError):
+    except UNREADABLE:
         raise EchoError(f"{path}: is no image that can be read: give a .csv, an image or a .npy") from None
     if pixels.ndim != 2:
         raise EchoError(f"{path}: has the shape {pixels.shape}: give one image (axial, lateral)")

@@ -19,22 +19,27 @@ from echotruth.evaluation.courses import motion_courses, strain_courses
 from echotruth.evaluation.displacement_error import WallPoints
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.repository.schema import LABELS
+from echotruth.tracking.plausibility import REFERENCE_WALL_MM, doubts
 from echotruth.tracking.tracker import track
-
-REFERENCE_WALL_MM = 0.85
-"""Thickness of the wall of the default mouse at end-diastole in a short axis. The lengths of the trackers suit it, and
-are scaled by the thickness of the wall that is drawn: a wall ten times as thick is tracked with windows ten times as
-large."""
 
 GRID_PX, IMAGE_PX = Tracking.model_fields["grid_px"].default, 512
 """Spacing of the points in a mouse's clip, and the side of that clip, which shows 12 mm."""
 
 MIN_WALL_PX = 6.0
 """Thickness of the wall below which nothing can be told of its strain, px."""
+WALLS_MM = 0.5, 50.0
+"""Thickness of the thinnest and of the thickest wall that is tracked: beyond, the side of a pixel is wrong."""
 
 LARGEST_FIRST, LARGEST_DRIFT, LEAST_COVERAGE = 1.05, 20.0, 90.0
 """Largest cavity of the cycle over that of the first frame; drift, %; and share of points with an estimate at
 end-systole, %: beyond these a note says so."""
+
+REFERENCE_CYCLE = 0.12
+"""Duration of a cycle of the heart with the wall `REFERENCE_WALL_MM`, s."""
+LARGEST_DEPARTURE = 4.0
+"""Thickness of the wall over that which suits the duration of the cycle, or the inverse, beyond which a note says so.
+In mammals the heart's lengths go with the cube root of the body's mass, the duration of a cycle with the fourth root
+(Dawson 2014, Systems 2:168, doi 10.3390/systems2020168), thus the thickness with the duration to the power of 4/3."""
 
 Tracker = str | Callable[..., Any]
 
@@ -70,7 +75,8 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     Raises
     ------
     EchoError
-        If the wall is not within the clip, is too thin to be tracked, or was drawn on other frames or pixels.
+        If the wall is not within the clip, is too thin or too thick to be tracked, or was drawn on other frames or
+        pixels.
     ConfigError
         If there is no such method or setting.
     TrackerFailed
@@ -112,9 +118,10 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     curves["cavity_area"] = _area(place[:, lines.contour == 0])
     values = {"displacement": moved, "quality": quality, "strain": strain, "line_position": place} | curves
     data = _dataset(values, position, tissue, clip)
+    told = [*doubts(frames, mask, spacing, settings), *_size(wall.thickness() * spacing, clip["time"].values)]
     data["line_contour"] = ("line_point", lines.contour, {"long_name": "index of the contour of a point of a line"})
     return data.assign_attrs(
-        _summary(curves, moved, clip["time"].values, wall),
+        _summary(curves, moved, clip["time"].values, wall, told),
         tracker=tracker if isinstance(tracker, str) else getattr(tracker, "__name__", type(tracker).__name__),
         view=wall.view,
         source=clip.attrs.get("source", ""),
@@ -144,7 +151,13 @@ def _scale(wall: Wall, spacing: float) -> float:
         raise EchoError(
             f"the wall is {thickness:.1f} px thick: a clip of which it has {MIN_WALL_PX:g} px or more is needed"
         )
-    return thickness * spacing * 1e3 / REFERENCE_WALL_MM
+    length = thickness * spacing * 1e3
+    if not WALLS_MM[0] <= length <= WALLS_MM[1]:
+        raise EchoError(
+            f"the wall is {length:.2g} mm thick, with pixels of {1e3 * spacing:.2g} mm: walls of {WALLS_MM[0]:g} to "
+            f"{WALLS_MM[1]:g} mm can be tracked: is the side of a pixel (spacing_mm) right?"
+        )
+    return length / REFERENCE_WALL_MM
 
 
 def _points(mask: NDArray[np.bool_], spacing: float, scale: float) -> Floats:
@@ -191,8 +204,8 @@ def _area(line: Floats) -> Floats:
     return area
 
 
-def _summary(curves: dict[str, Floats], moved: Floats, time: Floats, wall: Wall) -> dict[str, Any]:
-    """End-systole, global strain of the middle line there, and drift."""
+def _summary(curves: dict[str, Floats], moved: Floats, time: Floats, wall: Wall, told: list[str]) -> dict[str, Any]:
+    """End-systole, global strain of the middle line there, drift, and notes, after those that are `told` already."""
     area = curves["cavity_area"]
     es = int(np.nanargmin(area)) if np.isfinite(area).any() else 0
     coverage = 100 * float(np.isfinite(moved[es]).all(axis=-1).mean())
@@ -205,7 +218,7 @@ def _summary(curves: dict[str, Floats], moved: Floats, time: Floats, wall: Wall)
         "end_systole": float(time[es]),
         name: 100 * float(curves["line_strain"][es, 1]),
         "drift_percent": drift,
-        "notes": "\n".join(_notes(area, drift, coverage)),
+        "notes": "\n".join([*told, *_notes(area, drift, coverage)]),
     }
 
 
@@ -223,6 +236,18 @@ def _notes(area: Floats, drift: float, coverage: float) -> list[str]:
     if coverage < LEAST_COVERAGE:
         notes.append(f"only {coverage:.0f} % of the points have an estimate at end-systole")
     return notes
+
+
+def _size(thickness: float, time: Floats) -> list[str]:
+    """What should make one doubt the scale: a wall of a thickness (m) that does not suit the duration of the cycle."""
+    duration = float(time[-1] - time[0]) * len(time) / (len(time) - 1)
+    suited = REFERENCE_WALL_MM * (duration / REFERENCE_CYCLE) ** (4 / 3)
+    if 1 / LARGEST_DEPARTURE <= 1e3 * thickness / suited <= LARGEST_DEPARTURE:
+        return []
+    return [
+        f"a wall {1e3 * thickness:.2g} mm thick does not go with a cycle of {1e3 * duration:.0f} ms, as a heart has "
+        f"whose wall is about {suited:.2g} mm thick: are spacing and frame time right, and is it one cycle?"
+    ]
 
 
 DIMENSIONS = {

@@ -34,6 +34,7 @@ from echotruth.notebook.arguments import check_clip, check_heart, check_whole
 from echotruth.repository.choice import image_size
 from echotruth.repository.datasets import as_stored, case_of, clip_dataset, dataset, plane_of
 from echotruth.seeds import generator
+from echotruth.tracking.plausibility import doubts
 from echotruth.tracking.point_grid import grid_points
 from echotruth.tracking.tracker import track as track_points
 
@@ -255,7 +256,10 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     arguments = Clip(
         image, mask[0], inside, points, spacing, clip["time"].values, seed, case.config.tracking.frame_step
     )
-    found = track_points(*arguments.tracker_arguments, tracker_section(case.config, tracker, options))
+    settings = tracker_section(case.config, tracker, options)
+    found = track_points(*arguments.tracker_arguments, settings)
+    for doubt in doubts(image, mask[0], spacing, settings):
+        warnings.warn(doubt, stacklevel=2)
     displacement, quality = arguments.on_grid(*found)
     coordinates = {"axial": clip["grid_axial"].values, "lateral": clip["grid_lateral"].values}
     values = {"tracking/SIZE/TRACKER": {"displacement": displacement, "quality": quality}}

@@ -1,0 +1,92 @@
+"""What of a clip, and of the lengths of a tracker, should make one doubt its motion before it is tracked."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+REFERENCE_WALL_MM = 0.85
+"""Thickness of the wall of the default mouse at end-diastole in a short axis, which the default lengths suit."""
+LENGTHS = ("knots_mm", "subset_mm", "windows_mm")
+"""Settings that say how large a piece of tissue is followed; the last of several windows gives the result."""
+MISFIT = 2.5
+"""Thickness of the wall over that which the lengths suit, or the inverse, above which they are told."""
+REPEATED = 0.03
+"""Difference of two consecutive frames in the wall, over the upper quartile of these, below which both are the same
+image: a video that is compressed anew hardly changes it."""
+NAMED = 3
+"""Frames that are named at most."""
+
+
+def doubts(frames: np.ndarray, mask: np.ndarray, spacing: float, settings: Any) -> list[str]:
+    """What should make one doubt.
+
+    Parameters
+    ----------
+    frames : ndarray of shape (frame, axial, lateral)
+        Grey values.
+    mask : ndarray of shape (axial, lateral), bool
+        The wall at end-diastole.
+    spacing : float
+        Distance of pixel centres, m.
+    settings : Section
+        Of a tracker, see `config/tracking.py`.
+
+    Returns
+    -------
+    list of str
+        A plain sentence each, without a full stop.
+    """
+    found = (_repetition(repeated(frames, mask)), _misfit(1e3 * spacing * wall_thickness(mask), settings))
+    return [text for text in found if text]
+
+
+def repeated(frames: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Which frames show the same image as the one before, (frame,), bool; where the mask is empty, none.
+
+    `frames` (frame, axial, lateral) are grey values, `mask` (axial, lateral) is the wall at end-diastole.
+    """
+    same = np.zeros(len(frames), bool)
+    if mask.any():
+        wall = np.nan_to_num(frames[:, mask].astype(np.float32))
+        change = np.array([np.abs(second - first).mean() for first, second in pairwise(wall)])
+        same[1:] = change <= REPEATED * np.quantile(change, 0.75)
+    return same
+
+
+def wall_thickness(mask: np.ndarray) -> float:
+    """Twice the largest distance of a pixel of the wall from the rest of the image (axial, lateral), px."""
+    return 2 * float(ndimage.distance_transform_edt(mask).max())
+
+
+def _repetition(same: np.ndarray) -> str:
+    """What is to be said of frames that repeat the one before."""
+    numbers = np.flatnonzero(same)
+    if not len(numbers):
+        return ""
+    if len(numbers) == len(same) - 1:
+        return "all frames show the same image: nothing moves"
+    if len(numbers) > 1 and (np.diff(numbers) == 2).all() and len(numbers) >= (len(same) - 1) // 2:
+        return "every image comes twice: take one frame of each pair, with twice the time from frame to frame"
+    named = ", ".join(map(str, numbers[:NAMED])) + (", ..." if len(numbers) > NAMED else "")
+    return (
+        f"{len(numbers)} of {len(same)} frames show the same image as the one before ({named}): the tissue seems to "
+        "halt there and to jump afterwards"
+    )
+
+
+def _misfit(thickness_mm: float, settings: Any) -> str:
+    """What is to be said of lengths that do not suit a wall of this thickness."""
+    key = next((name for name in LENGTHS if getattr(settings, name, None)), "")
+    if not key or not thickness_mm > 0:
+        return ""
+    default = type(settings).model_fields[key].get_default()
+    given, usual = (float(np.ravel(length)[-1]) for length in (getattr(settings, key), default))
+    suited = REFERENCE_WALL_MM * given / usual
+    if 1 / MISFIT <= thickness_mm / suited <= MISFIT:
+        return ""
+    return (
+        f"{key} = {given:.3g} suits a wall {suited:.2g} mm thick, and this one has {thickness_mm:.2g} mm: give about "
+        f"{usual * thickness_mm / REFERENCE_WALL_MM:.2g}, and other lengths of the tracker likewise, or leave them out"
+    )
