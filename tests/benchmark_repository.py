@@ -11,6 +11,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 import echotruth as et
 from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.truth import pixel_truth
 from echotruth.workflow.job import Job
 from echotruth.workflow.processes import script
@@ -60,8 +61,7 @@ def images_and_truth(known: Known) -> dict[str, dict[str, np.ndarray]]:
     """Arrays of the stages before tracking, by group."""
     plane = known.plane("mid")
     arrays = {"phantom": {"origin": plane.origin, "axes": plane.axes}}
-    images, truth = (
-        {"image": moving_speckle()},
-        pixel_truth(known.heart, plane, *pixel_centres(known.config.bmode, SIZE)),
-    )
+    pixels = pixel_centres(known.config.bmode, SIZE)
+    tissue = TissueImages(known.config, known.heart, plane, *pixels)
+    images, truth = {"image": moving_speckle()}, pixel_truth(known.heart, plane, *pixels, tissue)
     return arrays | {f"bmode/{SIZE}": images, f"truth/{SIZE}": truth}

@@ -13,6 +13,7 @@ from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.labels import unpack
+from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
 from echotruth.repository import schema
@@ -106,7 +107,8 @@ class Known:
 
     @cache  # noqa: B019 - one object a session
     def truth(self, view: str, size: int) -> dict[str, np.ndarray]:
-        return pixel_truth(self.heart, self.plane(view), *pixel_centres(self.config.bmode, size))
+        plane, pixels = self.plane(view), pixel_centres(self.config.bmode, size)
+        return pixel_truth(self.heart, plane, *pixels, TissueImages(self.config, self.heart, plane, *pixels))
 
 
 def known_images(size: int) -> np.ndarray:

@@ -10,6 +10,7 @@ import echotruth as et
 from echotruth.config import Bmode, Config, Motion
 from echotruth.config.motion import Affine
 from echotruth.imaging.bmode import pixel_centres
+from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
 from echotruth.repository.case_file import read_case
@@ -45,7 +46,7 @@ def of_job(job: Job):
     if job.stage not in ("truth", "bmode"):
         return result(job)
     centres = pixel_centres(config.bmode, job.size)
-    truth = pixel_truth(heart, plane, *centres)
+    truth = pixel_truth(heart, plane, *centres, TissueImages(config, heart, plane, *centres))
     if job.stage == "truth":
         return {f"truth/{job.size}": truth}
     random = np.random.default_rng([config.seed, number])

@@ -63,10 +63,6 @@ REFUSED = {
     "tracker": (["--format", "csv", "--tracker", "three"], "tracker = 'three': use one of one, two"),
     "tracker of a video": (["--tracker", "one"], "--tracker does nothing for mp4: it is for matlab, csv"),
     "overlay": (["--overlay", "strain"], "--overlay strain: use wall, segments, tissue, displacement, scale"),
-    "overlay of what is not there": (
-        ["--format", "png", "--overlay", "tissue"],
-        "realism.neighbours are off: use wall",
-    ),
     "overlay of tracks": (
         ["--format", "tap", "--overlay", "wall"],
         "--overlay does nothing for tap: it is for mp4, gif, png",

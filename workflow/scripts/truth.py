@@ -7,11 +7,9 @@ from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
-    group, pixels = f"truth/{job.size}", pixel_centres(job.config.bmode, job.size)
-    # Of a sweep in which some hearts have neighbours, all have the array.
-    has_tissue = job.store.has(f"{group}/tissue")
-    tissue = TissueImages(job.config, job.heart, job.plane, *pixels) if has_tissue else None
-    return {group: PixelTruth(job.heart, job.plane, *pixels, tissue)}
+    pixels = pixel_centres(job.config.bmode, job.size)
+    tissue = TissueImages(job.config, job.heart, job.plane, *pixels)
+    return {f"truth/{job.size}": PixelTruth(job.heart, job.plane, *pixels, tissue)}
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ from echotruth.config import shipped
 from echotruth.export.clip import Clip
 from echotruth.export.destination import draft
 from echotruth.export.error import ExportError
-from echotruth.repository import schema
 from echotruth.repository.choice import chosen
 from echotruth.repository.reader import Repository
 
@@ -144,10 +143,6 @@ class Export:
             raise ExportError(f"--rate {self.rate:g}: give 0.1 to 1000 frames per second")
         if unknown := [name for name in self.overlay if name not in OVERLAYS]:
             raise ExportError(f"--overlay {unknown[0]}: use {', '.join(OVERLAYS)}")
-        has_tissue = any(array.name == "tissue" for array in schema.truth_arrays(self.repository.config))
-        if "tissue" in self.overlay and not has_tissue:
-            lacks = f"{self.repository.folder} has no tissues but the wall, because realism.neighbours are off"
-            raise ExportError(f"--overlay tissue: {lacks}: use wall or segments")
 
     @property
     def trackers(self) -> list[str]:

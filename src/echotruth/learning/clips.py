@@ -27,7 +27,7 @@ class Clips(Items):
     repository, cases, views, size
         See :class:`Items`.
     truth : iterable of str
-        Any of displacement, strain, wall_depth, labels, tissue, flow; tissue of realistic clips with neighbours.
+        Any of displacement, strain, wall_depth, labels, tissue, flow.
 
     Examples
     --------

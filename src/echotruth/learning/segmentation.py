@@ -24,8 +24,8 @@ class Segmentation(Items):
         See :class:`Items`.
     target : {"wall", "layer", "segment", "region", "tissue"}
         What the label is: wall 1 and the rest 0; transmural layer, 1 at the endocardium, or AHA segment, 0 outside; or
-        region of disease, 0 healthy or outside; or the tissue, in realistic clips with neighbours: 1 cavity, 2 wall,
-        3 left atrium, and others (docs/schema.md).
+        region of disease, 0 healthy or outside; or the tissue: 1 cavity, 2 wall, 3 left
+        atrium, and others (docs/schema.md).
 
     Examples
     --------

@@ -180,7 +180,7 @@ def image(
         lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range
     gain = clip_gain(config.probe, config.bmode, config.rf.lines, range_, random("dropout"))
     pixels = pixel_centres(config.bmode, size)
-    tissue = TissueImages(config, heart, plane, *pixels) if config.realism.neighbours.any else None
+    tissue = TissueImages(config, heart, plane, *pixels)
     values = {
         f"bmode/{size}": {"image": bmode_clip(lines, sequence.scanner.scan, range_, config.bmode, gain)[size]},
         f"truth/{size}": pixel_truth(heart, plane, *pixels, tissue),

@@ -240,7 +240,7 @@ class Repository:
         from echotruth.repository.derived import stored_names
 
         found, view, size = self.case(case), self.view(view), image_size(self.config, size)
-        arrays = {group: schema.groups(self.config)[group] for group in (f"bmode/{size}", f"truth/{size}")}
+        arrays = {f"{stage}/{size}": schema.SIZED[stage] for stage in ("bmode", "truth")}
         wanted = stored_names(variables, {array.name for group in arrays.values() for array in group})
         names = {group: [array.name for array in members if array.name in wanted] for group, members in arrays.items()}
         values = {group: self.arrays(group, found.id, view, *members) for group, members in names.items() if members}

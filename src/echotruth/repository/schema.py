@@ -109,7 +109,6 @@ def groups(config: Config) -> dict[str, tuple[Array, ...]]:
     sizes, trackers = config.bmode.sizes, config.tracking.trackers
     every = {"cases": CASES} | SINGLE
     every |= {f"{name}/{size}": arrays for name, arrays in SIZED.items() for size in sizes}
-    every |= {f"truth/{size}": truth_arrays(config) for size in sizes}
     every |= {f"{name}/{size}/{one}": arrays for name, arrays in TRACKED.items() for size in sizes for one in trackers}
     every |= {"rf": rf_arrays(config)} if config.rf.keep else {}
     every |= INFERENCE if config.inference.tracker else {}
@@ -130,13 +129,6 @@ def observations(config: Config) -> list[str]:
 def units_of_observations(config: Config) -> list[str]:
     """Units of what may be seen, in the order of its labels."""
     return ["rad" if label.endswith("rotation") else "1" for label in observations(config)]
-
-
-def truth_arrays(config: Config) -> tuple[Array, ...]:
-    """Arrays of a group `truth/SIZE`: the tissue only if any heart has neighbours."""
-    keys = ("realism.preset", "realism.neighbours.")
-    may_have = config.realism.neighbours.any or any(key.startswith(keys) for key in config.cases.keys)
-    return tuple(array for array in SIZED["truth"] if may_have or array.name != "tissue")
 
 
 def rf_arrays(config: Config) -> tuple[Array, ...]:

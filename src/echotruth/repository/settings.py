@@ -42,12 +42,14 @@ def phantom(config: Config, view: str) -> Settings:
 def truth(config: Config, view: str) -> Settings:
     """What the truth of a view depends on."""
     settings = config.views[view], config.rf.focus_mm, config.bmode.field_of_view_mm, config.bmode.size_px
-    return (*settings, *_neighbours(config)) if config.realism.neighbours.any else settings
+    return *settings, *_neighbours(config)
 
 
 def _neighbours(config: Config) -> Settings:
     """What the labels of the neighbours depend on, besides the heart and the view."""
     present = [level is not None for level in config.realism.neighbours.model_dump().values()]
+    if not any(present):
+        return (present,)
     surroundings = config.realism.surroundings
     return present, surroundings.start_mm, surroundings.motion_decay_mm, config.probe.resolved(), config.rf
 

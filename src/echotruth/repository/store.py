@@ -130,10 +130,6 @@ class Store:
         """
         return self._strings({"case": "cases/case", "view": "phantom/view"}[dimension])
 
-    def has(self, path: str) -> bool:
-        """Whether an array, as "truth/512/tissue", was laid out."""
-        return (self.path / path / "zarr.json").is_file()
-
     def files(self, group: str, *row: int) -> list[Path]:
         """Files that one job wrote in a group, sorted."""
         shards = (self._shard(group, array, row) for array in schema.arrays_of(group) if array.leading == len(row))

@@ -15,11 +15,7 @@ from echotruth.repository import estimates, schema
 from echotruth.repository.reader import Repository
 
 Floats32 = NDArray[np.float32]
-PARTS = {
-    "images": "bmode/{size}/image",
-    "truth": "truth/{size}/displacement",
-    "tissue": "truth/{size}/tissue",
-}
+PARTS = {"images": "bmode/{size}/image", "truth": "truth/{size}/displacement"}
 """Part of a clip to the array by which it is known to be written."""
 ESTIMATES = {"tracking": "displacement", "evaluation": "true_displacement"}
 """Part of what was tracked to the array by which it is known to be written."""

@@ -31,8 +31,7 @@ COLOURS = {
 """What the colour can show, and its name."""
 NEEDS = {
     "none": (),
-    **dict.fromkeys(("strain", "layer", "segment", "region", "wall_depth", "flow"), ("truth",)),
-    "tissue": ("tissue",),
+    **dict.fromkeys(("strain", "layer", "segment", "region", "wall_depth", "flow", "tissue"), ("truth",)),
     **dict.fromkeys(("tracked_strain", "strain_error", "displacement_error"), ("tracking", "evaluation")),
 }
 """Parts of a clip that a colour is made of."""
