@@ -3,7 +3,8 @@
     echotruth run config/fimh25.yaml
     echotruth run config/paper.yaml
     echotruth run default.yaml  # no keys but the name and `tracking.trackers` of config/paper.yaml
-    python benchmarks/paper.py --authors out/fimh25 --printed out/paper --default out/default
+    echotruth run realistic.yaml  # the same with `realism.preset: mouse`
+    python benchmarks/paper.py --authors out/fimh25 --printed out/paper --default out/default --realistic out/realistic
 
 `--otherwise "in the plane=out/FOLDER"` adds a column to the table of corrections, for the authors' heart run with
 `phantom.in_plane_only: true`.
@@ -46,6 +47,7 @@ NAMES = {
     "authors": "authors' heart",
     "printed": "paper's heart",
     "default": "default heart",
+    "realistic": "default heart, realistic images",
 }
 
 ALONE = {"from frame to frame": {"reference": "previous"}, "tapered": {"taper": "hann"}}
