@@ -190,8 +190,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--clip", type=Path, required=True)
     parser.add_argument("--clips", type=Path, default=HERE / ".cache/segmenter.npz")
-    parser.add_argument("--number", type=int, default=40)
-    parser.add_argument("--epochs", type=int, default=9)
+    parser.add_argument("--number", type=int, default=80)
+    parser.add_argument("--epochs", type=int, default=25)
     given = parser.parse_args()
     if not given.clips.exists():
         made = clips(given.number)
