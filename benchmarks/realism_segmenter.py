@@ -1,13 +1,13 @@
 """A small network that finds the wall of a human apical echo, and has seen nothing but our clips.
 
-    python benchmarks/realism_segmenter.py --clip color3d_jpeg_baseline.dcm    # needs torch; half an hour on one core
+    python benchmarks/realism_segmenter.py --clip color3d_jpeg_baseline.dcm    # needs torch; a GPU helps
 
 It is the U-Net of examples/segmentation.py with one level more, trained to tell wall, cavity and the rest in human
 hearts on a coarse mesh, whose acoustics, machine and plane are drawn (DRAWN), with frames turned, shifted, scaled,
 mirrored, shaded and blurred. The real clip, whose wall was drawn by hand in four frames (apical_wall.csv), is for the
 test alone: nothing is chosen by it, and the network is that after the last epoch. The result is
 results/realism_segmenter.json and .md: Dice of the wall in these frames and in clips of ours that were left out, of
-the network and of the mean wall of ours. --clips keeps ours.
+the network and of the mean wall of ours. --clips keeps ours, and --network what was trained, which is not done again.
 """
 
 from __future__ import annotations
@@ -119,15 +119,16 @@ def varied(image: NDArray[np.uint8], label: NDArray[np.uint8], random: np.random
 def train(frames: Frames, epochs: int) -> UNet:
     """The network, trained on some epochs of our frames."""
     torch.manual_seed(0)
-    random, network, batch = np.random.default_rng(0), UNet(CHANNELS, LABELS), 8
+    device = "cuda" if torch.cuda.is_available() else "cpu"
+    random, network, batch = np.random.default_rng(0), UNet(CHANNELS, LABELS).to(device), 8
     steps = torch.optim.Adam(network.parameters(), lr=3e-3)
     pace = torch.optim.lr_scheduler.OneCycleLR(steps, 8e-3, total_steps=epochs * (len(frames) // batch))
     for epoch in range(epochs):
         order, losses = random.permutation(len(frames)), []
         for first in range(0, len(frames) - batch + 1, batch):
             pairs = [varied(*frames[k], random) for k in order[first : first + batch]]
-            logit = network.labels(torch.from_numpy(np.stack([pair[0] for pair in pairs])[:, None]))
-            label = torch.from_numpy(np.stack([pair[1] for pair in pairs]).astype(np.int64))
+            logit = network.labels(torch.from_numpy(np.stack([pair[0] for pair in pairs])[:, None]).to(device))
+            label = torch.from_numpy(np.stack([pair[1] for pair in pairs]).astype(np.int64)).to(device)
             likeness = overlap(logit.softmax(1)[:, WALL], (label == WALL).float())
             loss = torch.nn.functional.cross_entropy(logit, label) + 1 - likeness
             steps.zero_grad()
@@ -136,7 +137,7 @@ def train(frames: Frames, epochs: int) -> UNet:
             pace.step()
             losses.append(loss.item())
         print(f"epoch {epoch + 1}: loss {np.mean(losses):.3f}", flush=True)
-    return network.eval()
+    return network.cpu().eval()
 
 
 def real_frames(file: Path) -> Frames:
@@ -190,6 +191,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--clip", type=Path, required=True)
     parser.add_argument("--clips", type=Path, default=HERE / ".cache/segmenter.npz")
+    parser.add_argument("--network", type=Path, default=HERE / ".cache/segmenter.pt")
     parser.add_argument("--number", type=int, default=80)
     parser.add_argument("--epochs", type=int, default=25)
     given = parser.parse_args()
@@ -199,7 +201,13 @@ def main() -> None:
     with np.load(given.clips) as arrays:
         frames = list(zip(arrays["image"], arrays["label"], strict=True))
     known, new = frames[: -TESTED * FRAMES], frames[-TESTED * FRAMES :]
-    network, mean = train(known, given.epochs), np.mean([label == WALL for _, label in known], axis=0) > 0.5
+    if given.network.exists():
+        network = UNet(CHANNELS, LABELS).eval()
+        network.load_state_dict(torch.load(given.network, weights_only=True))
+    else:
+        network = train(known, given.epochs)
+        torch.save(network.state_dict(), given.network)
+    mean = np.mean([label == WALL for _, label in known], axis=0) > 0.5
     results = {"real": scores(network, mean, real_frames(given.clip)), "ours": scores(network, mean, new)}
     results |= {"clips": len(known) // FRAMES, "frames": len(known), "epochs": given.epochs}
     file = HERE / "results/realism_segmenter.json"
