@@ -193,7 +193,7 @@ def main() -> None:
     parser.add_argument("--clips", type=Path, default=HERE / ".cache/segmenter.npz")
     parser.add_argument("--network", type=Path, default=HERE / ".cache/segmenter.pt")
     parser.add_argument("--number", type=int, default=80)
-    parser.add_argument("--epochs", type=int, default=25)
+    parser.add_argument("--epochs", type=int, default=200)
     given = parser.parse_args()
     if not given.clips.exists():
         made = clips(given.number)
