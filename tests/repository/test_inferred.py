@@ -175,7 +175,7 @@ def test_heart_of_which_nothing_can_be_inferred_is_told_and_the_others_stay(fold
     repository = Repository(copy)
     assert inferred.hearts(repository) == CASES[1:]
     assert [fault for fault in check(copy).faults if "inference" in str(fault)] == []
-    told = account.inference(repository)
+    told = account.inference(repository, inferred.table(repository))
     assert [one["case"] for one in told["failed"]] == CASES[:1] and [one["case"] for one in told["hearts"]] == CASES[1:]
     assert told["hearts"][0]["misfit"] and told["case"] == CASES[1]
 

@@ -73,8 +73,7 @@ class Figures:
         self.folder.mkdir(parents=True, exist_ok=True)
         infers = self.config.inference.tracker is not None
         if infers:
-            table = inferred.table(self.repository)
-            table.to_csv(self.repository.folder / inferred.FILE, index=False, float_format="%.6g")
+            inferred.write(self.repository.folder / inferred.FILE, self.inferred)
         for name in (*NAMES, "inference") if infers else NAMES:
             figure = getattr(self, name)() if self.case else style.sentence(NONE_COMPLETE)
             if figure is not None:
@@ -190,12 +189,16 @@ class Figures:
         self.standings.round(4).to_csv(self.folder / "leaderboard.csv", index=False)
         return leaderboard.draw(self.standings, best(self.standings))
 
+    @cached_property
+    def inferred(self) -> pd.DataFrame:
+        """Table of what was inferred of the hearts."""
+        return inferred.table(self.repository)
+
     def inference(self) -> Figure:
         """What was inferred of the muscle of a heart from what a tracker saw."""
-        hearts = inferred.hearts(self.repository)
-        if not hearts:
+        case = inferred.shown(self.repository, self.inferred)
+        if not case:
             return style.sentence("Nothing was inferred of any heart. The reasons are in the report.")
-        case = self.case if self.case in hearts else hearts[0]
         fit = self.repository.arrays("inference/fit", case)
         groups = {
             name: self.repository.arrays(f"inference/{name}", case) for name in ("observed_data", "constant_data")

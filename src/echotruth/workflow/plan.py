@@ -11,6 +11,7 @@ from echotruth.cases import Case, expand
 from echotruth.config import Cases, Config
 from echotruth.config.loading import ConfigError, load, validate
 from echotruth.repository import ledger, settings
+from echotruth.repository.choice import image_size
 from echotruth.repository.ledger import record_path, record_paths
 from echotruth.repository.provenance import code_version, settings_version
 from echotruth.repository.verdict import excluded
@@ -139,7 +140,7 @@ class Plan:
 
     def tracked(self, wildcards: Wildcards) -> list[str]:
         """Records of what was tracked in the views of a heart, in the images from which is inferred."""
-        size = self.config.inference.size_px or self.config.bmode.sizes[0]
+        size = image_size(self.config, self.config.inference.size_px)
         return [str(record_path(self.folder, "tracking", wildcards.case, view, size)) for view in self.config.views]
 
     def bmode_source(self, wildcards: Wildcards) -> list[str]:
