@@ -94,6 +94,8 @@ def test_settings_are_those_of_the_section_and_of_all_that_was_tracked():
         finished.configured(motion=Motion(), tracking=Tracking(trackers=trackers), inference=Inference(tracker="one")),
         finished.configured(motion=Motion(), views=("mid",), inference=Inference(tracker="one")),
         finished.configured(motion=Motion(), inference=Inference(tracker="one", size_px=finished.SIZE)),
+        finished.configured(motion=Motion(), inference=Inference(tracker="one", prior={"fibres.endo_deg": [75, 3]})),
+        finished.configured(motion=Motion(), inference=Inference(tracker="one", prior={"fibres.endo_deg": None})),
     ]
     hashes = [settings.of_job(config, "inference", None) for config in (CONFIG, *others)]
     assert len(set(hashes)) == len(hashes)
@@ -154,6 +156,8 @@ def test_another_repository_takes_it_over(folder, tmp_path):
         ),
         ({"inference": {"size_px": 512}}, "inference.size_px = 512: needs inference.tracker"),
         ({"inference": {"errors": "a.csv"}}, "inference.errors = 'a.csv': needs inference.tracker"),
+        ({"inference": {"prior": {"fibres.endo_deg": None}}}, "inference.prior = .*: needs inference.tracker"),
+        ({"inference": {"tracker": "dis", "prior": {"fibres.endo_deg": [75]}}}, "endo_deg = .*: must have 2 entries"),
         ({"inference": {"tracker": "dis"}, "motion": {"kind": "rigid"}}, "motion.kind = rigid has not"),
         ({"cases": {"inference.tracker": ["dis", "ilk"]}}, "inference.tracker"),
     ],

@@ -32,7 +32,7 @@ def stored(repository: Repository, case: Case) -> Groups:
     """
     section = case.config.inference
     observed = observe(repository, section.tracker, case.id, section.size_px, section.errors)
-    return _groups(repository, case, observed, infer(observed, progress=False))
+    return _groups(repository, case, observed, infer(observed, section.prior, progress=False))
 
 
 def rows(
@@ -48,8 +48,8 @@ def rows(
     list of dict
         Of each parameter its values, by the names of :data:`.inferred.COLUMNS`.
     """
-    observed = observe(repository, tracker, case, size, errors)
-    found = _groups(repository, repository.case(case), observed, infer(observed))
+    observed, of = observe(repository, tracker, case, size, errors), repository.case(case)
+    found = _groups(repository, of, observed, infer(observed, of.config.inference.prior))
     about = {name: observed.attrs[name] for name in ("case", "tracker", "size_px")}
     return [about | row for row in inferred.rows(found["inference/fit"])]
 
