@@ -184,6 +184,23 @@ def test_heart_of_which_nothing_can_be_inferred_is_told_and_the_others_stay(fold
     assert told["hearts"][0]["misfit"] and told["case"] == CASES[1]
 
 
+def test_table_of_a_repository_of_which_nothing_was_inferred_is_read_and_shown_as_none(folder, tmp_path):
+    repository, path = Repository(folder), tmp_path / inferred.FILE
+    inferred.write(path, inferred.table_of([]))
+    found = inferred.read(path)
+    assert found.empty and inferred.shown(repository, found) == ""
+    assert account.inference(repository, found)["hearts"] == []
+
+
+def test_table_is_read_as_it_was_written(folder, tmp_path):
+    table = inferred.table(Repository(folder)).assign(case="007")  # a name of digits is none of a number
+    inferred.write(tmp_path / inferred.FILE, table)
+    read = inferred.read(tmp_path / inferred.FILE)
+    assert list(read["case"].unique()) == ["007"] and read["misfit"].dtype == bool
+    np.testing.assert_allclose(read["mean"], table["mean"], rtol=1e-5)
+    np.testing.assert_array_equal(read["scar_probability"].isna(), table["scar_probability"].isna())
+
+
 def test_figure_has_the_inferred_numbers_and_hatches_what_is_not_identifiable(folder):
     repository = Repository(folder)
     fit = repository.arrays("inference/fit", CASES[0])
