@@ -5,7 +5,7 @@ FIGURES += ["heart", "resolutions", "views"]
 
 TABLES = []
 if PLAN.config.inference.tracker:
-    FIGURES += ["inference"]
+    FIGURES += ["inference", "posterior"]
     TABLES += [f"{OUT}/inference.csv"]
 
 

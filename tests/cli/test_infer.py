@@ -4,7 +4,8 @@ import pandas as pd
 import pytest
 
 import echotruth as et
-from echotruth.inference import table
+from echotruth.inference import stored
+from echotruth.repository.inferred import COLUMNS
 from echotruth.repository.layout import as_yaml
 
 
@@ -12,14 +13,14 @@ def test_command_writes_the_table_after_each_heart_and_goes_on_after_one_that_fa
     def rows(_, tracker, case, *__):
         if case == "infarct":
             raise ValueError("infarct: dis saw no segment")
-        return [dict.fromkeys(table.COLUMNS, 1.0) | {"case": case, "tracker": tracker}]
+        return [dict.fromkeys(COLUMNS, 1.0) | {"case": case, "tracker": tracker}]
 
-    monkeypatch.setattr(table, "rows", rows)
+    monkeypatch.setattr(stored, "rows", rows)
     status, output, errors = call("infer", "sample", "--tracker", "dis", "-o", "found.csv")
     assert status == 1 and "found.csv" in output
     assert "echotruth: infarct: dis saw no segment" in errors
     written = pd.read_csv(tmp_path / "found.csv")
-    assert list(written.columns) == list(table.COLUMNS) and list(written["case"]) == ["healthy"]
+    assert list(written.columns) == list(COLUMNS) and list(written["case"]) == ["healthy"]
 
 
 def test_table_that_a_run_made_is_not_replaced(call, tmp_path):

@@ -9,7 +9,7 @@ from scipy.stats import kstest, norm
 import echotruth as et
 from echotruth.inference import draws, modes
 from echotruth.inference.draws import MATERIAL, TENSION, of_posterior, of_prior, standard_normal
-from echotruth.inference.laplace import Posterior
+from echotruth.inference.laplace import Posterior, Prediction
 from echotruth.inference.modes import Mode, weights
 from echotruth.inference.parameters import (
     CONTRACTILITY,
@@ -39,19 +39,18 @@ def mode(scarred=(), log_evidence=0.0, sd=0.1, seen=(8, 9, 10)):
     """A mode at the mean of the prior, of which each parameter is known to a share of its prior."""
     free = scar_parameters(FREE, scarred) if scarred else FREE
     prior = prior_of(free)
-    slopes = np.zeros((2, len(free)))
+    there = Prediction(np.zeros(SEEN), np.zeros((SEEN, len(free))), np.log([1e3, 50e3]), np.zeros((2, len(free))))
     found = Posterior(
         mean=prior.mean,
         covariance=np.diag((sd * prior.sd) ** 2),
-        predicted=np.zeros(SEEN),
-        jacobian=np.zeros((SEEN, len(free))),
+        start=there,
+        prediction=there,
         log_evidence=log_evidence,
         misfit=0.5,
         steps=1,
         converged=True,
     )
-    muscle = {prior.mean.tobytes(): (np.log([1e3, 50e3]), slopes)}
-    return Mode(scarred, free, SimpleNamespace(muscle=muscle, aha=list(seen)), found)
+    return Mode(scarred, free, SimpleNamespace(aha=list(seen)), found)
 
 
 def test_columns_are_standard_normal_and_do_not_depend_on_each_other():
@@ -103,7 +102,7 @@ def test_quantiles_are_those_of_the_mixture(segments):
 def test_c_and_tension_follow_their_slopes_and_the_means_of_the_wall(segments):
     single = mode()
     column = [one.key for one in single.free].index("loop.esp_mmHg")
-    single.model.muscle[single.found.mean.tobytes()][1][1, column] = 0.1
+    single.found.prediction.derived_jacobian[1, column] = 0.1
     found, _ = of_posterior([single], segments, np.eye(SEEN))
     assert np.median(found.values[TENSION]) == pytest.approx(50, rel=0.02)
     assert np.median(found.values[MATERIAL]) == pytest.approx(1, rel=0.01)

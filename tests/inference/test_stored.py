@@ -10,7 +10,7 @@ import xarray as xr
 import echotruth as et
 from echotruth.cases import expand
 from echotruth.config.loading import ConfigError, validate
-from echotruth.inference import tracker_errors
+from echotruth.inference import stored, tracker_errors
 from echotruth.inference.stored import groups
 from echotruth.repository import ledger, schema
 from echotruth.workflow.plan import Plan
@@ -59,9 +59,9 @@ def test_values_stand_at_their_labels_and_what_was_not_seen_is_no_number():
     value = made["inference/observed_data"]["value"]
     np.testing.assert_array_equal(value[at], [0.1, -0.2, -0.3])
     assert np.isfinite(value).sum() == 3
-    stored = made["inference/constant_data"]["covariance"]
-    np.testing.assert_array_equal(stored[np.ix_(at, at)], covariance)
-    assert np.isfinite(stored).sum() == 9
+    kept = made["inference/constant_data"]["covariance"]
+    np.testing.assert_array_equal(kept[np.ix_(at, at)], covariance)
+    assert np.isfinite(kept).sum() == 9
     assert made["inference/constant_data"]["true_value"][at[2]] == -0.28
     fit = made["inference/fit"]
     assert fit["true"][parameters.index("contractility.8")] == 0 and fit["predicted"][at[1]] == -0.21
@@ -105,11 +105,26 @@ def test_other_errors_of_the_tracker_are_other_settings(tmp_path, monkeypatch):
     [
         ({"tracker": "dis", "size_px": 512}, "inference: tracker: the error of dis at 512 px with ideal acoustics"),
         ({"tracker": "dis", "errors": "none.csv"}, "inference: none.csv: there is no such table of errors"),
+        (
+            {"tracker": "dis", "size_px": 256, "prior": {"fibres.endo_deg": [95, 8]}},
+            "inference: prior: fibres.endo_deg = .95, 8.: give a mean from -90 to 90",
+        ),
     ],
 )
-def test_tracker_whose_error_is_not_known_is_refused_before_the_run(tmp_path, monkeypatch, inference, said):
+def test_what_cannot_be_inferred_from_is_refused_before_the_run(tmp_path, monkeypatch, inference, said):
     with pytest.raises(ConfigError, match=said):
         plan(tmp_path, monkeypatch, **inference)
+
+
+def test_prior_of_the_configuration_is_that_of_what_is_inferred(monkeypatch):
+    given = {"fibres.endo_deg": [75.0, 3.0], "mechanics.regional.stiffness": None}
+    config = et.configure(et.configure(CONFIG, inference={"prior": given}), seed=2)  # null is kept in another one too
+    asked = []
+    monkeypatch.setattr(stored, "observe", lambda *_: None)
+    monkeypatch.setattr(stored, "infer", lambda _, prior, **__: asked.append(prior))
+    monkeypatch.setattr(stored, "_groups", lambda *_: {})
+    stored.stored(None, SimpleNamespace(id="heart", config=config))
+    assert asked == [given]
 
 
 def test_hearts_of_a_sweep_are_inferred_alike():

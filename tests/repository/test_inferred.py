@@ -94,6 +94,8 @@ def test_settings_are_those_of_the_section_and_of_all_that_was_tracked():
         finished.configured(motion=Motion(), tracking=Tracking(trackers=trackers), inference=Inference(tracker="one")),
         finished.configured(motion=Motion(), views=("mid",), inference=Inference(tracker="one")),
         finished.configured(motion=Motion(), inference=Inference(tracker="one", size_px=finished.SIZE)),
+        finished.configured(motion=Motion(), inference=Inference(tracker="one", prior={"fibres.endo_deg": [75, 3]})),
+        finished.configured(motion=Motion(), inference=Inference(tracker="one", prior={"fibres.endo_deg": None})),
     ]
     hashes = [settings.of_job(config, "inference", None) for config in (CONFIG, *others)]
     assert len(set(hashes)) == len(hashes)
@@ -154,6 +156,8 @@ def test_another_repository_takes_it_over(folder, tmp_path):
         ),
         ({"inference": {"size_px": 512}}, "inference.size_px = 512: needs inference.tracker"),
         ({"inference": {"errors": "a.csv"}}, "inference.errors = 'a.csv': needs inference.tracker"),
+        ({"inference": {"prior": {"fibres.endo_deg": None}}}, "inference.prior = .*: needs inference.tracker"),
+        ({"inference": {"tracker": "dis", "prior": {"fibres.endo_deg": [75]}}}, "endo_deg = .*: must have 2 entries"),
         ({"inference": {"tracker": "dis"}, "motion": {"kind": "rigid"}}, "motion.kind = rigid has not"),
         ({"cases": {"inference.tracker": ["dis", "ilk"]}}, "inference.tracker"),
     ],
@@ -175,9 +179,26 @@ def test_heart_of_which_nothing_can_be_inferred_is_told_and_the_others_stay(fold
     repository = Repository(copy)
     assert inferred.hearts(repository) == CASES[1:]
     assert [fault for fault in check(copy).faults if "inference" in str(fault)] == []
-    told = account.inference(repository)
+    told = account.inference(repository, inferred.table(repository))
     assert [one["case"] for one in told["failed"]] == CASES[:1] and [one["case"] for one in told["hearts"]] == CASES[1:]
     assert told["hearts"][0]["misfit"] and told["case"] == CASES[1]
+
+
+def test_table_of_a_repository_of_which_nothing_was_inferred_is_read_and_shown_as_none(folder, tmp_path):
+    repository, path = Repository(folder), tmp_path / inferred.FILE
+    inferred.write(path, inferred.table_of([]))
+    found = inferred.read(path)
+    assert found.empty and inferred.shown(repository, found) == ""
+    assert account.inference(repository, found)["hearts"] == []
+
+
+def test_table_is_read_as_it_was_written(folder, tmp_path):
+    table = inferred.table(Repository(folder)).assign(case="007")  # a name of digits is none of a number
+    inferred.write(tmp_path / inferred.FILE, table)
+    read = inferred.read(tmp_path / inferred.FILE)
+    assert list(read["case"].unique()) == ["007"] and read["misfit"].dtype == bool
+    np.testing.assert_allclose(read["mean"], table["mean"], rtol=1e-5)
+    np.testing.assert_array_equal(read["scar_probability"].isna(), table["scar_probability"].isna())
 
 
 def test_figure_has_the_inferred_numbers_and_hatches_what_is_not_identifiable(folder):

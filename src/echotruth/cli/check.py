@@ -12,6 +12,7 @@ from echotruth.cli.command import fail, named
 
 if TYPE_CHECKING:
     from echotruth.cases import Case
+    from echotruth.config import Config
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -31,7 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def check(arguments: argparse.Namespace) -> int:
     """Check a configuration, or all files and values of a repository.
 
-    Of a configuration, the meshes and motions that it names are read too. A repository is
+    Of a configuration, the files that it names are read too. A repository is
     checked to the end, with one line for each fault.
 
     examples:
@@ -50,7 +51,7 @@ def check(arguments: argparse.Namespace) -> int:
     from echotruth.cli.configuration import LISTED, load_cases
 
     config, cases = load_cases(arguments.path, f"a YAML file, {LISTED}, or the folder of a repository")
-    if errors := list(_of_files(cases)):
+    if errors := [*_of_files(cases), *_of_inference(config, cases)]:
         sys.exit(named("\n".join(f"{arguments.path}: {error}" for error in errors)))
     print(f"{arguments.path}: valid; cases: {len(cases)}, views per case: {len(config.views)}")
     from echotruth.cli.estimation import estimated, print_concerns
@@ -76,6 +77,16 @@ def _check_repository(folder: Path, healing: bool, quick: bool) -> int:
     if healing and shipped.is_sample(folder):
         return fail(f"{folder}: {shipped.NOT_WRITTEN}")
     return check_repository(folder, healing, quick)
+
+
+def _of_inference(config: Config, cases: list[Case]) -> Iterator[str]:
+    """What is wrong with that from which the muscle is inferred: the errors of the tracker, and the priors."""
+    from echotruth.workflow.plan import errors_version
+
+    try:
+        errors_version(config, cases)
+    except ValueError as error:
+        yield f"inference: {error}"
 
 
 def _of_files(cases: list[Case]) -> Iterator[str]:

@@ -34,8 +34,8 @@ def infer(arguments: argparse.Namespace) -> int:
       1  some are not: each is told
       2  none is, or an option is wrong
     """
-    from echotruth.inference.table import columns, rows
-    from echotruth.repository.inferred import FILE
+    from echotruth.inference.stored import rows
+    from echotruth.repository.inferred import FILE, table_of, write
     from echotruth.repository.reader import Repository
 
     table: list[dict[str, object]] = []
@@ -60,7 +60,7 @@ def infer(arguments: argparse.Namespace) -> int:
                 continue
             table += found
             # After every heart, so that what was inferred is not lost if the rest is stopped.
-            columns(table).to_csv(output, index=False, float_format="%.6g")
+            write(output, table_of(table))
     except (ValueError, OSError) as error:
         return fail(str(error))
     if not table:

@@ -2,9 +2,11 @@
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
 from echotruth.section import Name, Section, check, invalid
+
+MeanAndDeviation = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
 
 
 class Inference(Section):
@@ -17,9 +19,13 @@ class Inference(Section):
     """Side of the images in which it tracked. Default: the largest."""
     errors: str | None = None
     """Table of the errors of trackers, .csv, that `benchmarks/tracker_errors.py` makes. Default: the package's."""
+    prior: dict[str, MeanAndDeviation | None] = Field(default_factory=dict)
+    """What is known of parameters before anything is seen, by their keys: mean and standard deviation, as
+    `fibres.endo_deg: [75, 3]`, or `null` for what is known as the model has it. `mechanics.regional.contractility` and
+    `mechanics.regional.stiffness` stand for all segments. Default: docs/inference.md."""
 
     @check
     def _has_tracker(self) -> None:
-        for key in ("size_px", "errors"):
-            if self.tracker is None and getattr(self, key) is not None:
+        for key in ("size_px", "errors", "prior"):
+            if self.tracker is None and getattr(self, key) not in (None, {}):
                 raise invalid(key, getattr(self, key), "needs inference.tracker: name it, or leave this out")

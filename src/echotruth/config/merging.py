@@ -2,7 +2,7 @@
 
 from typing import Any
 
-NAMED = ("views", "trackers", "cases")
+NAMED = ("views", "trackers", "cases", "prior")
 """Mappings of names that the user gives: one that is given replaces the other."""
 KINDS = ("law", "method")
 """Keys that decide which other keys a section has."""

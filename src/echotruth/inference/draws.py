@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from echotruth.arrays import Floats
+from echotruth.inference.laplace import Prediction
 from echotruth.inference.modes import Mode, weights
 from echotruth.inference.parameters import (
     CONTRACTILITY,
@@ -81,7 +82,7 @@ def of_posterior(
     for mode, count in zip(modes, _shares(weights(modes), number), strict=True):
         found, size = mode.found, len(mode.free)
         scaled = found.mean + standard_normal(count, size, random) @ np.linalg.cholesky(found.covariance).T
-        seen = found.predicted + (scaled - found.mean) @ found.jacobian.T
+        seen = found.prediction.observed + (scaled - found.mean) @ found.prediction.jacobian.T
         parts.append((_of_mode(mode, segments, scaled), seen))
     order = random.permutation(number)
     errors = standard_normal(number, len(covariance), random) @ np.linalg.cholesky(covariance).T
@@ -91,11 +92,11 @@ def of_posterior(
 
 
 def of_prior(mode: Mode, segments: SegmentMeans, number: int = DRAWS) -> Draws:
-    """Draws of the prior of a wall without a scar, given the mode of such a wall."""
+    """Draws of the prior of a wall without a scar, given the mode of such a wall, sought from the mean of the prior."""
     random, prior = np.random.default_rng(SEED), prior_of(mode.free)
     scaled = prior.mean + prior.sd * standard_normal(number, len(mode.free), random)
     wall = _Wall.of(mode.free, segments, scaled)
-    return Draws(_named(mode, wall, scaled, prior.mean), np.zeros((number, len(SEGMENTS)), bool))
+    return Draws(_named(mode, wall, scaled, prior.mean, mode.found.start), np.zeros((number, len(SEGMENTS)), bool))
 
 
 def _shares(weight: Floats, number: int) -> list[int]:
@@ -111,7 +112,7 @@ def _of_mode(mode: Mode, segments: SegmentMeans, scaled: Floats) -> Draws:
     wall = _Wall.of(mode.free, segments, scaled, mode.scarred)
     scar = np.zeros((len(scaled), len(SEGMENTS)), bool)
     scar[:, [number - 1 for number in mode.scarred]] = True
-    return Draws(_named(mode, wall, scaled, mode.found.mean), scar)
+    return Draws(_named(mode, wall, scaled, mode.found.mean, mode.found.prediction), scar)
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ class _Wall:
         return np.log(self.stiffness) @ self.segments.share
 
 
-def _named(mode: Mode, wall: _Wall, scaled: Floats, about: Floats) -> dict[str, Floats]:
+def _named(mode: Mode, wall: _Wall, scaled: Floats, about: Floats, there: Prediction) -> dict[str, Floats]:
     """Values of all that is inferred, by name, (draw,).
 
     Parameters
@@ -165,6 +166,8 @@ def _named(mode: Mode, wall: _Wall, scaled: Floats, about: Floats) -> dict[str, 
     scaled : ndarray of shape (draw, p)
     about : ndarray of shape (p,)
         Where C and the active tension and their derivatives are known.
+    there : Prediction
+        Of it.
     """
     values = {
         parameter.key: parameter.values(scaled[:, column])
@@ -180,14 +183,13 @@ def _named(mode: Mode, wall: _Wall, scaled: Floats, about: Floats) -> dict[str, 
             name = section.rpartition(".")[2]
             ratio = means / np.exp(level)[:, None]
             values |= {f"{name}.{number}": ratio[:, place] for place, number in enumerate(wall.segments.number)}
-    logarithms, slopes = mode.model.muscle[about.tobytes()]
 
     def levels(at: Floats) -> Floats:
-        there = _Wall.of(mode.free, wall.segments, at, mode.scarred)
-        return np.stack([there.log_mean_stiffness, there.log_mean_contractility])
+        of_wall = _Wall.of(mode.free, wall.segments, at, mode.scarred)
+        return np.stack([of_wall.log_mean_stiffness, of_wall.log_mean_contractility])
 
-    slopes = slopes + _slopes(levels, about)
-    found = logarithms[:, None] + levels(about[None]) + slopes @ (scaled - about).T
+    slopes = there.derived_jacobian + _slopes(levels, about)
+    found = there.derived[:, None] + levels(about[None]) + slopes @ (scaled - about).T
     return values | dict(zip((MATERIAL, TENSION), np.exp(found) / UNITS["kPa"], strict=True))
 
 

@@ -136,11 +136,12 @@ def _check_values(value: Floats, covariance: Floats) -> None:
 def _dataset(observed: xr.Dataset, found: list[Mode], segments: SegmentMeans) -> xr.Dataset:
     """What was found, as :func:`infer` returns it."""
     best, value = max(found, key=lambda mode: mode.log_weight), observed["value"].values
+    predicted = best.found.prediction.observed
     draws, replicated = of_posterior(found, segments, observed["covariance"].values)
     before = of_prior(found[0], segments)
     names = list(draws.values)
     posterior, prior = (np.stack([one.values[name] for name in names], axis=1) for one in (draws, before))
-    seen = {"observed": value, "predicted": best.found.predicted, "residual": value - best.found.predicted}
+    seen = {"observed": value, "predicted": predicted, "residual": value - predicted}
     seen["sd_error"] = np.sqrt(np.diag(observed["covariance"].values))
     arrays: dict[str, Any] = {name: ("parameter", values) for name, values in _summary(names, posterior, prior).items()}
     arrays |= {name: ("observation", values) for name, values in seen.items()}

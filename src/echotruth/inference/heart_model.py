@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from echotruth.config.loop import Loop
 from echotruth.config.regional import Regional
 from echotruth.heart import Heart
 from echotruth.inference.imaged_wall import ImagedWall
+from echotruth.inference.laplace import Prediction
 from echotruth.inference.observation import ObservationError
 from echotruth.inference.parameters import Parameter, slopes
 from echotruth.loop.cycle import read_loop
@@ -123,16 +124,12 @@ class HeartModel:
         View of each observation.
     aha : sequence of int
         Its segment, 0 for rotation.
-    muscle : dict
-        Of the parameters that were tried, by their bytes: logarithms of C and of the active tension at end-systole, Pa,
-        and their derivatives by the parameters, ((2,), (2, p)).
     """
 
     config: Config
     parameters: Sequence[Parameter]
     view: Sequence[str]
     aha: Sequence[int]
-    muscle: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._frames = read_loop(self.config.loop).systole
@@ -142,8 +139,8 @@ class HeartModel:
         values = {p.key: p.value(x) for p, x in zip(self.parameters, scaled, strict=True)}
         return configure(self.config, **values)
 
-    def __call__(self, scaled: Floats) -> tuple[Floats, Floats]:
-        """Observations (n,) of parameters (p,) on their scales, and their derivatives by these, (n, p)."""
+    def __call__(self, scaled: Floats) -> Prediction:
+        """Observations of parameters (p,) on their scales, and logarithms of C and T (Pa) at end-systole as derived."""
         heart, by = sensitivities(self.at(scaled), [p.key for p in self.parameters], self._frames)
         moved = by["node_position"].values[:, None] + by["displacement"].values[:, [0, -1]]
         at_ed, at_es = heart.positions(0), heart.positions(-1)
@@ -164,8 +161,7 @@ class HeartModel:
             raise ObservationError(
                 f"{self.view[row]}: the model shows no segment {self.aha[row]} there: use a finer mesh"
             )
-        self.muscle[scaled.tobytes()] = _muscle(heart, by, slope)
-        return predicted, jacobian
+        return Prediction(predicted, jacobian, *_muscle(heart, by, slope))
 
 
 def _muscle(heart: Heart, by: xr.Dataset, slope: Floats) -> tuple[Floats, Floats]:

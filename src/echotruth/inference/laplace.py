@@ -30,9 +30,6 @@ from echotruth.arrays import Floats
 
 logger = logging.getLogger("echotruth.inference")
 
-Model = Callable[[Floats], tuple[Floats, Floats]]
-"""From parameters (p,) to what they predict (n,), and its Jacobian (n, p)."""
-
 MAX_STEPS = 8
 CLOSE = 0.1
 """Step, over the posterior standard deviation of each parameter, below which the mode is found."""
@@ -41,6 +38,31 @@ MAX_HALVINGS = 4
 
 class NoMode(RuntimeError):
     """Raised if no step from the mean of the prior lowers the misfit."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a model predicts of parameters (p,).
+
+    Attributes
+    ----------
+    observed : ndarray of shape (n,)
+        What would be observed, without errors.
+    jacobian : ndarray of shape (n, p)
+        Its derivatives by the parameters.
+    derived : ndarray of shape (q,)
+        What else follows from the parameters, which nothing observes; no search depends on it.
+    derived_jacobian : ndarray of shape (q, p)
+    """
+
+    observed: Floats
+    jacobian: Floats
+    derived: Floats
+    derived_jacobian: Floats
+
+
+Model = Callable[[Floats], Prediction]
+"""From parameters (p,) to what they predict."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +90,8 @@ class Posterior:
     mean : ndarray of shape (p,)
         The mode.
     covariance : ndarray of shape (p, p)
-    predicted : ndarray of shape (n,)
-        Observations of the mode.
-    jacobian : ndarray of shape (n, p)
+    start, prediction : Prediction
+        Of where the search began, and of the mode.
     log_evidence : float
         log Z.
     misfit : float
@@ -83,8 +104,8 @@ class Posterior:
 
     mean: Floats
     covariance: Floats
-    predicted: Floats
-    jacobian: Floats
+    start: Prediction
+    prediction: Prediction
     log_evidence: float
     misfit: float
     steps: int
@@ -116,7 +137,8 @@ def posterior(
         If no step from the start lowers the misfit.
     """
     problem = _Problem(model, observed, cholesky(covariance, lower=True), prior)
-    point, converged, steps = problem.at(prior.mean if start is None else start), False, 0
+    first = point = problem.at(prior.mean if start is None else start)
+    converged, steps = False, 0
     while not converged and steps < MAX_STEPS:
         change = problem.step(point)
         spread = np.sqrt(np.diag(problem.covariance(point)))
@@ -131,17 +153,16 @@ def posterior(
         if lower is None:
             break
         point, steps = lower, steps + 1
-    found, residual = problem.covariance(point), observed - point.predicted
-    misfit = _misfit(residual, covariance, point.jacobian, prior.sd)
+    found, there = problem.covariance(point), point.prediction
+    misfit = _misfit(observed - there.observed, covariance, there.jacobian, prior.sd)
     evidence = problem.log_evidence(point)
-    return Posterior(point.values, found, point.predicted, point.jacobian, evidence, misfit, steps, converged)
+    return Posterior(point.values, found, first.prediction, there, evidence, misfit, steps, converged)
 
 
 @dataclass(frozen=True)
 class _Point:
     values: Floats
-    predicted: Floats
-    jacobian: Floats
+    prediction: Prediction
     cost: float
 
 
@@ -156,15 +177,16 @@ class _Problem:
 
     def at(self, values: Floats) -> _Point:
         """The model and J at parameters."""
-        predicted, jacobian = self.model(values)
-        whitened = solve_triangular(self.root, self.observed - predicted, lower=True)
+        prediction = self.model(values)
+        whitened = solve_triangular(self.root, self.observed - prediction.observed, lower=True)
         cost = np.sum(whitened**2) + np.sum(((values - self.prior.mean) / self.prior.sd) ** 2)
-        return _Point(values, predicted, jacobian, float(cost))
+        return _Point(values, prediction, float(cost))
 
     def step(self, point: _Point) -> Floats:
         """Step to the mode of the problem that is linear about a point, within the bounds."""
-        matrix = np.vstack([solve_triangular(self.root, point.jacobian, lower=True), np.diag(1 / self.prior.sd)])
-        residual = solve_triangular(self.root, self.observed - point.predicted, lower=True)
+        jacobian = solve_triangular(self.root, point.prediction.jacobian, lower=True)
+        matrix = np.vstack([jacobian, np.diag(1 / self.prior.sd)])
+        residual = solve_triangular(self.root, self.observed - point.prediction.observed, lower=True)
         right = np.concatenate([residual, (self.prior.mean - point.values) / self.prior.sd])
         # In standard deviations of the prior, so that the least squares are well scaled.
         bounds = [(limit - point.values) / self.prior.sd for limit in (self.prior.lower, self.prior.upper)]
@@ -180,7 +202,7 @@ class _Problem:
 
     def _curvature(self, point: _Point) -> Floats:
         """Half the second derivatives of J (p, p) by parameters in standard deviations of the prior."""
-        scaled = solve_triangular(self.root, point.jacobian * self.prior.sd, lower=True)
+        scaled = solve_triangular(self.root, point.prediction.jacobian * self.prior.sd, lower=True)
         return np.asarray(scaled.T @ scaled + np.eye(len(self.prior.sd)))
 
     def lowered(self, point: _Point, change: Floats) -> _Point | None:

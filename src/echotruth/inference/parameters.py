@@ -23,7 +23,15 @@ EDP_SD_MMHG, ESP_SD_MMHG = 0.5, 4.0
 EDV_SD, EJECTION_FRACTION_SD = 0.02, 0.02
 """Standard deviation of the end-diastolic volume over it, and of the ejection fraction."""
 
-Given = Mapping[str, tuple[float, float] | None]
+LIMITS: dict[str, tuple[float, float]] = {
+    **{f"{section}.{number}": FACTOR_LIMITS for section in (CONTRACTILITY, STIFFNESS) for number in SEGMENTS},
+    **dict.fromkeys(("mechanics.active.sheet_share", "mechanics.active.normal_share"), (0.0, 1.0)),
+    **dict.fromkeys(("fibres.endo_deg", "fibres.epi_deg"), (-90.0, 90.0)),
+    **dict.fromkeys(("loop.edp_mmHg", "loop.esp_mmHg", "loop.edv_uL", "loop.esv_uL"), (1e-6, np.inf)),
+}
+"""Keys that are inferred, and the smallest and largest value of each."""
+
+Given = Mapping[str, Sequence[float] | None]
 
 
 class PriorError(ValueError):
@@ -75,52 +83,70 @@ def parameters(config: Config, given: Given) -> list[Parameter]:
     PriorError
         If a key is none of these, or a number cannot be used.
     """
+    check_prior(given)
     active, fibres, loop = config.mechanics.active, config.fibres, config.loop
     assert loop.edv_uL and loop.esv_uL and loop.edp_mmHg and loop.esp_mmHg
-    positive, angle = (1e-6, np.inf), (-90.0, 90.0)
-    found = [
-        *(Parameter(f"{CONTRACTILITY}.{number}", 1.0, 0.5, FACTOR_LIMITS) for number in SEGMENTS),
-        *(Parameter(f"{STIFFNESS}.{number}", 0.0, 1.0, FACTOR_LIMITS, logarithmic=True) for number in SEGMENTS),
-        Parameter("mechanics.active.sheet_share", active.sheet_share, 0.1, (0.0, 1.0)),
-        Parameter("mechanics.active.normal_share", active.normal_share, 0.1, (0.0, 1.0)),
-        Parameter("fibres.endo_deg", fibres.endo_deg, 8.0, angle),
-        Parameter("fibres.epi_deg", fibres.epi_deg, 8.0, angle),
-        Parameter("loop.edp_mmHg", loop.edp_mmHg, EDP_SD_MMHG, positive),
-        Parameter("loop.esp_mmHg", loop.esp_mmHg, ESP_SD_MMHG, positive),
-        Parameter("loop.edv_uL", loop.edv_uL, EDV_SD * loop.edv_uL, positive),
-        Parameter("loop.esv_uL", loop.esv_uL, EJECTION_FRACTION_SD * loop.edv_uL, positive),
-    ]
-    keys = {parameter.key for parameter in found}
-    for key in given:
-        if key not in keys | {CONTRACTILITY, STIFFNESS}:
-            shown = ", ".join([f"{CONTRACTILITY}.N", f"{STIFFNESS}.N", *(p.key for p in found[2 * len(SEGMENTS) :])])
+    usual = {
+        **{f"{CONTRACTILITY}.{number}": (1.0, 0.5) for number in SEGMENTS},
+        **{f"{STIFFNESS}.{number}": (1.0, 1.0) for number in SEGMENTS},
+        "mechanics.active.sheet_share": (active.sheet_share, 0.1),
+        "mechanics.active.normal_share": (active.normal_share, 0.1),
+        "fibres.endo_deg": (fibres.endo_deg, 8.0),
+        "fibres.epi_deg": (fibres.epi_deg, 8.0),
+        "loop.edp_mmHg": (loop.edp_mmHg, EDP_SD_MMHG),
+        "loop.esp_mmHg": (loop.esp_mmHg, ESP_SD_MMHG),
+        "loop.edv_uL": (loop.edv_uL, EDV_SD * loop.edv_uL),
+        "loop.esv_uL": (loop.esv_uL, EJECTION_FRACTION_SD * loop.edv_uL),
+    }
+    pairs = {key: given.get(_named(key, given), pair) for key, pair in usual.items()}
+    return [_parameter(key, *pair) for key, pair in pairs.items() if pair is not None]
+
+
+def check_prior(given: Given) -> None:
+    """Refuse priors that cannot be used.
+
+    Parameters
+    ----------
+    given : mapping
+        As of :func:`parameters`.
+
+    Raises
+    ------
+    PriorError
+    """
+    for key, pair in given.items():
+        of_all = key in (CONTRACTILITY, STIFFNESS)
+        if key not in LIMITS and not of_all:
+            others = [name for name in LIMITS if not name.startswith((CONTRACTILITY, STIFFNESS))]
+            shown = ", ".join([f"{CONTRACTILITY}.N", f"{STIFFNESS}.N", *others])
             raise PriorError(f"prior: {key} is not inferred: the keys are {shown}")
-    chosen = [_with(parameter, given) for parameter in found]
-    free = [parameter for parameter in chosen if parameter is not None]
-    if not free:
+        if pair is not None:
+            _check_pair(key, pair, FACTOR_LIMITS if of_all else LIMITS[key])
+    if all(given.get(_named(key, given), True) is None for key in LIMITS):
         raise PriorError("prior: leaves nothing to infer: give a mean and a standard deviation of one key")
-    return free
 
 
-def _with(parameter: Parameter, given: Given) -> Parameter | None:
-    """A parameter with the prior that is given of it, or of all segments."""
-    section = parameter.key.rpartition(".")[0]
-    named = parameter.key if parameter.key in given else section
-    if named not in given:
-        return parameter
-    if (pair := given[named]) is None:
-        return None
+def _check_pair(key: str, pair: Sequence[float], limits: tuple[float, float]) -> None:
     try:
         mean, sd = (float(number) for number in pair)
     except (TypeError, ValueError):
-        raise PriorError(f"prior: {named} = {pair!r}: give a mean and a standard deviation, or None") from None
-    low, high = parameter.limits
+        raise PriorError(f"prior: {key} = {pair!r}: give a mean and a standard deviation, or None") from None
+    low, high = limits
     if not (low <= mean <= high and np.isfinite(mean) and 0 < sd < np.inf):
         remedy = f"give a mean from {low:g} to {high:g} and a positive standard deviation"
-        raise PriorError(f"prior: {named} = ({mean:g}, {sd:g}): {remedy}")
-    if parameter.logarithmic:
-        mean, sd = float(np.log(mean)), sd / mean
-    return Parameter(parameter.key, mean, sd, parameter.limits, parameter.logarithmic)
+        raise PriorError(f"prior: {key} = ({mean:g}, {sd:g}): {remedy}")
+
+
+def _named(key: str, given: Given) -> str:
+    """The key by which the prior of a key is given: its own, or that of all segments."""
+    return key if key in given else key.rpartition(".")[0]
+
+
+def _parameter(key: str, mean: float, sd: float) -> Parameter:
+    """A parameter, of the mean and standard deviation of its value."""
+    if key.startswith(STIFFNESS):
+        return Parameter(key, float(np.log(mean)), sd / mean, LIMITS[key], logarithmic=True)
+    return Parameter(key, float(mean), float(sd), LIMITS[key])
 
 
 def scar_parameters(free: Sequence[Parameter], scarred: Sequence[int]) -> list[Parameter]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,8 @@ from echotruth.cases import Case
 from echotruth.inference.estimate import infer
 from echotruth.inference.imaged_wall import ROTATION
 from echotruth.inference.observation import observe, seen_of
-from echotruth.inference.table import truth
-from echotruth.repository import schema
+from echotruth.inference.truth import truth
+from echotruth.repository import inferred, schema
 from echotruth.repository.reader import Repository
 
 Groups = dict[str, dict[str, Any]]
@@ -31,11 +32,35 @@ def stored(repository: Repository, case: Case) -> Groups:
     """
     section = case.config.inference
     observed = observe(repository, section.tracker, case.id, section.size_px, section.errors)
+    return _groups(repository, case, observed, infer(observed, section.prior, progress=False))
+
+
+def rows(
+    repository: Repository, tracker: str | None, case: str, size: int | None, errors: Path | None
+) -> list[dict[str, Any]]:
+    """Infer a heart of a repository as is asked for, and give its rows of the table of what was inferred.
+
+    Parameters, errors
+        Those of :func:`.observation.observe` and :func:`.estimate.infer`.
+
+    Returns
+    -------
+    list of dict
+        Of each parameter its values, by the names of :data:`.inferred.COLUMNS`.
+    """
+    observed, of = observe(repository, tracker, case, size, errors), repository.case(case)
+    found = _groups(repository, of, observed, infer(observed, of.config.inference.prior))
+    about = {name: observed.attrs[name] for name in ("case", "tracker", "size_px")}
+    return [about | row for row in inferred.rows(found["inference/fit"])]
+
+
+def _groups(repository: Repository, case: Case, observed: xr.Dataset, found: xr.Dataset) -> Groups:
+    """Arrays of the groups, beside what is true of the heart."""
     seen = seen_of(repository, case, observed.attrs["tracker"], observed.attrs["size_px"])
     true = {
         _label(one.view, number): value for one in seen for number, value in zip(one.segments, one.true, strict=True)
     }
-    return groups(infer(observed, progress=False), observed, true, truth(repository, case.id), case)
+    return groups(found, observed, true, truth(repository, case.id), case)
 
 
 def groups(

@@ -26,6 +26,7 @@ from scipy.stats import norm, t
 
 from echotruth.arrays import Floats
 from echotruth.config import Config
+from echotruth.repository.choice import image_size
 
 SHIPPED = Path(__file__).with_name("tracker_errors.csv")
 """Errors of the trackers of the benchmark, of its develop hearts; `benchmarks/tracker_errors.py` makes it."""
@@ -170,14 +171,20 @@ def version(configs: Iterable[Config]) -> str:
     NoErrors
         If the table cannot be read, or does not know the tracker on images like those of one of the hearts.
     """
-    kept = {(config.inference, config.bmode.sizes[0], acoustics(config), _quantities(config)) for config in configs}
+    kept = {(_asked(config), acoustics(config), _quantities(config)) for config in configs}
     digest = sha256()
-    for inference, largest, kind, quantities in sorted(kept, key=str):
-        table = read(Path(inference.errors) if inference.errors else None)
+    for (path, tracker, size), kind, quantities in sorted(kept, key=str):
+        table = read(Path(path) if path else None)
         for quantity in quantities:
-            error_of(table, str(inference.tracker), inference.size_px or largest, kind, quantity, "")
+            error_of(table, tracker, size, kind, quantity, "")
         digest.update(table.to_csv().encode())
     return digest.hexdigest()[:16]
+
+
+def _asked(config: Config) -> tuple[str | None, str, int]:
+    """File of the table, tracker and image size that a configuration names."""
+    section = config.inference
+    return section.errors, str(section.tracker), image_size(config, section.size_px)
 
 
 def _quantities(config: Config) -> tuple[str, ...]:

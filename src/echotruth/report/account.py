@@ -11,6 +11,7 @@ from echotruth.config.imaging import ALL_VIEWS
 from echotruth.evaluation.no_estimate import FAILED
 from echotruth.repository import inferred
 from echotruth.repository.benchmark_files import total
+from echotruth.repository.choice import image_size
 from echotruth.repository.ledger import STAGES, imaged_statuses, read
 from echotruth.repository.reader import Repository
 
@@ -49,16 +50,14 @@ def failures(repository: Repository) -> dict[str, Any]:
     }
 
 
-def inference(repository: Repository) -> dict[str, Any] | None:
-    """What was inferred of the muscle of hearts, and of which it was not, with the reasons; None if none was to be."""
-    if not repository.config.inference.tracker:
-        return None
-    table = inferred.table(repository)
+def inference(repository: Repository, table: pd.DataFrame) -> dict[str, Any]:
+    """What was inferred of the muscle of hearts, as the table has it, and of which it was not, with the reasons."""
+    config, case = repository.config, inferred.shown(repository, table)
     found = [_inferred(case, rows) for case, rows in islice(table.groupby("case", sort=False), LISTED)]
     failed = [(case, repository.problem(case, None, "inference")) for case in repository.shown]
-    case = repository.shown[0] if (table["case"] == repository.shown[0]).any() else str(table["case"].min())
     of_wall = ~table["parameter"].str.startswith(("contractility.", "stiffness."))
     return {
+        "size_px": image_size(config, config.inference.size_px),
         "case": case,
         "hearts": found,
         "more_hearts": table["case"].nunique() - len(found),

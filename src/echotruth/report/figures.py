@@ -27,6 +27,7 @@ from echotruth.report import (
     loop,
     physiology,
     population,
+    posterior,
     resolutions,
     strain,
     style,
@@ -44,7 +45,13 @@ NAMES = (
     *("loop", "strain", "physiology", "population", "curves", "segments", "bullseye", "error", "leaderboard"),
     *("heart", "clip", "resolutions", "views"),
 )
-"""Figures, in the order in which they are drawn; `inference` follows if a tracker is named to infer from."""
+"""Figures, in the order in which they are drawn."""
+
+INFERRED = ("inference", "posterior")
+"""Those that follow if a tracker is named to infer from."""
+
+NONE_INFERRED = "Nothing was inferred of any heart. The reasons are in the report."
+"""In place of them."""
 
 NONE_COMPLETE = "No heart is complete, so that there is nothing to show. The reasons are in the report."
 """In place of figures."""
@@ -73,9 +80,8 @@ class Figures:
         self.folder.mkdir(parents=True, exist_ok=True)
         infers = self.config.inference.tracker is not None
         if infers:
-            table = inferred.table(self.repository)
-            table.to_csv(self.repository.folder / inferred.FILE, index=False, float_format="%.6g")
-        for name in (*NAMES, "inference") if infers else NAMES:
+            inferred.write(self.repository.folder / inferred.FILE, self.inferred)
+        for name in (*NAMES, *INFERRED) if infers else NAMES:
             figure = getattr(self, name)() if self.case else style.sentence(NONE_COMPLETE)
             if figure is not None:
                 style.save(figure, self.folder / name)
@@ -190,12 +196,16 @@ class Figures:
         self.standings.round(4).to_csv(self.folder / "leaderboard.csv", index=False)
         return leaderboard.draw(self.standings, best(self.standings))
 
+    @cached_property
+    def inferred(self) -> pd.DataFrame:
+        """Table of what was inferred of the hearts."""
+        return inferred.table(self.repository)
+
     def inference(self) -> Figure:
         """What was inferred of the muscle of a heart from what a tracker saw."""
-        hearts = inferred.hearts(self.repository)
-        if not hearts:
-            return style.sentence("Nothing was inferred of any heart. The reasons are in the report.")
-        case = self.case if self.case in hearts else hearts[0]
+        case = inferred.shown(self.repository, self.inferred)
+        if not case:
+            return style.sentence(NONE_INFERRED)
         fit = self.repository.arrays("inference/fit", case)
         groups = {
             name: self.repository.arrays(f"inference/{name}", case) for name in ("observed_data", "constant_data")
@@ -203,6 +213,17 @@ class Figures:
         seen = groups["observed_data"]["value"], groups["constant_data"]["covariance"]
         true = groups["constant_data"]["true_value"]
         return inference.draw(fit, inference.Seen(observations(self.config), *seen, true, fit["predicted"]))
+
+    def posterior(self) -> Figure:
+        """What was learned of the parameters of that heart together."""
+        case = inferred.shown(self.repository, self.inferred)
+        if not case:
+            return style.sentence(NONE_INFERRED)
+        fit = self.repository.arrays("inference/fit", case)
+        names = posterior.chosen(fit)
+        at = [LABELS["parameter"].index(name) for name in names]
+        draws = (self.repository.arrays(f"inference/{name}", case)["value"][0] for name in ("posterior", "prior"))
+        return posterior.draw(names, *(values[:, at].astype(float) for values in draws), fit["true"][at])
 
     def bullseye(self) -> Figure:
         """Strain of the segments at end-systole, true and of the best tracker."""

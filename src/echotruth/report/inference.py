@@ -55,26 +55,27 @@ def draw(fit: Arrays, seen: Seen) -> Figure:
         Group `inference/fit` of the heart.
     seen : Seen
     """
-    figure = style.figure(9.6, 6.9)
-    upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[3.5, 3.4])[:, 0]
-    discs = upper.subplots(1, 4)
+    figure = style.figure(9.6, 9.6)
+    upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[6.2, 3.4])[:, 0]
+    *discs, rest = upper.subplots(2, 3).ravel()
+    rest.axis("off")
     names = [f"contractility.{number}" for number in range(1, 18)]
     at = [LABELS["parameter"].index(name) for name in names]
     known = fit["identifiable"][at] == 1
     shown = {
         "Inferred (mean)": (np.where(known, fit["mean"][at], np.nan), "contractility"),
-        "Standard deviation": (fit["sd"][at], "sd"),
-        "Probability of a scar": (fit["scar_probability"], "probability"),
         "True": (fit["true"][at], "contractility"),
+        "Probability of a scar": (fit["scar_probability"], "probability"),
+        "Standard deviation": (fit["sd"][at], "sd"),
+        "Standard deviation before": (fit["prior_sd"][at], "sd"),
     }
     for axes, (title, (values, scale)) in zip(discs, shown.items(), strict=True):
         bullseye.disc(axes, values, _SCALES[scale], decimals=2)
         axes.set_title(title, fontweight="normal", fontsize=9)
     upper.suptitle("Contractility of the segments over the mean of the wall", fontweight="bold", fontsize=10)
-    hatched = Patch(
-        linewidth=0.6, label="not identifiable, as little known as before; or shown by no view", **bullseye.UNSEEN
-    )
-    upper.legend(handles=[hatched], loc="lower center", fontsize=8.5, labelcolor=style.MUTED)
+    reason = "not identifiable, as little\nknown as before; or\nshown by no view"
+    hatched = Patch(linewidth=0.6, label=reason, **bullseye.UNSEEN)
+    rest.legend(handles=[hatched], loc="center", fontsize=8.5, labelcolor=style.MUTED)
     _strains(lower.subplots(), seen)
     return figure
 

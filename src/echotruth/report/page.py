@@ -14,7 +14,7 @@ from echotruth.report import account, board, style, vector
 from echotruth.report.clips import STRAIN_LIMIT, clips
 from echotruth.report.comparison import Comparison
 from echotruth.report.hearts import MEASURES, subjects
-from echotruth.repository import durable
+from echotruth.repository import durable, inferred
 from echotruth.repository.choice import main_view
 from echotruth.repository.description.citation import PAPER
 from echotruth.repository.reader import Repository
@@ -47,6 +47,7 @@ def _context(repository: Repository) -> dict[str, Any]:
     """All that the template sets in."""
     folder, config, cases, shown = repository.folder, repository.config, repository.cases, repository.shown
     case, view = shown[0] if shown else "", main_view(config)
+    infers = bool(case and config.inference.tracker)
     standings = pd.read_csv(folder / "figures/leaderboard.csv") if case else None
     order = [name for name in best(standings) if name in repository.trackers] if standings is not None else []
     comparison = Comparison(repository, repository.case(case), tuple(order)) if case else None
@@ -70,7 +71,7 @@ def _context(repository: Repository) -> dict[str, Any]:
         "tally": {name: cases[name].value_counts().sort_index().to_dict() for name in ("status", "diagnosis")},
         "measures": list(MEASURES),
         "hearts": subjects(repository, view, config.bmode.sizes[-1]) if shown else [],
-        "inferred": account.inference(repository) if shown else None,
+        "inferred": account.inference(repository, inferred.read(folder / inferred.FILE)) if infers else None,
         "failures": account.failures(repository),
         "stages": account.stages(folder),
         "configuration": (folder / "config.yaml").read_text(encoding="utf-8"),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from echotruth.repository import schema
+from echotruth.repository.choice import image_size
 from echotruth.section import UNITS
 
 if TYPE_CHECKING:
@@ -50,16 +52,43 @@ def hearts(repository: Repository) -> list[str]:
 
 def table(repository: Repository) -> pd.DataFrame:
     """Table of all that was inferred of the hearts of a repository: a row for each heart and parameter."""
-    section = repository.config.inference
-    about = {"tracker": section.tracker, "size_px": section.size_px or repository.sizes[0]}
+    config, section = repository.config, repository.config.inference
+    about = {"tracker": section.tracker, "size_px": image_size(config, section.size_px)}
     fits = {case: repository.arrays("inference/fit", case) for case in hearts(repository)}
-    rows = [{"case": case} | row for case, fit in fits.items() for row in _rows(fit)]
-    found = pd.DataFrame(rows).assign(**about) if rows else pd.DataFrame()
-    return found.reindex(columns=list(COLUMNS))
+    return table_of([{"case": case} | about | row for case, fit in fits.items() for row in rows(fit)])
 
 
-def _rows(fit: dict[str, Any]) -> list[dict[str, Any]]:
-    """Rows of the parameters of one heart that were inferred."""
+def write(path: Path, table: pd.DataFrame) -> None:
+    """Write a table, with six digits."""
+    table.to_csv(path, index=False, float_format="%.6g")
+
+
+def read(path: Path) -> pd.DataFrame:
+    """Read a table that :func:`write` wrote."""
+    texts = dict.fromkeys(("case", "tracker", "parameter", "unit"), str)
+    return pd.read_csv(path, dtype=texts, keep_default_na=False, na_values="")
+
+
+def shown(repository: Repository, table: pd.DataFrame) -> str:
+    """Case that is shown where only one can be: the first complete one or, if nothing was inferred of it, the first of
+    which something was; empty if there is none."""
+    cases = list(table["case"].unique())
+    return next((str(case) for case in (*repository.shown[:1], *cases) if case in cases), "")
+
+
+def table_of(found: list[dict[str, Any]]) -> pd.DataFrame:
+    """Table of rows, which may be none."""
+    return pd.DataFrame(found, columns=list(COLUMNS))
+
+
+def rows(fit: dict[str, Any]) -> list[dict[str, Any]]:
+    """Rows of the parameters of one heart that were inferred, by the names of their columns.
+
+    Parameters
+    ----------
+    fit : dict of ndarray
+        Group `inference/fit` of the heart.
+    """
     probability = float(fit["misfit_probability"])
     about = {
         "misfit_probability": probability,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from copy import copy
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from echotruth.cases import Case, expand
 from echotruth.config import Cases, Config
 from echotruth.config.loading import ConfigError, load, validate
 from echotruth.repository import ledger, settings
+from echotruth.repository.choice import image_size
 from echotruth.repository.ledger import record_path, record_paths
 from echotruth.repository.provenance import code_version, settings_version
 from echotruth.repository.verdict import excluded
@@ -21,6 +22,23 @@ from echotruth.workflow.sharing import first_with_same
 
 Wildcards = Any
 """Wildcards of a job: its `case`, and its `view` and `size` if there are."""
+
+
+def errors_version(config: Config, cases: Iterable[Case]) -> str:
+    """Hash of the errors of the tracker from which the muscle of cases is inferred, "" if none is named.
+
+    Raises
+    ------
+    NoErrors, PriorError
+        If they are not known, or the priors cannot be used.
+    """
+    if not config.inference.tracker:
+        return ""
+    from echotruth.inference.parameters import check_prior
+    from echotruth.inference.tracker_errors import version
+
+    check_prior(config.inference.prior)
+    return version(case.config for case in cases)
 
 
 class Plan:
@@ -55,7 +73,7 @@ class Plan:
         self.config: Config = validate(given, source)
         self.folder = Path("out") / self.config.name
         self._every = {case.id: case for case in expand(self.config, source)}
-        self._errors = self._error_version(source)
+        self._errors = self._errors_version(source)
         self._motions = settings.motions({id: case.config for id, case in self._every.items()})
         self._same = first_with_same(self._motions, ledger.rows(self.folder / "registry.txt"))
         self._choose(Block.parse(block, source))
@@ -117,15 +135,10 @@ class Plan:
     def _settings(self, stage: str, case: str, view: str) -> str:
         return settings_version(*settings.OF_VIEW[stage](self._every[case].config, view))
 
-    def _error_version(self, source: str) -> str:
-        """Hash of the errors of the tracker from which is inferred; ConfigError if they are not known."""
-        if not self.config.inference.tracker:
-            return ""
-        from echotruth.inference.tracker_errors import NoErrors, version
-
+    def _errors_version(self, source: str) -> str:
         try:
-            return version(case.config for case in self._every.values())
-        except NoErrors as error:
+            return errors_version(self.config, self._every.values())
+        except ValueError as error:
             raise ConfigError(f"{source}: inference: {error}") from None
 
     def same_motion(self, wildcards: Wildcards) -> list[str]:
@@ -139,7 +152,7 @@ class Plan:
 
     def tracked(self, wildcards: Wildcards) -> list[str]:
         """Records of what was tracked in the views of a heart, in the images from which is inferred."""
-        size = self.config.inference.size_px or self.config.bmode.sizes[0]
+        size = image_size(self.config, self.config.inference.size_px)
         return [str(record_path(self.folder, "tracking", wildcards.case, view, size)) for view in self.config.views]
 
     def bmode_source(self, wildcards: Wildcards) -> list[str]:

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import echotruth as et
-from echotruth.inference import table
+from echotruth.inference.truth import truth
 from echotruth.section import UNITS
 
 
 def test_true_contractility_of_an_infarct_is_none_there_and_one_in_the_mean_of_the_wall():
-    true, heart = table.truth(et.sample(), "infarct"), et.sample().heart("infarct")
+    true, heart = truth(et.sample(), "infarct"), et.sample().heart("infarct")
     assert true["contractility.7"] == true["contractility.8"] == 0
     assert true["contractility.11"] > true["contractility.10"] > 0
     volume = np.bincount(heart.arrays["fibres"]["segment"], minlength=18)[1:]  # cells of about one size
@@ -21,7 +21,7 @@ def test_true_contractility_of_an_infarct_is_none_there_and_one_in_the_mean_of_t
 
 
 def test_true_values_of_a_healthy_heart_are_its_configuration():
-    true = table.truth(et.sample(), "healthy")
+    true = truth(et.sample(), "healthy")
     config = et.sample().case("healthy").config
     assert true["fibres.endo_deg"] == config.fibres.endo_deg
     assert true["mechanics.active.sheet_share"] == config.mechanics.active.sheet_share

@@ -1,61 +1,15 @@
-"""Rows of the table of what was inferred of the hearts of a repository, beside what is true."""
+"""True values of what is inferred of a heart."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
-import pandas as pd
-import xarray as xr
 
 from echotruth.cases import Case
 from echotruth.heart import Heart
 from echotruth.inference.draws import MATERIAL, TENSION
-from echotruth.inference.estimate import infer
-from echotruth.inference.observation import observe
 from echotruth.inference.segment_means import means_of_cells
-from echotruth.repository.inferred import COLUMNS
 from echotruth.repository.reader import Repository
 from echotruth.section import UNITS, value_of
-
-
-def rows(
-    repository: Repository, tracker: str | None, case: str, size: int | None, errors: Path | None
-) -> list[dict[str, Any]]:
-    """Infer one heart of a repository.
-
-    Parameters, errors
-        Those of :func:`.observation.observe` and :func:`.estimate.infer`.
-
-    Returns
-    -------
-    list of dict
-        Of each parameter its values in the order of `COLUMNS`.
-    """
-    return rows_of(infer(observe(repository, tracker, case, size, errors)), truth(repository, case))
-
-
-def rows_of(found: xr.Dataset, true: dict[str, float]) -> list[dict[str, Any]]:
-    """Rows of what :func:`.estimate.infer` returns, beside the true values by the name of the parameter."""
-    table = found.drop_dims(["observation", "draw", "aha"]).to_dataframe().reset_index()
-    about = {name: found.attrs[name] for name in COLUMNS if name in found.attrs}
-    scars = {
-        f"contractility.{number}": float(found["scar_probability"].sel(aha=number)) for number in found["aha"].values
-    }
-    names = table["parameter"]
-    table = table.assign(
-        **about,
-        true=[true.get(name, np.nan) for name in names],
-        scar_probability=[scars.get(name, np.nan) for name in names],
-    )
-    table[["misfit", "converged"]] = table[["misfit", "converged"]].astype(bool)
-    return [{name: row[name] for name in COLUMNS} for row in table.to_dict("records")]
-
-
-def columns(table: list[dict[str, Any]]) -> pd.DataFrame:
-    """Table of rows."""
-    return pd.DataFrame(table, columns=list(COLUMNS))
 
 
 def truth(repository: Repository, case: str) -> dict[str, float]:
