@@ -32,7 +32,7 @@ import xarray as xr
 import echotruth as et
 from echotruth.inference.estimate import COVERED
 from echotruth.inference.observation import dataset, loop_of, seen_of
-from echotruth.inference.table import truth
+from echotruth.inference.truth import truth
 from echotruth.inference.tracker_errors import TrackerError
 
 RESULTS = Path(__file__).parent / "results"
