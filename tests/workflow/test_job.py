@@ -2,6 +2,7 @@
 
 import errno
 import os
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -46,6 +47,15 @@ def test_damaged_file_is_deleted_with_a_sentence(job):
         ):
             job.passed_on(job.lines)
         assert not job.lines.exists()
+
+
+def test_bytes_in_place_of_an_array_are_not_passed_on(job):
+    """NumPy gives what is no array in an archive as it stands there."""
+    job.lines.parent.mkdir(parents=True, exist_ok=True)
+    with ZipFile(job.lines, "w") as archive:
+        archive.writestr("lines.npy", b"no array")
+    with pytest.raises(FileNotFoundError, match="is not what was written"):
+        job.passed_on(job.lines)
 
 
 def test_objects_are_not_unpickled(job):
