@@ -9,6 +9,7 @@ import pytest
 from finished_repository import configured
 
 from echotruth.cases import expand
+from echotruth.repository.case_file import read_case
 from echotruth.repository.layout import lay_out
 from echotruth.workflow.job import Job, run
 
@@ -56,6 +57,13 @@ def test_bytes_in_place_of_an_array_are_not_passed_on(job):
         archive.writestr("lines.npy", b"no array")
     with pytest.raises(FileNotFoundError, match="is not what was written"):
         job.passed_on(job.lines)
+
+
+def test_pipe_in_place_of_the_configuration_of_a_case_is_not_waited_for(tmp_path):
+    (tmp_path / "cases").mkdir()
+    os.mkfifo(tmp_path / "cases/heart.json")
+    with pytest.raises(FileNotFoundError, match=r"heart\.json: is not a file: the ids are in cases\.csv"):
+        read_case(tmp_path, "heart")
 
 
 def test_objects_are_not_unpickled(job):
