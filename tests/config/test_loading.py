@@ -38,6 +38,8 @@ BAD = {
     "tracking: {window_px: 32}": "window_px is not a key: did you mean tracking.trackers.NAME.window_px?",
     "fibres: {endo: 60}": "fibres.endo is not a key: did you mean fibres.endo_deg?",
     "materials: {}": "materials is not a key: the keys here are name, seed, geometry,",
+    "views: {preset: {}}": "views.preset = {}: must be one of paper, echo",
+    "views: {preset: {position: 0.4}, mid: {}}": "views.preset = {'position': 0.4}: must be one of paper, echo",
     "views: {mid: {positon: 0.5}}": "views.mid.positon is not a key: did you mean views.mid.position?",
     "views: {mid: {plane: sagittal}}": "views.mid.plane = 'sagittal': should be 'short_axis' or 'long_axis'",
     "views: {all: {position: 0.4}}": "views = 'all': is the name of the mean over all views in the lead",

@@ -1,6 +1,7 @@
 """A check finds every fault of a repository, and healing it makes just what was damaged, byte for byte."""
 
 import json
+import os
 import shutil
 from pathlib import Path
 from shutil import copytree, rmtree
@@ -259,7 +260,14 @@ def test_exchanged_metadata_are_found_and_no_values_are_read_by_them(folder, arr
 
 @pytest.mark.parametrize("array", ["bmode/64/image", "physiology/scalars", "mechanics/pressure"])
 @pytest.mark.parametrize(
-    "edited", [{"shape": [0, 0, 0, 0]}, {"data_type": "int16"}, {"codecs": [{"name": "bytes"}]}, {"node_type": "group"}]
+    "edited",
+    [
+        {"shape": [0, 0, 0, 0]},
+        {"data_type": "int16"},
+        {"codecs": [{"name": "bytes"}]},
+        {"node_type": "group"},
+        {"attributes": []},
+    ],
 )
 def test_edited_metadata_are_found_even_if_the_record_has_their_checksum(folder, array, edited):
     path, before = folder / "small.zarr" / array / "zarr.json", finished.content(folder)
@@ -313,6 +321,76 @@ def test_damaged_report_and_figures_are_found_and_deleted(folder, harm):
     assert set(faults(folder)) == {"figures/loop.png"}
     heal(check(folder))
     assert files[0].exists() and not files[1].exists()
+
+
+@pytest.mark.parametrize(("name", "page"), [("configuration", False), ("report", True)])
+def test_missing_record_of_the_files_beside_the_store_is_found(folder, name, page):
+    """Without it nothing vouches for them."""
+    (folder / "report.html").write_bytes(b"drawn once")
+    commit_beside(folder, folder / "ledger/report.json", [folder / "report.html"])
+    (folder / f"ledger/{name}.json").unlink()
+    assert faults(folder) == {f"ledger/{name}.json": "is missing"}
+    heal(check(folder))
+    run(folder)
+    assert check(folder).faults == []
+    assert (folder / "report.html").exists() is not page  # a run draws it again
+
+
+def test_record_of_the_report_in_place_of_that_of_the_publication_is_found(folder):
+    commit_beside(folder, folder / "ledger/repository.json", [])
+    assert faults(folder) == {"ledger/repository.json": "cannot be read (it is not that of a publication)"}
+
+
+def pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+def device(path: Path) -> None:
+    path.unlink()
+    path.symlink_to("/dev/zero")
+
+
+def loop(path: Path) -> None:
+    path.unlink()
+    path.symlink_to(path.name)
+
+
+def directory(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+@pytest.mark.parametrize("harm", [pipe, device, loop, directory])
+def test_what_is_no_file_is_found_without_waiting_for_its_end_and_made_again(folder, harm):
+    names = ["small.zarr/bmode/64/image/c/0/0/0/0/0", "small.zarr/bmode/64/image/zarr.json", "cases.csv"]
+    names.append(record_path(folder, "truth", CASES[0], "mid", finished.SIZE).relative_to(folder).as_posix())
+    before = finished.content(folder)
+    for name in names:
+        harm(folder / name)
+    assert set(names) <= set(faults(folder))
+    heal(check(folder))
+    run(folder)
+    assert check(folder).faults == [] and finished.content(folder) == before
+
+
+@pytest.mark.parametrize("record", ["structure.json", "configuration.json", "bmode"])
+def test_healing_touches_no_file_outside(folder, record):
+    """The records of a repository that comes from elsewhere may name any file."""
+    path = (
+        record_path(folder, "bmode", CASES[0], "mid", finished.SIZE)
+        if record == "bmode"
+        else folder / "ledger" / record
+    )
+    mine, key = folder.with_name("mine"), "files" if record == "configuration.json" else "sha256"
+    mine.write_text("mine")
+    known = ledger.read(path)
+    known[key] |= {name: "0" * 64 for name in (str(mine), "../mine", "../../mine")}
+    ledger.commit(path, known)
+    found = check(folder)
+    assert path.relative_to(folder).as_posix() in {fault.path for fault in found.faults}
+    heal(found)
+    assert mine.read_text() == "mine"
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Records are complete or absent, and rows never change."""
 
+import json
 import os
 import subprocess
 import sys
@@ -14,6 +15,41 @@ def test_record_reads_back(tmp_path):
     ledger.commit(tmp_path / "rf/heart/mid.json", record)
     assert ledger.read(tmp_path / "rf/heart/mid.json") == record
     assert [path.name for path in (tmp_path / "rf/heart").iterdir()] == ["mid.json"]
+
+
+@pytest.mark.parametrize("key", ["sha256", "files"])
+@pytest.mark.parametrize("name", ["/etc/passwd", "../../mine", "bmode/../../../mine"])
+def test_record_that_vouches_for_a_file_outside_is_not_read(tmp_path, key, name):
+    ledger.commit(tmp_path / "mid.json", {key: {"bmode/64/image/c/0": "0" * 64, name: "0" * 64}})
+    with pytest.raises(json.JSONDecodeError, match="it names a file outside of the repository"):
+        ledger.read(tmp_path / "mid.json")
+
+
+@pytest.mark.parametrize("measures", [None, [1, 2], {"gls_max": "high"}])
+def test_record_whose_measures_are_no_numbers_is_not_read(tmp_path, measures):
+    ledger.commit(tmp_path / "heart.json", {"bounded": measures})
+    with pytest.raises(json.JSONDecodeError, match="its entry bounded does not hold numbers"):
+        ledger.read(tmp_path / "heart.json")
+
+
+@pytest.mark.parametrize("text", ["null", "[1, 2]", "1e999", '"sha256"'])
+def test_text_that_is_no_record_is_not_read(text):
+    with pytest.raises(json.JSONDecodeError, match="it is not a record"):
+        ledger.parse(text)
+
+
+def test_record_of_many_levels_is_not_read(tmp_path):
+    (tmp_path / "mid.json").write_text('{"a":' * 100_000 + "1" + "}" * 100_000)
+    with pytest.raises(json.JSONDecodeError, match="it is nested too deeply"):
+        ledger.read(tmp_path / "mid.json")
+
+
+def test_pipe_in_place_of_a_record_or_registry_is_not_waited_for(tmp_path):
+    for name in ("mid.json", "registry.txt"):
+        os.mkfifo(tmp_path / name)
+    with pytest.raises(json.JSONDecodeError, match="it is not a file"):
+        ledger.read(tmp_path / "mid.json")
+    assert ledger.rows(tmp_path / "registry.txt") == {}
 
 
 def test_record_that_cannot_be_written_leaves_no_file_under_its_name(tmp_path):

@@ -61,6 +61,20 @@ def test_merged_repository_has_the_hearts_of_both_and_is_whole(out):
     assert list(tree["cases/status"].values) == 3 * ["complete"]
 
 
+@pytest.mark.parametrize("into", ["both", "first"])
+def test_record_that_cannot_be_read_is_named(out, capsys, into):
+    """One that names a file outside would be merged into a place of its choice."""
+    path = record_path(out / "second", "bmode", next(iter(finished.expand(SECOND))).id, "mid", finished.SIZE)
+    known = ledger.read(path)
+    known["sha256"]["../../../mine/c/0/0"] = "0" * 64
+    ledger.commit(path, known)
+    assert merge_repositories(out / into, [out / "second"]) == 2
+    told = capsys.readouterr().err
+    assert (
+        f"{path}: cannot be read (it names a file outside of the repository" in told and "before it is merged" in told
+    )
+
+
 def test_hearts_are_added_without_a_change_of_what_was_there(out):
     before, owners, times = finished.content(out / "first"), finished.owners(out / "first"), {}
     for path in (out / "first/ledger").glob("*/**/*.json"):

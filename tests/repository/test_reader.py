@@ -152,6 +152,17 @@ def test_script_may_go_to_another_folder_before_and_while_it_reads(known, tmp_pa
     assert (done.stdout, done.stderr) == (f"({FRAMES}, 64, 64) mid 8\n", "")
 
 
+def test_array_of_an_earlier_format_is_not_read(known, tmp_path):
+    """Its codecs may be any of numcodecs, of which one is the pickle."""
+    folder = shutil.copytree(known.folder, tmp_path / "known")
+    array = folder / f"known.zarr/bmode/{SIZES[0]}/image"
+    shape = et.Repository(folder).array(f"bmode/{SIZES[0]}/image").shape
+    shutil.rmtree(array)
+    zarr.create_array(array, shape=shape, dtype="uint8", zarr_format=2)
+    with pytest.raises(FileNotFoundError, match=f"has no array bmode/{SIZES[0]}/image"):
+        et.Repository(folder).read(f"bmode/{SIZES[0]}/image", 0)
+
+
 def test_scores_have_a_row_for_every_clip_and_tracker(repository):
     scores = repository.scores
     assert len(scores) == 2 * 2 * 2 and set(scores["failure"]) == {""}

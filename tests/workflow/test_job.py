@@ -2,12 +2,14 @@
 
 import errno
 import os
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 from finished_repository import configured
 
 from echotruth.cases import expand
+from echotruth.repository.case_file import read_case
 from echotruth.repository.layout import lay_out
 from echotruth.workflow.job import Job, run
 
@@ -46,6 +48,22 @@ def test_damaged_file_is_deleted_with_a_sentence(job):
         ):
             job.passed_on(job.lines)
         assert not job.lines.exists()
+
+
+def test_bytes_in_place_of_an_array_are_not_passed_on(job):
+    """NumPy gives what is no array in an archive as it stands there."""
+    job.lines.parent.mkdir(parents=True, exist_ok=True)
+    with ZipFile(job.lines, "w") as archive:
+        archive.writestr("lines.npy", b"no array")
+    with pytest.raises(FileNotFoundError, match="is not what was written"):
+        job.passed_on(job.lines)
+
+
+def test_pipe_in_place_of_the_configuration_of_a_case_is_not_waited_for(tmp_path):
+    (tmp_path / "cases").mkdir()
+    os.mkfifo(tmp_path / "cases/heart.json")
+    with pytest.raises(FileNotFoundError, match=r"heart\.json: is not a file: the ids are in cases\.csv"):
+        read_case(tmp_path, "heart")
 
 
 def test_objects_are_not_unpickled(job):

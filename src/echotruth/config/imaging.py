@@ -244,10 +244,10 @@ they show all of a bullseye. The basal plane is low enough for the base not to p
 
 def named_views(value: Any) -> Any:
     """Views of a section `views`, in which those of its `preset`, if it has one, are named."""
-    preset = value.get("preset") if isinstance(value, dict) else None
-    if not isinstance(preset, str):
+    if not isinstance(value, dict) or "preset" not in value:
         return value
-    if preset not in VIEWS:
+    preset = value["preset"]
+    if not isinstance(preset, str) or preset not in VIEWS:
         raise invalid("preset", preset, f"must be one of {', '.join(VIEWS)}")
     return VIEWS[preset] | {name: view for name, view in value.items() if name != "preset"}
 

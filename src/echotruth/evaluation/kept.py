@@ -55,7 +55,7 @@ class Keeping:
         self.discard()
         rows, views = (list(ledger.rows(self.folder / name)) for name in ("registry.txt", "views.txt"))
         repository = self.folder / f"{self.config.name}.zarr"
-        time = np.asarray(zarr.open_array(repository, path="mechanics/time", mode="r")[...])
+        time = np.asarray(zarr.open_array(repository, path="mechanics/time", mode="r", zarr_format=3)[...])
         some = next(iter(self.config.tracking.trackers.values()))
         tracking = self.config.tracking.model_copy(update={"trackers": {self.tracker: some}})
         config = self.config.model_copy(update={"tracking": tracking})

@@ -26,7 +26,7 @@ def sample_positions(rf: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 def open_rf(clip: Clip) -> xr.Dataset:
     """Open the group `rf` of one case and view, without reading its arrays; the size of the elements is the case's."""
-    rf = xr.open_zarr(clip.repository.store, group="rf", consolidated=False, chunks=None)
+    rf = xr.open_zarr(clip.repository.store, group="rf", consolidated=False, chunks=None, zarr_format=3)
     probe = clip.case.config.probe.si()
     rf = rf.assign_attrs(element_width=probe.width, element_height=probe.height)
     return rf.sel(case=clip.case.id, view=clip.view)

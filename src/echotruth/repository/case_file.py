@@ -22,6 +22,9 @@ def read_case(folder: Path, case: str) -> Case:
         If it has no configuration, or one that is damaged.
     """
     path, remedy = case_path(folder, case), "the ids are in cases.csv; run the repository again, which writes the file"
+    # A pipe or a device could be read for ever.
+    if path.exists() and not path.is_file():
+        raise FileNotFoundError(f"{path}: is not a file: {remedy}")
     try:
         return Case(case, {}, Config.model_validate_json(path.read_bytes()))
     except FileNotFoundError:

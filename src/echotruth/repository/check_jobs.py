@@ -89,7 +89,7 @@ def _read_record(job: JobRecord) -> tuple[dict[str, Any] | None, str]:
     except (OSError, ValueError) as error:
         return None, f"cannot be read ({reason(error)})"
     identity = {"stage": job.stage, "case": job.case, "view": job.view, "size": job.size}
-    if not isinstance(record, dict) or any(record.get(key, "") != value for key, value in identity.items()):
+    if any(record.get(key, "") != value for key, value in identity.items()):
         return None, f"is not the record of {job.job}"
     if record.get("status") not in STATUSES:
         return None, f"has the status {record.get('status')!r}, not one of {', '.join(STATUSES)}"

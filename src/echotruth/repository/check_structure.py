@@ -70,8 +70,8 @@ def check_others(repository: Inventory) -> Iterator[Fault]:
     """Record of the publication, and the files beside the store: table, configurations of the hearts, and report."""
     path = repository.publication_record
     try:
-        if path.is_file():
-            ledger.read(path)
+        if path.exists() and not isinstance(ledger.read(path).get("files"), int):
+            raise ValueError("it is not that of a publication")
     except ValueError as error:
         yield Fault(repository.name(path), f"cannot be read ({reason(error)})", _REWRITTEN, (path,))
     for record in repository.records_beside:
@@ -79,13 +79,22 @@ def check_others(repository: Inventory) -> Iterator[Fault]:
 
 
 def _beside(repository: Inventory, record: Path) -> Iterator[Fault]:
-    """Files beside the store against the checksums in their record, which earlier versions have not written."""
+    """Files beside the store against the checksums in their record."""
+    name, page = repository.name(record), repository.folder / "report.html"
+    of_report = record.name == "report.json"
+    # Without its page a run draws the report again, and then writes its record.
+    page_of_it = (page,) if of_report else ()
+    if not (record.exists() or record.is_symlink()):
+        # Earlier versions have not written it, and there need be no report yet.
+        if repository.is_of_this_version and (page.exists() or not of_report):
+            yield Fault(name, "is missing", _REWRITTEN, (), page_of_it)
+        return
     try:
-        files = ledger.read(record)["files"] if record.is_file() else {}
+        files = ledger.read(record)["files"]
         if not are_checksums(files):
             raise ValueError("has no checksums")
-    except (ValueError, KeyError, TypeError) as error:
-        yield Fault(repository.name(record), f"cannot be read ({reason(error)})", _REWRITTEN, (), (record,))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        yield Fault(name, f"cannot be read ({reason(error)})", _REWRITTEN, (), (record, *page_of_it))
         return
     for name, checksum in files.items():
         if problem := damage(repository.folder / name, checksum):
@@ -123,7 +132,7 @@ def _metadata_problem(opened: zarr.Array[Any], array: Array, repository: Invento
 
 def _check_times(repository: Inventory) -> Iterator[Fault]:
     try:
-        times = np.asarray(zarr.open_array(repository.store, path="mechanics/time", mode="r")[...])
+        times = np.asarray(zarr.open_array(repository.store, path="mechanics/time", mode="r", zarr_format=3)[...])
     except Exception:  # a repository that was not laid out, or in an earlier layout
         return
     rows = [repository.rows[case] for case in repository.cases if repository.rows.get(case, len(times)) < len(times)]

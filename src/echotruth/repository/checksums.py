@@ -46,6 +46,9 @@ def commit_beside(folder: Path, record: Path, files: list[Path]) -> None:
 def damage(file: Path, expected: str) -> str:
     """What is wrong with a file that must have a SHA-256; empty if nothing is."""
     try:
+        # A pipe or a device could be read for ever.
+        if file.exists() and not file.is_file():
+            return "is not a file"
         with file.open("rb") as opened:
             if file_digest(opened, sha256).hexdigest() == expected:
                 return ""

@@ -73,7 +73,8 @@ def _scale(repository: Inventory, path: str, *arrays: NDArray[Any]) -> Any:
     for pack in schema.packs_of(group):
         if path == f"{group}/{pack.array.name}":
             largest = magnitude.reshape(-1, magnitude.shape[-1]).max(0)
-            units = np.asarray(zarr.open_array(repository.store, path=f"{group}/{pack.dimension}_units", mode="r")[...])
+            of_units = f"{group}/{pack.dimension}_units"
+            units = np.asarray(zarr.open_array(repository.store, path=of_units, mode="r", zarr_format=3)[...])
             scale = {unit: max(largest[units == unit].max(), SMALLEST_SCALE.get(unit, 0)) for unit in units.tolist()}
             return np.array([scale[unit] for unit in units.tolist()])
     return magnitude.max(initial=0)

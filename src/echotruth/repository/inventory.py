@@ -117,9 +117,12 @@ class Inventory:
     def opened(self) -> dict[str, zarr.Array[Any]]:
         """Arrays of the jobs that can be opened, by path."""
         arrays = {}
-        for path in self.shard_paths:
+        # A pipe or a device could be read for ever.
+        for path in (path for path in self.shard_paths if (self.store / path / "zarr.json").is_file()):
             with suppress(Exception):  # damaged metadata, which is a fault of its own, fail in many ways
-                arrays[path] = zarr.open_array(self.store, path=path, mode="r")
+                array = zarr.open_array(self.store, path=path, mode="r", zarr_format=3)
+                if isinstance(array.metadata.attributes, dict):
+                    arrays[path] = array
         return arrays
 
     @cached_property

@@ -60,7 +60,7 @@ def about(folder: Path, tracker: str) -> dict[str, Any]:
     """
     path = store_path(folder, tracker)
     try:
-        found = dict(zarr.open_group(path, mode="r").attrs)
+        found = dict(zarr.open_group(path, mode="r", zarr_format=3).attrs)
     except (ValueError, KeyError, TypeError, OSError):  # what it is said to be by zarr is no help
         found = {}
     if not {"settings", "clips"} <= set(found):

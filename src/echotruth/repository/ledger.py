@@ -70,18 +70,40 @@ def read(path: Path) -> dict[str, Any]:
     JSONDecodeError, UnicodeDecodeError
         If it is not what was written.
     """
+    # A pipe or a device could be read for ever.
+    if path.exists() and not path.is_file():
+        raise json.JSONDecodeError("it is not a file", "", 0)
     return parse(path.read_text(encoding="utf-8"))
 
 
 def parse(text: str) -> dict[str, Any]:
     """A record from the text of its file, as :func:`read` returns it."""
-    record = json.loads(text)
-    if isinstance(record, dict):
-        seal = record.pop("seal", None)
-        is_other = seal is not None and seal != _seal(record)
-        if is_other or (seal is None and _has_seal_of_other_name(record)):
-            raise json.JSONDecodeError("the record is not what was written", text, 0)
+    try:
+        record = json.loads(text)
+    except RecursionError:
+        raise json.JSONDecodeError("it is nested too deeply", text, 0) from None
+    if not isinstance(record, dict):
+        raise json.JSONDecodeError("it is not a record", text, 0)
+    seal = record.pop("seal", None)
+    is_other = seal is not None and seal != _seal(record)
+    if is_other or (seal is None and _has_seal_of_other_name(record)):
+        raise json.JSONDecodeError("the record is not what was written", text, 0)
+    if flaw := _flaw(record):
+        raise json.JSONDecodeError(flaw, text, 0)
     return record
+
+
+def _flaw(record: dict[str, Any]) -> str:
+    """What makes a record one that this program has not written, whatever its seal is; empty if nothing does."""
+    listed = (record.get(key) for key in ("sha256", "files"))
+    names = (name for files in listed if isinstance(files, dict) for name in files)
+    # Whoever heals, merges or releases the repository would delete the file, or take it along.
+    if any(name.startswith("/") or ".." in name.split("/") for name in names):
+        return "it names a file outside of the repository"
+    measures = record.get("bounded", {})
+    if not (isinstance(measures, dict) and all(isinstance(value, int | float) for value in measures.values())):
+        return "its entry bounded does not hold numbers"
+    return ""
 
 
 def _has_seal_of_other_name(record: dict[str, Any]) -> bool:
@@ -162,4 +184,4 @@ def register(registry: Path, ids: list[str], stored: Sequence[str] = ()) -> dict
 
 
 def _lines(registry: Path) -> list[str]:
-    return registry.read_text(encoding="utf-8", errors="replace").split() if registry.exists() else []
+    return registry.read_text(encoding="utf-8", errors="replace").split() if registry.is_file() else []

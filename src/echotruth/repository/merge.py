@@ -15,7 +15,7 @@ from echotruth.config.loading import ConfigError, validate
 from echotruth.repository import durable, ledger
 from echotruth.repository.checksums import ChecksumError, verify
 from echotruth.repository.equivalence import first_difference
-from echotruth.repository.inventory import Inventory, JobRecord
+from echotruth.repository.inventory import Inventory, JobRecord, reason
 from echotruth.section import dotted_values, value_of
 
 
@@ -178,7 +178,7 @@ def _renamed(record: JobRecord, giving: Inventory, receiving: Inventory) -> Iter
     before, after = giving.row(record), receiving.row(record)
     if before is None or after is None:
         raise MergeError(f"{record.path}: its case or view has no row: check {giving.folder} and {receiving.folder}")
-    for path, hash in ledger.read(record.path).get("sha256", {}).items():
+    for path, hash in _entries(record.path).get("sha256", {}).items():
         array, _, index = path.partition("/c/")
         rest = index.split("/")[len(before) :]
         yield path, "/".join((array, "c", *map(str, after), *rest)), hash
@@ -186,7 +186,7 @@ def _renamed(record: JobRecord, giving: Inventory, receiving: Inventory) -> Iter
 
 def _compare(record: JobRecord, giving: Inventory, receiving: Inventory) -> None:
     """Both must have the same bytes of a job that both have, or but for rounding if machines of two kinds made them."""
-    mine, theirs = ledger.read(_in(record, giving, receiving)), ledger.read(record.path)
+    mine, theirs = _entries(_in(record, giving, receiving)), _entries(record.path)
     have_same_verdict = all(mine.get(key) == theirs.get(key) for key in ("status", "reason"))
     hashes = {path: hash for _, path, hash in _renamed(record, giving, receiving)}
     if have_same_verdict and hashes == mine.get("sha256", {}):
@@ -208,9 +208,17 @@ def _compare(record: JobRecord, giving: Inventory, receiving: Inventory) -> None
 def _verify(repository: Inventory, path: Path) -> None:
     """Compare the files of a job with the checksums in its record."""
     try:
-        verify(repository.store, path, ledger.read(path))
-    except (ChecksumError, ValueError) as error:
+        verify(repository.store, path, _entries(path))
+    except ChecksumError as error:
         raise MergeError(f"{error}: heal {repository.folder} before it is merged") from None
+
+
+def _entries(path: Path) -> dict[str, Any]:
+    """What a record holds."""
+    try:
+        return ledger.read(path)
+    except ValueError as error:
+        raise MergeError(f"{path}: cannot be read ({reason(error)}): heal its repository before it is merged") from None
 
 
 def _copy(record: JobRecord, giving: Inventory, receiving: Inventory) -> None:
@@ -218,7 +226,7 @@ def _copy(record: JobRecord, giving: Inventory, receiving: Inventory) -> None:
     paths = list(_renamed(record, giving, receiving))
     for old, new, _ in paths:
         durable.link(giving.store / old, receiving.store / new)
-    target, entries = _in(record, giving, receiving), ledger.read(record.path)
+    target, entries = _in(record, giving, receiving), _entries(record.path)
     if "sha256" in entries:
         entries["sha256"] = {new: hash for _, new, hash in paths}
     ledger.commit(target, entries)

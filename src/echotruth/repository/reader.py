@@ -594,7 +594,7 @@ class Repository:
         key = str(store or ""), path
         if key not in self._opened:
             try:
-                self._opened[key] = zarr.open_array(store or self.store, path=path, mode="r")
+                self._opened[key] = zarr.open_array(store or self.store, path=path, mode="r", zarr_format=3)
             except FileNotFoundError:
                 remedy = "run its configuration again with this version of echotruth"
                 raise FileNotFoundError(f"{self._place}: has no array {path}: {remedy}") from None
@@ -614,13 +614,13 @@ class Repository:
     def names(self, group: str) -> list[str]:
         """Names of the arrays of a group, sorted; none if there is no such group."""
         with suppress(FileNotFoundError):
-            return sorted(zarr.open_group(self.store, path=group, mode="r").array_keys())
+            return sorted(zarr.open_group(self.store, path=group, mode="r", zarr_format=3).array_keys())
         return []
 
     def attributes(self, group: str) -> dict[str, Any]:
         """Attributes of a group, those of the repository for ""; none if there is no such group."""
         with suppress(FileNotFoundError):
-            return zarr.open_group(self.store, path=group, mode="r").attrs.asdict()
+            return zarr.open_group(self.store, path=group, mode="r", zarr_format=3).attrs.asdict()
         return {}
 
     def is_written(self, path: str, case: str, view: str | None = None) -> bool:

@@ -163,7 +163,7 @@ class Store:
 
     def _strings(self, path: str) -> list[str]:
         try:
-            opened = zarr.open_array(self.path, path=path, mode="r")
+            opened = zarr.open_array(self.path, path=path, mode="r", zarr_format=3)
             return [str(value) for value in np.asarray(opened[...])]
         except Exception:  # absent, or damaged in one of the many ways for which Zarr and its codecs have errors
             return []
@@ -220,7 +220,7 @@ class Store:
             ledger.commit(self.record, {"sha256": sha256})
 
     def _open(self, group: str, mode: Any) -> Mapping[str, zarr.Array[Any]]:
-        return cast(Any, zarr.open_group(self.path, path=group, mode=mode, use_consolidated=False))
+        return cast(Any, zarr.open_group(self.path, path=group, mode=mode, zarr_format=3, use_consolidated=False))
 
 
 def _nodes(folder: Path) -> list[Path]:

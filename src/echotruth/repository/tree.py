@@ -28,7 +28,8 @@ def open_tree(store: Path | ObjectStore) -> xr.DataTree:
     """
     import xarray as xr
 
-    groups = xr.open_groups(store, engine="zarr", create_default_indexes=False)  # type: ignore[arg-type]  # it may be a store
+    opened = {"engine": "zarr", "create_default_indexes": False, "zarr_format": 3}
+    groups = xr.open_groups(store, **opened)  # type: ignore[arg-type]  # it may be a store
     groups["/cases"] = _with_constants(groups["/cases"])
     return xr.DataTree.from_dict(_indexed(groups))
 

@@ -133,7 +133,8 @@ class Job:
 
     def coordinates(self, group: str, *names: str) -> dict[str, Any]:
         """Coordinates of a group, which all cases share."""
-        return {name: np.asarray(zarr.open_array(self.store.path / group / name, mode="r")[...]) for name in names}
+        paths = {name: self.store.path / group / name for name in names}
+        return {name: np.asarray(zarr.open_array(path, mode="r", zarr_format=3)[...]) for name, path in paths.items()}
 
     def files(self, group: str) -> list[Path]:
         """Files of this job in a group."""
@@ -158,7 +159,11 @@ class Job:
         try:
             # A .npz has a CRC-32 of every array.
             with np.load(file, allow_pickle=False) as opened:
-                return dict(opened)
+                arrays = dict(opened)
+            # What is no array comes as the bytes that stand there.
+            if not all(isinstance(values, np.ndarray) for values in arrays.values()):
+                raise ValueError
+            return arrays
         except Exception:  # a damaged archive raises one of many errors
             file.unlink()
             remedy = "it is deleted, and the next run makes it anew"

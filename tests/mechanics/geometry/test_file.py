@@ -64,6 +64,13 @@ def test_surface_of_triangles_in_any_orientation(file_heart, surface, write_surf
     np.testing.assert_allclose(one.nodes, other.nodes, atol=1e-8)
 
 
+def test_surface_with_a_point_so_far_away_that_all_others_coincide(file_heart, surface, write_surface):
+    nodes = file_heart.nodes.copy()
+    nodes[surface[0, 0]] = 1e38
+    with pytest.raises(GeometryError, match=r"wall\.stl: the corners of all its triangles coincide"):
+        left_ventricle(Geometry(file=write_surface(nodes, surface), remesh=True))
+
+
 def test_two_surfaces(tmp_path):
     pyvista.merge([pyvista.Sphere(radius=5), pyvista.Sphere(radius=3)]).extract_surface(algorithm=None).save(
         tmp_path / "two.stl"

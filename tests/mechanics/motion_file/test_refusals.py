@@ -147,7 +147,13 @@ def test_xdmf_with_a_point_that_is_not_there(series, point):
 
 @pytest.mark.parametrize(
     ("was", "becomes"),
-    [(r'(\d+) 4"', r'9999999999999 4"'), (r'(\d+) 4"', r'\1 3"'), ('Precision="8"', 'Precision="7"')],
+    [
+        (r'(\d+) 4"', r'9999999999999 4"'),
+        (r'(\d+) 4"', r'\1 3"'),
+        ('Precision="8"', 'Precision="7"'),
+        (r'(\d+) 4"', '-1 4"'),
+        (r">[^<>]*\.bin<", ">/dev/zero<"),
+    ],
 )
 def test_xdmf_with_wrong_sizes(series, was, becomes):
     made = series("xdmf Binary")
@@ -155,7 +161,8 @@ def test_xdmf_with_wrong_sizes(series, was, becomes):
     text, count = re.subn(was, becomes, file.read_text())
     assert count
     file.write_text(text)
-    assert re.search("heart.xdmf(: cannot be read as .xdmf|, frame 0: its topology has the shape)", made.refused())
+    told = "heart.xdmf(: cannot be read as .xdmf|, frame 0: its topology has the shape|: a DataItem has the Dimensions)"
+    assert re.search(told, made.refused())
 
 
 def test_unknown_format(series):
@@ -216,6 +223,19 @@ def test_array_that_does_not_fit_the_mesh(series):
     np.savez(made.folder / "positions.npz", u=made.positions)
     path = str(made.folder / "positions.npz")
     assert "holds no array 'positions' (it has u)" in made.refused(path=path)
+
+
+@pytest.mark.parametrize("kind", [complex, str, "datetime64[s]"])
+def test_array_of_no_real_numbers(series, kind):
+    made = series("npy")
+    np.save(made.folder / "positions.npy", made.positions.astype(kind))
+    assert "positions.npy: 'positions' is an array of" in made.refused()
+
+
+def test_array_of_no_frames(series):
+    made = series("npy")
+    np.save(made.folder / "positions.npy", made.positions[:0])
+    assert "positions.npy: has the shape (0, " in made.refused()
 
 
 def test_motion_that_is_none(series):

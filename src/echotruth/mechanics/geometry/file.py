@@ -112,6 +112,11 @@ def _closed_surface(imported: ImportedMesh) -> Integers:
     corners = np.sort(imported.triangles, axis=1)
     # Triangles whose corners were merged have shrunk to a line.
     facets = imported.triangles[(corners[:, 1:] != corners[:, :-1]).all(axis=1)]
+    if not len(facets):
+        raise GeometryError(
+            f"{imported.source}: the corners of all its triangles coincide, as far as its largest coordinate tells "
+            "them apart: write the file again"
+        )
     _, _, count = triangle_edges(facets)
     if (count != 2).any():
         faults = f"{np.sum(count == 1)} open and {np.sum(count > 2)} non-manifold edges"

@@ -178,7 +178,9 @@ def _array_series(source: str, displacement: str | None, points: Floats | None) 
     if values is None:
         found = "it is a .npy file of positions" if isinstance(loaded, np.ndarray) else f"it has {', '.join(loaded)}"
         raise MotionError(f"{source}: holds no array {name!r} ({found}): name it, or give positions.")
-    if values.ndim != 3 or values.shape[2] != 3:
+    if values.dtype.kind not in "fiu":
+        raise MotionError(f"{source}: {name!r} is an array of {values.dtype}: give real numbers.")
+    if values.ndim != 3 or values.shape[2] != 3 or not values.size:
         raise MotionError(f"{source}: has the shape {values.shape}: give positions of shape (frame, point, 3).")
     positions = np.asarray(values, float)
     if points is not None and positions.shape[1:] != points.shape:

@@ -5,6 +5,7 @@ with topology and geometry of its own or, by reference, of the mesh at the begin
 binary file or, read with h5py, in an HDF5 file.
 """
 
+from math import prod
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -110,6 +111,8 @@ class _Reader:
 
     def _item(self, item: Element) -> NDArray:
         shape = tuple(int(length) for length in item.get("Dimensions", "").split())
+        if any(length < 0 for length in shape):
+            raise MotionError(f"{self._path}: a DataItem has the Dimensions {shape}: write the file again.")
         kind, text = item.get("Format", "XML").lower(), (item.text or "").strip()
         if kind == "xml":
             return np.array(text.split(), dtype=float).reshape(shape)
@@ -119,8 +122,8 @@ class _Reader:
             number = item.get("NumberType") or item.get("DataType") or "Float"
             order = {"little": "<", "big": ">"}.get(item.get("Endian", "Native").lower(), "=")
             dtype = f"{order}{_KINDS[number.lower()]}{item.get('Precision', '4')}"
-            offset, count = int(item.get("Seek", "0")), int(np.prod(shape))
-            return np.fromfile(self._path.parent / text, dtype, count, offset=offset).reshape(shape)
+            offset, count = int(item.get("Seek", "0")), prod(shape)
+            return np.fromfile(self._beside(text), dtype, count, offset=offset).reshape(shape)
         raise MotionError(f"{self._path}: a DataItem has the format {kind}: write XML, HDF or Binary.")
 
     def _from_hdf(self, text: str) -> NDArray:
@@ -130,5 +133,12 @@ class _Reader:
             remedy = "install it, with pip install 'echotruth[export]'"
             raise MotionError(f"{self._path}: its numbers are in HDF5, which needs h5py: {remedy}.") from None
         name, _, dataset = text.partition(":")
-        with h5py.File(self._path.parent / name, "r") as file:
+        with h5py.File(self._beside(name), "r") as file:
             return np.asarray(file[dataset])
+
+    def _beside(self, name: str) -> Path:
+        """Path of a file of numbers; a pipe or a device could be read for ever."""
+        path = self._path.parent / name
+        if not path.is_file():
+            raise ValueError(f"{path} is not a file")
+        return path

@@ -66,7 +66,7 @@ def _size(path: str) -> int:
 
 def _read(folder: Path, path: Path) -> NDArray[np.float64]:
     try:
-        return np.asarray(zarr.open_array(path, mode="r")[...], dtype=float)
+        return np.asarray(zarr.open_array(path, mode="r", zarr_format=3)[...], dtype=float)
     except Exception:  # damaged arrays fail in many ways, for which Zarr and its codecs have errors of their own
         raise damaged(folder, path) from None
 
