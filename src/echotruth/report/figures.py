@@ -222,8 +222,11 @@ class Figures:
         fit = self.repository.arrays("inference/fit", case)
         names = posterior.chosen(fit)
         at = [LABELS["parameter"].index(name) for name in names]
-        draws = (self.repository.arrays(f"inference/{name}", case)["value"][0] for name in ("posterior", "prior"))
-        return posterior.draw(names, *(values[:, at].astype(float) for values in draws), fit["true"][at])
+        after, before = (
+            self.repository.arrays(f"inference/{name}", case)["value"][0][:, at].astype(float)
+            for name in ("posterior", "prior")
+        )
+        return posterior.draw(names, after, before, fit["true"][at])
 
     def bullseye(self) -> Figure:
         """Strain of the segments at end-systole, true and of the best tracker."""

@@ -131,7 +131,7 @@ def _histogram(axes: Axes, posterior: Floats, prior: Floats, true: float, edges:
 
 def _density(axes: Axes, draws: Floats, true: Floats, edges: tuple[Floats, Floats]) -> None:
     """Areas in which pairs of parameters are, of draws (draw, 2)."""
-    counts = np.histogram2d(*draws.T, bins=edges)[0]
+    counts = np.histogram2d(draws[:, 0], draws[:, 1], bins=list(edges))[0]
     density = gaussian_filter(counts, SMOOTHING)
     middle = [(edge[1:] + edge[:-1]) / 2 for edge in edges]
     levels = np.unique([*_levels(density), 1.001 * density.max()])
