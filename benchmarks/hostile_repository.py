@@ -221,8 +221,11 @@ def _beside(harmed: _Harmed, name: str, harm: str) -> Trial:
     """Harm to a file beside the hierarchy, which other commands read as well."""
     answer = harmed.check("--quick")
     outcome, said = _found(answer, name)
-    if outcome == SILENT and TOLD.get(name, "\n") in answer.text:
+    if outcome == SILENT and name in TOLD and TOLD[name] in answer.text:
         outcome, said = FOUND, TOLD[name]
+    if outcome == SILENT and answer.status == 2 and name == "config.yaml":
+        # Without it the folder is no repository, and is named as a whole.
+        outcome, said = answer.refusal(harmed.folder.name), answer.text[-300:]
     if outcome == SILENT and name in ("registry.txt", "views.txt") and _rows(harmed, name):
         outcome, said = ACCEPTED, "the rows are those of before; a run that was broken off may have added others"
     for command in ("info", "status") if harm in READ else ():
