@@ -32,8 +32,8 @@ import xarray as xr
 import echotruth as et
 from echotruth.inference.estimate import COVERED
 from echotruth.inference.observation import dataset, loop_of, seen_of
-from echotruth.inference.truth import truth
 from echotruth.inference.tracker_errors import TrackerError
+from echotruth.inference.truth import truth
 
 RESULTS = Path(__file__).parent / "results"
 TABLE, PAGE = RESULTS / "inference.csv", RESULTS / "inference.md"
