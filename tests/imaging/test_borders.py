@@ -8,8 +8,17 @@ import pytest
 from echotruth.config import Config
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.medium.borders import Border, border_amplitude, seed_border
+from echotruth.imaging.medium.mitral_valve import SHUT, Leaflets, seed_leaflets
 
-CONFIG = Config.model_validate({"phantom": {"density_per_mm3": 3000.0}, "rf": {"focal_zones": 1, "lines": 16}})
+CONFIG = Config.model_validate(
+    {
+        "phantom": {"density_per_mm3": 3000.0},
+        "rf": {"focal_zones": 1, "lines": 16},
+        "realism": {"neighbours": {"leaflets_dB": 10.0}},
+    }
+)
+HALF = np.array([0.7e-3, 0.6e-3, 0.6e-3])
+"""Half the sides of a block of muscle about the focus, and of a sheet, m."""
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +27,12 @@ def heart(half_sphere, twisting_heart):
     displacement = np.stack([0 * half_sphere.nodes, half_sphere.nodes])
     arrays = {"geometry": {"endo": half_sphere.endo, "epi": half_sphere.epi}}
     return replace(
-        twisting_heart, nodes=half_sphere.nodes, cells=half_sphere.cells, displacement=displacement, arrays=arrays
+        twisting_heart,
+        nodes=half_sphere.nodes,
+        cells=half_sphere.cells,
+        displacement=displacement,
+        endo=half_sphere.endo,
+        arrays=arrays,
     )
 
 
@@ -41,32 +55,46 @@ def test_amplitude_grows_with_the_area(heart):
     np.testing.assert_allclose(border.amplitudes(heart.positions(1), heart.nodes), 8.0)
 
 
-def power(position, amplitude):
-    """Mean power of the middle lines about the focus, in the range of half a pulse."""
+@pytest.fixture(scope="module")
+def level():
+    """Function of positions (n, 3), m, about the focus and amplitudes (n,): greatest power over that of muscle, dB."""
     scanner = Scanner(CONFIG.probe, CONFIG.rf, imaging_depth(CONFIG.rf, CONFIG.bmode))
-    lines = scanner.lines(position, amplitude)
-    focus = CONFIG.rf.si().focus
-    middle = np.argsort(np.abs(scanner.scan.angle))[:6]
-    return lines[middle], np.abs(scanner.range - focus) < 0.4e-3, scanner
+    focus, random = CONFIG.rf.si().focus, np.random.default_rng(4)
+    middle, near = np.argsort(np.abs(scanner.scan.angle))[:6], np.abs(scanner.range - focus) < 0.4e-3
+
+    def power(position, amplitude):
+        lines = scanner.lines(position + [0, focus, 0], amplitude)
+        return np.abs(lines[middle][:, near]) ** 2
+
+    number = random.poisson(3000e9 * np.prod(2 * HALF))
+    reference = power(random.uniform(-1, 1, (number, 3)) * HALF, random.standard_normal(number)).mean()
+    return lambda position, amplitude: 10 * np.log10(power(position, amplitude).max(axis=1).mean() / reference)
 
 
-def test_flat_border_across_the_beam_has_its_level_and_a_tilted_one_has_not():
-    random, focus = np.random.default_rng(4), CONFIG.rf.si().focus
-    half = np.array([0.7e-3, 0.6e-3, 0.6e-3])
-    number = random.poisson(3000e9 * np.prod(2 * half))
-    muscle = random.uniform(-1, 1, (number, 3)) * half + [0, focus, 0]
-    lines, near, _ = power(muscle, random.standard_normal(number))
-    reference = np.mean(np.abs(lines[:, near]) ** 2)
+def tilted(sheet, degrees):
+    """Positions (n, 3) on a sheet of coordinates (n, 2), lateral and elevation, across the beam or tilted."""
+    turn = np.radians(degrees)
+    return np.column_stack([sheet[:, 0] * np.cos(turn), sheet[:, 0] * np.sin(turn), sheet[:, 1]])
 
-    amplitude = border_amplitude(CONFIG, 10.0)
-    probe = CONFIG.probe.si()
-    count = random.poisson((probe.frequency / probe.sound_speed) ** 2 * 4 * half[0] * half[2])
-    sheet = random.uniform(-1, 1, (count, 3)) * [half[0], 0, half[2]]
-    levels = []
-    for tilt in (0.0, 25.0):
-        turn = np.radians(tilt)
-        turned = np.column_stack([sheet[:, 0] * np.cos(turn), sheet[:, 0] * np.sin(turn), sheet[:, 2]]) + [0, focus, 0]
-        lines, near, _ = power(turned, np.full(count, amplitude))
-        levels.append(10 * np.log10(np.mean(np.max(np.abs(lines[:, near]) ** 2, axis=1)) / reference))
-    assert levels[0] == pytest.approx(10, abs=3)
-    assert levels[1] < levels[0] - 5
+
+def test_flat_border_across_the_beam_has_its_level_and_a_tilted_one_has_not(level):
+    probe, random = CONFIG.probe.si(), np.random.default_rng(5)
+    count = random.poisson((probe.frequency / probe.sound_speed) ** 2 * 4 * HALF[0] * HALF[2])
+    sheet, amplitude = random.uniform(-1, 1, (count, 2)) * HALF[[0, 2]], np.full(count, border_amplitude(CONFIG, 10.0))
+    across, oblique = (level(tilted(sheet, tilt), amplitude) for tilt in (0.0, 25.0))
+    assert across == pytest.approx(10, abs=3)
+    assert oblique < across - 5
+
+
+def test_a_leaflet_shows_across_the_beam_and_fades_where_it_is_oblique(heart, level):
+    drawn = seed_leaflets(CONFIG, heart, np.random.default_rng(6))
+    leaflets, anterior = Leaflets(heart, **drawn), drawn["place"][:, 1] > 0
+    position = leaflets.positions(0)[anterior]
+    # Along the leaflet from the rim inwards, and along the line on which both meet.
+    sheet = position @ np.array([[-np.cos(SHUT), 0, -np.sin(SHUT)], [0, 1, 0]]).T
+    sheet -= sheet.mean(axis=0)
+    part = (np.abs(sheet) < HALF[[0, 2]]).all(axis=1)
+    amplitude = leaflets.amplitudes(0)[anterior][part]
+    across, oblique = (level(tilted(sheet[part], tilt), amplitude) for tilt in (0.0, 25.0))
+    assert across == pytest.approx(10, abs=3)
+    assert oblique < across - 5

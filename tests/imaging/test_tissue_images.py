@@ -96,7 +96,8 @@ def test_scatterers_around_the_heart_are_in_pixels_of_their_label(heart, plane, 
 
 def test_bodies_in_the_cavity_are_where_their_scatterers_are(heart, plane):
     dense = CONFIG.model_copy(update={"phantom": CONFIG.phantom.model_copy(update={"density_per_mm3": 2e4})})
-    valve = Leaflets(heart, **seed_leaflets(dense, heart, random("leaflets")))
+    drawn = [seed_leaflets(CONFIG, heart, random(f"leaflets {k}")) for k in range(10)]
+    valve = Leaflets(heart, *(np.concatenate([each[name] for each in drawn]) for name in ("place", "amplitude")))
     muscles = PapillaryMuscles(heart, **seed_papillary_muscles(dense, heart, random("papillary_muscles")))
     is_long_axis = plane.axes[1, 2] != 0
     body, tissue = (valve, TissueLabel.MITRAL_LEAFLET) if is_long_axis else (muscles, TissueLabel.PAPILLARY_MUSCLE)
@@ -127,6 +128,28 @@ def test_cavity_and_right_ventricle_narrow_as_the_heart_does_and_the_docs_say(he
     septum = [pixel_truth(heart, at, AXIAL, LATERAL, images)["tissue"][frame][row] for frame in (0, ES)]
     widths = [(each == TissueLabel.RIGHT_VENTRICLE).sum(axis=1).mean() for each in septum]
     assert widths[1] / widths[0] == pytest.approx(0.6, abs=0.04)
+
+
+def test_there_is_no_gap_between_an_atrium_and_the_lung_beside_it(heart):
+    at = imaging_plane(CONFIG.views["four_chamber"], CONFIG.rf, heart.endo_at_ed)
+    images = TissueImages(CONFIG, heart, at, AXIAL, LATERAL)
+    for frame in (0, 2, ES):
+        gaps = []
+        for row in images(frame):
+            wall, lung = np.flatnonzero(row == TissueLabel.ATRIAL_WALL), np.flatnonzero(row == TissueLabel.LUNG)
+            blood = np.flatnonzero(row == TissueLabel.LEFT_ATRIUM)
+            # Of the rows that cut the lateral wall of the left atrium, which has the lung on its other side.
+            if len(blood) and len(wall) and len(lung) and blood[-1] < wall[-1]:
+                gaps.append(lung[lung > wall[-1]].min() - wall[-1] - 1)
+        assert len(gaps) > 15 and max(gaps) <= 1, (frame, gaps)
+
+
+def test_a_label_says_what_is_there_however_faint_its_echo(heart):
+    at = imaging_plane(CONFIG.views["four_chamber"], CONFIG.rf, heart.endo_at_ed)
+    faint = {"preset": "mouse", "neighbours": {"lung_dB": -60, "chambers_dB": -60}, "blood": {"level_dB": -70}}
+    config = Config.model_validate({"realism": faint, "views": {"preset": "echo"}})
+    bright, dark = (TissueImages(each, heart, at, AXIAL, LATERAL)(ES) for each in (CONFIG, config))
+    assert (bright == dark).all() and (dark == TissueLabel.LUNG).any()
 
 
 def test_what_is_off_has_no_label(heart):

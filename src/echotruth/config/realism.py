@@ -67,8 +67,9 @@ class Neighbours(Section):
     """Lung behind the free wall, at the epicardium, from which on it fades."""
     chest_wall_dB: Level | None = None
     """Brightest layers of the chest wall, between `surroundings.start_mm` and the heart."""
-    leaflets_dB: Level | None = None
-    """Mitral leaflets, which are open while the cavity fills."""
+    leaflets_dB: BorderLevel | None = None
+    """Mitral leaflets, which are open while the cavity fills: echo power of one that lies across the beam at the focus;
+    as borders, they are fainter where they are oblique."""
     papillary_muscles_dB: Level | None = None
     """Two papillary muscles, which move with the endocardium; 0 for the echo of muscle."""
 
@@ -158,7 +159,7 @@ def _preset(scale: float, times_ms: tuple[float, float]) -> dict[str, Any]:
             "chambers_dB": 0.0,
             "lung_dB": -1.0,
             "chest_wall_dB": -1.0,
-            "leaflets_dB": 4.0,
+            "leaflets_dB": 12.0,
             "papillary_muscles_dB": 0.0,
         },
         "noise": {"snr_dB": 40.0},

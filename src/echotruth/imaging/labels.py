@@ -16,7 +16,10 @@ LABELS = ("layer", "segment", "region")
 
 
 class TissueLabel(IntEnum):
-    """Tissues in realistic images; the first four are numbered as in CAMUS, the usual set of clinical clips."""
+    """Tissues in realistic images; the first four are numbered as in CAMUS, the usual set of clinical clips.
+
+    A label says what is there, however faint its echo.
+    """
 
     OTHER = 0
     CAVITY = 1

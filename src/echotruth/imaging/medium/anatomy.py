@@ -154,6 +154,21 @@ class Anatomy:
         """Share (n,) of the motion of the base that tissue above it has: it falls from the base to the roof."""
         return np.clip(1 - place.height / (self.roof - self.base[2]), 0, 1)
 
+    def atrial_distance(self, position: Floats) -> Floats:
+        """Distance (n,), m, of positions (n, 3), m, from the nearer atrium with its wall, on the ray from its middle.
+
+        It is 0 within.
+        """
+        within = self._in_atria(position, ATRIAL_WALL * self.radius)
+        middles = self.base + np.array([[0.0, 0.0, 0.0], [self._right_atrium()[0], 0.0, 0.0]])
+        from_middle = np.linalg.norm(position - middles[:, None], axis=2)
+        return (from_middle * (1 - 1 / np.maximum(within, 1))).min(axis=0)
+
+    def _right_atrium(self) -> tuple[float, float]:
+        """Middle of the right atrium and half its width, m, from the long axis outwards."""
+        near = self.inner_radius + ATRIAL_WALL * self.radius
+        return (self._septal_radius + near) / 2, (self._septal_radius - near) / 2
+
     def _in_atria(self, position: Floats, thickness: float) -> Floats:
         """Distance of positions (n, 3), m, from the middle of each atrium over that of its surface, (2, n).
 
@@ -162,9 +177,8 @@ class Anatomy:
         x, y, z = (position - self.base).T
         height = self.roof - self.base[2] + thickness
         left = np.hypot(x, y) / (self.inner_radius + thickness)
-        near = self.inner_radius + ATRIAL_WALL * self.radius
-        middle, half = (self._septal_radius + near) / 2, (self._septal_radius - near) / 2 + thickness
-        right = np.hypot((x - middle) / half, y / (self.radius + thickness))
+        middle, half = self._right_atrium()
+        right = np.hypot((x - middle) / (half + thickness), y / (self.radius + thickness))
         return np.hypot(np.stack([left, right]), z / height)
 
 

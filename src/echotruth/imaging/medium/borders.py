@@ -69,7 +69,7 @@ def seed_border(config: Config, heart: Heart, surface: str, random: np.random.Ge
     facets = heart.arrays["geometry"][surface]
     middle = np.full((len(facets), 2), 1 / 3)
     area = _area(heart.nodes, facets, middle) / 2
-    number = random.poisson(_density(config) * area.sum())
+    number = random.poisson(border_density(config) * area.sum())
     chosen = random.choice(len(facets), size=number, p=area / area.sum())
     return facets[chosen].astype(np.int32), cube_to_simplex(random.random((number, 2)))
 
@@ -92,10 +92,10 @@ def border_amplitude(config: Config, level_dB: float) -> float:
     elevation = BEAM_STD * wavelength * focus / probe.height
     axial = PULSE_STD * probe.sound_speed / 2 / (probe.bandwidth * probe.frequency)
     power = config.phantom.si().density * sqrt(pi) * axial / (4 * pi * lateral * elevation)
-    return 10 ** (level_dB / 20) * sqrt(power) / _density(config)
+    return 10 ** (level_dB / 20) * sqrt(power) / border_density(config)
 
 
-def _density(config: Config) -> float:
+def border_density(config: Config) -> float:
     """Scatterers of a border per area, 1/m^2: one per square of the wavelength."""
     probe = config.probe.si()
     return (probe.frequency / probe.sound_speed) ** 2

@@ -226,7 +226,7 @@ class Medium:
             position = body.positions(frame)
             present = locate(nodes, self._heart.cells, position).cell < 0
             position = self._plane.to_image(position[present])
-            parts.append(_of_tissue(self._config.phantom, position, body.amplitude[present]))
+            parts.append(_of_tissue(self._config.phantom, position, body.amplitudes(frame)[present]))
         together = tuple(map(np.concatenate, zip(*parts, strict=True)))
         return together[0], together[1], together[2]
 

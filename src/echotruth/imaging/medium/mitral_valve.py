@@ -4,6 +4,10 @@ In every plane across the line on which they meet, a leaflet is a strip from the
 at a third of the radius on the lateral side: the anterior leaflet, on the septal side, is twice as long as the
 posterior one, as in adults (e-echocardiography.com, Anatomy of the mitral valve). Open, both point into the cavity. The
 angles and the thickness were chosen by eye. There are no chordae.
+
+Leaflets are smooth sheets of collagen between blood and blood, so that they echo as the borders of the wall do: their
+scatterers lie on their middle surfaces and have equal amplitudes, which add up in phase where a leaflet faces the probe
+and not where it is oblique (:mod:`echotruth.imaging.medium.borders`).
 """
 
 from math import pi
@@ -15,6 +19,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.medium.anatomy import rim
+from echotruth.imaging.medium.borders import border_amplitude, border_density
 from echotruth.imaging.medium.filling import opening, volumes
 
 SHUT, OPEN = pi / 15, 5 * pi / 12
@@ -74,24 +79,28 @@ class Leaflets:
     Parameters
     ----------
     heart : Heart
-    place : ndarray of shape (n, 4)
+    place : ndarray of shape (n, 3)
         Coordinate along the line on which the leaflets meet, over the radius of the rim, -1 to 1; 1 in the anterior and
-        -1 in the posterior leaflet; share of the length from the rim; offset across it over the radius of the rim.
+        -1 in the posterior leaflet; share of the length from the rim.
     amplitude : ndarray of shape (n,)
+        At end-diastole.
     """
 
     def __init__(self, heart: Heart, place: Floats, amplitude: Floats) -> None:
-        self._valve, self._place, self.amplitude = MitralValve(heart), place, amplitude
+        self._valve, self._place, self._amplitude = MitralValve(heart), place, amplitude
 
     def positions(self, frame: int) -> Floats:
         """Positions in a frame, (n, 3), m, in the heart frame."""
         centre, radius, angle = self._valve.hinge(frame)
-        along, side, share, across = self._place.T
+        along, side, share = self._place.T
         chord = np.sqrt(1 - along**2)
         length = _length(side, chord) * share
-        x = side * (chord - length * np.cos(angle) - across * np.sin(angle))
-        z = -length * np.sin(angle) + across * np.cos(angle)
+        x, z = side * (chord - length * np.cos(angle)), -length * np.sin(angle)
         return centre + radius * np.column_stack([x, along, z])
+
+    def amplitudes(self, frame: int) -> Floats:
+        """Amplitudes in a frame, (n,): in proportion to the area of the leaflets, which that of the rim sets."""
+        return self._amplitude * (self._valve.hinge(frame)[1] / self._valve.hinge(0)[1]) ** 2
 
 
 def _length(side: Floats | int, chord: Floats) -> Floats:
@@ -100,7 +109,7 @@ def _length(side: Floats | int, chord: Floats) -> Floats:
 
 
 def seed_leaflets(config: Config, heart: Heart, random: np.random.Generator) -> dict[str, Floats]:
-    """Draw scatterers uniformly over the leaflets, as many in a volume as in muscle.
+    """Draw scatterers uniformly over the middle surfaces of the leaflets, as many in an area as on a border.
 
     Parameters
     ----------
@@ -111,17 +120,15 @@ def seed_leaflets(config: Config, heart: Heart, random: np.random.Generator) -> 
     Returns
     -------
     dict of ndarray
-        place and amplitude, as :class:`Leaflets` has them. The amplitudes are normally distributed; their variance in a
-        volume is that of muscle times the level.
+        place and amplitude, as :class:`Leaflets` has them. The amplitudes are equal: those of a border of the level.
     """
     level = config.realism.neighbours.leaflets_dB
     assert level is not None
     _, radius = rim(heart.positions(0), heart.endo)
     # Both together are as long as the chord; of the square around the rim, candidates in the circle are kept.
-    volume = 4 / np.cos(SHUT) * THICKNESS * radius**3
-    number = random.poisson(config.phantom.si().density * volume)
-    along, across = random.uniform(-1, 1, (2, number))
+    number = random.poisson(border_density(config) * 4 / np.cos(SHUT) * radius**2)
+    along = random.uniform(-1, 1, number)
     side = np.where(random.random(number) < (1 - MEETING) / 2, 1.0, -1.0)
     kept = random.random(number) < np.sqrt(1 - along**2)
-    place = np.column_stack([along, side, random.random(number), THICKNESS / 2 * across])[kept]
-    return {"place": place, "amplitude": 10 ** (level / 20) * random.standard_normal(len(place))}
+    place = np.column_stack([along, side, random.random(number)])[kept]
+    return {"place": place, "amplitude": np.full(len(place), border_amplitude(config, level))}

@@ -41,12 +41,16 @@ class PapillaryMuscles:
     """
 
     def __init__(self, heart: Heart, position: Floats, muscle: NDArray[np.uint8], amplitude: Floats) -> None:
-        self._position, self._muscle, self.amplitude = position, muscle, amplitude
+        self._position, self._muscle, self._amplitude = position, muscle, amplitude
         self._displacement = np.stack([_displacement(heart, azimuth) for azimuth in AZIMUTHS], axis=1)
 
     def positions(self, frame: int) -> Floats:
         """Positions in a frame, (n, 3), m, in the heart frame."""
         return self._position + self._displacement[frame, self._muscle]
+
+    def amplitudes(self, frame: int) -> Floats:
+        """Amplitudes in a frame, (n,): they do not change."""
+        return self._amplitude
 
 
 class PapillaryMuscle:

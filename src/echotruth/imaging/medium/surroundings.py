@@ -47,7 +47,8 @@ class SurroundingsMotion:
 
     Nodes are weighted by the inverse square of their distance. With chambers, the distance is that from them: the right
     ventricle moves with the septum, and its free wall also towards it as the left ventricle empties; the atria move
-    with the base, less towards their roof. The chest wall is at rest.
+    with the base, less towards their roof, and what lies beside them is drawn along, so that there is no gap. The chest
+    wall is at rest.
 
     Parameters
     ----------
@@ -85,7 +86,9 @@ class SurroundingsMotion:
         share = np.exp(-np.maximum(place.distance - place.gap - place.wall, 0) / decay_length)
         inward = -RIGHT_SHORTENING * (share * np.minimum(place.distance, place.gap))[:, None] * place.outward
         atrial = np.isin(tissue, FOLLOWING_BASE)
-        share[atrial] = anatomy.atrial_share(place)[atrial]
+        of_atria = anatomy.atrial_share(place)
+        share = np.maximum(share, of_atria * np.exp(-anatomy.atrial_distance(self._position) / decay_length))
+        share[atrial] = of_atria[atrial]
         at_rest = tissue == TissueLabel.CHEST_WALL
         share[at_rest] = 0
         inward[atrial | at_rest] = 0
