@@ -91,3 +91,10 @@ def test_damaged_repository_is_refused_in_one_line(call, finished, tmp_path):
         path.write_text("{")
         status, output, errors = call("info", copy)
         assert (status, output, errors.count("\n")) == (2, "", 1) and str(copy) in errors, errors
+
+
+def test_repository_without_its_list_of_views_is_told(call, finished, tmp_path):
+    shutil.copytree(finished, tmp_path / "small")
+    (tmp_path / "small/views.txt").write_text("")
+    status, output, _ = call("info", tmp_path / "small")
+    assert status == 0 and "et.Repository" in output and ".clip(" not in output

@@ -57,7 +57,7 @@ def info(arguments: argparse.Namespace) -> int:
         return fail(f"{place}: is damaged ({' '.join(str(error).split())}): run echotruth check {place}")
     if found.attributes(""):
         print(f'\nOpen it:\n  import echotruth as et\n  repository = et.Repository("{place}")')
-    if found.shown:
+    if found.shown and found.views:
         print(f'  clip = repository.clip("{found.shown[0]}", "{found.views[0]}")')
     return 0
 
