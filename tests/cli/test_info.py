@@ -6,6 +6,7 @@ import re
 import shutil
 from contextlib import chdir
 from importlib.metadata import version
+from pathlib import Path
 
 import finished_repository
 import known_repository
@@ -93,8 +94,10 @@ def test_damaged_repository_is_refused_in_one_line(call, finished, tmp_path):
         assert (status, output, errors.count("\n")) == (2, "", 1) and str(copy) in errors, errors
 
 
-def test_repository_without_its_list_of_views_is_told(call, finished, tmp_path):
+@pytest.mark.parametrize("instead", [Path.touch, os.mkfifo])
+def test_repository_without_its_list_of_views_is_told(call, finished, tmp_path, instead):
     shutil.copytree(finished, tmp_path / "small")
-    (tmp_path / "small/views.txt").write_text("")
+    (tmp_path / "small/views.txt").unlink()
+    instead(tmp_path / "small/views.txt")
     status, output, _ = call("info", tmp_path / "small")
     assert status == 0 and "et.Repository" in output and ".clip(" not in output

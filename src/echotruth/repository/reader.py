@@ -638,12 +638,13 @@ class Repository:
         return {id: row for row, id in enumerate(self._text(name).split())}
 
     def _text(self, name: str) -> str:
-        """Content of a text file in the folder; empty if there is none."""
-        with suppress(FileNotFoundError, NotADirectoryError):
-            return (self._remote.get(name) if self._remote else (self.folder / name).read_bytes()).decode(
-                errors="replace"
-            )
-        return ""
+        """Content of a text file in the folder; empty if there is none, or a pipe, which would be waited for."""
+        if self._remote:
+            with suppress(FileNotFoundError, NotADirectoryError):
+                return self._remote.get(name).decode(errors="replace")
+            return ""
+        path = self.folder / name
+        return path.read_bytes().decode(errors="replace") if path.is_file() else ""
 
 
 def sample() -> Repository:
