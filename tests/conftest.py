@@ -1,6 +1,7 @@
 """Meshes and motions of which everything is known, and a browser."""
 
 import shutil
+from dataclasses import replace
 
 import cores  # noqa: F401 - before whatever multiplies or compiles
 import numpy as np
@@ -77,3 +78,20 @@ def twisting_heart(coarse_mesh, affine) -> Heart:
     nodes, (matrix, shift) = coarse_mesh.nodes, affine
     motion = np.stack([np.zeros_like(nodes), nodes @ (matrix - np.eye(3)).T + shift])
     return Heart(nodes, coarse_mesh.cells, motion, wall_depth(coarse_mesh), coarse_mesh.endo, layers=6, es=1)
+
+
+@pytest.fixture(scope="session")
+def hemispherical_heart(half_sphere, twisting_heart):
+    """Function of the displacements (frame, node, 3), m, of half a sphere: the heart that is one, with its surfaces."""
+
+    def heart(displacement):
+        return replace(
+            twisting_heart,
+            nodes=half_sphere.nodes,
+            cells=half_sphere.cells,
+            displacement=displacement,
+            endo=half_sphere.endo,
+            arrays={"geometry": {"endo": half_sphere.endo, "epi": half_sphere.epi}},
+        )
+
+    return heart

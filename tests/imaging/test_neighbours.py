@@ -73,17 +73,8 @@ def test_the_right_ventricle_is_a_cavity_of_blood_on_the_septal_side(heart):
     assert anatomy.chambers(opposite, anatomy.place(opposite)) == TissueLabel.OTHER
 
 
-def test_the_nearest_point_of_a_sphere_is_on_the_ray_from_its_centre(half_sphere, twisting_heart):
-    displacement = np.zeros((1, *half_sphere.nodes.shape))
-    arrays = {"geometry": {"endo": half_sphere.endo, "epi": half_sphere.epi}}
-    heart = replace(
-        twisting_heart,
-        nodes=half_sphere.nodes,
-        cells=half_sphere.cells,
-        displacement=displacement,
-        endo=half_sphere.endo,
-        arrays=arrays,
-    )
+def test_the_nearest_point_of_a_sphere_is_on_the_ray_from_its_centre(half_sphere, hemispherical_heart):
+    heart = hemispherical_heart(np.zeros((1, *half_sphere.nodes.shape)))
     angle, height = np.random.default_rng(1).uniform([0, -0.9], [2 * np.pi, -0.1], (500, 2)).T
     ray = np.column_stack([np.cos(angle) * np.sqrt(1 - height**2), np.sin(angle) * np.sqrt(1 - height**2), height])
     for distance in (0.3e-3, 1.5e-3, 4e-3):
