@@ -103,6 +103,7 @@ def beat_of(config: Config, file: Path) -> dict[str, np.ndarray]:
         from echotruth.mechanics.beat import beat
 
         result = beat(config)
+        file.parent.mkdir(parents=True, exist_ok=True)
         np.savez(file, **{f"{group}/{name}": value for group, of in result.items() for name, value in of.items()})
     with np.load(file) as arrays:
         return {name: arrays[name] for name in arrays.files}

@@ -44,7 +44,7 @@ REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 250}
 """`realism.preset` -> default of `bmode.smoothing_width_px` over the side of the image."""
 REALISM_IMAGE: dict[str, float] = {
     "bmode.dynamic_range_dB": 50.0,
-    "bmode.gain_dB": -12.0,
+    "bmode.gain_dB": -13.0,
     "bmode.grey_gamma": 1.3,
     "bmode.smoothing": 0.65,
 }

@@ -153,7 +153,7 @@ def _preset(scale: float, times_ms: tuple[float, float]) -> dict[str, Any]:
         },
         "borders": {"endocardium_dB": 10.0, "epicardium_dB": 13.0},
         "decorrelation": {"time_ms": times_ms[0]},
-        "blood": {"level_dB": -19.0, "density": 0.15, "decorrelation_time_ms": times_ms[1]},
+        "blood": {"level_dB": -16.5, "density": 0.15, "decorrelation_time_ms": times_ms[1]},
         "surroundings": {"level_dB": -11.0, "density": 0.15, "start_mm": scale, "motion_decay_mm": scale},
         "neighbours": {
             "chambers_dB": 0.0,
