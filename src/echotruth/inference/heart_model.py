@@ -67,6 +67,14 @@ def model_config(observed: xr.Dataset, mesh: tuple[int, int, int] | None, folder
     return given.model_copy(update=sections)
 
 
+def elements(config: Config) -> tuple[int, int, int]:
+    """Elements around, along and through the wall of the mesh of a configuration; 0 of a mesh from a file."""
+    geometry = config.geometry
+    if geometry.file is not None:
+        return 0, 0, 0
+    return geometry.circumferential_elements, geometry.longitudinal_elements, geometry.transmural_elements
+
+
 def _measured(observed: xr.Dataset, given: Config, folder: Path) -> Loop:
     """Measured loop of the pressure and the volume that were observed, with the four values that have errors."""
     name = f"the loop of {observed.attrs['case']}"
