@@ -9,6 +9,7 @@ import echotruth as et
 from echotruth.config.loading import ConfigError
 from echotruth.inference import observation
 from echotruth.inference.estimate import COARSE_SD, infer, with_error_of_mesh
+from echotruth.inference.heart_model import model_config
 from echotruth.inference.imaged_wall import ImagedWall, quantity
 from echotruth.inference.observation import ObservationError, Seen
 from echotruth.inference.parameters import PriorError
@@ -79,16 +80,18 @@ def test_contractility_of_segments_is_found_from_the_motion_of_a_heart_of_anothe
     ("mesh", "added"),
     [((12, 6, 1), True), ((18, 10, 1), True), ((12, 8, 2), False), ((24, 12, 3), False), (None, False)],
 )
-def test_strain_has_the_error_of_a_mesh_that_is_coarser_than_the_usual_one(observed, mesh, added):
+def test_strain_has_the_error_of_a_mesh_that_is_coarser_than_the_usual_one(observed, mesh, added, tmp_path):
     geometry = {"circumferential_elements": 18, "longitudinal_elements": 10, "transmural_elements": 2}
     config = et.configure(json.loads(observed.attrs["config"]), geometry=geometry)
     fine = observed.assign_attrs(config=config.model_dump_json())
-    more = (with_error_of_mesh(fine, mesh)["covariance"] - fine["covariance"]).values
+    model = model_config(fine, mesh, tmp_path)
+    more = (with_error_of_mesh(fine, model)["covariance"] - fine["covariance"]).values
     np.testing.assert_allclose(more, added * COARSE_SD**2 * np.eye(len(more)), atol=1e-12)
 
 
-def test_mesh_as_coarse_as_that_of_the_heart_adds_no_error(observed):
-    assert with_error_of_mesh(observed, (12, 6, 1)).identical(observed)
+def test_mesh_as_coarse_as_that_of_the_heart_adds_no_error(observed, tmp_path):
+    model = model_config(observed, (12, 6, 1), tmp_path)
+    assert with_error_of_mesh(observed, model).identical(observed)
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import echotruth
 from echotruth.arrays import Floats
+from echotruth.config import Config
 from echotruth.config.building import configure
 from echotruth.inference.draws import MATERIAL, TENSION, of_posterior, of_prior
 from echotruth.inference.heart_model import elements, model_config
@@ -97,18 +98,16 @@ def infer(
     True
     """
     check(observed)
-    observed = with_error_of_mesh(observed, mesh)
     with TemporaryDirectory() as folder, progress_line("infer", progress):
         config = model_config(observed, mesh, Path(folder))
-        segments = SegmentMeans.of(config)
+        observed, segments = with_error_of_mesh(observed, config), SegmentMeans.of(config)
         return _dataset(observed, modes(config, prior or {}, observed, segments), segments)
 
 
-def with_error_of_mesh(observed: xr.Dataset, mesh: tuple[int, int, int] | None) -> xr.Dataset:
-    """Observations whose covariance has the error of a mesh that is coarser than the usual one and the heart's own."""
+def with_error_of_mesh(observed: xr.Dataset, model: Config) -> xr.Dataset:
+    """Observations whose covariance has the error of a mesh that is coarser than the usual and the heart's own."""
     own = elements(configure(json.loads(observed.attrs["config"])))
-    needed = np.minimum(own, MESH)
-    if mesh is None or len(mesh) != len(needed) or np.all(np.asarray(mesh) >= needed):
+    if np.all(np.asarray(elements(model)) >= np.minimum(own, MESH)):
         return observed
     more = np.diag(np.where(observed["quantity"] == ROTATION, 0.0, COARSE_SD**2))
     return observed.assign(covariance=observed["covariance"] + more)
