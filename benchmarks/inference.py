@@ -3,12 +3,13 @@
     echotruth run config/inference.yaml
     python benchmarks/tracker_errors.py out/inference
     python benchmarks/inference.py out/inference --processes 2
+    python benchmarks/inference.py out/benchmark --processes 2 --motion tracked --size 512
 
 Hearts whose label `split` is test are inferred from what the tracker saw, at every image size, with the errors of
 `tracker_errors.csv`, in which they are not; with a prior of contractility as it was drawn; from how they truly moved,
 with the error of the model's mesh alone: the difference is what the tracker costs; and by a model of another passive
 law than theirs. Each takes one to four minutes; what is done is kept in results/inference.csv, and the same command
-goes on with the rest. The page is results/inference.md.
+goes on with the rest. Clips of a variation (label `variation`) are left out. The page is results/inference.md.
 
 The rank of a true value is the share of the draws of its posterior that are below it. If hearts were drawn from the
 prior and the posteriors are right, ranks are uniform: as many in the first fifth as in each other (simulation-based
@@ -30,9 +31,10 @@ import pandas as pd
 import xarray as xr
 
 import echotruth as et
+from echotruth.cases import Case
 from echotruth.inference.estimate import COVERED
 from echotruth.inference.observation import dataset, loop_of, seen_of
-from echotruth.inference.tracker_errors import TrackerError
+from echotruth.inference.tracker_errors import TrackerError, acoustics
 from echotruth.inference.truth import truth
 
 RESULTS = Path(__file__).parent / "results"
@@ -49,7 +51,7 @@ LAW = "holzapfel_ogden"
 PRIORS = {DRAWN: {"mechanics.regional.contractility": (1.0, 0.3)}}
 """Other priors than the default ones."""
 NO_ERROR = TrackerError(0.0, 0.0, 0.0, 0.0, 2)
-ABOUT = ["motion", "size_px", "case"]
+ABOUT = ["hearts", "motion", "size_px", "case"]
 COLUMNS = [
     *ABOUT,
     *("parameter", "mean", "sd", "lower", "upper", "prior_mean", "prior_sd", "identifiable", "scar_probability"),
@@ -73,6 +75,8 @@ class Observed(NamedTuple):
 
     Attributes
     ----------
+    hearts : str
+        Name of their repository and what their images are.
     motion : {"tracked", "drawn prior", "true", "another law"}
     size_px : int
     case : str
@@ -83,6 +87,7 @@ class Observed(NamedTuple):
         Its segments.
     """
 
+    hearts: str
     motion: str
     size_px: int
     case: str
@@ -91,21 +96,29 @@ class Observed(NamedTuple):
     infarct: list[int]
 
 
-def observed(repository: et.Repository, tracker: str) -> Iterator[Observed]:
+def observed(repository: et.Repository, tracker: str, motions: list[str], sizes: list[int]) -> Iterator[Observed]:
     """What is inferred from: largest images first, then true motion, then the smaller ones."""
-    test = [case for case in repository.every.values() if case.labels.get("split") == "test"]
-    hearts = [
+    test = [case for case in repository.every.values() if is_test(case)]
+    cases = [
         case for case in test if not any(repository.problem(case.id, view, "tracking") for view in repository.views)
     ]
-    print(f"{len(hearts)} of {len(test)} hearts were imaged and tracked", flush=True)
-    about = {case.id: (truth(repository, case.id), case.config.pathology.infarct.segments or []) for case in hearts}
+    print(f"{len(cases)} of {len(test)} cases were imaged and tracked", flush=True)
+    about = {case.id: (truth(repository, case.id), case.config.pathology.infarct.segments or []) for case in cases}
     largest, *others = repository.sizes
     makers = {TRACKED: et.observe, DRAWN: et.observe, TRUE: moved, OTHER_LAW: of_another_law}
     groups = [*((motion, largest) for motion in makers), *((TRACKED, size) for size in others)]
     for motion, size in groups:
-        for case in hearts:
+        if motion not in motions or size not in sizes:
+            continue
+        for case in cases:
+            hearts = f"{repository.config.name} ({acoustics(case.config)})"
             seen = makers[motion](repository, tracker, case.id, size)
-            yield Observed(motion, size, case.id, seen, *about[case.id])
+            yield Observed(hearts, motion, size, case.id, seen, *about[case.id])
+
+
+def is_test(case: Case) -> bool:
+    """Whether a case is there to report on, as its heart is usually imaged."""
+    return case.labels.get("split") == "test" and case.labels.get("variation", "none") == "none"
 
 
 def of_another_law(repository: et.Repository, tracker: str, case: str, size: int) -> xr.Dataset:
@@ -140,6 +153,7 @@ def inferred(given: Observed) -> pd.DataFrame:
         .to_dataframe()
         .reset_index()
         .assign(
+            hearts=given.hearts,
             motion=given.motion,
             size_px=given.size_px,
             case=given.case,
@@ -243,8 +257,8 @@ def scars(table: pd.DataFrame) -> list[str]:
 def report(table: pd.DataFrame) -> str:
     """The page."""
     lines = []
-    for (motion, size), rows in table.groupby(["motion", "size_px"], sort=False):
-        lines += [f"## {TITLES[motion]} {size} px", "", *summary(rows)]
+    for (hearts, motion, size), rows in table.groupby(["hearts", "motion", "size_px"], sort=False):
+        lines += [f"## {TITLES[motion]} {size} px: {hearts}", "", *summary(rows)]
     return HEAD + "\n".join(lines)
 
 
@@ -253,7 +267,7 @@ def infer_all(left: list[Observed], processes: int, output: Path) -> None:
     with ProcessPoolExecutor(processes) as pool:
         jobs = {pool.submit(inferred, one): one for one in left}
         for number, job in enumerate(as_completed(jobs), 1):
-            name = " ".join(map(str, jobs[job][:3]))
+            name = " ".join(map(str, jobs[job][: len(ABOUT)]))
             try:
                 rows = job.result()
             except (ValueError, RuntimeError) as error:
@@ -268,13 +282,18 @@ def main() -> None:
     parser.add_argument("repository", type=Path)
     parser.add_argument("--tracker", default="bspline_dic")
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--motion", choices=list(TITLES), action="append", help="can be repeated (default: all)")
+    parser.add_argument("--size", type=int, action="append", help="image size, px; can be repeated (default: all)")
     parser.add_argument("-o", "--output", type=Path, default=TABLE, help="table of what is done")
     arguments = parser.parse_args()
     table = pd.read_csv(arguments.output) if arguments.output.is_file() else pd.DataFrame(columns=COLUMNS)
     done = set(table[ABOUT].itertuples(index=False, name=None))
-    left = [one for one in observed(et.Repository(arguments.repository), arguments.tracker) if one[:3] not in done]
+    repository = et.Repository(arguments.repository)
+    motions, sizes = arguments.motion or list(TITLES), arguments.size or repository.sizes
+    wanted = observed(repository, arguments.tracker, motions, sizes)
+    left = [one for one in wanted if one[: len(ABOUT)] not in done]
     infer_all(left, arguments.processes, arguments.output)
-    table = pd.read_csv(arguments.output).sort_values(["motion", "size_px", "case"], ascending=[True, False, True])
+    table = pd.read_csv(arguments.output).sort_values(ABOUT, ascending=[False, True, False, True])
     PAGE.write_text(report(table.dropna(subset="true")))
     print(PAGE.read_text())
 
