@@ -19,6 +19,7 @@ calibration, Talts 2018, arXiv:1804.06788).
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import time
 from collections.abc import Iterator
@@ -50,7 +51,7 @@ LAW = "holzapfel_ogden"
 """That of the hearts is `fung`."""
 PRIORS = {DRAWN: {"mechanics.regional.contractility": (1.0, 0.3)}}
 """Other priors than the default ones."""
-NO_ERROR = TrackerError(0.0, 0.0, 0.0, 0.0, 2)
+NO_ERROR = TrackerError(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 6)
 ABOUT = ["hearts", "motion", "size_px", "case"]
 COLUMNS = [
     *ABOUT,
@@ -112,7 +113,11 @@ def observed(repository: et.Repository, tracker: str, motions: list[str], sizes:
             continue
         for case in cases:
             hearts = f"{repository.config.name} ({acoustics(case.config)})"
-            seen = makers[motion](repository, tracker, case.id, size)
+            try:
+                seen = makers[motion](repository, tracker, case.id, size)
+            except ValueError as error:
+                print(f"left out: {error}", flush=True)
+                continue
             yield Observed(hearts, motion, size, case.id, seen, *about[case.id])
 
 
@@ -241,17 +246,29 @@ def scars(table: pd.DataFrame) -> list[str]:
     area = area_under_curve(-muscle["mean"].to_numpy(), muscle["infarct"].to_numpy())
     of_infarct, others = (muscle[muscle["infarct"] == there] for there in (True, False))
     rms = [np.sqrt(np.mean((rows["mean"] - rows["true"]) ** 2)) for rows in (of_infarct, others)]
+    bias = [np.mean(rows["mean"] - rows["true"]) for rows in (of_infarct, others)]
+    counts = " ".join(map(str, np.histogram(of_infarct["rank"], BINS, (0, 1))[0]))
     likely = [rows["scar_probability"].mean() for rows in (of_infarct, others)]
     held = [100 * rows["true"].between(rows["lower"], rows["upper"]).mean() for rows in (of_infarct, others)]
     ill = table[table["case"].isin(of_infarct["case"])]
     angles = [azimuth_error(rows) for _, rows in ill.groupby("case")]
     return [
         f"Identifiable segments in an infarct ({len(of_infarct)}) and others ({len(others)}): RMS error of their"
-        f" contractility {rms[0]:.2f} and {rms[1]:.2f}, intervals that hold {held[0]:.0f} and {held[1]:.0f} %, mean"
+        f" contractility {rms[0]:.2f} and {rms[1]:.2f}, mean error {bias[0]:.2f} and {bias[1]:.2f},"
+        f" intervals that hold {held[0]:.0f} and {held[1]:.0f} %, mean"
         f" probability of a scar {likely[0]:.2f} and {likely[1]:.2f}; area under the ROC curve {area:.3f}. Azimuth of"
         f" the infarct: off by {np.median(angles):.0f} deg in the median, {np.percentile(angles, 90):.0f} deg in the"
-        f" 90th percentile of {len(angles)} hearts.",
+        f" 90th percentile of {len(angles)} hearts. Ranks in an infarct: {counts}. {of_scars(muscle)}",
     ]
+
+
+def of_scars(muscle: pd.DataFrame) -> str:
+    """Sentence on how many of the segments with a probability of a scar are in one."""
+    counts = []
+    for low, high in itertools.pairwise((0.02, 0.2, 0.5, 0.8, 1.001)):
+        inside = muscle[muscle["scar_probability"].between(low, high, inclusive="left")]
+        counts.append(f"{inside['infarct'].sum()} of {len(inside)} at {low:g} to {min(high, 1):g}")
+    return f"In an infarct are, by the probability of a scar, {', '.join(counts)}."
 
 
 def report(table: pd.DataFrame) -> str:

@@ -1,6 +1,6 @@
 """Table of the errors of trackers at end-systole, by which parameters of hearts are inferred.
 
-    python benchmarks/tracker_errors.py out/benchmark                  # the table of the package
+    python benchmarks/tracker_errors.py out/inference out/benchmark    # the table of the package
     python benchmarks/tracker_errors.py out/mine --all -o errors.csv   # one of hearts and trackers of your own
 
 Only hearts whose label `split` is `develop` count, and only clips without a variation (label `variation` none); with
@@ -29,7 +29,9 @@ def chosen(case: Case, every: bool) -> bool:
     return every or (labels.get("split") == "develop" and labels.get("variation", "none") == "none")
 
 
-def errors(repository: et.Repository, every: bool) -> Iterator[tuple[str, int, str, str, str, Floats, Floats]]:
+def errors(
+    repository: et.Repository, every: bool
+) -> Iterator[tuple[str, int, str, str, str, str, str, Floats, Floats]]:
     """What was tracked and is true in the segments of the views of each case, tracker and size."""
     for case in repository.every.values():
         if not chosen(case, every):
@@ -40,7 +42,7 @@ def errors(repository: et.Repository, every: bool) -> Iterator[tuple[str, int, s
                 try:
                     for seen in seen_of(repository, case, tracker, size):
                         if seen.segments:
-                            yield tracker, size, kind, seen.quantity, heart, seen.tracked, seen.true
+                            yield tracker, size, kind, seen.quantity, heart, case.id, seen.view, seen.tracked, seen.true
                 except ObservationError as error:
                     print(f"left out: {error}")
 
@@ -56,7 +58,7 @@ def main() -> None:
         rows += errors(et.Repository(place), arguments.all)
     table = tracker_errors.table_of(rows)
     if arguments.output.is_file():
-        old, keys = tracker_errors.read(arguments.output), [*tracker_errors.KEYS, "heart"]
+        old, keys = tracker_errors.read(arguments.output), [*tracker_errors.KEYS, *tracker_errors.PLACE]
         table = pd.concat([old, table]).drop_duplicates(keys, keep="last").sort_values(keys)
     table.to_csv(arguments.output, index=False, float_format="%.6f")
     print(f"{arguments.output}: {table['heart'].nunique()} hearts, {len(table)} rows")

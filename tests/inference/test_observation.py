@@ -14,12 +14,18 @@ ES_ROUNDING = 1e-4
 """Of the strain of points and of the mean of segments in the store."""
 
 
+def tracked_and_true(random):
+    """Of a tracker that shows 0.8 of how segments differ."""
+    true = random.normal(-0.15, 0.05, 6)
+    return 0.01 + np.mean(true) + 0.8 * (true - np.mean(true)) + 0.005 * random.normal(size=6), true
+
+
 @pytest.fixture(scope="module")
 def errors(tmp_path_factory):
     """Table of errors of `dis` at 256 px."""
     random = np.random.default_rng(1)
     rows = [
-        ("dis", 256, "ideal", quantity, f"heart{number}", 0.01 + 0.005 * random.normal(size=6), np.zeros(6))
+        ("dis", 256, "ideal", quantity, f"heart{number}", "case", "view", *tracked_and_true(random))
         for quantity in ("circumferential", "longitudinal", "rotation")
         for number in range(4)
     ]
@@ -41,7 +47,7 @@ def test_a_modelled_heart_shows_the_true_strain_and_rotation_of_the_repository(c
     np.testing.assert_allclose(seen[0], float(true["true_rotation"]), atol=ES_ROUNDING)
 
 
-def test_observation_is_what_was_tracked_less_the_bias_with_its_errors(errors):
+def test_observation_is_what_was_tracked_without_bias_and_lost_contrast_with_its_errors(errors):
     hearts = et.sample()
     seen = observe(hearts, "dis", "healthy", errors=errors)
     strain = hearts.curves("healthy", "mid", "dis")["tracked_segment_strain"]
@@ -50,12 +56,15 @@ def test_observation_is_what_was_tracked_less_the_bias_with_its_errors(errors):
     mid = seen["value"][(seen["quantity"] == "circumferential").values]
     due = tracked.sel(aha=mid["aha"].values).values
     error = tracker_errors.error_of(
-        tracker_errors.read(errors), "dis", 256, "ideal", COMPONENTS["short_axis"][1], "sample/healthy"
+        tracker_errors.read(errors), "dis", 256, "ideal", COMPONENTS["short_axis"][1], "another"
     )
-    np.testing.assert_allclose(mid + error.bias, due, rtol=1e-9)
+    assert error.gain == pytest.approx(0.8, abs=0.05)
+    assert float(mid.mean()) == pytest.approx(due.mean() - error.bias, rel=1e-9)
+    np.testing.assert_allclose(error.gain * (mid - mid.mean()), due - due.mean(), rtol=1e-9)
     assert mid["aha"].values.tolist() == [7, 8, 9, 10, 11, 12]
     assert 17 not in seen["aha"] and np.all(np.linalg.eigvalsh(seen["covariance"]) > 0)
-    assert seen["covariance"].values[0, 0] >= error.segment_variance + observation.MODEL_SD["circumferential"] ** 2
+    least = error.segment_variance * 5 / 6 / error.gain**2 + observation.MODEL_SD["circumferential"] ** 2
+    assert seen["covariance"].values[0, 0] >= least
 
 
 def test_segment_that_the_tracker_lost_is_left_out(errors, monkeypatch):

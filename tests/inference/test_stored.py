@@ -91,8 +91,8 @@ def test_other_errors_of_the_tracker_are_other_settings(tmp_path, monkeypatch):
     table = tmp_path / "mine.csv"
     rows = list(csv.reader(tracker_errors.SHIPPED.open(encoding="utf-8")))
     versions = []
-    for scale in ("1", "2"):
-        rows[1][-1] = scale
+    for correlation in ("0.5", "0.9"):
+        rows[1][-1] = correlation
         with table.open("w", encoding="utf-8", newline="") as file:
             csv.writer(file).writerows(rows)
         made = plan(tmp_path, monkeypatch, tracker="dis", size_px=256, errors=str(table))

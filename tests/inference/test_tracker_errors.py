@@ -1,6 +1,7 @@
 """The error of a tracker, from errors that are drawn with a known one."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import norm
 
@@ -9,39 +10,83 @@ from echotruth.inference import tracker_errors
 from echotruth.inference.tracker_errors import NoErrors
 
 ABOUT = ("mine", 256, "ideal", "circumferential")
+SEGMENTS = 6
 
 
-def table(random, hearts, bias=0.02, common=0.01, own=0.03, smoothing=0.0, segments=6):
-    rows = []
-    for number in range(hearts):
-        true = random.choice([0.02, 0.1]) * random.normal(size=segments)
-        spread = np.hypot(own, np.sqrt(smoothing) * np.std(true, ddof=1))
-        error = bias + common * random.normal() + spread * random.normal(size=segments)
-        rows.append((*ABOUT, f"heart{number}", true + error, true))
+def heart(random, common=0.01, own=0.03, gain=1.0, unevenness=0.0):
+    """What was tracked of a heart and what is true: half of the walls are uneven."""
+    true = -0.15 + random.choice([0.02, 0.1]) * random.normal(size=SEGMENTS)
+    apart = true - np.mean(true)
+    spread = np.hypot(own, np.sqrt(unevenness) * np.std(true, ddof=1))
+    error = spread * random.normal(size=SEGMENTS)
+    return np.mean(true) + 0.02 + common * random.normal() + gain * apart + error - np.mean(error), true
+
+
+def table(random, hearts, **errors):
+    rows = ((*ABOUT, f"heart{number}", "case", "mid", *heart(random, **errors)) for number in range(hearts))
     return tracker_errors.table_of(rows)
 
 
-@pytest.mark.parametrize("smoothing", [0.0, 0.1])
-def test_bias_and_variances_of_many_hearts_are_those_they_were_drawn_with(smoothing):
-    drawn = table(np.random.default_rng(1), 3000, own=0.01, smoothing=smoothing)
+@pytest.mark.parametrize("unevenness", [0.0, 0.1])
+@pytest.mark.parametrize("gain", [1.0, 0.7])
+def test_bias_gain_and_variances_of_many_hearts_are_those_they_were_drawn_with(gain, unevenness):
+    drawn = table(np.random.default_rng(1), 3000, own=0.01, gain=gain, unevenness=unevenness)
     found = tracker_errors.error_of(drawn, *ABOUT, "another")
     assert found.bias == pytest.approx(0.02, abs=1e-3)
     assert found.common_sd == pytest.approx(0.01, rel=0.1)
-    assert found.smoothing == pytest.approx(smoothing, abs=0.01)
-    alike, apart = np.full(3, 0.2), np.array([-0.1, 0.0, 0.1])
-    np.testing.assert_allclose(found.covariance(alike)[0], [2e-4, 1e-4, 1e-4], rtol=0.3)
-    np.testing.assert_allclose(found.covariance(apart)[0, 0], 2e-4 + smoothing * 1e-2, rtol=0.15)
+    assert found.gain == pytest.approx(gain, abs=0.01)
+    assert found.segment_variance == pytest.approx(1e-4, rel=0.2)
+    assert found.unevenness == pytest.approx(unevenness, abs=0.01)
 
 
-@pytest.mark.parametrize("hearts", [3, 6])
-def test_intervals_of_few_hearts_are_wide_enough_for_the_next_one(hearts):
-    random, inside = np.random.default_rng(hearts), []
+@pytest.mark.parametrize("common", [0.03, 0.003])
+@pytest.mark.parametrize("hearts", [3, 6, 20])
+def test_intervals_of_few_hearts_are_wide_enough_for_the_next_one(hearts, common):
+    drawn = {"common": common, "own": 0.01, "gain": 0.7}
+    random, of_mean, of_segment = np.random.default_rng(hearts), [], []
     for _ in range(300):
-        found = tracker_errors.error_of(table(random, hearts, common=0.03, own=0.01), *ABOUT, "another")
-        new = 0.02 + 0.03 * random.normal() + 0.01 * random.normal(size=6)
-        sd = np.sqrt(np.mean(found.covariance(np.zeros(6))))
-        inside.append(abs(np.mean(new) - found.bias) < norm.ppf(0.95) * sd)
-    assert 0.84 < np.mean(inside) < 0.96
+        found = tracker_errors.error_of(table(random, hearts, **drawn), *ABOUT, "another")
+        tracked, true = heart(random, **drawn)
+        error, covariance = found.corrected(tracked) - true, found.covariance(tracked)
+        of_mean.append(abs(np.mean(error)) < norm.ppf(0.95) * np.sqrt(np.mean(covariance)))
+        of_segment.append(np.abs(error) < norm.ppf(0.95) * np.sqrt(np.diag(covariance)))
+    assert 0.84 < np.mean(of_mean) < 0.96
+    assert 0.84 < np.mean(of_segment) < 0.98
+
+
+def test_correction_leaves_no_error_that_grows_with_how_much_segments_differ():
+    """What is inferred from has the contrast of the truth, whichever the hearts are that the errors were learned on."""
+    random = np.random.default_rng(5)
+    found = tracker_errors.error_of(table(random, 200, gain=0.7, own=0.02), *ABOUT, "another")
+    true = np.array([-0.02, -0.05, -0.2, -0.2, -0.18, -0.19])
+    apart = true - true.mean()
+    tracked = [true.mean() + 0.7 * apart + 0.02 * random.normal(size=SEGMENTS) for _ in range(2000)]
+    mean = np.mean([found.corrected(one) for one in tracked], axis=0)
+    np.testing.assert_allclose(mean - mean.mean(), apart, atol=0.006)
+
+
+def test_view_that_shows_fewer_segments_tells_the_mean_less_well():
+    found = tracker_errors.error_of(table(np.random.default_rng(1), 100), *ABOUT, "another")
+    all_, few = (np.mean(found.covariance(np.full(number, -0.15))) for number in (SEGMENTS, 2))
+    assert all_ == pytest.approx(found.common_sd**2)
+    assert few == pytest.approx(found.common_sd**2 + found.segment_variance * (1 / 2 - 1 / 6) / found.gain**2)
+
+
+def test_tracker_that_shows_no_contrast_tells_next_to_nothing_of_it():
+    found = tracker_errors.error_of(table(np.random.default_rng(1), 50, gain=0.0, own=0.02), *ABOUT, "another")
+    assert found.gain == tracker_errors.LEAST_GAIN
+    assert np.sqrt(found.covariance(np.full(SEGMENTS, -0.15))[0, 0]) > 0.15
+
+
+def test_several_clips_of_a_heart_are_one_heart():
+    random = np.random.default_rng(2)
+    once = table(random, 4)
+    twice = pd.concat([once, once.assign(view="basal")], ignore_index=True)
+    one, two = (tracker_errors.error_of(rows, *ABOUT, "another") for rows in (once, twice))
+    assert two.common_sd == pytest.approx(one.common_sd) and two.bias == pytest.approx(one.bias)
+    single = twice[twice["heart"] == "heart0"]
+    with pytest.raises(NoErrors, match="of 1 hearts"):
+        tracker_errors.error_of(single, *ABOUT, "another")
 
 
 def test_errors_of_the_heart_itself_do_not_count():
@@ -69,7 +114,8 @@ def test_table_is_written_and_read_and_one_that_is_none_is_refused(tmp_path):
         ("empty", "", "is no table"),
         ("columns", "tracker,mean\nmine,1\n", "has no column size_px"),
         ("text", rows.to_csv(index=False).replace("256", "big"), "row 1: size_px is big"),
-        ("sd", rows.assign(sd=-0.1).to_csv(index=False), "row 1: sd is -0.1"),
+        ("sd", rows.assign(true_sd=-0.1).to_csv(index=False), "row 1: true_sd is -0.1"),
+        ("correlation", rows.assign(correlation=2).to_csv(index=False), "row 1: correlation is 2"),
     ):
         (tmp_path / name).write_text(text)
         with pytest.raises(NoErrors, match=said):
@@ -78,7 +124,20 @@ def test_table_is_written_and_read_and_one_that_is_none_is_refused(tmp_path):
         tracker_errors.read(tmp_path / "nowhere.csv")
 
 
-def test_images_with_noise_surroundings_or_a_shadow_are_realistic():
-    assert tracker_errors.acoustics(et.configure()) == "ideal"
-    for key, value in (("noise.snr_dB", 20.0), ("surroundings.level_dB", -10.0), ("shadow.side", "left")):
+def test_images_of_which_more_than_muscle_blood_and_borders_is_seen_are_realistic():
+    for given in ({}, {"blood.level_dB": -20.0, "borders.endocardium_dB": 10.0, "shadow.edge_deg": 3.0}):
+        assert (
+            tracker_errors.acoustics(et.configure(**{f"realism.{key}": value for key, value in given.items()}))
+            == "ideal"
+        )
+    for key, value in (
+        ("noise.snr_dB", 20.0),
+        ("haze.level_dB", -20.0),
+        ("surroundings.level_dB", -10.0),
+        ("decorrelation.time_ms", 5.0),
+        ("neighbours.papillary_muscles_dB", 0.0),
+        ("backscatter.variation_dB", 3.0),
+        ("shadow.side", "left"),
+    ):
         assert tracker_errors.acoustics(et.configure(**{f"realism.{key}": value})) == "realistic"
+    assert tracker_errors.acoustics(et.configure(realism={"preset": "mouse"})) == "realistic"

@@ -26,7 +26,7 @@ def infer(arguments: argparse.Namespace) -> int:
     three minutes; the key inference.tracker makes it a stage of a run, which keeps the draws and does nothing twice.
 
     examples:
-      echotruth infer out/benchmark --tracker bspline_dic --case infarct_inferior_ideal
+      echotruth infer out/benchmark --tracker bspline_dic --size 256 --case infarct_inferior_ideal
       echotruth infer out/benchmark --tracker dis --size 128 --output dis.csv
 
     exit status:

@@ -17,6 +17,7 @@ from echotruth.evaluation.segment_strain import SHOWN
 from echotruth.inference import tracker_errors
 from echotruth.inference.imaged_wall import ROTATION, quantity
 from echotruth.inference.tracker_errors import TrackerError
+from echotruth.repository import settings
 from echotruth.repository.choice import image_size
 from echotruth.repository.kept import NotEvaluated
 from echotruth.repository.reader import Repository
@@ -69,17 +70,18 @@ def observe(
     size : int, optional
         Pixels along a side of the images.
     errors : str or Path, optional
-        Table of the errors of trackers (docs/inference.md). Default: that of the package, which knows those of the
-        benchmark. Errors of the heart itself in it do not count.
+        Table of the errors of trackers (docs/inference.md). Default: that of the package. Errors of the heart itself
+        in it do not count; trackers are told apart by their names.
 
     Returns
     -------
     Dataset
-        `value` (observation), at end-systole since end-diastole and less the tracker's bias: engineering strain along
-        the wall of an AHA segment, or rotation, rad; `covariance` (observation, other) of its errors; of each
-        observation `quantity` (circumferential, longitudinal or rotation), `view` and `aha`, 0 for rotation; and the
-        loop of the heart, `pressure` (frame), Pa, and `volume` (frame), m3. Segments of which the tracker lost half the
-        points, and those of which the view shows only a corner, are left out, and so is segment 17.
+        `value` (observation), at end-systole since end-diastole, less the tracker's bias and with the contrast that it
+        loses: engineering strain along the wall of an AHA segment, or rotation, rad; `covariance` (observation, other)
+        of its errors; of each observation `quantity` (circumferential, longitudinal or rotation), `view` and `aha`, 0
+        for rotation; and the loop of the heart, `pressure` (frame), Pa, and `volume` (frame), m3. Segments of which the
+        tracker lost half the points, and those of which the view shows only a corner, are left out, and so is segment
+        17.
 
     Raises
     ------
@@ -113,8 +115,8 @@ def observe(
 
 
 def heart_name(repository: Repository, case: Case) -> str:
-    """Name of the heart of a case that no other repository has."""
-    return f"{repository.config.name}/{label_text(case.labels.get('heart')) or case.id}"
+    """Name of the heart of a case that no other repository has; cases of one motion are of one heart."""
+    return f"{repository.config.name}/{label_text(case.labels.get('heart')) or settings.mechanics(case.config)}"
 
 
 def seen_of(repository: Repository, case: Case, tracker: str, size: int) -> Iterator[Seen]:
@@ -184,7 +186,7 @@ def dataset(
         "view": np.repeat([seen.view for seen, _ in rows], sizes),
         "aha": np.concatenate([seen.segments for seen, _ in rows]),
     }
-    value = np.concatenate([seen.tracked - error.bias for seen, error in rows])
+    value = np.concatenate([error.corrected(seen.tracked) for seen, error in rows])
     arrays: dict[str, Any] = {
         "value": ("observation", value, {"units": "1", "long_name": "engineering strain, or rotation in rad"}),
         "covariance": (("observation", "other"), covariance, {"long_name": "of the errors of the values"}),
