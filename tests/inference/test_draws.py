@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import kstest, norm
+from scipy.stats import kstest, norm, truncnorm
 
 import echotruth as et
 from echotruth.inference import draws, modes
-from echotruth.inference.draws import MATERIAL, TENSION, of_posterior, of_prior, standard_normal
+from echotruth.inference.draws import MATERIAL, TENSION, normal_within, of_posterior, of_prior, standard_normal
 from echotruth.inference.laplace import Posterior, Prediction
 from echotruth.inference.modes import Mode, weights
 from echotruth.inference.parameters import (
@@ -73,12 +73,22 @@ def test_draws_are_of_both_modes_as_often_as_they_are_probable(segments):
     assert found.scar[:, 7].mean() == pytest.approx(0.75, abs=1 / 512) and not found.scar[:, 9].any()
     ratio = found.values["contractility.8"]
     scar = found.scar[:, 7]
-    # A scar hardly contracts: positive normal numbers of a tenth of the prior's deviation. The rest is the wall then.
+    # A scar hardly contracts: half a normal distribution of a tenth of the prior's deviation. The rest is the wall.
     lost = segments.share[[number in SCARRED for number in segments.number]].sum()
-    assert ratio[scar].mean() == pytest.approx(0.015 / np.sqrt(2 * np.pi) / (1 - lost), rel=0.1)
+    assert ratio[scar].mean() == pytest.approx(0.015 * np.sqrt(2 / np.pi) / (1 - lost), rel=0.1)
     assert ratio[~scar].mean() == pytest.approx(1, abs=0.02)
     stiff = found.values["stiffness.8"]
     assert np.median(stiff[scar]) > 8 and np.median(stiff[~scar]) == pytest.approx(1, abs=0.05)
+
+
+def test_draws_at_a_bound_are_of_the_part_of_the_normal_distribution_within_it():
+    free = [one for one in FREE if one.key in ("fibres.endo_deg", "fibres.epi_deg")]
+    root = np.linalg.cholesky([[25.0, 15.0], [15.0, 25.0]])
+    drawn = normal_within(np.array([88.0, -40.0]), root, free, 512, np.random.default_rng(1))
+    part = truncnorm(-np.inf, (90 - 88) / 5, 88, 5)
+    assert kstest(drawn[:, 0], part.cdf).pvalue > 0.01
+    # What lies with it moves with it.
+    assert drawn[:, 1].mean() == pytest.approx(-40 + 0.6 * (part.mean() - 88), abs=0.5)
 
 
 def test_wall_has_the_mean_of_its_segments_in_every_draw(segments):
@@ -91,11 +101,16 @@ def test_wall_has_the_mean_of_its_segments_in_every_draw(segments):
 
 
 def test_quantiles_are_those_of_the_mixture(segments):
-    """Of a key that both modes share, the distribution is that of one normal; of all, the same draws."""
-    found, seen = of_posterior([mode(sd=0.5), mode(SCARRED, 4.0, sd=0.5)], segments, np.diag([1.0, 4.0, 9.0]))
-    endo = next(one for one in FREE if one.key == "fibres.endo_deg")
-    due = norm(endo.mean, 0.5 * endo.sd).ppf([0.05, 0.5, 0.95])
-    np.testing.assert_allclose(np.quantile(found.values[endo.key], [0.05, 0.5, 0.95]), due, atol=0.15 * 0.5 * endo.sd)
+    """Of two modes that lie apart the quantiles are those of the sum of their distributions."""
+    wide = mode(SCARRED, 4.0, sd=0.5)
+    weight, place = weights([mode(sd=0.2), wide]), [one.key for one in wide.free].index("loop.esp_mmHg")
+    pressure = wide.free[place]
+    wide.found.mean[place] += pressure.sd
+    found, seen = of_posterior([mode(sd=0.2), wide], segments, np.diag([1.0, 4.0, 9.0]))
+    one, other = norm(pressure.mean, 0.2 * pressure.sd), norm(pressure.mean + pressure.sd, 0.5 * pressure.sd)
+    for level in (0.05, 0.3, 0.6, 0.95):
+        at = np.quantile(found.values[pressure.key], level)
+        assert weight @ [one.cdf(at), other.cdf(at)] == pytest.approx(level, abs=0.02)
     np.testing.assert_allclose(seen.std(axis=0), [1, 2, 3], rtol=0.05)
 
 

@@ -4,12 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 import echotruth as et
 from echotruth.config.loading import ConfigError
 from echotruth.inference import observation
-from echotruth.inference.estimate import COARSE_SD, infer, with_error_of_mesh
-from echotruth.inference.heart_model import model_config
+from echotruth.inference.estimate import COARSE_SD, infer, shortest_interval, with_error_of_mesh
+from echotruth.inference.heart_model import MESH_KEYS, model_config
 from echotruth.inference.imaged_wall import ImagedWall, quantity
 from echotruth.inference.observation import ObservationError, Seen
 from echotruth.inference.parameters import PriorError
@@ -45,7 +46,10 @@ def observed(heart):
         wall = ImagedWall.of(heart, heart.config, view)
         exact = wall.seen(heart, heart.positions(0), heart.positions(-1))[list(segments)]
         rows.append(
-            (Seen(quantity(wall.kind), view, list(segments), exact, exact), TrackerError(0.0, 0.0, ERROR**2, 0.0, 99))
+            (
+                Seen(quantity(wall.kind), view, list(segments), exact, exact),
+                TrackerError(0.0, ERROR, 1.0, 0.0, ERROR**2, 0.0, 6),
+            )
         )
     cycle = read_loop(heart.config.loop)
     loop = {"pressure": cycle.pressure, "volume": cycle.volume}
@@ -77,21 +81,32 @@ def test_contractility_of_segments_is_found_from_the_motion_of_a_heart_of_anothe
 
 
 @pytest.mark.parametrize(
-    ("mesh", "added"),
-    [((12, 6, 1), True), ((18, 10, 1), True), ((12, 8, 2), False), ((24, 12, 3), False), (None, False)],
+    ("own", "mesh", "added"),
+    [
+        ((18, 10, 2), (12, 6, 1), True),
+        ((18, 10, 2), (18, 10, 1), True),
+        ((18, 10, 2), (12, 8, 2), False),
+        ((18, 10, 2), (24, 12, 3), False),
+        ((18, 10, 2), None, False),
+        ((12, 8, 1), (12, 8, 2), True),
+        ((12, 8, 1), None, False),
+        ((18, 6, 1), (12, 6, 1), False),
+    ],
 )
-def test_strain_has_the_error_of_a_mesh_that_is_coarser_than_the_usual_one(observed, mesh, added, tmp_path):
-    geometry = {"circumferential_elements": 18, "longitudinal_elements": 10, "transmural_elements": 2}
-    config = et.configure(json.loads(observed.attrs["config"]), geometry=geometry)
+def test_strain_has_the_error_of_a_mesh_that_is_coarser_than_the_usual_one(observed, own, mesh, added, tmp_path):
+    config = et.configure(json.loads(observed.attrs["config"]), **dict(zip(MESH_KEYS, own, strict=True)))
     fine = observed.assign_attrs(config=config.model_dump_json())
     model = model_config(fine, mesh, tmp_path)
     more = (with_error_of_mesh(fine, model)["covariance"] - fine["covariance"]).values
     np.testing.assert_allclose(more, added * COARSE_SD**2 * np.eye(len(more)), atol=1e-12)
 
 
-def test_mesh_as_coarse_as_that_of_the_heart_adds_no_error(observed, tmp_path):
-    model = model_config(observed, (12, 6, 1), tmp_path)
-    assert with_error_of_mesh(observed, model).identical(observed)
+def test_interval_is_that_of_highest_density():
+    random = np.random.default_rng(1)
+    drawn = np.stack([random.normal(3, 2, 20000), np.abs(random.normal(0, 1, 20000))], axis=1)
+    lower, upper = shortest_interval(drawn)
+    np.testing.assert_allclose([lower[0], upper[0]], norm(3, 2).ppf([0.05, 0.95]), atol=0.3)
+    np.testing.assert_allclose([lower[1], upper[1]], [0, norm.ppf(0.95)], atol=0.03)
 
 
 @pytest.mark.slow
@@ -134,6 +149,7 @@ def test_observations_that_cannot_be_used_are_refused_in_a_sentence(observed, ch
         ({"fibres.endo": (80, 8)}, "fibres.endo is not inferred: the keys are .*fibres.endo_deg"),
         ({"fibres.endo_deg": (95, 8)}, "give a mean from -90 to 90"),
         ({"fibres.endo_deg": (80, 0)}, "positive standard deviation"),
+        ({"mechanics.regional.contractility": (1, 1000)}, "standard deviation of at most"),
         ({"fibres.endo_deg": 80}, "give a mean and a standard deviation, or None"),
         ({"mechanics.regional.contractility": (0.01, 0.1)}, "give a mean from 0.05 to 20"),
     ],

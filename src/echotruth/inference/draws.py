@@ -35,6 +35,9 @@ MATERIAL, TENSION = "mechanics.material.stiffness_kPa", "active_tension_kPa"
 SEED = 1
 """Of the draws: the same observations give the same ones."""
 
+ATTEMPTS = 100
+"""To draw numbers within their limits."""
+
 STEP = 1e-6
 """Change of a parameter by which logarithms of means over the wall are differenced."""
 
@@ -65,6 +68,32 @@ def standard_normal(number: int, size: int, random: np.random.Generator) -> Floa
     return np.asarray(norm.ppf((ranks + 0.5) / number))
 
 
+def normal_within(
+    mean: Floats, root: Floats, free: Sequence[Parameter], number: int, random: np.random.Generator
+) -> Floats:
+    """Normal numbers (number, p) within the limits of parameters on their scales.
+
+    Those outside are drawn again, at most :data:`ATTEMPTS` times; what is outside then is put on the limit.
+
+    Parameters
+    ----------
+    mean : ndarray of shape (p,)
+    root : ndarray of shape (p, p)
+        Of the covariance: its product with its transpose.
+    free : sequence of Parameter
+    number : int
+    random : Generator
+    """
+    prior = prior_of(free)
+    drawn = mean + standard_normal(number, len(mean), random) @ root.T
+    for _ in range(ATTEMPTS):
+        outside = np.flatnonzero(np.any((drawn < prior.lower) | (drawn > prior.upper), axis=1))
+        if not len(outside):
+            break
+        drawn[outside] = mean + random.standard_normal((len(outside), len(mean))) @ root.T
+    return np.clip(drawn, prior.lower, prior.upper)
+
+
 def of_posterior(
     modes: Sequence[Mode], segments: SegmentMeans, covariance: Floats, number: int = DRAWS
 ) -> tuple[Draws, Floats]:
@@ -80,8 +109,8 @@ def of_posterior(
     """
     random, parts = np.random.default_rng(SEED), []
     for mode, count in zip(modes, _shares(weights(modes), number), strict=True):
-        found, size = mode.found, len(mode.free)
-        scaled = found.mean + standard_normal(count, size, random) @ np.linalg.cholesky(found.covariance).T
+        found = mode.found
+        scaled = normal_within(found.mean, np.asarray(np.linalg.cholesky(found.covariance)), mode.free, count, random)
         seen = found.prediction.observed + (scaled - found.mean) @ found.prediction.jacobian.T
         parts.append((_of_mode(mode, segments, scaled), seen))
     order = random.permutation(number)
@@ -94,7 +123,7 @@ def of_posterior(
 def of_prior(mode: Mode, segments: SegmentMeans, number: int = DRAWS) -> Draws:
     """Draws of the prior of a wall without a scar, given the mode of such a wall, sought from the mean of the prior."""
     random, prior = np.random.default_rng(SEED), prior_of(mode.free)
-    scaled = prior.mean + prior.sd * standard_normal(number, len(mode.free), random)
+    scaled = normal_within(prior.mean, np.diag(prior.sd), mode.free, number, random)
     wall = _Wall.of(mode.free, segments, scaled)
     return Draws(_named(mode, wall, scaled, prior.mean, mode.found.start), np.zeros((number, len(SEGMENTS)), bool))
 
@@ -188,12 +217,13 @@ def _named(mode: Mode, wall: _Wall, scaled: Floats, about: Floats, there: Predic
         of_wall = _Wall.of(mode.free, wall.segments, at, mode.scarred)
         return np.stack([of_wall.log_mean_stiffness, of_wall.log_mean_contractility])
 
-    slopes = there.derived_jacobian + _slopes(levels, about)
+    slopes = there.derived_jacobian + _slopes(levels, mode.free, about)
     found = there.derived[:, None] + levels(about[None]) + slopes @ (scaled - about).T
     return values | dict(zip((MATERIAL, TENSION), np.exp(found) / UNITS["kPa"], strict=True))
 
 
-def _slopes(function: Callable[[Floats], Floats], about: Floats) -> Floats:
-    """Derivatives (q, p) of a function of parameters (n, p), whose values are (q, n), by central differences."""
-    steps = STEP * np.eye(len(about))
-    return (function(about + steps) - function(about - steps)) / (2 * STEP)
+def _slopes(function: Callable[[Floats], Floats], free: Sequence[Parameter], about: Floats) -> Floats:
+    """Derivatives (q, p) of a function of parameters (n, p), whose values are (q, n), by differences within limits."""
+    prior, steps = prior_of(free), STEP * np.eye(len(about))
+    above, below = (np.clip(about + change, prior.lower, prior.upper) for change in (steps, -steps))
+    return (function(above) - function(below)) / np.diag(above - below)

@@ -18,7 +18,7 @@ from echotruth.config.building import configure
 from echotruth.inference.draws import MATERIAL, TENSION, of_posterior, of_prior
 from echotruth.inference.heart_model import elements, model_config
 from echotruth.inference.imaged_wall import ROTATION
-from echotruth.inference.modes import Mode, modes
+from echotruth.inference.modes import Modes, modes
 from echotruth.inference.observation import ObservationError
 from echotruth.inference.parameters import Given
 from echotruth.inference.segment_means import SEGMENTS, SegmentMeans
@@ -60,25 +60,27 @@ def infer(
     prior : mapping, optional
         Dotted key to the mean and the standard deviation of its value before anything is observed, or to None for what
         is known as the model has it; `mechanics.regional.contractility` and `mechanics.regional.stiffness` stand for
-        those of all segments. Default: those of docs/inference.md.
+        those of all segments; of a stiffness the pair is the median, and the standard deviation of its logarithm times
+        that. Default: those of docs/inference.md.
     mesh : tuple of int, optional
         Elements of the model around, along and through the wall. None: those of the observed heart. Fewer than by
-        default are faster, and their error of 2 percentage points of strain is added to that of the tracker.
+        default, here or in the observed heart, add an error of 2 percentage points of strain to that of the tracker.
     progress : bool
         Whether a line on stderr says how far it is, where a person watches.
 
     Returns
     -------
     Dataset
-        By `parameter`, in its `unit`: `mean`, `sd`, `lower` and `upper` of the 90 % interval, `prior_mean`, `prior_sd`,
-        and `identifiable`, whether the standard deviation (of stiffness and tension: of its logarithm) is at most 0.8
-        of the prior's. Parameters `contractility.N` and `stiffness.N` are means over the muscle of AHA segments,
-        relative to the mean of the whole wall (the geometric one of stiffness). They are of the draws `posterior` and
-        `prior` (draw, parameter); `scar` (draw, aha) tells in which of the first a segment is a scar,
-        `scar_probability` (aha) in how many, NaN of a segment that no view shows, and `replicated` (draw, observation)
-        what would be seen, with errors. By `observation`: `observed`, `predicted` of the most probable heart,
-        `residual` and `sd_error`. Attributes: `misfit_probability` of residuals as large, `misfit` if it is below 0.01,
-        `converged`, `steps`, `case`, `tracker`, `size_px` and the `config` of the most probable heart.
+        By `parameter`, in its `unit`: `mean`, `sd`, `lower` and `upper` of the shortest 90 % interval, `prior_mean`,
+        `prior_sd`, and `identifiable`, whether the standard deviation (of stiffness and tension: of its logarithm) is
+        at most 0.8 of the prior's. Parameters `contractility.N` and `stiffness.N` are means over the muscle of AHA
+        segments, relative to the mean of the whole wall (the geometric one of stiffness). They are of the draws
+        `posterior` and `prior` (draw, parameter); `scar` (draw, aha) tells in which of the first a segment is a scar,
+        `scar_probability` (aha) in how many, NaN of a segment that no view shows and where no scar is tried, and
+        `replicated` (draw, observation) what would be seen, with errors. By `observation`: `observed`, `predicted` of
+        the most probable heart, `residual` and `sd_error`. Attributes: `misfit_probability` of observations as far from
+        what model and prior say, `misfit` if it is below 0.01, `converged` if every search found its mode, `steps`,
+        `case`, `tracker`, `size_px` and the `config` of the most probable heart.
 
     Raises
     ------
@@ -105,9 +107,12 @@ def infer(
 
 
 def with_error_of_mesh(observed: xr.Dataset, model: Config) -> xr.Dataset:
-    """Observations whose covariance has the error of a mesh that is coarser than the usual and the heart's own."""
-    own = elements(configure(json.loads(observed.attrs["config"])))
-    if np.all(np.asarray(elements(model)) >= np.minimum(own, MESH)):
+    """Observations whose covariance has the error of a mesh, of the model or the heart, coarser than the usual one.
+
+    There is none in a direction in which both have as many elements.
+    """
+    own, of_model = (np.array(elements(config)) for config in (configure(json.loads(observed.attrs["config"])), model))
+    if np.all((own == of_model) | (np.minimum(own, of_model) >= MESH)):
         return observed
     more = np.diag(np.where(observed["quantity"] == ROTATION, 0.0, COARSE_SD**2))
     return observed.assign(covariance=observed["covariance"] + more)
@@ -150,9 +155,11 @@ def _check_values(value: Floats, covariance: Floats) -> None:
         raise ObservationError("observed: the covariance is not positive definite: each value needs an error")
 
 
-def _dataset(observed: xr.Dataset, found: list[Mode], segments: SegmentMeans) -> xr.Dataset:
+def _dataset(observed: xr.Dataset, every: Modes, segments: SegmentMeans) -> xr.Dataset:
     """What was found, as :func:`infer` returns it."""
-    best, value = max(found, key=lambda mode: mode.log_weight), observed["value"].values
+    found, value = every.found, observed["value"].values
+    best = max(found, key=lambda mode: mode.log_weight)
+    tried, shown = found[0].may_have_scar, np.isin(SEGMENTS, found[0].model.aha)
     predicted = best.found.prediction.observed
     draws, replicated = of_posterior(found, segments, observed["covariance"].values)
     before = of_prior(found[0], segments)
@@ -167,7 +174,7 @@ def _dataset(observed: xr.Dataset, found: list[Mode], segments: SegmentMeans) ->
         "prior": (("draw", "parameter"), prior),
         "replicated": (("draw", "observation"), replicated),
         "scar": (("draw", "aha"), draws.scar),
-        "scar_probability": ("aha", np.where(np.isin(SEGMENTS, found[0].model.aha), draws.scar.mean(axis=0), np.nan)),
+        "scar_probability": ("aha", np.where(tried & shown, draws.scar.mean(axis=0), np.nan)),
     }
     labels: dict[str, Any] = {name: ("observation", observed[name].values) for name in ("quantity", "view")}
     labels |= {"segment": ("observation", observed["aha"].values), "unit": ("parameter", [unit(one) for one in names])}
@@ -175,7 +182,7 @@ def _dataset(observed: xr.Dataset, found: list[Mode], segments: SegmentMeans) ->
     about |= {
         "misfit_probability": best.found.misfit,
         "misfit": int(best.found.misfit < MISFIT),
-        "converged": int(all(mode.found.converged for mode in found)),
+        "converged": int(every.converged),
         "steps": sum(mode.found.steps for mode in found),
         "version": echotruth.__version__,
         "config": best.model.at(best.found.mean).model_dump_json(),
@@ -183,9 +190,20 @@ def _dataset(observed: xr.Dataset, found: list[Mode], segments: SegmentMeans) ->
     return xr.Dataset(arrays, {"parameter": names, "aha": list(SEGMENTS), **labels}, about)
 
 
+def shortest_interval(draws: Floats) -> tuple[Floats, Floats]:
+    """Ends (parameter,) of the shortest interval that holds 90 % of the draws (draw, parameter).
+
+    Of what cannot be negative and is most probably nearly nothing, as the contractility of a scar, it begins there.
+    """
+    ordered, inside = np.sort(draws, axis=0), int(np.ceil(COVERED * len(draws)))
+    width = ordered[inside - 1 :] - ordered[: len(draws) - inside + 1]
+    first, column = np.argmin(width, axis=0), np.arange(draws.shape[1])
+    return ordered[first, column], ordered[first + inside - 1, column]
+
+
 def _summary(names: list[str], posterior: Floats, prior: Floats) -> dict[str, NDArray[Any]]:
     """Summaries (parameter,) of draws (draw, parameter)."""
-    lower, upper = np.quantile(posterior, [(1 - COVERED) / 2, (1 + COVERED) / 2], axis=0)
+    lower, upper = shortest_interval(posterior)
     logarithmic = np.array([name.startswith(POSITIVE) for name in names])
     # Of a positive factor its logarithm is normal, whose spread tells what was learned.
     spread, before = (

@@ -55,7 +55,11 @@ def model_config(observed: xr.Dataset, mesh: tuple[int, int, int] | None, folder
         given = configure(given, **dict(zip(MESH_KEYS, mesh, strict=True)))
     shares = {name: getattr(species.mechanics.active, name) for name in ("sheet_share", "normal_share")}
     mechanics = given.mechanics.model_copy(
-        update={"regional": Regional(), "active": given.mechanics.active.model_copy(update=shares)}
+        update={
+            "regional": Regional(),
+            "active": given.mechanics.active.model_copy(update=shares),
+            "material": given.mechanics.material.model_copy(update=_unknown_stiffness(given)),
+        }
     )
     sections = {
         "geometry": given.geometry,
@@ -65,6 +69,11 @@ def model_config(observed: xr.Dataset, mesh: tuple[int, int, int] | None, folder
         "mechanics": mechanics,
     }
     return given.model_copy(update=sections)
+
+
+def _unknown_stiffness(given: Config) -> dict[str, None]:
+    """C follows from pressure and volume, unless the mesh is that at end-diastole, of unknown unloaded volume."""
+    return {} if given.geometry.given_state == "end_diastole" else {"stiffness_kPa": None}
 
 
 def elements(config: Config) -> tuple[int, int, int]:

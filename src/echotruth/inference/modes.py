@@ -12,8 +12,10 @@ scar before anything is seen: a spike and slab (Mitchell & Beauchamp 1988, J Am 
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -36,6 +38,8 @@ from echotruth.inference.parameters import (
 from echotruth.inference.segment_means import SEGMENTS, SegmentMeans
 from echotruth.mechanics.pathology import PathologyError
 from echotruth.mechanics.solver.newton import Diverged
+
+logger = logging.getLogger("echotruth.inference")
 
 SCAR_PROBABILITY = 0.1
 """That a segment is a scar before anything is seen: as if half of the hearts had an infarct of three segments."""
@@ -78,8 +82,28 @@ class Mode:
         return keys >= {f"{section}.{number}" for section in (CONTRACTILITY, STIFFNESS) for number in SEGMENTS}
 
 
-def modes(config: Config, given: Given, observed: xr.Dataset, segments: SegmentMeans) -> list[Mode]:
-    """Modes of the posterior, that without a scar first.
+class Modes(NamedTuple):
+    """Modes of the posterior.
+
+    Attributes
+    ----------
+    found : list of Mode
+        That without a scar first.
+    missed : list of tuple of int
+        AHA segments that may be a scar together, of which no heart or no mode was found.
+    """
+
+    found: list[Mode]
+    missed: list[tuple[int, ...]]
+
+    @property
+    def converged(self) -> bool:
+        """Whether every search found its mode."""
+        return not self.missed and all(mode.found.converged for mode in self.found)
+
+
+def modes(config: Config, given: Given, observed: xr.Dataset, segments: SegmentMeans) -> Modes:
+    """Find the modes of the posterior.
 
     Parameters
     ----------
@@ -98,13 +122,14 @@ def modes(config: Config, given: Given, observed: xr.Dataset, segments: SegmentM
         If no step lowers the misfit of the model without a scar.
     """
     free = parameters(config, given)
-    found = [_mode(config, free, (), observed, None)]
+    found, missed = [_mode(config, free, (), observed, None)], []
     for scarred in _candidates(found[0], segments):
         try:
             found.append(_with_scar(found[0], config, scarred, observed))
-        except (NoMode, Diverged, ObservationError, PathologyError):
-            continue  # there is no such heart
-    return found
+        except (NoMode, Diverged, ObservationError, PathologyError) as error:
+            logger.info("scar in %s: %s", scarred, error)
+            missed.append(scarred)
+    return Modes(found, missed)
 
 
 def weights(found: Sequence[Mode]) -> Floats:

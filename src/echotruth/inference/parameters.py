@@ -132,8 +132,8 @@ def _check_pair(key: str, pair: Sequence[float], limits: tuple[float, float]) ->
     except (TypeError, ValueError):
         raise PriorError(f"prior: {key} = {pair!r}: give a mean and a standard deviation, or None") from None
     low, high = limits
-    if not (low <= mean <= high and np.isfinite(mean) and 0 < sd < np.inf):
-        remedy = f"give a mean from {low:g} to {high:g} and a positive standard deviation"
+    if not (low <= mean <= high and np.isfinite(mean) and 0 < sd <= high - low and np.isfinite(sd)):
+        remedy = f"give a mean from {low:g} to {high:g} and a positive standard deviation of at most their difference"
         raise PriorError(f"prior: {key} = ({mean:g}, {sd:g}): {remedy}")
 
 
@@ -143,7 +143,7 @@ def _named(key: str, given: Given) -> str:
 
 
 def _parameter(key: str, mean: float, sd: float) -> Parameter:
-    """A parameter, of the mean and standard deviation of its value."""
+    """A parameter, of the mean and standard deviation of its value; of stiffness, the median and that over it."""
     if key.startswith(STIFFNESS):
         return Parameter(key, float(np.log(mean)), sd / mean, LIMITS[key], logarithmic=True)
     return Parameter(key, float(mean), float(sd), LIMITS[key])
