@@ -43,8 +43,8 @@ def found():
 
 def test_values_stand_at_their_labels_and_what_was_not_seen_is_no_number():
     given, covariance = found(), np.diag([1.0, 4.0, 9.0]) + 0.1
-    observed = xr.Dataset({"covariance": (("observation", "other"), covariance)})
-    made = groups(given, observed, {"mid 8": -0.28}, {"contractility.8": 0.0}, SimpleNamespace(config=CONFIG))
+    given["covariance"] = ("observation", "other"), covariance
+    made = groups(given, {"mid 8": -0.28}, {"contractility.8": 0.0}, SimpleNamespace(config=CONFIG))
     assert set(made) == set(schema.INFERENCE)
     for group, arrays in made.items():
         assert set(arrays) == {array.name for array in schema.named(group)}

@@ -78,9 +78,10 @@ def infer(
         `posterior` and `prior` (draw, parameter); `scar` (draw, aha) tells in which of the first a segment is a scar,
         `scar_probability` (aha) in how many, NaN of a segment that no view shows and where no scar is tried, and
         `replicated` (draw, observation) what would be seen, with errors. By `observation`: `observed`, `predicted` of
-        the most probable heart, `residual` and `sd_error`. Attributes: `misfit_probability` of observations as far from
-        what model and prior say, `misfit` if it is below 0.01, `converged` if every search found its mode, `steps`,
-        `case`, `tracker`, `size_px` and the `config` of the most probable heart.
+        the most probable heart, `residual` and `sd_error`, and `covariance` (observation, other) of the errors, that of
+        the mesh included. Attributes: `misfit_probability` of observations as far from what model and prior say,
+        `misfit` if it is below 0.01, `converged` if every search found its mode, `steps`, `case`, `tracker`, `size_px`
+        and the `config` of the most probable heart.
 
     Raises
     ------
@@ -173,6 +174,7 @@ def _dataset(observed: xr.Dataset, every: Modes, segments: SegmentMeans) -> xr.D
         "posterior": (("draw", "parameter"), posterior),
         "prior": (("draw", "parameter"), prior),
         "replicated": (("draw", "observation"), replicated),
+        "covariance": (("observation", "other"), observed["covariance"].values),
         "scar": (("draw", "aha"), draws.scar),
         "scar_probability": ("aha", np.where(tried & shown, draws.scar.mean(axis=0), np.nan)),
     }

@@ -32,7 +32,7 @@ def stored(repository: Repository, case: Case) -> Groups:
     """
     section = case.config.inference
     observed = observe(repository, section.tracker, case.id, section.size_px, section.errors)
-    return _groups(repository, case, observed, infer(observed, section.prior, progress=False))
+    return _groups(repository, case, infer(observed, section.prior, progress=False))
 
 
 def rows(
@@ -49,29 +49,27 @@ def rows(
         Of each parameter its values, by the names of :data:`.inferred.COLUMNS`.
     """
     observed, of = observe(repository, tracker, case, size, errors), repository.case(case)
-    found = _groups(repository, of, observed, infer(observed, of.config.inference.prior))
+    found = _groups(repository, of, infer(observed, of.config.inference.prior))
     about = {name: observed.attrs[name] for name in ("case", "tracker", "size_px")}
     return [about | row for row in inferred.rows(found["inference/fit"])]
 
 
-def _groups(repository: Repository, case: Case, observed: xr.Dataset, found: xr.Dataset) -> Groups:
+def _groups(repository: Repository, case: Case, found: xr.Dataset) -> Groups:
     """Arrays of the groups, beside what is true of the heart."""
-    seen = seen_of(repository, case, observed.attrs["tracker"], observed.attrs["size_px"])
+    seen = seen_of(repository, case, found.attrs["tracker"], found.attrs["size_px"])
     true = {
         _label(one.view, number): value for one in seen for number, value in zip(one.segments, one.true, strict=True)
     }
-    return groups(found, observed, true, truth(repository, case.id), case)
+    return groups(found, true, truth(repository, case.id), case)
 
 
-def groups(
-    found: xr.Dataset, observed: xr.Dataset, true_seen: dict[str, float], true: dict[str, float], case: Case
-) -> Groups:
+def groups(found: xr.Dataset, true_seen: dict[str, float], true: dict[str, float], case: Case) -> Groups:
     """Arrays of the groups `inference`, by group and name.
 
     Parameters
     ----------
-    found, observed : Dataset
-        As :func:`.estimate.infer` and :func:`.observation.observe` return them.
+    found : Dataset
+        As :func:`.estimate.infer` returns it.
     true_seen : dict
         True values of what may be observed, by their labels (:func:`.schema.observations`).
     true : dict
@@ -90,7 +88,7 @@ def groups(
         return whole
 
     covariance = np.full((len(labels), len(labels)), np.nan)
-    covariance[np.ix_(at, at)] = observed["covariance"].values
+    covariance[np.ix_(at, at)] = found["covariance"].values
     estimates = {name: placed(found[name].values, of, len(parameters)) for name in (*SUMMARY, "identifiable")}
     estimates |= {
         "true": np.array([true.get(name, np.nan) for name in parameters]),
