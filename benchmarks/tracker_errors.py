@@ -1,6 +1,6 @@
 """Table of the errors of trackers at end-systole, by which parameters of hearts are inferred.
 
-    python benchmarks/tracker_errors.py out/inference out/benchmark    # the table of the package
+    python benchmarks/tracker_errors.py out/inference                  # the table of the package
     python benchmarks/tracker_errors.py out/mine --all -o errors.csv   # one of hearts and trackers of your own
 
 Only hearts whose label `split` is `develop` count, and only clips without a variation (label `variation` none); with

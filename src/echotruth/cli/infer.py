@@ -23,7 +23,7 @@ def infer(arguments: argparse.Namespace) -> int:
 
     The table has a row for each heart and parameter: mean, standard deviation and 90 % interval, those of the prior,
     whether the observations tell anything of it, the probability of a scar, and its true value. A heart takes one to
-    three minutes; the key inference.tracker makes it a stage of a run, which keeps the draws and does nothing twice.
+    four minutes; the key inference.tracker makes it a stage of a run, which keeps the draws and does nothing twice.
 
     examples:
       echotruth infer out/benchmark --tracker bspline_dic --size 256 --case infarct_inferior_ideal

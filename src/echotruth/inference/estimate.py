@@ -51,7 +51,7 @@ def infer(
 
     The finite elements themselves are the model; Gauss-Newton steps find the most probable parameters of a wall without
     a scar and of such as have one, and Laplace's approximation their intervals and weights (docs/inference.md). One to
-    three minutes.
+    four minutes.
 
     Parameters
     ----------
