@@ -30,9 +30,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import xarray as xr
+from suite.splits import TEST, is_usual
 
 import echotruth as et
-from echotruth.cases import Case
 from echotruth.inference.estimate import COVERED
 from echotruth.inference.observation import dataset, loop_of, seen_of
 from echotruth.inference.tracker_errors import TrackerError, acoustics
@@ -99,7 +99,7 @@ class Observed(NamedTuple):
 
 def observed(repository: et.Repository, tracker: str, motions: list[str], sizes: list[int]) -> Iterator[Observed]:
     """What is inferred from: largest images first, then true motion, then the smaller ones."""
-    test = [case for case in repository.every.values() if is_test(case)]
+    test = [case for case in repository.every.values() if is_usual(case, TEST)]
     cases = [
         case for case in test if not any(repository.problem(case.id, view, "tracking") for view in repository.views)
     ]
@@ -119,11 +119,6 @@ def observed(repository: et.Repository, tracker: str, motions: list[str], sizes:
                 print(f"left out: {error}", flush=True)
                 continue
             yield Observed(hearts, motion, size, case.id, seen, *about[case.id])
-
-
-def is_test(case: Case) -> bool:
-    """Whether a case is there to report on, as its heart is usually imaged."""
-    return case.labels.get("split") == "test" and case.labels.get("variation", "none") == "none"
 
 
 def of_another_law(repository: et.Repository, tracker: str, case: str, size: int) -> xr.Dataset:
@@ -179,6 +174,11 @@ def ranks(posterior: np.ndarray, true: np.ndarray) -> np.ndarray:
     return np.mean((posterior < true) + 0.5 * (posterior == true), axis=0)
 
 
+def rank_counts(rows: pd.DataFrame) -> str:
+    """How many ranks are in each bin of the histogram."""
+    return " ".join(map(str, np.histogram(rows["rank"], BINS, (0, 1))[0]))
+
+
 def kinds(table: pd.DataFrame) -> pd.Series:
     """What each row is one of: `contractility`, seen or not, `stiffness`, or its own name."""
     kind = table["parameter"].str.replace(r"\.\d+$", "", regex=True)
@@ -223,9 +223,9 @@ def summary(table: pd.DataFrame) -> list[str]:
     for kind, rows in table.groupby(kinds(table), sort=False):
         error, before = (np.sqrt(np.mean((rows[name] - rows["true"]) ** 2)) for name in ("mean", "prior_mean"))
         bias, held = np.mean(rows["mean"] - rows["true"]), np.mean(rows["true"].between(rows["lower"], rows["upper"]))
-        counts = " ".join(map(str, np.histogram(rows["rank"], BINS, (0, 1))[0]))
         lines.append(
-            f"| {kind} | {len(rows)} | {error:.3g} | {before:.3g} | {bias:.3g} | {100 * held:.0f} % | {counts} |"
+            f"| {kind} | {len(rows)} | {error:.3g} | {before:.3g} | {bias:.3g} | {100 * held:.0f} % |"
+            f" {rank_counts(rows)} |"
         )
     return [*lines, "", *scars(table), ""]
 
@@ -247,7 +247,6 @@ def scars(table: pd.DataFrame) -> list[str]:
     of_infarct, others = (muscle[muscle["infarct"] == there] for there in (True, False))
     rms = [np.sqrt(np.mean((rows["mean"] - rows["true"]) ** 2)) for rows in (of_infarct, others)]
     bias = [np.mean(rows["mean"] - rows["true"]) for rows in (of_infarct, others)]
-    counts = " ".join(map(str, np.histogram(of_infarct["rank"], BINS, (0, 1))[0]))
     likely = [rows["scar_probability"].mean() for rows in (of_infarct, others)]
     held = [100 * rows["true"].between(rows["lower"], rows["upper"]).mean() for rows in (of_infarct, others)]
     ill = table[table["case"].isin(of_infarct["case"])]
@@ -258,7 +257,7 @@ def scars(table: pd.DataFrame) -> list[str]:
         f" intervals that hold {held[0]:.0f} and {held[1]:.0f} %, mean"
         f" probability of a scar {likely[0]:.2f} and {likely[1]:.2f}; area under the ROC curve {area:.3f}. Azimuth of"
         f" the infarct: off by {np.median(angles):.0f} deg in the median, {np.percentile(angles, 90):.0f} deg in the"
-        f" 90th percentile of {len(angles)} hearts. Ranks in an infarct: {counts}. {of_scars(muscle)}",
+        f" 90th percentile of {len(angles)} hearts. Ranks in an infarct: {rank_counts(of_infarct)}. {of_scars(muscle)}",
     ]
 
 

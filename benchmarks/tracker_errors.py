@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from suite.splits import DEVELOP, is_usual
 
 import echotruth as et
 from echotruth.arrays import Floats
@@ -25,8 +26,7 @@ from echotruth.inference.observation import ObservationError, heart_name, seen_o
 
 def chosen(case: Case, every: bool) -> bool:
     """Whether the errors of a case are learned."""
-    labels = case.labels
-    return every or (labels.get("split") == "develop" and labels.get("variation", "none") == "none")
+    return every or is_usual(case, DEVELOP)
 
 
 def errors(

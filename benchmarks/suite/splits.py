@@ -19,6 +19,11 @@ def split_of(case: Case) -> str:
     return split
 
 
+def is_usual(case: Case, split: str) -> bool:
+    """Whether the label `split` of a case names a half, and its clips are of no variation."""
+    return case.labels.get("split") == split and case.labels.get("variation", "none") == "none"
+
+
 def split_of_label(label: object) -> str:
     """Half that a label `split` names; without one it is `test`, lest anybody tunes on a heart by accident."""
     return ("" if label is None else str(label)) or TEST

@@ -37,6 +37,11 @@ def test_bias_gain_and_variances_of_many_hearts_are_those_they_were_drawn_with(g
     assert found.gain == pytest.approx(gain, abs=0.01)
     assert found.segment_variance == pytest.approx(1e-4, rel=0.2)
     assert found.unevenness == pytest.approx(unevenness, abs=0.01)
+    alike, apart = np.full(SEGMENTS, 0.2), gain * np.array([-0.1, 0.0, 0.1, -0.1, 0.0, 0.1])
+    due = (1e-4 + unevenness * np.array([0.0, 8e-3])) / gain**2  # of each segment, less what is of the mean
+    for tracked, own in zip((alike, apart), due, strict=True):
+        row = [1e-4 + own * 5 / 6, *np.full(SEGMENTS - 1, 1e-4 - own / 6)]
+        np.testing.assert_allclose(found.covariance(tracked)[0], row, atol=0.15 * own + 1e-5)
 
 
 @pytest.mark.parametrize("common", [0.03, 0.003])

@@ -47,6 +47,8 @@ NUMBERS = ["segments", "mean", "true_sd", "tracked_sd", "correlation"]
 """Of the segments of a view: how many, the mean of their errors (strain, or rotation in rad), the standard deviations
 of what is true and of what was tracked, and the correlation of both."""
 COLUMNS = [*KEYS, *PLACE, *NUMBERS]
+LIMITS = {"mean": (-np.inf, np.inf), "correlation": (-1.0, 1.0), "segments": (1.0, np.inf)}
+"""Of numbers; those of the others are 0 and infinity."""
 
 GAIN_SD = 0.3
 """Standard deviation of the gain, about 1, before anything is known of a tracker."""
@@ -130,18 +132,18 @@ def read(path: Path | None = None) -> pd.DataFrame:
     if missing := [name for name in COLUMNS if name not in table]:
         raise NoErrors(f"{path}: has no column {missing[0]}: it needs {', '.join(COLUMNS)}")
     for name in ("size_px", *NUMBERS):
-        _check_numbers(path, name, pd.to_numeric(table[name], errors="coerce").to_numpy(float), table[name])
+        _check_numbers(path, table[name])
     return table
 
 
-def _check_numbers(path: Path, name: str, values: Floats, written: pd.Series) -> None:
-    low, high = {"mean": (-np.inf, np.inf), "correlation": (-1.0, 1.0), "segments": (1.0, np.inf)}.get(
-        name, (0.0, np.inf)
-    )
+def _check_numbers(path: Path, column: pd.Series) -> None:
+    """Refuse a column of a table in which a number is none, or beyond its limits."""
+    values = pd.to_numeric(column, errors="coerce").to_numpy(float)
+    low, high = LIMITS.get(str(column.name), (0.0, np.inf))
     wrong = ~(np.isfinite(values) & (values >= low) & (values <= high))
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise NoErrors(f"{path}, row {row + 1}: {name} is {written.iloc[row]}: give a number of an error")
+        raise NoErrors(f"{path}, row {row + 1}: {column.name} is {column.iloc[row]}: give a number of an error")
 
 
 def error_of(table: pd.DataFrame, tracker: str, size: int, kind: str, quantity: str, heart: str) -> TrackerError:
