@@ -10,10 +10,10 @@ import echotruth as et
 from echotruth.config.loading import ConfigError
 from echotruth.inference import observation
 from echotruth.inference.estimate import COARSE_SD, infer, shortest_interval, with_error_of_mesh
-from echotruth.inference.heart_model import MESH_KEYS, model_config
+from echotruth.inference.heart_model import MESH_KEYS, HeartModel, model_config
 from echotruth.inference.imaged_wall import ImagedWall, quantity
 from echotruth.inference.observation import ObservationError, Seen
-from echotruth.inference.parameters import PriorError
+from echotruth.inference.parameters import PriorError, parameters, prior_of
 from echotruth.inference.segment_means import SegmentMeans
 from echotruth.inference.tracker_errors import TrackerError
 from echotruth.loop.cycle import read_loop
@@ -78,6 +78,21 @@ def test_contractility_of_segments_is_found_from_the_motion_of_a_heart_of_anothe
     assert np.all((rows["lower"] <= due) & (due <= rows["upper"]))
     assert rows["identifiable"].all()
     assert not found.attrs["misfit"] and found.attrs["converged"]
+
+
+@pytest.mark.slow
+def test_derivatives_are_those_of_what_the_model_shows(observed, tmp_path):
+    config, edv = model_config(observed, (12, 6, 1), tmp_path), "loop.edv_uL"
+    free = [
+        one for one in parameters(config, {}) if one.key in (edv, "mechanics.regional.stiffness.9", "fibres.epi_deg")
+    ]
+    views, segments = ["mid"] * 7 + ["long_axis"] * 3, [0, *range(7, 13), 3, 14, 16]
+    model, mean = HeartModel(config, free, views, segments), prior_of(free).mean
+    along, step = prior_of(free).sd, 0.1
+    first = model(mean)
+    above, below = (model(mean + sign * step * along).observed for sign in (1, -1))
+    due = first.jacobian @ along
+    np.testing.assert_allclose((above - below) / (2 * step), due, rtol=0.02, atol=0.01 * np.abs(due).max())
 
 
 @pytest.mark.parametrize(

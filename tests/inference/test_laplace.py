@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.optimize import minimize
-from scipy.stats import kstest, multivariate_normal
+from scipy.stats import kstest, multivariate_normal, norm
 
 from echotruth.inference.laplace import NoMode, Prediction, Prior, posterior
 
@@ -49,6 +50,18 @@ def test_evidence_is_the_density_of_what_was_observed():
     due = multivariate_normal(linear(PRIOR.mean).observed, spread).logpdf(observed)
     due -= multivariate_normal(np.zeros(5), COVARIANCE).logpdf(np.zeros(5))
     assert found.log_evidence == pytest.approx(due, abs=1e-6)
+
+
+@pytest.mark.parametrize("lower", [0.0, -0.3])
+def test_evidence_is_that_of_a_prior_that_is_cut_off_at_its_bounds(lower):
+    prior = Prior(np.array([0.0]), np.array([0.2]), np.array([lower]), np.array([0.5]))
+    found = posterior(lambda q: Prediction(3 * q, np.array([[3.0]]), *NOTHING), np.array([1.4]), np.eye(1), prior)
+
+    def density(value):
+        return np.exp(-((1.4 - 3 * value) ** 2) / 2) * norm.pdf(value, 0, 0.2)
+
+    allowed = norm.cdf(0.5, 0, 0.2) - norm.cdf(lower, 0, 0.2)
+    assert found.log_evidence == pytest.approx(np.log(quad(density, lower, 0.5)[0] / allowed), abs=1e-6)
 
 
 def test_search_that_begins_elsewhere_ends_in_the_same_mode():

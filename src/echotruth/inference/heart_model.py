@@ -130,7 +130,9 @@ def with_scar(config: Config, scarred: Sequence[int]) -> Config:
 
 @dataclass
 class HeartModel:
-    """What a heart of given parameters shows.
+    """What a heart of given parameters shows, at the points of the wall that are in the views of the first such heart.
+
+    Were they found in each heart anew, some would enter and leave the wall from one to the next, and J would jump.
 
     Attributes
     ----------
@@ -150,6 +152,7 @@ class HeartModel:
 
     def __post_init__(self) -> None:
         self._frames = read_loop(self.config.loop).systole
+        self._walls: dict[str, ImagedWall] = {}
 
     def at(self, scaled: Floats) -> Config:
         """Configuration of parameters (p,) on their scales."""
@@ -165,13 +168,13 @@ class HeartModel:
         steps = np.array([STEP * p.sd for p in self.parameters]) * slope
         predicted, jacobian = np.full(len(self.aha), np.nan), np.full((len(self.aha), len(self.parameters)), np.nan)
         for view in dict.fromkeys(self.view):
-            wall_seen = ImagedWall.of(heart, self.config, view)
-            base = wall_seen.seen(heart, at_ed, at_es)
+            wall = self._wall(heart, view)
+            base = wall.seen(heart, at_ed, at_es)
             rows = [row for row, name in enumerate(self.view) if name == view]
             of = [self.aha[row] for row in rows]
             predicted[rows] = base[of]
             for column, (change, step) in enumerate(zip(moved, steps, strict=True)):
-                changed = wall_seen.seen(heart, at_ed + step * change[0], at_es + step * change[1])
+                changed = wall.seen(heart, at_ed + step * change[0], at_es + step * change[1])
                 jacobian[rows, column] = (changed - base)[of] / step * slope[column]
         if not np.isfinite(predicted).all():
             row = int(np.argmax(~np.isfinite(predicted)))
@@ -179,6 +182,11 @@ class HeartModel:
                 f"{self.view[row]}: the model shows no segment {self.aha[row]} there: use a finer mesh"
             )
         return Prediction(predicted, jacobian, *_muscle(heart, by, slope))
+
+    def _wall(self, heart: Heart, view: str) -> ImagedWall:
+        if view not in self._walls:
+            self._walls[view] = ImagedWall.of(heart, self.config, view)
+        return self._walls[view]
 
 
 def _muscle(heart: Heart, by: xr.Dataset, slope: Floats) -> tuple[Floats, Floats]:

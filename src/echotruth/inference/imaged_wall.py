@@ -40,8 +40,6 @@ class ImagedWall:
     ----------
     plane : Plane
     kind : {"short_axis", "long_axis"}
-    position : ndarray of shape (n, 2), m
-        Of the points in the image: lateral, axial.
     points : MaterialPoints of length n
     segment : ndarray of shape (n,)
         AHA segment 1..17 of the points.
@@ -49,7 +47,6 @@ class ImagedWall:
 
     plane: Plane
     kind: Kind
-    position: Floats
     points: MaterialPoints
     segment: NDArray[np.integer]
 
@@ -64,7 +61,7 @@ class ImagedWall:
         inside = np.flatnonzero(found.cell >= 0)
         points = MaterialPoints(found.cell[inside], found.xi[inside])
         segment = labels(heart, points)["segment"].astype(int)
-        return cls(plane, section.plane, position[inside], points, segment)
+        return cls(plane, section.plane, points, segment)
 
     def seen(self, heart: Heart, at_ed: Floats, at_es: Floats) -> Floats:
         """Strain of the segments and rotation at end-systole of these points.
@@ -93,6 +90,6 @@ class ImagedWall:
         count = np.bincount(self.segment, minlength=SEGMENTS + 1)[: SEGMENTS + 1]
         total = np.bincount(self.segment, tangential, minlength=SEGMENTS + 1)[: SEGMENTS + 1]
         found = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-        moved = interpolate(at_es - at_ed, heart.cells, self.points) @ rows.T
-        found[0] = rotation(self.position, moved[None])[0] if self.kind == "short_axis" else np.nan
+        ed, es = (self.plane.to_image(interpolate(nodes, heart.cells, self.points))[:, :2] for nodes in (at_ed, at_es))
+        found[0] = rotation(ed, (es - ed)[None])[0] if self.kind == "short_axis" else np.nan
         return found

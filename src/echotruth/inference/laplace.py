@@ -12,11 +12,12 @@ which is exact if g is linear and no bound is reached (Tarantola, Inverse Proble
 Models that explain the same observations are compared by their evidence (MacKay, Information Theory, Inference, and
 Learning Algorithms, Cambridge 2003, chapter 28), but for a constant that they share
 
-    log Z = -J(q*) / 2 - log det(I + diag(s) G^T C^-1 G diag(s)) / 2.
+    log Z = -J(q*) / 2 - log det(I + diag(s) G^T C^-1 G diag(s)) / 2 + log(P / P0),
 
-If model and prior are true, g is linear and no bound is reached, J(q*) is a chi-squared number of as many degrees of
-freedom as there are observations, since it is (y - g(m))^T S^-1 (y - g(m)), S = C + G diag(s)^2 G^T: what they are off
-from the mean of the prior.
+P and P0 being the probabilities that the normal posterior and the normal prior have between the bounds, each parameter
+taken by itself. If model and prior are true, g is linear and no bound is reached, J(q*) is a chi-squared number of as
+many degrees of freedom as there are observations, since it is (y - g(m))^T S^-1 (y - g(m)), S = C + G diag(s)^2 G^T:
+what they are off from the mean of the prior.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from echotruth.arrays import Floats
 
@@ -84,6 +85,10 @@ class Prior:
     sd: Floats
     lower: Floats
     upper: Floats
+
+    def log_within(self, mean: Floats, sd: Floats) -> float:
+        """Logarithm of the probability that independent normal numbers (p,) are within the bounds."""
+        return float(np.sum(np.log(norm.cdf(self.upper, mean, sd) - norm.cdf(self.lower, mean, sd))))
 
 
 @dataclass(frozen=True)
@@ -200,8 +205,10 @@ class _Problem:
         return np.linalg.inv(self._curvature(point)) * np.outer(self.prior.sd, self.prior.sd)
 
     def log_evidence(self, point: _Point) -> float:
-        """log Z of the posterior that is normal about a point."""
-        return -0.5 * (point.cost + float(np.linalg.slogdet(self._curvature(point))[1]))
+        """log Z of the posterior that is normal about a point, within the bounds."""
+        spread = np.sqrt(np.diag(self.covariance(point)))
+        within = self.prior.log_within(point.values, spread) - self.prior.log_within(self.prior.mean, self.prior.sd)
+        return within - 0.5 * (point.cost + float(np.linalg.slogdet(self._curvature(point))[1]))
 
     def _curvature(self, point: _Point) -> Floats:
         """Half the second derivatives of J (p, p) by parameters in standard deviations of the prior."""
