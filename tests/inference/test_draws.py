@@ -10,7 +10,7 @@ import echotruth as et
 from echotruth.inference import draws, modes
 from echotruth.inference.draws import MATERIAL, TENSION, normal_within, of_posterior, of_prior, standard_normal
 from echotruth.inference.laplace import Posterior, Prediction
-from echotruth.inference.modes import Mode, weights
+from echotruth.inference.modes import Mode, Modes, weights
 from echotruth.inference.parameters import (
     CONTRACTILITY,
     SCAR_CONTRACTILITY,
@@ -35,7 +35,7 @@ def segments():
     return SegmentMeans.of(CONFIG)
 
 
-def mode(scarred=(), log_evidence=0.0, sd=0.1, seen=(8, 9, 10)):
+def mode(scarred=(), log_evidence=0.0, sd=0.1, seen=(8, 9, 10), converged=True):
     """A mode at the mean of the prior, of which each parameter is known to a share of its prior."""
     free = scar_parameters(FREE, scarred) if scarred else FREE
     prior = prior_of(free)
@@ -48,7 +48,7 @@ def mode(scarred=(), log_evidence=0.0, sd=0.1, seen=(8, 9, 10)):
         log_evidence=log_evidence,
         misfit=0.5,
         steps=1,
-        converged=True,
+        converged=converged,
     )
     return Mode(scarred, free, SimpleNamespace(aha=list(seen)), found)
 
@@ -64,6 +64,15 @@ def test_weight_of_a_mode_is_its_evidence_times_the_odds_of_its_scars():
     found = [mode(log_evidence=-20.0), mode((8,), -17.0), mode(SCARRED, -14.0)]
     odds = np.exp([-20.0, -17.0, -14.0]) * (0.1 / 0.9) ** np.arange(3)
     np.testing.assert_allclose(weights(found), odds / odds.sum(), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("log_evidence", "converged", "missed", "due"),
+    [(0.0, True, [], True), (0.0, False, [], False), (-4.0, False, [], True), (-4.0, True, [(9,)], False)],
+)
+def test_modes_are_found_if_none_was_missed_and_those_that_count_are_exact(log_evidence, converged, missed, due):
+    found = [mode(), mode((8,), log_evidence, converged=converged)]
+    assert Modes(found, missed).converged == due
 
 
 def test_draws_are_of_both_modes_as_often_as_they_are_probable(segments):

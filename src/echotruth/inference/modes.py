@@ -50,6 +50,9 @@ WEAK = 0.75
 MAX_SCARRED = 3
 """Most segments of a scar that are tried."""
 
+NEGLIGIBLE = 0.01
+"""Weight of a mode in the posterior up to which it need not be found exactly."""
+
 
 @dataclass(frozen=True)
 class Mode:
@@ -98,8 +101,11 @@ class Modes(NamedTuple):
 
     @property
     def converged(self) -> bool:
-        """Whether every search found its mode."""
-        return not self.missed and all(mode.found.converged for mode in self.found)
+        """Whether every search found a mode, and those did so exactly whose weight is not negligible."""
+        of_weight = weights(self.found) > NEGLIGIBLE
+        return not self.missed and all(
+            mode.found.converged for mode, counts in zip(self.found, of_weight, strict=True) if counts
+        )
 
 
 def modes(config: Config, given: Given, observed: xr.Dataset, segments: SegmentMeans) -> Modes:
