@@ -244,7 +244,7 @@ def scars(table: pd.DataFrame) -> list[str]:
     """Lines on the infarcts."""
     muscle = table[table["parameter"].str.startswith("contractility") & table["identifiable"]]
     if not muscle["infarct"].any():
-        return ["No segment in an infarct is identifiable."]
+        return [f"No identifiable segment is in an infarct. {of_scars(muscle)}"]
     area = area_under_curve(-muscle["mean"].to_numpy(), muscle["infarct"].to_numpy())
     of_infarct, others = (muscle[muscle["infarct"] == there] for there in (True, False))
     rms = [np.sqrt(np.mean((rows["mean"] - rows["true"]) ** 2)) for rows in (of_infarct, others)]

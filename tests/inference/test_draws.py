@@ -35,7 +35,7 @@ def segments():
     return SegmentMeans.of(CONFIG)
 
 
-def mode(scarred=(), log_evidence=0.0, sd=0.1, seen=(8, 9, 10), converged=True):
+def mode(scarred=(), log_evidence=0.0, sd=0.1, seen=(8, 9, 10), converged=True, promised=0.0):
     """A mode at the mean of the prior, of which each parameter is known to a share of its prior."""
     free = scar_parameters(FREE, scarred) if scarred else FREE
     prior = prior_of(free)
@@ -46,6 +46,7 @@ def mode(scarred=(), log_evidence=0.0, sd=0.1, seen=(8, 9, 10), converged=True):
         start=there,
         prediction=there,
         log_evidence=log_evidence,
+        promised=promised,
         misfit=0.5,
         steps=1,
         converged=converged,
@@ -67,12 +68,17 @@ def test_weight_of_a_mode_is_its_evidence_times_the_odds_of_its_scars():
 
 
 @pytest.mark.parametrize(
-    ("log_evidence", "converged", "missed", "due"),
-    [(0.0, True, [], True), (0.0, False, [], False), (-4.0, False, [], True), (-4.0, True, [(9,)], False)],
+    ("other", "missed", "due"),
+    [
+        ({"log_evidence": 0.0}, [], True),
+        ({"log_evidence": 0.0, "converged": False}, [], False),
+        ({"log_evidence": -4.0, "converged": False, "promised": 0.2}, [], True),
+        ({"log_evidence": -4.0, "converged": False, "promised": 8.0}, [], False),
+        ({"log_evidence": -4.0}, [(9,)], False),
+    ],
 )
-def test_modes_are_found_if_none_was_missed_and_those_that_count_are_exact(log_evidence, converged, missed, due):
-    found = [mode(), mode((8,), log_evidence, converged=converged)]
-    assert Modes(found, missed).converged == due
+def test_modes_are_found_if_none_was_missed_and_each_search_ended_that_might_count(other, missed, due):
+    assert Modes([mode(), mode((8,), **other)], missed).converged == due
 
 
 def test_draws_are_of_both_modes_as_often_as_they_are_probable(segments):

@@ -80,8 +80,8 @@ def infer(
         `replicated` (draw, observation) what would be seen, with errors. By `observation`: `observed`, `predicted` of
         the most probable heart, `residual` and `sd_error`, and `covariance` (observation, other) of the errors, that of
         the mesh included. Attributes: `misfit_probability` of observations as far from what model and prior say,
-        `misfit` if it is below 0.01, `converged` if every search found its mode, or one whose weight is below
-        0.01, `steps`, `case`, `tracker`, `size_px` and the `config` of the most probable heart.
+        `misfit` if it is below 0.01, `converged` if every search ended at its mode, but for those of
+        negligible weight, `steps`, `case`, `tracker`, `size_px` and the `config` of the most probable heart.
 
     Raises
     ------

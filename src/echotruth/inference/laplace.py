@@ -15,9 +15,10 @@ Learning Algorithms, Cambridge 2003, chapter 28), but for a constant that they s
     log Z = -J(q*) / 2 - log det(I + diag(s) G^T C^-1 G diag(s)) / 2 + log(P / P0),
 
 P and P0 being the probabilities that the normal posterior and the normal prior have between the bounds, each parameter
-taken by itself. If model and prior are true, g is linear and no bound is reached, J(q*) is a chi-squared number of as
-many degrees of freedom as there are observations, since it is (y - g(m))^T S^-1 (y - g(m)), S = C + G diag(s)^2 G^T:
-what they are off from the mean of the prior.
+taken by itself and J as stationary: where a bound holds the mode, Z is too large, up to some three times. If model and
+prior are true, g is linear and no bound is reached, J(q*) is a chi-squared number of as many degrees of freedom as
+there are observations, since it is (y - g(m))^T S^-1 (y - g(m)), S = C + G diag(s)^2 G^T: what they are off from the
+mean of the prior.
 """
 
 from __future__ import annotations
@@ -104,6 +105,8 @@ class Posterior:
         Of where the search began, and of the mode.
     log_evidence : float
         log Z.
+    promised : float
+        By how much the next step would lower J if g were linear.
     misfit : float
         Probability of a J(q*) as large or larger where model and prior are true.
     steps : int
@@ -117,6 +120,7 @@ class Posterior:
     start: Prediction
     prediction: Prediction
     log_evidence: float
+    promised: float
     misfit: float
     steps: int
     converged: bool
@@ -163,7 +167,8 @@ def posterior(
         point = lower
     misfit, evidence = float(chi2.sf(point.cost, len(observed))), problem.log_evidence(point)
     spread = problem.covariance(point)
-    return Posterior(point.values, spread, first.prediction, point.prediction, evidence, misfit, steps, converged)
+    about = first.prediction, point.prediction, evidence, fall, misfit, steps, converged
+    return Posterior(point.values, spread, *about)
 
 
 @dataclass(frozen=True)

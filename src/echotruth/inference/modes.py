@@ -51,7 +51,7 @@ MAX_SCARRED = 3
 """Most segments of a scar that are tried."""
 
 NEGLIGIBLE = 0.01
-"""Weight of a mode in the posterior up to which it need not be found exactly."""
+"""Weight of a mode, over the largest, up to which its search need not end."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +101,11 @@ class Modes(NamedTuple):
 
     @property
     def converged(self) -> bool:
-        """Whether every search found a mode, and those did so exactly whose weight is not negligible."""
-        of_weight = weights(self.found) > NEGLIGIBLE
-        return not self.missed and all(
-            mode.found.converged for mode, counts in zip(self.found, of_weight, strict=True) if counts
-        )
+        """Whether every search ended at a mode, but for those that could not find one that counts."""
+        best = max(mode.log_weight for mode in self.found)
+        open_ended = [mode for mode in self.found if not mode.found.converged]
+        reached = [mode.log_weight + mode.found.promised / 2 - best for mode in open_ended]
+        return not self.missed and all(weight < np.log(NEGLIGIBLE) for weight in reached)
 
 
 def modes(config: Config, given: Given, observed: xr.Dataset, segments: SegmentMeans) -> Modes:
