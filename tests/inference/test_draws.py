@@ -35,7 +35,7 @@ def segments():
     return SegmentMeans.of(CONFIG)
 
 
-def mode(scarred=(), log_evidence=0.0, sd=0.1, seen=(8, 9, 10), converged=True, promised=0.0):
+def mode(scarred=(), log_evidence=0.0, sd=0.1, seen=(8, 9, 10), promised=0.0):
     """A mode at the mean of the prior, of which each parameter is known to a share of its prior."""
     free = scar_parameters(FREE, scarred) if scarred else FREE
     prior = prior_of(free)
@@ -49,7 +49,6 @@ def mode(scarred=(), log_evidence=0.0, sd=0.1, seen=(8, 9, 10), converged=True, 
         promised=promised,
         misfit=0.5,
         steps=1,
-        converged=converged,
     )
     return Mode(scarred, free, SimpleNamespace(aha=list(seen)), found)
 
@@ -71,9 +70,9 @@ def test_weight_of_a_mode_is_its_evidence_times_the_odds_of_its_scars():
     ("other", "missed", "due"),
     [
         ({"log_evidence": 0.0}, [], True),
-        ({"log_evidence": 0.0, "converged": False}, [], False),
-        ({"log_evidence": -4.0, "converged": False, "promised": 0.2}, [], True),
-        ({"log_evidence": -4.0, "converged": False, "promised": 8.0}, [], False),
+        ({"log_evidence": 0.0, "promised": 0.2}, [], False),
+        ({"log_evidence": -4.0, "promised": 0.2}, [], True),
+        ({"log_evidence": -4.0, "promised": 8.0}, [], False),
         ({"log_evidence": -4.0}, [(9,)], False),
     ],
 )

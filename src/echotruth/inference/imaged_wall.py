@@ -90,6 +90,9 @@ class ImagedWall:
         count = np.bincount(self.segment, minlength=SEGMENTS + 1)[: SEGMENTS + 1]
         total = np.bincount(self.segment, tangential, minlength=SEGMENTS + 1)[: SEGMENTS + 1]
         found = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-        ed, es = (self.plane.to_image(interpolate(nodes, heart.cells, self.points))[:, :2] for nodes in (at_ed, at_es))
-        found[0] = rotation(ed, (es - ed)[None])[0] if self.kind == "short_axis" else np.nan
+        found[0] = self._rotation(heart, at_ed, at_es) if self.kind == "short_axis" else np.nan
         return found
+
+    def _rotation(self, heart: Heart, at_ed: Floats, at_es: Floats) -> float:
+        ed, es = (self.plane.to_image(interpolate(nodes, heart.cells, self.points))[:, :2] for nodes in (at_ed, at_es))
+        return float(rotation(ed, (es - ed)[None])[0])

@@ -111,8 +111,6 @@ class Posterior:
         Probability of a J(q*) as large or larger where model and prior are true.
     steps : int
         Number of Gauss-Newton steps.
-    converged : bool
-        Whether the next step promises less than `CLOSE`; else the point is the best that was found.
     """
 
     mean: Floats
@@ -123,7 +121,11 @@ class Posterior:
     promised: float
     misfit: float
     steps: int
-    converged: bool
+
+    @property
+    def converged(self) -> bool:
+        """Whether the next step promises no more than `CLOSE`; else the point is the best that was found."""
+        return self.promised <= CLOSE
 
 
 def posterior(
@@ -154,9 +156,8 @@ def posterior(
     first = point = problem.at(prior.mean if start is None else start)
     for steps in range(MAX_STEPS + 1):
         change, fall = problem.step(point)
-        converged = fall <= CLOSE
         logger.info("step %d: misfit %.1f, of which the next step promises to take %.2f", steps, point.cost, fall)
-        if converged or steps == MAX_STEPS:
+        if fall <= CLOSE or steps == MAX_STEPS:
             break
         lower = problem.lowered(point, change)
         if lower is None and not steps:
@@ -165,10 +166,17 @@ def posterior(
         if lower is None:
             break
         point = lower
-    misfit, evidence = float(chi2.sf(point.cost, len(observed))), problem.log_evidence(point)
     spread = problem.covariance(point)
-    about = first.prediction, point.prediction, evidence, fall, misfit, steps, converged
-    return Posterior(point.values, spread, *about)
+    return Posterior(
+        mean=point.values,
+        covariance=spread,
+        start=first.prediction,
+        prediction=point.prediction,
+        log_evidence=problem.log_evidence(point, spread),
+        promised=fall,
+        misfit=float(chi2.sf(point.cost, len(observed))),
+        steps=steps,
+    )
 
 
 @dataclass(frozen=True)
@@ -209,10 +217,10 @@ class _Problem:
         """Covariance (p, p) of the posterior that is normal about a point."""
         return np.linalg.inv(self._curvature(point)) * np.outer(self.prior.sd, self.prior.sd)
 
-    def log_evidence(self, point: _Point) -> float:
-        """log Z of the posterior that is normal about a point, within the bounds."""
-        spread = np.sqrt(np.diag(self.covariance(point)))
-        within = self.prior.log_within(point.values, spread) - self.prior.log_within(self.prior.mean, self.prior.sd)
+    def log_evidence(self, point: _Point, covariance: Floats) -> float:
+        """log Z of the posterior that is normal about a point, with a covariance (p, p), within the bounds."""
+        prior, sd = self.prior, np.sqrt(np.diag(covariance))
+        within = prior.log_within(point.values, sd) - prior.log_within(prior.mean, prior.sd)
         return within - 0.5 * (point.cost + float(np.linalg.slogdet(self._curvature(point))[1]))
 
     def _curvature(self, point: _Point) -> Floats:

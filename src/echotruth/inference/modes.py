@@ -102,10 +102,10 @@ class Modes(NamedTuple):
     @property
     def converged(self) -> bool:
         """Whether every search ended at a mode, but for those that could not find one that counts."""
-        best = max(mode.log_weight for mode in self.found)
-        open_ended = [mode for mode in self.found if not mode.found.converged]
-        reached = [mode.log_weight + mode.found.promised / 2 - best for mode in open_ended]
-        return not self.missed and all(weight < np.log(NEGLIGIBLE) for weight in reached)
+        least = max(mode.log_weight for mode in self.found) + np.log(NEGLIGIBLE)
+        return not self.missed and all(
+            mode.found.converged or mode.log_weight + mode.found.promised / 2 < least for mode in self.found
+        )
 
 
 def modes(config: Config, given: Given, observed: xr.Dataset, segments: SegmentMeans) -> Modes:
