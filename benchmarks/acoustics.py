@@ -9,8 +9,7 @@ import argparse
 import json
 import platform
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -94,14 +93,9 @@ class Bench:
     python: str
     repeats: int
 
-    @contextmanager
-    def side(self, threads: int = 1) -> Iterator[Worker]:
+    def side(self, threads: int = 1) -> Worker:
         """A process that has all parties."""
-        worker = Worker(self.python, HERE / "acoustics_side.py", {"NUMBA_NUM_THREADS": str(threads)})
-        try:
-            yield worker
-        finally:
-            worker.close()
+        return Worker(self.python, HERE / "acoustics_side.py", {"NUMBA_NUM_THREADS": str(threads)})
 
 
 def speed(bench: Bench) -> Result:

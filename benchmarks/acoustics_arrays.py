@@ -51,12 +51,12 @@ class Array:
         p = self.probe().si()
         return self.probe(height_mm=1e3 * THIN * p.sound_speed / p.frequency, **changes)
 
-    def scatterers(self, number: int, *, thick: bool = False, seed: int = 0) -> tuple[Floats, Floats]:
+    def scatterers(self, number: int, *, thick: bool = False) -> tuple[Floats, Floats]:
         """Positions (number, 3; lateral, axial, elevation; m) and amplitudes (number,) of scatterers in the sector.
 
         They are evenly distributed over its area, in the plane of the image or through the slab.
         """
-        random = np.random.default_rng([2026, seed])
+        random = np.random.default_rng([2026, 0])
         angle = random.uniform(-SECTOR / 2, SECTOR / 2, number)
         range_ = np.sqrt(random.uniform(self.near**2, self.far**2, number))
         elevation = random.uniform(-self.slab, self.slab, number) if thick else np.zeros(number)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from statistics import median
 from typing import Any
 
 import numba
 import numpy as np
 from acoustics_arrays import ARRAYS, SECTOR, Array
-from worker import Clock
+from worker import Clock, medians
 
 from echotruth.config import Bmode, Rf
 from echotruth.imaging.beamforming.scan import scan_lines
@@ -39,7 +38,7 @@ def frame(
     )
     phantom = setup.scatterers(scatterers, thick=True)
     turns = [_parts(scanner, channels, phantom, bmode).seconds for _ in range(repeats + 1)][1:]
-    return {"seconds": _medians(turns), "threads": numba.get_num_threads(), "size_px": bmode.size_px}
+    return {"seconds": medians(turns), "threads": numba.get_num_threads(), "size_px": bmode.size_px}
 
 
 def lines(array: str, scatterers: int, probe: dict[str, Any], **changes: Any) -> int:
@@ -85,8 +84,4 @@ def transmits(array: str, scatterers: int, number: int, repeats: int) -> Seconds
             for _ in channels(matrix):
                 pass
         turns.append(clock.seconds)
-    return _medians(turns[1:])
-
-
-def _medians(turns: list[Seconds]) -> Seconds:
-    return {part: {kind: median(turn[part][kind] for turn in turns) for kind in ("wall", "cpu")} for part in turns[0]}
+    return medians(turns[1:])

@@ -2,9 +2,10 @@
 
     python benchmarks/chain.py out/demo out/human
 
-The first table of a repository is made of the files that Snakemake's `benchmark` wrote: processor seconds a heart and a
-frame, seconds of the clock, greatest memory, and bytes written. The second has, for one view, what the stage cost
-without the start of its processes, and what its parts cost in a short loop in this process, on one thread:
+The first table of a repository is made of the files that Snakemake's `benchmark` wrote: processor seconds a case (of
+mechanics, a heart) and a frame, seconds of the clock, greatest memory, and bytes written. The second has, for one view,
+what the stage cost without the start of its processes, and what its parts cost in a short loop in this process, on one
+thread:
 
 phantom      seeding
 truth        the truth of four frames, for all frames
@@ -23,8 +24,6 @@ other work. Its speed stands above: figures of machines compare only over it. Th
 from __future__ import annotations
 
 import argparse
-import csv
-import shutil
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -40,6 +39,7 @@ import numpy as np
 import report
 from threadpoolctl import threadpool_limits
 
+from echotruth.config import Config
 from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.scoring import read_truth, score
 from echotruth.imaging.beamforming.scan import scan_lines
@@ -47,20 +47,20 @@ from echotruth.imaging.beamforming.scanner import validate_scatterers
 from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
-from echotruth.repository import estimates, packing, schema
-from echotruth.repository.benchmark_files import core_seconds
-from echotruth.repository.ledger import STAGES
-from echotruth.repository.reader import Repository
-from echotruth.repository.store import Store
+from echotruth.report.account import took
+from echotruth.repository import estimates, group
+from echotruth.repository.coordinates import coordinates_of
+from echotruth.repository.reader import SIZED, STAGES, Repository
 from echotruth.section import Section
 from echotruth.seeds import generator
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
-from echotruth.workflow.cost import START_CPU_SECONDS
 
 RESULTS = Path(__file__).parent / "results"
 EXCERPT = np.array([0, 1, 2, 1, 0])
 """Frames of ejection in the short loops of trackers, there and back: a closed cycle, which is tracked both ways."""
+START = 1.0
+"""CPU time that a job takes to start, s, as echotruth.workflow.cost has it."""
 SOME = 4
 """Frames in the other loops over frames."""
 TURNS = 3
@@ -96,28 +96,32 @@ def machine() -> dict[str, float]:
 def costs(folder: Path) -> list[list[Any]]:
     """Rows of the first table, one a stage."""
     repository = Repository(folder)
-    store, frames = folder / f"{repository.config.name}.zarr", repository.config.loop.frames
+    frames, hearts, cases = repository.config.loop.frames, repository.cases["heart"].nunique(), len(repository.present)
     rows = []
     for stage in STAGES:
-        files = list(folder.glob(f"benchmarks/{stage}/**/*.tsv"))
-        told = [next(csv.DictReader(file.open(), delimiter="\t")) for file in files]
-        hearts, spent = len(repository.present), sum(map(core_seconds, files))
-        shards = (path for group in _groups(repository, stage) for path in store.glob(f"{group}/*/c/**/*"))
-        written = sum(path.stat().st_size for path in shards if path.is_file())
+        if not (files := list(folder.glob(f"benchmarks/{stage}/**/*.tsv"))):
+            continue
+        table, number, views = took(files), cases, len(repository.views)
+        if stage == "mechanics":
+            number, views = hearts, 1
+        spent = table["cpu_time"].sum() / number
         rows.append([
             stage,
             len(files),
-            f"{spent / hearts:.1f}",
-            f"{spent / hearts / frames / (1 if stage == 'mechanics' else len(repository.views)):.3f}",
-            f"{sum(float(each['s']) for each in told) / hearts:.1f}",
-            f"{max(float(each['max_rss']) for each in told):.0f}",
-            f"{written / hearts / 1e6:.1f}",
+            f"{spent:.1f}",
+            f"{spent / frames / views:.3f}",
+            f"{table['s'].sum() / number:.1f}",
+            f"{table['max_rss'].max():.0f}",
+            f"{_written(repository, stage) / number / 1e6:.1f}",
         ])  # fmt: skip
     return rows
 
 
-def _groups(repository: Repository, stage: str) -> list[str]:
-    return schema.written_by(stage, repository.config)
+def _written(repository: Repository, stage: str) -> int:
+    """Bytes of what a stage has written."""
+    of = {"mechanics": "hearts", "inference": "inference"}.get(stage, f"clips/*/*/{stage}")
+    folder = repository.folder / f"{repository.config.name}.zarr"
+    return sum(path.stat().st_size for path in folder.glob(f"{of}/**/*") if path.is_file())
 
 
 class Parts:
@@ -139,19 +143,9 @@ class Parts:
 
     def writing(self, stage: str) -> float:
         """What it takes to write what is stored of a stage, to another folder."""
-        store = Store(self._repository.folder / f"{self._config.name}.zarr")
-        index = self._repository.place(*self._place)
-        with TemporaryDirectory() as folder:
-            other, spent = Store(Path(folder)), 0.0
-            for group in _groups(self._repository, stage):
-                for file in store.path.glob(f"{group}/**/zarr.json"):
-                    copy = other.path / file.relative_to(store.path)
-                    copy.parent.mkdir(parents=True, exist_ok=True)
-                    shutil.copyfile(file, copy)
-                values = packing.pack(schema.packs_of(group), store.read(group, *index))
-                own = {array.name: values[array.name] for array in schema.arrays_of(group) if array.leading == 2}
-                spent += timed(partial(other.write, group, own, *index))
-        return spent
+        groups = [f"{stage}/{size}" for size in self._config.bmode.sizes] if stage in SIZED else [stage]
+        arrays = {name: self._repository.arrays(name, *self._place) for name in groups}
+        return sum(timed(partial(_write, name, values, self._config)) for name, values in arrays.items())
 
     def phantom(self) -> float:
         return timed(self._sequence.scatterers)
@@ -196,6 +190,12 @@ class Parts:
         return len(sizes) * (timed(lambda: read_truth(self._repository, *self._place)) + len(trackers) * a_score)
 
 
+def _write(name: str, values: dict[str, Any], config: Config) -> None:
+    """Write a group to a folder that goes."""
+    with TemporaryDirectory() as folder:
+        group.write(Path(folder) / "group", name, values, coordinates_of(name, config), config, {})
+
+
 def _try(excerpt: Clip, tracker: Section) -> None:
     """Track, with whatever success."""
     with suppress(TrackerFailed):
@@ -207,10 +207,10 @@ def beside(folder: Path) -> list[list[Any]]:
     repository = Repository(folder)
     case, view = repository.shown[0], repository.views[0]
     parts, rows = Parts(folder, case, view), []
-    for stage in [stage for stage, place in STAGES.items() if "view" in place]:
+    for stage in (stage for stage in STAGES if stage not in ("mechanics", "inference")):
         at = folder / "benchmarks" / stage / case
         files = [*at.glob(f"{view}.tsv"), *at.glob(f"{view}/*.tsv")]
-        spent = sum(core_seconds(file) - START_CPU_SECONDS for file in files)
+        spent = took(files)["cpu_time"].sum() - START * len(files)
         predicted = getattr(parts, stage)() + parts.writing(stage)
         mark = " **" if spent > max(BEYOND * predicted, predicted + 1) else ""
         rows.append([stage, f"{spent:.1f}", f"{predicted:.1f}", f"{spent / predicted:.2f}{mark}"])
@@ -219,7 +219,7 @@ def beside(folder: Path) -> list[list[Any]]:
 
 def section(folder: Path) -> list[str]:
     """Markdown of one repository."""
-    head = ["stage", "jobs", "CPU s a heart", "CPU s a frame", "wall s", "memory, MB", "MB"]
+    head = ["stage", "jobs", "CPU s a case", "CPU s a frame", "wall s", "memory, MB", "MB"]
     parts = report.table(["stage, one view", "CPU s", "CPU s of its parts", "ratio"], beside(folder))
     return [f"## {folder.name}", "", *report.table(head, costs(folder)), "", *parts, ""]
 
@@ -235,7 +235,7 @@ def main() -> None:
         sections = [line for folder in arguments.repositories for line in section(folder)]
     told = f"A loop of ten million turns in plain Python takes this machine {speed['loop']:.2f} s, a product of two "
     told += f"matrices of 2048 x 2048 in single precision {speed['product']:.2f} s, on one thread."
-    remark = f"Wall seconds are added up over the jobs of a heart. **: beyond {BEYOND}."
+    remark = f"Wall seconds are added up over the jobs of a case. **: beyond {BEYOND}."
     text = ["# The chain, stage by stage", "", told, "", remark, "", *sections]
     (arguments.results / "chain.md").write_text("\n".join(text))
     print("\n".join(text))

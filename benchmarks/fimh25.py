@@ -105,12 +105,11 @@ def of_files(folder: Path) -> dict[str, float]:
 
 def of_store(repository: Path) -> dict[str, float]:
     """The same of the groups kinematics, physiology and mechanics."""
-    heart = et.Repository(repository).tree.sel(case="heart")
-    es = int(heart["mechanics/es_frame"])
-    mean = heart["kinematics/strain_mean"].isel(frame=es).values
-    volume = 1e9 * heart["mechanics/volume"].values
+    read, case = et.Repository(repository).read, "heart"
+    es = int(read("mechanics/es_frame", case))
+    mean, volume = read("kinematics/strain_mean", case, None, es), 1e9 * read("mechanics/volume", case)
     found = {f"E_{name}": float(value) for name, value in zip(("RR", "CC", "LL", "RC", "RL", "CL"), mean, strict=True)}
-    twist = float(np.degrees(heart["physiology/courses"].sel(course="twist").values[es]))
+    twist = float(np.degrees(read("physiology/twist", case, None, es)))
     return found | {"twist (deg)": twist, "EDV (uL)": float(volume[0]), "ESV (uL)": float(volume[es])}
 
 

@@ -11,8 +11,7 @@ import json
 import platform
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -23,7 +22,7 @@ from typing import Any
 import land
 import numpy as np
 import report
-from worker import Worker
+from worker import Worker, medians
 
 HERE = Path(__file__).parent
 OPTIMISED = ["-O3", "-march=native", "-g0"]
@@ -70,13 +69,11 @@ class Bench:
     frames: int
     folder: Path
 
-    @contextmanager
-    def ours(self) -> Iterator[Worker]:
+    def ours(self) -> Worker:
         """The process that runs echotruth."""
-        yield from _running(Worker(sys.executable, HERE / "ours.py"))
+        return Worker(sys.executable, HERE / "ours.py")
 
-    @contextmanager
-    def peer(self, name: str) -> Iterator[Worker]:
+    def peer(self, name: str) -> Worker:
         """A process that runs fenicsx-pulse; its compiled forms are kept in `.cache`."""
         cache = HERE / ".cache" / name.replace(" ", "").replace(",", "-")
         options = cache / "config" / "dolfinx" / "dolfinx_jit_options.json"
@@ -84,20 +81,13 @@ class Bench:
         flags = COMPILED[name]
         options.write_text(json.dumps({"cffi_extra_compile_args": flags} if flags else {}))
         places = {"XDG_CONFIG_HOME": str(cache / "config"), "XDG_CACHE_HOME": str(cache)}
-        yield from _running(Worker(self.peer_python, HERE / "peer.py", places))
+        return Worker(self.peer_python, HERE / "peer.py", places)
 
     def hand_over(self, ours: Worker, peer: Worker, name: str, **options: Any) -> str:
         """File with our mesh, and the fibres at the peer's quadrature points."""
         file = str(self.folder / f"{name.replace(' ', '')}.npz")
         ours("hand_over", file=file, points=peer("points", degree=DEGREE[name]), **options)
         return file
-
-
-def _running(worker: Worker) -> Iterator[Worker]:
-    try:
-        yield worker
-    finally:
-        worker.close()
 
 
 def steps(bench: Bench) -> Result:
@@ -113,7 +103,7 @@ def steps(bench: Bench) -> Result:
         for _ in range(bench.repeats):
             for name, side in (("ours", ours), *peers.items()):
                 turns[name].append(side("step"))
-    return {name: answer[name] | {"seconds": _medians(taken)} for name, taken in turns.items()}
+    return {name: answer[name] | {"seconds": medians(taken)} for name, taken in turns.items()}
 
 
 def _filled(bench: Bench, ours: Worker, peer: Worker, name: str, stiffness: float) -> Result:
@@ -123,11 +113,6 @@ def _filled(bench: Bench, ours: Worker, peer: Worker, name: str, stiffness: floa
     built = peer("build", file=file, law=law, base=ours("base"), control="volume", degree=DEGREE[name])
     peer("go", tension=0.0, prescribed=FILLED * built["volume"])
     return {"unknowns": built["unknowns"]}
-
-
-def _medians(turns: list[Result]) -> Result:
-    """Median over the turns of each part of a step."""
-    return {part: {kind: median(turn[part][kind] for turn in turns) for kind in ("wall", "cpu")} for part in turns[0]}
 
 
 def cycles(bench: Bench, method: str) -> Result:
@@ -202,7 +187,7 @@ def scaling(bench: Bench) -> Result:
             for _ in range(max(3, bench.repeats // 2)):
                 turns["ours"].append(ours("step"))
                 turns[PULSE].append(peer("step"))
-            seconds = {name: _medians(taken) for name, taken in turns.items()}
+            seconds = {name: medians(taken) for name, taken in turns.items()}
             rows.append({"elements": elements} | made | {"unknowns_pulse": theirs["unknowns"], "seconds": seconds})
             _tell(f"{made['unknowns']} unknowns: {seconds['ours']['step']['wall']:.2f} s")
     return {"rows": rows}

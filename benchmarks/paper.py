@@ -10,7 +10,7 @@
 `phantom.in_plane_only: true`.
 
 The page is results/paper.md, its figures are results/paper_*.png. Of the numbers, those of the heart are read from the
-groups kinematics, mechanics and physiology, and those of the trackers from evaluation and tracking.
+groups kinematics, mechanics and physiology, and those of the trackers from tracking.
 """
 
 from __future__ import annotations

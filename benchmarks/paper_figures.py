@@ -65,7 +65,7 @@ def _merged(parts: Iterable[tuple[pyvista.PolyData, tuple[float, float, float]]]
 def draw_figures(folder: Path, hearts: Hearts, printed: str, mended: str) -> None:
     """Figures 2B, 3 and 4 of every heart, as the report draws them, for two trackers."""
     for name, heart in hearts.items():
-        clips = [heart.group(f"bmode/{size}").image.sel(view="mid").isel(frame=0).values for size in heart.sizes[:2]]
+        clips = [heart.read.read(f"bmode/{size}/image", heart.case, "mid", 0) for size in heart.sizes[:2]]
         style.save(resolutions.draw(clips, heart.field_of_view), folder / f"paper_bmode_{name}.png")
         for tracker in (printed, mended):
             true, tracked = (1e6 * values for values in heart.segments(tracker))

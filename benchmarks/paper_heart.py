@@ -17,6 +17,7 @@ import echotruth as et
 from echotruth.evaluation.displacement_error import transmural_gradient
 from echotruth.evaluation.polar import resolve
 from echotruth.fem.volume import cell_volumes
+from echotruth.imaging.truth import cavity_centroid
 
 if TYPE_CHECKING:
     import echotruth.heart
@@ -81,49 +82,48 @@ class Heart:
     repository: Path
 
     @cached_property
-    def tree(self) -> xr.DataTree:
-        """The store."""
-        return et.Repository(self.repository).tree
+    def read(self) -> et.Repository:
+        """The repository, to be read."""
+        return et.Repository(self.repository)
 
-    def group(self, path: str) -> xr.Dataset:
-        """A group of the store for this heart."""
-        return self.tree[path].to_dataset().isel(case=0)
+    def group(self, path: str, view: str | None = None) -> xr.Dataset:
+        """A group of this heart, or of its clip in a view."""
+        return self.read.tree[self.read.path(path, self.case, view)].to_dataset()
 
-    @cached_property
+    @property
     def case(self) -> str:
         """Case id."""
-        return str(self.tree["cases"].case.values[0])
+        return self.read.present[0]
 
     @cached_property
     def es(self) -> int:
         """Frame of end-systole."""
-        return int(self.group("mechanics").es_frame)
+        return int(self.read.read("mechanics/es_frame", self.case))
 
-    @cached_property
+    @property
     def sizes(self) -> list[int]:
         """Image sizes, px, the largest first."""
-        return sorted(map(int, self.tree["bmode"].children), reverse=True)
+        return self.read.sizes
 
-    @cached_property
+    @property
     def trackers(self) -> list[str]:
         """Names of the trackers."""
-        return list(et.Repository(self.repository).config.tracking.trackers)
+        return list(self.read.config.tracking.trackers)
 
     @cached_property
     def field_of_view(self) -> float:
         """Side of the images, m."""
-        lateral = self.group(f"bmode/{self.sizes[0]}").lateral.values
-        return float(lateral[1] - lateral[0]) * len(lateral)
+        return self.read.config.bmode.si().field_of_view
 
     @cached_property
     def mesh(self) -> echotruth.heart.Heart:
         """Mesh and motion."""
-        return et.Repository(self.repository).heart(self.case)
+        return self.read.heart(self.case)
 
     @cached_property
     def volumes(self) -> dict[str, float]:
         """Volumes of the cavity at end-diastole and end-systole, and of the wall at end-diastole, uL."""
-        cavity = self.group("mechanics").volume.values / UL
+        cavity = self.read.read("mechanics/volume", self.case) / UL
         wall = float(np.sum(cell_volumes(self.mesh.positions(0), self.mesh.cells))) / UL
         return {"edv": float(cavity[0]), "esv": float(cavity[self.es]), "wall": wall}
 
@@ -148,11 +148,11 @@ class Heart:
 
     def measured(self, name: str) -> float:
         """A measure that is an angle, deg."""
-        return float(np.degrees(self.group("physiology").scalars.sel(scalar=name)))
+        return float(np.degrees(self.read.read(f"physiology/{name}", self.case)))
 
     def scores(self, view: str, tracker: str, size: int) -> xr.Dataset:
         """Scores of one clip."""
-        return et.unpack(self.group(f"evaluation/{size}/{tracker}")[["scores"]].sel(view=view))
+        return self.group(f"tracking/{size}", view).sel(tracker=tracker)
 
     def circumferential(
         self, view: str, size: int, tracker: str | None = None, centred: bool = False
@@ -171,7 +171,7 @@ class Heart:
         """
         vector, position, layer = self._displacement(view, size, tracker)
         vector = vector - vector.mean(0) if centred else vector
-        centre = self.group("phantom").centre.sel(view=view).values
+        centre = cavity_centroid(self.mesh, self.read.plane(self.case, view))
         return resolve(vector, position, centre, "short_axis")[:, 1], layer
 
     def mean_motion(self, view: str) -> float:
@@ -185,13 +185,13 @@ class Heart:
 
     def tracked_anew(self, view: str, size: int, method: str, options: Mapping[str, object]) -> float:
         """Error of circumferential displacement over its RMS, %, of a tracker that is not in the repository."""
-        clip = et.Repository(self.repository).clip(self.case, view, size)
+        clip = self.read.clip(self.case, view, size)
         found = et.evaluate(et.track(clip, method, **options), self.mesh)
         return float(found["tangential_nrmse_percent"])
 
     def _displacement(self, view: str, size: int, tracker: str | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Displacement at end-systole and position (point, 2), m, and layer of the points of a view."""
-        read = et.Repository(self.repository).tracks(self.case, view, size, [tracker or self.trackers[0]])
+        read = self.read.tracks(self.case, view, size, [tracker or self.trackers[0]])
         found = read.isel(frame=self.es, tracker=0)
         true = found.true_displacement.sel(vector=list(found["plane"].values)).transpose("axial", "lateral", "vector")
         vector = (true if tracker is None else found.displacement.transpose("axial", "lateral", "plane")).values
@@ -235,9 +235,8 @@ class Heart:
 
     def segments(self, tracker: str) -> tuple[np.ndarray, np.ndarray]:
         """True and tracked circumferential displacement of the AHA segments in the largest images, m, (17,) each."""
-        names = "true_segment_displacement", "tracked_segment_displacement"
-        scores = self.group(f"evaluation/{self.sizes[0]}/{tracker}").sel(view=list(SLICES))
-        data = et.unpack(scores, *names).sel(polar="tangential")
         # A segment at a boundary may be visible in two planes; their mean is shown.
-        true, tracked = (data[name].mean("view").values for name in names)
-        return true, tracked
+        names = ["true_segment_displacement", "tracked_segment_displacement"]
+        scores = [self.scores(view, tracker, self.sizes[0])[names] for view in SLICES]
+        mean = xr.concat(scores, "view").mean("view").sel(polar="tangential")
+        return mean[names[0]].values, mean[names[1]].values

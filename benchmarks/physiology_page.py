@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from physiology import LEVERS, TARGETS, levers_of, misfit, missed
+from report import table
 
 from echotruth.report import style
 
@@ -117,12 +118,6 @@ def draw_fronts(rows: list[Row], chosen: Row, species: str) -> Figure:
     return figure
 
 
-def table(header: list[str], rows: list[list[str]]) -> str:
-    """A Markdown table."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
 def asked_table(species: str, columns: dict[str, Row]) -> str:
     """Targets beside hearts."""
     rows = []
@@ -141,7 +136,7 @@ def asked_table(species: str, columns: dict[str, Row]) -> str:
     ):
         rows.append([label, "", "", *(f"{row[name]:.3g}" for row in columns.values())])
     rows.append(["misfit (published SD)", "", "", *(f"{misfit(row):.2f}" for row in columns.values())])
-    return table(["quantity", "measured", "asked", *columns], rows)
+    return "\n".join(table(["quantity", "measured", "asked", *columns], rows))
 
 
 def effects_table(rows: list[Row]) -> str:
@@ -153,7 +148,7 @@ def effects_table(rows: list[Row]) -> str:
         + [f"{found[name][k]:+.{digits}f}" for name, (_, digits) in EFFECTS.items()]
         for k, lever in enumerate(levers_of(rows[0]["species"]))
     ]
-    return table(header, lines)
+    return "\n".join(table(header, lines))
 
 
 def best_table(rows: list[Row], number: int) -> str:
@@ -167,7 +162,7 @@ def best_table(rows: list[Row], number: int) -> str:
             + [f"{values[lever.keys[0]]:.3g}" for lever in LEVERS]
             + [values["mechanics.base"], ", ".join(missed(row)) or "none"]
         )
-    return table(header, lines)
+    return "\n".join(table(header, lines))
 
 
 def write(folder: Path, results: Path) -> None:

@@ -19,7 +19,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from echo_statistics import peak
+from report import table
+from skimage.feature import match_template
 
 from echotruth.config import Config, Rf
 from echotruth.config.loading import load
@@ -38,6 +39,8 @@ SIZE = 256
 """Pixels along a side, 47 um each. Our cavity is 6.8 mm long and the real one 79 mm: its pixels would be 44 um."""
 WINDOWS = (24, 48)
 """Sides of the windows, px."""
+SEARCH = 8
+"""How far a window is sought to every side in the next frame, px."""
 DARK = 4
 """Grey levels, of 255, up to which a pixel is dark."""
 REAL = {"septum": (302, 190, 245), "lateral": (400, 220, 310), "blood": (345, 195, 240)}
@@ -47,6 +50,14 @@ REAL_SECTOR = (17, 339, 42.0, 40, 380)
 
 Measures = dict[str, float]
 Places = dict[str, list[tuple[int, int]]]
+
+
+def peak(before: np.ndarray, after: np.ndarray, place: tuple[int, int], side: int) -> float:
+    """Largest normalised correlation of a window of one frame with windows near it in the next."""
+    row, column = (middle - side // 2 for middle in place)
+    window = before[row : row + side, column : column + side].astype(float)
+    near = after[row - SEARCH : row + side + SEARCH, column - SEARCH : column + side + SEARCH].astype(float)
+    return float(match_template(near, window).max()) if window.std() > 0 else np.nan
 
 
 def correlations(pairs: list[tuple[np.ndarray, np.ndarray]], places: Places) -> Measures:
@@ -157,15 +168,12 @@ def measure_ours(config: Config, beating: Heart, time: np.ndarray, save: Callabl
 def report(results: dict[str, Measures]) -> str:
     """The table."""
     names = list(next(iter(results.values())))
-    head = ["# How alike ours and a real clip are", "", f"| | {' | '.join(names)} |", "|---|" + "---|" * len(names)]
-    rows = [
-        f"| {row} | " + " | ".join(f"{values[name]:.2f}" for name in names) + " |" for row, values in results.items()
-    ]
+    rows = [[row, *(f"{values[name]:.2f}" for name in names)] for row, values in results.items()]
     note = (
         "Mean peak of the normalised cross-correlation of square windows from one frame to the next, 1/27 of a cycle"
         f" later, and share of the sector with a grey level of {DARK} of 255 or less. `benchmarks/realism.py` says how."
     )
-    return "\n".join([*head, *rows, "", note, ""])
+    return "\n".join(["# How alike ours and a real clip are", "", *table(["", *names], rows), "", note, ""])
 
 
 def main() -> None:

@@ -30,7 +30,6 @@ from echotruth.config.tracking import External, default_trackers
 from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import bmode_clip
-from echotruth.repository import ledger
 from echotruth.repository.reader import Repository
 from echotruth.tracking import grid, track
 
@@ -108,8 +107,8 @@ def full(clip: Clip) -> Clip:
 
 def pace(folder: Path, trackers: dict[str, Any], external: str) -> dict[str, list[float]]:
     """Time of a pair of the largest images, s, of each tracker at every turn: that of the clip over its pairs."""
-    case = next(iter(ledger.rows(folder / "registry.txt")))
-    clip = next(iter(read_clips(Repository(folder), case, "mid").values()))
+    repository = Repository(folder)
+    clip = next(iter(read_clips(repository, repository.present[0], "mid").values()))
     entries = [(name, settings, clip) for name, settings in trackers.items()]
     if external:
         entries.append((external + WHOLE, trackers[external], full(clip)))

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 ONE_THREAD = {
@@ -28,7 +29,7 @@ ONE_THREAD = {
 
 
 class Worker:
-    """A process that carries out commands one at a time and waits idly between them.
+    """A process that carries out commands one at a time within a `with` block, and waits idly between them.
 
     Parameters
     ----------
@@ -58,7 +59,10 @@ class Worker:
             raise RuntimeError(f"{' '.join(self._process.args)} ended during the command {command!r}.")
         return json.loads(line)
 
-    def close(self) -> None:
+    def __enter__(self) -> Worker:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         """End the process."""
         self._process.stdin.close()
         self._process.wait()
@@ -80,6 +84,11 @@ def serve(commands: dict[str, Callable[..., Any]]) -> None:
         name, options = json.loads(line)
         answers.write(json.dumps(commands[name](**options)) + "\n")
         answers.flush()
+
+
+def medians(turns: list[dict[str, dict[str, float]]]) -> dict[str, dict[str, float]]:
+    """Median over the turns of the wall and CPU seconds of each part, as clocks have them."""
+    return {part: {kind: median(turn[part][kind] for turn in turns) for kind in ("wall", "cpu")} for part in turns[0]}
 
 
 class Clock:

@@ -11,10 +11,10 @@ import yaml
 from pydantic import AfterValidator, Field, StringConstraints, ValidationError
 from pydantic_core import ErrorDetails
 
+from echotruth import files
 from echotruth.config.loading import load
 from echotruth.config.reading import ConfigError, read_yaml, shown_key
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.repository import durable
 from echotruth.section import Name, Section, meaning
 
 from .repositories import opened
@@ -112,7 +112,7 @@ def attach(folder: Path, card: Card) -> Path:
     """
     path = card_path(folder, card.tracker)
     values = card.model_dump(mode="json", exclude_none=True)
-    durable.write(path, yaml.safe_dump(values, sort_keys=False, allow_unicode=True, width=120).encode())
+    files.write(path, yaml.safe_dump(values, sort_keys=False, allow_unicode=True, width=120).encode())
     return path
 
 

@@ -130,7 +130,7 @@ def verdict(tracker: str, records: Records, split: str) -> Verdict:
     return Verdict(tracker, ratio, again.older, len(known_of), len(clips), gap)
 
 
-def paired_ratio(clips: pd.DataFrame, again: pd.DataFrame, seed: int = 1) -> Ratio | None:
+def paired_ratio(clips: pd.DataFrame, again: pd.DataFrame) -> Ratio | None:
     """Errors of a tracker on variants of clips over those on the clips themselves.
 
     Parameters
@@ -139,8 +139,6 @@ def paired_ratio(clips: pd.DataFrame, again: pd.DataFrame, seed: int = 1) -> Rat
         Clips that count: columns `CLIP` of :mod:`echotruth.evaluation.resampling`, and heart.
     again : DataFrame
         Rows as :func:`variants_of` returns them.
-    seed : int
-        Of the bootstrap.
 
     Returns
     -------
@@ -155,7 +153,7 @@ def paired_ratio(clips: pd.DataFrame, again: pd.DataFrame, seed: int = 1) -> Rat
     means = both[np.isfinite(both["logarithm"])].groupby("heart")["logarithm"].mean().to_numpy()
     if not (hearts := len(means)):
         return None
-    low, high = np.exp(interval(means[:, None], draws(hearts, seed)))[:, 0]
+    low, high = np.exp(interval(means[:, None], draws(hearts, 1)))[:, 0]
     return Ratio(float(np.exp(means.mean())), float(low), float(high), hearts, _part(clips, both))
 
 
@@ -219,7 +217,7 @@ def variants_of(suites: list[Suite], tracker: str, variant: str) -> Result:
     Result
         Of all repositories, with the column `repository`.
     """
-    found = [result_of(suite.folder, suite.config, tracker, variant) for suite in suites]
+    found = [result_of(suite.repository, tracker, variant) for suite in suites]
     tables = [result.rows.assign(repository=suite.name) for suite, result in zip(suites, found, strict=True)]
     filled = [table for table in tables if len(table)] or tables[:1]
     return Result(pd.concat(filled, ignore_index=True), sum(result.older for result in found))

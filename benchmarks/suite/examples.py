@@ -74,13 +74,12 @@ def chosen(clips: pd.DataFrame) -> dict[str, pd.Series]:
     return {name: ranked.iloc[place] for place, name in sorted(found.items())}
 
 
-def example(folder: Path, clip: pd.Series, what: str) -> Example:
+def example(repository: Repository, clip: pd.Series, what: str) -> Example:
     """Read a clip at end-systole.
 
     Parameters
     ----------
-    folder : Path
-        Folder of the repository.
+    repository : Repository
     clip : Series
         Columns case, view, size_px, tracker and nrmse_all_percent.
     what : str
@@ -90,8 +89,8 @@ def example(folder: Path, clip: pd.Series, what: str) -> Example:
     -------
     Example
     """
-    repository, case, view, size = Repository(folder), str(clip["case"]), str(clip["view"]), int(clip["size_px"])
-    config, es = repository.case(case).config, int(repository.arrays("mechanics", case, None, "es_frame")["es_frame"])
+    case, view, size = str(clip["case"]), str(clip["view"]), int(clip["size_px"])
+    config, es = repository.case(case).config, int(repository.read("mechanics/es_frame", case))
     tracked = estimates.tracked(repository, case, view, str(clip["tracker"]), size, "displacement")["displacement"][es]
     true = estimates.true(repository, case, view, "true_displacement")["true_displacement"][es, ..., :2]
     spacing = config.bmode.si().field_of_view / size
@@ -101,7 +100,7 @@ def example(folder: Path, clip: pd.Series, what: str) -> Example:
     shown = thin(here, DISTANCE * size / config.bmode.sizes[0])
     error = 100 * np.linalg.norm(tracked - true, axis=-1) / np.sqrt((true**2).sum(-1).mean())
     places = here + tracked / spacing, here + true / spacing
-    image = repository.read(f"bmode/{size}/image", *repository.place(case, view), es)
+    image = repository.read(f"bmode/{size}/image", case, view, es)
     title = f"{what}: {clip[RANKED_BY]:.1f} %\n{clip['case']}, {style.title(str(clip['view'])).lower()}"
     return Example(title, image, spacing, places[0][shown], places[1][shown], error[shown])
 

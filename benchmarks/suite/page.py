@@ -10,12 +10,10 @@ import pandas as pd
 import yaml
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from echotruth.cases import all_cases
+from echotruth import files
 from echotruth.evaluation.resampling import CLIP
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
-from echotruth.repository import durable
-from echotruth.repository.kept import NotEvaluated
-from echotruth.repository.reader import Repository
+from echotruth.repository.estimates import NotEvaluated
 from echotruth.section import Section
 
 from . import card, charts, checks, examples, reliability, tables
@@ -147,7 +145,7 @@ class Page:
             lstrip_blocks=True,
         )
         text = environment.get_template("page.md.jinja").render(values)
-        durable.write(path, text.replace("BENCHMARK_FILES", folder.name).encode())
+        files.write(path, text.replace("BENCHMARK_FILES", folder.name).encode())
         return path
 
     def _draw(self, folder: Path) -> list[tuple[str, str, str]]:
@@ -156,8 +154,8 @@ class Page:
         charts.draw_conditions(folder / "conditions.png", self.standings, self._floors(), self.order)
         charts.draw_floors(folder / "floors.png", clips, self.records.difficulty, first)
         charts.draw_reliability(folder / "reliability.png", reliability.curve(self.main.reliability), first)
-        folders = {suite.name: suite.folder for suite in self.records.suites}
-        stored = {name for suite in self.records.suites for name in Repository(suite.folder).trackers}
+        repositories = {suite.name: suite.repository for suite in self.records.suites}
+        stored = {name for suite in self.records.suites for name in suite.repository.trackers}
         found = []
         for tracker in self.everyone:
             of = clips[(clips["tracker"] == tracker) & (clips["size_px"] == self.largest)]
@@ -165,7 +163,7 @@ class Page:
                 continue
             rows = examples.chosen(of)
             try:
-                drawn = [examples.example(folders[row["repository"]], row, what) for what, row in rows.items()]
+                drawn = [examples.example(repositories[row["repository"]], row, what) for what, row in rows.items()]
             except NotEvaluated:  # what is kept is older than the scores
                 continue
             examples.draw(folder / f"example_{tracker}.png", drawn)
@@ -194,7 +192,7 @@ class Page:
     @property
     def halves(self) -> list[str]:
         """Halves of which there are hearts."""
-        return sorted({split_of(case) for suite in self.records.suites for case in all_cases(suite.config).values()})
+        return sorted({split_of(case) for suite in self.records.suites for case in suite.repository.every.values()})
 
     @property
     def conditions(self) -> list[str]:
@@ -328,5 +326,6 @@ def _cards(records: Records) -> dict[str, Card]:
     """Cards of the trackers of all repositories."""
     trackers = records.clips["tracker"].unique()
     # That of the first repository counts.
-    found = ((name, card.card_of(suite.folder, name)) for suite in reversed(records.suites) for name in trackers)
+    folders = [suite.repository.folder for suite in reversed(records.suites)]
+    found = ((name, card.card_of(folder, name)) for folder in folders for name in trackers)
     return {name: of for name, of in found if of is not None}

@@ -9,11 +9,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from echotruth.cases import all_cases
 from echotruth.config import Config
 from echotruth.evaluation.clip_metrics import ClipMetrics, clip_metrics
 from echotruth.evaluation.difficulty.table import difficulties
-from echotruth.evaluation.hearts import hearts_of
 from echotruth.evaluation.leaderboard import scores_of_guests
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.resampling import CLIP
@@ -34,23 +32,28 @@ class Suite:
 
     Attributes
     ----------
-    folder : Path
-    config : Config
+    repository : Repository
     complete : list of (case, view)
         Views that are tracked and evaluated.
-    expected : int
-        Number of views that its configuration makes.
     """
 
-    folder: Path
-    config: Config
+    repository: Repository
     complete: list[tuple[str, str]]
-    expected: int
+
+    @property
+    def config(self) -> Config:
+        """Its configuration."""
+        return self.repository.config
 
     @property
     def name(self) -> str:
         """Name of the configuration."""
         return self.config.name
+
+    @property
+    def expected(self) -> int:
+        """Number of views that the configuration makes."""
+        return len(self.repository.every) * len(self.config.views)
 
     @property
     def clips(self) -> tuple[int, int]:
@@ -143,12 +146,12 @@ def read(repositories: list[Path], sizes: list[int], jobs: int = 1) -> Records:
         chosen = [size for size in suite.config.bmode.sizes if size in (sizes or [size])]
         if not chosen:
             choices = _listed(suite.config.bmode.sizes)
-            raise EvaluationError(f"{suite.folder}: has no images of {sizes[0]} px: use {choices}")
-        metrics = partial(clip_metrics, Repository(suite.folder), sizes=chosen)
+            raise EvaluationError(f"{suite.repository.folder}: has no images of {sizes[0]} px: use {choices}")
+        metrics = partial(clip_metrics, suite.repository, sizes=chosen)
         # A share for each process: what all cases have in common is read once in each.
         shares = _shares(list(dict.fromkeys(case for case, _ in suite.complete)), jobs)
         parts += [(suite, found) for found in in_processes(metrics, shares, jobs)]
-        difficulty = partial(_difficulty, suite.folder)
+        difficulty = partial(_difficulty, suite.repository)
         floors += [found.assign(repository=suite.name) for found in in_processes(difficulty, suite.complete, jobs)]
     several = len(suites) > 1
     clips, segments, sure = (
@@ -185,18 +188,16 @@ def read_suites(repositories: list[Path]) -> list[Suite]:
 def _suite(folder: Path) -> Suite:
     """A repository, given its folder or its store."""
     repository = opened(folder)
-    folder, config = repository.folder, repository.config
     try:
         scores_of_guests(repository)
     except ValueError as error:
         raise EvaluationError(str(error)) from None
-    cases = all_cases(config)
     try:
-        check_halves(cases, hearts_of(cases))
+        check_halves(repository.every)
     except EvaluationError as error:
-        raise EvaluationError(f"{folder}: {error}") from None
-    wanted = [(case, view) for case in cases for view in config.views]
-    return Suite(folder, config, [clip for clip in wanted if not repository.problem(*clip, "tracking")], len(wanted))
+        raise EvaluationError(f"{repository.folder}: {error}") from None
+    wanted = [(case, view) for case in repository.every for view in repository.views]
+    return Suite(repository, [clip for clip in wanted if not repository.problem(*clip, "tracking")])
 
 
 def _listed(sizes: Sequence[int]) -> str:
@@ -209,9 +210,9 @@ def _shares(cases: list[str], number: int) -> list[list[str]]:
     return [cases[start : start + size] for start in range(0, len(cases), max(1, size))]
 
 
-def _difficulty(folder: Path, clip: tuple[str, str]) -> pd.DataFrame:
+def _difficulty(repository: Repository, clip: tuple[str, str]) -> pd.DataFrame:
     case, view = clip
-    return difficulties(Repository(folder), cases=[case], views=[view])
+    return difficulties(repository, cases=[case], views=[view])
 
 
 def _of(suite: Suite, table: pd.DataFrame, several: bool) -> pd.DataFrame:

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from echotruth.cases import all_cases
-from echotruth.config import Config
-from echotruth.config.loading import load
 from echotruth.evaluation.availability import check_runs
 from echotruth.evaluation.clip import read_clips
 from echotruth.evaluation.displacement_error import evaluate
@@ -26,8 +23,7 @@ from echotruth.evaluation.run import prepare, track_clip
 from echotruth.evaluation.scoring import Truth, read_truth
 from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
 from echotruth.loop.cycle import read_loop
-from echotruth.repository import estimates, kept
-from echotruth.repository.digest import digest
+from echotruth.repository import estimates
 from echotruth.repository.reader import Repository
 from echotruth.section import Section
 
@@ -44,10 +40,7 @@ class Rerun:
 
     Attributes
     ----------
-    folder : Path
-        Folder of the repository.
-    config : Config
-        Its configuration.
+    repository : Repository
     tracker : str
         Name under which it was scored.
     settings : Section
@@ -58,8 +51,7 @@ class Rerun:
         Half of the hearts on whose clips it is run.
     """
 
-    folder: Path
-    config: Config
+    repository: Repository
     tracker: str
     settings: Section
     variant: str
@@ -73,22 +65,23 @@ class Rerun:
         EvaluationError
             If there is none.
         """
-        cases = [case.id for case in all_cases(self.config).values() if split_of(case) == self.split]
-        found = [(case, view) for case in cases for view in self.config.views if self._is_tracked(case, view)]
+        cases = [id for id, case in self.repository.every.items() if split_of(case) == self.split]
+        clips, sizes = [(case, view) for case in cases for view in self.repository.views], self.sizes
+        found = [clip for clip in clips if self._is_tracked(*clip, sizes)]
         if not found:
             remedy = "run the repository to its end, or evaluate the tracker again with --keep"
             raise EvaluationError(
-                f"{self.folder}: {self.tracker} has tracked no clip of the split {self.split}: {remedy}"
+                f"{self.repository.folder}: {self.tracker} has tracked no clip of the split {self.split}: {remedy}"
             )
         return found
 
     @property
     def sizes(self) -> list[int]:
         """Image sizes at which the tracker was scored, px."""
-        own, known = self.config.tracking.trackers, self.config.bmode.sizes
+        own, known = self.repository.config.tracking.trackers, self.repository.sizes
         table = scores_of_guests(self.repository)
         scored = set(table[table["tracker"] == self.tracker]["size_px"])
-        return [size for size in known if self.tracker in own or size in scored] or list(known)
+        return [size for size in known if self.tracker in own or size in scored] or known
 
     def rows(self, sizes: list[int], jobs: int = 1) -> Iterator[Row]:
         """Scores of the variants, one row each.
@@ -103,32 +96,19 @@ class Rerun:
         for rows in in_processes(partial(_view_rows, self, sizes), self.case_views(), jobs):
             yield from rows
 
-    def _is_tracked(self, case: str, view: str) -> bool:
+    def _is_tracked(self, case: str, view: str, sizes: list[int]) -> bool:
         """Whether what the tracker found in a clip is stored, and the clip is still the same."""
-        is_own = self.tracker in self.config.tracking.trackers
-        stages = ("truth", "bmode", *(("tracking",) if is_own else ()))
-        if self.repository.problem(case, view, *stages):
+        if self.repository.problem(case, view, "truth", "bmode", "tracking"):
             return False
-        return is_own or self.kept_clips.get(f"{case}/{view}") == digest(self.folder, case, view)
-
-    @cached_property
-    def repository(self) -> Repository:
-        """The repository, to be read."""
-        return Repository(self.folder)
-
-    @cached_property
-    def kept_clips(self) -> dict[str, str]:
-        """Digest of every clip of which a tracker from outside has left something, by "CASE/VIEW"."""
-        return dict(kept.about(self.folder, self.tracker)["clips"])
+        return any(estimates.each(self.repository, case, view, sizes, [self.tracker], "nrmse_all"))
 
 
-def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun:
+def prepare_rerun(repository: Repository, tracker: str, variant: str, split: str) -> Rerun:
     """Prepare the run of a tracker that was scored on a repository.
 
     Parameters
     ----------
-    folder : Path
-        Folder of the repository.
+    repository : Repository
     tracker : str
         Its name, or `package.module:function` if its name was derived from that.
     variant, split : str
@@ -139,18 +119,16 @@ def prepare_rerun(folder: Path, tracker: str, variant: str, split: str) -> Rerun
     EvaluationError
         If it was not scored, what was scored was not kept, or it cannot run.
     """
-    config = load(folder / "config.yaml")
+    own = repository.config.tracking.trackers
     name = parse_tracker(tracker, None, [])[0] if ":" in tracker else tracker
-    if name in config.tracking.trackers:
-        return Rerun(folder, config, name, config.tracking.trackers[name], variant, split)
-    known = Repository(folder).trackers
-    if name not in known:
-        remedy = f"evaluate it with --keep first, or use one of {', '.join(known)}"
-        raise EvaluationError(f"{tracker}: the motion that it tracked is not kept in {folder}: {remedy}")
-    about = kept.about(folder, name)
-    settings = prepare(Repository(folder), name, about["settings"]).settings
+    if name in own:
+        return Rerun(repository, name, own[name], variant, split)
+    if name not in repository.trackers:
+        remedy = f"evaluate it with --keep first, or use one of {', '.join(repository.trackers)}"
+        raise EvaluationError(f"{tracker}: the motion that it tracked is not kept in {repository.folder}: {remedy}")
+    settings = prepare(repository, name, estimates.settings(repository, name)).settings
     check_runs(settings)
-    return Rerun(folder, config, name, settings, variant, split)
+    return Rerun(repository, name, settings, variant, split)
 
 
 def rerun(
@@ -163,13 +141,13 @@ def rerun(
     or an image size is that of none.
     """
     runs, reasons = [], []
-    for folder in (opened(repository).folder for repository in repositories):
-        known = load(folder / "config.yaml").bmode.sizes
+    for repository in map(opened, repositories):
+        known, folder = repository.sizes, repository.folder
         if missing := [size for size in sizes if size not in known]:
             choices = ", ".join(map(str, known))
             raise EvaluationError(f"--size {missing[0]}: is not an image size of {folder}: use {choices}")
         try:
-            run = prepare_rerun(folder, tracker, variant, split)
+            run = prepare_rerun(repository, tracker, variant, split)
         except EvaluationError as error:
             reasons.append(str(error))
             continue
@@ -185,7 +163,7 @@ def rerun(
         for row in run.rows(chosen, jobs):
             rows.append(row)
             yield _line(row, variant)
-        results.write(run.folder, run.config, run.tracker, variant, rows)
+        results.write(run.repository, run.tracker, variant, rows)
 
 
 def _line(row: Row, variant: str) -> str:
@@ -197,14 +175,14 @@ def _view_rows(run: Rerun, sizes: list[int], case_view: tuple[str, str]) -> list
     """Rows of the variants of the clips of one view of one heart."""
     with threadpool_limits(1):
         repository = run.repository
-        time = read_loop(run.config.loop).time
+        time = read_loop(repository.config.loop).time
         found: dict[int, tuple[np.ndarray, str, int]] = {}
         for size, clip in read_clips(repository, *case_view).items():
             if size in sizes:
                 variant = VARIANTS[run.variant](clip)
                 estimate, failure = track_clip(anonymous(variant.clip, time), run.settings)
                 found[size] = clip.on_grid(*variant.restored(*estimate))[0], failure, variant.last
-        truth, of_clip = read_truth(repository, *case_view), digest(run.folder, *case_view)
+        truth, of_clip = read_truth(repository, *case_view), repository.version(*case_view)
         rows = []
         for size, (displacement, failure, last) in found.items():
             found_before = estimates.tracked(repository, *case_view, run.tracker, size, "displacement")

@@ -13,10 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from echotruth.config import Config
+from echotruth import files
+from echotruth.evaluation.leaderboard import is_current
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.repository import durable, kept
-from echotruth.repository.digest import digest
+from echotruth.repository import estimates
+from echotruth.repository.reader import Repository
 
 COLUMNS = ("case", "view", "size_px", "clip", "error_percent", "before_percent", "failure")
 """Columns of a row: error in the variant, and in the same frame of the clip as it was scored, as `nrmse_all` has them;
@@ -46,32 +47,13 @@ def result_path(folder: Path, tracker: str, variant: str) -> Path:
     return folder / "external" / f"{tracker}.{variant}.json"
 
 
-def settings_of(folder: Path, config: Config, tracker: str) -> dict[str, Any]:
-    """Settings with which a tracker was scored; none if it is not the repository's own and nothing of it is kept.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the repository.
-    config : Config
-        Its configuration.
-    tracker : str
-    """
-    if tracker in config.tracking.trackers:
-        return config.tracking.trackers[tracker].model_dump(mode="json")
-    if tracker not in kept.names(folder):
-        return {}
-    return dict(kept.about(folder, tracker)["settings"])
-
-
-def write(folder: Path, config: Config, tracker: str, variant: str, rows: list[Row]) -> Path:
+def write(repository: Repository, tracker: str, variant: str, rows: list[Row]) -> Path:
     """Write scores beside those of other cases, views and image sizes that count still.
 
     Parameters
     ----------
-    folder, config, tracker
-        As :func:`settings_of` takes them.
-    variant : str
+    repository : Repository
+    tracker, variant : str
     rows : list of dict
         One for each clip, by `COLUMNS`.
 
@@ -80,23 +62,23 @@ def write(folder: Path, config: Config, tracker: str, variant: str, rows: list[R
     Path
         The file.
     """
-    earlier = result_of(folder, config, tracker, variant).rows.to_dict("records")
+    earlier = result_of(repository, tracker, variant).rows.to_dict("records")
     of_clip = {(row["case"], row["view"], row["size_px"]): row for row in [*earlier, *rows]}
     values = {
-        "settings": settings_of(folder, config, tracker),
+        "settings": estimates.settings(repository, tracker),
         "clips": [of_clip[clip] for clip in sorted(of_clip)],
     }
-    path = result_path(folder, tracker, variant)
-    durable.write(path, f"{json.dumps(values, indent=1)}\n".encode())
+    path = result_path(repository.folder, tracker, variant)
+    files.write(path, f"{json.dumps(values, indent=1)}\n".encode())
     return path
 
 
-def result_of(folder: Path, config: Config, tracker: str, variant: str) -> Result:
+def result_of(repository: Repository, tracker: str, variant: str) -> Result:
     """Scores of a tracker on variants of clips.
 
     Parameters
     ----------
-    folder, config, tracker, variant
+    repository, tracker, variant
         As :func:`write` takes them.
 
     Raises
@@ -104,8 +86,7 @@ def result_of(folder: Path, config: Config, tracker: str, variant: str) -> Resul
     EvaluationError
         If the file is not what was written.
     """
-    path = result_path(folder, tracker, variant)
-    settings = settings_of(folder, config, tracker)
+    path, settings = result_path(repository.folder, tracker, variant), estimates.settings(repository, tracker)
     try:
         values = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {"settings": {}, "clips": []}
         same = values["settings"] == settings
@@ -116,5 +97,5 @@ def result_of(folder: Path, config: Config, tracker: str, variant: str) -> Resul
     except (ValueError, TypeError, KeyError) as error:
         raise EvaluationError(f"{path}: is not what was written: delete it, and run {tracker} again") from error
     clips = zip(table["case"], table["view"], table["clip"], strict=True)
-    counts = np.array([same and digest(folder, case, view) == clip for case, view, clip in clips], bool)
+    counts = np.array([same and is_current(repository, *one) for one in clips], bool)
     return Result(table[counts].reset_index(drop=True), int((~counts).sum()))

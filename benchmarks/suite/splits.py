@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from echotruth.cases import Case
+from echotruth.cases.labels import heart_of
 from echotruth.evaluation.tracker_options import EvaluationError
 
 DEVELOP, TEST = "develop", "test"
@@ -29,15 +30,13 @@ def split_of_label(label: object) -> str:
     return ("" if label is None else str(label)) or TEST
 
 
-def check_halves(cases: Mapping[str, Case], hearts: Mapping[str, str]) -> None:
+def check_halves(cases: Mapping[str, Case]) -> None:
     """Check that each heart is in one half.
 
     Parameters
     ----------
     cases : mapping
         By their names.
-    hearts : mapping
-        Case to heart.
 
     Raises
     ------
@@ -47,7 +46,8 @@ def check_halves(cases: Mapping[str, Case], hearts: Mapping[str, str]) -> None:
     halves = {name: split_of(case) for name, case in cases.items()}
     first: dict[str, str] = {}
     for name, half in halves.items():
-        other = first.setdefault(hearts[name], name)
+        heart = heart_of(cases[name])
+        other = first.setdefault(heart, name)
         if half != halves[other]:
             both = f"{other}: {halves[other]}, {name}: {half}"
-            raise EvaluationError(f"heart {hearts[name]} is in both halves ({both}): give its cases one label.split")
+            raise EvaluationError(f"heart {heart} is in both halves ({both}): give its cases one label.split")

@@ -7,11 +7,10 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 import numpy as np
 import pandas as pd
 
-from echotruth.cases import Case, all_cases, diagnosis
-from echotruth.evaluation.hearts import hearts_of
+from echotruth.cases import Case, diagnosis
+from echotruth.cases.labels import heart_of
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.resampling import CLIP
-from echotruth.repository.reader import Repository
 
 from .comparison import LEAST_HEARTS
 from .conditions import PLAIN
@@ -81,8 +80,8 @@ def progress(suites: list[Suite]) -> str:
     """How far each repository is."""
     rows = []
     for suite in suites:
-        cases = all_cases(suite.config)
-        names = set(hearts_of(cases).values())
+        cases = suite.repository.every
+        names = set(map(heart_of, cases.values()))
         versions = dict.fromkeys(str(case.labels.get("suite") or NONE) for case in cases.values())
         (done, wanted), sizes = suite.clips, len(suite.config.bmode.sizes)
         state = "whole" if done == wanted else f"{wanted - done} clips are missing"
@@ -99,14 +98,13 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
     clips : DataFrame
         Columns repository, case, true_gls_percent and true_gcs_percent.
     """
-    cases = all_cases(suite.config)
-    names = hearts_of(cases)
+    cases = list(suite.repository.every.values())
     columns = ["true_gls_percent", "true_gcs_percent"]
     # That of a case which is not finished yet is that of another one with the same motion and planes.
     strains = clips[clips["repository"] == suite.name].groupby("case")[columns].first()
     rows = []
-    for heart in dict.fromkeys(names.values()):
-        own = [cases[case] for case, name in names.items() if name == heart]
+    for heart in dict.fromkeys(map(heart_of, cases)):
+        own = [case for case in cases if heart_of(case) == heart]
         first = own[0]
         found = [str(of.labels.get("variation") or "") for of in own]
         varied = ", ".join(name.replace("_", " ") for name in dict.fromkeys(found) if name not in PLAIN)
@@ -121,10 +119,9 @@ def hearts(suite: Suite, clips: pd.DataFrame) -> str:
 
 def ejection_fraction(suite: Suite, case: str) -> float:
     """Ejection fraction of a heart; NaN if it was not solved."""
-    repository = Repository(suite.folder)
-    if repository.record("mechanics", case).get("status") != "complete":
+    if suite.repository.problem(case, None, "mechanics"):
         return np.nan
-    return float(repository.arrays("physiology", case, None, "ejection_fraction")["ejection_fraction"])
+    return float(suite.repository.read("physiology/ejection_fraction", case))
 
 
 def _group(case: Case) -> str:
@@ -153,10 +150,8 @@ def halves(suite: Suite) -> str:
 def hearts_by_group(suite: Suite) -> dict[str, dict[str, set[str]]]:
     """Names of the hearts by group and half."""
     groups: dict[str, dict[str, set[str]]] = {}
-    cases = all_cases(suite.config)
-    names = hearts_of(cases)
-    for case in cases.values():
-        groups.setdefault(_group(case), {DEVELOP: set(), TEST: set()})[split_of(case)].add(names[case.id])
+    for case in suite.repository.every.values():
+        groups.setdefault(_group(case), {DEVELOP: set(), TEST: set()})[split_of(case)].add(heart_of(case))
     return groups
 
 
