@@ -8,6 +8,7 @@ writes config/schema.json, config/README.md and docs/schema.md in the current fo
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from math import log2
 from pathlib import Path
 from typing import Any, get_origin
@@ -18,6 +19,7 @@ from pydantic_core import PydanticUndefined
 
 from echotruth.config import Config
 from echotruth.repository import schema
+from echotruth.repository.array import Array
 from echotruth.section import discriminator, meaning, section_in, shown_unit, variants
 
 _CONFIG_HEAD = """# Configuration
@@ -25,7 +27,9 @@ _CONFIG_HEAD = """# Configuration
 A configuration is a YAML file. A key that it leaves out has the default that is listed here; a
 key without a default must be given where its section is used. Unknown keys and invalid values
 are refused before anything runs. With `schema.json` in this folder,
-editors complete and check the YAML. The keys carry their units.
+editors complete and check the YAML. The keys carry their units. The path in `cases.file` is from
+the folder of the configuration that names it; all others are from the folder in which the command
+is run.
 
 This page is generated from `src/echotruth/config` by `make reference`.
 
@@ -33,51 +37,63 @@ This page is generated from `src/echotruth/config` by `make reference`.
 
 _SCHEMA_HEAD = """# The tree on disk
 
-The repository is one Zarr hierarchy (format 3) that `xarray.open_datatree` opens. Every array is rectangular over
-case, view and frame; one job writes a shard, and a chunk is one component of one frame (of what was tracked: of the
-whole cycle) with a crc32c checksum. Numbers are compressed by Blosc (zstd, bytes shuffled).
-`SIZE` stands for each image size of the configuration (512, 256, 128 px) and `TRACKER` for each tracker, as in
-`evaluation/512/bspline_dic`. Missing values are `nan`, 0 or "": outside the wall, and in the row of a case that failed
-(`cases/status`).
+A repository is one Zarr hierarchy (format 3). Each job writes one group of it:
+
+```text
+out/NAME/NAME.zarr/
+  hearts/HEART/             a solved heart                               job of the rule
+    geometry/                 mesh                                         mechanics
+    fibres/                   fibres, sheets, layers, AHA segments         mechanics
+    pathology/                infarct, late activation                     mechanics
+    mechanics/                pressure, volume, tension, displacement      mechanics
+    kinematics/               strain                                       mechanics
+    physiology/               measures, such as twist and GLS              mechanics
+  clips/CASE/VIEW/          a case seen in a view
+    phantom/                  plane, scatterers                            phantom
+    rf/                       lines; channels if rf.keep has them          rf
+    truth/SIZE/               motion, strain and labels of every pixel     truth
+    bmode/SIZE/               images                                       bmode
+    tracking/SIZE/            motion and scores of all trackers            tracking
+  inference/CASE/           if inference.tracker names a tracker         inference
+    posterior/ prior/ observed_data/ posterior_predictive/ constant_data/ fit/
+```
+
+`HEART` and `CASE` are ids of `cases.csv`, `VIEW` a view and `SIZE` an image size of the configuration (512, 256,
+128 px). Cases that differ only in speckle, array or image have one heart. `xarray.open_datatree` opens all of it,
+and `xarray.open_zarr` a heart, a clip or a group; `echotruth.Repository` reads it by case, view and size.
+
+Files beside it, in `out/NAME`: `config.yaml`, `cases.csv` (the cases with status, heart, labels and all keys),
+`cases/CASE.json` (the configuration of each), `SHA256SUMS` (checksum of every file), `report.html` and `figures/`,
+`logs/` and `benchmarks/` (time and memory of every job), `drafts/` (what jobs are writing), and `external/` (scores
+of other trackers, NAME.csv, and what `echotruth evaluate --keep` stored of them, NAME.zarr, with the same groups).
+
+- **Attributes of a group:** `status` (complete; failed: the heart has no solution; skipped: the heart is not
+  imaged), `reason` (why it is not complete; then it has no arrays), and `version`, a hash of the settings and the
+  code that it was made with. A heart has `bounded` (its measures that have bounds in the section `physiology`), and
+  tracking has `failures` (tracker -> why it failed). The root has title, summary, references, config (the whole
+  configuration), seed and packages (their versions).
+- **Coordinates** lie beside the arrays that have their dimensions.
+- **Chunks.** An array is one shard, and a chunk is one component of one frame (of what was tracked: of the whole
+  cycle) with a crc32c checksum. Small arrays are one chunk. Numbers are compressed by Blosc (zstd, bytes shuffled).
+- **Missing values** are `nan`, 0 or "": outside the wall, and where a tracker has no estimate.
+- **Steps.** Arrays with a step hold ordinary numbers rounded to multiples of it, so that they take less room. They
+  are off by half a step at most, and the attribute `quantum` has the step in the unit of the array. `pixel/256` is
+  the largest power of two, in metres, not above 1/256 pixel of the largest image. Scores are computed from the
+  rounded numbers.
+
 Axes, signs and reference states are in `conventions.md`.
-
-Arrays with a **step** hold ordinary numbers rounded to multiples of it, so that they take less place: they are off by
-half a step at most, and the attribute `quantum` has the step in the unit of the array. `pixel/256` is the largest power
-of two, in metres, not above 1/256 pixel of the largest image. Scores are computed from the rounded numbers: whoever
-reads the truth and the tracked motion finds the same.
-
-A **pack** is one array of many small numbers, with a label for each, such as `nrmse[0,total]`, and its unit beside it:
-`tree["evaluation/512/dis/scores"].sel(score="nrmse[0,total]")`. `echotruth.unpack(group.to_dataset(), "nrmse")`, of the
-group `tree["evaluation/512/dis"]`, gives the array itself, with the dimensions that are listed under its pack.
-
-The root has the attributes title, summary, references, config (the whole configuration), seed, code (version of
-each stage's source) and packages (their versions). Every group has the coordinates of its dimensions, and the
-attribute `labels` (dimension -> labels) for readers that cannot read arrays of strings; the labels of `case`, in the
-order of the rows, are in that of the group `cases` only.
-
-Cases and views keep their place for good: new ones are appended, whatever their order in the configuration, and those
-that leave it stay, a case as `retired`. Find them by their labels.
-
-The folder of the repository also contains `config.yaml`, `cases.csv` (the present cases with labels and all keys) and
-`cases/CASE.json` (the configuration of each), `registry.txt` (row of every case) and `views.txt` (index of every view),
-`ledger/STAGE/CASE/VIEW/SIZE.json` (a record of every finished job, without what the stage does not have: status,
-checksums, seed, code; `structure.json`: checksums of all other files of the tree), `benchmarks/` (time and memory of
-every job), `figures/` and `logs/`; and `external/` what `echotruth evaluate` found of other trackers: their scores
-(NAME.csv) and, with `--keep`, NAME.zarr, which has their groups of tracking and evaluation, in the same rows.
 
 This page is generated from `src/echotruth/repository/arrays.csv` by `make reference`.
 
 """
 
-_RF = """The group exists if `rf.keep` is not empty, and contains `lines`, `channels` or both. Its attributes are, in
-SI units, sampling_frequency (of the channels), demodulation_frequency (of the lines), sound_speed, centre_frequency,
-bandwidth, element_width, element_height, elevation_focus, attenuation (nepers per metre and hertz); transmit, scan,
-apodization and f_number, as in the section `rf`; foci (ranges of the foci of focused transmits; transmit number `zone`
-x lines + `line` belongs to that line and zone); accuracy (largest error of the RF relative to the exact sum) and
-accuracy_from (range from which that holds). Of these, those that differ among the cases are left out: the group `cases`
-has the keys that they follow from.
+_RF = """`lines` are rounded to 16 bits of the largest. The group has `channels` and `channels_step` if `rf.keep` names
+channels. Its attributes are, in SI units, sampling_frequency (of the channels), demodulation_frequency (of the lines),
+sound_speed, centre_frequency, bandwidth, element_width, element_height, elevation_focus, attenuation (nepers per metre
+and hertz); transmit, scan, apodization and f_number, as in the section `rf`; foci (ranges of the foci of focused
+transmits; transmit number `zone` x lines + `line` belongs to that line and zone); accuracy (largest error of the RF
+relative to the exact sum) and accuracy_from (range from which that holds).
 """
-
 
 _DERIVED = """What follows from the stored arrays is not stored. `echotruth.kinematics(heart)` gives the arrays
 below, for a heart that `echotruth.Repository.heart` reads or `echotruth.beat` makes. `echotruth.Repository.tracks`
@@ -94,17 +110,9 @@ def config_page() -> str:
 def schema_page() -> str:
     """Page of the arrays, group by group."""
     parts = [_SCHEMA_HEAD]
-    cases = (
-        "One more array for `seed` and for every key that differs among the cases, with the key's name and unit, and\n"
-        "likewise for `diagnosis`, `label.NAME` and `note` (docs/cases.md). The attribute `constants` holds what does\n"
-        "not differ; `echotruth.Repository.tree` gives the table with all of them.\n"
-    )
-    notes = {"cases": cases, "rf": _RF}
-    for path, arrays in ({"cases": schema.CASES} | schema.KINDS).items():
-        parts += [f"## {path}\n", *_arrays(arrays), notes.get(path, "")]
-        for pack in schema.PACKS.get(path, ()):
-            parts += [f"### In the pack {path}/{pack.array.name}\n", *_arrays(pack.members)]
-    parts += ["## Coordinates\n", *_arrays(schema.COORDINATES)]
+    for path, arrays in schema.KINDS.items():
+        parts += [f"## {path}\n", *_arrays(arrays), *([_RF] if path == "rf" else [])]
+    parts += ["## Coordinates\n", *_arrays(schema.COORDINATES.values())]
     return "\n".join([*parts, "## Computed on reading\n", _DERIVED, *_arrays(schema.DERIVED)])
 
 
@@ -114,7 +122,7 @@ def files() -> dict[str, str]:
     return {"config/schema.json": schema_text, "config/README.md": config_page(), "docs/schema.md": schema_page()}
 
 
-def _arrays(arrays: tuple[schema.Array, ...]) -> list[str]:
+def _arrays(arrays: Iterable[Array]) -> list[str]:
     rows = [
         f"| `{array.name}` | {', '.join(array.dims)} | {array.dtype} | {array.units} | {_step(array)} "
         f"| {array.long_name} |"
@@ -123,7 +131,7 @@ def _arrays(arrays: tuple[schema.Array, ...]) -> list[str]:
     return ["| array | dimensions | type | units | step | meaning |", "|---|---|---|---|---|---|", *rows, ""]
 
 
-def _step(array: schema.Array) -> str:
+def _step(array: Array) -> str:
     """Step of the numbers of an array; empty if they are not rounded."""
     if isinstance(array.quantum, float):
         return f"2^{round(log2(array.quantum))}"

@@ -8,7 +8,6 @@ import sys
 
 import echotruth as et
 
-tree = et.Repository(sys.argv[1] if len(sys.argv) > 1 else "sample").tree
-measures = et.unpack(tree["physiology"].to_dataset(), "longitudinal_strain", "ejection_fraction")
-table = measures.to_dataframe()
+hearts = et.learning.cases(sys.argv[1] if len(sys.argv) > 1 else "sample")
+table = hearts[["longitudinal_strain", "ejection_fraction"]]
 print((100 * table).round(1).to_string())
