@@ -1,20 +1,15 @@
 """A small benchmark: hearts that move as rigid bodies, with speckle that moves with them, and labels."""
 
-import runpy
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-from finished_repository import finish
-from known_repository import FRAMES, SETTINGS, SHIFT, Known, overlaid
+from finished_repository import finish, solved
+from known_repository import FRAMES, SETTINGS, SHIFT, overlaid
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 import echotruth as et
-from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.medium.tissue_images import TissueImages
-from echotruth.imaging.truth import pixel_truth
-from echotruth.workflow.job import Job
-from echotruth.workflow.processes import script
+from echotruth.workflow.job import Job, Result
 
 TABLE = """case,seed,loop.heart_rate_per_min,label.heart,label.split,label.group,label.acoustics,label.variation
 a_ideal,1,500,a,test,healthy,ideal,none
@@ -46,22 +41,11 @@ def moving_speckle() -> np.ndarray:
 def make(folder: Path) -> Path:
     """Write the repository as the workflow does; tracking is its own."""
     (folder.parent / "hearts.csv").write_text(TABLE)
-    config = et.configure(CONFIGURED | {"cases": {"file": str(folder.parent / "hearts.csv")}})
-    heart = et.beat(et.configure(config, cases={}), progress=False)
-    made = heart.arrays | images_and_truth(Known(folder, config, heart))
-    track = runpy.run_path(script("tracking"))["work"]
-
-    def result(job: Job):
-        return track(job) if job.stage == "tracking" else overlaid(job, made)
-
-    return finish(folder, config, result)
+    return finish(folder, et.configure(CONFIGURED | {"cases": {"file": str(folder.parent / "hearts.csv")}}), result)
 
 
-def images_and_truth(known: Known) -> dict[str, dict[str, np.ndarray]]:
-    """Arrays of the stages before tracking, by group."""
-    plane = known.plane("mid")
-    arrays = {"phantom": {"origin": plane.origin, "axes": plane.axes}}
-    pixels = pixel_centres(known.config.bmode, SIZE)
-    tissue = TissueImages(known.config, known.heart, plane, *pixels)
-    images, truth = {"image": moving_speckle()}, pixel_truth(known.heart, plane, *pixels, tissue)
-    return arrays | {f"bmode/{SIZE}": images, f"truth/{SIZE}": truth}
+def result(job: Job) -> Result:
+    """Arrays of a job."""
+    if job.stage in ("tracking", "truth"):
+        return solved(job)
+    return overlaid(job, {f"bmode/{SIZE}": {"image": moving_speckle()}})

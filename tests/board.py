@@ -3,7 +3,6 @@
 import numpy as np
 
 from echotruth.cases import Case
-from echotruth.evaluation.leaderboard import SCORES
 from echotruth.repository import schema
 from echotruth.repository.reader import Repository
 
@@ -20,16 +19,20 @@ class Board(Repository):
     folder : Path
     hearts : dict
         Case -> view -> score of each tracker.
+    about : dict, optional
+        Attributes of groups, by group, case and view.
     """
 
-    def __init__(self, config, folder, hearts):
+    def __init__(self, config, folder, hearts, about=None):
         self._remote, self._place, self._folder, self.config = None, str(folder), folder, config
-        self.hearts, self.shown = hearts, list(hearts)
-        self.indices = dict.fromkeys(config.views, 0)
+        self.hearts, self.shown, self.about = hearts, list(hearts), about or {}
+        self.rows = {case: row for row, case in enumerate(hearts)}
         self._known = {case: Case(case, {}, config) for case in hearts}
 
-    def arrays(self, group, case, view=None, *names, store=None):
-        dims = {array.name: array.dims[array.leading :] for array in schema.named(group)}
-        scores = dict(zip(self.config.tracking.trackers, self.hearts[case][view], strict=True))
-        assert set(names) == set(SCORES)
-        return {name: np.full([LENGTHS[dim] for dim in dims[name]], scores[group.rpartition("/")[2]]) for name in names}
+    def read(self, path, case, view=None, *index):
+        group, _, name = path.rpartition("/")
+        shape = [LENGTHS[dim] for dim in schema.arrays_of(group)[name].dims[1:]]
+        return np.full(shape, self.hearts[case][view][index[0]])
+
+    def attributes(self, group_name, case="", view=None):
+        return self.about.get((group_name, case, view), {})

@@ -1,9 +1,14 @@
 """Meshes and motions of which everything is known, and a browser."""
 
+import fcntl
+import os
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import cores  # noqa: F401 - before whatever multiplies or compiles
+import finished_repository
+import learning_repository
 import numpy as np
 import pytest
 
@@ -13,7 +18,7 @@ from echotruth.heart import Heart
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 
-LONGEST = ("test_growth", "test_workflow", "test_blocks", "test_snakemake", "test_circulation", "test_checks")
+LONGEST = ("test_states", "test_snakemake", "test_circulation", "test_checks")
 """Modules that take half a minute and more, longest first."""
 
 
@@ -41,10 +46,20 @@ def browser():
         opened.close()
 
 
-@pytest.fixture
-def roomy_disk(monkeypatch):
-    """Space for every shipped configuration: the disk on which tests run may have less."""
-    monkeypatch.setattr("echotruth.workflow.concerns.free_bytes", lambda folder: 10**13)
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory) -> Path:
+    """Folder of `finished_repository.FINISHED` as the scripts make it: one for all workers, which nobody writes to."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "finished"
+    with folder.with_suffix(".lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        return finished_repository.finish(folder, finished_repository.FINISHED, finished_repository.solved)
+
+
+@pytest.fixture(scope="session")
+def textured(tmp_path_factory) -> Path:
+    """Folder of the repository of `learning_repository.made`, which nobody writes to."""
+    return learning_repository.made(tmp_path_factory.mktemp("textured") / "small")
 
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)

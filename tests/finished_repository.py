@@ -1,30 +1,75 @@
-"""A small repository whose jobs are all done, with values that a heart could have, made in a second."""
+"""Repositories whose jobs are all done, in this process.
+
+    finish(folder, configured())            in 2 s: hearts that are squeezed, noise for images, nought for the rest
+    finish(folder, configured(), solved)    what a run makes: the work of the scripts, which takes a second a view
+    finish(folder, config, result)          with `result(job)`, the arrays of a job by group; it may raise CaseFailed
+    begin(folder, config)                   no job is done; `do(job)` does one of `jobs(folder, case)`
+
+The fixture `finished` is `FINISHED` as the scripts make it, once for all tests of a session: copy it to change it.
+"""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
-import zarr
 
-from echotruth.cases import expand
-from echotruth.config import Bmode, Config, Geometry, Loop, Motion, PhaseCorrelation, Tracking, View
-from echotruth.repository import ledger, packing, schema
-from echotruth.repository.layout import lay_out
-from echotruth.repository.publication import publish
-from echotruth.workflow.job import Job, Result
+from echotruth.cases import Case
+from echotruth.config import (
+    Bmode,
+    Config,
+    Geometry,
+    Inference,
+    Loop,
+    Motion,
+    Phantom,
+    PhaseCorrelation,
+    Probe,
+    Rf,
+    Tracking,
+    View,
+)
+from echotruth.mechanics.beat import simulate
+from echotruth.mechanics.physiology import measured_heart
+from echotruth.repository import schema
+from echotruth.repository.coordinates import coordinates_of
+from echotruth.repository.places import METADATA
+from echotruth.repository.publication import CHECKSUMS, publish
+from echotruth.workflow import lock
+from echotruth.workflow.job import Job, Result, Work, run
+from echotruth.workflow.plan import Plan
 
 SIZE, FRAMES = 64, 3
 
+DEPTHS = 8
+"""Samples of a line that is made up."""
+OPTIONAL = (
+    "blood",
+    "endocardium",
+    "epicardium",
+    "surroundings",
+    "leaflets",
+    "papillary_muscles",
+    "channels",
+    "transmit",
+)
+"""Beginnings of the names of arrays that a repository has only if they are asked for."""
+
 
 def configured(name="small", seeds=(1, 2), views=("mid", "long_axis"), **changes) -> Config:
+    """A configuration of few elements, frames and pixels."""
     planes = {"mid": View(), "long_axis": View(plane="long_axis"), "apex": View(position=0.8)}
     settings = {
         "geometry": Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1),
         "loop": Loop(frames=FRAMES),
         "motion": Motion(kind="affine"),
+        "phantom": Phantom(density_per_mm3=50.0),
+        "probe": Probe(elements=16),
+        "rf": Rf(lines=32, focal_zones=1),
         "bmode": Bmode(size_px=SIZE, downsampling=(1,)),
         "tracking": Tracking(trackers={"one": PhaseCorrelation(window_px=16)}),
     }
@@ -32,101 +77,139 @@ def configured(name="small", seeds=(1, 2), views=("mid", "long_axis"), **changes
     return Config(name=name, views={view: planes[view] for view in views}, **settings | swept | changes)
 
 
-FLOW = np.zeros((FRAMES, 2, 1, 1, 1))
-FLOW[0, 0] = FLOW[-1, 1] = np.nan
-"""No motion; there is no frame before the first and none after the last."""
-
-VALUES = {
-    "fibres": {"fibre": [1, 0, 0], "sheet": [0, 1, 0], "layer": 1, "segment": 1},
-    "mechanics": {"volume": 1, "volume_target": 1, "pressure": 1, "pressure_target": 1},
-    "kinematics": {"volume_ratio_min": 1, "volume_ratio_mean": 1},
-    "physiology": {"volume_ratio_min": 1},
-    "phantom": {"axes": np.eye(3)},
-    "truth": {"labels": np.reshape([1, 1, 0], (3, 1, 1)), "tissue": 2, "flow": FLOW},
-    "evaluation": {"wall_axes": np.eye(2)},
-}
-"""Values that are not 0: of a heart that does not move, and fills its images."""
+FINISHED = configured(
+    "finished",
+    cases={"fibres.endo_deg": [60.0, 70.0]},
+    bmode=Bmode(size_px=2 * SIZE, downsampling=(1, 2)),
+    tracking=Tracking(grid_px=2, trackers={"one": PhaseCorrelation(window_px=16), "dis": {"method": "dis"}}),
+)
+"""Two hearts in two views and two sizes, and two trackers."""
 
 
-@cache
-def shapes(store: Path, group: str) -> dict[str, tuple[int, ...]]:
-    """Shape of what one job writes of each array of a group, by the names of those in packs."""
-    opened = zarr.open_group(store, path=group, mode="r", use_consolidated=False)
-    blank = {
-        array.name: np.zeros(opened[array.name].shape[array.leading :])
-        for array in schema.arrays_of(group)
-        if array.name in opened
-    }
-    found = packing.unpack(schema.packs_of(group), blank, opened.attrs["labels"])
-    return {name: values.shape for name, values in found.items()}
+def plan_of(folder: Path, config: Config) -> Plan:
+    """Plan of the jobs of a repository that may be in any folder."""
+    plan = Plan(config.model_dump())
+    plan.folder = folder
+    return plan
 
 
-def result(job: Job) -> dict[str, dict[str, np.ndarray]]:
+def begin(folder: Path, config: Config) -> list[Case]:
+    """Write what a run writes before its first job, and set aside what is made otherwise; the cases."""
+    plan = plan_of(folder, config)
+    with mock.patch.object(lock, "hold", return_value=True):  # which would last until these tests end
+        plan.settle()
+        plan.begin()
+    return list(plan.cases.values())
+
+
+def jobs(folder: Path, case: Case) -> Iterator[Job]:
+    """Jobs of a case, in the order of their stages, that of its heart first."""
+    config = case.config
+    yield Job(folder, "mechanics", case.id)
+    for view in config.views:
+        yield from (Job(folder, stage, case.id, view) for stage in ("phantom", "rf", "truth", "bmode"))
+        yield from (Job(folder, "tracking", case.id, view, size) for size in config.bmode.sizes)
+    if config.inference.tracker:
+        yield Job(folder, "inference", case.id)
+
+
+def missing(folder: Path, cases: list[Case]) -> Iterator[Job]:
+    """Jobs that Snakemake would run: a group is not there, and is asked for or read by one that is."""
+    for one in (one for case in cases for one in jobs(folder, case)):
+        readers = {"phantom": ("rf", "bmode"), "rf": ("bmode",)}.get(one.stage, ())
+        others = [Job(folder, stage, one.case.id, one.view_name) for stage in readers]
+        if not any(is_made(job) for job in (one, *others)):
+            yield one
+
+
+def is_made(job: Job) -> bool:
+    """Whether the groups of a job are there."""
+    return all((job.store / job._place(name) / METADATA).is_file() for name in job.groups())
+
+
+def blank(job: Job) -> Result:
     """All arrays of a job by group; images are noise, so that they differ between jobs."""
-    arrays = {}
-    for group in schema.written_by(job.stage, job.config, job.size or None):
-        values = VALUES.get(group.partition("/")[0], {})
-        arrays[group] = {
-            name: np.broadcast_to(np.asarray(values.get(name, 0), float), shape)
-            for name, shape in shapes(job.store.path, group).items()
-        }
-        if job.stage == "bmode":
+    if job.stage == "mechanics":
+        kind = "affine" if job.config.motion.kind == "beat" else job.config.motion.kind
+        motion = job.config.motion.model_copy(update={"kind": kind})
+        config = job.config.model_copy(update={"motion": motion, "inference": Inference()})
+        groups, job.notes["bounded"] = _moved(config.model_dump_json())
+        return groups
+    if job.stage == "inference":
+        return {group: _zeros(group, job.config) for group in schema.INFERENCE}
+    found = {group: _zeros(group, job.config) for group in job.groups()}
+    for group, arrays in found.items():
+        if job.stage == "phantom":
+            arrays |= {"origin": job.plane.origin, "axes": job.plane.axes}
+        elif job.stage == "truth":
+            wall, moves = np.reshape([1, 1, 0], (3, 1, 1)), np.zeros_like(arrays["flow"])
+            moves[0, 0] = moves[-1, 1] = np.nan
+            arrays |= {"labels": arrays["labels"] + wall, "tissue": arrays["tissue"] + 2, "flow": moves}
+        elif job.stage == "bmode":
             noise = np.random.default_rng([job.config.seed, len(str(job.view_name))])
-            arrays[group]["image"] = noise.integers(256, size=shapes(job.store.path, group)["image"])
-    return arrays
+            arrays["image"] = noise.integers(256, size=arrays["image"].shape)
+        elif job.stage == "tracking":
+            arrays["wall_axes"] = arrays["wall_axes"] + np.eye(2)
+            found[group] = arrays | {"tracker": list(job.config.tracking.trackers)}
+    return found
 
 
-def jobs(folder: Path, config: Config, case: str) -> Iterator[Job]:
-    """Jobs of a heart, in the order of their stages."""
-    for path in ledger.record_paths(folder, case, config):
-        yield job_of(folder, path)
+def solved(job: Job) -> Result:
+    """What the script of a job makes of it."""
+    return import_module(f"workflow.scripts.{job.stage}").work(job)
 
 
-def job_of(folder: Path, record: Path) -> Job:
-    """The job that a record is of, given the path of it."""
-    stage, case, *place = record.relative_to(folder / "ledger").with_suffix("").parts
-    view, size = (*place, None, None)[:2]
-    return Job(folder, stage, case, view, int(size) if size else None, code="1")
+def do(job: Job, result: Work = blank) -> None:
+    """Do a job, given its arrays: its groups are written, or say why there are none."""
+    run(job, result)
 
 
-def finish(folder: Path, config: Config, result: Callable[[Job], Result] = result) -> Path:
+def remake(folder: Path, config: Config, result: Work = blank) -> list[str]:
+    """Make what is missing or was made otherwise, as a run does; the jobs that were done, as `rf 1 mid`."""
+    cases, done = begin(folder, config), []
+    for one in missing(folder, cases):
+        do(one, result)
+        done.append(" ".join(str(part) for part in (one.stage, one.case.id, one.view_name, one.size) if part))
+    if done or not (folder / CHECKSUMS).is_file():
+        publish(folder, config, cases)
+        done.append("repository")
+    return done
+
+
+def finish(folder: Path, config: Config, result: Work = blank) -> Path:
     """Make a repository, in its folder, as the workflow does, given the arrays of a job."""
-    cases = expand(config)
-    lay_out(folder, config, cases)
-    for case in cases:
-        for job in jobs(folder, config, case.id):
-            job.commit(result(job))
-    ledger.commit(folder / "ledger/repository.json", publish(folder))
+    remake(folder, config, result)
     return folder
 
 
-def remake(folder: Path, config: Config) -> list[str]:
-    """Make what has no record, as a run does; the records that were made, below the folder."""
-    cases = expand(config)
-    lay_out(folder, config, cases)
-    missing = [job for case in cases for job in jobs(folder, config, case.id) if not job.record.exists()]
-    for job in missing:
-        job.commit(result(job))
-    made, published = [job.record for job in missing], folder / "ledger/repository.json"
-    if made or not published.exists():
-        ledger.commit(published, publish(folder))
-        made.append(published)
-    return [path.relative_to(folder).as_posix() for path in made]
-
-
 def content(folder: Path) -> dict[str, str]:
-    """Path -> hash of every file of the hierarchy."""
-    store = next(folder.glob("*.zarr"))
-    files = [path for path in store.rglob("*") if path.is_file()]
+    """Path -> hash of every file that a repository hands over: store, table of cases and checksums."""
+    files = [path for path in folder.glob("*.zarr/**/*") if path.is_file()]
+    files += [folder / "cases.csv", folder / "config.yaml", folder / CHECKSUMS]
     return {path.relative_to(folder).as_posix(): sha256(path.read_bytes()).hexdigest() for path in files}
 
 
-def owners(folder: Path) -> dict[str, str]:
-    """Path of every file of the hierarchy -> path of its record, both below the folder."""
-    store = next(folder.glob("*.zarr")).name
-    records = [path for path in (folder / "ledger").rglob("*.json")]
-    return {
-        f"{store}/{name}": path.relative_to(folder).as_posix()
-        for path in records
-        for name in json.loads(path.read_text()).get("sha256", {})
-    }
+def made_otherwise(group: Path) -> None:
+    """Give a group the version of one that was made with other settings."""
+    path = group / METADATA
+    found = json.loads(path.read_bytes())
+    found["attributes"]["version"] = "another"
+    path.write_text(json.dumps(found))
+
+
+@cache
+def _moved(config: str) -> tuple[Result, dict[str, float]]:
+    """Groups of a heart that is moved by a formula, and its measures that have bounds."""
+    found = Config.model_validate_json(config, strict=False)
+    groups = simulate(found)
+    measures, bounded = measured_heart(groups, found)
+    return groups | {"physiology": measures}, bounded
+
+
+def _zeros(group: str, config: Config) -> dict[str, np.ndarray]:
+    lengths = {name: np.size(values) for name, values in coordinates_of(group, config).items()}
+    lengths |= {"tracker": len(config.tracking.trackers), "line": config.rf.lines, "range": DEPTHS}
+    arrays = [array for array in schema.arrays_of(group).values() if not array.name.startswith(OPTIONAL)]
+    shapes = {array.name: [lengths.get(dim, 1) for dim in array.dims] for array in arrays}
+    lines = {"range": 1e-3 * np.arange(DEPTHS), "line_angle": np.zeros(config.rf.lines)} if group == "rf" else {}
+    return {name: np.zeros(shape) for name, shape in shapes.items()} | lines

@@ -17,7 +17,7 @@ from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
 from echotruth.repository import schema
-from echotruth.workflow.job import Job
+from echotruth.workflow.job import Job, Result
 
 SIZES = (128, 64)
 FRAMES = finished_repository.FRAMES
@@ -63,6 +63,7 @@ TRUE = {
     "true_rotation": 0.15,
 }
 """Of the three references, told apart by their values."""
+TRACKED = schema.arrays_of("tracking/SIZE")
 
 
 @dataclass(eq=False)
@@ -92,23 +93,24 @@ class Known:
         """Mask, layer, segment and region of the pixels, each (frame, axial, lateral)."""
         return unpack(self.truth(view, size)["labels"])
 
-    def arrays(self, job: Job) -> dict[str, dict[str, np.ndarray]]:
+    def arrays(self, job: Job) -> Result:
         """Known arrays of a job, by group."""
-        if job.stage == "mechanics":
-            return self.heart.arrays
-        plane, size = self.plane(job.view_name), job.size
+        size = job.size or SIZES[0]
         if job.stage == "tracking":
-            found = {f"{kind}/{size}/{name}": arrays for kind in schema.TRACKED for name, arrays in FOUND.items()}
-            return found | {f"evaluation/{size}": TRUE}
+            return {f"tracking/{size}": TRUE | {name: each_tracker(name) for name in FOUND["one"]}}
         if job.stage == "truth":
-            return {f"truth/{size}": self.truth(job.view_name, size)}
-        images = {f"bmode/{size}": {"image": known_images(size)}} if size else {}
-        return images | {"phantom": {"origin": plane.origin, "axes": plane.axes}}
+            return {f"truth/{size}": self.truth(job.view_name, size) for size in job.config.bmode.sizes}
+        return {f"bmode/{size}": {"image": known_images(size)} for size in job.config.bmode.sizes}
 
     @cache  # noqa: B019 - one object a session
     def truth(self, view: str, size: int) -> dict[str, np.ndarray]:
         plane, pixels = self.plane(view), pixel_centres(self.config.bmode, size)
         return pixel_truth(self.heart, plane, *pixels, TissueImages(self.config, self.heart, plane, *pixels))
+
+
+def each_tracker(name: str) -> np.ndarray:
+    """What the trackers found of an array, one value each, with its dimensions."""
+    return np.reshape([found[name] for found in FOUND.values()], (-1, *[1] * (len(TRACKED[name].dims) - 1)))
 
 
 def known_images(size: int) -> np.ndarray:
@@ -120,18 +122,22 @@ def known_images(size: int) -> np.ndarray:
     return images[:, ::step, ::step]
 
 
-def make(folder: Path, settings: dict) -> Known:
-    """Write a repository as the workflow does, with known images."""
+def make(folder: Path, settings: dict, **tracking: np.ndarray) -> Known:
+    """Write a repository as the workflow does, with known images, and other arrays of tracking if they are given."""
     config = et.configure(settings)
-    heart = et.beat(et.configure(settings, cases={}), progress=False)
-    known = Known(folder, config, heart)
-    finished_repository.finish(folder, config, lambda job: overlaid(job, known.arrays(job)))
+    known = Known(folder, config, et.beat(et.configure(settings, cases={}), progress=False))
+
+    def result(job: Job) -> Result:
+        arrays = known.arrays(job)
+        return overlaid(job, {name: values | tracking for name, values in arrays.items()})
+
+    finished_repository.finish(folder, config, result)
     return known
 
 
-def overlaid(job: Job, known: dict[str, dict[str, np.ndarray]]) -> dict[str, dict[str, np.ndarray]]:
-    """Arrays of a job: known ones, and zeros for all others."""
-    arrays = finished_repository.result(job)
+def overlaid(job: Job, known: Result) -> Result:
+    """Arrays of a job: known ones, and those that are made up for all others."""
+    arrays = finished_repository.blank(job)
     for group, values in arrays.items():
         for name in values.keys() & known.get(group, {}).keys():
             values[name] = np.broadcast_to(known[group][name], np.shape(values[name]))

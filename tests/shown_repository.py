@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from known_repository import FRAMES, SETTINGS, SIZES, make
 
-from echotruth.repository.store import Store
+import echotruth as et
 from echotruth.tracking.point_grid import grid_positions
 
 SIDE = 12e-3
@@ -29,15 +29,11 @@ class Shown:
 
 def shown_repository(folder: Path) -> Shown:
     """Write the repository, in its folder."""
-    known = make(folder, SETTINGS | {"tracking": SETTINGS["tracking"] | {"grid_px": 2}})
-    grid = grid_positions(known.config)
+    settings = SETTINGS | {"tracking": SETTINGS["tracking"] | {"grid_px": 2}}
+    grid = grid_positions(et.configure(settings))
     radius = np.hypot(grid[..., 0], grid[..., 1] - SIDE / 2)
     inside = (radius > RADII[0]) & (radius < RADII[1])
     share = np.arange(FRAMES)[:, None, None, None] / (FRAMES - 1)
     moved = np.where(inside[..., None], share * SHIFT, np.nan)
     axes = np.where(inside[..., None, None], np.eye(2), np.nan)
-    store = Store(known.folder / "known.zarr")
-    for index in range(len(known.config.views)):
-        for size in SIZES:
-            store.write(f"evaluation/{size}", {"true_displacement": moved, "wall_axes": axes}, 0, index)
-    return Shown(known.folder, grid[inside], inside)
+    return Shown(make(folder, settings, true_displacement=moved, wall_axes=axes).folder, grid[inside], inside)

@@ -96,7 +96,7 @@ def lifted(repository):
 
 
 def test_clip_of_a_repository_has_the_labels_by_name(repository, lifted):
-    stored = et.Repository(repository).tree["truth/64"].sel(case="heart", view="mid")["labels"]
+    stored = et.Repository(repository).tree["clips/heart/mid/truth/64"]["labels"]
     for name in ("layer", "segment", "region"):
         np.testing.assert_array_equal(lifted[name], stored.sel(label=name))
     np.testing.assert_array_equal(lifted["mask"], lifted["displacement"].notnull().all("vector"))

@@ -78,7 +78,7 @@ def test_command_works_from_the_wheel_in_an_empty_folder(wheel, tmp_path):
 def test_sample_is_read_from_the_wheel(wheel, tmp_path):
     output = run(wheel, tmp_path, "info", "sample")
     assert str(wheel / "echotruth/shipped/sample") in output and "2 complete" in output
-    assert "no faults" in run(wheel, tmp_path, "check", "sample", "--quick")
+    assert "nothing is wrong" in run(wheel, tmp_path, "check", "sample", "--quick")
     assert not any(tmp_path.iterdir())
 
 
@@ -103,7 +103,3 @@ def test_workflow_is_run_from_the_wheel_with_its_own_files(wheel, tmp_path):
     output = run(wheel, tmp_path, "run", "demo", "-n", "--cores", "1")
     assert f"Snakefile: {shipped}/Snakefile" in output
     assert "tracking" in output and not (tmp_path / "out").exists()
-    code = "from echotruth.workflow.processes import script; print(script('rf'))"
-    environment = os.environ | {"PYTHONPATH": str(wheel)}
-    found = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    assert found.stdout.strip() == str(shipped / "workflow/scripts/rf.py")

@@ -6,7 +6,6 @@ import sys
 
 import numpy as np
 import pytest
-from learning_repository import made
 
 from echotruth import learning
 
@@ -29,9 +28,8 @@ def et_torch():
 
 
 @pytest.fixture(scope="module")
-def repository(tmp_path_factory):
-    pytest.importorskip("torch")
-    return made(tmp_path_factory.mktemp("torch") / "small")
+def repository(et_torch, textured):
+    return textured
 
 
 def test_example_of_the_module_runs_on_the_repository_that_is_shipped(et_torch):

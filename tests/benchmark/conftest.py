@@ -15,13 +15,12 @@ from echotruth.repository.reader import Repository
 
 SUBMISSIONS = '''
 import sys
-from pathlib import Path
 
 import numpy as np
 
 from echotruth.config.tracking import Dis
+from echotruth.repository.reader import Repository
 from echotruth.tracking.tracker import track
-from echotruth.workflow.job import Job
 
 
 def honest(frames, points, mask, spacing, frame_time, seed):
@@ -30,10 +29,10 @@ def honest(frames, points, mask, spacing, frame_time, seed):
 
 def reading(frames, points, mask, spacing, frame_time, seed, repository):
     """The truth of the clip with these images in the store; if there is none, no motion."""
-    for case in ("a_ideal", "b_ideal", "c_ideal"):
-        job = Job(Path(repository), "tracking", case, "mid", 64, code="-")
-        if np.array_equal(job.read("bmode/64", "image")["image"], frames):
-            true = job.read("evaluation/64", "true_displacement")["true_displacement"][..., :2]
+    opened = Repository(repository)
+    for case in opened.present:
+        if np.array_equal(opened.read("bmode/64/image", case, "mid"), frames):
+            true = opened.read("tracking/64/true_displacement", case, "mid")[..., :2]
             return true[:, np.isfinite(true[0, ..., 0])] / spacing
     return np.zeros((len(frames), *points.shape))
 

@@ -6,6 +6,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -134,7 +135,9 @@ def beside(known, species, size=64, factor=1.0, name="other", preset="medium"):
         more.append(with_conditions(table.assign(**of, **scaled, size_px=size, heart=name + table["heart"])))
     difficulty = known.difficulty.assign(repository=name, size_px=size)
     both = zip((known.clips, known.segments, known.reliability, known.difficulty), (*more, difficulty), strict=True)
-    return Records([suite, replace(suite, config=config)], *(pd.concat(each, ignore_index=True) for each in both))
+    other = copy(suite.repository)
+    other.store, other.config = suite.repository.store, config
+    return Records([suite, replace(suite, repository=other)], *(pd.concat(each, ignore_index=True) for each in both))
 
 
 def test_drift_quality_and_gap_are_of_the_main_species_and_the_page_says_so(page, tmp_path):
@@ -166,7 +169,7 @@ def test_settings_that_differ_are_told_of_each_repository(page):
 
 
 def test_strain_of_a_heart_is_that_of_a_case_that_is_finished(page, monkeypatch):
-    monkeypatch.setattr(tables, "hearts_of", lambda cases: dict.fromkeys(cases, "one"))
+    monkeypatch.setattr(tables, "heart_of", lambda case: "one")
     strains = {"true_gls_percent": -11.5, "true_gcs_percent": -14.5}
     clips = pd.DataFrame([{"repository": "bench", "case": "b_ideal"} | strains])
     assert "| −11.5 | −14.5 |" in tables.hearts(page.whole.suites[0], clips)
@@ -184,7 +187,7 @@ def run(*arguments):
 
 @pytest.mark.slow
 def test_command_writes_the_page_twice_alike_and_keeps_what_a_person_wrote(repository, tmp_path, capsys):
-    (repository / "ledger/tracking/b_ideal/mid/64.json").unlink()
+    (repository / "bench.zarr/clips/b_ideal/mid/tracking/64/zarr.json").unlink()
     shutil.rmtree(repository / "external")
     page = tmp_path / "page.md"
     arguments = (repository, "--page", page)

@@ -1,14 +1,14 @@
 """Submissions: an honest one passes the checks, those that look the truth up are caught; cards; variants of clips."""
 
-import shutil
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from finished_repository import made_otherwise
 
-from benchmarks.suite import checks, records, results
+from benchmarks.suite import checks, results
 from benchmarks.suite.card import Card, attach, attach_card, card_of, read
 from benchmarks.suite.page import EXAMPLE, Page
 from benchmarks.suite.rerun import prepare_rerun, rerun
@@ -19,8 +19,7 @@ from echotruth.config.reading import ConfigError
 from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.run import prepare
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.repository import estimates, ledger
-from echotruth.repository.kept import KeptError
+from echotruth.repository import estimates
 from echotruth.repository.reader import Repository
 
 pytestmark = pytest.mark.slow
@@ -49,13 +48,12 @@ def test_tracker_does_not_find_the_truth_in_its_process(repository, evaluate_sub
 
 def result_of(folder, tracker, variant):
     """Rows of the clips that count, and the number of older ones."""
-    return results.result_of(folder, load(folder / "config.yaml"), tracker, variant)
+    return results.result_of(Repository(folder), tracker, variant)
 
 
 def test_scores_on_mirrored_clips_of_older_images_do_not_count(repository):
     assert len(result_of(repository, "honest", "mirrored").rows) == 2
-    path = repository / "ledger/bmode/a_ideal/mid/64.json"
-    ledger.commit(path, ledger.read(path) | {"sha256": {"image": "another"}})
+    made_otherwise(repository / "bench.zarr/clips/a_ideal/mid/bmode/64")
     found = result_of(repository, "honest", "mirrored")
     assert list(found.rows["case"]) == ["b_ideal"] and found.older == 1
     result_path(repository, "honest", "mirrored").write_text("[1, 2")
@@ -75,7 +73,7 @@ def test_scores_with_older_settings_of_a_tracker_of_the_repository_do_not_count_
     values = yaml.safe_load(config.read_text())
     values["tracking"]["trackers"]["dis"]["preset"] = "fine"
     config.write_text(yaml.safe_dump(values))
-    suites = [replace(page.whole.suites[0], folder=repository, config=load(config))]
+    suites = [replace(page.whole.suites[0], repository=Repository(repository))]
     verdict = checks.verdict("dis", replace(page.whole, suites=suites), "test")
     assert verdict.mirrored is None and verdict.older == 2
     assert "2 older results on mirrored clips do not count: check it again" in verdict.text
@@ -85,7 +83,7 @@ def test_scores_with_older_settings_of_a_tracker_of_the_repository_do_not_count_
 
 
 def test_check_of_one_half_leaves_that_of_the_other_and_the_verdict_says_what_was_checked(repository, page):
-    suites = [replace(page.whole.suites[0], folder=repository)]
+    suites = [replace(page.whole.suites[0], repository=Repository(repository))]
     list(rerun([repository], "dis", "mirrored", "develop", []))
     assert checks.verdict("dis", replace(page.whole, suites=suites), "test").words.endswith("not run on mirrored clips")
     list(rerun([repository], "dis", "mirrored", "test", []))
@@ -108,7 +106,7 @@ def test_a_tracker_is_given_neither_seed_nor_times_by_which_it_would_know_the_cl
     monkeypatch.setattr(
         "echotruth.evaluation.run.track", lambda *arguments: given.append(arguments) or missing(arguments)
     )
-    run = prepare_rerun(repository, "dis", "mirrored", "test")
+    run = prepare_rerun(Repository(repository), "dis", "mirrored", "test")
     list(run.rows([64]))
     known = [read_clips(Repository(repository), case, view)[64] for case, view in run.case_views()]
     times, seeds = ([arguments[k] for arguments in given] for k in (4, 5))
@@ -210,22 +208,10 @@ def test_only_sizes_at_which_a_tracker_was_scored_are_run_again(repository):
     config = repository / "config.yaml"
     config.write_text(config.read_text().replace("downsampling:\n  - 1\n", "downsampling:\n  - 1\n  - 2\n"))
     assert load(config).bmode.sizes == (64, 32)
-    assert prepare_rerun(repository, "honest", "mirrored", "test").sizes == [64]
-    assert prepare_rerun(repository, "dis", "mirrored", "test").sizes == [64, 32]
+    assert prepare_rerun(Repository(repository), "honest", "mirrored", "test").sizes == [64]
+    assert prepare_rerun(Repository(repository), "dis", "mirrored", "test").sizes == [64, 32]
     with pytest.raises(EvaluationError, match=r"--size 32: honest was not evaluated at it on .*: use 64"):
         list(rerun([repository], "honest", "mirrored", "test", [32]))
-
-
-@pytest.mark.parametrize("content", ["[1, 2", "", None])
-def test_damaged_store_of_what_a_tracker_found_is_told_in_a_sentence(repository, content):
-    shutil.rmtree(store := repository / "external/honest.zarr")
-    store.mkdir()
-    if content is not None:
-        (store / "zarr.json").write_text(content)
-    sentence = r"honest\.zarr: is not what echotruth evaluate --keep wrote: evaluate honest again"
-    for what in (lambda: records.read([repository], []), lambda: prepare_rerun(repository, "honest", "open", "test")):
-        with pytest.raises(KeptError, match=sentence):
-            what()
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ def heart():
 
 
 @pytest.fixture
-def check(call, tmp_path, monkeypatch, roomy_disk):
+def check(call, tmp_path, monkeypatch):
     """Status and output of the check of a configuration."""
     monkeypatch.chdir(tmp_path)
 

@@ -6,11 +6,15 @@ import sys
 
 import pandas as pd
 import pytest
+import yaml
 from cli.command_line import ROOT, run_cli
+from finished_repository import configured, finish
 
 import echotruth
 from echotruth.cases import expand
+from echotruth.cli.run import NO_HEART
 from echotruth.config.loading import load
+from echotruth.workflow.failure import CaseFailed
 
 
 def run_process(*arguments, cwd=ROOT):
@@ -26,7 +30,7 @@ def is_refused(status, output, errors):
 
 
 @pytest.mark.parametrize("name, cases", [("demo", 1), ("sweep", 108), ("human", 1), ("hearts", 24)])
-def test_check_accepts_a_shipped_configuration(name, cases, roomy_disk):
+def test_check_accepts_a_shipped_configuration(name, cases):
     status, output, errors = run_cli("check", f"config/{name}.yaml")
     assert (status, errors) == (0, "")
     assert f"valid; cases: {cases}," in output
@@ -81,17 +85,57 @@ def test_evaluation_of_no_repository_is_refused_in_one_line(tmp_path):
 
 
 @pytest.mark.slow
-def test_run_needs_no_checkout_and_makes_only_the_files_asked_for(tmp_path):
+def test_run_makes_only_the_files_asked_for_and_listing_them_writes_nothing(tmp_path):
     config = ROOT / "config/demo.yaml"
-    file = f"out/demo/ledger/mechanics/{expand(load(config), 'demo')[0].id}.json"
+    file = f"out/demo/demo.zarr/hearts/{expand(load(config), 'demo')[0].heart}/zarr.json"
     status, output, _ = run_process("run", config, file, "-n", cwd=tmp_path)
-    assert status == 0 and "mechanics" in output and "phantom" not in output
+    assert status == 0 and "mechanics" in output and "phantom" not in output and not (tmp_path / "out").exists()
 
 
-def test_option_that_snakemake_does_not_take_is_not_told_as_an_interrupted_run(tmp_path):
-    status, _, errors = run_process("run", ROOT / "config/demo.yaml", "--coress", "2", cwd=tmp_path)
-    assert status == 2 and "unrecognized arguments: --coress" in errors
-    assert errors.splitlines()[-1] == "echotruth: Snakemake does not take these options: see echotruth run --help"
+@pytest.mark.parametrize(
+    ("status", "last"),
+    [
+        (2, "echotruth: Snakemake does not take these options: see echotruth run --help"),
+        (1, "echotruth: not finished: run the same command again to go on (echotruth status out/demo)"),
+    ],
+)
+def test_end_of_snakemake_is_told_by_its_status(tmp_path, monkeypatch, status, last):
+    monkeypatch.setattr("echotruth.workflow.run.execute", lambda *_: status)
+    found, output, errors = run_cli("run", ROOT / "config/demo.yaml", "--coress", "2", cwd=tmp_path)
+    assert (found, output) == (status, "") and errors.splitlines()[-1] == last
+
+
+def test_run_whose_hearts_all_fail_has_a_status_of_its_own(tmp_path, monkeypatch):
+    def execute(*_):
+        finish(tmp_path / "out/small", config, fail)
+        (tmp_path / "out/small/report.html").touch()
+        return 0
+
+    def fail(job):
+        raise CaseFailed("no equilibrium")
+
+    config = configured(views=("mid",), cases={})
+    (tmp_path / "small.yaml").write_text(yaml.safe_dump(config.model_dump(mode="json")))
+    monkeypatch.setattr("echotruth.workflow.run.execute", execute)
+    status, output, _ = run_cli("run", "small.yaml", cwd=tmp_path)
+    assert status == NO_HEART and "Hearts: 1 failed\n  heart: failed: no equilibrium\n" in output
+    assert output.endswith("No heart is complete, so there are no images.\n")
+
+
+ABSURD = "geometry: {preset: human}\nrf: {focus_mm: 40, focal_zones: 1}\nbmode: {field_of_view_mm: 45}\n"
+
+
+def test_absurd_is_refused_and_run_if_it_is_asked_for_and_an_estimate_runs_nothing(tmp_path, monkeypatch):
+    (tmp_path / "absurd.yaml").write_text(ABSURD)
+    status, _, errors = run_cli("run", "absurd.yaml", cwd=tmp_path)
+    assert status == 2 and "echotruth: bmode.field_of_view_mm = 45:" in errors and not (tmp_path / "out").exists()
+    status, output, errors = run_cli("run", "absurd.yaml", "--estimate", "--cores", "4", cwd=tmp_path)
+    assert status == 0 and not errors and "hearts: 1, cases: 1, views of each: 4" in output and "on 4 cores" in output
+    assert run_cli("check", "absurd.yaml", cwd=tmp_path)[0] == 1 and list(tmp_path.iterdir()) == [
+        tmp_path / "absurd.yaml"
+    ]
+    monkeypatch.setattr("echotruth.cli.run._make", lambda *_: 0)
+    assert run_cli("run", "absurd.yaml", "--yes", cwd=tmp_path) == (0, "", "")
 
 
 def test_help_names_every_command():

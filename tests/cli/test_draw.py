@@ -19,13 +19,16 @@ def clip(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["no.dcm"], "no.dcm: is not there: give the path of a clip"),
+        (["no.dcm"], "no.dcm: is not there, or no file: give the path of a clip"),
         (["clip.npy", "--frame-time-ms", "20"], "clip.npy: does not say the side of its pixels: give --spacing-mm"),
         (
             ["clip.npy", "--spacing-mm", "0.3"],
             "clip.npy: does not say the time from frame to frame: give --frame-time-ms",
         ),
-        (["clip.npy", "--spacing-mm", "-1", "--frame-time-ms", "20"], "--spacing-mm = -1.0: give a positive number"),
+        (
+            ["clip.npy", "--spacing-mm", "-1", "--frame-time-ms", "20"],
+            "--spacing-mm = -1: give the side of a pixel, from",
+        ),
         (["KNOWN", "--cycle", "2", "1"], "cycle = 2, 1: clip.npy has 4 frames"),
         (["KNOWN", "--crop", "0", "0", "500", "10"], "crop = 0, 0, 500, 10: clip.npy is 120 x 90 px"),
         (["KNOWN", "--wall", "no.csv"], "no.csv: is not there"),
@@ -43,10 +46,19 @@ def test_what_cannot_be_drawn_is_told_in_one_line(call, clip, tmp_path, argument
     assert (status, output, errors.count("\n")) == (2, "", 1) and errors.startswith(f"echotruth: {sentence}"), errors
 
 
+DRAW = """
+import signal
+from echotruth.cli import main
+# A shell may start background processes with SIGINT ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+main()
+"""
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_command_prints_the_address_and_ends_when_it_is_told(clip, number):
     options = ["--spacing-mm", "0.3", "--frame-time-ms", "20", "--crop", "20", "0", "110", "90", "--no-browser"]
-    command = [sys.executable, "-m", "echotruth", "draw", str(clip), *options]
+    command = [sys.executable, "-c", DRAW, "draw", str(clip), *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         line = process.stdout.readline()
         process.send_signal(number)

@@ -6,7 +6,7 @@ import pytest
 import echotruth as et
 from echotruth.inference import stored
 from echotruth.repository.inferred import COLUMNS
-from echotruth.repository.layout import as_yaml
+from echotruth.workflow.plan import as_yaml
 
 
 def test_command_writes_the_table_after_each_heart_and_goes_on_after_one_that_fails(call, tmp_path, monkeypatch):

@@ -6,7 +6,6 @@ import re
 import shutil
 from contextlib import chdir
 from importlib.metadata import version
-from pathlib import Path
 
 import finished_repository
 import known_repository
@@ -62,11 +61,9 @@ def test_repository_opens_as_it_is_told(call, tmp_path):
     np.testing.assert_array_equal(found["clip"]["image"].values, known.images(known_repository.SIZES[0]))
 
 
-def test_repository_that_no_run_has_published_is_told_so(call, finished, tmp_path):
-    (tmp_path / "begun").mkdir()
-    for name in ("config.yaml", "registry.txt", "views.txt"):
-        shutil.copy(finished / name, tmp_path / "begun")
-    status, output, _ = call("info", "begun")
+def test_repository_that_no_run_has_published_is_told_so(call, tmp_path):
+    finished_repository.begin(tmp_path / "small", finished_repository.configured(seeds=(1, 2, 3)))
+    status, output, _ = call("info", "small")
     found = told(output)
     assert status == 0 and found["cases"] == "3: 3 unfinished" and "not published" in found["made by"]
     assert "et.Repository" not in output
@@ -84,20 +81,9 @@ def test_what_is_no_repository_is_refused_in_one_line(call, place, sentence):
     assert (status, output, errors.count("\n")) == (2, "", 1) and sentence in errors
 
 
-def test_damaged_repository_is_refused_in_one_line(call, finished, tmp_path):
-    for number, name in enumerate(("config.yaml", "zarr.json", "cases/status/zarr.json")):
-        copy = tmp_path / f"copy{number}" / "small"
-        shutil.copytree(finished, copy)
-        path = copy / name if name == "config.yaml" else copy / "small.zarr" / name
-        path.write_text("{")
-        status, output, errors = call("info", copy)
-        assert (status, output, errors.count("\n")) == (2, "", 1) and str(copy) in errors, errors
-
-
-@pytest.mark.parametrize("instead", [Path.touch, os.mkfifo])
-def test_repository_without_its_list_of_views_is_told(call, finished, tmp_path, instead):
+@pytest.mark.parametrize("name", ["config.yaml", "cases.csv"])
+def test_damaged_repository_is_refused_in_one_line(call, finished, tmp_path, name):
     shutil.copytree(finished, tmp_path / "small")
-    (tmp_path / "small/views.txt").unlink()
-    instead(tmp_path / "small/views.txt")
-    status, output, _ = call("info", tmp_path / "small")
-    assert status == 0 and "et.Repository" in output and ".clip(" not in output
+    (tmp_path / "small" / name).write_text("{")
+    status, output, errors = call("info", "small")
+    assert (status, output, errors.count("\n")) == (2, "", 1) and name in errors, errors

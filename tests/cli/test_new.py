@@ -1,106 +1,64 @@
-"""`echotruth new`: what it writes is valid as it is, and says of each key what the models say."""
+"""`echotruth new`: the shipped configurations that it copies are valid, and their comments say what the models do."""
 
 import re
 
+import numpy as np
 import pytest
 import yaml
 
 from echotruth.cases import expand
-from echotruth.config import Config, Geometry, Loop, Rf, shipped
-from echotruth.config.allowed import allowed
+from echotruth.config import Config, shipped
 from echotruth.config.building import configure
-from echotruth.config.commented import FIRST, commented
 from echotruth.config.loading import load, validate
-from echotruth.section import Section
+from echotruth.loop.cycle import read_loop
 
-DISABLED = re.compile(r"(?m)^( *)#(?=\w)")
-"""What makes a key a comment."""
-
-
-def keys(section, prefix=""):
-    """Dotted keys of a configuration; views, trackers and cases count as one each."""
-    for key in type(section).model_fields:
-        value = getattr(section, key)
-        if isinstance(value, Section) and key != "cases":
-            yield from keys(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}"
+COMMENTED = re.compile(r"(?m)^( *)#(?=[a-z])(.*)$")
+"""A key that is commented out, with its value and what is said of it."""
+LINES = [
+    pytest.param(name, match, id=f"{name}:{match[0].split(':')[0].strip()}")
+    for name in shipped.names()
+    for match in COMMENTED.finditer(shipped.path_of(name).read_text())
+]
 
 
-def written_keys(node, prefix=""):
-    """Dotted keys in a mapping of YAML."""
-    for key, value in node.items():
-        yield f"{prefix}{key}"
-        if isinstance(value, dict):
-            yield from written_keys(value, f"{prefix}{key}.")
-
-
-@pytest.mark.parametrize("everything", [False, True])
 @pytest.mark.parametrize("name", shipped.names())
-def test_preset_is_unchanged_with_comments_and_without_them(name, everything):
+def test_shipped_configuration_is_valid(name, monkeypatch):
+    monkeypatch.chdir(shipped.ROOT)
+    assert load(shipped.path_of(name)).name == name
+
+
+def test_configurations_of_the_presets_name_the_keys_that_people_change():
+    assert {match.values[0] for match in LINES} == {"mouse", "human", "rat"}
+
+
+def leaves(node, prefix=()):
+    """Keys, as a tuple, and value of everything in a mapping of YAML."""
+    for key, value in node.items():
+        yield from leaves(value, (*prefix, key)) if isinstance(value, dict) else [((*prefix, key), value)]
+
+
+def value_in(section, keys):
+    for key in keys:
+        section = getattr(section.resolved(), key)
+    return section
+
+
+@pytest.mark.parametrize(("name", "match"), LINES)
+def test_key_that_is_commented_out_is_one_and_has_its_default_or_is_an_example(name, match):
     text = shipped.path_of(name).read_text()
-    text = re.sub(r"config/(\w+\.csv)", rf"{shipped.folder()}/\1", text)
-    wanted, new = validate(yaml.safe_load(text), name), commented(text, everything)
-    assert validate(yaml.safe_load(new), "as written") == wanted
-    assert validate(yaml.safe_load(DISABLED.sub(r"\1", new)), "without #") == wanted
-
-
-def test_all_keys_are_written_with_all_and_the_first_ones_without():
-    for everything, wanted in ((True, set(keys(Config()))), (False, set(FIRST))):
-        new = commented("geometry: {preset: mouse}", everything)
-        found = set(written_keys(yaml.safe_load(DISABLED.sub(r"\1", new))))
-        assert wanted <= found, wanted - found
-    assert set(FIRST) <= set(keys(Config()))
-
-
-def test_every_key_has_its_description_above_it():
-    lines = commented("{}", everything=True).splitlines()
-    text = " ".join(line.strip().removeprefix("# ") for line in lines)
-    for model in (Geometry, Loop, Rf):
-        for key, field in model.model_fields.items():
-            assert " ".join((field.description or "").split()) in text, key
-
-
-def test_default_that_follows_the_heart_is_left_to_it():
-    mouse = commented("geometry: {preset: mouse}", everything=True)
-    rat = validate(yaml.safe_load(mouse.replace("preset: mouse\n", "preset: rat\n", 1)), "rat")
-    expected = validate({"geometry": {"preset": "rat"}}, "rat")
-    assert (rat.probe.preset, rat.fibres, rat.bmode) == (expected.probe.preset, expected.fibres, expected.bmode)
-
-
-def test_comments_of_the_preset_stay():
-    new = commented(shipped.path_of("paper").read_text())
-    for line in re.findall(r"#.*", shipped.path_of("paper").read_text()):
-        assert line in new, line
-
-
-@pytest.mark.parametrize(
-    ("model", "key", "words"),
-    [
-        (Geometry, "preset", "one of mouse, rat, human"),
-        (Geometry, "transmural_elements", "whole number from 1 to 20"),
-        (Geometry, "circumferential_elements", "whole number from 6 to 120, a multiple of 6"),
-        (Geometry, "endo_radius_mm", "number above 0"),
-        (Geometry, "remesh", "true or false"),
-        (Geometry, "septum_point", "list of 3, each number"),
-        (Loop, "edv_uL", "number above 0, not above 100000000"),
-        (Loop, "file", ""),
-        (Rf, "keep", "list, each one of lines, channels"),
-    ],
-)
-def test_limits_are_told_in_words(model, key, words):
-    assert allowed(model, key) == words
-
-
-def test_every_limit_is_that_of_the_model():
-    limited = [("geometry", Geometry, "transmural_elements"), ("geometry", Geometry, "circumferential_elements")]
-    for section, model, key in [*limited, ("loop", Loop, "frames"), ("rf", Rf, "lines")]:
-        low, high = (int(number) for number in re.findall(r"\d+", allowed(model, key))[:2])
-        for number in (low, high):
-            assert validate({section: {key: number}}, "limit")
-        for number in (low // 2, high * 2):
-            with pytest.raises(ValueError, match=key):
-                validate({section: {key: number}}, "limit")
+    with_key = f"{text[: match.start()]}{match[1]}{match[2]}{text[match.end() :]}"
+    before, after = validate(yaml.safe_load(text), name), validate(yaml.safe_load(with_key), "with the key")
+    if "e.g." in match[2]:
+        assert after != before
+        return
+    plain = list(leaves(yaml.safe_load(text)))
+    ((keys, value),) = [leaf for leaf in leaves(yaml.safe_load(with_key)) if leaf not in plain]
+    if keys[0] == "loop":
+        found, wanted = read_loop(after.loop), read_loop(before.loop)
+        assert (found.source, found.period) == (wanted.source, pytest.approx(wanted.period))
+        np.testing.assert_allclose(found.volume, wanted.volume, rtol=1e-12)
+    else:
+        assert value_in(before, keys) == value
 
 
 def test_file_is_written_under_its_name_and_never_replaced(call, tmp_path):
@@ -142,8 +100,8 @@ def test_list_names_every_preset_with_what_it_is(call):
 
 
 def test_output_can_be_printed(call, tmp_path):
-    status, output, errors = call("new", "demo", "--all", "-o", "-")
-    assert (status, errors) == (0, "") and yaml.safe_load(output)["name"] == "demo"
+    status, output, errors = call("new", "demo", "-o", "-")
+    assert (status, errors, output) == (0, "", shipped.path_of("demo").read_text())
     assert not list(tmp_path.iterdir())
 
 

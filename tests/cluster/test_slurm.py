@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from rigid_hearts import CONFIG
-from workspace import COMMAND, Workspace, differing
+from finished_repository import content
+from workspace import COMMAND, Workspace
 
 PROGRAMS = ("slurmctld", "slurmd", "sbatch", "munged", "mungekey")
 SEARCHED = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
@@ -28,13 +28,13 @@ NOT_STARTED = 78
 
 
 def test_slurm_makes_the_bytes_of_a_local_run(tmp_path):
-    local, cluster = Workspace(tmp_path / "local", CONFIG), Workspace(tmp_path / "cluster", CONFIG)
+    local, cluster = Workspace(tmp_path / "local"), Workspace(tmp_path / "cluster")
     local.echotruth("run", "tiny.yaml", "--cores", "2")
     run = cluster.start("timeout", LIMIT, str(CLUSTER), *COMMAND, "run", "tiny.yaml", "--profile", "slurm")
     output, _ = run.communicate()
     if run.returncode == NOT_STARTED:
         pytest.skip(f"SLURM does not start on this machine: {output[-500:]}")
     assert run.returncode == 0, output
-    assert differing(cluster.out, local.out) == []
+    assert content(cluster.out) == content(local.out)
     submitted = (cluster.out / "logs/snakemake.log").read_text().count("has been submitted with SLURM jobid")
     assert submitted <= 5  # two hearts, their views, and repository with report; not one a rule and heart

@@ -12,9 +12,9 @@ import pytest
 from echotruth import cli
 from echotruth.config import Config
 from echotruth.config.amounts import ventricle_mm3
-from echotruth.config.limits import MAX_CASES
 from echotruth.config.loading import ConfigError, load, override, validate
 from echotruth.config.reading import MAX_BYTES, MAX_DEPTH, MAX_VALUES
+from echotruth.config.table import MAX_CASES
 from echotruth.fem.volume import cell_volumes
 from echotruth.mechanics.geometry import left_ventricle
 
@@ -36,16 +36,13 @@ BOMBS = {
     "a section": (bomb("geometry"), "geometry holds too much"),
     "the values of a case": ("cases:\n" + indented(bomb("seed"), 2), "cases holds too much"),
     "the options of a tracker": (TRACKER + indented(bomb("x"), 8), "tracking holds too much"),
-    "merged keys": ("a: &a {x: 1}\nb: {<<: [*a, *a]}", "line 2: << would merge another mapping: write its keys out"),
+    "merged keys": ("geometry: {<<: {scale: 2}}", "geometry.<< is not a key"),
     "an alias in its anchor": ("geometry: &a\n  file: *a", "an alias must not lie within its own anchor"),
-    "an alias in its list": ("cases: {seed: &a [1, *a]}", "an alias must not lie within its own anchor"),
-    "an unknown alias": ("seed: *nope", "line 1: found undefined alias: correct the YAML"),
 }
 
 NESTED = {
     "lists": "cases: " + "[" * 3000 + "]" * 3000,
     "mappings": "a: " + "{a: " * 3000 + "}" * 3000,
-    "blocks": "".join(" " * n + "a:\n" for n in range(1000)),
     "unclosed lists": "[" * 100_000,
     "one level too many": "x: " + "[" * MAX_DEPTH + "]" * MAX_DEPTH,
 }
@@ -58,44 +55,28 @@ LARGE = {
     ),
     "keys": ("".join(f"k{n}: 1\n" for n in range(MAX_VALUES)), "the file holds too much: give at most 100000 values"),
     "views": ("views:\n" + "".join(f"  v{n}: {{}}\n" for n in range(20_000)), "must have at most 64 entries"),
-    "trackers": (
-        "tracking:\n  trackers:\n" + "".join(f"    t{n}: {{}}\n" for n in range(20_000)),
-        "at most 64 entries",
-    ),
     "text": ("name: " + "a" * 3_000_000, "should have at most 60 characters"),
     "name of a key": ("? " + "a" * 3_000_000 + "\n: 1", "is not a key: the keys here are"),
-    "bytes": ("# " + "x" * MAX_BYTES, "holds 4.0 MiB: a configuration has at most 4 MiB"),
+    "bytes": ("# " + "x" * MAX_BYTES, "holds 4.0 MiB, and a configuration at most 4 MiB"),
     "integer": ("seed: " + "9" * 5000, "line 1: '9999999999999999999999999999999999999999' is not a valid int"),
-    "integer in base 60": ("seed: " + ":".join(["59"] * 3000), "line 1: '59:59:59"),
 }
 
 MALFORMED = {
     "a list as a key": ("? [a, b]\n: 1", "line 1: a list or a mapping is used as a key: write the name of a key"),
-    "a mapping as a key": ("geometry:\n  ? {a: b}\n  : 1", "line 2: a list or a mapping is used as a key"),
     "a number as a key": ("1: 2", "1 = 1: is not a key: keys are text"),
-    "null as a key": ("~: 2", "is not a key: keys are text"),
     "a key twice": ("geometry:\n  scale: 1\n  scale: 2", "line 3: key 'scale' is given twice: give it once"),
     "a tab": ("geometry:\n\tscale: 1", "line 2: found character that cannot start any token: indent by spaces"),
     "NUL": ("name: a\0b", "holds a control character, which is not text: write plain UTF-8 text"),
     "a list": ("- 3", "contains a list: write a mapping of keys to values"),
-    "text": ("hello", "contains text: write a mapping of keys to values"),
-    "a number": ("3", "contains a single value: write a mapping of keys to values"),
     "two documents": ("seed: 1\n---\nseed: 2", "write one document, without a second line of ---"),
     "a Python object": (
         "name: !!python/object/apply:os.system [ls]",
         "the tag python/object/apply:os.system is not re",
     ),
     "an unknown tag": ("seed: !mine 1", "line 1: the tag !mine is not read: leave it out"),
-    "a set": ("geometry: !!set {a, b}", "the tag set is not read: leave it out"),
-    "an ordered mapping": ("geometry: !!omap [a: 1]", "the tag omap is not read: leave it out"),
-    "a time": ("seed: !!timestamp hello", "the tag timestamp is not read: leave it out"),
     "a date": ("seed: 2020-99-99", "seed = '2020-99-99': must be a whole number"),
-    "not an integer": ("seed: !!int hello", "line 1: 'hello' is not a valid int: write a plain value"),
-    "not a float": ("geometry: {scale: !!float hello}", "'hello' is not a valid float: write a plain value"),
-    "not a truth value": ("seed: !!bool hello", "'hello' is not a valid bool: write a plain value"),
-    "not a mapping": ("geometry: !!map [1]", "line 1: this is not a valid map: write a plain value"),
+    "a number with a tag": ("seed: !!int 3", "line 1: the tag int is not read: leave it out"),
     "an unclosed quote": ("name: 'abc", "found unexpected end of stream: correct the YAML"),
-    "a reserved character": ("name: @a", "put text that begins with a special character in quotes"),
     "a line break in a key": ('"a\\nb": 1', "a\\nb is not a key"),
     "a line break in a name": ('views: {"mid\\n": {}}', "use letters, digits and underscores only"),
     "a section that is a number": ("bmode: 3", "bmode = 3: must be a mapping of keys to values"),
@@ -122,18 +103,10 @@ ABSURD = {
     "loop: {frames: 1000000}": "loop.frames = 1000000: should be less than or equal to 1000",
     "loop: {frames: 1000}\nbmode: {size_px: 4096}": "size_px = 4096: must be at most 1000 with loop.frames = 1000",
     "loop: {heart_rate_per_min: 1.0e-300}": "heart_rate_per_min = 1e-300: should be greater than or equal to 1",
-    "loop: {edv_uL: 1.0e+300}": "loop.edv_uL = 1e+300: should be less than or equal to 100000000",
-    "bmode: {size_px: 1000000}": "bmode.size_px = 1000000: should be less than or equal to 4096",
     "bmode: {field_of_view_mm: 1.0e+12}": "field_of_view_mm = 1000000000000.0: should be less than or equal to 1000",
     "bmode: {field_of_view_mm: 1000}\nprobe: {elements: 512}": "at most 105 with 512 elements sampled at 100 MHz",
     "bmode: {field_of_view_mm: 900}\nloop: {frames: 1000}\nrf: {lines: 2048}": "with 1000 frames of 2048 lines sampled",
-    "probe: {elements: 100000}": "probe.elements = 100000: should be less than or equal to 512",
-    "probe: {frequency_MHz: 1.0e+12}": "frequency_MHz = 1000000000000.0: should be less than or equal to 1000",
-    "probe: {sampling_MHz: 1.0e+12}": "sampling_MHz = 1000000000000.0: should be less than or equal to 10000",
-    "rf: {lines: 100000}": "rf.lines = 100000: should be less than or equal to 2048",
-    "geometry: {circumferential_elements: 600000}": "should be less than or equal to 120",
     "geometry: {wall_mm: 1.0e+300}": "geometry.wall_mm = 1e+300: should be less than or equal to 1000000000000",
-    "fibres: {layers: 1000000}": "fibres.layers = 1000000: should be less than or equal to 24",
 }
 
 

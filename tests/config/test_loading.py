@@ -1,13 +1,16 @@
 """An invalid configuration is refused in one sentence with file, key, value and remedy."""
 
+import os
 from pathlib import Path
 
 import pytest
 
+from echotruth.cases import expand
 from echotruth.config import Config, Mechanics
-from echotruth.config.loading import ConfigError, load, override
+from echotruth.config.building import configure
+from echotruth.config.loading import ConfigError, beside, load, override
 from echotruth.materials import LAWS
-from echotruth.repository.layout import as_yaml
+from echotruth.workflow.plan import as_yaml
 
 ROOT = Path(__file__).parents[2]
 
@@ -98,8 +101,40 @@ BENCHMARKS = ["ablation", "benchmark", "benchmark_human", "benchmark_small"]
 
 
 @pytest.mark.parametrize("name", [*BENCHMARKS, "demo", "fimh25", "hearts", "paper", "realistic", "rodero", "sweep"])
-def test_shipped_configurations_are_accepted(name):
+def test_shipped_configurations_are_accepted_in_every_folder(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     assert load(ROOT / f"config/{name}.yaml").name == name
+    assert configure(name).name == name
+
+
+def test_table_is_that_beside_the_configuration_and_not_that_of_the_working_folder(tmp_path, monkeypatch):
+    study, elsewhere = tmp_path / "study", tmp_path / "else"
+    for folder in (study, study / "tables", elsewhere):
+        folder.mkdir()
+        (folder / "hearts.csv").write_text(f"case,note\na,{folder.name}\n")
+    names = {"mine": "hearts.csv", "below": "tables/hearts.csv", "above": "../else/hearts.csv"}
+    for name, table in (names | {"absolute": str(study / "hearts.csv")}).items():
+        (study / f"{name}.yaml").write_text(f"cases: {{file: {table}}}")
+    notes = {"mine": "study", "below": "tables", "above": "else", "absolute": "study"}
+    for folder in (elsewhere, study):
+        monkeypatch.chdir(folder)
+        for name, note in notes.items():
+            path = study / f"{name}.yaml"
+            for given in (path, os.path.relpath(path)):
+                assert expand(load(given))[0].note == expand(str(given))[0].note == note
+        assert expand({"cases": {"file": "hearts.csv"}})[0].note == folder.name  # no file names it
+
+
+def test_table_of_several_files_is_beside_the_last_that_names_it(tmp_path):
+    for name, text in (("a", "cases: {file: x.csv}"), ("b", "cases: {file: x.csv}"), ("c", "seed: 2"), ("d", "")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "my.yaml").write_text(text)
+    files = [tmp_path / name / "my.yaml" for name in "abcd"]
+    merged = {"seed": 2, "cases": {"file": "x.csv", "seed": [1, 2]}}
+    assert beside(merged, *files) == merged | {"cases": {"file": str(tmp_path / "b/x.csv"), "seed": [1, 2]}}
+    for cases in ({"file": "y.csv"}, {"file": 1}, {"seed": [1, 2]}, None):
+        other = {"cases": cases}
+        assert beside(other, *files) == other
 
 
 @pytest.mark.parametrize("text", ["1e-6", "1E-06", "+1e-6", "1.0e-06", "0.000001"])

@@ -1,5 +1,7 @@
 """Recorded clips: what a file holds comes back, with its scale and its time, or is told."""
 
+import zlib
+
 import imageio_ffmpeg
 import numpy as np
 import pytest
@@ -8,8 +10,8 @@ from PIL import Image
 
 import echotruth as et
 from echotruth.echo.failure import EchoError
-from echotruth.export import Export, Selection
 from echotruth.repository.reader import Repository
+from echotruth.sharing.export import Export, Selection
 
 GIVEN = {"spacing_mm": 0.3, "frame_time_ms": 20.0}
 FILM = np.random.default_rng(1).integers(0, 255, (6, 32, 48), np.uint8)
@@ -113,6 +115,45 @@ def test_region_beyond_the_image_has_lost_its_scale(tmp_path):
     assert et.read_clip(path, spacing_mm=0.5)["image"].shape == FILM.shape
 
 
+@pytest.mark.parametrize(("delta", "said"), [(1e-9, "1e-08 x 1e-08"), (np.inf, "inf x inf"), (6.0, "60 x 60")])
+def test_scale_of_no_echo_is_told(tmp_path, delta, said):
+    scale = {"SequenceOfUltrasoundRegions": [region((8, 4, 39, 23), (delta, delta))]}
+    path = written(tmp_path / "scale.dcm", FILM, FrameTime=20, **scale)
+    with pytest.raises(EchoError, match=f"scale.dcm: has pixels of {said} mm: give their right side, from"):
+        et.read_clip(path)
+
+
+def test_value_of_half_a_number_is_told(tmp_path):
+    path = written(tmp_path / "half.dcm", FILM, SequenceOfUltrasoundRegions=[region((8, 4, 39, 23), (0.04, 0.02))])
+    content = path.read_bytes()
+    place = content.index(b"\x18\x00\x2e\x60FD\x08\x00") + 6  # length of PhysicalDeltaY, the last of the region
+    path.write_bytes(content[:place] + b"\x06" + content[place + 1 :])
+    with pytest.raises(EchoError, match=r"half.dcm: is a damaged DICOM clip|half.dcm: is no DICOM clip"):
+        et.read_clip(path)
+
+
+def test_time_of_no_echo_is_told(tmp_path):
+    path = written(tmp_path / "time.dcm", FILM, FrameTime="1e300", PixelSpacing=[0.3, 0.3])
+    with pytest.raises(EchoError, match=r"time.dcm: has a time from frame to frame of 1e\+300 ms: give the right one"):
+        et.read_clip(path)
+    assert et.read_clip(path, frame_time_ms=20)["time"][-1] == pytest.approx(0.1)
+
+
+def test_levels_that_say_how_dark_it_is_are_inverted(tmp_path):
+    path = written(tmp_path / "dark.dcm", 255 - FILM, PhotometricInterpretation="MONOCHROME1")
+    np.testing.assert_array_equal(et.read_clip(path, **GIVEN)["image"], FILM)
+
+
+def test_levels_of_a_palette_are_its_colours(tmp_path):
+    colours = np.random.default_rng(2).permutation(256).astype(np.uint8)
+    palette = {}
+    for name in ("Red", "Green", "Blue"):
+        palette[f"{name}PaletteColorLookupTableDescriptor"] = [256, 0, 8]
+        palette[f"{name}PaletteColorLookupTableData"] = colours.tobytes()
+    path = written(tmp_path / "palette.dcm", FILM, PhotometricInterpretation="PALETTE COLOR", **palette)
+    np.testing.assert_array_equal(et.read_clip(path, **GIVEN)["image"], colours[FILM])
+
+
 def test_scale_that_is_empty_is_told(tmp_path):
     broken = region((8, 4, 39, 23), (0.04, 0.02))
     broken.PhysicalDeltaX = None
@@ -124,12 +165,12 @@ def test_scale_that_is_empty_is_told(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
-        ("huge.gif", b"GIF89a" + b"\xff\xff\xff\xff" + bytes(3), "is no animation that can be read"),
+        ("huge.gif", b"GIF89a" + b"\xff\xff\xff\xff" + bytes(3), "is no image that can be read"),
         ("header.npy", b"\x93NUMPY\x01\x00\x10\x00{'descr': (((    \n", "is no array that numpy.load reads"),
         ("missing.dcm", None, "is not there"),
         ("bad.dcm", b"no dicom", "is no DICOM clip that can be decoded"),
         ("bad.mp4", b"no video", "is no video that can be read"),
-        ("bad.gif", b"no image", "is no animation that can be read"),
+        ("bad.gif", b"no image", "is no image that can be read"),
         ("bad.nii", b"no image", "is no NIfTI file that can be read"),
         ("bad.npy", b"no array", "is no array that numpy.load reads"),
         ("clip.docx", b"", "use a file of .dcm"),
@@ -148,8 +189,11 @@ def test_what_is_no_clip_is_told(tmp_path, name, content, sentence):
     [
         ({"spacing_mm": None}, "array: does not say the side of its pixels: give spacing_mm"),
         ({"frame_time_ms": None}, "array: does not say the time from frame to frame: give frame_time_ms"),
-        ({"spacing_mm": -1}, "spacing_mm = -1: give a positive number"),
-        ({"frame_time_ms": float("nan")}, "frame_time_ms = nan: give a positive number"),
+        ({"spacing_mm": -1}, "spacing_mm = -1: give the side of a pixel, from 0.001 to 10 mm"),
+        ({"spacing_mm": 60}, "spacing_mm = 60: give the side of a pixel, from 0.001 to 10 mm"),
+        ({"spacing_mm": 1e31}, "spacing_mm = 1e.31: give the side of a pixel"),
+        ({"frame_time_ms": float("nan")}, "frame_time_ms = nan: give the time from frame to frame, from 0.01 to"),
+        ({"frame_time_ms": 1e300}, "frame_time_ms = 1e.300: give the time from frame to frame"),
         ({"cycle": (3, 9)}, "cycle = 3, 9: array has 6 frames"),
         ({"cycle": (3, 4)}, "cycle = 3, 4"),
         ({"crop": (0, 0, 60, 10)}, "crop = 0, 0, 60, 10: array is 48 x 32 px"),
@@ -160,10 +204,155 @@ def test_wrong_option_is_told(options, sentence):
         et.read_clip(FILM, **(GIVEN | options))
 
 
-@pytest.mark.parametrize("pixels", [np.zeros((3, 4)), np.full((3, 4, 5), np.nan), np.array(["a"])])
-def test_array_that_is_no_clip_is_told(pixels):
-    with pytest.raises(EchoError, match="array: has"):
+def outlier(level, base=FILM):
+    pixels = base.astype(float)
+    pixels[1, 2, 3] = level
+    return pixels
+
+
+@pytest.mark.parametrize(
+    ("pixels", "sentence"),
+    [
+        (np.zeros((3, 4)), r"has the shape \(3, 4\) of float64"),
+        (np.zeros((3, 4, 5, 0), np.uint8), r"has the shape \(3, 4, 5, 0\) of uint8"),
+        (np.zeros((0, 4, 5)), r"has the shape \(0, 4, 5\)"),
+        (np.zeros((3, 4, 5), complex), ".* of complex128"),
+        (np.array(["a"]), ".* of <U1"),
+        (outlier(np.nan), "has the grey level nan: give finite ones"),
+        (outlier(-np.inf), "has the grey level -inf: give finite ones"),
+        (outlier(1e40), r"has the grey level 1e\+40: give finite ones, up to 1e\+20"),
+        (outlier(1e10), r"has grey levels from 0 to 1e\+10, and almost none between"),
+        (np.broadcast_to(np.uint8(0), (2**15, 2**10, 2**10)), r"has 3.4e\+10 pixels: .*, 2.1e\+09 are read"),
+    ],
+)
+def test_array_that_is_no_clip_is_told(pixels, sentence):
+    with pytest.raises(EchoError, match=f"array: {sentence}"):
         et.read_clip(pixels, **GIVEN)
+
+
+def frames_as(folder, images, suffix="png", names=None):
+    folder.mkdir()
+    for number, image in enumerate(images):
+        Image.fromarray(image).save(folder / f"{names[number] if names else f'{number:02}'}.{suffix}")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("suffix", "images"),
+    [
+        ("png", FILM.astype(np.uint16) * 16),  # 12 bits of 16
+        ("tif", FILM.astype(np.uint16) * 256),
+        ("tif", FILM.astype(np.int32) * 1000 - 70_000),
+        ("tif", FILM.astype(np.float32) / 254),
+    ],
+)
+def test_images_of_more_than_8_bits_are_scaled_by_the_range_of_the_clip(tmp_path, suffix, images):
+    clip = et.read_clip(frames_as(tmp_path / "frames", images, suffix), **GIVEN)
+    np.testing.assert_allclose(clip["image"], FILM * (255 / FILM.max()), atol=0.501)
+
+
+def test_large_levels_that_differ_little_are_told_apart():
+    np.testing.assert_allclose(et.read_clip(1e9 + FILM, **GIVEN)["image"], FILM * (255 / FILM.max()), atol=0.501)
+
+
+def test_16_bit_tiff_in_which_0_is_white_is_inverted(tmp_path):
+    for number, image in enumerate(FILM.astype(np.uint16)):
+        Image.fromarray(image).save(tmp_path / f"{number}.tif")
+        content = (tmp_path / f"{number}.tif").read_bytes()
+        tag = content.index(b"\x06\x01\x03\x00\x01\x00\x00\x00\x01")  # photometric interpretation, a short: 1
+        (tmp_path / f"{number}.tif").write_bytes(content[: tag + 8] + b"\0" + content[tag + 9 :])
+    expected = (FILM.max() - FILM.astype(float)) * (255 / FILM.max())
+    np.testing.assert_allclose(et.read_clip(tmp_path, **GIVEN)["image"], expected, atol=0.501)
+
+
+def test_frames_come_in_the_order_of_their_numbers(tmp_path):
+    names = [0, 1, 2, 10, 11, 100]
+    np.testing.assert_array_equal(et.read_clip(frames_as(tmp_path / "a", FILM, names=names), **GIVEN)["image"], FILM)
+
+
+def test_all_pages_of_a_tiff_are_frames(tmp_path):
+    first, *others = map(Image.fromarray, FILM)
+    (tmp_path / "pages").mkdir()
+    path = tmp_path / "pages/film.tif"
+    first.save(path, save_all=True, append_images=others)
+    for source in (path, path.parent):
+        np.testing.assert_array_equal(et.read_clip(source, **GIVEN)["image"], FILM)
+
+
+def test_frames_of_two_kinds_are_told(tmp_path):
+    folder = frames_as(tmp_path / "a", [FILM[0], FILM[1].astype(np.uint16)])
+    with pytest.raises(EchoError, match=r"01.png: has levels of uint16, and 00.png of uint8: frames must be of one"):
+        et.read_clip(folder, **GIVEN)
+
+
+def test_header_that_claims_more_than_the_file_holds_is_told_without_reading(tmp_path):
+    header = np.lib.format.header_data_from_array_1_0(np.zeros(1)) | {"shape": (10**6, 10**4, 11368)}
+    with (tmp_path / "big.npy").open("wb") as file:
+        np.lib.format.write_array_header_1_0(file, header)
+    for read in (lambda path: et.read_clip(path, **GIVEN), lambda path: et.read_wall(path, "mid")):
+        with pytest.raises(EchoError, match=r"big.npy: is no array that numpy.load reads: .*"):
+            read(tmp_path / "big.npy")
+
+
+def test_animation_of_an_impossible_size_is_told_without_decoding(tmp_path):
+    path = tmp_path / "big.gif"
+    Image.fromarray(FILM[0]).save(path)
+    content = path.read_bytes()
+    size = (20_000).to_bytes(2, "little") * 2
+    place = content.index(b",")
+    path.write_bytes(content[:6] + size + content[10 : place + 5] + size + content[place + 9 :])
+    with pytest.raises(EchoError, match=r"big.gif: has images of more than 9e.07 pixels, as no echo has"):
+        et.read_clip(path, **GIVEN)
+
+
+def test_palette_of_no_colours_is_told(tmp_path):
+    path = tmp_path / "none.png"
+    Image.fromarray(FILM[0]).convert("P").save(path)
+    content = path.read_bytes()
+    start = content.index(b"PLTE") - 4
+    end = start + 12 + int.from_bytes(content[start : start + 4], "big")
+    empty = bytes(4) + b"PLTE" + zlib.crc32(b"PLTE").to_bytes(4, "big")
+    path.write_bytes(content[:start] + empty + content[end:])
+    with pytest.raises(EchoError, match=r"none.png: has a pixel of colour \d+, and a palette of 0: save it again"):
+        et.read_clip(tmp_path, **GIVEN)
+
+
+def test_nifti_of_an_unknown_unit_is_told(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    image = nibabel.Nifti1Image(FILM.T, np.eye(4))
+    image.header["xyzt_units"] = 128
+    image.to_filename(tmp_path / "unit.nii")
+    with pytest.raises(EchoError, match=r"unit.nii: is no NIfTI file that can be read"):
+        et.read_clip(tmp_path / "unit.nii", **GIVEN)
+
+
+def test_nifti_of_levels_that_are_not_finite_is_told(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    for name, level in (("nan", np.nan), ("much", 1e30)):
+        path = tmp_path / f"{name}.nii"
+        nibabel.Nifti1Image(outlier(level).astype(np.float32).T, np.eye(4)).to_filename(path)
+        with pytest.raises(EchoError, match=rf"{name}.nii: has the grey level .*: give finite ones"):
+            et.read_clip(path, **GIVEN)
+
+
+@pytest.mark.parametrize(
+    ("zooms", "sentence"),
+    [
+        ((60, 60, 0.02), "has pixels of 60 x 60 mm: give their right side, from 0.001 to 10 mm, as spacing_mm"),
+        ((1, 1e-9, 0.02), "has pixels of 1e-09 x 1 mm: give their right side"),
+        ((5, 0.01, 0.02), "has pixels of 0.01 x 5 mm, more than 100 to 1: if they are square give spacing_mm"),
+        ((1, 1, 1e30), r"has a time from frame to frame of 1e\+33 ms: give the right one, from 0.01 to 1000 ms"),
+        ((1, 1, np.inf), "has frames of which the times do not increase: give frame_time_ms"),
+    ],
+)
+def test_scale_and_time_of_no_echo_are_told(tmp_path, zooms, sentence):
+    nibabel = pytest.importorskip("nibabel")
+    image = nibabel.Nifti1Image(FILM.T, np.eye(4))
+    image.header.set_zooms(zooms)
+    image.header.set_xyzt_units("mm", "sec")
+    image.to_filename(tmp_path / "clip.nii")
+    with pytest.raises(EchoError, match=f"clip.nii: {sentence}"):
+        et.read_clip(tmp_path / "clip.nii")
 
 
 def test_images_of_two_sizes_are_told(tmp_path):

@@ -13,7 +13,7 @@ from PIL import Image
 
 import echotruth as et
 from echotruth.echo.drawing import MAX_BODY, Drawing, DrawingServer, default_output
-from echotruth.echo.wall import View, write_wall
+from echotruth.echo.wall import write_wall
 
 SHAPE, CENTRE, RADII = (90, 120), np.array([60.0, 45.0]), (20.0, 32.0)
 INSERTIONS = {"anterior_insertion": [33.0, 28.0], "inferior_insertion": [33.0, 62.0]}
@@ -194,7 +194,7 @@ def test_what_cannot_be_written_is_told(serve, clip, tmp_path, monkeypatch):
     def full(path, content):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("echotruth.repository.durable.write", full)
+    monkeypatch.setattr("echotruth.files.write", full)
     status, said = save(serve(), ring())
     assert (status, said["error"]) == (
         400,
@@ -256,7 +256,3 @@ def test_default_output_is_beside_the_clip(tmp_path):
     names = {"a.dcm": "a", "a.NII.GZ": "a", "a.b.mp4": "a.b", "IM_0001": "IM_0001", "images.d": "images.d"}
     for clip, stem in names.items():
         assert default_output(tmp_path / clip) == tmp_path / f"{stem}.wall.csv"
-
-
-def test_views_of_the_page_are_those_of_a_wall(server):
-    assert ask(server, "GET", "/clip.json")[1]["views"] == list(View.__args__)

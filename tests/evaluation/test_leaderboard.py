@@ -1,7 +1,5 @@
 """The order of trackers, and how sure it is."""
 
-import json
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -121,9 +119,9 @@ CONFIG = Config(
 )
 
 
-def board(folder, hearts="abc"):
+def board(folder, hearts="abc", about=None):
     """Hearts of which everything is 0.1 or, of the second tracker, 0.2."""
-    return Board(CONFIG, folder, {case: dict.fromkeys(CONFIG.views, (0.1, 0.2)) for case in hearts})
+    return Board(CONFIG, folder, {case: dict.fromkeys(CONFIG.views, (0.1, 0.2)) for case in hearts}, about)
 
 
 def test_rows_are_of_the_hearts_that_count(tmp_path):
@@ -138,27 +136,18 @@ def test_a_repository_whose_hearts_are_not_finished_has_no_rows(tmp_path):
     assert table.empty and list(table.columns) == ["case", "view", "size_px", "tracker", "failure"]
 
 
-def test_scores_of_a_view_are_found_by_its_name(tmp_path):
-    """Whatever the order in the store, and beside views that have left the configuration."""
-    views = {"former": [0.9, 0.9], "long_axis": [0.2, 0.4], "mid": [0.1, 0.2]}
-    table = rows(Board(CONFIG, tmp_path, {"a": views}))
-    assert list(table["view"]) == ["mid", "mid", "long_axis", "long_axis"]
-    np.testing.assert_allclose(table["nrmse_percent"], [10, 20, 20, 40])
-
-
-def test_a_failure_is_read_from_the_ledger(tmp_path):
-    (tmp_path / "ledger/tracking/b/mid").mkdir(parents=True)
-    record = {"failures": {"two": "no motion found"}}
-    (tmp_path / "ledger/tracking/b/mid/64.json").write_text(json.dumps(record))
-    table = rows(board(tmp_path))
+def test_a_failure_is_told_beside_the_scores(tmp_path):
+    about = {("tracking/64", "b", "mid"): {"failures": {"two": "no motion found"}}}
+    table = rows(board(tmp_path, about=about))
     assert list(table[table["failure"] != ""][["case", "view", "tracker"]].iloc[0]) == ["b", "mid", "two"]
     assert overall(standings(table, 1)).loc["two", "failures"] == 1
 
 
 def test_external_trackers_stand_beside_the_others_on_the_clips_that_count(tmp_path):
     (tmp_path / "external").mkdir()
-    own = rows(board(tmp_path))
-    external = own[own["tracker"] == "one"].assign(tracker="mine", nrmse_all_percent=1.0, failure=np.nan)
+    own, read = rows(board(tmp_path)), board(tmp_path)
+    clips = [read.version(case, view) for case in "abc" for view in CONFIG.views]
+    external = own[own["tracker"] == "one"].assign(tracker="mine", nrmse_all_percent=1.0, failure=np.nan, clip=clips)
     external.to_csv(tmp_path / "external/mine.csv", index=False)
     own.assign(nrmse_all_percent=0.0).to_csv(tmp_path / "external/one.csv", index=False)
     table = rows(board(tmp_path, "ab"))

@@ -1,6 +1,6 @@
 """`echotruth evaluate` scores anyone's tracker on a repository whose motion is an affine map."""
 
-import runpy
+import json
 import shutil
 import sys
 from pathlib import Path
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import zarr
+from finished_repository import blank, finish, made_otherwise, solved
 
 from echotruth.cases import expand
 from echotruth.cli import main
@@ -16,22 +16,10 @@ from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Tr
 from echotruth.config.tracking import External
 from echotruth.evaluation import scoring
 from echotruth.evaluation.tracker_options import parse_tracker
-from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.truth import pixel_truth
-from echotruth.imaging.view import imaging_plane
-from echotruth.mechanics.fibres import wall_depth
-from echotruth.mechanics.geometry import left_ventricle
-from echotruth.repository import layout, ledger, schema
-from echotruth.repository.checksums import checksums
-from echotruth.repository.digest import digest
-from echotruth.repository.ledger import record_path
 from echotruth.repository.reader import Repository
-from echotruth.repository.store import Store
 from echotruth.workflow.job import Job
-from echotruth.workflow.processes import script
 
-ROOT = Path(__file__).parents[2]
 COURSE = np.array([0, 0.4, 1, 0.3])
 """Share of the motion in each frame."""
 
@@ -51,6 +39,8 @@ CONFIG = Config(
     ),
     cases={"seed": [1, 2]},
 )
+
+FIRST, SECOND = (case.id for case in expand(CONFIG))
 
 CUSTOM = """
 import os
@@ -83,48 +73,22 @@ np.savez(sys.argv[2], displacement=np.zeros((len(clip["frames"]), *clip["points"
 """
 
 
-def heart(affine):
-    """A ventricle moved by an affine map: deformation gradient and shift (m)."""
-    mesh, (matrix, shift) = left_ventricle(CONFIG.geometry), affine
-    motion = np.multiply.outer(COURSE, mesh.nodes @ (matrix - np.eye(3)).T + shift)
-    return Heart(mesh.nodes, mesh.cells, motion, wall_depth(mesh), mesh.endo, layers=6, es=2), mesh
-
-
-def write(store, group, index, **values):
-    """What one job writes of a group; arrays not given are zero."""
-    opened = zarr.open_group(store.path, path=group, mode="r")
-    shapes = {array.name: opened[array.name].shape[array.leading :] for array in schema.arrays_of(group)}
-    store.write(group, {name: np.zeros(shape) for name, shape in shapes.items()} | values, *index)
-
-
-def write_clip(folder, store, case, index, beating, view):
-    """Phantom, truth, images of noise and their records."""
-    where = imaging_plane(CONFIG.views[view], CONFIG.rf, beating.positions(0)[beating.endo.ravel()])
-    write(store, "phantom", index, origin=where.origin, axes=where.axes, centre=[0, CONFIG.rf.si().focus])
-    random = np.random.default_rng(index)
-    for size in CONFIG.bmode.sizes:
-        label = pixel_truth(beating, where, *pixel_centres(CONFIG.bmode, size))["labels"][0]
-        store.write(f"truth/{size}", {"labels": np.broadcast_to(label, (len(COURSE), *label.shape))}, *index)
-        store.write(f"bmode/{size}", {"image": random.integers(0, 256, (len(COURSE), size, size))}, *index)
-        for stage in ("truth", "bmode"):
-            record = {"status": "complete", "sha256": checksums(store.files(f"{stage}/{size}", *index), store.path)}
-            ledger.commit(record_path(folder, stage, case, view, size), record)
-
-
 @pytest.fixture(scope="module")
 def made(affine, tmp_path_factory):
-    """Folder of a repository of two hearts, of which the second has one view only."""
-    folder = tmp_path_factory.mktemp("made") / "small"
-    layout.lay_out(folder, CONFIG, expand(CONFIG))
-    cases, store = [case.id for case in expand(CONFIG)], Store(folder / "small.zarr")
-    beating, mesh = heart(affine)
-    for row, case in enumerate(cases):
-        write(store, "geometry", (row,), node_position=mesh.nodes, cell_node=mesh.cells, endo=mesh.endo)
-        write(store, "fibres", (row,), wall_depth=beating.wall_depth)
-        write(store, "pathology", (row,))
-        write(store, "mechanics", (row,), displacement=beating.displacement, es_frame=beating.es)
-        for index, view in enumerate(list(CONFIG.views)[: 2 - row]):
-            write_clip(folder, store, case, (row, index), beating, view)
+    """Folder of a repository of two cases whose heart is moved by an affine map; the second has one view only."""
+
+    def result(job):
+        if job.stage in ("mechanics", "truth"):
+            groups = solved(job) if job.stage == "truth" else blank(job)
+            if job.stage == "mechanics":
+                matrix, shift = affine
+                motion = np.multiply.outer(COURSE, groups["geometry"]["node_position"] @ (matrix - np.eye(3)).T + shift)
+                groups = groups | {"mechanics": groups["mechanics"] | {"displacement": motion, "es_frame": 2}}
+            return groups
+        return blank(job)
+
+    folder = finish(tmp_path_factory.mktemp("made") / "small", CONFIG, result)
+    (folder / f"small.zarr/clips/{SECOND}/apex/bmode/128/zarr.json").unlink()
     return folder
 
 
@@ -149,11 +113,10 @@ def scores(made, name):
     return pd.read_csv(made / f"external/{name}.csv")
 
 
-def in_image(affine, view):
+def in_image(made, affine, view):
     """The affine map in the image: its gradient less one, and the shift of the corner of the first pixel (m)."""
     matrix, shift = affine[0] - np.eye(3), affine[1]
-    beating, _ = heart(affine)
-    where = imaging_plane(CONFIG.views[view], CONFIG.rf, beating.positions(0)[beating.endo.ravel()])
+    where = Repository(made).plane(FIRST, view)
     axial, lateral = pixel_centres(CONFIG.bmode, 128)
     corner = np.array([lateral[0], axial[0]]) - CONFIG.bmode.si().field_of_view / 128 / 2
     axes = where.axes[:2]
@@ -161,7 +124,7 @@ def in_image(affine, view):
 
 
 def test_tracker_that_knows_the_motion_has_no_error_at_any_size(made, evaluate, affine):
-    gradient, shift = in_image(affine, "mid")
+    gradient, shift = in_image(made, affine, "mid")
     options = {"course": COURSE.tolist(), "gradient": gradient.tolist(), "shift": shift.tolist()}
     given = [word for key, value in options.items() for word in ("--option", f"{key}={value}")]
     status, output, errors = evaluate("--tracker", "custom:exact", "--view", "mid", *given)
@@ -181,14 +144,13 @@ def test_tracker_that_sees_no_motion_is_off_by_all_of_it(made, evaluate):
 
 
 def test_every_complete_clip_is_tried_and_no_other(made, evaluate):
-    first, second = (case.id for case in expand(CONFIG))
     evaluate("--tracker", "custom:still", "--name", "all")
     tried = list(scores(made, "all")[["case", "view", "size_px"]].itertuples(index=False, name=None))
     assert tried == [
-        (*case_view, size) for case_view in ((first, "mid"), (first, "apex"), (second, "mid")) for size in (128, 64)
+        (*case_view, size) for case_view in ((FIRST, "mid"), (FIRST, "apex"), (SECOND, "mid")) for size in (128, 64)
     ]
-    evaluate("--tracker", "custom:still", "--name", "few", "--case", first, "--view", "apex", "--size", "64")
-    assert list(scores(made, "few")[["case", "view", "size_px"]].iloc[0]) == [first, "apex", 64]
+    evaluate("--tracker", "custom:still", "--name", "few", "--case", FIRST, "--view", "apex", "--size", "64")
+    assert list(scores(made, "few")[["case", "view", "size_px"]].iloc[0]) == [FIRST, "apex", 64]
     assert len(scores(made, "few")) == 1
 
 
@@ -227,6 +189,7 @@ def test_scores_are_the_same_bytes_whatever_the_number_of_processes(made, evalua
         for jobs in (1, 2)
     ]
     assert [outcome[0] for outcome, _ in read] == [0, 0]
+
     assert read[0] == read[1]
 
 
@@ -244,13 +207,11 @@ def test_scores_of_images_made_anew_are_of_another_clip(made, evaluate, tmp_path
     shutil.copytree(made, again, ignore=shutil.ignore_patterns("external"))
     evaluate("--tracker", "custom:still", "--view", "mid", "--size", "64", repository=again)
     before = scores(again, "custom_still")
-    path = record_path(again, "bmode", before["case"][0], "mid", 64)
-    record = ledger.read(path)
-    ledger.commit(path, record | {"seconds": 7})
-    assert list(before["clip"]) == [digest(again, case, "mid") for case in before["case"]]
-    ledger.commit(path, record | {"sha256": record["sha256"] | {sorted(record["sha256"])[0]: 64 * "0"}})
-    same = [clip == digest(again, case, "mid") for case, clip in zip(before["case"], before["clip"], strict=True)]
-    assert same == [False, True] and before["clip"].str.fullmatch("[0-9a-f]{12}").all()
+    assert list(before["clip"]) == [Repository(again).version(case, "mid") for case in before["case"]]
+    made_otherwise(again / f"small.zarr/clips/{FIRST}/mid/bmode/128")
+    read = Repository(again)
+    same = [clip == read.version(case, "mid") for case, clip in zip(before["case"], before["clip"], strict=True)]
+    assert same == [False, True]
 
 
 def test_scores_that_could_not_be_written_are_refused_before_the_first_clip(made, evaluate, tmp_path):
@@ -267,9 +228,20 @@ def test_tracker_that_ends_its_process_is_told_in_one_sentence(made, evaluate):
     assert not (made / "external/custom_crash.csv").exists()
 
 
+@pytest.mark.parametrize("path", ["clips/heart/mid/bmode/128/image", "hearts/heart/fibres/wall_depth"])
+def test_repository_with_damaged_metadata_is_refused_in_one_sentence(made, evaluate, tmp_path, path):
+    """Zarr raises a TypeError of these shapes and names."""
+    shutil.copytree(made, tmp_path / "damaged")
+    metadata = tmp_path / f"damaged/small.zarr/{path}/zarr.json"
+    written = json.loads(metadata.read_text())
+    metadata.write_text(json.dumps(written | {"shape": ["x"], "dimension_names": [True]}))
+    status, _, errors = evaluate("--tracker", "custom:still", repository=tmp_path / "damaged")
+    assert (status, errors.count("\n")) == (2, 1) and "cannot be read at" in errors
+
+
 def test_repository_with_a_damaged_clip_is_refused_in_one_sentence(made, evaluate, tmp_path):
     shutil.copytree(made, tmp_path / "damaged")
-    shard = tmp_path / "damaged/small.zarr/bmode/128/image/c/0/0/0/0/0"
+    shard = tmp_path / f"damaged/small.zarr/clips/{FIRST}/mid/bmode/128/image/c/0/0/0"
     content = bytearray(shard.read_bytes())
     content[len(content) // 3] ^= 1
     shard.write_bytes(content)
@@ -312,29 +284,27 @@ def test_option_that_looks_like_a_number_is_one(tracker, text, value):
 @pytest.fixture
 def worked(made, evaluate):
     """Jobs and results of the workflow's own script, by image size, on one view of the first heart."""
-    work = runpy.run_path(script("tracking"))["work"]
-    jobs = {size: Job(made, "tracking", expand(CONFIG)[0].id, "mid", size) for size in CONFIG.bmode.sizes}
-    return {size: (job, work(job)) for size, job in jobs.items()}
+    jobs = {size: Job(made, "tracking", FIRST, "mid", size) for size in CONFIG.bmode.sizes}
+    return {size: (job, solved(job)[f"tracking/{size}"]) for size, job in jobs.items()}
 
 
 def test_external_tracker_of_the_configuration_gets_the_scores_it_gets_on_the_command_line(made, worked, evaluate):
-    case = expand(CONFIG)[0].id
-    evaluate("--tracker", "custom:drawn", "--case", case, "--view", "mid")
-    truth = scoring.read_truth(Repository(made), case, "mid")
+    evaluate("--tracker", "custom:drawn", "--case", FIRST, "--view", "mid")
+    truth = scoring.read_truth(Repository(made), FIRST, "mid")
     for _, found in scores(made, "custom_drawn").iterrows():
         size = found["size_px"]
-        tracked = worked[size][1][f"tracking/{size}/lot"]["displacement"]
+        tracked = worked[size][1]["displacement"][list(CONFIG.tracking.trackers).index("lot")]
         for name, value in scoring.metrics(scoring.score(tracked, truth), "short_axis").items():
             np.testing.assert_allclose(found[name], value, rtol=1e-9, err_msg=name)
 
 
 def test_external_tracker_of_the_configuration_that_fails_leaves_the_others_their_motion(worked):
     found = {
-        (size, name): result[f"tracking/{size}/{name}"]["displacement"]
+        (size, name): tracked
         for size, (_, result) in worked.items()
-        for name in CONFIG.tracking.trackers
+        for name, tracked in zip(CONFIG.tracking.trackers, result["displacement"], strict=True)
     }
-    failures = {size: job._notes["failures"] for size, (job, _) in worked.items()}
+    failures = {size: job.notes["failures"] for size, (job, _) in worked.items()}
     assert list(failures[128]) == ["poor"] and failures[64] == {} and "no room" in failures[128]["poor"]
     assert np.isnan(found.pop((128, "poor"))).all() and not np.nanmax(abs(found.pop((64, "poor"))))
     for tracked in found.values():
@@ -392,7 +362,7 @@ def test_folder_that_is_no_repository_is_refused_in_one_sentence(evaluate, name)
 
 
 def test_repository_that_was_not_run_is_refused_in_one_sentence(made, evaluate, tmp_path):
-    for name in ("config.yaml", "registry.txt", "views.txt"):
+    for name in ("config.yaml", "cases.csv"):
         (tmp_path / name).write_text((made / name).read_text())
     status, _, errors = evaluate("--tracker", "custom:still", repository=tmp_path)
     assert (status, errors.count("\n")) == (2, 1) and "no complete clip" in errors

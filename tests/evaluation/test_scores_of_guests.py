@@ -5,9 +5,6 @@ from board import Board
 
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking, View
 from echotruth.evaluation.leaderboard import rows
-from echotruth.repository import ledger
-from echotruth.repository.digest import digest
-from echotruth.repository.ledger import record_path
 
 CONFIG = Config(
     views={"mid": View(), "null": View(position=0.7)},
@@ -16,25 +13,24 @@ CONFIG = Config(
 )
 
 
-def commit(folder, stage, view, content):
-    record = {"status": "complete", "sha256": {f"{stage}/64/c/0": content}, "seconds": 1.0}
-    ledger.commit(record_path(folder, stage, "a", view, 64), record)
-
-
 @pytest.fixture
-def board(tmp_path):
-    """Rows of the leaderboard of one heart and two views."""
+def read(tmp_path):
+    """A repository of one heart and two views."""
     (tmp_path / "external").mkdir()
-    for view in CONFIG.views:
-        for stage in ("bmode", "truth"):
-            commit(tmp_path, stage, view, "0")
-    return lambda: rows(Board(CONFIG, tmp_path, {"a": dict.fromkeys(CONFIG.views, (0.1,))}))
+    versions = {(f"{stage}/64", "a", view): {"version": "0"} for stage in ("bmode", "truth") for view in CONFIG.views}
+    return Board(CONFIG, tmp_path, {"a": dict.fromkeys(CONFIG.views, (0.1,))}, versions)
 
 
 @pytest.fixture
-def file(board, tmp_path):
+def board(read):
+    """Rows of its leaderboard."""
+    return lambda: rows(read)
+
+
+@pytest.fixture
+def file(read, tmp_path):
     """Table of an external tracker that was scored on both clips."""
-    table = board().assign(tracker="mine", clip=[digest(tmp_path, "a", view) for view in CONFIG.views])
+    table = rows(read).assign(tracker="mine", clip=[read.version("a", view) for view in CONFIG.views])
     table.to_csv(tmp_path / "external/mine.csv", index=False)
     return tmp_path / "external/mine.csv"
 
@@ -50,10 +46,11 @@ def test_external_tracker_stands_under_the_name_of_its_file_on_clips_that_are_wh
 
 
 @pytest.mark.parametrize("stage", ["bmode", "truth"])
-def test_scores_of_older_images_are_left_out_and_told_of(board, file, tmp_path, stage, caplog):
-    commit(tmp_path, stage, "mid", "1")
+def test_scores_of_older_images_are_left_out_and_told_of(board, read, file, stage, caplog):
+    read.about[f"{stage}/64", "a", "mid"] = {"version": "1"}
     assert views(board) == ["null"]
-    assert caplog.messages == ["external/mine.csv: 1 of 2 rows are of older images: evaluate that tracker again"]
+    older = "1 of 2 rows are of older images or other points: evaluate that tracker again"
+    assert caplog.messages == [f"external/mine.csv: {older}"]
 
 
 def test_scores_of_unknown_images_are_left_out(board, file):

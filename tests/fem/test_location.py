@@ -16,7 +16,7 @@ def _bent(nodes):
 def test_every_point_of_the_wall_is_found_where_it_is(coarse_mesh):
     scattered = seed_volume(
         Phantom(density_per_mm3=300.0), coarse_mesh.nodes, coarse_mesh.cells, np.random.default_rng(0)
-    ).points
+    )
     bent = _bent(coarse_mesh.nodes)
     found = locate(bent, coarse_mesh.cells, interpolate(bent, coarse_mesh.cells, scattered))
     assert (found.cell >= 0).all()

@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
+from scenes import medium, random, scene
 
 from echotruth.config import Config
 from echotruth.imaging.acquisition import Acquisition
 from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner
-from echotruth.imaging.medium.medium import Medium, seed_medium
 from echotruth.imaging.rf.haze import reverberation, reverberation_filter
 from echotruth.imaging.rf.shadow import Rib
-from echotruth.imaging.view import imaging_plane
 
 SMALL = {"probe": {"elements": 16, "pitch_um": 90.0}, "rf": {"lines": 16}, "phantom": {"density_per_mm3": 300.0}}
 ALL = {
@@ -21,11 +20,6 @@ ALL = {
     "haze": {"level_dB": -20.0},
     "shadow": {"side": "right"},
 }
-TIME = np.array([0, 4e-3])
-
-
-def random(name):
-    return np.random.default_rng(list(name.encode()))
 
 
 @pytest.fixture(scope="module")
@@ -40,24 +34,19 @@ def acquire(twisting_heart, scanner):
 
     def made(**realism):
         config = Config.model_validate(SMALL | {"realism": realism})
-        where = imaging_plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
-        seeded = seed_medium(config, twisting_heart, where, random, scanner.matrix.in_beam)
-        medium = Medium(config, twisting_heart, where, time=TIME, seeded=seeded, random=random)
-        return Acquisition(config, scanner, medium, random), medium
+        whole, _ = medium(scene(config, twisting_heart), scanner.matrix.in_beam)
+        return Acquisition(config, scanner, whole, random), whole
 
     return made
 
 
 @pytest.mark.slow
 def test_without_realism_the_bytes_are_those_of_the_matrix(acquire, scanner, twisting_heart):
-    from echotruth.imaging.medium.wall import seed_wall
+    from echotruth.imaging.medium.wall import Wall
 
     acquisition, _ = acquire()
-    config = Config.model_validate(SMALL)
-    where = imaging_plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
-    bare = seed_wall(config, twisting_heart, where, random("phantom"))
-    places = bare.image_positions(twisting_heart.positions(1), twisting_heart.cells, where)
-    assert acquisition(1).tobytes() == scanner.matrix(places, bare.amplitude).tobytes()
+    bare = Wall.seed(scene(Config.model_validate(SMALL), twisting_heart))
+    assert acquisition(1).tobytes() == scanner.matrix(bare.positions(1), bare.amplitude).tobytes()
 
 
 @pytest.mark.slow
@@ -80,24 +69,22 @@ def test_every_tissue_has_the_exponent_of_its_own_key(twisting_heart, scanner):
     tissues = {"blood": {"scattering_exponent": 2.0}, "surroundings": {"scattering_exponent": 0.5}}
     realism = {name: ALL[name] | values for name, values in tissues.items()}
     config = Config.model_validate(SMALL | keys | {"realism": realism})
-    where = imaging_plane(config.views["mid"], config.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
-    seeded = seed_medium(config, twisting_heart, where, random, scanner.matrix.in_beam)
-    medium = Medium(config, twisting_heart, where, time=TIME, seeded=seeded, random=random)
-    position, _, exponent = medium(1)
-    wall = len(seeded["cell"])
-    assert (exponent[:wall] == 1.5).all() and (medium.wall(1)[2] == 1.5).all()
+    whole, seeded = medium(scene(config, twisting_heart), scanner.matrix.in_beam)
+    position, _, exponent = whole(1)
+    wall = len(seeded["wall_cell"])
+    assert (exponent[:wall] == 1.5).all() and (whole.wall(1)[2] == 1.5).all()
     assert 0 < (exponent == 2.0).sum() <= len(seeded["blood_cell"])
     assert 0 < (exponent == 0.5).sum() <= len(seeded["surroundings_position"])
     assert len(position) == wall + (exponent == 2.0).sum() + (exponent == 0.5).sum()
-    one = Acquisition(config, scanner, medium, random)(1)
-    assert one.tobytes() == scanner.matrix(*medium(1)).tobytes()
+    one = Acquisition(config, scanner, whole, random)(1)
+    assert one.tobytes() == scanner.matrix(*whole(1)).tobytes()
 
 
 @pytest.mark.parametrize("snr", [10.0, 30.0])
 def test_the_lines_have_the_ratio_of_signal_to_noise_asked_for(acquire, scanner, snr):
-    acquisition, medium = acquire(noise={"snr_dB": snr})
-    muscle = medium.in_wall(0, *sample_positions(scanner.scan, scanner.range))
-    echo = scanner.lines(*medium.wall(0))
+    acquisition, whole = acquire(noise={"snr_dB": snr})
+    muscle = whole.wall.contains(0, *sample_positions(scanner.scan, scanner.range))
+    echo = scanner.lines(*whole.wall(0))
     noise = scanner.beamform(np.float32(acquisition.noise) * acquisition.unit_noise(1))
     ratio = np.linalg.norm(echo[muscle]) / np.linalg.norm(noise[muscle])
     assert 20 * np.log10(ratio) == pytest.approx(snr, abs=0.3)

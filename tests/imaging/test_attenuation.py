@@ -1,14 +1,12 @@
 """Attenuation in products of time and frequency."""
 
 import numpy as np
-import pytest
 
 from echotruth.imaging.rf.attenuation import separable_damping
 
 
-@pytest.mark.parametrize("decibel", [0.5, 1.0, 2.0])
-def test_few_products_are_the_damping_of_every_frequency_at_every_time(decibel):
-    rate = decibel * np.log(10) / 20 * 1e-4 * np.linspace(-16e6, 16e6, 200) * 1540
+def test_few_products_are_the_damping_of_every_frequency_at_every_time():
+    rate = 2.0 * np.log(10) / 20 * 1e-4 * np.linspace(-16e6, 16e6, 200) * 1540
     time = np.linspace(0, 17e-6, 1500)
     damping, filters = separable_damping(rate, time)
     exact = np.exp(-np.outer(rate, time))

@@ -4,27 +4,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenes import medium, scene
 
 from echotruth.config import Config
 from echotruth.config.realism import Backscatter
-from echotruth.fem.tetrahedra import MaterialPoints, interpolate
+from echotruth.fem.tetrahedra import interpolate
 from echotruth.imaging.medium.backscatter import FibreEcho, variation
-from echotruth.imaging.medium.borders import Border
-from echotruth.imaging.medium.medium import Medium, seed_medium
-from echotruth.imaging.medium.wall import seed_volume
-from echotruth.imaging.view import imaging_plane
+from echotruth.imaging.medium.borders import Endocardium, Epicardium
+from echotruth.imaging.medium.wall import Wall
 
 CONFIG = Config.model_validate({"phantom": {"density_per_mm3": 20.0}})
 
 
 @pytest.fixture(scope="module")
-def mid(twisting_heart):
-    return imaging_plane(CONFIG.views["mid"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+def seeded(twisting_heart):
+    return Wall.seed(scene(CONFIG, twisting_heart))
 
 
 @pytest.fixture(scope="module")
-def seeded(twisting_heart):
-    return seed_volume(CONFIG.phantom, twisting_heart.nodes, twisting_heart.cells, np.random.default_rng(1))
+def mid(seeded):
+    return seeded.scene.plane
 
 
 def echo(heart, mid, seeded, direction, **levels):
@@ -32,7 +31,7 @@ def echo(heart, mid, seeded, direction, **levels):
     fibre = np.tile(np.asarray(direction, float), (len(heart.cells), 1))
     heart = replace(heart, arrays={"fibres": {"fibre": fibre}})
     factors = FibreEcho(Backscatter(**levels), heart, mid, seeded.points)
-    positions = [seeded.image_positions(heart.positions(frame), heart.cells, mid) for frame in (0, 1)]
+    positions = [seeded.positions(frame) for frame in (0, 1)]
     return np.stack([20 * np.log10(factors(frame, positions[frame])) for frame in (0, 1)]), positions
 
 
@@ -75,26 +74,22 @@ def test_variation_keeps_the_mean_power_and_has_the_given_spread_and_length():
     assert np.corrcoef(one, other)[0, 1] == pytest.approx(np.exp(-0.5), abs=0.1)
 
 
-def test_variation_is_that_of_the_material_in_muscle_and_borders(twisting_heart, coarse_mesh, mid):
+def test_variation_is_that_of_the_material_in_muscle_and_borders(twisting_heart, coarse_mesh):
     heart = replace(twisting_heart, arrays={"geometry": {"endo": coarse_mesh.endo, "epi": coarse_mesh.epi}})
-
-    def random(name):
-        return np.random.default_rng(list(name.encode()))
 
     def amplitudes(std):
         realism = {"backscatter": {"variation_dB": std}, "borders": {"endocardium_dB": 10.0, "epicardium_dB": 10.0}}
         config = Config.model_validate({"phantom": {"density_per_mm3": 20.0}, "realism": realism})
-        seeded = seed_medium(config, heart, mid, random, lambda position: np.ones(len(position), bool))
-        medium = Medium(config, heart, mid, time=np.arange(2) * 0.01, seeded=seeded, random=random)
-        return [medium(frame)[1] for frame in (0, 1)], seeded
+        at = scene(config, heart)
+        return [medium(at)[0](frame)[1] for frame in (0, 1)], at
 
-    (bare, seeded), (varied, _) = amplitudes(0.0), amplitudes(3.0)
-    points = MaterialPoints(seeded["cell"], seeded["xi"])
-    position = interpolate(heart.nodes, heart.cells, points)
-    for name in ("endo", "epi"):
-        facets, xi = (seeded[f"{name}cardium_{key}"] for key in ("facets", "xi"))
-        position = np.vstack([position, Border(facets, xi, 1.0).positions(heart.nodes)])
-    wanted = variation(Backscatter(variation_dB=3.0), position, random("variation"))
-    assert (20 * np.log10(wanted)).std() > 1 and len(position) > len(points) + 100
+    (bare, at), (varied, _) = amplitudes(0.0), amplitudes(3.0)
+    wall = Wall.seed(at)
+    position = interpolate(heart.nodes, heart.cells, wall.points)
+    # At end-diastole, which is unloaded here.
+    borders = [at.plane.to_heart(border.seed(at).positions(0)) for border in (Endocardium, Epicardium)]
+    position = np.vstack([position, *borders])
+    wanted = variation(Backscatter(variation_dB=3.0), position, at.random("variation"))
+    assert (20 * np.log10(wanted)).std() > 1 and len(position) > len(wall.cell) + 100
     for frame in (0, 1):
         np.testing.assert_allclose(varied[frame] / bare[frame], wanted, rtol=1e-9)

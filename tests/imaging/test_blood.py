@@ -2,29 +2,33 @@
 
 import numpy as np
 import pytest
+from scenes import scene
 
 from echotruth.config import Config
 from echotruth.fem.location import locate
 from echotruth.fem.volume import cell_volumes
-from echotruth.imaging.medium.blood import Cavity, seed_blood
-from echotruth.imaging.medium.random_process import brownian
+from echotruth.imaging.medium.blood import Blood, Cavity
 from echotruth.mechanics.solver.cavity import cavity_volume
 
 CONFIG = Config.model_validate({"realism": {"blood": {"level_dB": -20.0, "density": 0.3}}})
-TIME = np.array([0, 3e-3])
-
-
-def random(name):
-    return np.random.default_rng(list(name.encode()))
-
-
-def no_diffusion(blood):
-    return lambda frame: np.zeros((len(blood.points), 3))
 
 
 @pytest.fixture(scope="module")
 def blood(twisting_heart):
-    return seed_blood(CONFIG, twisting_heart, np.random.default_rng(4))
+    """At one time in all frames, so that it does not diffuse."""
+    return Blood.seed(scene(CONFIG, twisting_heart, step=0.0))
+
+
+@pytest.fixture(scope="module")
+def diffusing(twisting_heart):
+    fast = {"level_dB": -20.0, "density": 0.3, "decorrelation_time_ms": 0.5}
+    config = Config.model_validate({"realism": {"blood": fast}})
+    return Blood.seed(scene(config, twisting_heart, step=30e-3))
+
+
+def in_heart(blood, frame):
+    """Positions of those that are present, in the heart frame."""
+    return blood.scene.plane.to_heart(blood(frame)[0])
 
 
 @pytest.mark.parametrize("frame", [0, 1])
@@ -38,16 +42,16 @@ def test_the_cells_of_the_cavity_have_its_volume(twisting_heart, frame):
 
 @pytest.mark.parametrize("frame", [0, 1])
 def test_blood_is_as_dense_in_every_frame(blood, twisting_heart, frame):
-    position, _ = blood.at(frame, twisting_heart, no_diffusion(blood))
+    position = in_heart(blood, frame)
     nodes = twisting_heart.positions(frame)
     lid = nodes[Cavity(twisting_heart.endo).rim].mean(axis=0)
     expected = 0.3 * CONFIG.phantom.si().density * cavity_volume(nodes - lid, twisting_heart.endo)
     assert abs(len(position) - expected) < 4 * np.sqrt(expected)
 
 
-def test_blood_is_even_over_the_cavity(blood, twisting_heart):
+def test_blood_is_even_over_the_cavity(blood):
     # The endocardium is an ellipsoid of semi-axes 1.45 and 5.4 mm, cut 1.4 mm above its equator.
-    position, _ = blood.at(0, twisting_heart, no_diffusion(blood))
+    position = in_heart(blood, 0)
     height = np.linspace(-6.8e-3, 0, 30001)
     area = 1 - ((height + 1.4e-3) / 5.4e-3) ** 2
     mean = (height * area).sum() / area.sum()
@@ -57,9 +61,9 @@ def test_blood_is_even_over_the_cavity(blood, twisting_heart):
     assert np.all(np.abs(position[:, :2].mean(axis=0)) < 4 * error)
 
 
-def test_blood_follows_an_affine_motion_of_the_wall(blood, twisting_heart, affine):
+def test_blood_follows_an_affine_motion_of_the_wall(blood, affine):
     matrix, shift = affine
-    (before, _), (after, _) = (blood.at(frame, twisting_heart, no_diffusion(blood)) for frame in (0, 1))
+    before, after = (in_heart(blood, frame) for frame in (0, 1))
     # Who is left in the smaller cavity was in the larger one, in the same order.
     expected = before @ matrix.T + shift
     found = np.searchsorted(expected[:, 0], after[:, 0], sorter=(order := np.argsort(expected[:, 0])))
@@ -70,10 +74,8 @@ def test_blood_follows_an_affine_motion_of_the_wall(blood, twisting_heart, affin
 
 
 @pytest.mark.parametrize("frame", [0, 1])
-def test_blood_that_diffuses_far_stays_out_of_the_wall_and_below_the_base(blood, twisting_heart, frame):
-    diffusion = brownian(len(blood.points), TIME, 0.5e-3, 200e-6, random)
-    position, _ = blood.at(frame, twisting_heart, diffusion)
-    carried, _ = blood.at(frame, twisting_heart, no_diffusion(blood))
+def test_blood_that_diffuses_far_stays_out_of_the_wall_and_below_the_base(blood, diffusing, twisting_heart, frame):
+    position, carried = in_heart(diffusing, frame), in_heart(blood, frame)
     nodes = twisting_heart.positions(frame)
     assert (np.abs(position - carried).max() > 1e-4) == (frame == 1)
     assert (locate(nodes, twisting_heart.cells, position).cell < 0).all()
@@ -81,13 +83,12 @@ def test_blood_that_diffuses_far_stays_out_of_the_wall_and_below_the_base(blood,
 
 
 def test_its_power_in_a_volume_is_that_of_muscle_times_the_level(blood, twisting_heart):
-    _, amplitude = blood.at(0, twisting_heart, no_diffusion(blood))
+    _, amplitude, _ = blood(0)
     power = (amplitude**2).sum() / cavity_volume(twisting_heart.positions(0), twisting_heart.endo)
     assert 10 * np.log10(power / CONFIG.phantom.si().density) == pytest.approx(-20, abs=0.1)
 
 
-def test_diffusion_leaves_the_seeded_blood_as_it_is(blood, twisting_heart):
-    before = blood.amplitude.copy(), blood.points.xi.copy()
-    blood.at(1, twisting_heart, brownian(len(blood.points), TIME, 1e-3, 60e-6, random))
-    assert np.array_equal(before[0], blood.amplitude)
-    assert np.array_equal(before[1], blood.points.xi)
+def test_diffusion_leaves_the_seeded_blood_as_it_is(blood, diffusing):
+    diffusing(1)
+    assert np.array_equal(blood.amplitude, diffusing.amplitude)
+    assert np.array_equal(blood.xi, diffusing.xi)

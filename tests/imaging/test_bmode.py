@@ -67,11 +67,6 @@ def test_pixel_centres_fill_the_field_of_view():
     assert np.allclose(np.diff(lateral), 12e-3 / 512)
 
 
-def test_small_pixels_share_centres_with_their_blocks():
-    for fine, coarse in zip(pixel_centres(Bmode(), 512), pixel_centres(Bmode(), 128), strict=True):
-        assert np.allclose(fine.reshape(128, 4).mean(axis=1), coarse)
-
-
 @pytest.mark.parametrize("decibels", [None, 0.7])
 def test_gain_undoes_what_attenuation_takes_both_ways(decibels):
     """0.5 dB/cm/MHz at 25 MHz over 1 cm and back is 25 dB; with 0.7 given, 35 dB."""
@@ -79,10 +74,6 @@ def test_gain_undoes_what_attenuation_takes_both_ways(decibels):
     gain = time_gain_compensation(probe, Bmode(tgc_dB_per_cm_MHz=decibels), np.array([0, 1e-2]))
     assert np.allclose(20 * np.log10(gain), [0, 25 if decibels is None else 35], atol=1e-4)
     assert np.allclose(envelope(np.array([3 + 4j, 3 + 4j], np.complex64), gain), 5 * gain)
-
-
-def test_without_attenuation_there_is_no_gain():
-    assert (time_gain_compensation(Probe(), Bmode(), RANGE) == 1).all()
 
 
 def test_a_gain_beyond_all_numbers_is_refused():
@@ -120,14 +111,6 @@ def test_parallel_lines_are_put_on_their_place():
     inside = (np.abs(lateral) < 2.7e-3) & (axial > 0.3e-3)
     assert np.abs(image - expected)[inside].max() < 1e-4
     assert (image[:, np.abs(lateral) > 3e-3] == 0).all()
-
-
-def test_scan_conversion_turns_the_smallest_angle_to_the_first_columns():
-    polar = np.zeros((len(ANGLE), len(RANGE)), np.float32)
-    polar[:20] = 1
-    image = ScanConversion(SECTOR, RANGE, BMODE)(polar)
-    assert image[:, :64].sum() > 0
-    assert image[:, 64:].max() < 1e-3
 
 
 def test_scan_converted_envelope_is_never_negative():
@@ -284,12 +267,3 @@ def test_a_clip_is_smoothed_before_its_edges_are_enhanced():
     clip = largest_clip(lines, SECTOR, RANGE, BMODE.model_copy(update=keys))[0]
     middle = np.s_[50:90, 54:74]
     assert np.abs(clip - 255 * (3 * narrow - 2 * wide).clip(0, 1))[middle].max() < 1.5
-
-
-def test_edges_of_a_clip_are_enhanced_within_the_sector():
-    lines = noise_lines(1)
-    sharp = largest_clip(lines, SECTOR, RANGE, BMODE.model_copy(update={"edge_enhancement": 1.0}))[0]
-    axial, lateral = pixel_grid(128)
-    inside = np.abs(np.arctan2(lateral, axial)) < np.radians(32)
-    assert sharp[inside].std() > 1.2 * largest_clip(lines, SECTOR, RANGE, BMODE)[0][inside].std()
-    assert (sharp[~inside] == 0).all()

@@ -2,17 +2,18 @@
 
 import numpy as np
 import pytest
+from scenes import scene
 
 from echotruth.config import Config
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
-from echotruth.imaging.medium.borders import Border, border_amplitude, seed_border
-from echotruth.imaging.medium.mitral_valve import SHUT, Leaflets, seed_leaflets
+from echotruth.imaging.medium.borders import Endocardium, Epicardium, border_amplitude
+from echotruth.imaging.medium.mitral_valve import SHUT, Leaflets
 
 CONFIG = Config.model_validate(
     {
         "phantom": {"density_per_mm3": 3000.0},
         "rf": {"focal_zones": 1, "lines": 16},
-        "realism": {"neighbours": {"leaflets_dB": 10.0}},
+        "realism": {"neighbours": {"leaflets_dB": 10.0}, "borders": {"endocardium_dB": 10.0, "epicardium_dB": 10.0}},
     }
 )
 HALF = np.array([0.7e-3, 0.6e-3, 0.6e-3])
@@ -26,11 +27,11 @@ def heart(half_sphere, hemispherical_heart):
 
 
 def test_scatterers_are_spread_evenly_over_the_surface(heart):
-    facets, xi = seed_border(CONFIG, heart, "epi", np.random.default_rng(2))
-    position = Border(facets, xi, 1.0).positions(heart.nodes)
+    border = Epicardium.seed(scene(CONFIG, heart))
+    position = border.scene.plane.to_heart(border.positions(0))
     probe = CONFIG.probe.si()
     expected = 2 * np.pi * (3e-3 * probe.frequency / probe.sound_speed) ** 2  # half a sphere, one per square wavelength
-    assert abs(len(facets) - expected) < 5 * np.sqrt(expected) + 0.01 * expected
+    assert abs(len(position) - expected) < 5 * np.sqrt(expected) + 0.01 * expected
     np.testing.assert_allclose(np.linalg.norm(position, axis=1), 3e-3, rtol=2e-3)
     # The height of points that are even on a sphere is even.
     height = -position[:, 2] / 3e-3
@@ -38,10 +39,9 @@ def test_scatterers_are_spread_evenly_over_the_surface(heart):
 
 
 def test_amplitude_grows_with_the_area(heart):
-    facets, xi = seed_border(CONFIG, heart, "endo", np.random.default_rng(3))
-    border = Border(facets, xi, 2.0)
-    np.testing.assert_allclose(border.amplitudes(heart.positions(0), heart.nodes), 2.0)
-    np.testing.assert_allclose(border.amplitudes(heart.positions(1), heart.nodes), 8.0)
+    border, unloaded = Endocardium.seed(scene(CONFIG, heart)), border_amplitude(CONFIG, 10.0)
+    np.testing.assert_allclose(border(0)[1], unloaded)
+    np.testing.assert_allclose(border(1)[1], 4 * unloaded)
 
 
 @pytest.fixture(scope="module")
@@ -76,9 +76,9 @@ def test_flat_border_across_the_beam_has_its_level_and_a_tilted_one_has_not(leve
 
 
 def test_a_leaflet_shows_across_the_beam_and_fades_where_it_is_oblique(heart, level):
-    drawn = seed_leaflets(CONFIG, heart, np.random.default_rng(6))
-    leaflets, anterior = Leaflets(heart, **drawn), drawn["place"][:, 1] > 0
-    position = leaflets.positions(0)[anterior]
+    leaflets = Leaflets.seed(scene(CONFIG, heart))
+    anterior = leaflets.place[:, 1] > 0
+    position = leaflets.in_heart(0)[anterior]
     # Along the leaflet from the rim inwards, and along the line on which both meet.
     sheet = position @ np.array([[-np.cos(SHUT), 0, -np.sin(SHUT)], [0, 1, 0]]).T
     sheet -= sheet.mean(axis=0)

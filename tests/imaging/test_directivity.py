@@ -28,7 +28,7 @@ def test_spectral_exponent_is_the_power_of_the_frequency_that_the_directivity_fo
     assert greatest == beyond
 
 
-@pytest.mark.parametrize("angle", [0, 10, 20, 25])
+@pytest.mark.parametrize("angle", [0, 25])
 @pytest.mark.parametrize("count, bound", [(6, 2e-5), (4, 1e-3)])
 def test_pair_spectra_give_the_pulse_of_a_pair_of_unlike_elements(angle, count, bound):
     width = 0.67

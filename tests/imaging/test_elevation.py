@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 
 from echotruth.config import Probe
 from echotruth.imaging.flow import fresnel
-from echotruth.imaging.rf.elevation import BEAM_TAIL_ENERGY, Lens, subaperture_bounds
+from echotruth.imaging.rf.elevation import BEAM_TAIL_ENERGY, Lens
 from echotruth.imaging.rf.kernel import Band, Grid
 
 WAVELENGTH = 1540 / 25e6
@@ -29,7 +29,7 @@ def at(beside, depth):
     return np.stack([np.zeros_like(beside), np.full_like(beside, depth), beside], axis=1)
 
 
-@pytest.mark.parametrize("depth", [1.1e-3, 3.7e-3, 6.5e-3, 12e-3])
+@pytest.mark.parametrize("depth", [1.1e-3, 6.5e-3])
 def test_table_holds_the_integral_once_its_delay_is_put_back(lens, band, depth):
     row = np.abs(lens.curvature - 1 / depth).argmin()
     columns = np.arange(0, 60, 7)
@@ -73,7 +73,7 @@ def test_scatterers_far_beside_the_plane_are_out_of_the_beam_and_those_in_it_tak
     assert lens.blocks_at(lens.lens_terms(beside[:1], 1540.0)[0]).tolist() == [[1]]
 
 
-@pytest.mark.parametrize("depth", [3e-3, 5e-3, 6.5e-3, 10e-3])
+@pytest.mark.parametrize("depth", [3e-3, 10e-3])
 def test_echoes_beyond_the_edge_of_the_beam_have_the_energy_that_may_be_left_out(lens, band, depth):
     """Summed over evenly spread elevations with the integral itself, a nearer tail than the tables'."""
     edge = depth * np.interp(1 / depth, lens.curvature, lens.edge_slope)
@@ -87,19 +87,3 @@ def test_either_side_of_the_plane_is_alike(lens):
     beside = np.linspace(0, 1e-3, 50)
     one, other = (lens.lens_terms(at(side * beside, 5e-3), 1540.0) for side in (1, -1))
     np.testing.assert_array_equal(one[0], other[0])
-
-
-def test_near_the_array_it_is_looked_up_from_subapertures(lens):
-    assert lens.subapertures(np.array([3e-3, 6.5e-3])).tolist() == [2, 1]
-    position = at(np.linspace(0, 3e-4, 5), 3e-3)
-    _, terms = lens.lens_terms(position, 1540.0, 2)
-    quarter = 16 * Probe().si().pitch
-    np.testing.assert_allclose(terms[..., 0], 1 / np.hypot(quarter, 3e-3), rtol=1e-9)
-
-
-def test_every_element_is_in_one_subaperture():
-    assert subaperture_bounds(64, 2).tolist() == [0, 32, 64]
-    for elements, number in ((65, 2), (17, 3)):
-        own = np.arange(elements) * number // elements
-        first = np.searchsorted(own, np.arange(number + 1))
-        np.testing.assert_array_equal(first, subaperture_bounds(elements, number))

@@ -8,6 +8,7 @@ from scipy.ndimage import map_coordinates
 
 import echotruth as et
 from echotruth.config import Config, Phantom, Probe
+from echotruth.fem.tetrahedra import interpolate
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.flow import STEPS, beam_thickness, out_of_slice, slice_thickness
 from echotruth.imaging.labels import LABELS, pack, unpack
@@ -94,7 +95,7 @@ class Beating:
 
 @pytest.fixture(scope="module")
 def solved():
-    return et.beat(et.configure(geometry=SMALL, fibres=STRAIGHT))
+    return et.beat(et.configure(geometry=SMALL, fibres=STRAIGHT, loop={"frames": 20}))
 
 
 @pytest.fixture(scope="module")
@@ -169,14 +170,14 @@ def test_forth_and_back_again_returns(beating):
 def test_flow_carries_scatterers_as_the_phantom_does(beating):
     """Scatterers that are within 2 um of the plane, and the flow at the place of their echo."""
     heart = beating.heart
-    scatterers = seed_volume(Phantom(density_per_mm3=3000.0), heart.nodes, heart.cells, np.random.default_rng(0))
+    points = seed_volume(Phantom(density_per_mm3=3000.0), heart.nodes, heart.cells, np.random.default_rng(0))
     for frame in (0, heart.es - 2, heart.es + 4):
         now, after = (
-            scatterers.image_positions(beating.positions[k], heart.cells, beating.plane) for k in (frame, frame + 1)
+            beating.plane.to_image(interpolate(beating.positions[k], heart.cells, points)) for k in (frame, frame + 1)
         )
         near = np.abs(now[:, 2]) < 2e-6
-        points = (now[near, :2] - beating.origin) / PIXEL
-        error = beating.step(points, frame, NEXT) - (after[near, :2] - beating.origin) / PIXEL
+        start = (now[near, :2] - beating.origin) / PIXEL
+        error = beating.step(start, frame, NEXT) - (after[near, :2] - beating.origin) / PIXEL
         error = np.linalg.norm(error, axis=-1)
         assert np.isfinite(error).sum() > 50
         assert np.nanmax(error) < 0.02
@@ -228,10 +229,10 @@ def test_slice_is_as_thick_as_a_squared_sinc_in_the_focus():
         assert beam_thickness(p, np.array([focus]))[0] == pytest.approx(expected, rel=1e-3)
 
 
-@pytest.mark.parametrize("depth", [5e-3, 6.5e-3, 8e-3])
+@pytest.mark.parametrize("depth", [5e-3, 8e-3])
 def test_echo_from_the_edge_of_the_slice_is_half_of_that_from_the_plane(depth):
     """Of the engine that makes the RF, over its whole band, of which the centre frequency stands for the beam."""
-    matrix = FullMatrix(Probe(), 13e-3)
+    matrix = FullMatrix(Probe(elements=3), 11e-3)
     edge = slice_thickness(CONFIG, np.array([depth]))[0] / 2
     echoes = [matrix(np.array([[0.0, depth, y]]), np.ones(1)) for y in (0.0, edge)]
     middle = len(matrix.centres) // 2

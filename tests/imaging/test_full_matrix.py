@@ -34,16 +34,16 @@ def relative(estimate, exact):
     return np.linalg.norm(estimate - exact) / np.linalg.norm(exact)
 
 
-def error(probe, position, amplitude, lens=False, **options):
+def error(probe, position, amplitude, depth=DEPTH):
     """Relative L2 error against the exact sum, of every sixth frequency."""
-    matrix = FullMatrix(probe, options.pop("depth", DEPTH), elevation=lens, **options)
+    matrix = FullMatrix(probe, depth, elevation=False)
     found = matrix(position, amplitude)[::6]
-    return relative(found, exact_matrix(probe, position, amplitude, matrix.frequency[::6], elevation=lens))
+    return relative(found, exact_matrix(probe, position, amplitude, matrix.frequency[::6], elevation=False))
 
 
-@pytest.mark.parametrize("attenuation", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("attenuation", [0.0, 1.0])
 def test_in_the_plane_the_rf_is_the_exact_sum_with_directivity_and_attenuation(attenuation):
-    probe = Probe(attenuation_dB_per_cm_MHz=attenuation)
+    probe = Probe(elements=32, attenuation_dB_per_cm_MHz=attenuation)
     assert error(probe, *sector(60)) < PLANE_ACCURACY
 
 
@@ -65,13 +65,7 @@ def test_the_memory_of_the_spectra_of_clusters_is_bounded(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "preset, scale, half_angle",
-    [
-        ("mouse_30MHz", 1, 24),
-        ("mouse_40MHz", 1, 24),
-        ("rat_15MHz", 2, 32),
-        ("human_2_7MHz", 12, 32),
-        ("human_3MHz", 12, 32),
-    ],
+    [("mouse_40MHz", 1, 24), ("rat_15MHz", 2, 32), ("human_2_7MHz", 12, 32)],
 )
 def test_other_arrays_come_as_near_to_the_exact_sum(preset, scale, half_angle):
     """Elements of 0.88 wavelengths only within 24 degrees: further out their echoes are longer than a kernel."""
@@ -108,9 +102,8 @@ def lens_errors(probe, depth, beside, bands):
     return np.array(errors)
 
 
-@pytest.mark.parametrize("attenuation", [0.0, 0.5])
-def test_under_the_lens_the_rf_is_the_fresnel_integral_at_all_ranges(attenuation):
-    probe = Probe(attenuation_dB_per_cm_MHz=attenuation)
+def test_under_the_lens_the_rf_is_the_fresnel_integral_at_all_ranges():
+    probe = Probe(elements=32, attenuation_dB_per_cm_MHz=0.5)
     bands = [(3, 3.5), (3.5, 4), (4, 5.5), (5.5, 11)]
     assert (lens_errors(probe, DEPTH, 0.7e-3, bands) < 0.015).all()
 
@@ -132,8 +125,9 @@ def test_under_a_tall_lens_it_is_so_near_the_plane_and_beyond_two_apertures(atte
     assert (lens_errors(probe, 120e-3, 9.8e-3, [(66, 120)]) < bound).all()
 
 
-def test_under_the_lens_a_scatterer_in_the_plane_is_nearly_exact():
-    assert error(Probe(), np.array([[0.4e-3, 6.5e-3, 0.0]]), np.ones(1), lens=True) < 2e-3
+def test_under_the_lens_a_scatterer_in_the_plane_is_nearly_exact(matrix):
+    point = np.array([[0.4e-3, 6.5e-3, 0.0]]), np.ones(1)
+    assert relative(matrix(*point)[::6], exact_matrix(Probe(), *point, matrix.frequency[::6])) < 2e-3
 
 
 def test_band_reaches_the_faint_edges_of_the_pulse(matrix):
@@ -150,11 +144,6 @@ def test_echoes_superpose(matrix):
     position, amplitude = sector(60, elevation=3e-4)
     parts = matrix(position[:25], amplitude[:25]) + matrix(position[25:], amplitude[25:])
     assert relative(matrix(position, amplitude), parts) < 1e-5
-
-
-def test_echoes_are_proportional_to_the_amplitude(matrix):
-    position, amplitude = sector(20)
-    assert relative(matrix(position, -3 * amplitude), -3 * matrix(position, amplitude)) < 1e-6
 
 
 def test_elevation_sign_does_not_matter(matrix):
@@ -180,7 +169,7 @@ def test_bytes_do_not_depend_on_threads(elevation):
     assert results[0] == results[1]
 
 
-@pytest.mark.parametrize("elements", [2, 17, 33])
+@pytest.mark.parametrize("elements", [2, 33])
 def test_every_pair_is_filled_whatever_the_number_of_elements(elements):
     position, amplitude = sector(10)
     assert error(Probe(elements=elements), position, amplitude) < 2e-5

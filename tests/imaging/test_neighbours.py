@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenes import medium, scene
 
 from echotruth.config import Config
 from echotruth.fem.location import locate
@@ -11,25 +12,15 @@ from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.anatomy import Anatomy
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.filling import emptied, opening, volumes
-from echotruth.imaging.medium.medium import Medium, seed_medium
-from echotruth.imaging.medium.mitral_valve import Leaflets, seed_leaflets
-from echotruth.imaging.medium.papillary_muscles import PapillaryMuscles, seed_papillary_muscles
-from echotruth.imaging.medium.surroundings import AroundHeart, seed_surroundings
-from echotruth.imaging.view import imaging_plane
+from echotruth.imaging.medium.mitral_valve import Leaflets
+from echotruth.imaging.medium.papillary_muscles import PapillaryMuscles
+from echotruth.imaging.medium.surroundings import Surroundings
 
 LEVELS = {"chambers_dB": 0.0, "lung_dB": 2.0, "chest_wall_dB": 3.0, "leaflets_dB": 4.0, "papillary_muscles_dB": 0.0}
-REALISM = {
-    "blood": {"level_dB": -25.0},
-    "surroundings": {"level_dB": -20.0, "density": 0.3},
-    "neighbours": LEVELS,
-}
+REALISM = {"blood": {"level_dB": -25.0}, "surroundings": {"level_dB": -20.0, "density": 0.3}, "neighbours": LEVELS}
 CONFIG = Config.model_validate({"phantom": {"density_per_mm3": 1500.0}, "realism": REALISM})
 EJECTED = np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.6, 0.2, 0.1])
 """Course of a cycle: isovolumic, ejection, isovolumic, filling."""
-
-
-def random(name):
-    return np.random.default_rng(list(name.encode()))
 
 
 @pytest.fixture(scope="module")
@@ -42,33 +33,27 @@ def heart(twisting_heart, coarse_mesh):
 
 
 @pytest.fixture(scope="module", params=["mid", "long_axis"])
-def plane(request, heart):
-    return imaging_plane(CONFIG.views[request.param], CONFIG.rf, heart.endo_at_ed)
+def at(request, heart):
+    return scene(CONFIG, heart, request.param)
 
 
-@pytest.fixture(scope="module")
-def seeded(heart, plane):
-    return seed_surroundings(CONFIG, heart, plane, random("surroundings"))
-
-
-def power_dB(seeded, plane, box, volume):
+def power_dB(around, box, volume):
     """Echo power in a box of the image (lateral, axial), relative to muscle, and its standard error, dB."""
-    lateral, axial, elevation = plane.to_image(seeded["position"]).T
+    lateral, axial, elevation = around.positions(0).T
     inside = box(lateral, axial) & (np.abs(elevation) < 0.15e-3)
-    power = seeded["amplitude"][inside] ** 2
+    power = around.amplitude[inside] ** 2
     relative = power.sum() / volume / CONFIG.phantom.si().density
     return 10 * np.log10(relative), 10 / np.log(10) * np.sqrt((power**2).sum()) / power.sum()
 
 
 def test_the_right_ventricle_is_a_cavity_of_blood_on_the_septal_side(heart):
-    mid = imaging_plane(CONFIG.views["mid"], CONFIG.rf, heart.endo_at_ed)
-    seeded = seed_surroundings(CONFIG, heart, mid, random("surroundings"))
+    around = Surroundings.seed(scene(CONFIG, heart))
     # The septum is at the left; its epicardium is 2.4 mm from the long axis, which is 6.5 mm deep.
     found, error = power_dB(
-        seeded, mid, lambda x, z: (np.abs(x + 3.1e-3) < 0.4e-3) & (np.abs(z - 6.5e-3) < 0.4e-3), 0.8e-3**2 * 0.3e-3
+        around, lambda x, z: (np.abs(x + 3.1e-3) < 0.4e-3) & (np.abs(z - 6.5e-3) < 0.4e-3), 0.8e-3**2 * 0.3e-3
     )
     assert found == pytest.approx(-25, abs=4 * error + 0.3)
-    opposite = mid.to_heart(np.array([[3.1e-3, 6.5e-3, 0.0]]))
+    opposite = around.scene.plane.to_heart(np.array([[3.1e-3, 6.5e-3, 0.0]]))
     anatomy = Anatomy(heart)
     assert anatomy.chambers(opposite, anatomy.place(opposite)) == TissueLabel.OTHER
 
@@ -84,23 +69,24 @@ def test_the_nearest_point_of_a_sphere_is_on_the_ray_from_its_centre(half_sphere
         assert np.linalg.norm(place.outward - ray, axis=1).max() < 0.02
 
 
-def test_walls_of_chambers_have_their_level(seeded, heart, plane):
-    walls = np.isin(seeded["tissue"], (TissueLabel.RIGHT_FREE_WALL, TissueLabel.ATRIAL_WALL))
-    near = np.abs(plane.to_image(seeded["position"])[:, 2]) < 0.15e-3
+def test_walls_of_chambers_have_their_level(at):
+    around = Surroundings.seed(at)
+    position = around.positions(0)
+    walls = np.isin(around.tissue, (TissueLabel.RIGHT_FREE_WALL, TissueLabel.ATRIAL_WALL))
+    near = np.abs(position[:, 2]) < 0.15e-3
     assert (walls & near).sum() > 20
     # Power of a scatterer over that of one of the connective tissue beside it, which has the same density.
-    range_ = np.linalg.norm(plane.to_image(seeded["position"])[:, :2], axis=1)
-    scaled = seeded["amplitude"] ** 2 / range_
-    rest = seeded["tissue"] == TissueLabel.OTHER
+    range_ = np.linalg.norm(position[:, :2], axis=1)
+    scaled = around.amplitude**2 / range_
+    rest = around.tissue == TissueLabel.OTHER
     middle = np.abs(range_ - 6.5e-3) < 1.5e-3
     ratio = scaled[walls & near & middle].mean() / scaled[rest & near & middle & (scaled > 0)].min()
     assert 10 * np.log10(ratio) == pytest.approx(20, abs=4)
 
 
-def test_the_medium_has_nothing_of_them_in_the_wall_nor_in_the_cavity(heart, plane):
-    seeded = seed_medium(CONFIG, heart, plane, random, lambda position: np.ones(len(position), bool))
-    medium = Medium(CONFIG, heart, plane, time=np.arange(8) * 15e-3, seeded=seeded, random=random)
-    around = AroundHeart(CONFIG, heart, plane, seeded["surroundings_position"], seeded["surroundings_tissue"])
+def test_the_medium_has_nothing_of_them_in_the_wall_nor_in_the_cavity(heart, at):
+    (whole, seeded), plane = medium(at), at.plane
+    around = Surroundings.restored(at, seeded)
     for frame in (0, 3, 6):
         nodes, cavity = heart.positions(frame), Cavity(heart.endo)
         position = around.positions(frame)
@@ -108,15 +94,14 @@ def test_the_medium_has_nothing_of_them_in_the_wall_nor_in_the_cavity(heart, pla
         assert len(position) > 1000
         assert (locate(nodes, heart.cells, position).cell < 0).all()
         assert (locate(cavity.positions(nodes), cavity.cells, position).cell < 0).all()
-        others = plane.to_heart(medium(frame)[0][len(seeded["cell"]) :])
+        others = plane.to_heart(whole(frame)[0][len(seeded["wall_cell"]) :])
         assert (locate(nodes, heart.cells, others).cell < 0).all()
 
 
-def test_neighbours_leave_the_wall_and_its_bytes_as_they_are(heart, plane):
+def test_neighbours_leave_the_wall_and_its_bytes_as_they_are(heart):
     def made(**realism):
         config = Config.model_validate({"phantom": {"density_per_mm3": 100.0}, "realism": realism})
-        seeded = seed_medium(config, heart, plane, random, lambda position: np.ones(len(position), bool))
-        return Medium(config, heart, plane, time=np.arange(8) * 15e-3, seeded=seeded, random=random)(3)
+        return medium(scene(config, heart, "long_axis"))[0](3)
 
     alone, together, again = made(), made(**REALISM), made(**REALISM)
     for bare, full, same in zip(alone, together, again, strict=True):
@@ -125,17 +110,15 @@ def test_neighbours_leave_the_wall_and_its_bytes_as_they_are(heart, plane):
 
 
 def test_the_free_wall_moves_inwards_and_the_chest_wall_stays(heart):
-    mid = imaging_plane(CONFIG.views["mid"], CONFIG.rf, heart.endo_at_ed)
-    seeded = seed_surroundings(CONFIG, heart, mid, random("surroundings"))
-    around = AroundHeart(CONFIG, heart, mid, seeded["position"], seeded["tissue"])
+    around = Surroundings.seed(scene(CONFIG, heart))
     start, end = around.positions(0), around.positions(3)
-    free = (seeded["tissue"] == TissueLabel.RIGHT_FREE_WALL) & (np.abs(start[:, 1] - 6.5e-3) < 0.5e-3)
+    free = (around.tissue == TissueLabel.RIGHT_FREE_WALL) & (np.abs(start[:, 1] - 6.5e-3) < 0.5e-3)
     free &= start[:, 0] < -2.6e-3
     septum, height = 0.2 * 2.33e-3, (3.4 / 7.6) / 0.85
     # Two fifths of its width, which falls from 0.75 of 2.5 mm at the base, besides the motion of the septum.
     expected = septum + 0.4 * 0.75 * 2.5e-3 * (1 - height**2)
     assert free.sum() > 20 and (end - start)[free, 0].mean() == pytest.approx(expected, rel=0.1)
-    chest = seeded["tissue"] == TissueLabel.CHEST_WALL
+    chest = around.tissue == TissueLabel.CHEST_WALL
     assert chest.sum() > 100 and np.array_equal(start[chest], end[chest])
     assert np.array_equal(start[:, 2], end[:, 2])
 
@@ -152,9 +135,9 @@ def test_the_valve_is_open_while_the_cavity_fills(heart):
 def test_leaflets_meet_below_the_base_when_shut_and_point_into_the_cavity_when_open(heart):
     along = np.zeros(4)
     place = np.column_stack([along, [1, 1, -1, -1], [0, 1, 0, 1]])
-    leaflets = Leaflets(heart, place, np.ones(4))
+    leaflets = Leaflets(scene(CONFIG, heart), place, np.ones(4))
     rim = heart.positions(0)[Cavity(heart.endo).rim]
-    shut, open_ = leaflets.positions(1), leaflets.positions(4)
+    shut, open_ = leaflets.in_heart(1), leaflets.in_heart(4)
     radius = np.hypot(*rim[:, :2].T).mean()
     assert shut[1, 0] == pytest.approx(shut[3, 0]) == pytest.approx(-radius / 3)
     assert (shut[[1, 3], 2] < rim[:, 2].mean()).all()
@@ -165,35 +148,33 @@ def test_leaflets_meet_below_the_base_when_shut_and_point_into_the_cavity_when_o
 
 
 def test_papillary_muscles_have_their_level(heart):
-    muscles = seed_papillary_muscles(CONFIG, heart, random("papillary_muscles"))
-    assert len(muscles["amplitude"]) > 500
-    assert 10 * np.log10((muscles["amplitude"] ** 2).mean()) == pytest.approx(0.0, abs=0.8)
+    muscles = PapillaryMuscles.seed(scene(CONFIG, heart))
+    assert len(muscles.amplitude) > 500
+    assert 10 * np.log10((muscles.amplitude**2).mean()) == pytest.approx(0.0, abs=0.8)
     # As dense as muscle: in a box within the body.
-    one = muscles["position"][muscles["muscle"] == 0]
+    one = muscles.position[muscles.muscle == 0]
     box = (np.abs(one - one.mean(axis=0)) < 0.08e-3).all(axis=1).sum()
     expected = CONFIG.phantom.si().density * 0.16e-3**3
     assert abs(box - expected) < 4 * np.sqrt(expected)
 
 
 def test_leaflets_have_the_echo_of_their_area_when_the_rim_is_narrower_too(heart):
-    drawn, probe = seed_leaflets(CONFIG, heart, random("leaflets")), CONFIG.probe.si()
+    leaflets, probe = Leaflets.seed(scene(CONFIG, heart)), CONFIG.probe.si()
     rims = (heart.positions(frame)[Cavity(heart.endo).rim] for frame in (0, 3))
     # Strips in planes across the line on which both meet: together as long as the chord, 12 degrees below the base.
     areas = [np.pi * np.hypot(*rim[:, :2].T).mean() ** 2 / np.cos(np.pi / 15) for rim in rims]
     expected = areas[0] * (probe.frequency / probe.sound_speed) ** 2
-    assert abs(len(drawn["place"]) - expected) < 4 * np.sqrt(expected)
-    leaflets = Leaflets(heart, **drawn)
+    assert abs(len(leaflets.place) - expected) < 4 * np.sqrt(expected)
     before, narrowed = (leaflets.amplitudes(frame).sum() / area for frame, area in zip((0, 3), areas, strict=True))
     assert areas[1] < 0.7 * areas[0] and narrowed == pytest.approx(before, rel=1e-6)
 
 
 def test_papillary_muscles_lie_in_the_cavity_and_ride_with_its_wall(heart):
-    muscles = seed_papillary_muscles(CONFIG, heart, random("papillary_muscles"))
-    body, cavity = PapillaryMuscles(heart, **muscles), Cavity(heart.endo)
-    assert (locate(cavity.positions(heart.positions(0)), cavity.cells, body.positions(0)).cell >= 0).all()
-    moved = body.positions(3) - body.positions(0)
-    assert np.ptp(moved[muscles["muscle"] == 1], axis=0).max() < 1e-12
+    muscles, cavity = PapillaryMuscles.seed(scene(CONFIG, heart)), Cavity(heart.endo)
+    assert (locate(cavity.positions(heart.positions(0)), cavity.cells, muscles.in_heart(0)).cell >= 0).all()
+    moved = muscles.in_heart(3) - muscles.in_heart(0)
+    assert np.ptp(moved[muscles.muscle == 1], axis=0).max() < 1e-12
     # Towards the axis, by a fifth of its distance at the endocardium.
     azimuth = 7 * np.pi / 4
-    inwards = -moved[muscles["muscle"] == 1].mean(axis=0)[:2] @ [np.cos(azimuth), np.sin(azimuth)]
+    inwards = -moved[muscles.muscle == 1].mean(axis=0)[:2] @ [np.cos(azimuth), np.sin(azimuth)]
     assert inwards == pytest.approx(0.2 * 1.3e-3, rel=0.15)

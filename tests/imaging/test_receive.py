@@ -86,11 +86,8 @@ def exact_line(scanner, matrix, rf, line, ranges):
     "keys",
     [
         {},
-        {"focal_zones": 1},
         {"focal_zones": 2, "focal_spacing_mm": 3.0, "f_number": 2.5},
         {"apodization": "none"},
-        {"f_number": 2.5},
-        {"scan": "linear"},
         {"scan": "linear", "f_number": 3.0},
         {"transmit": "plane", "transmits": 3},
         {"transmit": "plane", "transmits": 2, "scan": "linear", "f_number": 2.0},
@@ -108,10 +105,9 @@ def test_a_point_of_a_line_is_the_exact_delayed_sum_over_all_pairs(matrix, keys)
         assert np.linalg.norm(lines[line, chosen] - exact) < 3e-5 * np.linalg.norm(exact)
 
 
-@pytest.mark.parametrize("preset", ["human_2_7MHz", "mouse_40MHz"])
-def test_it_holds_for_other_arrays(preset):
+def test_it_holds_for_other_arrays():
     """The interpolation is as good at any band, also a narrow one that is sampled below its carrier."""
-    probe = Probe(preset=preset, bandwidth=0.2)
+    probe = Probe(preset="human_2_7MHz", bandwidth=0.2)
     wavelength = SPEED / probe.si().frequency
     rf = Rf(lines=16, focus_mm=6.5, focal_zones=1)
     scanner = Scanner(probe, rf, 160 * wavelength)
@@ -175,7 +171,7 @@ def test_echoes_out_of_the_record_weigh_nothing():
     assert np.hypot(*times[-2:]) == pytest.approx([0, 0, 1, 1, 0, 0], abs=1e-6)
 
 
-@pytest.mark.parametrize("keys", [{}, {"transmit": "diverging"}, {"transmit": "synthetic_aperture"}, {"f_number": 2.0}])
+@pytest.mark.parametrize("keys", [{}, {"transmit": "diverging"}])
 def test_lines_closer_than_echoes_change_are_those_that_would_be_focused_one_by_one(matrix, keys):
     """Every fourth line of a frame of 257 is a line of one of 65, of which each is focused."""
     few, many = (Scanner(Probe(), Rf(lines=n, **keys), 10e-3).beamform(matrix) for n in (65, 257))

@@ -10,7 +10,7 @@ from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
 
 DEPTH = 11e-3
-PROBE = Probe(attenuation_dB_per_cm_MHz=0.5)
+PROBE = Probe()
 TISSUES = np.array([0.0, 1.5, 2.0])
 """Exponents of three tissues."""
 
@@ -32,15 +32,13 @@ def relative(estimate, exact):
     return np.linalg.norm(estimate - exact) / np.linalg.norm(exact)
 
 
-@pytest.mark.parametrize("exponent", [2.0, 4.0])
-def test_in_the_plane_the_rf_is_the_exact_sum_with_that_power(plane, exponent):
+def test_in_the_plane_the_rf_is_the_exact_sum_with_that_power(plane):
     """Kernels err most at the edges of the band, and the upper one is the louder the greater the power."""
-    scatterers = sector(60)
+    scatterers, exponent = sector(60), 4.0
     exact = exact_matrix(PROBE, *scatterers, plane.frequency[::6], exponent=exponent, elevation=False)
     assert relative(plane(*scatterers, exponent)[::6], exact) < PLANE_ACCURACY * (1 + exponent / 2)
 
 
-@pytest.mark.slow
 def test_in_the_plane_tissues_with_different_powers_add_up_to_the_exact_sum(plane):
     scatterers, exponent = sector(90), np.resize(TISSUES, 90)
     exact = exact_matrix(PROBE, *scatterers, plane.frequency[::6], exponent=exponent, elevation=False)
@@ -50,12 +48,13 @@ def test_in_the_plane_tissues_with_different_powers_add_up_to_the_exact_sum(plan
 @pytest.mark.slow
 def test_under_the_lens_tissues_with_different_powers_add_up_to_the_exact_sum():
     """Over four draws: one of 60 scatterers errs by 1.4 to 2.2 %, by where they are."""
-    matrix, errors, sums = FullMatrix(PROBE, DEPTH), [], []
+    probe = Probe(attenuation_dB_per_cm_MHz=0.5)
+    matrix, errors, sums = FullMatrix(probe, DEPTH), [], []
     for seed in range(4):
         position, amplitude = sector(60, elevation=0.7e-3, seed=seed)
         inside = matrix.in_beam(position)
         scatterers, exponent = (position[inside], amplitude[inside]), np.resize(TISSUES, inside.sum())
-        exact = exact_matrix(PROBE, *scatterers, matrix.frequency[::24], exponent=exponent)
+        exact = exact_matrix(probe, *scatterers, matrix.frequency[::24], exponent=exponent)
         errors.append(np.linalg.norm(matrix(*scatterers, exponent)[::24] - exact))
         sums.append(np.linalg.norm(exact))
     assert np.linalg.norm(errors) < 0.016 * np.linalg.norm(sums)
@@ -69,7 +68,7 @@ def raw_moment(order, mean, variance):
     return moments[order]
 
 
-@pytest.mark.parametrize("exponent", [0.5, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("exponent", [0.5, 2.0])
 def test_the_centroid_of_an_echo_rises_as_that_of_a_gaussian_times_the_power(exponent):
     """The power spectrum f^2n exp(-(f - f0)^2 / s^2) has a ratio of moments of a normal distribution as its centroid.
 
@@ -91,14 +90,13 @@ def test_at_the_centre_frequency_the_echo_does_not_depend_on_the_power(plane):
     assert np.allclose(steep[middle], factor * flat[middle], rtol=1e-5, atol=1e-6 * np.abs(flat[middle]).max())
 
 
-@pytest.mark.slow
 def test_a_power_of_zero_leaves_every_byte_as_it_is(plane):
     position, amplitude = sector(200)
     assert plane(position, amplitude, np.zeros(200)).tobytes() == plane(position, amplitude).tobytes()
 
 
 def test_lines_are_those_of_the_same_power_and_bad_powers_are_refused():
-    config = Config.model_validate({"probe": {"elements": 16}, "rf": {"lines": 16}})
+    config = Config.model_validate({"probe": {"elements": 16}, "rf": {"lines": 16, "elevation_beam": False}})
     scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
     position, amplitude = sector(50)
     lines = scanner.lines(position, amplitude, 2.0)

@@ -41,10 +41,10 @@ def test_dense_speckle_is_fully_developed():
     """
     scanner = Scanner(Probe(elements=16), Rf(lines=21, sector_deg=56), 9e-3)
     depth = np.flatnonzero((scanner.range > 5e-3) & (scanner.range < 8e-3))[::15]
-    sample = np.stack([np.abs(scanner.lines(*fan(seed, 18000)))[::5, depth] for seed in range(40)])
+    sample = np.stack([np.abs(scanner.lines(*fan(seed, 18000)))[::5, depth] for seed in range(24)])
     power = (sample**2).mean(axis=0)
     sample = (sample / np.sqrt(np.outer(power.mean(axis=1), power.mean(axis=0)) / power.mean())).ravel()
-    assert len(sample) == 40 * 5 * 26
+    assert len(sample) == 24 * 5 * 26
     assert sample.mean() / sample.std() == pytest.approx(np.sqrt(np.pi / (4 - np.pi)), abs=0.03)
     assert kstest(sample, "rayleigh", args=(0, 1 / np.sqrt(2))).pvalue > 0.05
 
@@ -56,7 +56,7 @@ def test_sparse_speckle_has_the_kurtosis_of_its_density(fine):
     point = np.abs(fine.lines(np.array([[0.0, 6.5e-3, 0]]), np.ones(1))) ** 2
     area = point.sum() ** 2 / (point**2).sum() * 6.5e-3 * np.radians(0.4) * (fine.range[1] - fine.range[0])
     density = 2 / area
-    intensity = np.stack([np.abs(fine.lines(*sheet(seed, density)))[:, depth] ** 2 for seed in range(30)])
+    intensity = np.stack([np.abs(fine.lines(*sheet(seed, density)))[:, depth] ** 2 for seed in range(20)])
     mean = intensity.mean(axis=(0, 2), keepdims=True)
     found = ((intensity / mean) ** 2).mean()
     assert found == pytest.approx(2.5, rel=0.06)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from scenes import scene
 
 from echotruth.config import Config
-from echotruth.imaging.medium.surroundings import SurroundingsMotion, epicardial_nodes, outside_heart, seed_surroundings
-from echotruth.imaging.view import imaging_plane
+from echotruth.imaging.medium.surroundings import Surroundings, SurroundingsMotion, epicardial_nodes, outside_heart
 
 CONFIG = Config.model_validate(
     {"realism": {"surroundings": {"level_dB": -12.0, "density": 0.02, "motion_decay_mm": 0.5}}}
@@ -13,19 +13,19 @@ CONFIG = Config.model_validate(
 
 
 @pytest.fixture(scope="module")
-def mid(twisting_heart):
-    return imaging_plane(CONFIG.views["mid"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+def seeded(twisting_heart):
+    return Surroundings.seed(scene(CONFIG, twisting_heart))
 
 
 @pytest.fixture(scope="module")
-def seeded(twisting_heart, mid):
-    return seed_surroundings(CONFIG, twisting_heart, mid, np.random.default_rng(5))
+def mid(seeded):
+    return seeded.scene.plane
 
 
 @pytest.fixture(scope="module")
 def around(seeded):
     """Positions at end-diastole."""
-    return seeded["position"]
+    return seeded.position
 
 
 def ellipsoid_radius(position):
@@ -110,14 +110,9 @@ def test_the_density_is_that_asked_for_at_the_focus(around, mid):
     assert box.sum() == pytest.approx(expected, abs=0.1 * expected + 4 * np.sqrt(expected))
 
 
-def test_two_seeds_of_one_number_are_the_same(twisting_heart, mid, seeded):
-    again = seed_surroundings(CONFIG, twisting_heart, mid, np.random.default_rng(5))
-    assert all(again[name].tobytes() == values.tobytes() for name, values in seeded.items())
-
-
 def test_their_power_in_a_volume_is_that_of_muscle_times_the_level(seeded, mid):
-    amplitude = seeded["amplitude"]
-    lateral, axial, elevation = mid.to_image(seeded["position"]).T
+    amplitude = seeded.amplitude
+    lateral, axial, elevation = mid.to_image(seeded.position).T
     box = (np.abs(lateral) < 2e-3) & (np.abs(axial - 7e-3) < 3e-3) & (np.abs(elevation) < 0.15e-3)
     power = (amplitude[box] ** 2).sum() / (4e-3 * 6e-3 * 0.3e-3)
     error = 10 / np.log(10) * np.sqrt(2 / box.sum())

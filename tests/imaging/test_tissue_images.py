@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenes import random, scene
 
 from echotruth.config import Config
 from echotruth.imaging.labels import TissueLabel, unpack
 from echotruth.imaging.medium.anatomy import FOLLOWING_BASE
-from echotruth.imaging.medium.mitral_valve import Leaflets, seed_leaflets
-from echotruth.imaging.medium.papillary_muscles import PapillaryMuscles, seed_papillary_muscles
-from echotruth.imaging.medium.surroundings import AroundHeart, seed_surroundings
+from echotruth.imaging.medium.mitral_valve import Leaflets
+from echotruth.imaging.medium.papillary_muscles import PapillaryMuscles
+from echotruth.imaging.medium.surroundings import Surroundings
 from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
@@ -29,10 +30,6 @@ EJECTED = np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.6, 0.2, 0.1])
 ES = 3
 
 
-def random(name):
-    return np.random.default_rng(list(name.encode()))
-
-
 @pytest.fixture(scope="module")
 def heart(twisting_heart, coarse_mesh):
     """A ventricle that narrows by a fifth, turns by 3 degrees, and whose base descends by 0.5 mm, as it empties."""
@@ -43,8 +40,13 @@ def heart(twisting_heart, coarse_mesh):
 
 
 @pytest.fixture(scope="module", params=["mid", "four_chamber"])
-def plane(request, heart):
-    return imaging_plane(CONFIG.views[request.param], CONFIG.rf, heart.endo_at_ed)
+def at(request, heart):
+    return scene(CONFIG, heart, request.param)
+
+
+@pytest.fixture(scope="module")
+def plane(at):
+    return at.plane
 
 
 @pytest.fixture(scope="module")
@@ -69,9 +71,8 @@ def test_the_wall_of_the_tissues_is_that_of_the_other_labels(truth):
     assert ((truth["tissue"] == TissueLabel.WALL) == mask).all() and mask.any((1, 2)).all()
 
 
-def test_scatterers_around_the_heart_are_in_pixels_of_their_label(heart, plane, truth):
-    seeded = seed_surroundings(CONFIG, heart, plane, random("surroundings"))
-    around = AroundHeart(CONFIG, heart, plane, seeded["position"], seeded["tissue"])
+def test_scatterers_around_the_heart_are_in_pixels_of_their_label(at, truth):
+    around = Surroundings.seed(at)
     seen = set()
     # Others come out of the wall as it draws back, and their label is that of what is beside them.
     visible = around.present(0, around.positions(0))
@@ -79,7 +80,7 @@ def test_scatterers_around_the_heart_are_in_pixels_of_their_label(heart, plane, 
         position = around.positions(frame)
         present = visible & around.present(frame, position)
         index, label = labels_at(truth["tissue"][frame], position[present])
-        own = seeded["tissue"][present][index]
+        own = around.tissue[present][index]
         # The atria, which follow the base, and the chest wall, which is at rest, lie over what moves otherwise.
         over = np.isin(label, (*FOLLOWING_BASE, TissueLabel.CHEST_WALL)) & (own == TissueLabel.OTHER)
         for tissue in np.unique(own[~over]):
@@ -94,20 +95,20 @@ def test_scatterers_around_the_heart_are_in_pixels_of_their_label(heart, plane, 
     assert {TissueLabel.OTHER, TissueLabel.RIGHT_VENTRICLE, TissueLabel.LUNG, TissueLabel.CHEST_WALL} <= seen
 
 
-def test_bodies_in_the_cavity_are_where_their_scatterers_are(heart, plane):
+def test_bodies_in_the_cavity_are_where_their_scatterers_are(at, heart, plane):
     dense = CONFIG.model_copy(update={"phantom": CONFIG.phantom.model_copy(update={"density_per_mm3": 2e4})})
-    drawn = [seed_leaflets(CONFIG, heart, random(f"leaflets {k}")) for k in range(10)]
-    valve = Leaflets(heart, *(np.concatenate([each[name] for each in drawn]) for name in ("place", "amplitude")))
-    muscles = PapillaryMuscles(heart, **seed_papillary_muscles(dense, heart, random("papillary_muscles")))
+    drawn = [Leaflets.seed(replace(at, random=lambda _, k=k: random(f"leaflets {k}"))) for k in range(10)]
+    valve = Leaflets(at, *(np.concatenate([getattr(each, name) for each in drawn]) for name in ("place", "amplitude")))
+    muscles = PapillaryMuscles.seed(replace(at, config=dense))
     is_long_axis = plane.axes[1, 2] != 0
     body, tissue = (valve, TissueLabel.MITRAL_LEAFLET) if is_long_axis else (muscles, TissueLabel.PAPILLARY_MUSCLE)
-    middle = plane.to_image(body.positions(0)).mean(axis=0)
+    middle = body.positions(0).mean(axis=0)
     axial, lateral = (middle[k] + np.arange(-80, 80) * 25e-6 for k in (1, 0))
     images = TissueImages(CONFIG, heart, plane, axial, lateral)
     # At end-systole the muscles are below the mid plane.
     for frame in (0, 2, 6):
         image = images(frame)
-        _, label = labels_at(image, plane.to_image(body.positions(frame)), axial, lateral)
+        _, label = labels_at(image, body.positions(frame), axial, lateral)
         assert len(label) > 100
         assert (label == tissue).mean() > 0.9, (frame, tissue.name, np.bincount(label))
 

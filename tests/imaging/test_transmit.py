@@ -77,10 +77,6 @@ def test_plane_waves_are_tilted_evenly_about_straight_ahead():
     assert np.allclose(np.degrees(np.arcsin(slope)), [-20, -10, 0, 10, 20])
 
 
-def test_a_single_wave_goes_straight_ahead():
-    assert not sent(transmit="plane", transmits=1).delay.any()
-
-
 def test_a_diverging_wave_is_on_a_circle_about_its_source():
     transmits = sent(transmit="diverging", transmits=3, angle_span_deg=60.0, virtual_source_mm=3.0)
     source = -3e-3 * np.array([np.sin(np.radians(30)), np.cos(np.radians(30))])

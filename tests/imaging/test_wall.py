@@ -1,25 +1,22 @@
 """The wall: its scatterers are spread evenly, normally strong, and ride with the tissue."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scenes import scene
 
 from echotruth.config import Config, Phantom
 from echotruth.fem.tetrahedra import interpolate
 from echotruth.fem.volume import cell_volumes
-from echotruth.imaging.medium.wall import seed_volume, seed_wall
-from echotruth.imaging.view import imaging_plane
+from echotruth.imaging.medium.wall import Wall
 
 CONFIG = Config(phantom=Phantom(density_per_mm3=1500.0))
 
 
 @pytest.fixture(scope="module")
-def scatterers(coarse_mesh):
-    return seed_volume(CONFIG.phantom, coarse_mesh.nodes, coarse_mesh.cells, np.random.default_rng(2))
-
-
-@pytest.fixture(scope="module")
-def mid(twisting_heart):
-    return imaging_plane(CONFIG.views["mid"], CONFIG.rf, twisting_heart.positions(0)[twisting_heart.endo.ravel()])
+def scatterers(twisting_heart):
+    return Wall.seed(scene(CONFIG, twisting_heart))
 
 
 def test_their_number_is_density_times_volume(scatterers, coarse_mesh):
@@ -29,7 +26,7 @@ def test_their_number_is_density_times_volume(scatterers, coarse_mesh):
 
 def test_every_cell_has_its_share(scatterers, coarse_mesh):
     expected = 1500e9 * cell_volumes(coarse_mesh.nodes, coarse_mesh.cells)
-    counted = np.bincount(scatterers.points.cell, minlength=len(expected))
+    counted = np.bincount(scatterers.cell, minlength=len(expected))
     chi_squared = ((counted - expected) ** 2 / expected).sum()
     assert abs(chi_squared - len(expected)) < 5 * np.sqrt(2 * len(expected))
 
@@ -47,27 +44,23 @@ def test_amplitudes_are_normal(scatterers):
     assert kstest(scatterers.amplitude, "norm").pvalue > 0.01
 
 
-def test_scatterers_follow_an_affine_motion_exactly(scatterers, twisting_heart, mid, affine):
-    heart, (matrix, shift) = twisting_heart, affine
-    before, after = (
-        mid.to_heart(scatterers.image_positions(heart.positions(frame), heart.cells, mid)) for frame in (0, 1)
-    )
+def test_scatterers_follow_an_affine_motion_exactly(scatterers, affine):
+    matrix, shift = affine
+    before, after = (scatterers.scene.plane.to_heart(scatterers.positions(frame)) for frame in (0, 1))
     assert np.abs(after - (before @ matrix.T + shift)).max() < 1e-16
 
 
-def test_in_plane_only_scatterers_start_in_the_plane_and_stay_there(twisting_heart, mid):
+def test_in_plane_only_scatterers_start_in_the_plane_and_stay_there(twisting_heart):
     heart = twisting_heart
-    config = CONFIG.model_copy(update={"phantom": Phantom(in_plane_only=True)})
-    flat = seed_wall(config, heart, mid, np.random.default_rng(0))
+    flat = Wall.seed(scene(Config(phantom=Phantom(in_plane_only=True)), heart))
     assert len(flat.points) > 1000
-    assert (flat.image_positions(heart.positions(1), heart.cells, mid)[:, 2] == 0).all()
-    started = mid.to_image(interpolate(heart.positions(0), heart.cells, flat.points))
+    assert (flat.positions(1)[:, 2] == 0).all()
+    started = flat.scene.plane.to_image(interpolate(heart.positions(0), heart.cells, flat.points))
     assert np.abs(started[:, 2]).max() < 1e-15
 
 
-def test_the_same_seed_gives_the_same_scatterers_and_another_others(coarse_mesh):
-    draws = [
-        seed_volume(CONFIG.phantom, coarse_mesh.nodes, coarse_mesh.cells, np.random.default_rng(k)) for k in (5, 5, 6)
-    ]
-    assert np.array_equal(draws[0].points.xi, draws[1].points.xi)
-    assert len(draws[0].points) != len(draws[2].points) or not np.array_equal(draws[0].points.xi, draws[2].points.xi)
+def test_the_same_seed_gives_the_same_scatterers_and_another_others(twisting_heart, scatterers):
+    same = scene(CONFIG, twisting_heart)
+    other = replace(same, random=lambda name: np.random.default_rng(6))
+    assert np.array_equal(Wall.seed(same).xi, scatterers.xi)
+    assert not np.array_equal(Wall.seed(other).xi, scatterers.xi)

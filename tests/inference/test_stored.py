@@ -1,6 +1,5 @@
 """What is inferred, as the store has it, and the stage that makes it."""
 
-import csv
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,11 +8,12 @@ import xarray as xr
 
 import echotruth as et
 from echotruth.cases import expand
+from echotruth.cli import check
 from echotruth.config.loading import ConfigError, validate
-from echotruth.inference import stored, tracker_errors
+from echotruth.inference import stored
 from echotruth.inference.stored import groups
-from echotruth.repository import ledger, schema
-from echotruth.workflow.plan import Plan
+from echotruth.repository import schema
+from echotruth.repository.version import version_of
 
 VIEWS = {"mid": {"position": 0.5}, "long": {"plane": "long_axis", "rotation_deg": 30.0}}
 CONFIG = et.configure(views=VIEWS, tracking={"trackers": {"dis": {"method": "dis"}}}, inference={"tracker": "dis"})
@@ -47,7 +47,7 @@ def test_values_stand_at_their_labels_and_what_was_not_seen_is_no_number():
     made = groups(given, {"mid 8": -0.28}, {"contractility.8": 0.0}, SimpleNamespace(config=CONFIG))
     assert set(made) == set(schema.INFERENCE)
     for group, arrays in made.items():
-        assert set(arrays) == {array.name for array in schema.named(group)}
+        assert set(arrays) == set(schema.arrays_of(group))
     parameters, seen = list(schema.LABELS["parameter"]), schema.observations(CONFIG)
     posterior = made["inference/posterior"]["value"]
     assert posterior.shape == (1, schema.DRAWS, len(parameters))
@@ -68,52 +68,31 @@ def test_values_stand_at_their_labels_and_what_was_not_seen_is_no_number():
     assert float(fit["identifiable"][parameters.index("contractility.2")]) == 0
 
 
-def plan(tmp_path, monkeypatch, **inference):
-    monkeypatch.chdir(tmp_path)
-    values = CONFIG.model_dump(mode="json") | {"cases": {"seed": [1, 2]}}
-    return Plan(values | {"inference": inference})
-
-
-def test_rule_takes_what_was_tracked_in_all_views_of_the_images_that_are_named(tmp_path, monkeypatch):
-    made = plan(tmp_path, monkeypatch, tracker="dis", size_px=256)
-    case = next(iter(made.cases))
-    wanted = [str(ledger.record_path(made.folder, "tracking", case, view, 256)) for view in VIEWS]
-    assert made.tracked(SimpleNamespace(case=case)) == wanted
-    records = made.records(SimpleNamespace())
-    assert [path for path in records if "/inference/" in path] == [
-        str(ledger.record_path(made.folder, "inference", one)) for one in made.cases
-    ]
-    without = plan(tmp_path, monkeypatch)
-    assert not [path for path in without.records(SimpleNamespace()) if "/inference/" in path]
-
-
-def test_other_errors_of_the_tracker_are_other_settings(tmp_path, monkeypatch):
+def test_other_errors_of_the_tracker_are_another_version(tmp_path):
     table = tmp_path / "mine.csv"
-    rows = list(csv.reader(tracker_errors.SHIPPED.open(encoding="utf-8")))
-    versions = []
-    for correlation in ("0.5", "0.9"):
-        rows[1][-1] = correlation
-        with table.open("w", encoding="utf-8", newline="") as file:
-            csv.writer(file).writerows(rows)
-        made = plan(tmp_path, monkeypatch, tracker="dis", size_px=256, errors=str(table))
-        versions.append(made.settings("inference")(SimpleNamespace()))
-    assert versions[0] != versions[1]
+    config = et.configure(CONFIG, inference={"errors": str(table)})
+    versions = [version_of("inference", config)]
+    for content in ("one", "two"):
+        table.write_text(content)
+        versions.append(version_of("inference", config))
+    assert len(set(versions)) == 3
 
 
 @pytest.mark.parametrize(
     ("inference", "said"),
     [
-        ({"tracker": "dis", "size_px": 512}, "inference: tracker: the error of dis at 512 px with ideal acoustics"),
-        ({"tracker": "dis", "errors": "none.csv"}, "inference: none.csv: there is no such table of errors"),
+        ({"size_px": 512}, "inference: tracker: the error of dis at 512 px with ideal acoustics"),
+        ({"errors": "none.csv"}, "inference: none.csv: there is no such table of errors"),
         (
-            {"tracker": "dis", "size_px": 256, "prior": {"fibres.endo_deg": [95, 8]}},
-            "inference: prior: fibres.endo_deg = .95, 8.: give a mean from -90 to 90",
+            {"size_px": 256, "prior": {"fibres.endo_deg": [95, 8]}},
+            "inference: prior: fibres.endo_deg = (95, 8): give a mean from -90 to 90",
         ),
     ],
 )
-def test_what_cannot_be_inferred_from_is_refused_before_the_run(tmp_path, monkeypatch, inference, said):
-    with pytest.raises(ConfigError, match=said):
-        plan(tmp_path, monkeypatch, **inference)
+def test_check_tells_from_what_cannot_be_inferred(inference, said):
+    config = et.configure(CONFIG, inference=inference)
+    (found,) = check._of_inference(config, expand(config))
+    assert found.startswith(said)
 
 
 def test_prior_of_the_configuration_is_that_of_what_is_inferred(monkeypatch):

@@ -49,10 +49,14 @@ def moved(position, start, end):
     return position @ np.linalg.inv(first).T @ second.T
 
 
+def coordinate(items, name):
+    return items.repository.read(f"truth/{items.size}/{name}", *items.places[0])
+
+
 def centres(items):
     """Pixel centres about the fixed point of the motion, which is at the transmit focus, (axial, lateral, 3), m."""
     index = (np.arange(items.size) - (items.size - 1) / 2) * items.spacing
-    axial = items.repository.read(f"truth/{items.size}/axial", ...) - items.repository.config.rf.si().focus
+    axial = coordinate(items, "axial") - items.repository.config.rf.si().focus
     return np.stack(np.broadcast_arrays(index, axial[:, None], 0.0), axis=-1)
 
 
@@ -69,7 +73,7 @@ def linear(repository, tmp_path_factory):
 
 def quantum(items):
     """Step of the stored flow, m."""
-    return items.repository.array(f"truth/{items.size}/flow").attrs["quantum"]
+    return items.repository.array(f"truth/{items.size}/flow", *items.places[0]).attrs["quantum"]
 
 
 @pytest.mark.parametrize("size", [64, 32])
@@ -88,13 +92,13 @@ def test_flow_is_the_affine_motion_from_frame_to_frame(repository, size):
 
 def test_tissue_leaves_and_enters_where_the_motion_takes_it_beyond_half_the_slice(repository):
     pairs = learning.FlowPairs(repository, views=["mid"])
-    axial, lateral = (pairs.repository.read(f"truth/{SIZE}/{name}", ...) for name in ("axial", "lateral"))
+    axial, lateral = (coordinate(pairs, name) for name in ("axial", "lateral"))
     assert_leaves_and_enters(pairs, slice_thickness(Config(), np.hypot(axial[:, None], lateral)) / 2)
 
 
 def test_slice_of_a_linear_scan_is_as_thick_as_at_its_depth(linear):
     pairs = learning.FlowPairs(linear, views=["mid"])
-    axial = pairs.repository.read(f"truth/{SIZE}/axial", ...)
+    axial = coordinate(pairs, "axial")
     assert_leaves_and_enters(pairs, slice_thickness(Config(), np.tile(axial[:, None], SIZE)) / 2)
     position, seen = (learning.PointTracks(linear, views=["mid"], points=200)[0][name] for name in NAMES)
     half = slice_thickness(Config(), position[..., 1]) / 2
@@ -154,11 +158,11 @@ def test_labels_are_those_of_the_notebook(repository, target):
 
 
 def test_strain_and_diagnosis_are_those_of_the_heart(repository):
-    means, part = et.Repository(repository).tree["kinematics"]["strain_mean"], {"views": ["mid"], "size": 32}
+    hearts, part = et.Repository(repository), {"views": ["mid"], "size": 32}
     for strain, diagnosis in zip(
         learning.Strain(repository, **part), learning.Diagnosis(repository, **part), strict=True
     ):
-        heart, mean = et.Repository(repository).heart(strain["case"]), means.sel(case=strain["case"])
+        heart, mean = hearts.heart(strain["case"]), hearts.read("kinematics/strain_mean", strain["case"])
         np.testing.assert_allclose(strain["strain"], mean, atol=1e-7)
         assert strain["es_frame"] == heart.es
         assert diagnosis["label"] == (heart.region == 1).any() == (diagnosis["scar_size"] > 0)

@@ -6,12 +6,12 @@ import pytest
 from echotruth.learning.table import _selected
 
 FOUND = pd.DataFrame({"status": ["complete", "failed"], "ejection_fraction": [0.6, 0.4], "fibres.endo_deg": [60, 66]})
-CONSTANTS = {"loop.edv_uL": 50.0}
+PARAMETERS = FOUND[["fibres.endo_deg"]].assign(**{"loop.edv_uL": 50.0})
 
 
 def test_query_over_columns_and_over_keys_that_are_the_same_in_all_cases():
-    assert list(_selected(FOUND, CONSTANTS, "status == 'complete' and `loop.edv_uL` > 40")) == [0]
-    assert list(_selected(FOUND, CONSTANTS, "`fibres.endo_deg` > 60")) == [1]
+    assert list(_selected(FOUND, PARAMETERS, "status == 'complete' and `loop.edv_uL` > 40")) == [0]
+    assert list(_selected(FOUND, PARAMETERS, "`fibres.endo_deg` > 60")) == [1]
 
 
 @pytest.mark.parametrize(
@@ -30,5 +30,5 @@ def test_query_over_columns_and_over_keys_that_are_the_same_in_all_cases():
 )
 def test_query_that_cannot_be_evaluated_is_told_with_what_would_be_right(query, sentence):
     with pytest.raises(ValueError) as error:
-        _selected(FOUND, CONSTANTS, query)
+        _selected(FOUND, PARAMETERS, query)
     assert str(error.value).startswith(f"query = {query!r}: {sentence}") and "\n" not in str(error.value)

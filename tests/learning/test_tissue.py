@@ -9,14 +9,13 @@ import echotruth as et
 from echotruth import learning
 from echotruth.config import Bmode, Motion
 from echotruth.config.motion import Affine
-from echotruth.export.clip import Clip
-from echotruth.export.overlay import pictures
 from echotruth.imaging.labels import TissueLabel
 from echotruth.repository.check import check
+from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.overlay import pictures
 from echotruth.viewer import clip as viewer
 from echotruth.viewer.points import Points
 from echotruth.viewer.tint import tint
-from workflow.scripts import truth
 
 NONE, MOUSE = 0, 1
 
@@ -30,11 +29,7 @@ def folder(tmp_path_factory):
         bmode=Bmode(size_px=64, downsampling=(2,)),
         motion=motion,
     )
-    return finish(tmp_path_factory.mktemp("tissues"), config, _result)
-
-
-def _result(job):
-    return truth.work(job) if job.stage == "truth" else learning_repository.of_job(job)
+    return finish(tmp_path_factory.mktemp("tissues"), config, learning_repository.of_job)
 
 
 def test_every_heart_has_its_tissues(folder):

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.config import Loop
-from echotruth.loop.cycle import read_loop
-from echotruth.loop.phases import CONTRACTION, EJECTION, FILLING, RELAXATION, es_frame, noise, phases
+from echotruth.loop.phases import CONTRACTION, EJECTION, FILLING, RELAXATION, noise, phases
 
 
 def beat(frames, opens=0.1, closes=0.45, fills=0.65):
@@ -45,18 +43,6 @@ def test_noise_is_read_off_the_curve():
     _, volume = beat(2000)
     assert noise(volume) < 1e-12
     assert noise(volume + 3e-10 * rng.normal(size=2000)) == pytest.approx(3e-10, rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("name", "opens", "fills"),
-    [("mouse", 8.2 / 120, 79.6 / 120), ("rat", 12 / 160, 123.5 / 160), ("human", 46 / 800, 428 / 800)],
-)
-def test_shipped_loops_have_the_phases_at_their_head(name, opens, fills):
-    loop = read_loop(Loop(file=name, frames=100))
-    contraction, ejection, relaxation = ends(phases(loop.pressure, loop.volume))
-    assert contraction == pytest.approx(100 * opens, abs=3)
-    assert relaxation == pytest.approx(100 * fills, abs=4)
-    assert ejection == es_frame(loop.pressure, loop.volume)
 
 
 def test_a_heart_that_is_only_filled_and_emptied_has_labels_too():

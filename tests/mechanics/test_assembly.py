@@ -27,6 +27,7 @@ def test_fixed_base_does_not_move(mesh):
     moved = assembly.displacement(np.ones(assembly.n_equations))
     assert np.all(moved[mesh.base] == 0)
     assert assembly.n_equations == 3 * (len(mesh.nodes) - len(np.unique(mesh.base)))
+    assert Assembly(mesh, base_support(mesh, "elastic")).n_equations == 3 * len(mesh.nodes)
 
 
 def test_sums_are_those_of_dense_matrices(mesh):

@@ -10,7 +10,7 @@ from echotruth.mechanics.solver.cavity import cavity_volume, volume_gradient, vo
 
 @pytest.fixture(scope="module")
 def mesh():
-    return left_ventricle(Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1))
+    return left_ventricle(Geometry(circumferential_elements=6, longitudinal_elements=4, transmural_elements=1))
 
 
 def derivatives(nodes, endo):
@@ -42,16 +42,3 @@ def test_hessian_is_the_derivative_of_the_gradient_and_symmetric(mesh):
     predicted = np.einsum("frc,fc->fr", hessian, change[mesh.endo].reshape(len(mesh.endo), 18))
     np.testing.assert_allclose(predicted, slope, atol=1e-10 * np.abs(slope).max())
     np.testing.assert_array_equal(hessian, hessian.swapaxes(1, 2))
-
-
-def test_volume_is_homogeneous_of_degree_three(mesh):
-    gradient, _ = derivatives(mesh.nodes, mesh.endo)
-    assert np.sum(gradient * mesh.nodes[mesh.endo]) == pytest.approx(
-        3 * cavity_volume(mesh.nodes, mesh.endo), rel=1e-12
-    )
-
-
-def test_a_shift_of_the_heart_in_the_plane_of_the_base_keeps_the_volume(mesh):
-    wide = mesh.nodes * [1.2, 0.9, 1.1]
-    gradient, _ = derivatives(wide, mesh.endo)
-    assert np.abs(gradient[..., :2].sum(axis=(0, 1))).max() < 1e-12 * np.abs(gradient).sum()

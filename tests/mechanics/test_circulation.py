@@ -1,20 +1,24 @@
 """Hearts in a circulation: the healthy one gives its loop back, and changed ones change as in life."""
 
+import warnings
+
 import numpy as np
 import pytest
 
-from echotruth.config import Config
+from echotruth.config import Config, Physiology
 from echotruth.heart import Heart
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat
+from echotruth.mechanics.bounds import violation
 from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.physiology import measured_heart
 from echotruth.mechanics.solver import circulation as solver
 from echotruth.mechanics.solver.newton import Diverged
 from echotruth.mechanics.solver.wall import equilibrium, wall
+from echotruth.notebook import simulation
 
-COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
+COARSE = {"circumferential_elements": 6, "longitudinal_elements": 4, "transmural_elements": 1}
 
 
 def heart(frames=12, geometry=None, pathology=None, **factors):
@@ -97,10 +101,10 @@ def test_late_wall_is_stretched_before_it_shortens():
 
 @pytest.mark.slow
 def test_steady_beat_does_not_depend_on_how_the_arteries_are_hastened(monkeypatch):
-    hastened, _ = measured(heart(frames=12, resistance=1.15))
+    hastened, _ = measured(heart(frames=12, resistance=1.15, beats_max=40))
     monkeypatch.setattr(solver, "STEADY", 5e-4)
     monkeypatch.setattr(solver, "_hastened", lambda circulation, first, last: last)
-    natural, _ = measured(heart(frames=12, resistance=1.15))
+    natural, _ = measured(heart(frames=12, resistance=1.15, beats_max=40))
     for name in ("pressure", "volume", "arterial_pressure"):
         assert np.abs(hastened[name] - natural[name]).max() < 0.01 * np.abs(natural[name]).max()
 
@@ -114,6 +118,20 @@ def test_bounds_of_healthy_hearts_are_not_asked_of_changed_ones(healthy):
     assert "circumferential_strain_min" in measured_heart(healthy, heart(40))[1]
     assert "circumferential_strain_min" not in measured_heart(healthy, heart(40, contractility=0.6))[1]
     assert "circumferential_strain_min" not in measured_heart(healthy, heart(40, geometry={"hypertrophy": 1.2}))[1]
+
+
+@pytest.mark.parametrize("contractility", [1.0, 0.6])
+def test_notebook_and_workflow_judge_a_heart_alike(healthy, monkeypatch, contractility):
+    """The bounds of healthy hearts, here one that none meets, are asked of those that differ in nothing."""
+    monkeypatch.setattr(simulation, "simulate", lambda config: dict(healthy))
+    config = heart(40, contractility=contractility)
+    config = config.model_copy(update={"physiology": Physiology(circumferential_strain_min=-0.08)})
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        simulation.beat(config, progress=False)
+    reason = violation(measured_heart(healthy, config)[1], config.physiology)
+    assert bool(reason) == (contractility == 1)
+    assert [str(each.message) for each in told] == [f"implausible heart: {reason}"] * bool(reason)
 
 
 def test_tension_of_a_late_wall_follows_the_velocity_in_a_circulation_only():

@@ -16,11 +16,9 @@ from echotruth.mechanics.solver.cycle import solve
 from echotruth.mechanics.solver.newton import Diverged
 from echotruth.mechanics.solver.wall import equilibrium, wall
 
-COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)
+COARSE = Geometry(circumferential_elements=6, longitudinal_elements=4, transmural_elements=1)
 ELASTIC = Mechanics(
-    viscosity_Pa_s=0.0,
-    pericardium={"dashpot_kPa_s_per_mm": 0.0},
-    active={"shortening_velocity_max_per_s": None},
+    viscosity_Pa_s=0.0, pericardium={"dashpot_kPa_s_per_mm": 0.0}, active={"shortening_velocity_max_per_s": None}
 )
 CONFIG = Config(geometry=COARSE, loop=Loop(frames=12), mechanics=ELASTIC)
 

@@ -11,7 +11,7 @@ BOX = 20e-3
 
 @pytest.fixture(scope="module")
 def positions():
-    return np.random.default_rng(1).uniform(0, BOX, (20000, 3))
+    return np.random.default_rng(1).uniform(0, BOX, (8000, 3))
 
 
 def test_numbers_are_normal_with_standard_deviation_one(positions):
@@ -21,8 +21,7 @@ def test_numbers_are_normal_with_standard_deviation_one(positions):
     assert np.mean(values**4) / np.var(values) ** 2 == pytest.approx(3, abs=0.2)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("lengths", [0.25, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("lengths", [0.5, 1.5])
 def test_correlation_falls_with_the_distance_as_a_bell_curve(positions, lengths):
     way = np.random.default_rng(2).normal(size=positions.shape)
     way *= lengths * LENGTH / np.linalg.norm(way, axis=1, keepdims=True)
@@ -32,7 +31,7 @@ def test_correlation_falls_with_the_distance_as_a_bell_curve(positions, lengths)
 
 def test_a_place_has_its_number_in_whatever_order_and_another_seed_has_others(positions):
     values = random_field(positions, LENGTH, seed=7)
-    assert np.array_equal(random_field(positions[::-1].reshape(100, 200, 3), LENGTH, seed=7).ravel()[::-1], values)
+    assert np.array_equal(random_field(positions[::-1].reshape(100, 80, 3), LENGTH, seed=7).ravel()[::-1], values)
     assert abs(np.corrcoef(random_field(positions, LENGTH, seed=8), values)[0, 1]) < 0.05
 
 

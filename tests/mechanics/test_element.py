@@ -61,12 +61,11 @@ def test_homogeneous_deformation_leaves_the_inside_in_balance(mesh):
     np.testing.assert_allclose(out.volume, np.linalg.det(gradient) * unloaded, rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_rigid_rotation_needs_no_passive_force(mesh, name):
+def test_rigid_rotation_needs_no_passive_force(mesh):
     turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    out = response(mesh, mesh.nodes @ turn.T + 1e-3, cell_state(mesh), laws=law(name))
-    stretched = response(mesh, 1.01 * mesh.nodes * [1, 1, 0.9], cell_state(mesh), laws=law(name))
+    out = response(mesh, mesh.nodes @ turn.T + 1e-3, cell_state(mesh))
+    stretched = response(mesh, 1.01 * mesh.nodes * [1, 1, 0.9], cell_state(mesh))
     assert np.abs(out.force[:, 0]).max() < 1e-10 * np.abs(stretched.force[:, 0]).max()
 
 
@@ -76,7 +75,12 @@ def test_cell_that_is_inside_out_has_no_volume(mesh):
 
 @pytest.mark.parametrize(
     ("name", "power", "cross_fibre"),
-    [*((name, 2.0, (0.0, 0.0)) for name in LAWS), ("fung", 0.0, (0.0, 0.0)), ("fung", 2.0, (0.3, 0.2))],
+    [
+        ("fung", 2.0, (0.0, 0.0)),
+        ("holzapfel_ogden", 2.0, (0.0, 0.0)),
+        ("fung", 0.0, (0.0, 0.0)),
+        ("fung", 2.0, (0.3, 0.2)),
+    ],
 )
 def test_tangent_is_the_derivative_of_the_condensed_force(mesh, name, power, cross_fibre):
     rng, laws = np.random.default_rng(5), law(name, power, cross_fibre=cross_fibre)

@@ -5,16 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import scene
 from skimage.registration import phase_cross_correlation
 
-from echotruth.config import Config, Geometry
+from echotruth.config import Config
 from echotruth.config.loading import load
 from echotruth.fem.tetrahedra import Mesh, shape
 from echotruth.fem.volume import cell_volumes
 from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
 from echotruth.imaging.bmode import bmode_clip, time_gain_compensation
-from echotruth.imaging.medium.wall import seed_wall
+from echotruth.imaging.medium.wall import Wall
 from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.fibres import CENTROID
@@ -105,18 +106,6 @@ def test_tube_has_the_volume_of_a_tube_and_keeps_it():
     radius = np.hypot(*after[np.unique(mesh.endo), :2].T)
     np.testing.assert_allclose(radius, 0.65 * INNER, rtol=1e-12)
     assert np.ptp(after[:, 2]) == pytest.approx(0.9 * LENGTH)
-
-
-def test_the_ventricle_of_a_file_or_preset_can_be_shifted_as_well():
-    section = {"kind": "rigid", "time_course": "ramp", "rigid": {"lateral_um": 50.0, "axial_um": 0.0}}
-    setting = Config(
-        geometry=Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1),
-        loop={"file": "mouse", "frames": 2},
-        motion=section,
-    )
-    np.testing.assert_allclose(
-        prescribed_motion(setting)["mechanics"]["displacement"][1] - [-50e-6, 0, 0], 0, atol=1e-18
-    )
 
 
 def test_a_shift_has_its_components_in_the_short_axis_image_and_no_strain():
@@ -224,11 +213,9 @@ def test_the_image_moves_as_asked():
     imaging = {"phantom": {"density_per_mm3": 300.0}, "probe": {"elements": 32}, "rf": {"lines": 128}}
     setting = Config(**{**setting.model_dump(include={"geometry", "loop", "motion"}), **imaging})
     moving = heart(setting)
-    view = imaging_plane(setting.views["mid"], setting.rf, moving.positions(0)[moving.endo.ravel()])
-    scatterers = seed_wall(setting, moving, view, np.random.default_rng(1))
+    scatterers = Wall.seed(scene(setting, moving))
     scanner = Scanner(setting.probe, setting.rf, imaging_depth(setting.rf, setting.bmode))
-    places = [scatterers.image_positions(moving.positions(frame), moving.cells, view) for frame in (0, 1)]
-    lines = np.stack([scanner.lines(place, scatterers.amplitude) for place in places])
+    lines = np.stack([scanner.lines(scatterers.positions(frame), scatterers.amplitude) for frame in (0, 1)])
     gain = time_gain_compensation(setting.probe, setting.bmode, scanner.range)
     before, after = bmode_clip(lines, scanner.scan, scanner.range, setting.bmode, gain)[512].astype(float)
     shift = phase_cross_correlation(after, before, upsample_factor=100, normalization=None)[0]

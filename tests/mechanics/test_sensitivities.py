@@ -7,7 +7,7 @@ import echotruth as et
 from echotruth.config.loading import ConfigError
 from echotruth.loop.cycle import read_loop
 
-COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
+COARSE = {"circumferential_elements": 6, "longitudinal_elements": 4, "transmural_elements": 1}
 # Changes so small that no step of the load is halved in one heart and not in the next.
 HEART = et.configure(geometry=COARSE | {"wall_mm": 1.0}, loop={"frames": 12, "esp_mmHg": 100.0})
 FILLED = et.configure(HEART, **{"mechanics.material.stiffness_kPa": 1.2})

@@ -153,10 +153,7 @@ def test_a_dashpot_alone_delays_and_a_slow_beat_does_not_feel_it():
 
 def base_motion(axial_spring, circumferential_spring):
     """Rotation of the inner less that of the outer rim of the base (rad), and the largest axial motion (m), at ES."""
-    springs = {
-        "axial_spring_kPa_per_mm": axial_spring,
-        "circumferential_spring_kPa_per_mm": circumferential_spring,
-    }
+    springs = {"axial_spring_kPa_per_mm": axial_spring, "circumferential_spring_kPa_per_mm": circumferential_spring}
     mechanics = Mechanics(base="elastic", elastic_base=springs, hold="base")
     mesh, heart = left_ventricle(COARSE), beat(Config(geometry=COARSE, loop=Loop(frames=10), mechanics=mechanics))
     displacement, es = heart["mechanics"]["displacement"], int(heart["mechanics"]["es_frame"])

@@ -10,9 +10,7 @@ from echotruth.mechanics.solver import unloaded
 from echotruth.mechanics.solver.cavity import cavity_volume
 from echotruth.mechanics.solver.newton import Diverged
 
-IMAGE = Geometry(
-    circumferential_elements=12, longitudinal_elements=6, transmural_elements=1, given_state="end_diastole"
-)
+IMAGE = Geometry(circumferential_elements=6, longitudinal_elements=4, transmural_elements=1, given_state="end_diastole")
 
 
 def config(**loop):

@@ -16,5 +16,5 @@ def standings(hearts):
 
 def test_it_says_what_the_bootstrap_draws():
     assert "over the 3 hearts." in board.of(standings(3), 64, 3)["interval"]
-    assert "over the 3 hearts (label.heart) of the 7 cases." in board.of(standings(3), 64, 7)["interval"]
+    assert "over the 3 hearts of the 7 cases." in board.of(standings(3), 64, 7)["interval"]
     assert "no intervals" in board.of(standings(1), 64, 2)["interval"]

@@ -10,12 +10,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pandas as pd
 import pytest
-import zarr
 from known_repository import FRAMES, SETTINGS, make
 from reported_repository import report
 from shown_repository import SHIFT
 
 from echotruth.report import page
+from echotruth.repository import metadata
 from echotruth.repository.reader import Repository
 
 pytestmark = [
@@ -132,9 +132,9 @@ def test_page_shows_its_figures_in_its_own_colours(text):
 
 def test_page_of_a_repository_without_a_complete_heart_says_why(reported, tmp_path):
     folder = shutil.copytree(reported.folder, tmp_path / "known")
-    cases = zarr.open_group(folder / "known.zarr/cases", mode="r+")
-    cases["status"][:] = np.array(["failed"], dtype=object)
-    cases["reason"][:] = np.array(["no <b>equilibrium</b> in frame 3"], dtype=object)
+    metadata.write(
+        folder / "known.zarr/hearts/heart", {"status": "failed", "reason": "no <b>equilibrium</b> in frame 3"}
+    )
     said = report(folder)
     assert "no &lt;b&gt;equilibrium&lt;/b&gt; in frame 3" in said and "<b>equilibrium" not in said
     assert sections(said) == ["made", "hearts", "failures", "provenance", "use", "cite"]

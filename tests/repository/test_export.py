@@ -6,10 +6,9 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-import yaml
 
-from echotruth.export import Export, ExportError, Selection
 from echotruth.repository.reader import Repository
+from echotruth.sharing.export import Export, Selection
 
 pytestmark = pytest.mark.slow
 
@@ -23,8 +22,8 @@ def folder(rf_repository):
 
 @pytest.fixture(scope="module")
 def rf(folder):
-    with xr.open_zarr(folder / "small.zarr", group="rf", consolidated=False) as group:
-        return group.sel(case="heart", view="mid").load()
+    with xr.open_zarr(folder / "small.zarr", group="clips/heart/mid/rf", consolidated=False) as group:
+        return group.load()
 
 
 def export(folder, name, case, view, output=None):
@@ -216,43 +215,31 @@ def test_lines_of_the_uff_have_the_properties_of_their_class_and_the_sampling_in
         assert file["channel_data/sampling_frequency"][()] == rf.attrs["sampling_frequency"]
 
 
-SIZES = {"element_width": 30e-6, "element_height": 3e-3}
-
-
-def test_size_of_the_elements_is_that_of_the_case(rf_repository):
-    """A case of which both are swept."""
+def test_sizes_of_the_elements_are_those_of_the_array(folder):
     h5py = pytest.importorskip("h5py")
-    folder = rf_repository()
-    config = yaml.safe_load((folder / "config.yaml").read_text())
-    config["cases"] = {"table": "case,probe.width_um,probe.height_mm\nheart,30,3\n"}
-    (folder / "config.yaml").write_text(yaml.safe_dump(config))
     with h5py.File(written(folder, "uff")) as uff, h5py.File(written(folder, "zea")) as zea:
-        for name, value in SIZES.items():
-            for group in (uff["channel_data/probe"], uff["beamformed_data/probe"], zea["probe"]):
-                assert group[name][()] == pytest.approx(value)
+        for group in (uff["channel_data/probe"], uff["beamformed_data/probe"], zea["probe"]):
+            assert group["element_width"][()] == pytest.approx(41e-6)  # of mouse_25MHz
+            assert group["element_height"][()] == pytest.approx(1e-3)
         geometry = uff["channel_data/probe/geometry"][5:]
-    np.testing.assert_allclose(geometry.T, np.tile(list(SIZES.values()), (ELEMENTS, 1)))
+    np.testing.assert_allclose(geometry.T, np.tile([41e-6, 1e-3], (ELEMENTS, 1)))
 
 
 @pytest.mark.parametrize("name, suffix", [("uff", ".uff"), ("zea", ".hdf5")])
-@pytest.mark.parametrize(
-    "keep, there, absent", [("lines", "beamformed_data", "a"), ("channels", "a", "beamformed_data")]
-)
-def test_only_what_is_kept_is_written(rf_repository, tmp_path, name, suffix, keep, there, absent):
+def test_channels_are_written_where_they_are_kept(rf_repository, tmp_path, name, suffix):
     h5py = pytest.importorskip("h5py")
     found = []
-    with h5py.File(export(rf_repository([keep]), name, "heart", "mid", tmp_path / f"a{suffix}")) as file:
+    with h5py.File(export(rf_repository([]), name, "heart", "mid", tmp_path / f"a{suffix}")) as file:
         file.visit(found.append)
     leaves = {path.rpartition("/")[2] for path in found}
-    assert ("beamformed_data" in leaves) == (keep == "lines")
-    assert bool({"raw_data", "channel_data"} & leaves) == (keep == "channels")
+    assert "beamformed_data" in leaves and not {"raw_data", "channel_data"} & leaves
 
 
 REFUSED = {
     ("nowhere", "heart", "mid"): "is not a repository",
     ("small", "hart", "mid"): "case = 'hart': use one of heart",
-    ("small", "heart", "middle"): "view = 'middle': use one of apex, mid",
-    ("small", "heart", "apex"): "heart has no RF of apex",
+    ("small", "heart", "middle"): "view = 'middle': use one of mid, apex",
+    ("small", "heart", "apex"): "has no rf of heart apex yet: run it to its end",
 }
 
 
@@ -262,16 +249,6 @@ def test_what_is_not_there_is_said_in_one_sentence(folder, tmp_path, asked):
     place, case, view = asked
     with pytest.raises((ValueError, FileNotFoundError), match=REFUSED[asked]):
         export(folder if place == "small" else tmp_path, "uff", case, view)
-
-
-def test_repository_without_rf_is_said_so(rf_repository, rf_layout):
-    from echotruth.repository.store import Store
-
-    pytest.importorskip("h5py")
-    folder = rf_repository(["lines"])
-    rf_layout(Store(folder / "small.zarr"), [])
-    with pytest.raises(ExportError, match=r"keeps no RF: set rf\.keep to \[lines, channels\]"):
-        export(folder, "zea", "heart", "mid")
 
 
 def test_missing_h5py_is_said_in_one_line(folder):

@@ -1,6 +1,6 @@
 """What is inferred, in the store: of a repository whose jobs are all done, with draws that are known."""
 
-import runpy
+import shutil
 
 import finished_repository as finished
 import numpy as np
@@ -10,18 +10,14 @@ import xarray as xr
 from echotruth.cases import expand
 from echotruth.config import Inference, Motion, PhaseCorrelation, Tracking
 from echotruth.config.loading import ConfigError, validate
-from echotruth.release.parts import heart_files
 from echotruth.report import account
 from echotruth.report import inference as drawing
-from echotruth.repository import inferred, ledger, schema, settings
+from echotruth.repository import inferred, schema
 from echotruth.repository.check import check
-from echotruth.repository.inventory import Inventory
-from echotruth.repository.layout import lay_out
-from echotruth.repository.merge import take_over
 from echotruth.repository.publication import publish
 from echotruth.repository.reader import Repository
-from echotruth.workflow.job import Job, run
-from echotruth.workflow.processes import script
+from echotruth.repository.version import version_of
+from echotruth.workflow.job import Job
 
 CONFIG = finished.configured(motion=Motion(), inference=Inference(tracker="one"))
 CASES = [case.id for case in expand(CONFIG)]
@@ -29,11 +25,12 @@ SEEN = schema.observations(CONFIG)
 
 
 def result(job):
-    arrays = finished.result(job)
+    arrays = finished.blank(job)
     if job.stage == "inference":
+        row = CASES.index(job.case.id)
         names = schema.LABELS["parameter"]
         places = {name: place for place, name in enumerate(names)}
-        draws = np.random.default_rng(job.row).normal(1, 0.1, (1, schema.DRAWS, len(names)))
+        draws = np.random.default_rng(row).normal(1, 0.1, (1, schema.DRAWS, len(names)))
         draws[..., places["fibres.endo_deg"]] = np.nan  # is not inferred if fibres are read from a file
         scar = np.zeros((1, schema.DRAWS, 17))
         scar[:, : schema.DRAWS // 2, 7] = 1
@@ -42,7 +39,7 @@ def result(job):
             "mean": draws.mean((0, 1)),
             "scar_probability": scar.mean((0, 1)),
             "identifiable": np.arange(len(names)) % 2,
-            "misfit_probability": np.array([0.5, 0.001][job.row % 2]),
+            "misfit_probability": np.array([0.5, 0.001][row % 2]),
             "converged": np.array(1.0),
         }
         seen = np.full(len(SEEN), np.nan)
@@ -57,37 +54,29 @@ def folder(tmp_path_factory):
 
 
 def test_xarray_opens_the_groups_of_inference_data(folder):
-    tree = xr.open_datatree(folder / "small.zarr", group="inference", engine="zarr")
+    tree = xr.open_datatree(folder / f"small.zarr/inference/{CASES[1]}", engine="zarr")
     assert {*tree.children} == {
         *("posterior", "prior", "observed_data", "posterior_predictive", "constant_data", "fit"),
     }
-    posterior = tree["posterior"].to_dataset().sel(case=CASES[1])
+    posterior = tree["posterior"].to_dataset()
     assert posterior["value"].dims == ("chain", "draw", "parameter") and posterior.sizes["draw"] == schema.DRAWS
     due = np.random.default_rng(1).normal(1, 0.1, (1, schema.DRAWS, posterior.sizes["parameter"]))[0, :, 2]
     np.testing.assert_allclose(posterior["value"].isel(chain=0).sel(parameter="contractility.3"), due, rtol=1e-6)
     assert posterior["parameter_units"].sel(parameter="loop.esp_mmHg").item() == "mmHg"
-    seen = tree["observed_data"].to_dataset().sel(case=CASES[0])["value"]
+    seen = tree["observed_data"].to_dataset()["value"]
     assert seen.sel(observation="mid 7").item() == -0.12 and int(seen.notnull().sum()) == 1
 
 
-def test_whole_repository_has_no_faults_and_is_of_one_job_more_a_heart(folder):
-    report = check(folder)
-    known = [fault for fault in report.faults if "inference" in str(fault)]
-    assert known == [] and report.jobs == len(CASES) * (2 + 5 * len(CONFIG.views))
-
-
-def test_damage_to_what_was_inferred_is_found_and_made_again(folder, tmp_path):
-    from shutil import copytree
-
-    copy = copytree(folder, tmp_path / "small")
-    shards = (copy / "small.zarr/inference/posterior/value/c/0").rglob("*")
+def test_damage_to_what_was_inferred_is_found(folder, tmp_path):
+    assert [fault for fault in check(folder).faults if "inference" in str(fault)] == []
+    copy = shutil.copytree(folder, tmp_path / "small")
+    shards = (copy / f"small.zarr/inference/{CASES[0]}/posterior/value/c").rglob("*")
     next(path for path in shards if path.is_file()).unlink()
-    assert [fault.records for fault in check(copy).faults if "inference" in str(fault)] == [
-        (ledger.record_path(copy, "inference", CASES[0]),)
-    ]
+    found = [str(fault) for fault in check(copy).faults if "inference" in str(fault)]
+    assert found and all(f"delete small.zarr/inference/{CASES[0]} and run" in fault for fault in found)
 
 
-def test_settings_are_those_of_the_section_and_of_all_that_was_tracked():
+def test_version_is_that_of_the_section_and_of_all_that_was_tracked():
     trackers = {name: PhaseCorrelation(window_px=16) for name in ("one", "two")}
     others = [
         finished.configured(motion=Motion(), tracking=Tracking(trackers=trackers), inference=Inference(tracker="two")),
@@ -97,9 +86,9 @@ def test_settings_are_those_of_the_section_and_of_all_that_was_tracked():
         finished.configured(motion=Motion(), inference=Inference(tracker="one", prior={"fibres.endo_deg": [75, 3]})),
         finished.configured(motion=Motion(), inference=Inference(tracker="one", prior={"fibres.endo_deg": None})),
     ]
-    hashes = [settings.of_job(config, "inference", None) for config in (CONFIG, *others)]
+    hashes = [version_of("inference", config) for config in (CONFIG, *others)]
     assert len(set(hashes)) == len(hashes)
-    assert len({settings.of_job(config, "mechanics", None) for config in (CONFIG, *others)}) == 1
+    assert len({version_of("mechanics", config) for config in (CONFIG, *others)}) == 1
 
 
 def test_table_has_a_row_for_each_heart_and_parameter_that_was_inferred(folder):
@@ -116,34 +105,10 @@ def test_table_has_a_row_for_each_heart_and_parameter_that_was_inferred(folder):
     assert list(table.groupby("case", sort=False)["misfit"].first()) == [False, True]
 
 
-def test_without_a_tracker_there_is_no_group_no_job_and_no_stage():
-    without = finished.configured()
-    assert not [group for group in schema.groups(without) if group.startswith("inference")]
-    assert schema.written_by("inference", without) == [] and "inference" not in ledger.stages(without)
-
-
-def test_tracker_that_leaves_takes_what_was_inferred_with_it(folder, tmp_path):
-    from shutil import copytree
-
-    copy = copytree(folder, tmp_path / "small")
-    finished.remake(copy, finished.configured(motion=Motion()))
-    assert not (copy / "small.zarr/inference").exists() and inferred.table(Repository(copy)).empty
-    assert [fault for fault in check(copy).faults if "inference" in str(fault)] == []
-
-
-def test_parts_of_a_release_have_what_was_inferred(folder):
-    names = {name for _, jobs in heart_files(Inventory(folder)) for files in jobs for name in files}
-    assert f"small/ledger/inference/{CASES[0]}.json" in names
-    assert any(name.startswith("small/small.zarr/inference/posterior/value/c/1/") for name in names)
-
-
-def test_another_repository_takes_it_over(folder, tmp_path):
-    target = tmp_path / "small"
-    lay_out(target, CONFIG, list(expand(CONFIG)))
-    taken, known = take_over(folder, target)
-    assert known == 0 and {record.case for record in taken if record.stage == "inference"} == set(CASES)
-    publish(target)
-    assert inferred.table(Repository(target)).equals(inferred.table(Repository(folder)))
+def test_without_a_tracker_nothing_is_inferred(folder, tmp_path):
+    copy = shutil.copytree(folder, tmp_path / "small")
+    without = finished.configured(motion=Motion())
+    assert finished.remake(copy, without) == ["repository"] and inferred.table(Repository(copy)).empty
 
 
 @pytest.mark.parametrize(
@@ -168,15 +133,13 @@ def test_settings_that_cannot_be_inferred_from_are_refused_in_a_sentence(given, 
 
 
 def test_heart_of_which_nothing_can_be_inferred_is_told_and_the_others_stay(folder, tmp_path):
-    from shutil import copytree
-
-    copy = copytree(folder, tmp_path / "small")
-    job = Job(copy, "inference", CASES[0], code="1")
-    run(job, runpy.run_path(script("inference"))["work"])  # the error of this tracker is not known
-    record = ledger.read(ledger.record_path(copy, "inference", CASES[0]))
-    assert record["status"] == "failed" and record["reason"].startswith("tracker: the error of one at 64 px")
-    publish(copy)
+    copy = shutil.copytree(folder, tmp_path / "small")
+    job = Job(copy, "inference", CASES[0])
+    finished.do(job, finished.solved)  # the error of this tracker is not known
+    publish(copy, CONFIG, expand(CONFIG))
     repository = Repository(copy)
+    found = repository.attributes("inference", CASES[0])
+    assert found["status"] == "failed" and found["reason"].startswith("tracker: the error of one at 64 px")
     assert inferred.hearts(repository) == CASES[1:]
     assert [fault for fault in check(copy).faults if "inference" in str(fault)] == []
     told = account.inference(repository, inferred.table(repository))

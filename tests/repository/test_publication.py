@@ -1,248 +1,139 @@
-"""A repository is published when every file is what its job wrote."""
+"""Publication: the table of the cases with what became of them, the metadata of the folders, and the checksums."""
 
-from pathlib import Path
+import re
+from contextlib import chdir
 from shutil import copytree
 
-import finished_repository as finished
-import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
+from finished_repository import blank, configured, content, finish, remake
 
 import echotruth as et
 from echotruth.cases import expand, table
-from echotruth.config import Bmode, Cases, Config, Geometry, Loop, PhaseCorrelation, Physiology, Tracking, View
-from echotruth.repository import ledger, schema
-from echotruth.repository.checksums import ChecksumError
-from echotruth.repository.layout import lay_out
-from echotruth.repository.ledger import stages
-from echotruth.repository.publication import publish
-from echotruth.repository.store import Store
-from echotruth.workflow.job import Job
+from echotruth.config import Physiology
+from echotruth.repository.publication import CHECKSUMS, checksum
+from echotruth.workflow.failure import CaseFailed
 
-CONFIG = Config(
-    name="small",
-    geometry=Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1),
-    loop=Loop(frames=4),
-    views={"mid": View(), "long_axis": View(plane="long_axis")},
-    bmode=Bmode(size_px=64, downsampling=(1, 2)),
-    tracking=Tracking(trackers={"one": PhaseCorrelation(window_px=16)}),
-    cases={"seed": [1, 2]},
-)
-CASES = expand(CONFIG)
-LENGTHENS = (
-    "the mean longitudinal strain at end-systole is 0.04 and must be at most 0 (physiology.longitudinal_strain_max)."
-)
+SWEEP = {"table": 'case,fibres.endo_deg,label.group,note\none,60,sham,"first, of ""three"""\ntwo,65,,\nthree,70,MI,\n'}
+CONFIG = configured(views=("mid",), cases=SWEEP)
+LENGTHENS = "the mean longitudinal strain at end-systole is 0.04 and must be at most 0"
 
 
-def ones(job: Job) -> dict:
-    """Ones in the shape of every array of a job."""
-    shapes = {group: finished.shapes(job.store.path, group) for group in written_by(job)}
-    return {group: {name: np.ones(shape) for name, shape in found.items()} for group, found in shapes.items()}
-
-
-def written_by(job: Job) -> list[str]:
-    return schema.written_by(job.stage, job.config, job.size or None)
+def result(job):
+    """The second heart lengthens, the third has no solution."""
+    if job.case.id == "three":
+        raise CaseFailed("no equilibrium at frame 3")
+    found = blank(job)
+    if job.stage == "mechanics" and job.case.id == "two":
+        job.notes["bounded"] = {"longitudinal_strain_max": 0.04}
+    return found
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory) -> Path:
-    """A repository of two cases, all of whose jobs are done."""
-    return finished.finish(tmp_path_factory.mktemp("done") / "small", CONFIG, ones)
+def done(tmp_path_factory):
+    return finish(tmp_path_factory.mktemp("done") / "small", CONFIG, result)
 
 
 @pytest.fixture
-def folder(done, tmp_path) -> Path:
-    """A copy of it of its own for every test: the jobs take much longer."""
+def folder(done, tmp_path):
     return copytree(done, tmp_path / "small")
 
 
-def test_whole_repository_is_verified_and_opens(folder):
-    summary = publish(folder)
-    assert (summary["complete"], summary["implausible"], summary["failed"]) == (2, 0, 0)
-    tree = xr.open_datatree(folder / "small.zarr")
-    assert list(tree["cases/status"].values) == ["complete", "complete"]
-    assert set(tree.attrs["code"]) == set(stages(CONFIG))
+def changed(**sections):
+    return CONFIG.model_copy(update=sections)
 
 
-def test_every_file_of_the_hierarchy_is_verified(folder):
-    written = {path for path in (folder / "small.zarr").rglob("*") if path.is_file()}
-    assert publish(folder)["files"] == len(written)
-    paths = (path for path in (folder / "ledger").rglob("*.json") if path.name != "repository.json")
-    records = [ledger.read(path).get("sha256", {}) for path in paths]
-    recorded = [name for record in records for name in record]
-    assert len(recorded) == len(set(recorded))
-    assert {folder / "small.zarr" / name for name in recorded} == written
+def test_table_has_a_row_a_case_with_its_heart_what_became_of_it_labels_and_keys(done):
+    found = pd.read_csv(done / "cases.csv", keep_default_na=False, dtype=str).set_index("case")
+    assert list(found["status"]) == ["complete", "implausible", "failed"]
+    assert found["reason"].iloc[0] == "" and found["reason"].iloc[1].startswith(LENGTHENS)
+    assert found["reason"].iloc[2] == "no equilibrium at frame 3"
+    assert list(found["heart"]) == [case.heart for case in expand(CONFIG)]
+    assert list(found["label.group"]) == ["sham", "", "MI"] and found["note"].iloc[0] == 'first, of "three"'
+    assert set(found.columns) == {*table(expand(CONFIG)).columns, "status", "reason", "heart"} - {"case"}
 
 
-@pytest.mark.parametrize("name", ["zarr.json", "bmode/64/image/zarr.json", "truth/32/view/c/0", "cases/status/c/0"])
-def test_damaged_structure_is_named(folder, name):
-    publish(folder)
-    file = folder / "small.zarr" / name
-    file.write_bytes(file.read_bytes()[:-1])
-    with pytest.raises(ChecksumError, match="differs from what was laid out: run again") as caught:
-        publish(folder)
-    assert str(file) in str(caught.value) and "\n" not in str(caught.value)
+def test_checksums_are_of_every_file_of_the_store_and_of_those_that_describe_it(done):
+    lines = (done / CHECKSUMS).read_text().splitlines()
+    listed = {name: hash for hash, name in (line.split("  ", 1) for line in lines)}
+    files = [path for path in (done / "small.zarr").rglob("*") if path.is_file()]
+    files += [done / "cases.csv", done / "config.yaml"]
+    assert listed == {path.relative_to(done).as_posix(): checksum(path) for path in files}
 
 
-@pytest.mark.parametrize("content", [None, "", "{", "[]", "{}"])
-def test_repository_whose_structure_nothing_vouches_for_is_not_published(folder, content):
-    record = folder / "ledger/structure.json"
-    record.unlink()
-    if content is not None:
-        record.write_text(content)
-    with pytest.raises(ChecksumError, match=r"structure\.json: is missing or damaged"):
-        publish(folder)
+def test_store_opens_as_a_tree_from_its_root_and_from_each_heart_and_clip(done):
+    tree = et.Repository(done).tree
+    assert set(tree["hearts"].children) == {case.heart for case in expand(CONFIG)}
+    assert {"title", "summary", "references", "config", "seed", "packages"} <= set(tree.attrs)
+    with xr.open_datatree(done / "small.zarr/clips/one/mid", engine="zarr", consolidated=True) as clip:
+        assert clip.attrs == {"case": "one", "view": "mid", "heart": expand(CONFIG)[0].heart}
+        assert clip["bmode/64/image"].dims == ("frame", "axial", "lateral")
+    assert not tree["clips/three/mid"]["rf"].variables
 
 
-def test_publishing_twice_gives_the_same_bytes(folder):
-    def content():
-        return {path: path.read_bytes() for path in (folder / "small.zarr").rglob("*") if path.is_file()}
-
-    publish(folder)
-    first = content()
-    publish(folder)
-    assert content() == first
-
-
-@pytest.mark.parametrize("harm", ["changed", "truncated", "missing"])
-@pytest.mark.parametrize("group, row", [("bmode/64", (1, 0)), ("mechanics", (0,)), ("evaluation/64/one", (0, 1))])
-def test_damaged_file_and_its_record_are_named(folder, group, row, harm):
-    file = Store(folder / "small.zarr").files(group, *row)[0]
-    content = bytearray(file.read_bytes())
-    content[len(content) // 2] ^= 1
-    file.write_bytes(content if harm == "changed" else content[:-1])
-    if harm == "missing":
-        file.unlink()
-    with pytest.raises(ChecksumError) as caught:
-        publish(folder)
-    assert str(file) in str(caught.value)
-    stage = {"evaluation/64/one": "tracking"}.get(group, group.partition("/")[0])
-    assert f"ledger/{stage}/{CASES[row[0]].id}" in str(caught.value)
-    assert "\n" not in str(caught.value)
+@pytest.mark.parametrize("case", ["two", "three"])
+def test_groups_of_a_heart_that_is_not_imaged_say_skipped_and_why(done, case):
+    repository = et.Repository(done)
+    for name in ("phantom", "rf", "truth/64", "bmode/64", "tracking/64"):
+        found = repository.attributes(name, case, "mid")
+        assert found["status"] == "skipped" and found["reason"] == repository.cases.loc[case, "reason"], name
+    assert repository.attributes("heart", "three")["status"] == "failed"
+    assert repository.arrays("mechanics", "two")["displacement"].size, "an implausible heart keeps its arrays"
+    assert repository.shown == ["one"]
 
 
-def test_heart_without_a_solution_is_told_with_its_reason(folder):
-    for job in finished.jobs(folder, CONFIG, CASES[1].id):
-        failed = job.stage == "mechanics"
-        job.lines.parent.mkdir(parents=True, exist_ok=True)  # as Snakemake does
-        job.commit_without_result("failed" if failed else "skipped", job.excluded() or "no equilibrium at frame 3")
-    assert publish(folder)["failed"] == 1
-    cases = xr.open_datatree(folder / "small.zarr")["cases"]
-    assert list(cases["status"].values) == ["complete", "failed"]
-    assert list(cases["reason"].values) == ["", "no equilibrium at frame 3"]
+def test_a_wider_bound_images_what_it_decides_otherwise_and_nothing_else(folder):
+    before = content(folder)
+    made = remake(folder, changed(physiology=Physiology(longitudinal_strain_max=0.1)), result)
+    stages = ["phantom two mid", "rf two mid", "truth two mid", "bmode two mid", "tracking two mid 64"]
+    assert made == [*stages, "repository"]
+    after = content(folder)
+    kept = [name for name in before if name.startswith(("small.zarr/hearts", "small.zarr/clips/one"))]
+    assert kept and all(after[name] == before[name] for name in kept)
+    assert list(et.Repository(folder).cases["status"]) == ["complete", "complete", "failed"]
 
 
-def doubt(folder):
-    """The second heart solved again, and found out of bounds."""
-    job = Job(folder, "mechanics", CASES[1].id)
-    job.note(bounded={"longitudinal_strain_max": 0.04})
-    job.commit(ones(job))
+def test_implausible_hearts_are_imaged_if_the_configuration_says_so(folder):
+    made = remake(folder, changed(physiology=Physiology(exclude_implausible=False)), result)
+    assert len(made) == 6 and all(" two " in name for name in made[:-1])
+    assert list(et.Repository(folder).cases["status"]) == ["complete", "implausible", "failed"]
 
 
-def change(folder, **sections):
-    """Lay the repository out for a configuration with other sections."""
-    config = CONFIG.model_copy(update=sections)
-    lay_out(folder, config, expand(config))
+def test_bound_that_decides_nothing_otherwise_changes_the_configuration_and_makes_nothing(folder):
+    assert remake(folder, changed(physiology=Physiology(twist_max_deg=89.0)), result) == ["repository"]
+    assert remake(folder, changed(physiology=Physiology(twist_max_deg=89.0)), result) == []
 
 
-def test_heart_out_of_bounds_keeps_its_arrays_and_is_marked(folder):
-    doubt(folder)
-    summary = publish(folder)
-    assert (summary["complete"], summary["implausible"], summary["failed"]) == (1, 1, 0)
-    tree = xr.open_datatree(folder / "small.zarr")
-    assert list(tree["cases/status"].values) == ["complete", "implausible"]
-    assert list(tree["cases/reason"].values) == ["", LENGTHENS]
-    assert (tree["mechanics/displacement"].isel(case=1) == 1).all()
-    assert (tree["physiology/scalars"].sel(scalar="longitudinal_strain") == 1).all()
+def test_label_that_changes_is_published_and_makes_nothing(folder):
+    other = changed(cases=CONFIG.cases.model_copy(update={"table": SWEEP["table"].replace("sham", "control")}))
+    assert remake(folder, other, result) == ["repository"]
+    assert list(et.Repository(folder).cases["label.group"]) == ["control", "", "MI"]
 
 
-@pytest.mark.parametrize("stage, place", [("phantom", ("mid",)), ("tracking", ("long_axis", 32))])
-def test_heart_out_of_bounds_is_imaged_only_where_the_configuration_says_so(folder, stage, place):
-    doubt(folder)
-    assert Job(folder, stage, CASES[0].id, *place).excluded() == ""
-    assert Job(folder, stage, CASES[1].id, *place).excluded() == LENGTHENS
-    assert Job(folder, "mechanics", CASES[1].id).excluded() == ""
-    change(folder, physiology=Physiology(exclude_implausible=False))
-    assert Job(folder, stage, CASES[1].id, *place).excluded() == ""
-    assert publish(folder)["implausible"] == 1
+def test_case_that_leaves_the_configuration_is_not_listed_and_returns_without_a_job(folder):
+    before = content(folder)
+    fewer = SWEEP["table"].replace("two,65,,\n", "")
+    assert remake(folder, changed(cases=CONFIG.cases.model_copy(update={"table": fewer})), result) == ["repository"]
+    assert list(et.Repository(folder).cases.index) == ["one", "three"]
+    assert remake(folder, CONFIG, result) == ["repository"] and content(folder) == before
 
 
-def test_other_bounds_change_the_verdict_and_not_a_byte_of_the_hearts(folder):
-    doubt(folder)
-    before = finished.content(folder)
-    record = (folder / f"ledger/mechanics/{CASES[1].id}.json").read_bytes()
-    change(folder, physiology=Physiology(longitudinal_strain_max=0.1))
-    assert publish(folder)["implausible"] == 0
-    after = finished.content(folder)
-    shards = {path for path in before if "small.zarr/cases/" not in path and not path.endswith("small.zarr/zarr.json")}
-    assert {path: after[path] for path in shards} == {path: before[path] for path in shards}
-    assert (folder / f"ledger/mechanics/{CASES[1].id}.json").read_bytes() == record
+def test_publishing_again_gives_the_same_bytes(folder):
+    before = content(folder)
+    (folder / CHECKSUMS).unlink()
+    assert remake(folder, CONFIG, result) == ["repository"] and content(folder) == before
 
 
-@pytest.mark.parametrize("exclude", [True, False])
-def test_heart_without_a_solution_is_never_measured_nor_imaged(folder, exclude):
-    change(folder, physiology=Physiology(exclude_implausible=exclude))
-    Job(folder, "mechanics", CASES[1].id).commit_without_result("failed", "no equilibrium")
-    for job in list(finished.jobs(folder, CONFIG, CASES[1].id))[1:]:
-        assert job.excluded() == "no equilibrium"
+def test_configuration_of_the_repository_has_the_lines_of_the_table_and_makes_it_again(done, tmp_path):
+    text = (done / "config.yaml").read_text()
+    assert re.search(r"table: \|\n    case,fibres.endo_deg,label.group,note\n    one,60,sham,\"first", text)
+    with chdir(tmp_path):
+        assert et.Repository(done).config == CONFIG
 
 
-@pytest.mark.parametrize("stage, place", [("bmode", ("mid", 64)), ("tracking", ("mid", 32)), ("mechanics", ())])
-def test_what_is_skipped_leaves_nothing_of_an_earlier_run_and_all_of_others(folder, stage, place):
-    other, job = (Job(folder, stage, case.id, *place) for case in CASES)
-    before = {path for path in job.store.path.rglob("*") if path.is_file()}
-    own = {path for group in written_by(job) for path in job.store.files(group, *job.index)}
-    job.commit_without_result("skipped", LENGTHENS)
-    assert own and {path for path in job.store.path.rglob("*") if path.is_file()} == before - own
-    for group in written_by(other):
-        assert other.store.files(group, *other.index)
-
-
-def test_job_of_a_view_has_its_place_whatever_is_put_in_front_of_it(folder):
-    before = {view: Job(folder, "phantom", CASES[1].id, view).index for view in CONFIG.views}
-    assert before == {"mid": (1, 0), "long_axis": (1, 1)}
-    change(folder, views={"apex": View(position=0.8), **CONFIG.views})
-    assert {view: Job(folder, "phantom", CASES[1].id, view).index for view in CONFIG.views} == before
-    assert Job(folder, "phantom", CASES[1].id, "apex").index == (1, 2)
-
-
-def test_case_that_left_the_configuration_is_retired(folder):
-    change(folder, cases=Cases(seed=[1]))
-    assert publish(folder)["complete"] == 1
-    assert list(xr.open_datatree(folder / "small.zarr")["cases/status"].values) == ["complete", "retired"]
-
-
-def test_table_of_cases_has_a_row_a_case_and_a_column_a_key(folder):
-    publish(folder)
-    tree = et.Repository(folder).tree
-    frame = tree["cases"].to_dataset().to_dataframe()
-    expected = table(CASES).set_index("case")
-    assert list(frame.index) == list(expected.index)
-    assert set(frame.columns) == {"status", "reason", *expected.columns}
-    for key in expected:
-        text = isinstance(expected[key].iloc[0], str)
-        values = list(expected[key]) if text else expected[key].astype(float).to_numpy()
-        np.testing.assert_array_equal(frame[key], values, err_msg=key)
-    assert tree["cases/fibres.endo_deg"].attrs == {"units": "degree", "long_name": "fibres.endo_deg"}
-
-
-def test_retired_case_has_no_values_in_the_table(folder):
-    change(folder, cases=Cases(seed=[1]))
-    publish(folder)
-    frame = et.Repository(folder).tree["cases"].to_dataset().to_dataframe()
-    assert np.isnan(frame["fibres.endo_deg"].iloc[1]) and frame["geometry.preset"].iloc[1] == ""
-    assert frame["fibres.endo_deg"].iloc[0] == CONFIG.fibres.endo_deg
-
-
-def test_groups_opened_together_have_the_labels_and_indexes_that_each_has_alone(folder):
-    publish(folder)
-    tree = et.Repository(folder).tree
-    for group in schema.groups(CONFIG):
-        alone = xr.open_zarr(folder / "small.zarr", group=group, chunks=None)
-        together, above = tree[group].to_dataset(), tree[group].parent.to_dataset()
-        assert set(together.xindexes) == set(alone.xindexes) | set(above.xindexes)
-        assert set(together.coords) == set(alone.coords) | set(above.xindexes)
-        for name in alone.coords:
-            assert together.coords[name].variable.identical(alone.coords[name].variable), name
-            assert name not in alone.xindexes or together.indexes[name].equals(alone.indexes[name])
-        assert "labels" not in together.attrs
+def test_table_that_is_damaged_is_refused_in_a_sentence(folder):
+    (folder / "cases.csv").write_text("heart\n\x00")
+    with pytest.raises(FileNotFoundError, match=r"cases.csv is damaged: run the configuration again, which writes it$"):
+        et.Repository(folder).cases  # noqa: B018 - it is read
+    assert remake(folder, CONFIG, result) == ["repository"]

@@ -5,7 +5,6 @@ import pickle
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import finished_repository
 import numpy as np
@@ -16,9 +15,7 @@ from known_repository import FRAMES, SETTINGS, SIZES, make
 
 import echotruth as et
 from echotruth.repository import estimates, remote
-from echotruth.repository.store import NotWritten
-
-pytestmark = pytest.mark.slow
+from echotruth.repository.group import NotWritten
 
 
 @pytest.fixture(scope="module")
@@ -33,15 +30,14 @@ def repository(known):
 
 @pytest.fixture
 def several(tmp_path):
-    """Three hearts that are not made yet."""
-    config = finished_repository.configured(seeds=(1, 2, 3))
-    finished_repository.lay_out(tmp_path / "small", config, finished_repository.expand(config))
+    """Three cases that are not made yet."""
+    finished_repository.begin(tmp_path / "small", finished_repository.configured(seeds=(1, 2, 3)))
     return et.Repository(tmp_path / "small")
 
 
 def stored(known, path):
     """The array of the only heart in the view mid, read by Zarr alone."""
-    return np.asarray(zarr.open_array(known.folder / "known.zarr", path=path, mode="r")[0, 0])
+    return np.asarray(zarr.open_array(known.folder / "known.zarr", path=f"clips/heart/mid/{path}", mode="r")[...])
 
 
 def test_it_says_what_is_in_it(repository, known):
@@ -68,7 +64,7 @@ def test_values_are_those_of_the_store(repository, known):
     np.testing.assert_array_equal(clip["displacement"], stored(known, f"truth/{SIZES[1]}/displacement"))
     np.testing.assert_array_equal(repository.heart().displacement, known.heart.displacement)
     assert list(repository.cases["status"]) == ["complete"] and list(repository.cases["reason"]) == [""]
-    assert repository.tree["cases"].sizes["case"] == 1
+    assert repository.tree["clips/heart/mid/bmode/64/image"].shape == (FRAMES, SIZES[1], SIZES[1])
 
 
 def test_tracked_arrays_are_those_of_their_size_and_tracker(repository):
@@ -124,18 +120,10 @@ def test_what_there_is_not_is_refused_in_one_sentence(repository, what):
 
 
 def test_heart_that_is_not_made_is_refused_in_one_sentence(several):
-    with pytest.raises(NotWritten, match=r"small: geometry/\w+ has no data of heart: run it to its end, or fetch"):
+    with pytest.raises(NotWritten, match=r"has no group hearts/heart/geometry: run its configuration, which makes it"):
         several.heart("heart")
     with pytest.raises(ValueError, match=r"small has no truth of heart mid yet: run it to its end, or fetch"):
         several.difficulty("heart", "mid")
-
-
-def test_damaged_record_is_told_with_its_remedy(known, tmp_path):
-    folder = Path(shutil.copytree(known.folder, tmp_path / "known"))
-    record = folder / "ledger/bmode/heart/mid/128.json"
-    record.write_text("{")
-    problem = et.Repository(folder).problem("heart", "mid", "truth", "bmode")
-    assert problem.startswith(f"{record} is damaged: run echotruth check {folder} --heal")
 
 
 def test_script_may_go_to_another_folder_before_and_while_it_reads(known, tmp_path):
@@ -155,12 +143,19 @@ def test_script_may_go_to_another_folder_before_and_while_it_reads(known, tmp_pa
 def test_array_of_an_earlier_format_is_not_read(known, tmp_path):
     """Its codecs may be any of numcodecs, of which one is the pickle."""
     folder = shutil.copytree(known.folder, tmp_path / "known")
-    array = folder / f"known.zarr/bmode/{SIZES[0]}/image"
-    shape = et.Repository(folder).array(f"bmode/{SIZES[0]}/image").shape
+    array = folder / f"known.zarr/clips/heart/mid/bmode/{SIZES[0]}/image"
+    shape = et.Repository(folder).array(f"bmode/{SIZES[0]}/image", "heart", "mid").shape
     shutil.rmtree(array)
     zarr.create_array(array, shape=shape, dtype="uint8", zarr_format=2)
-    with pytest.raises(FileNotFoundError, match=f"has no array bmode/{SIZES[0]}/image"):
-        et.Repository(folder).read(f"bmode/{SIZES[0]}/image", 0)
+    with pytest.raises(NotWritten, match=f"bmode/{SIZES[0]}/image has no data of heart mid"):
+        et.Repository(folder).read(f"bmode/{SIZES[0]}/image", "heart", "mid")
+
+
+def test_lost_file_is_told_where_a_part_is_read(known, tmp_path):
+    folder = shutil.copytree(known.folder, tmp_path / "known")
+    shutil.rmtree(folder / f"known.zarr/clips/heart/mid/bmode/{SIZES[0]}/image/c")
+    with pytest.raises(NotWritten, match="image: its data are lost: delete the group"):
+        et.Repository(folder).read(f"bmode/{SIZES[0]}/image", "heart", "mid", 0)
 
 
 def test_scores_have_a_row_for_every_clip_and_tracker(repository):
@@ -170,7 +165,7 @@ def test_scores_have_a_row_for_every_clip_and_tracker(repository):
 
 
 def test_copy_reads_the_same_and_has_nothing_open(repository):
-    image = repository.clip()["image"]
+    image = repository.read(f"bmode/{SIZES[0]}/image", "heart", "mid")
     copy = pickle.loads(pickle.dumps(repository))
     assert not copy._opened and repository._opened
     np.testing.assert_array_equal(copy.clip()["image"], image)
@@ -189,5 +184,5 @@ def test_bucket_is_read_as_a_folder_is(repository, known, monkeypatch):
         assert distant.scores.equals(repository.scores) and distant.config == repository.config
     with pytest.raises(FileNotFoundError, match=r"known\.zarr: is an address and not a folder: download it"):
         distant.difficulty()
-    with pytest.raises(FileNotFoundError, match="s3://bucket/ledger: is not a repository"):
-        et.Repository("s3://bucket/ledger")
+    with pytest.raises(FileNotFoundError, match="s3://bucket/cases: is not a repository"):
+        et.Repository("s3://bucket/cases")

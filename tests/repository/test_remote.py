@@ -1,55 +1,27 @@
-"""What is kept in object storage, here a dictionary or a folder in its place: mended, and read by all that read."""
+"""What is kept in object storage, here a folder or a server on the own machine, is read by all that read."""
 
+import logging
 import pickle
-from hashlib import sha256
+import re
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from bokeh.document import Document
 from finished_repository import configured, finish
 
 import echotruth as et
 from echotruth.learning import Clips
 from echotruth.repository.remote import Remote
-from echotruth.repository.upload import Upload
 from echotruth.viewer.choice import first
 from echotruth.viewer.page import Page
 from echotruth.viewer.server import opened
-from echotruth.workflow import uploading
 
 obstore = pytest.importorskip("obstore")
 zarr_storage = pytest.importorskip("zarr.storage")
-
-
-class Bucket:
-    """Objects with their content and the checksum that they carry."""
-
-    url = "s3://bucket/small"
-
-    def __init__(self):
-        self.objects = {}
-
-    def names(self):
-        return iter(list(self.objects))
-
-    def checksum(self, name):
-        return self.objects.get(name, (b"", ""))[1]
-
-    def put(self, name, content):
-        self.objects[name] = content, sha256(content).hexdigest()
-
-    def get(self, name):
-        if name not in self.objects:
-            raise FileNotFoundError(name)
-        return self.objects[name][0]
-
-    def delete(self, name):
-        self.objects.pop(name, None)
-
-    def damage(self, name):
-        """As a disk does it: what the object carries stays."""
-        self.objects[name] = b"damaged", self.objects[name][1]
 
 
 @pytest.fixture(scope="module")
@@ -58,44 +30,10 @@ def repository(tmp_path_factory):
 
 
 @pytest.fixture
-def bucket(repository):
-    found = Bucket()
-    Upload(repository, found).send()
-    return found
-
-
-def verified(repository, bucket, monkeypatch):
-    monkeypatch.setattr(uploading, "Remote", lambda url: bucket)
-    return uploading.upload_repository(repository, bucket.url, True)
-
-
-@pytest.mark.parametrize("name", ["registry.txt", "small.zarr/bmode/64/image/c/0/0/0/0/0", "ledger/structure.json"])
-def test_object_that_is_damaged_there_is_sent_again(repository, bucket, monkeypatch, capsys, name):
-    bucket.damage(name)
-    assert verified(repository, bucket, monkeypatch) == 0
-    assert bucket.get(name) == (repository / name).read_bytes()
-    assert f"{bucket.url}/{name}: differed from {repository / name}, and was sent again" in capsys.readouterr().out
-
-
-def test_object_is_not_replaced_by_a_file_that_is_not_what_was_sent(repository, bucket, monkeypatch, capsys):
-    name = "small.zarr/bmode/64/image/c/0/0/0/0/0"
-    sent, whole = bucket.get(name), (repository / name).read_bytes()
-    (repository / name).write_bytes(b"damaged here")
-    try:
-        assert verified(repository, bucket, monkeypatch) == 1
-    finally:
-        (repository / name).write_bytes(whole)
-    assert bucket.get(name) == sent
-    assert f"{name}: differs from {repository / name}: echotruth check" in capsys.readouterr().err
-
-
-@pytest.fixture
 def address(repository, monkeypatch):
     """An address at which the files of a folder are read as objects."""
     objects = zarr_storage.ObjectStore(obstore.store.LocalStore(repository / "small.zarr"), read_only=True)
-    remote = SimpleNamespace(
-        get=lambda name: (repository / name).read_bytes(), has=lambda name: (repository / name).is_file()
-    )
+    remote = SimpleNamespace(get=lambda name: (repository / name).read_bytes())
     monkeypatch.setattr("echotruth.repository.reader.hierarchy", lambda url: (remote, objects))
     return "s3://bucket/small"
 
@@ -108,14 +46,13 @@ def test_learning_reads_an_address_as_a_folder(repository, address):
 
 
 def test_learning_names_the_address_where_something_is_missing(address, repository):
-    shard = repository / "small.zarr/bmode/64/image/c/0/0/0/0/0"
-    content = shard.read_bytes()
-    shard.unlink()
+    (group,) = repository.glob("small.zarr/clips/*/mid/bmode/64/zarr.json")
+    hidden = group.rename(group.with_name("hidden"))
     try:
-        with pytest.raises(ValueError, match=r"s3://bucket/small: \w+ has no bmode/64/image in the view mid"):
+        with pytest.raises(ValueError, match=r"s3://bucket/small\b.* bmode\b.* \w+ mid\b"):
             Clips(address)
     finally:
-        shard.write_bytes(content)
+        hidden.rename(group)
 
 
 def test_viewer_shows_an_address(address):
@@ -127,3 +64,51 @@ def test_viewer_shows_an_address(address):
 def test_address_is_opened_anew_in_another_process():
     copy = pickle.loads(pickle.dumps(Remote("s3://bucket/small")))
     assert copy.url == "s3://bucket/small"
+
+
+@pytest.fixture
+def server(monkeypatch):
+    """A bucket of a server on the own machine."""
+    moto, boto3 = pytest.importorskip("moto.server"), pytest.importorskip("boto3")
+    logging.getLogger("werkzeug").setLevel(logging.ERROR)  # it would print a line for every object
+    served = moto.ThreadedMotoServer("127.0.0.1", port=0, verbose=False)
+    served.start()
+    endpoint = "http://{}:{}".format(*served.get_host_and_port())
+    settings = {"ACCESS_KEY_ID": "some", "SECRET_ACCESS_KEY": "secret", "REGION": "us-east-1", "ENDPOINT_URL": endpoint}
+    for name, value in settings.items():
+        monkeypatch.setenv(f"AWS_{name}", value)
+    boto3.client("s3", endpoint_url=endpoint, region_name="us-east-1").create_bucket(Bucket="bucket")
+    yield endpoint
+    served.stop()
+
+
+def test_what_was_copied_to_a_bucket_as_the_page_says_is_read_there_as_it_is_here(server, repository):
+    with pytest.raises(FileNotFoundError, match="is not a repository: give an address"):
+        et.Repository("s3://bucket/hearts")
+    (code,) = re.findall(r"```python\n(.*?)```", (Path(__file__).parents[2] / "docs/storage.md").read_text(), re.DOTALL)
+    exec(
+        code.replace("out/my", str(repository)).replace(
+            "from_url(", 'from_url(client_options={"allow_http": True}, url='
+        )
+    )
+    here = et.Repository(repository)
+    for place in ("s3://bucket/hearts", "s3://bucket/hearts/", "s3://bucket/hearts/small.zarr"):
+        there = et.Repository(place)
+        xr.testing.assert_identical(there.tree["clips"].load(), here.tree["clips"].load())
+        assert there.cases.equals(here.cases) and there.scores.equals(here.scores)
+    case = here.present[0]
+    for group in ("bmode/64", "truth/64", "phantom"):
+        far, near = there.arrays(group, case, "mid"), here.arrays(group, case, "mid")
+        assert far.keys() == near.keys() and all(far[name].tobytes() == near[name].tobytes() for name in far)
+
+
+@pytest.mark.parametrize("url", ["s3://", "s3:///small", "s3://a b", "ftp://bucket/small"])
+def test_address_that_is_none_is_refused_in_a_sentence(url):
+    with pytest.raises(OSError, match=r"is not an address in object storage: give s3://BUCKET/FOLDER$"):
+        et.Repository(url)
+
+
+def test_without_the_package_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "obstore", None)
+    with pytest.raises(OSError, match=r"pip install 'echotruth\[s3\]'$"):
+        et.Repository("s3://bucket/small")

@@ -1,69 +1,53 @@
-"""The schema describes every array once, in known units."""
+"""The schema describes every array once, in known units, and a finished repository holds what it says."""
 
 import numpy as np
 import pytest
+import zarr
 
-from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking
-from echotruth.config.tracking import NOT_TRACKERS
 from echotruth.repository import schema
+from echotruth.repository.group import path_in
 
-ALL = [*schema.CASES, *schema.COORDINATES]
-ALL += [array for group in schema.KINDS for array in schema.named(group)]
-ALL += schema.DERIVED
+ALL = [*schema.COORDINATES.values(), *schema.DERIVED, *(array for arrays in schema.KINDS.values() for array in arrays)]
+UNITS = {"1", "m", "m3", "s", "s-1", "Pa", "Pa s-1", "rad", "rad s-1", "percent"}
 
 
 @pytest.mark.parametrize("array", ALL, ids=lambda array: f"{array.name}-{len(array.dims)}")
 def test_array_is_whole(array):
-    assert array.dims and array.long_name
+    assert array.long_name
     if array.units == "mixed":  # a coordinate has the unit of each
-        assert {f"{dim}_units" for dim in array.dims} & {one.name for one in schema.COORDINATES}
-        return
-    assert array.units in {"1", "m", "m3", "s", "s-1", "Pa", "Pa s-1", "rad", "rad s-1", "percent"}
-    assert array.dtype == "string" or np.dtype(array.dtype).name == array.dtype
-    assert array.dims[: array.leading] == tuple(dim for dim in array.dims if dim in ("case", "view"))
+        assert {f"{dim}_units" for dim in array.dims} & set(schema.COORDINATES)
+    else:
+        assert array.units in UNITS and (array.dtype == "string" or np.dtype(array.dtype).name == array.dtype)
 
 
-def test_names_stand_once_in_a_group():
-    for group, arrays in schema.KINDS.items():
-        for listed in (arrays, schema.named(group)):
-            names = [array.name for array in (*listed, *schema.coordinates(arrays))]
-            assert len(names) == len(set(names))
+def test_names_stand_once_in_a_group_and_labels_belong_to_coordinates():
+    for arrays in schema.KINDS.values():
+        assert len({array.name for array in arrays}) == len(arrays)
+    assert set(schema.LABELS) <= set(schema.COORDINATES)
 
 
-def test_members_of_a_pack_have_all_its_dimensions_and_its_type():
-    for packs in schema.PACKS.values():
-        for pack in packs:
-            for member in pack.members:
-                assert set(member.dims) >= set(pack.array.dims[:-1]) and member.dtype == pack.array.dtype, member.name
+def test_finished_repository_has_the_arrays_of_the_schema_and_no_others(finished):
+    store, seen = zarr.open_group(next(finished.glob("*.zarr")), mode="r", use_consolidated=False), set()
+    for path, group in store.members(max_depth=None):
+        kind = schema.kind(path_in(path)) if isinstance(group, zarr.Group) and path.count("/") > 1 else ""
+        if kind in schema.KINDS:
+            arrays = dict(group.arrays())
+            known = schema.COORDINATES | schema.arrays_of(kind)
+            for name, array in arrays.items():
+                dtype = "string" if known[name].dtype == "string" else str(array.dtype)
+                assert (array.metadata.dimension_names or ()) == known[name].dims and dtype in (
+                    "string",
+                    known[name].dtype,
+                )
+                assert array.attrs["units"] == known[name].units
+            seen.add(kind)
+            assert arrays.keys() & schema.arrays_of(kind).keys(), path
+    assert seen == {kind for kind in schema.KINDS if not kind.startswith("inference/")}
 
 
-def test_labels_belong_to_coordinates():
-    assert set(schema.LABELS) <= {array.name for array in schema.COORDINATES}
-
-
-def test_sized_groups_stand_once_for_every_image_size_and_tracked_ones_for_every_tracker():
-    trackers = {name: PhaseCorrelation(window_px=32) for name in ("one", "two")}
-    config = Config(bmode=Bmode(size_px=256, downsampling=(1, 4)), tracking=Tracking(trackers=trackers))
-    groups = schema.groups(config)
-    sized = {f"{stage}/{px}" for stage in schema.SIZED for px in (256, 64)}
-    tracked = {f"{stage}/{px}/{name}" for stage in schema.TRACKED for px in (256, 64) for name in ("one", "two")}
-    assert {path for path in groups if "/" in path} == sized | tracked
-
-
-def test_names_that_no_tracker_may_have_are_those_beside_its_group():
-    """In `tracking/SIZE` there is no array; the shards of every array lie in a folder c."""
-    arrays = schema.SIZED["evaluation"]
-    assert {array.name for array in (*arrays, *schema.coordinates(arrays))} | {"c"} == NOT_TRACKERS
-
-
-def test_fill_says_that_nothing_was_written():
-    assert np.isnan(schema.Array("a", ("case",), "float32", "m", "a").fill)
-    assert schema.Array("a", ("case",), "string", "1", "a").fill == ""
-    assert schema.Array("a", ("case",), "uint8", "1", "a").fill == 0
-
-
-def test_columns_of_cases_carry_the_unit_of_their_key():
-    columns = {"cases:fibres.endo_deg": np.array([84.0]), "cases:loop.file": np.array(["mouse"])}
-    *_, angle, file = schema.parameters(columns)
-    assert (angle.name, angle.dtype, angle.units) == ("fibres.endo_deg", "float64", "degree")
-    assert (file.name, file.dtype, file.units) == ("loop.file", "string", "1")
+def test_every_array_is_in_a_finished_repository_but_for_those_that_are_asked_for(finished):
+    store = next(finished.glob("*.zarr"))
+    found = {path.parent.name for path in store.rglob("zarr.json")}
+    wanted = [array.name for kind, arrays in schema.KINDS.items() if "inference" not in kind for array in arrays]
+    asked = ("blood", "endocardium", "epicardium", "surroundings", "leaflets", "papillary_muscles", "channels")
+    assert [name for name in wanted if name not in found and not name.startswith(asked)] == []

@@ -8,7 +8,7 @@ import pytest
 from echotruth.cases import diagnosis, expand
 from echotruth.config.loading import load
 from echotruth.config.realism import Neighbours
-from echotruth.repository.settings import motions
+from echotruth.repository.version import motion_hash
 
 ROOT = Path(__file__).parents[2]
 SUITES = {
@@ -30,8 +30,9 @@ def suite(request):
 @pytest.fixture(scope="module")
 def table(suite):
     """Labels, hash of the motion and diagnosis of each case."""
-    hashes = motions({case.id: case.config for case in suite[1]})
-    rows = [case.labels | {"motion": hashes[case.id], "diagnosis": diagnosis(case.config)} for case in suite[1]]
+    rows = [
+        case.labels | {"motion": motion_hash(case.config), "diagnosis": diagnosis(case.config)} for case in suite[1]
+    ]
     return pd.DataFrame(rows, index=[case.id for case in suite[1]])
 
 

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from echotruth.cases import expand
-from echotruth.cases.conditions import Condition, ConditionError
+from echotruth.cases.conditions import Condition
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, validate
 
@@ -24,30 +24,22 @@ VALUES = {"a.x": 3, "a.y": 4.5, "b.name": "mouse", "b.on": True, "b.none": None,
         ("b.name == 'mouse'", True),
         ("b.name in ['rat', 'human']", False),
         ("8 in b.list and 9 not in b.list", True),
-        ("b.on and b.none is null", True),
-        ("b.on == true and b.on != 1", True),
+        ("b.on and b.none is null and a.y is 4.5 and a.y is not 5", True),
+        ("b.on == true and b.on", True),
         ("b.none == None", True),
         ("b.list == [7, 8]", True),
         (" (a.x\n < a.y) ", True),
     ],
 )
 def test_condition_has_the_truth_that_it_has_in_arithmetic(text, holds):
-    assert Condition(text).holds(VALUES.__getitem__) is holds
+    assert Condition(text, "my.yaml").holds(VALUES.__getitem__, "row 1") is holds
 
 
 REFUSED = (
-    *("__import__('os').system('true')", "open('x')", "abs(a.x) < 3", "(lambda: a.x)() < 3", "[x for x in a.x]"),
-    *(
-        "a.x if b.on else a.y",
-        "f'{a.x}' == '3'",
-        "a.x[0] < 1",
-        "{1: 2} == a.x",
-        "a.x := 3",
-        "(y := 3) < a.x",
-        "~a.x < 3",
-    ),
-    *("a.x // 2 == 1", "a.x << 3 > 1", "a.x @ a.y > 1", "'a'.upper() == 'A'", "'a'.b == 1", "await a.x", "a.x < b'3'"),
-    *("a.x < 3j", "*a.x", "a.x =", "", "a.x < 1; b", "import os", "a.x < ...", "x" * 1001, "(" * 900, "-" * 900 + "1"),
+    *("__import__('os').system('true')", "abs(a.x) < 3", "(lambda: a.x)() < 3", "[x for x in a.x]", "a.x[0] < 1"),
+    *("a.x if b.on else a.y", "f'{a.x}' == '3'", "{1: 2} == a.x", "(y := 3) < a.x", "~a.x < 3", "a.x // 2 == 1"),
+    *("a.x @ a.y > 1", "'a'.upper() == 'A'", "'a'.b == 1", "(a.x + 1).real > 3", "a.x < b'3'", "a.x < 3j", "a.x < ..."),
+    *("*a.x", "a.x =", "", "a.x < 1; b", "import os", "x" * 1001, "(" * 900, "-" * 900 + "1"),
 )
 
 
@@ -56,8 +48,8 @@ def test_anything_else_of_python_is_refused_unseen(text):
     def lookup(key):
         raise AssertionError("nothing is looked up")
 
-    with pytest.raises(ConditionError):
-        Condition(text).holds(lookup)
+    with pytest.raises(ConfigError):
+        Condition(text, "my.yaml").holds(lookup, "row 1")
 
 
 @pytest.mark.parametrize(
@@ -65,21 +57,13 @@ def test_anything_else_of_python_is_refused_unseen(text):
     [
         *("9 ** 9 ** 9 ** 9 > a.x", "2 ** (2 ** 40) > a.x", "10.0 ** 400 > a.x", "a.x / 0 > 1", "a.x % 0 > 1"),
         *("'ab' * 10 ** 9 == b.name", "b.list * 10 ** 9 == b.list", "(-8) ** 0.5 > a.x", "b.name < 3", "b.none > 1"),
-        *(
-            "a.x",
-            "a.x and b.on",
-            "not a.x",
-            "a.x in 7",
-            "'m' in b.name",
-            "b.on < 2",
-            "1e400 > a.x * 1e300 * 1e300 ** 2",
-        ),
+        *("a.x", "b.on and a.x", "a.x in 7", "1e400 > a.x * 1e300 * 1e300 ** 2"),
     ],
 )
 def test_what_has_no_truth_is_refused_at_once(text):
     start = time.process_time()
-    with pytest.raises(ConditionError):
-        Condition(text).holds(VALUES.__getitem__)
+    with pytest.raises(ConfigError):
+        Condition(text, "my.yaml").holds(VALUES.__getitem__, "row 1")
     assert time.process_time() - start < 1
 
 
@@ -108,7 +92,7 @@ def test_values_follow_the_preset_of_the_case():
 def test_parameter_that_the_law_of_a_case_does_not_have_is_null():
     laws = {"mechanics.material.law": ["guccione", "neo_hooke"]}
     assert ids(laws | {"where": "mechanics.material.fibre != null"}) == [{"mechanics.material.law": "guccione"}]
-    with pytest.raises(ConfigError, match="needs a number in place of null"):
+    with pytest.raises(ConfigError, match=r"needs numbers to compute or compare: mechanics.material.fibre = null"):
         ids(laws | {"where": "mechanics.material.fibre > 1"})
 
 
@@ -133,7 +117,7 @@ def test_labels_of_the_table_can_be_asked_for():
         ("fibres == 1", "fibres is a section: name one of its keys"),
         ("label.group == 1", "label.group is not a column of the table"),
         ("seed > 5", "cases.where leaves out all 2 cases: widen a condition"),
-        ("loop.edv_uL > 5", "in {'seed': 1}: needs a number in place of null"),
+        ("loop.edv_uL > 5", "in {'seed': 1}: needs numbers to compute or compare: loop.edv_uL = null"),
         ("seed", "in {'seed': 1}: is 1 and neither true nor false"),
         ("seed() > 1", "has a call of a function"),
         ([3], "cases.where.0 = 3: must be text: put it in quotes"),

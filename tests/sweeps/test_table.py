@@ -12,8 +12,8 @@ import pyvista
 
 from echotruth.cases import as_table, diagnosis, expand, find_case, table
 from echotruth.config import Cases, Config, Geometry
-from echotruth.config.limits import MAX_CASES, MAX_TABLE_BYTES, MAX_TABLE_COLUMNS
 from echotruth.config.loading import ConfigError, load, override, validate
+from echotruth.config.table import MAX_BYTES, MAX_CASES, MAX_COLUMNS
 from echotruth.loop.cycle import SHIPPED
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.seeds import generator
@@ -176,7 +176,7 @@ REFUSED = {
     "seed,label.x\n2,a\n2,b\n": "row 1 and hearts.csv, row 2 are the same heart, seed2_b105c5: leave one",
     "case,seed\na,1.5\n": "row 1: seed = 1.5: must be a whole number",
     "case,seed\na,nan\n": "row 1: seed = 'nan': must be a whole number",
-    "case,seed\na,1,2\n": "row 1 has 3 cells and not 2",
+    "case,seed\na,1,2\n": "(Expected 2 fields in line 2, saw 3)",
     "case,seed\na\n": "row 1 has 1 cells and not 2",
     "case;seed\na;1\n": "separated by semicolons: separate them by commas",
     "case\tseed\na\t1\n": "separated by tabs: separate them by commas",
@@ -191,8 +191,8 @@ REFUSED = {
     "case,geometry.file,geometry.remesh\na,a.stl,true\n": "row 1: geometry.file = 'a.stl': file not found",
     "case,loop.edv_uL,loop.esv_uL\na,50,20\nb,20,50\n": "row 2: loop.esv_uL = 50.0: must be smaller than edv_uL",
     f"case,note\na,{'x' * 4001}\n": "row 1, column note: has 4001 characters: write at most 4000",
-    f"case,{','.join(f'label.a{i}' for i in range(MAX_TABLE_COLUMNS))}\n": "has 257 columns",
-    f"seed\n{'1' * MAX_TABLE_BYTES}\n": "holds 2.0 MiB: a table has at most 2 MiB",
+    f"case,{','.join(f'label.a{i}' for i in range(MAX_COLUMNS))}\n": "has 257 columns",
+    f"seed\n{'1' * MAX_BYTES}\n": "holds 2.0 MiB, and a table at most 2 MiB",
     "seed\n" + "1\n" * (MAX_CASES + 1): "has more than 100000 rows",
 }
 

@@ -9,28 +9,28 @@ def make_speckle(size, motion, blur=2.5, margin=40):
     random = np.random.default_rng(7)
     wide = size + 2 * margin
     position = random.uniform(-margin, size + margin, (wide**2 // 20, 2))
-    weight = random.normal(size=len(position)) + 1j * random.normal(size=len(position))
-    lateral, axial = motion(position).T
-    pixel = np.arange(size)[:, None]
+    weights = random.normal(size=(2, len(position))).astype(np.float32)
+    lateral, axial = motion(position).T.astype(np.float32)
+    pixel = np.arange(size, dtype=np.float32)[:, None]
     profile_x, profile_y = (np.exp(-((pixel - x) ** 2) / 2 / blur**2) for x in (lateral, axial))
-    envelope = np.abs((profile_y * weight) @ profile_x.T)
+    envelope = np.hypot(*(profile_y * weight @ profile_x.T for weight in weights))
     decibel = 20 * np.log10(envelope / envelope.max() + 1e-12)
     return np.clip(255 * (1 + decibel / 50), 0, 255).round().astype(np.uint8)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def speckle():
     """Image of a given size after a motion."""
     return make_speckle
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def shifted():
     """Image of a given size after a lateral and an axial shift in px."""
     return lambda size, lateral, axial: make_speckle(size, lambda position: position + np.array([lateral, axial]))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def clip():
     """Clip of square images whose motion is a function of position and frame."""
     return lambda motion, frames, size=160: np.stack(

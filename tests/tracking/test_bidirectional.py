@@ -1,11 +1,6 @@
 import numpy as np
 
-from echotruth.tracking.bidirectional import (
-    combined_variance,
-    forward_backward,
-    inverse_variance_weight,
-    weighted_mean,
-)
+from echotruth.tracking.bidirectional import combined_variance, forward_backward, inverse_variance_weight, weighted_mean
 
 
 def test_both_directions_begin_at_end_diastole_and_are_their_own_inverse():

@@ -14,7 +14,7 @@ def pair(clip):
     return clip(lambda place, t: place + t * SHIFT, 2)
 
 
-@pytest.mark.parametrize("preset", ["ultrafast", "fast", "medium"])
+@pytest.mark.parametrize("preset", ["fast", "medium"])
 def test_motion_at_whole_pixels_is_the_library_s_own(pair, preset):
     points = np.array([[40.0, 60.0], [100.0, 31.0]])
     moved, _ = track(pair, points, np.ones((160, 160), bool), 3e-5, np.arange(2.0), 0, Dis(preset=preset))
@@ -61,7 +61,7 @@ def test_bytes_do_not_depend_on_the_threads_of_the_library(pair):
     assert results[0] == results[1]
 
 
-@pytest.mark.parametrize("shape", [(MIN_IMAGE_SIDE, MIN_IMAGE_SIDE), (MIN_IMAGE_SIDE, 300), (300, MIN_IMAGE_SIDE)])
+@pytest.mark.parametrize("shape", [(MIN_IMAGE_SIDE, MIN_IMAGE_SIDE), (MIN_IMAGE_SIDE, 300)])
 def test_smallest_image_is_taken(shape):
     assert (optical_flow(*np.zeros((2, *shape), np.float32)) == 0).all()
 

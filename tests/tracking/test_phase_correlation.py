@@ -13,7 +13,7 @@ def match(first, second, side, taper="none"):
     return phase_correlation.window_shifts(tracker.prepare(first), tracker.prepare(second), side)
 
 
-@pytest.mark.parametrize("shift", [(0, 0), (5, 0), (0, -7), (-3, 11)])
+@pytest.mark.parametrize("shift", [(0, 0), (-3, 11)])
 def test_sign_and_axis_order_of_a_rolled_image(shift):
     first = np.random.default_rng(1).integers(0, 256, (64, 64)).astype(np.uint8)
     second = np.roll(first, (shift[1], shift[0]), axis=(0, 1))
@@ -29,7 +29,7 @@ def test_whole_pixel_shift_of_speckle_is_found_to_the_pixel(shifted, taper):
 
 
 @pytest.mark.parametrize("taper", ["none", "hann"])
-@pytest.mark.parametrize("shift", [0.2, 0.4, 0.5, 0.7, 2.3])
+@pytest.mark.parametrize("shift", [0.4, 2.3])
 def test_bias_of_sub_pixel_shifts_is_below_a_tenth_of_a_pixel(shifted, shift, taper):
     moved, _ = match(shifted(256, 0, 0), shifted(256, shift, -shift), 64, taper)
     error = moved - [shift, -shift]

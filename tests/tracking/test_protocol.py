@@ -18,10 +18,22 @@ def tracker(request):
     return request.param(**CORRECTED if request.param is PhaseCorrelation else {})
 
 
-@pytest.fixture
-def tall(clip):
-    """Clip of images higher than wide."""
-    return lambda motion, frames=2: np.ascontiguousarray(clip(motion, frames)[:, :, : SHAPE[1]])
+STEP = np.array([1.5, 0.5])
+CYCLE = np.array([2.8, -5.2])
+
+
+@pytest.fixture(scope="module")
+def clips(clip):
+    """Clips of images higher than wide: of a cycle of shifts, of turn and stretch, and of equal steps."""
+    motions = {
+        "cycle": (4, lambda place, t: place + beat(t, 4) * CYCLE),
+        "turn": (10, lambda place, t: CENTRE + (place - CENTRE) @ gradient(t)),
+        "steps": (3, lambda place, t: place + t * STEP),
+    }
+    made = {name: np.ascontiguousarray(clip(m, n)[:, :, : SHAPE[1]]) for name, (n, m) in motions.items()}
+    for frames in made.values():
+        frames.setflags(write=False)
+    return made
 
 
 def points():
@@ -44,65 +56,63 @@ def beat(t, frames):
     return np.sin(np.pi * t / frames) ** 2
 
 
-def test_shift_is_lateral_then_axial_and_positive_for_motion_of_the_tissue(tall, tracker):
-    moved, quality = found(tall(lambda place, t: place + beat(t, 4) * np.array([2.8, -5.2]), 4), tracker)
+def gradient(t):
+    angle, stretch = 0.36 * beat(t, 10), np.diag([1, 1 + 0.1 * beat(t, 10)])
+    return stretch @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+
+
+def test_shift_is_lateral_then_axial_and_positive_for_motion_of_the_tissue(clips, tracker):
+    moved, quality = found(clips["cycle"], tracker)
     assert moved.shape == (4, len(points()), 2) and quality.shape == moved.shape[:2]
     assert (moved[0] == 0).all() and (quality[0] == 1).all()
-    np.testing.assert_allclose(np.median(moved[2], axis=0), [2.8, -5.2], atol=0.3)
-    assert rms(moved[2] - [2.8, -5.2]) < 0.5
+    np.testing.assert_allclose(np.median(moved[2], axis=0), CYCLE, atol=0.3)
+    assert rms(moved[2] - CYCLE) < 0.5
     assert quality.min() >= 0 and quality.max() <= 1
 
 
-def test_turn_and_stretch_are_found_and_read_where_the_tissue_is(tall, tracker):
+def test_turn_and_stretch_are_found_and_read_where_the_tissue_is(clips, tracker):
     """Steps of a rotation measured at the initial position of a point would add up along the tangent."""
-
-    def gradient(t):
-        angle, stretch = 0.36 * beat(t, 10), np.diag([1, 1 + 0.1 * beat(t, 10)])
-        return stretch @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-
     arm = points() - CENTRE
     arm = arm[np.hypot(*arm.T) < 45]
-    moved, _ = found(tall(lambda place, t: CENTRE + (place - CENTRE) @ gradient(t), 10), tracker, CENTRE + arm)
+    moved, _ = found(clips["turn"], tracker, CENTRE + arm)
     # Windows with enough speckle for phase correlation are too wide to resolve so fast a rotation.
     tolerance = 0.15 if tracker.method == "phase_correlation" else 0.02
     np.testing.assert_allclose(np.linalg.lstsq(arm, moved[5])[0], gradient(5) - np.eye(2), atol=tolerance)
 
 
-@pytest.mark.parametrize("value", [0, 200, np.nan])
+@pytest.mark.parametrize("value", [0, np.nan])
 def test_clip_without_texture_has_no_displacement(tracker, value):
-    frames = np.full((3, *SHAPE), value) if np.isnan(value) else np.full((3, *SHAPE), value, np.uint8)
+    frames = np.full((2, *SHAPE), value, float if np.isnan(value) else np.uint8)
     moved, quality = found(frames, tracker)
     assert np.isnan(moved[1:]).all() and np.isnan(quality[1:]).all()
 
 
-@pytest.mark.parametrize("patch", ["black", "constant", "faint", "nan"])
-def test_place_without_texture_has_no_displacement_and_the_rest_has(tall, tracker, patch):
+@pytest.mark.parametrize("patch", ["black", "faint", "nan"])
+def test_place_without_texture_has_no_displacement_and_the_rest_has(clips, tracker, patch):
     """Rounding leaves noise of half a grey level of a signal below the resolution of 8 bits (faint)."""
-    frames = tall(lambda place, t: place + t * np.array([1.5, 0.5]), 2).astype(float)
+    frames = clips["steps"][:2].astype(float)
     random = np.random.default_rng(3)
-    frames[:, :80] = {"black": 0, "constant": 90, "nan": np.nan}.get(
-        patch, 90 + (random.uniform(size=(2, 80, 120)) < 0.1)
-    )
+    frames[:, :80] = {"black": 0, "nan": np.nan}.get(patch, 90 + (random.uniform(size=(2, 80, 120)) < 0.1))
     frames = frames if patch == "nan" else frames.astype(np.uint8)
     moved, quality = found(frames, tracker, np.array([[60.0, 30.0], [60.0, 125.0]]))
     assert np.isnan(moved[1, 0]).all() and np.isnan(quality[1, 0])
     np.testing.assert_allclose(moved[1, 1], [1.5, 0.5], atol=0.3)
 
 
-def test_points_outside_the_image_have_no_displacement(tall, tracker):
+def test_points_outside_the_image_have_no_displacement(clips, tracker):
     outside = np.array([[-40.0, 50.0], [50.0, 300.0], [1e9, -1e9], [np.nan, 50.0], [60.0, 80.0]])
-    moved, _ = found(tall(lambda place, t: place + t), tracker, outside)
+    moved, _ = found(clips["steps"][:2], tracker, outside)
     assert np.isnan(moved[1, :4]).all() and np.isfinite(moved[1, 4]).all()
 
 
-def test_no_points_are_no_displacement(tall, tracker):
-    moved, quality = found(tall(lambda place, t: place + t), tracker, np.zeros((0, 2)))
+def test_no_points_are_no_displacement(clips, tracker):
+    moved, quality = found(clips["steps"][:2], tracker, np.zeros((0, 2)))
     assert moved.shape == (2, 0, 2) and quality.shape == (2, 0)
 
 
-def test_one_frame_is_refused(tall, tracker):
+def test_one_frame_is_refused(clips, tracker):
     with pytest.raises(ValueError, match="two or more frames"):
-        found(tall(lambda place, t: place, 1), tracker)
+        found(clips["steps"][:1], tracker)
 
 
 @pytest.mark.parametrize(
@@ -128,19 +138,16 @@ def test_invalid_input_is_refused(changed, message):
         track(**arguments | changed, settings=PhaseCorrelation())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", [np.int16, np.float32])
-def test_any_real_type_of_grey_value_gives_the_same_motion(tall, tracker, kind):
-    frames = tall(lambda place, t: place + t * np.array([1.5, 0.5]), 2)
+def test_any_real_type_of_grey_value_gives_the_same_motion(clips, tracker, kind):
+    frames = clips["steps"][:2].copy()
     frames[:, 0, 0], frames[:, 0, 1] = 0, 255
     np.testing.assert_allclose(found(frames.astype(kind), tracker)[0], found(frames, tracker)[0], atol=2e-3)
 
 
-def test_same_input_gives_the_same_bytes_and_is_not_changed(tall, tracker):
-    frames, places = tall(lambda place, t: place + t * np.array([1.5, 0.5]), 3), points()
-    before = frames.copy()
-    frames.setflags(write=False)
+def test_same_input_gives_the_same_bytes_and_is_not_changed(clips, tracker):
+    """Neither frames nor points can be written to."""
+    places = points()
     places.setflags(write=False)
-    results = [b"".join(array.tobytes() for array in found(frames, tracker, places)) for _ in range(2)]
+    results = [b"".join(array.tobytes() for array in found(clips["steps"], tracker, places)) for _ in range(2)]
     assert results[0] == results[1]
-    np.testing.assert_array_equal(frames, before)

@@ -25,7 +25,7 @@ def inner():
     return np.stack([lateral, axial], -1).reshape(-1, 2)
 
 
-@pytest.mark.parametrize("shift", [0.1, 0.25, 0.5, 0.75, 2.3, 9.4])
+@pytest.mark.parametrize("shift", [0.25, 0.5, 9.4])
 def test_bias_of_rigid_shifts_is_below_a_fiftieth_of_a_pixel(shifted, inner, shift):
     error = step(shifted(192, 0, 0), shifted(192, shift, -shift), inner) - [shift, -shift]
     assert np.abs(error.mean(0)).max() < 0.02

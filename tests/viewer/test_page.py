@@ -9,12 +9,10 @@ from urllib.parse import parse_qs
 import numpy as np
 import pytest
 from bokeh.document import Document
-from finished_repository import configured
+from finished_repository import begin, configured
 from known_repository import SIZES
 
-from echotruth.cases import expand
 from echotruth.evaluation.run import prepare
-from echotruth.repository.layout import lay_out
 from echotruth.repository.reader import Repository
 from echotruth.viewer.choice import TRUTH, Choice, asked, first
 from echotruth.viewer.page import Page
@@ -40,8 +38,7 @@ def choose(page, **chosen):
 def unfinished(tmp_path_factory):
     """A repository of which no job is done."""
     folder = tmp_path_factory.mktemp("unfinished") / "small"
-    config = configured()
-    lay_out(folder, config, expand(config))
+    begin(folder, configured())
     return folder
 
 
@@ -96,11 +93,10 @@ def test_unfinished_case_is_said_so(unfinished):
 def test_damaged_file_is_said_and_nothing_else_is_shown(shown, tmp_path):
     folder = tmp_path / "known"
     shutil.copytree(shown.folder, folder)
-    shards = [path for path in (folder / f"known.zarr/bmode/{SIZES[0]}/image/c").rglob("*") if path.is_file()]
-    for shard in shards:
-        content = bytearray(shard.read_bytes())
-        content[len(content) // 3] ^= 0xFF
-        shard.write_bytes(content)
+    shard = folder / f"known.zarr/clips/heart/mid/bmode/{SIZES[0]}/image/c/0/0/0"
+    content = bytearray(shard.read_bytes())
+    content[len(content) // 3] ^= 0xFF
+    shard.write_bytes(content)
     repository = Repository(folder)
     page = Page(repository, first(repository), Document())
     page.show()
@@ -138,8 +134,7 @@ def test_kept_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_m
 
 @pytest.mark.slow
 def test_ten_thousand_cases_open_in_seconds(tmp_path):
-    config = configured(seeds=range(1, 10_001))
-    lay_out(tmp_path / "small", config, expand(config))
+    begin(tmp_path / "small", configured(seeds=range(1, 10_001)))
     start = time.process_time()
     repository = Repository(tmp_path / "small")
     page = Page(repository, first(repository), Document())
@@ -155,8 +150,8 @@ def test_folder_without_a_repository_is_refused_and_one_that_was_renamed_is_show
         opened(tmp_path)
     shutil.copytree(shown.folder, tmp_path / "renamed")
     assert opened(tmp_path / "renamed").present == ["heart"]
-    shutil.rmtree(tmp_path / "renamed/known.zarr")
-    with pytest.raises(ShowError, match="has no cases or no views yet: run its configuration first"):
+    (tmp_path / "renamed/cases.csv").unlink()
+    with pytest.raises(FileNotFoundError, match=r"cases\.csv: is not there: run the configuration again"):
         opened(tmp_path / "renamed")
 
 

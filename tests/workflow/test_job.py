@@ -1,87 +1,151 @@
-"""Files that the stages of a view pass on."""
+"""A job: it reads its inputs, does its work, and writes its groups, or says in one sentence why not."""
 
 import errno
 import os
-from zipfile import ZipFile
+from shutil import copytree
 
 import numpy as np
 import pytest
-from finished_repository import configured
+from finished_repository import SIZE, begin, blank, configured, content, do, finish, jobs, remake
 
 from echotruth.cases import expand
-from echotruth.repository.case_file import read_case
-from echotruth.repository.layout import lay_out
-from echotruth.workflow.job import Job, run
+from echotruth.repository.group import read
+from echotruth.workflow.failure import CaseFailed
+from echotruth.workflow.job import Job, main, read_case
 
-PASSED = {"lines": np.arange(6.0).reshape(2, 3), "range": np.arange(3)}
+CONFIG = configured(views=("mid",), cases={})
 
 
 @pytest.fixture(scope="module")
-def job(tmp_path_factory):
-    config, folder = configured(seeds=[1]), tmp_path_factory.mktemp("passed") / "small"
-    lay_out(folder, config, expand(config))
-    return Job(folder, "bmode", expand(config)[0].id, "mid", 64, code="1")
+def done(tmp_path_factory):
+    return finish(tmp_path_factory.mktemp("done") / "small", CONFIG)
 
 
-def test_arrays_come_back_as_they_were_passed_on(job):
-    job.pass_on(job.lines, PASSED)
-    found = job.passed_on(job.lines)
-    assert list(found) == list(PASSED)
-    for name, values in PASSED.items():
-        np.testing.assert_array_equal(found[name], values)
+@pytest.fixture
+def folder(done, tmp_path):
+    return copytree(done, tmp_path / "small")
 
 
-def damages(content):
-    """A file cut short, and one with a flipped bit in every byte of the values of its first array."""
-    yield content[: len(content) // 2]
-    first = content.index(PASSED["lines"].tobytes())
-    for place in range(first, first + PASSED["lines"].nbytes):
-        yield content[:place] + bytes([content[place] ^ 4]) + content[place + 1 :]
+def job(folder, stage):
+    return next(one for one in jobs(folder, expand(CONFIG)[0]) if one.stage == stage)
 
 
-def test_damaged_file_is_deleted_with_a_sentence(job):
-    job.pass_on(job.lines, PASSED)
-    for damaged in [*damages(job.lines.read_bytes()), b"", b"no archive"]:
-        job.lines.write_bytes(damaged)
+def test_job_reads_what_was_written_by_those_before_it(done):
+    tracking = job(done, "tracking")
+    assert tracking.read(f"bmode/{SIZE}", "image")["image"].shape == (3, SIZE, SIZE)
+    assert list(tracking.read("phantom")) == list(read(done / "small.zarr", "clips/heart/mid/phantom"))
+    np.testing.assert_array_equal(tracking.plane.origin, tracking.read("phantom")["origin"])
+    assert tracking.coordinate("rf", "range").shape == (8,)
+    assert (tracking.random_of("a").random(3) == job(done, "tracking").random_of("a").random(3)).all()
+
+
+def test_results_do_not_depend_on_the_order_of_the_jobs_of_a_view(done, tmp_path):
+    (case,) = begin(tmp_path / "small", CONFIG)
+    stages = {one.stage: one for one in jobs(tmp_path / "small", case)}
+    for stage in ("mechanics", "truth", "phantom", "rf", "bmode", "tracking"):
+        do(stages[stage])
+    assert remake(tmp_path / "small", CONFIG) == ["repository"]
+    assert content(tmp_path / "small") == content(done)
+
+
+@pytest.mark.parametrize("stage", ["mechanics", "phantom", "truth", "bmode", "tracking"])
+def test_heart_that_fails_leaves_groups_that_say_why_in_place_of_earlier_ones(folder, stage):
+    def fail(job):
+        raise CaseFailed("no equilibrium at frame 3")
+
+    one = job(folder, stage)
+    do(one, fail)
+    place = folder / "small.zarr" / one._place(one.groups()[0])
+    assert [path.name for path in place.iterdir()] == ["zarr.json"]
+    assert (
+        '"failed"' in (place / "zarr.json").read_text()
+        and "no equilibrium at frame 3" in (place / "zarr.json").read_text()
+    )
+
+
+@pytest.mark.parametrize(
+    ("number", "told"), [(errno.ENOSPC, "No space left on device"), (errno.EROFS, "Read-only file")]
+)
+@pytest.mark.parametrize("stage", ["mechanics", "bmode"])
+def test_disk_that_takes_nothing_is_told_in_one_sentence_and_the_next_run_goes_on(
+    folder, monkeypatch, stage, number, told
+):
+    before, one = content(folder), job(folder, stage)
+    (folder / "small.zarr" / one._place(one.groups()[0]) / "zarr.json").unlink()
+    written = []
+
+    def create(group, array, *_):
+        written.append(array.name)
+        if len(written) > 1 or stage == "bmode":
+            raise OSError(number, os.strerror(number), f"out/small/{array.name}")
+        return original(group, array, *_)
+
+    from echotruth.repository import group
+
+    original = group._create
+    with monkeypatch.context() as patch:
+        patch.setattr(group, "_create", create)
         with pytest.raises(
-            FileNotFoundError, match=r"lines\.npz: is not what was written: it is deleted, and the next"
-        ):
-            job.passed_on(job.lines)
-        assert not job.lines.exists()
+            SystemExit, match=rf"^{stage}: out/small/\w+: {told}.*: the folder must be writable"
+        ) as ended:
+            do(one)
+    assert "\n" not in str(ended.value) and not list((folder / "drafts").glob("*"))
+    assert remake(folder, CONFIG)[-1] == "repository" and content(folder) == before
 
 
-def test_bytes_in_place_of_an_array_are_not_passed_on(job):
-    """NumPy gives what is no array in an archive as it stands there."""
-    job.lines.parent.mkdir(parents=True, exist_ok=True)
-    with ZipFile(job.lines, "w") as archive:
-        archive.writestr("lines.npy", b"no array")
-    with pytest.raises(FileNotFoundError, match="is not what was written"):
-        job.passed_on(job.lines)
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [(None, "heart.json: is not there: the ids are in cases.csv"), ("{", "is damaged"), ("[]", "is damaged"),
+     ('{"heart": "a", "config": {"sed": 1}}', "is damaged")],
+)  # fmt: skip
+def test_configuration_of_a_case_that_cannot_be_read_is_told(folder, content, sentence):
+    path = folder / "cases/heart.json"
+    path.unlink() if content is None else path.write_text(content)
+    with pytest.raises(FileNotFoundError, match=sentence):
+        read_case(folder, "heart")
 
 
-def test_pipe_in_place_of_the_configuration_of_a_case_is_not_waited_for(tmp_path):
-    (tmp_path / "cases").mkdir()
-    os.mkfifo(tmp_path / "cases/heart.json")
-    with pytest.raises(FileNotFoundError, match=r"heart\.json: is not a file: the ids are in cases\.csv"):
-        read_case(tmp_path, "heart")
+@pytest.mark.parametrize(
+    ("stage", "arguments", "sentence"),
+    [
+        ("mechanics", ["nobody"], "nobody.json: is not there: the ids are in cases.csv"),
+        ("rf", ["heart", "side"], "side is not a view of .*small: use mid$"),
+        ("tracking", ["heart", "mid", "100"], "100 is not an image size of .*small: use 64$"),
+    ],
+)
+def test_wrong_place_is_refused_in_one_sentence(done, monkeypatch, stage, arguments, sentence):
+    monkeypatch.setattr("sys.argv", [f"{stage}.py", str(done), *arguments])
+    with pytest.raises(SystemExit, match=sentence) as ended:
+        main(stage, blank, None)
+    assert str(ended.value).startswith(f"{stage}: ") and "\n" not in str(ended.value)
 
 
-def test_objects_are_not_unpickled(job):
-    """A pickle that is planted in the folder runs nothing."""
-
-    class Planted:
-        def __reduce__(self):
-            return job.lines.with_name("planted").mkdir, ()
-
-    np.savez(job.lines, lines=np.array([Planted()], dtype=object))
-    with pytest.raises(FileNotFoundError, match="is not what was written"):
-        job.passed_on(job.lines)
-    assert not job.lines.with_name("planted").exists()
+def test_job_without_its_inputs_is_told_what_makes_them(tmp_path):
+    (case,) = begin(tmp_path / "small", CONFIG)
+    for one in jobs(tmp_path / "small", case):
+        if one.stage != "mechanics":
+            with pytest.raises(
+                SystemExit, match=rf"^{one.stage}: .*has no group \S+: run its configuration, which makes"
+            ):
+                do(one, lambda one: one.heart and one.plane and one.read("phantom") and {})
 
 
-def test_disk_that_is_full_is_told_with_the_file(job):
-    def work(job):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out/small/image")
+def test_folder_that_is_no_repository_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["rf.py", str(tmp_path), "heart", "mid"])
+    with pytest.raises(SystemExit, match=r"^rf: .*is not a repository: give the folder that a run made"):
+        main("rf", blank, None)
 
-    with pytest.raises(SystemExit, match="bmode: out/small/image: No space left on device: the folder must be"):
-        run(job, work)
+
+def test_job_writes_the_groups_of_all_sizes_or_those_of_its_own():
+    sizes = configured(bmode={"size_px": 64, "downsampling": (1, 2)})
+    found = {}
+    for stage, size in (("truth", None), ("tracking", 32), ("mechanics", None), ("inference", None)):
+        one = object.__new__(Job)
+        one.stage, one.size, one.config = stage, size or 0, sizes
+        found[stage] = one.groups()
+    assert found == {
+        "truth": ["truth/64", "truth/32"],
+        "tracking": ["tracking/32"],
+        "mechanics": ["heart"],
+        "inference": ["inference"],
+    }

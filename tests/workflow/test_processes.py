@@ -1,14 +1,13 @@
 """What every process of a stage is started with, and caches of compiled functions that processes share."""
 
 import os
-import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from echotruth.workflow.processes import SCRIPTS_THAT_COMPILE, cache_name, prefix, script
+from echotruth.workflow.processes import cache_name, prefix
 
 ROOT = Path(__file__).parents[2]
 FORMS = """\
@@ -41,24 +40,22 @@ def test_processes_that_compile_forms_of_a_function_at_once_keep_them_all(tmp_pa
     assert start().communicate()[0] == "[(1, 1), (2.5, 2.5), (1j, 1j), ((1, 2), (1, 2))] 4\n"
 
 
-def test_shell_of_a_job_knows_its_scripts_and_repository_and_the_python_of_this_process(tmp_path):
-    folder = tmp_path / "out/it's $mine"
-    code = 'echo "$SCRIPTS"; echo "$REPOSITORY"; command -v python; echo "$NUMBA_CACHE_DIR"'
-    done = subprocess.run(["bash", "-c", prefix(folder) + code], capture_output=True, text=True, check=True)
-    scripts, repository, python, cache = done.stdout.splitlines()
-    assert {path.stem for path in Path(scripts).glob("*.py")} >= set(SCRIPTS_THAT_COMPILE)
-    assert repository == str(folder) and Path(python).parent == Path(sys.executable).parent
+def shell(code, root=ROOT, **options):
+    return subprocess.run(["bash", "-c", prefix(root) + code], capture_output=True, text=True, check=False, **options)
+
+
+def test_shell_of_a_job_knows_its_scripts_its_package_and_the_python_of_this_process():
+    code = 'echo "$SCRIPTS"; command -v python; echo "$NUMBA_CACHE_DIR"; echo "$PYTHONPATH"'
+    scripts, python, cache, path = shell(code).stdout.splitlines()
+    assert Path(scripts) == ROOT / "workflow/scripts" and Path(python).parent == Path(sys.executable).parent
     assert Path(cache).is_absolute() and Path(cache).parts[-3:] == (".snakemake", "numba", cache_name())
+    assert path.split(":")[0] == str(ROOT / "src")
 
 
-def test_shell_of_a_job_ends_with_the_first_command_that_fails(tmp_path):
-    for commands in ("false; true", "false | true", 'echo "$no_such_variable"'):
-        assert subprocess.run(["bash", "-c", prefix(tmp_path) + commands], capture_output=True, check=False).returncode
+def test_shell_of_an_installed_package_leaves_the_path_of_python_alone(tmp_path):
+    assert "PYTHONPATH" not in prefix(tmp_path)
 
 
-def test_every_stage_has_a_script_that_is_part_of_the_name_of_the_cache(monkeypatch):
-    assert all(Path(script(stage)).is_file() for stage in SCRIPTS_THAT_COMPILE)
-    read = []
-    monkeypatch.setattr("echotruth.workflow.processes.code_version", lambda *paths: read.extend(paths) or "0")
-    assert cache_name() == "0" and read == [script(stage) for stage in SCRIPTS_THAT_COMPILE]
-    assert shlex.quote(str(ROOT / "workflow/scripts")) in prefix(Path("out/tiny"))
+@pytest.mark.parametrize("code", ["false; true", "false | true", 'echo "$no_such_variable"'])
+def test_shell_of_a_job_ends_with_the_first_command_that_fails(code):
+    assert shell(code).returncode

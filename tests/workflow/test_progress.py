@@ -1,142 +1,74 @@
-"""Progress of a run, from the logs of Snakemake and the durations that jobs are expected to have."""
+"""Progress of a run, from what Snakemake says of its steps."""
 
 import io
-import time
+from types import SimpleNamespace
 
 import pytest
 
-from echotruth.workflow.progress import Progress, RunLog, format_duration
-from echotruth.workflow.snakemake_process import ProgressLine
+from echotruth.workflow import run
+from echotruth.workflow.progress import Progress
+from echotruth.workflow.run import ProgressLine
 
 PLAN = """\
-Provided cores: 2
 Job stats:
-job                 count
-----------------  -------
-all                     1
-rf                      4
-mechanics               1
-total                   6
+job           count
+----------  -------
+all               1
+mechanics         2
+rf                4
+total             7
 """
-START = time.mktime(time.strptime("Sun Nov 22 02:00:00 2026", "%a %b %d %H:%M:%S %Y"))
 
 
-class Run:
-    """A run whose clock is set by hand, of one Snakemake or several."""
-
-    def __init__(self, jobs=None, **expected):
-        self.now = START
-        self.progress = Progress(expected, jobs, lambda: self.now)
-        self.log = self.begin()
-
-    def begin(self):
-        self.log = RunLog()
-        self.progress.logs.append(self.log)
-        return self.log
-
-    def read(self, text, at=None):
-        self.now = self.now if at is None else START + at
-        stamp = time.strftime("[%a %b %d %H:%M:%S %Y]", time.localtime(self.now))
-        for line in f"{stamp}\n{text}".splitlines():
-            self.log.read_line(line)
-        return self.progress
+def began(rule, number, log="out/a.log", indent=""):
+    return f"{indent}rule {rule}:\n    output: b\n    log: {log}\n    jobid: {number}\n    wildcards: case=a\n"
 
 
-def began(rule, job, log=""):
-    return f"localrule {rule}:\n    input: a\n    log: {log or f'{rule}.log'}\n    jobid: {job}\n"
+def failed(rule, number, log):
+    return f"Error in rule {rule}:\n    message: None\n    jobid: {number}\n    log: {log} (check log file(s))\n"
 
 
-def ended(rule, job):
-    return f"Finished jobid: {job} (Rule: {rule})\n1 of 6 steps (17%) done\n"
+def ended(rule, number):
+    return f"Finished jobid: {number} (Rule: {rule})\n1 of 7 steps (14%) done\n"
 
 
-def failed(rule, job, log):
-    return f"Error in rule {rule}:\n    message: None\n    jobid: {job}\n    log: {log} (check log file(s))\n"
+@pytest.fixture
+def told():
+    """A progress to which text is told at a time."""
+    clock = SimpleNamespace(now=0.0)
+    progress = Progress({"mechanics": 40, "rf": 10}, clock=lambda: clock.now)
+
+    def tell(output, now=0.0):
+        clock.now = now
+        for line in output.splitlines():
+            progress.read_line(line)
+        return progress
+
+    return tell
 
 
-def test_time_left_is_that_of_rule_after_rule_on_the_cores_there_are():
-    run = Run(mechanics=40, rf=100)
-    run.read(PLAN + began("mechanics", 5))
-    assert run.progress.share == 0
-    assert run.progress.seconds_left == pytest.approx(40 + 4 * 100 / 2)
+def test_share_is_that_of_the_expected_time_and_the_rest_takes_as_long_in_proportion(told):
+    assert told("Building DAG of jobs...\n").text == ""
+    assert told(PLAN).text == "0 of 6 jobs, 0 %, starting"
+    assert told(began("mechanics", 1) + began("mechanics", 2)).text == "0 of 6 jobs, 0 %, mechanics x 2"
+    progress = told(ended("mechanics", 1) + began("rf", 3), now=100)
+    assert progress.share == pytest.approx(40 / 120)
+    assert progress.text == "1 of 6 jobs, 33 %, mechanics, rf, about 3 min left"
+    progress = told("".join(ended("rf", number) for number in range(3, 7)) + ended("mechanics", 2), now=300)
+    assert progress.share == 1 and progress.text == "6 of 6 jobs, 100 %, starting"
 
 
-def test_end_of_the_rule_that_only_collects_the_results_is_the_end_of_the_run():
-    run = Run(mechanics=40, rf=100)
-    run.read("all                     1\nmechanics               1\n" + began("mechanics", 1))
-    run.read(ended("mechanics", 1) + began("all", 0) + ended("all", 0), 40)
-    assert (run.progress.share, run.progress.seconds_left) == (1, 0)
-    assert run.progress.activity == "starting", "no job is left"
+def test_jobs_of_a_group_on_a_cluster_are_read_as_others(told):
+    assert told(PLAN + began("rf", 3, indent="    ")).running["3"].rule == "rf"
+    assert told("localrule rf:\n    jobid: 4\n").running["4"].rule == "rf"
 
 
-def test_running_jobs_count_as_far_as_they_are():
-    run = Run(mechanics=40, rf=100)
-    run.read(PLAN + began("mechanics", 5))
-    run.now += 10
-    assert run.progress.activity == "mechanics (1 of 1)"
-    assert run.progress.share == pytest.approx(10 / 440)
-    assert run.progress.seconds_left == pytest.approx(30 + 200)
-
-
-def test_a_slow_machine_is_known_by_the_jobs_that_have_ended():
-    run = Run(mechanics=40, rf=100)
-    run.read(PLAN + began("mechanics", 5))
-    run.read(ended("mechanics", 5) + began("rf", 1) + began("rf", 2), 80)
-    assert run.progress.seconds_left == pytest.approx(2 * 200), "twice as slow as thought"
-    assert run.progress.activity == "rf (1 of 4)"
-
-
-def test_several_snakemakes_have_one_progress():
-    run = Run({"mechanics": 2, "rf": 8}, mechanics=40, rf=100)
-    run.read(PLAN + began("mechanics", 1))
-    assert run.progress.seconds_left == pytest.approx(2 * 40 / 2 + 8 * 100 / 2), "the second has not said what it plans"
-    run.read(ended("mechanics", 1), 40)
-    run.begin()
-    run.read(PLAN + began("mechanics", 1), 40)
-    run.read(ended("mechanics", 1), 80)
-    assert run.progress.share == pytest.approx(80 / 880), "jobs of both have the number 1"
-    assert run.progress.seconds_left == pytest.approx(8 * 100 / 2)
-
-
-def test_snakemakes_side_by_side_have_the_cores_of_both():
-    run = Run(mechanics=40, rf=100)
-    run.read(PLAN + began("rf", 1))
-    run.begin()
-    run.read(PLAN + began("rf", 1))
-    assert run.progress.seconds_left == pytest.approx(2 * 40 / 2 + 8 * 100 / 4)
-    assert run.progress.activity == "rf (1 of 8)" and len(run.progress.running) == 2
-
-
-def test_share_never_falls_and_ends_at_one():
-    run, before, seconds = Run(mechanics=40, rf=1), 0.0, 0
-    run.read(PLAN)
-    for number, rule in enumerate(["mechanics", *["rf"] * 4]):
-        run.read(began(rule, number), seconds)
-        for _ in range(3):
-            seconds += 30
-            run.now = START + seconds
-            assert run.progress.share >= before
-            before = run.progress.share
-        run.read(ended(rule, number), seconds)
-    assert run.progress.share == 1 and run.progress.seconds_left == 0
-
-
-def test_failed_job_is_done_with_and_its_log_is_known():
-    run = Run(mechanics=40, rf=100)
-    run.read(PLAN + began("rf", 1) + failed("rf", 1, "out/mid.log"))
-    assert [str(job.log) for job in run.progress.failed] == ["out/mid.log"] and not run.progress.running
-    run.read(began("rf", 2))
-    assert run.progress.seconds_left == pytest.approx(40 + 3 * 100 / 2)
-
-
-def test_job_that_is_tried_again_is_planned_again():
-    run = Run(mechanics=40, rf=100)
-    run.read(PLAN + began("rf", 1) + failed("rf", 1, "out/mid.log") + "Trying to restart job 1.\n")
-    assert not run.progress.failed
-    run.read(began("rf", 1))
-    assert run.progress.seconds_left == pytest.approx(40 + 4 * 100 / 2)
-    run.read(failed("rf", 1, "out/mid.log"))
-    assert [job.rule for job in run.progress.failed] == ["rf"]
+def test_failed_job_is_told_with_its_log_until_it_is_tried_again(told):
+    progress = told(PLAN + began("rf", 3) + failed("rf", 3, "out/mid.log"))
+    assert [str(step.log) for step in progress.failed.values()] == ["out/mid.log"] and not progress.running
+    assert "1 failed" in progress.text
+    progress = told("Trying to restart job 3.\n" + began("rf", 3))
+    assert not progress.failed and list(progress.running) == ["3"]
 
 
 class Terminal(io.StringIO):
@@ -144,29 +76,16 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_line_is_rewritten_on_a_terminal_and_comes_once_in_a_while_elsewhere():
-    for stream, expected in ((Terminal(), 4), (io.StringIO(), 2)):
-        run = Run(mechanics=40, rf=100)
-        line = ProgressLine("demo", stream, lambda run=run: run.now)
-        run.read(PLAN + began("mechanics", 5))
-        for _ in range(4):
-            line.show(run.progress)
-            run.now += 10
-        output = stream.getvalue()
-        assert output.count("demo: ") == expected
-        assert ("\n" in output) != stream.isatty()
-
-
-def test_planning_that_takes_long_is_told():
-    run, stream = Run(), Terminal()
-    line = ProgressLine("demo", stream, lambda: run.now)
-    line.show(run.progress)
-    assert not stream.getvalue()
-    run.now += 60
-    line.show(run.progress)
-    assert stream.getvalue().endswith("demo: planning")
-
-
-@pytest.mark.parametrize("seconds, text", [(3, "10 s"), (42, "40 s"), (70, "1 min"), (1000, "17 min"), (9000, "2.5 h")])
-def test_time_in_words(seconds, text):
-    assert format_duration(seconds) == text
+@pytest.mark.parametrize(("stream", "shown"), [(Terminal(), 4), (io.StringIO(), 2)])
+def test_line_is_rewritten_on_a_terminal_and_comes_once_in_a_while_elsewhere(monkeypatch, stream, shown):
+    clock = SimpleNamespace(now=0.0)
+    monkeypatch.setattr(run.time, "monotonic", lambda: clock.now)
+    line = ProgressLine("demo", stream)
+    line.show("")
+    for number in range(4):
+        line.show(f"{number} of 4 jobs")
+        line.show(f"{number} of 4 jobs")
+        clock.now += 0.6 * run.LINE_SECONDS
+    line.close()
+    output = stream.getvalue()
+    assert output.count("demo: ") == shown and ("\n" in output) != stream.isatty()

@@ -1,14 +1,21 @@
-"""The command `echotruth run` on the way to Snakemake: profiles, folders that cannot be written, names side by side."""
+"""The command `echotruth run` on the way to Snakemake, and what it says of how Snakemake ended."""
 
-import shutil
+import os
+import signal
 import subprocess
 import sys
+import threading
+import time
 from contextlib import chdir
 from pathlib import Path
 
+import psutil
 import pytest
+from cli.command_line import run_cli
 
-from echotruth.cli.snakemake import FOLDER, PROFILES, executor_error, option_errors, split_targets, with_profiles
+from echotruth.cli.snakemake import FOLDER, cores, executor_error, option_errors, split_targets, with_profiles
+from echotruth.workflow.progress import Progress
+from echotruth.workflow.run import execute, snakemake_command
 
 PACKAGED = ["--workflow-profile", str(FOLDER / "slurm")]
 
@@ -42,6 +49,15 @@ def test_numbers_of_cores_that_snakemake_takes_are_no_errors(options):
     assert option_errors(options) == []
 
 
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [(["--cores", "3"], 3), (["--cores=5"], 5), (["-c", "2"], 2), (["-j", "9"], 9), (["--profile", "slurm"], 200)],
+)
+def test_cores_are_those_that_the_options_or_the_profile_give(tmp_path, options, expected):
+    with chdir(tmp_path):
+        assert cores(options) == expected
+
+
 @pytest.mark.parametrize("option", ["--config", "-C", "--configfile"])
 def test_configuration_is_not_changed_behind_its_file(option):
     assert option_errors([option, "seed=3"]) == [f"{option}: change the file of the configuration"]
@@ -56,12 +72,6 @@ def test_configuration_is_not_taken_for_a_profile(tmp_path):
         (swapped,) = option_errors(["--profile", "tiny.yaml"])
     assert swapped.startswith("--profile tiny.yaml: is not a profile: give") and "slurm" in swapped
     assert swapped.endswith("the file of the configuration comes before the options")
-    assert is_refused(run(tmp_path, "--profile", "tiny.yaml")) and not (tmp_path / "out").exists()
-
-
-def test_profile_that_is_not_there_is_told_by_snakemake(tmp_path):
-    done = run(tmp_path, "--profile", "nowhere")
-    assert done.returncode and "nowhere" in done.stderr and "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize(("given", "options", "targets"), [
@@ -70,7 +80,7 @@ def test_profile_that_is_not_there_is_told_by_snakemake(tmp_path):
     ("--rerun-triggers mtime report -p", "--rerun-triggers mtime -p", "report"),
     ("--forcerun repository", "--forcerun repository", ""),
     ("-R repository --cores 2 all", "-R repository --cores 2", "all"),
-    ("out/tiny/ledger/rf/heart/mid.json -k", "-k", "out/tiny/ledger/rf/heart/mid.json"),
+    ("out/tiny/tiny.zarr/hearts/heart/zarr.json -k", "-k", "out/tiny/tiny.zarr/hearts/heart/zarr.json"),
     ("-R rf -- a b", "-R rf", "a b"),
 ])  # fmt: skip
 def test_what_is_to_be_made_is_told_from_options(given, options, targets):
@@ -78,82 +88,78 @@ def test_what_is_to_be_made_is_told_from_options(given, options, targets):
 
 
 @pytest.mark.parametrize(("executor", "remedy"), [("slurm", "'echotruth[slurm]'"), ("lsf", "executor-plugin-lsf")])
-def test_missing_package_of_an_executor_is_named_with_its_remedy(monkeypatch, executor, remedy):
+def test_missing_package_of_the_executor_of_a_profile_is_named_with_its_remedy(tmp_path, monkeypatch, executor, remedy):
     monkeypatch.setattr("echotruth.cli.snakemake.find_spec", lambda name: None)
-    assert executor_error(executor).endswith(remedy) and "pip install" in executor_error(executor)
-    assert executor_error("local") is executor_error(None) is None
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/config.yaml").write_text(f"executor: {executor}\n")
+    with chdir(tmp_path):
+        error = executor_error(["--profile", "mine"])
+        assert error.endswith(remedy) and "pip install" in error
+        assert executor_error([]) is None
 
 
-def run(folder, *options):
-    command = [sys.executable, "-c", "from echotruth.cli import main; main()", "run", "tiny.yaml", *options]
-    (folder / "tiny.yaml").exists() or (folder / "tiny.yaml").write_text("name: tiny")
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
+def test_targets_come_after_all_options_since_snakemake_takes_them_for_configurations():
+    command = snakemake_command("a.yaml", ["--cores", "2"], ["report"])
+    assert command[-2:] == ["--", "report"] and command[command.index("--configfile") + 1] == "a.yaml"
+    assert command[command.index("--configfile") + 2].startswith("--") and "--nolock" in command
 
 
-def is_refused(done):
-    """Whether a run ended with one line on stderr."""
-    one_line = done.stderr.count("\n") == 1 and done.stderr.startswith("echotruth: ")
-    return done.returncode != 0 and not done.stdout and one_line
+def executed(tmp_path, code, rule="rf"):
+    """Exit status of a program in place of Snakemake."""
+    return execute([sys.executable, "-c", code], tmp_path / "logs/snakemake.log", "tiny", Progress({rule: 1}))
+
+
+def test_output_is_kept_and_the_log_of_a_failed_job_is_shown(tmp_path, capfd):
+    (tmp_path / "rf.log").write_text("\n".join(f"line {number}" for number in range(40)))
+    said = f"Error in rule rf:\n    jobid: 1\n    log: {tmp_path / 'rf.log'} (check log file(s))\n"
+    assert executed(tmp_path, f"print({said!r}); raise SystemExit(3)") == 3
+    errors = capfd.readouterr().err
+    assert "line 39" in errors and "line 10\n" not in errors and f"The last lines of {tmp_path / 'rf.log'}" in errors
+    assert (tmp_path / "logs/snakemake.log").read_text().startswith("Error in rule rf:")
+
+
+def test_without_a_failed_job_the_output_itself_is_shown(tmp_path, capfd):
+    assert executed(tmp_path, "print('no such rule'); raise SystemExit(1)") == 1
+    assert "no such rule" in capfd.readouterr().err
+    assert executed(tmp_path, "print('done')") == 0 and "done" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_signal_ends_snakemake_with_all_that_it_started(tmp_path, number):
+    code = "import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(99)'])"
+    mine = psutil.Process()
+
+    def send():
+        while len(mine.children(recursive=True)) < 2:
+            time.sleep(0.05)
+        os.kill(os.getpid(), number)
+
+    threading.Thread(target=send, daemon=True).start()
+    with pytest.raises(SystemExit) as ended:
+        executed(tmp_path, f"{code}; time.sleep(99)")
+    assert ended.value.code == 128 + number and not mine.children(recursive=True)
 
 
 def test_file_in_the_place_of_the_folder_is_told_in_one_line(tmp_path):
+    (tmp_path / "tiny.yaml").write_text("name: tiny")
     (tmp_path / "out").write_text("")
-    done = run(tmp_path)
-    assert is_refused(done) and "out/tiny" in done.stderr, done.stderr
+    status, output, errors = run_cli("run", "tiny.yaml", cwd=tmp_path)
+    assert status == 1 and not output and errors.count("\n") == 1 and "out/tiny" in errors, errors
 
 
-def mounted(folder, options):
-    """Mount a small file system in memory, if this machine allows it."""
+def mounted(folder: Path) -> None:
+    """Mount a small file system that cannot be written, if this machine allows it."""
     folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
-    if shutil.which("mount") is None or subprocess.run(command, capture_output=True, check=False).returncode:
+    command = ["mount", "-t", "tmpfs", "-o", "ro,size=1m", "tmpfs", str(folder)]
+    if subprocess.run(command, capture_output=True, check=False).returncode:
         pytest.skip("file systems cannot be mounted here")
 
 
-@pytest.fixture
-def read_only(tmp_path):
-    folder = tmp_path / "read_only"
-    mounted(folder, "size=1m")
-    (folder / "tiny.yaml").write_text("name: tiny")
-    subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
-
-
-def test_folder_that_cannot_be_written_is_told_in_one_line(read_only):
-    done = run(read_only, "--yes")  # there is no space for a repository either
-    assert is_refused(done) and "Read-only file system" in done.stderr, done.stderr
-
-
-@pytest.fixture
-def full(tmp_path):
-    folder = tmp_path / "full"
-    mounted(folder, "size=64k")
-    (folder / "tiny.yaml").write_text("name: tiny")
-    with (folder / "rest").open("wb", buffering=0) as file:
-        while True:
-            try:
-                file.write(bytes(4096))
-            except OSError:
-                break
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
-
-
-def test_full_disk_is_told_in_one_line(full):
-    done = run(full)
-    assert is_refused(done) and "has less than 1 MB free" in done.stderr, done.stderr
-    done = run(full, "--yes")
-    assert is_refused(done) and "No space left on device" in done.stderr, done.stderr
-
-
-def test_help_of_run_names_profiles_and_options_of_snakemake():
-    command = [sys.executable, "-c", "from echotruth.cli import main; main()", "run", "--help"]
-    text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert all(word in text for word in (*PROFILES, "--profile", "--cores", "--hearts-per-block", "-n"))
-
-
-def test_dry_run_leaves_no_repository(tmp_path):
-    (tmp_path / "tiny.yaml").write_text((Path(__file__).parents[2] / "config/demo.yaml").read_text())
-    assert run(tmp_path, "-n").returncode == 0
-    assert not (tmp_path / "out").exists()
+def test_folder_that_cannot_be_written_is_told_in_one_line(tmp_path):
+    (tmp_path / "tiny.yaml").write_text("name: tiny")
+    mounted(tmp_path / "read_only")
+    try:
+        status, output, errors = run_cli("run", tmp_path / "tiny.yaml", cwd=tmp_path / "read_only")
+    finally:
+        subprocess.run(["umount", str(tmp_path / "read_only")], check=True)
+    assert status == 1 and not output and errors.count("\n") == 1 and "Read-only file system" in errors

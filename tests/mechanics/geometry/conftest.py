@@ -22,7 +22,7 @@ def file_heart():
 
 
 @pytest.fixture
-def write_mesh(tmp_path):
+def write_mesh(tmp_path, read_here):
     """Write tetrahedra, with arrays over them, to a .vtu and return its path."""
     import pyvista
 
@@ -37,7 +37,7 @@ def write_mesh(tmp_path):
 
 
 @pytest.fixture
-def write_surface(tmp_path):
+def write_surface(tmp_path, read_here):
     """Write triangles to an .stl and return its path."""
     import pyvista
 

@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry
-from echotruth.fem.volume import cell_volumes
-from echotruth.mechanics.geometry import GeometryError, left_ventricle
+from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver.cavity import cavity_volume
-
-COARSE = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
 
 
 def test_ellipsoid_and_file_are_the_same_heart(file_heart, write_mesh):
@@ -19,13 +16,3 @@ def test_ellipsoid_and_file_are_the_same_heart(file_heart, write_mesh):
     assert cavity_volume(found.nodes, found.endo) == pytest.approx(
         cavity_volume(file_heart.mesh.nodes, file_heart.mesh.endo)
     )
-
-
-def test_cells_add_up_to_the_wall(coarse_mesh):
-    assert cell_volumes(coarse_mesh.nodes, coarse_mesh.cells).min() > 0
-    assert cell_volumes(coarse_mesh.nodes, coarse_mesh.cells).sum() == pytest.approx(71e-9, rel=5e-3)
-
-
-def test_missing_file_is_refused():
-    with pytest.raises(GeometryError, match=r"gone\.vtu: geometry\.file does not exist: give its path"):
-        left_ventricle(Geometry(file="gone.vtu", **COARSE))

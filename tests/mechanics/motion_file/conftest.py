@@ -21,7 +21,7 @@ def linear(cells: Integers) -> tuple[Integers, Integers]:
 @pytest.fixture(scope="session")
 def affine_heart():
     """Nodes, m, in the heart frame, and cells, both linear and quadratic, and positions in the files over time."""
-    mesh = left_ventricle(Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1))
+    mesh = left_ventricle(Geometry(circumferential_elements=6, longitudinal_elements=4, transmural_elements=1))
     cells, used = linear(mesh.cells)
 
     def positions(order, phases):
@@ -103,7 +103,7 @@ WRITERS |= {f"xdmf {numbers}": partial(_xdmf, numbers=numbers) for numbers in ("
 
 
 @pytest.fixture
-def write_series(tmp_path, monkeypatch):
+def write_series(tmp_path, monkeypatch, read_here):
     """Write frames of positions (n_frames, n, 3) of tetrahedra in a format; return the section `motion.file`."""
     monkeypatch.chdir(tmp_path)  # where meshio writes its HDF5 file
     return lambda name, *arguments, **keys: WRITERS[name](tmp_path, *arguments, **keys)

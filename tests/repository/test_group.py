@@ -1,0 +1,156 @@
+"""A group on disk: it is there as a whole or not at all, it reads back, and no damage of it is a wrong number."""
+
+import errno
+import json
+import shutil
+from functools import partial
+
+import numpy as np
+import pytest
+import xarray as xr
+import zarr
+from finished_repository import configured
+
+from echotruth.config import Bmode, Tracking
+from echotruth.repository import group, rounding, schema
+from echotruth.repository.coordinates import coordinates_of
+from echotruth.repository.group import NotWritten
+from echotruth.repository.places import place
+
+CONFIG = configured(tracking=Tracking(grid_px=2, trackers={name: {"method": "dis"} for name in ("one", "two")}))
+SIZE = CONFIG.bmode.size_px
+ABOUT = {"status": "complete", "version": "1"}
+
+
+def values(name):
+    """Random values of all arrays of a group whose dimensions have a length in this configuration."""
+    lengths = {one: np.size(value) for one, value in coordinates_of(name, CONFIG).items()} | {"tracker": 2, "node": 7}
+    random = np.random.default_rng(len(name))
+    arrays = [array for array in schema.arrays_of(name).values() if lengths.keys() >= set(array.dims)]
+    return {array.name: random.integers(0, 9, [lengths[dim] for dim in array.dims]) / 8 for array in arrays}
+
+
+def write(name, given, folder):
+    group.write(folder, name, given, coordinates_of(name, CONFIG) | {"tracker": ["one", "two"]}, CONFIG, ABOUT)
+
+
+def path(name):
+    """Path of a group of one heart or clip, below the store."""
+    return place(name, "a", "a", "mid")
+
+
+def made(store, name, given=None):
+    given = values(name) if given is None else given
+    group.write_groups(store, {path(name): partial(write, name, given)})
+    return given
+
+
+@pytest.mark.parametrize("name", ["mechanics", "physiology", f"truth/{SIZE}", f"bmode/{SIZE}", f"tracking/{SIZE}"])
+def test_what_is_written_reads_back_rounded_to_the_quantum_that_its_metadata_state(tmp_path, name):
+    given = made(tmp_path / "a.zarr", name)
+    found = group.read(tmp_path / "a.zarr", path(name))
+    assert found.keys() == given.keys() and found
+    for key, value in given.items():
+        metadata = json.loads((tmp_path / "a.zarr" / path(name) / key / "zarr.json").read_bytes())
+        step = metadata["attributes"].get("quantum")
+        assert step == rounding.quantum(schema.arrays_of(name)[key], CONFIG)
+        stored = value.astype(found[key].dtype)
+        np.testing.assert_array_equal(found[key], stored if step is None else np.round(stored / step) * step)
+
+
+def test_xarray_finds_dimensions_coordinates_units_and_meaning(tmp_path):
+    made(tmp_path / "a.zarr", f"tracking/{SIZE}")
+    with xr.open_zarr(tmp_path / "a.zarr", group=path(f"tracking/{SIZE}"), consolidated=False) as opened:
+        assert opened["displacement"].dims == ("tracker", "frame", "axial", "lateral", "plane")
+        assert list(opened["tracker"].values) == ["one", "two"] and opened["time"].dims == ("frame",)
+        for name, array in schema.arrays_of(f"tracking/{SIZE}").items():
+            assert opened[name].attrs["units"] == array.units and opened[name].attrs["long_name"] == array.long_name
+
+
+def test_chunk_is_one_component_of_one_frame_or_of_the_cycle_that_one_tracker_found(tmp_path):
+    made(tmp_path / "a.zarr", f"truth/{SIZE}")
+    made(tmp_path / "a.zarr", f"tracking/{SIZE}")
+    strain, tracked = (
+        zarr.open_array(tmp_path / "a.zarr", path=path(name), mode="r")
+        for name in (f"truth/{SIZE}/strain", f"tracking/{SIZE}/displacement")
+    )
+    assert strain.chunks == (1, SIZE, SIZE, 1)
+    assert tracked.chunks == (1, *tracked.shape[1:4], 1) and tracked.shards == tracked.shape
+    folder = tmp_path / "a.zarr" / path(f"truth/{SIZE}") / "strain/c"
+    assert [file for file in folder.rglob("*") if file.is_file()] == [folder / "0/0/0/0"]
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.6, 0.99])
+@pytest.mark.parametrize(("name", "array"), [(f"truth/{SIZE}", "strain"), ("mechanics", "pressure")])
+def test_flipped_bit_is_an_error_and_not_a_wrong_number(tmp_path, name, array, share):
+    made(tmp_path / "a.zarr", name)
+    (file,) = [one for one in (tmp_path / "a.zarr" / path(name) / array / "c").rglob("*") if one.is_file()]
+    content = bytearray(file.read_bytes())
+    content[int(share * len(content))] ^= 4
+    file.write_bytes(content)
+    with pytest.raises(Exception, match=r"(?i)checksum|crc"):
+        group.read(tmp_path / "a.zarr", path(name))
+
+
+def test_what_is_not_there_is_said_in_one_sentence(tmp_path):
+    store = tmp_path / "a.zarr"
+    group.write_groups(store, {"failed": partial(group.write_nothing, attributes={"reason": "no equilibrium"})})
+    made(store, "mechanics")
+    (store / "hearts/a/mechanics/zarr.json").write_text("{")
+    for where, sentence in {
+        "none": "has no group none: run its configuration, which makes it",
+        "failed": "failed has no pressure: no equilibrium",
+        "hearts/a/mechanics": "the metadata of hearts/a/mechanics are damaged .*: delete that folder, and run",
+    }.items():
+        with pytest.raises(NotWritten, match=sentence) as caught:
+            group.read(store, where, "pressure")
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("broken", [0, 1])
+def test_groups_of_a_job_that_fails_are_not_there_and_leave_nothing(tmp_path, broken):
+    def fail(folder):
+        write("mechanics", values("mechanics"), folder)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    writers = [fail if number == broken else partial(write, "mechanics", values("mechanics")) for number in range(2)]
+    with pytest.raises(OSError, match="No space left"):
+        group.write_groups(tmp_path / "a.zarr", dict(zip(["one", "two"], writers, strict=True)))
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_group_takes_the_place_of_an_earlier_one_with_other_arrays(tmp_path):
+    store, few = tmp_path / "a.zarr", {"pressure": np.zeros(3)}
+    made(store, "mechanics")
+    made(store, "mechanics", few)
+    assert group.read(store, path("mechanics")).keys() == {"pressure"}
+    assert not (store / path("mechanics") / "volume").exists() and not list((tmp_path / "drafts").iterdir())
+
+
+def test_what_holds_fill_values_alone_is_on_disk_all_the_same(tmp_path):
+    made(tmp_path / "a.zarr", f"bmode/{SIZE}", {"image": np.zeros((3, SIZE, SIZE))})
+    assert (tmp_path / "a.zarr" / path(f"bmode/{SIZE}") / "image/c/0/0/0").is_file()
+
+
+@pytest.mark.parametrize("name", ["mechanics", "phantom", "truth/64", "inference/fit"])
+def test_name_of_a_group_is_that_of_its_path(name):
+    assert group.path_in(path(name)) == name
+
+
+@pytest.mark.parametrize(("field_of_view_mm", "size_px"), [(12, 512), (12, 128), (160, 512), (10.24, 1024)])
+def test_quantum_of_lengths_is_the_power_of_two_below_a_256th_of_the_finest_pixel(field_of_view_mm, size_px):
+    config = configured(bmode=Bmode(field_of_view_mm=field_of_view_mm, size_px=size_px, downsampling=(1, 2)))
+    quantum, finest = rounding.length_quantum(config), field_of_view_mm * 1e-3 / size_px
+    assert quantum <= finest / 256 < 2 * quantum and np.frexp(quantum)[0] == 0.5
+
+
+@pytest.mark.parametrize("name", ["mechanics", f"truth/{SIZE}", f"bmode/{SIZE}"])
+def test_lost_file_is_an_error_and_not_fill(tmp_path, name):
+    """What holds fill values alone is none."""
+    given = made(tmp_path / "a.zarr", name, {key: np.zeros_like(value) for key, value in values(name).items()})
+    assert group.read(tmp_path / "a.zarr", path(name)).keys() == given.keys()
+    for key in given:
+        shutil.rmtree(tmp_path / "a.zarr" / path(name) / key / "c", ignore_errors=True)
+        (tmp_path / "a.zarr" / path(name) / key / "c").unlink(missing_ok=True)
+        with pytest.raises(NotWritten, match=rf"{key}: its data are lost: delete the group"):
+            group.read(tmp_path / "a.zarr", path(name), key)

@@ -1,0 +1,151 @@
+"""Snakemake itself: it makes the bytes that the jobs make in this process, and finds again what stands already."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import yaml
+from finished_repository import content, finish, solved
+from workspace import ROOT, Workspace
+
+import echotruth as et
+from echotruth.workflow.lock import VARIABLE
+
+SCRIPTS = sorted((ROOT / "workflow/scripts").glob("[!_]*.py"))
+RULES = {"mechanics", "phantom", "rf", "truth", "bmode", "tracking", "inference", "repository", "report"}
+ASKED = sorted(RULES - {"inference"})
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Workspace:
+    """A folder in which `echotruth run` made the repository and its report."""
+    workspace = Workspace(tmp_path_factory.mktemp("made") / "it's $mine")
+    workspace.told = workspace.echotruth("run", "tiny.yaml", "--cores", "2")
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory, made) -> dict[str, str]:
+    """What its jobs make in this process, one after the other."""
+    config = et.configure(yaml.safe_load((made.folder / "tiny.yaml").read_text()))
+    return content(finish(tmp_path_factory.mktemp("alone") / "tiny", config, solved))
+
+
+@pytest.mark.slow
+def test_run_on_two_cores_makes_the_bytes_of_jobs_in_one_process(made, alone):
+    assert content(made.out) == alone
+    assert re.search(
+        r"Hearts: 2 complete\nTime: .*\nRepository: out/tiny/tiny.zarr\nReport: +out/tiny/report.html", made.told
+    )
+    assert (made.out / "report.html").stat().st_size > 10_000
+    assert not any((made.out / "drafts").glob("*"))
+    logs = {path.relative_to(made.out / "logs").with_suffix("").as_posix() for path in made.out.glob("logs/**/*.log")}
+    times = {path.relative_to(made.out / "benchmarks").with_suffix("").as_posix() for path in made.out.rglob("*.tsv")}
+    assert logs == {*times, "snakemake"} and {name.partition("/")[0] for name in times} == set(ASKED)
+
+
+@pytest.mark.slow
+def test_nothing_is_made_again_in_a_copy_without_snakemakes_folder_and_with_other_dates(made, tmp_path):
+    copy = Workspace(tmp_path / "copy")
+    shutil.copytree(made.out, copy.out)
+    for number, path in enumerate(copy.out.rglob("*")):
+        os.utime(path, (1e9 + 977 * number % 10**6,) * 2)
+    assert set(copy.planned()) <= {"repository", "report"}
+    (copy.folder / "tiny.yaml").write_text(
+        (copy.folder / "tiny.yaml").read_text().replace("size_px: 64", "size_px: 64, dynamic_range_dB: 35")
+    )
+    assert copy.planned() == {"bmode": 2, "tracking": 2, "repository": 1, "report": 1}
+
+
+@pytest.mark.slow
+def test_run_that_is_killed_with_all_its_jobs_and_run_again_is_one_that_went_on(alone, tmp_path):
+    workspace = Workspace(tmp_path / "killed")
+    for pattern in ("hearts/*/zarr.json", "clips/*/mid/phantom/zarr.json", "clips/*/mid/bmode/64/zarr.json"):
+        run = workspace.start(sys.executable, "-c", "from echotruth.cli import main; main()", "run", "tiny.yaml")
+        while not any((workspace.out / "tiny.zarr").glob(pattern)):
+            assert run.poll() is None, run.communicate()[0]
+            time.sleep(0.02)
+        os.killpg(run.pid, signal.SIGKILL)
+        run.communicate()
+        time.sleep(0.5)
+    workspace.echotruth("run", "tiny.yaml", "repository")
+    assert content(workspace.out) == alone
+
+
+def test_graph_of_rules_is_the_way_of_a_view_and_nothing_is_written(tmp_path):
+    workspace = Workspace(tmp_path / "empty")
+    graph = workspace.snakemake("--rulegraph")
+    names = dict(re.findall(r'(\d+)\[label = "(\w+)"', graph))
+    edges = {(names[one], names[other]) for one, other in re.findall(r"(\d+) -> (\d+)", graph)}
+    assert set(names.values()) == {"all", *ASKED}
+    chain = ["mechanics", "phantom", "rf", "bmode", "tracking", "repository", "report"]
+    assert set(pairwise(chain)) <= edges
+    assert {one for one, other in edges if other == "tracking"} == {"mechanics", "truth", "bmode"}
+    assert {other for one, other in edges if one == "truth"} == {"tracking", "repository", "all"}
+    assert not workspace.out.exists()
+
+
+def test_wrong_configuration_is_told_in_one_sentence(tmp_path):
+    workspace = Workspace(tmp_path / "wrong", "name: tiny\nphantoms: {}\n")
+    output = workspace.snakemake("-n", status=1)
+    assert "did you mean phantom?" in output and "Traceback" not in output
+
+
+def parsed(code: str, folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run the Python at the beginning of the Snakefile, up to where it reads the configuration, and then code."""
+    text = (ROOT / "Snakefile").read_text()
+    start = text[: text.index("if not config:")]
+    given = f"from types import SimpleNamespace\nworkflow = SimpleNamespace(basedir={str(ROOT)!r})\n"
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", VARIABLE)}
+    command = [sys.executable, "-c", given + start + code]
+    return subprocess.run(command, cwd=folder, env=environment | variables, capture_output=True, text=True, check=True)
+
+
+def test_checkout_runs_itself_whatever_is_installed(tmp_path):
+    (tmp_path / "echotruth").mkdir()
+    (tmp_path / "echotruth/__init__.py").write_text("raise SystemExit('another one')\n")
+    done = parsed("import echotruth; print(echotruth.__file__)", tmp_path, PYTHONPATH=str(tmp_path))
+    assert Path(done.stdout.strip()).parent == ROOT / "src/echotruth"
+
+
+def test_a_rule_and_a_script_stand_for_every_stage_and_are_short():
+    assert {path.stem for path in SCRIPTS} == {path.stem for path in (ROOT / "rules").glob("*.smk")} == RULES
+    assert [path.name for path in SCRIPTS if len(path.read_text().splitlines()) > 40] == []
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
+def test_script_says_what_it_takes(path, monkeypatch, capsys):
+    import runpy
+
+    monkeypatch.setattr(sys, "argv", [str(path), "--help"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(path), run_name="__main__")
+    output = capsys.readouterr().out
+    assert ended.value.code == 0 and output.startswith(f"usage: {path.name}")
+    assert "folder of the repository" in output
+
+
+@pytest.mark.parametrize("stage", ["repository", "report"])
+def test_script_refuses_a_folder_that_is_no_repository_in_one_sentence(stage, tmp_path, monkeypatch):
+    import runpy
+
+    monkeypatch.setattr(sys, "argv", [f"{stage}.py", str(tmp_path)])
+    with pytest.raises(SystemExit, match=rf"^{stage}: .*is not a repository: give the folder that a run made"):
+        runpy.run_path(str(ROOT / f"workflow/scripts/{stage}.py"), run_name="__main__")
+
+
+INTERNAL = re.compile(r"(?<!docs/)\bworkflow\.(?!(?:cores|configfiles|basedir)\b)\w+|\b(?:rules|checkpoints)\._\w+")
+"""Attributes of Snakemake's objects that it does not document for rules; only these say where files are."""
+
+
+def test_no_rule_uses_an_internal_of_snakemake():
+    for path in [ROOT / "Snakefile", *(ROOT / "rules").glob("*.smk")]:
+        code = re.sub(r"(?m)^from .*$", "", path.read_text())  # the package has a part named workflow
+        assert INTERNAL.findall(code) == [] and not re.search(r"(?:import|from) snakemake", code), path
