@@ -1,12 +1,13 @@
-# make demo, make benchmark and make test set up .venv from requirements.lock first, uncompiled: Python compiles what is imported.
+# make demo, make benchmark and make test set up .venv from requirements.lock first; Python compiles what is imported.
 # make test-all runs the slow tests too. Make test-integration runs the tests that need PyTorch, an S3 server, SLURM, validators of
 # other formats, other simulators or Sphinx, in an environment of their own; make docs builds the site there.
 
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
+unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo benchmark test test-all test-integration docs reference sample validation lock clean
+.PHONY: demo benchmark pytest static test test-all test-integration docs reference sample validation lock clean
 
 demo: .venv/ready
 	$(BIN)/echotruth run config/demo.yaml
@@ -14,17 +15,23 @@ demo: .venv/ready
 benchmark: .venv/ready  ## the suite that the benchmark's page reports; takes hours, and goes on where it was stopped
 	$(BIN)/echotruth run config/benchmark.yaml
 
-# Two workers; the tests of a module stay on one worker, because they share expensive fixtures.
+# Two workers, and the static checks beside them; the tests of a module stay on one worker, because they share expensive
+# fixtures.
 test: CHOICE := -m "not slow"
 test test-all: .venv/ready
+	$(MAKE) -j 2 static pytest CHOICE='$(CHOICE)'
+
+pytest:
+	$(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(CHOICE)
+
+static:
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(CHOICE)
 
 # Modules with tests that .venv skips. tests/cluster takes longest, and so comes first; tests/docs/test_site.py builds the site.
-INTEGRATION := tests/cluster tests/test_torch.py tests/learning/test_baselines.py tests/description tests/repository/test_upload.py \
+INTEGRATION := tests/cluster tests/test_torch.py tests/learning/test_baselines.py tests/sharing tests/repository/test_remote.py \
 	tests/repository/test_export.py tests/repository/test_tensorstore.py tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs/test_site.py
 
 test-integration: .venv-integration/ready
@@ -51,15 +58,15 @@ docs: .venv-integration/ready  ## the site, in out/site
 reference: .venv/ready  ## generated pages: schema and tables
 	$(BIN)/python docs/reference.py
 
-# A merge takes over what the ledger vouches for, and compares every file with it; logs, scratch files and leases stay behind.
+# Without scatterers and lines, which no reader needs, so that it is small.
 SAMPLE := src/echotruth/shipped/sample
 sample: .venv/ready config/sample.yaml  ## the repository that comes with the package
-	rm -rf out/sample out/shipped
+	rm -rf out/sample
 	$(BIN)/echotruth run config/sample.yaml
-	$(BIN)/echotruth merge out/shipped/sample out/sample
-	rm -rf out/shipped/sample/.??* $(SAMPLE)
-	mkdir -p $(dir $(SAMPLE))
-	mv out/shipped/sample $(SAMPLE)
+	rm -rf out/sample/sample.zarr/clips/*/*/rf out/sample/sample.zarr/clips/*/*/phantom
+	$(BIN)/python workflow/scripts/repository.py out/sample
+	rm -rf $(SAMPLE) && mkdir -p $(SAMPLE)
+	cd out/sample && cp -r sample.zarr config.yaml cases.csv cases SHA256SUMS $(abspath $(SAMPLE))
 	$(BIN)/echotruth check $(SAMPLE)
 
 validation: .venv/ready  ## docs/validation.md; takes half an hour on one core

@@ -3,47 +3,55 @@
     snakemake --cores 2                                   # makes out/demo
     snakemake --cores 2 --configfile config/sweep.yaml    # makes out/sweep
 
-docs/workflow.md follows a view through the rules, which have in common:
+The way of a view, of which docs/workflow.md has the picture:
 
-- PLAN, of src/echotruth/workflow/plan.py, gives the inputs and params that depend on the configuration. `code` (version
-  of the script and all that it imports), `settings` and `excluded` are params so that a job runs again if they change.
-- The output is a record in OUT/ledger. Arrays go to the store, OUT/NAME.zarr, as a side effect; then the record is
-  written, with their checksums and a status. Snakemake follows records, and the files in OUT/scratch that phantom and
-  rf pass on.
-- A heart without a solution has a record too, with the status failed. If a case is excluded, because its heart failed
-  or is outside the bounds of `physiology`, the records of its views say skipped, with the reason. The run goes on.
-- Groups (heart, view, report) are jobs that a cluster may run as one. By priority the later stage comes first, so that
-  a view is finished, and its scratch deleted, before the next one begins.
+    heart -> phantom -> rf -> bmode --+
+      |                               +-> tracking -> repository -> report
+      +----> truth -------------------+
+
+- What a rule makes is a group of the Zarr hierarchy: its output is the `zarr.json` of the group, which is there when
+  the group is whole. A job that was killed leaves nothing.
+- A group says in its attributes what it was made with: a hash of the settings and the code of its stage and of all
+  before it. `PLAN.settle` sets aside what was made otherwise, so that Snakemake makes it again. Dates of files say
+  nothing of that, and so what a job reads is `ancient`.
+- A heart without a solution is a group too, which says why. What follows it writes groups that say skipped.
 """
 
+import glob
 import sys
+from pathlib import Path
 
-from echotruth.config import shipped
-from echotruth.config.loading import ConfigError
-from echotruth.workflow import lease, processes
+if (Path(workflow.basedir) / "src").is_dir():  # a checkout runs itself, whatever is installed
+    sys.path.insert(0, f"{workflow.basedir}/src")
+
+from echotruth.config.loading import ConfigError, beside
+from echotruth.workflow import lock, processes
 from echotruth.workflow.plan import Plan
 
 if not config:
 
-    configfile: shipped.path_of("demo")
+    configfile: f"{workflow.basedir}/config/demo.yaml"
 
 
 try:
-    PLAN = Plan(config)
-    lease.join(PLAN.folder)  # the lease: one run at a time writes the folder, and its processes end with it
-except (ConfigError, lease.LeaseError) as error:
+    PLAN = Plan(beside(config, *workflow.configfiles))
+    PLAN.settle()
+except (ConfigError, lock.LockError, OSError) as error:
     sys.exit(f"echotruth: {error}")
 
-OUT = PLAN.folder.as_posix()
+OUT, STORE = PLAN.folder.as_posix(), PLAN.store.as_posix()
+HEARTS = list(PLAN.hearts)  # material, fibre angles, loop, disease: all that makes a heart move as it does
+CASES = list(PLAN.cases)  # a heart, and how it is imaged: seed of the scatterers, array, realism
+VIEWS = list(PLAN.config.views)  # slices: short axes from base to apex, long axes
+SIZES = list(PLAN.config.bmode.sizes)  # resolutions, px
 
-shell.prefix(processes.prefix(PLAN.folder))  # sets $SCRIPTS, $REPOSITORY and what all processes share
+CLIP = f"{STORE}/clips/{{case}}/{{view}}"  # a case seen in a view
 
-
-envvars:
-    lease.VARIABLE,
+shell.prefix(processes.prefix(Path(workflow.basedir)))  # sets $SCRIPTS and what all processes share
 
 
 wildcard_constraints:
+    heart="[^/]+",
     case="[^/]+",
     view="[^/]+",
     size="[0-9]+",
@@ -62,16 +70,18 @@ include: "rules/report.smk"
 
 localrules:
     all,
-    hearts,
 
 
 rule all:
     default_target: True
     input:
-        PLAN.records,  # Snakemake makes what is lost again only if it is asked for
-        rules.repository.output,
-        rules.report.output,
+        expand(f"{STORE}/hearts/{{heart}}/zarr.json", heart=HEARTS),
+        expand(f"{CLIP}/truth/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
+        expand(f"{CLIP}/bmode/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
+        expand(f"{CLIP}/tracking/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
+        f"{OUT}/SHA256SUMS",
+        f"{OUT}/report.html",
 
 
 onstart:
-    PLAN.begin()  # takes the lease, and lays out the table of cases and empty arrays
+    PLAN.begin()  # writes the configuration of each case

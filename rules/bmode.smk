@@ -1,28 +1,22 @@
-"""B-mode: the largest clip from the lines (envelope, log compression, scan conversion), smaller ones from the largest.
-
-The lines are in the store if the configuration keeps them (`rf.keep`), else in the file that rf passes on.
-"""
+"""B-mode: the largest clip from the lines (envelope, log compression, scan conversion), smaller ones from it."""
 
 
 rule bmode:
     input:
-        PLAN.bmode_source,  # record of rf, and lines.npz unless rf.keep has lines; for smaller clips, record of the largest
+        heart=ancient(PLAN.heart),
+        rf=ancient(f"{CLIP}/rf/zarr.json"),
     output:
-        f"{OUT}/ledger/bmode/{{case}}/{{view}}/{{size}}.json",
-    params:
-        code=PLAN.code("bmode"),
-        settings=PLAN.settings("bmode"),
+        expand(f"{CLIP}/bmode/{{size}}/zarr.json", size=SIZES, allow_missing=True),
     log:
-        f"{OUT}/logs/bmode/{{case}}/{{view}}/{{size}}.log",
+        f"{OUT}/logs/bmode/{{case}}/{{view}}.log",
     benchmark:
-        f"{OUT}/benchmarks/bmode/{{case}}/{{view}}/{{size}}.tsv"
+        f"{OUT}/benchmarks/bmode/{{case}}/{{view}}.tsv"
     group:
         "view"
     priority: 4
     resources:
-        runtime=PLAN.runtime("bmode"),
-        mem_mb=PLAN.mem_mb("bmode"),
+        **PLAN.resources("bmode"),
     conda:
         "../environment.yml"
     shell:
-        "python $SCRIPTS/bmode.py $REPOSITORY {wildcards.case} {wildcards.view} {wildcards.size} --code {params.code} &> {log}"
+        f"python $SCRIPTS/bmode.py {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}"

@@ -1,28 +1,21 @@
-"""What a tracker saw of a heart tells of its muscle: asked for only if `inference.tracker` names a tracker.
-
-The script also reads the heart and its truth from the store. They are there: tracking, whose records are the input,
-needs them too.
-"""
+"""What a tracker saw of a heart tells of its muscle: asked for only if `inference.tracker` names a tracker."""
 
 
 rule inference:
     input:
-        PLAN.tracked,  # of all views, in the images from which is inferred
+        heart=ancient(PLAN.heart),
+        truth=ancient(expand(f"{CLIP}/truth/{{size}}/zarr.json", view=VIEWS, size=SIZES, allow_missing=True)),
+        tracking=ancient(expand(f"{CLIP}/tracking/{{size}}/zarr.json", view=VIEWS, size=SIZES, allow_missing=True)),
     output:
-        f"{OUT}/ledger/inference/{{case}}.json",
-    params:
-        code=PLAN.code("inference"),
-        settings=PLAN.settings("inference"),
+        f"{STORE}/inference/{{case}}/zarr.json",
     log:
         f"{OUT}/logs/inference/{{case}}.log",
     benchmark:
         f"{OUT}/benchmarks/inference/{{case}}.tsv"
     priority: 6
-    threads: 1
     resources:
-        runtime=PLAN.runtime("inference"),
-        mem_mb=PLAN.mem_mb("inference"),
+        **PLAN.resources("inference"),
     conda:
         "../environment.yml"
     shell:
-        "python $SCRIPTS/inference.py $REPOSITORY {wildcards.case} --code {params.code} --threads {threads} &> {log}"
+        f"python $SCRIPTS/inference.py {OUT} {{wildcards.case}} &> {{log}}"

@@ -1,29 +1,21 @@
-"""The heart of a case: mesh, fibres, finite-element solution over the beat, kinematics and measures.
-
-Of cases that share one heart (the same motion) only the first is solved; the others take over its files.
-"""
+"""A heart: mesh, fibres, finite-element solution over the beat, kinematics and measures."""
 
 
 rule mechanics:
-    input:
-        PLAN.same_motion,  # record of the case whose motion is taken over, if there is one
     output:
-        f"{OUT}/ledger/mechanics/{{case}}.json",
+        f"{STORE}/hearts/{{heart}}/zarr.json",
     params:
-        code=PLAN.code("mechanics"),
-        settings=PLAN.settings("mechanics"),
+        case=PLAN.case_of,  # any that has this heart
     log:
-        f"{OUT}/logs/mechanics/{{case}}.log",
+        f"{OUT}/logs/mechanics/{{heart}}.log",
     benchmark:
-        f"{OUT}/benchmarks/mechanics/{{case}}.tsv"
+        f"{OUT}/benchmarks/mechanics/{{heart}}.tsv"
     group:
         "heart"
-    threads: workflow.cores if len(PLAN.cases) == 1 else 1
+    threads: workflow.cores if len(HEARTS) == 1 else 1
     resources:
-        runtime=PLAN.runtime("mechanics"),
-        mem_mb=PLAN.mem_mb("mechanics"),
+        **PLAN.resources("mechanics"),
     conda:
         "../environment.yml"
     shell:
-        "python $SCRIPTS/mechanics.py $REPOSITORY {wildcards.case} --same-as {input} --code {params.code} "
-        "--threads {threads} &> {log}"
+        f"python $SCRIPTS/mechanics.py {OUT} {{params.case}} --threads {{threads}} &> {{log}}"

@@ -3,14 +3,9 @@
 
 rule phantom:
     input:
-        f"{OUT}/ledger/mechanics/{{case}}.json",
+        heart=ancient(PLAN.heart),
     output:
-        f"{OUT}/ledger/phantom/{{case}}/{{view}}.json",
-        scatterers=temp(f"{OUT}/scratch/{{case}}/{{view}}/scatterers.npz"),
-    params:
-        code=PLAN.code("phantom"),
-        settings=PLAN.settings("phantom"),
-        excluded=PLAN.excluded,  # why the case is not imaged: its record then says skipped
+        f"{CLIP}/phantom/zarr.json",
     log:
         f"{OUT}/logs/phantom/{{case}}/{{view}}.log",
     benchmark:
@@ -19,9 +14,8 @@ rule phantom:
         "view"
     priority: 1
     resources:
-        runtime=PLAN.runtime("phantom"),
-        mem_mb=PLAN.mem_mb("phantom"),
+        **PLAN.resources("phantom"),
     conda:
         "../environment.yml"
     shell:
-        "python $SCRIPTS/phantom.py $REPOSITORY {wildcards.case} {wildcards.view} --code {params.code} &> {log}"
+        f"python $SCRIPTS/phantom.py {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}"

@@ -1,14 +1,15 @@
-"""The repository: every file verified against the ledger, verdicts and attributes written."""
+"""The repository: table of cases, metadata of its folders, and the checksums of all files."""
 
 
 rule repository:
     input:
-        PLAN.records,  # of all jobs, also failed and skipped ones
+        hearts=expand(f"{STORE}/hearts/{{heart}}/zarr.json", heart=HEARTS),
+        truth=expand(f"{CLIP}/truth/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
+        bmode=expand(f"{CLIP}/bmode/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
+        tracking=expand(f"{CLIP}/tracking/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
+        inference=expand(f"{STORE}/inference/{{case}}/zarr.json", case=CASES) if PLAN.config.inference.tracker else [],
     output:
-        f"{OUT}/ledger/repository.json",
-    params:
-        code=PLAN.code("repository"),
-        settings=PLAN.settings("repository"),
+        f"{OUT}/SHA256SUMS",
     log:
         f"{OUT}/logs/repository.log",
     benchmark:
@@ -16,25 +17,8 @@ rule repository:
     group:
         "report"
     resources:
-        runtime=PLAN.runtime("repository"),
-        mem_mb=PLAN.mem_mb("repository"),
+        **PLAN.resources("repository"),
     conda:
         "../environment.yml"
     shell:
-        "python $SCRIPTS/repository.py $REPOSITORY &> {log}"
-
-
-# So that the repository itself can be named as a target: snakemake out/demo/demo.zarr
-rule store:
-    input:
-        ancient(f"{OUT}/ledger/repository.json"),
-    output:
-        directory(f"{OUT}/{PLAN.config.name}.zarr"),
-
-
-# What a block of a large sweep makes; see docs/cluster.md.
-rule hearts:
-    input:
-        PLAN.records,
-    output:
-        touch(PLAN.mark),
+        f"python $SCRIPTS/repository.py {OUT} &> {{log}}"

@@ -1,18 +1,12 @@
-"""The RF of every frame, focused to lines.
-
-The script also reads the heart from the store. It is there: phantom, whose record is the input, needs it too.
-"""
+"""The RF of every frame, focused to lines."""
 
 
 rule rf:
     input:
-        rules.phantom.output,
+        heart=ancient(PLAN.heart),
+        phantom=ancient(f"{CLIP}/phantom/zarr.json"),
     output:
-        f"{OUT}/ledger/rf/{{case}}/{{view}}.json",
-        lines=temp(f"{OUT}/scratch/{{case}}/{{view}}/lines.npz"),
-    params:
-        code=PLAN.code("rf"),
-        settings=PLAN.settings("rf"),
+        f"{CLIP}/rf/zarr.json",
     log:
         f"{OUT}/logs/rf/{{case}}/{{view}}.log",
     benchmark:
@@ -20,11 +14,9 @@ rule rf:
     group:
         "view"
     priority: 2
-    threads: 1
     resources:
-        runtime=PLAN.runtime("rf"),
-        mem_mb=PLAN.mem_mb("rf"),
+        **PLAN.resources("rf"),
     conda:
         "../environment.yml"
     shell:
-        "python $SCRIPTS/rf.py $REPOSITORY {wildcards.case} {wildcards.view} --code {params.code} --threads {threads} &> {log}"
+        f"python $SCRIPTS/rf.py {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}"

@@ -1,19 +1,13 @@
-"""Tracking: every tracker on one clip, scored against the truth.
-
-The record of an earlier run is updated, not deleted: what a tracker found in the same clip stays. The script also reads
-the heart from the store. It is there: truth, whose record is an input, needs it too.
-"""
+"""Tracking: every tracker on one clip, scored against the truth."""
 
 
 rule tracking:
     input:
-        rules.bmode.output,
-        rules.truth.output,
+        heart=ancient(PLAN.heart),
+        truth=ancient(f"{CLIP}/truth/{{size}}/zarr.json"),
+        bmode=ancient(f"{CLIP}/bmode/{{size}}/zarr.json"),
     output:
-        update(f"{OUT}/ledger/tracking/{{case}}/{{view}}/{{size}}.json"),
-    params:
-        code=PLAN.code("tracking"),
-        settings=PLAN.settings("tracking"),
+        f"{CLIP}/tracking/{{size}}/zarr.json",
     log:
         f"{OUT}/logs/tracking/{{case}}/{{view}}/{{size}}.log",
     benchmark:
@@ -21,12 +15,9 @@ rule tracking:
     group:
         "view"
     priority: 5
-    threads: 1
     resources:
-        runtime=PLAN.runtime("tracking"),
-        mem_mb=PLAN.mem_mb("tracking"),
+        **PLAN.resources("tracking"),
     conda:
         "../environment.yml"
     shell:
-        "python $SCRIPTS/tracking.py $REPOSITORY {wildcards.case} {wildcards.view} {wildcards.size} --code {params.code} "
-        "--threads {threads} &> {log}"
+        f"python $SCRIPTS/tracking.py {OUT} {{wildcards.case}} {{wildcards.view}} {{wildcards.size}} &> {{log}}"

@@ -1,26 +1,21 @@
-"""The truth: motion, strain, layer and segment at every pixel of every frame."""
+"""The truth: motion, strain, layer and segment at every pixel of every frame, in all sizes."""
 
 
 rule truth:
     input:
-        f"{OUT}/ledger/mechanics/{{case}}.json",
+        heart=ancient(PLAN.heart),
     output:
-        f"{OUT}/ledger/truth/{{case}}/{{view}}/{{size}}.json",
-    params:
-        code=PLAN.code("truth"),
-        settings=PLAN.settings("truth"),
-        excluded=PLAN.excluded,  # why the case is not imaged: its record then says skipped
+        expand(f"{CLIP}/truth/{{size}}/zarr.json", size=SIZES, allow_missing=True),
     log:
-        f"{OUT}/logs/truth/{{case}}/{{view}}/{{size}}.log",
+        f"{OUT}/logs/truth/{{case}}/{{view}}.log",
     benchmark:
-        f"{OUT}/benchmarks/truth/{{case}}/{{view}}/{{size}}.tsv"
+        f"{OUT}/benchmarks/truth/{{case}}/{{view}}.tsv"
     group:
         "view"
     priority: 3
     resources:
-        runtime=PLAN.runtime("truth"),
-        mem_mb=PLAN.mem_mb("truth"),
+        **PLAN.resources("truth"),
     conda:
         "../environment.yml"
     shell:
-        "python $SCRIPTS/truth.py $REPOSITORY {wildcards.case} {wildcards.view} {wildcards.size} --code {params.code} &> {log}"
+        f"python $SCRIPTS/truth.py {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}"

@@ -14,7 +14,7 @@ A heart of one's own, and its clip, take a minute each:
 
 import lazy_loader
 
-__version__ = "0.1.1"
+__version__ = "0.2.0"
 
 # Modules are imported when one of their names is first used; __init__.pyi lists them.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -19,9 +19,8 @@ from .notebook.kinematics import kinematics
 from .notebook.point_tracks import point_tracks
 from .notebook.sensitivities import sensitivities
 from .notebook.simulation import beat, evaluate, image, systole, track
-from .repository.fetching import fetch
 from .repository.reader import Repository, sample
-from .repository.unpacking import unpack
+from .sharing.fetching import fetch
 from .tracking.failure import TrackerFailed
 
 __version__: str
@@ -59,5 +58,4 @@ __all__ = [
     "strain_peaks",
     "systole",
     "track",
-    "unpack",
 ]

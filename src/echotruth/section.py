@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
+from itertools import pairwise
 from math import log, pi
+from textwrap import dedent
 from types import SimpleNamespace
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
@@ -14,12 +18,13 @@ from pydantic import (
     Discriminator,
     Field,
     FiniteFloat,
+    GetJsonSchemaHandler,
     StringConstraints,
     Tag,
     ValidationError,
     model_validator,
 )
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
 UNITS: dict[str, float] = {
     "um": 1e-6,
@@ -85,7 +90,19 @@ def shown_unit(key: str) -> str:
 
 def meaning(section: type[BaseModel], key: str) -> str:
     """What a key of a section means, in one line."""
-    return " ".join((section.model_fields[key].description or "").split())
+    return " ".join((section.model_fields[key].description or _docstrings(section).get(key, "")).split())
+
+
+@cache
+def _docstrings(section: type[BaseModel]) -> dict[str, str]:
+    """Key -> the text below it. pydantic would read all sources at each import, which takes a third of its time."""
+    found: dict[str, str] = {}
+    for kind in reversed(section.mro()[: section.mro().index(BaseModel)]):
+        (definition,) = ast.parse(dedent(inspect.getsource(kind))).body
+        for field, text in pairwise(definition.body):  # type: ignore[attr-defined]
+            if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+                found[ast.unparse(field.target)] = inspect.cleandoc(str(text.value.value))
+    return found
 
 
 def section_in(annotation: Any) -> Any:
@@ -149,7 +166,15 @@ def discriminator(sections: dict[str, type[Section]]) -> str:
 class Section(BaseModel):
     """A section of the configuration; it is immutable and refuses unknown keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        schema, texts = handler(core_schema), _docstrings(cls)
+        for key, options in handler.resolve_ref_schema(schema).get("properties", {}).items():
+            if key in texts and handler.resolve_ref_schema(options).get("description") != texts[key]:
+                options.setdefault("description", texts[key])
+        return schema
 
     def si(self) -> SimpleNamespace:
         """Values in SI units, named without the unit suffix (`pitch_um` becomes `pitch`, m)."""

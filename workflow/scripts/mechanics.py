@@ -1,4 +1,4 @@
-"""Solve one heart, or take over the motion of one that moves alike: geometry, fibres, kinematics and measures."""
+"""Solve one heart: geometry, fibres, pathology, mechanics, kinematics and physiology."""
 
 from echotruth.loop.recording import LoopError
 from echotruth.mechanics.beat import simulate
@@ -10,20 +10,16 @@ from echotruth.mechanics.prescribed import MotionError
 from echotruth.mechanics.solver.newton import Diverged
 from echotruth.workflow.failure import CaseFailed
 from echotruth.workflow.job import Job, Result, main
-from echotruth.workflow.sharing import take_over
 
 NO_SOLUTION = (Diverged, FibreError, GeometryError, LoopError, MotionError, PathologyError)
 
 
 def work(job: Job) -> Result:
-    if job.same_as:
-        return take_over(job)
     try:
         groups = simulate(job.config)
     except NO_SOLUTION as error:
         raise CaseFailed(str(error)) from error
-    measures, bounded = measured_heart(groups, job.config)
-    job.note(bounded=bounded)
+    measures, job.notes["bounded"] = measured_heart(groups, job.config)
     return groups | {"physiology": measures}
 
 

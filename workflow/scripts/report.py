@@ -6,8 +6,6 @@ from pathlib import Path
 
 from echotruth.report import page
 from echotruth.report.figures import Figures
-from echotruth.repository import inferred
-from echotruth.repository.checksums import commit_beside
 from echotruth.repository.reader import Repository
 
 parser = argparse.ArgumentParser(description=__doc__)
@@ -15,10 +13,7 @@ parser.add_argument("repository", type=Path, help="folder of the repository, suc
 folder = parser.parse_args().repository
 try:
     repository = Repository(folder)
-except FileNotFoundError as error:
+    Figures(repository, repository.folder / "figures").draw()
+    page.write(repository)
+except OSError as error:
     sys.exit(f"report: {error}")
-Figures(repository, repository.folder / "figures").draw()
-page.write(repository)
-tables = [repository.folder / inferred.FILE] if repository.config.inference.tracker else []
-drawn = [repository.folder / "report.html", *tables, *sorted((repository.folder / "figures").glob("[!.]*"))]
-commit_beside(repository.folder, repository.folder / "ledger/report.json", drawn)

@@ -1,4 +1,4 @@
-"""True motion, strain and labels at every pixel of every frame."""
+"""True motion, strain and labels at every pixel of every frame, in all sizes."""
 
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.medium.tissue_images import TissueImages
@@ -7,9 +7,12 @@ from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
-    pixels = pixel_centres(job.config.bmode, job.size)
-    tissue = TissueImages(job.config, job.heart, job.plane, *pixels)
-    return {f"truth/{job.size}": PixelTruth(job.heart, job.plane, *pixels, tissue)}
+    found = {}
+    for size in job.config.bmode.sizes:
+        pixels = pixel_centres(job.config.bmode, size)
+        tissue = TissueImages(job.config, job.heart, job.plane, *pixels)
+        found[f"truth/{size}"] = PixelTruth(job.heart, job.plane, *pixels, tissue)
+    return found
 
 
 if __name__ == "__main__":

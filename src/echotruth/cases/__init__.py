@@ -4,7 +4,6 @@ A sweep is a grid of values, the rows of a table, random draws, and conditions o
 """
 
 from echotruth.cases.case import Case
-from echotruth.cases.checks import RF_INDEPENDENT
 from echotruth.cases.expansion import all_cases, expand, find_case
 from echotruth.cases.ids import case_id
 from echotruth.cases.labels import diagnosis
@@ -12,7 +11,6 @@ from echotruth.cases.rows import as_table
 from echotruth.cases.tabulation import table
 
 __all__ = [
-    "RF_INDEPENDENT",
     "Case",
     "all_cases",
     "as_table",

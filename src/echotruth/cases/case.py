@@ -24,6 +24,8 @@ class Case:
     """Name -> value of the labels in the table, which nothing that is computed depends on."""
     note: str = ""
     """The note in the table."""
+    heart: str = "heart"
+    """Id of its heart, by the swept keys on which motion depends: cases that move alike share one."""
 
 
 @dataclass(frozen=True)

@@ -2,18 +2,14 @@
 
 import json
 import re
+from contextlib import suppress
 from math import isfinite
 from typing import Any, Literal, get_args, get_origin
 
 from echotruth.config import Section
 
-_INTEGER = re.compile(r"[+-]?\d{1,18}")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 _WORDS = {"true": True, "false": False, "TRUE": True, "FALSE": False, "True": True, "False": False, "null": None}
-
-
-class CellError(ValueError):
-    """Raised if a cell has no value; the message says what would be right."""
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 
 
 def types(section: Section, key: str) -> frozenset[type]:
@@ -45,16 +41,25 @@ def value(cell: str, allowed: frozenset[type]) -> Any:
 
     Raises
     ------
-    CellError
+    ValueError
         If it begins a list or a mapping that does not end.
     """
-    if cell == "null":
-        return None
-    if str in allowed and not allowed & {int, float}:
+    takes_text = str in allowed and not allowed & {int, float}
+    words = {"null": None} if takes_text else _WORDS
+    if takes_text or cell in words:
+        return words.get(cell, cell)
+    if cell[0] in "[{":
+        try:
+            return json.loads(cell)
+        except (ValueError, RecursionError):
+            raise ValueError("must be a list or a mapping as JSON writes it, such as [7, 8]") from None
+    found = number(cell)
+    if found is None:
         return cell
-    if cell in _WORDS:
-        return _WORDS[cell]
-    return _nested(cell) if cell[0] in "[{" else _number_or_text(cell, allowed)
+    with suppress(ValueError):
+        return int(cell)
+    # A column of whole numbers in which cells are empty is often saved with decimal points.
+    return int(found) if found.is_integer() and float not in allowed else found
 
 
 def number(cell: str) -> float | None:
@@ -66,27 +71,6 @@ def number(cell: str) -> float | None:
 def written(value: Any) -> str:
     """Cell with a value, which is read back as the same."""
     return value if isinstance(value, str) else json.dumps(value)
-
-
-def _number_or_text(cell: str, allowed: frozenset[type]) -> int | float | str:
-    if _INTEGER.fullmatch(cell):
-        return int(cell)
-    found = number(cell)
-    if found is None:
-        return cell
-    # A column of whole numbers in which cells are empty is often saved with decimal points.
-    return int(found) if found.is_integer() and float not in allowed else found
-
-
-def _nested(cell: str) -> Any:
-    try:
-        return json.loads(cell, parse_constant=_refuse)
-    except (ValueError, RecursionError):
-        raise CellError("must be a list or a mapping as JSON writes it, such as [7, 8]") from None
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(constant)
 
 
 def _types(annotation: Any) -> list[type]:

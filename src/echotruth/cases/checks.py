@@ -1,7 +1,7 @@
 """Checks of a sweep: its keys, that all hearts differ, and the files that they name."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from echotruth.cases.rows import source_of
 from echotruth.config import Config, Section
 from echotruth.config.loading import ConfigError
 from echotruth.config.reading import Errors
-from echotruth.config.table import LABEL
+from echotruth.config.table import LABEL, labels, swept
 from echotruth.section import dotted_values, value_of
 
 NOT_SWEPT = (
@@ -24,21 +24,10 @@ NOT_SWEPT = (
 _SWEPT_WITHIN = re.compile(r"views\.\w+\.(position|rotation_deg|tilt_deg)|tracking\.frame_step")
 """Keys that can be swept within those that cannot."""
 
-RF_INDEPENDENT = {
-    "probe.width_um": ("element_width",),
-    "probe.height_mm": ("element_height", "accuracy_from"),
-    "probe.elevation_focus_mm": ("elevation_focus", "accuracy_from"),
-    "probe.attenuation_dB_per_cm_MHz": ("attenuation",),
-}
-"""Keys of the probe that can be swept even if RF is kept, because they change neither its length nor the scan lines,
-and the attributes of the group `rf` that follow from them."""
-
 
 def can_be_swept(key: str) -> bool:
     """Whether a dotted key may differ between the cases of a repository."""
-    if _SWEPT_WITHIN.fullmatch(key):
-        return True
-    return not (key.startswith(NOT_SWEPT) or key.endswith("_elements"))
+    return bool(_SWEPT_WITHIN.fullmatch(key)) or not (key.startswith(NOT_SWEPT) or key.endswith("_elements"))
 
 
 def check_keys(config: Config, source: str) -> None:
@@ -49,17 +38,21 @@ def check_keys(config: Config, source: str) -> None:
     ConfigError
         With the keys that cannot.
     """
-    places: dict[str, str] = {}
+    rows, draw = config.cases.rows, config.cases.draw
+    places = [(key, f"{source_of(config)}, column {key[:80]!r}") for key in ([] if rows is None else swept(rows))]
+    places += [(key, f"cases.{key[:80]}") for key in config.cases.grid]
+    places += [(key, f"cases.draw.keys.{key[:80]}") for key in (draw.keys if draw else ())]
+    first: dict[str, str] = {}
     errors = Errors()
-    for key, place in _keys(config):
+    for key, place in places:
         with errors.collecting():
-            if key in places:
-                raise ConfigError(f"{source}: {place}: {key} is swept by {places[key]} too: give it in one of them")
-            places[key] = place
+            if (other := first.setdefault(key, place)) != place:
+                raise ConfigError(f"{source}: {place}: {key} is swept by {other} too: give it in one of them")
             _check_swept_key(config, key, f"{source}: {place}")
     for key, values in config.cases.grid.items():
-        with errors.collecting():
-            _check_distinct(key, values, source)
+        texts = [exact(value) for value in values]
+        for value in [value for number, value in enumerate(values) if texts[number] in texts[:number]][:1]:
+            errors.messages.append(f"{source}: cases.{key} gives a value twice, {value}: list each value once")
     errors.raise_all(source)
 
 
@@ -70,21 +63,15 @@ def check_ids(hearts: list[tuple[Combination, Case]], source: str) -> None:
         other, first = known.setdefault(case.id.casefold(), (heart, case))
         if first is case:
             continue
-        places = [one.origin or str(one.parameters) for one in (other, heart)]
-        given = f"{places[0]} and {places[1]}"
+        given = " and ".join(one.origin or str(one.parameters) for one in (other, heart))
         if first.id != case.id:
             ids = f"{first.id} and {case.id}"
             raise ConfigError(f"{source}: cases: {given} have ids that differ in capitals alone, {ids}: change one")
-        remedy = _remedy_of_twins(other.origin, heart.origin)
+        rows = [re.sub(r"(^|, )draw \d+$", "", one.origin) for one in (other, heart)]
+        remedy = "leave one of them out" + (", or give each an id in a column case" if rows[1] else "")
+        if rows[0] == rows[1] and rows[0] != other.origin:
+            remedy = "draw fewer hearts, or another key as well"
         raise ConfigError(f"{source}: cases: {given} are the same heart, {case.id}: {remedy}")
-
-
-def _remedy_of_twins(*origins: str) -> str:
-    """What to do about two combinations that are the same heart, given where they come from."""
-    rows = [re.sub(r"(^|, )draw \d+$", "", origin) for origin in origins]
-    if rows[0] == rows[1] and rows[0] != origins[0]:
-        return "draw fewer hearts, or another key as well"
-    return "leave one of them out" + (", or give each an id in a column case" if rows[1] else "")
 
 
 def check_files(hearts: list[tuple[Combination, Case]], source: str) -> None:
@@ -95,50 +82,32 @@ def check_files(hearts: list[tuple[Combination, Case]], source: str) -> None:
     ConfigError
         With the row that names the file, if it is in a table.
     """
-    for loop, heart in _distinct(hearts, "loop"):
-        _check_loop(loop, _place(heart, "loop.", source))
-    series = set()
-    for motion, heart in _distinct(hearts, "motion"):
-        if motion.kind == "file" and motion.file.path not in series:
-            series.add(motion.file.path)
-            _check_series(motion.file.path, _place(heart, "motion.", source))
-    meshes: set[str | None] = {None}
-    for geometry, heart in _distinct(hearts, "geometry"):
-        place = _place(heart, "geometry.", source)
+    for loop, place, _ in _distinct(hearts, "loop", source):
+        _check_loop(loop, place)
+    known: set[str | None] = {None}
+    for motion, place, _ in _distinct(hearts, "motion", source):
+        if motion.kind == "file" and motion.file.path not in known:
+            known.add(motion.file.path)
+            _check_series(motion.file.path, place)
+    for geometry, place, heart in _distinct(hearts, "geometry", source):
         if geometry.file and "geometry.file" in heart.parameters and not geometry.remesh:
             where = place if heart.origin else f"{source}: cases.geometry.file"
             raise ConfigError(f"{where}: the meshes may differ in size: set geometry.remesh: true")
-        if geometry.file not in {*meshes, *series} and not Path(str(geometry.file)).is_file():
+        if geometry.file not in known and not Path(str(geometry.file)).is_file():
             remedy = "file not found: give its path from this folder"
             raise ConfigError(f"{place}: geometry.file = {geometry.file!r}: {remedy}")
-        meshes.add(geometry.file)
+        known.add(geometry.file)
 
 
-def check_condition_key(config: Config, key: str, table_labels: list[str], place: str) -> None:
+def check_condition_key(config: Config, key: str, place: str) -> None:
     """Check that a key of a condition is one of the configuration, or a label of the table."""
-    if key in table_labels:
+    rows = config.cases.rows
+    if rows is not None and key in labels(rows):
         return
     if key.startswith(LABEL):
         raise ConfigError(f"{place}: {key} is not a column of the table: name one, or leave it out")
-    value = _value_of(config, key, place)
-    if isinstance(value, Section | dict):
+    if isinstance(_value_of(config, key, place), Section | dict):
         raise ConfigError(f"{place}: {key} is a section: name one of its keys")
-
-
-def _keys(config: Config) -> Iterator[tuple[str, str]]:
-    """Each swept key, and what errors call the place in which it is swept."""
-    rows, draw = config.cases.rows, config.cases.draw
-    yield from ((key, f"{source_of(config)}, column {key[:80]!r}") for key in (rows.keys if rows else ()))
-    yield from ((key, f"cases.{key[:80]}") for key in config.cases.grid)
-    yield from ((key, f"cases.draw.keys.{key[:80]}") for key in (draw.keys if draw else ()))
-
-
-def _check_distinct(key: str, values: list[Any], source: str) -> None:
-    seen: set[str] = set()
-    for value in values:
-        if (text := exact(value)) in seen:
-            raise ConfigError(f"{source}: cases.{key} gives a value twice, {value}: list each value once")
-        seen.add(text)
 
 
 def _check_swept_key(config: Config, key: str, place: str) -> None:
@@ -148,8 +117,6 @@ def _check_swept_key(config: Config, key: str, place: str) -> None:
         raise ConfigError(f"{place}: {key} is a section: sweep one of its keys")
     if not can_be_swept(key):
         raise ConfigError(f"{place}: {key} cannot be swept, all cases share it: set it once")
-    if config.rf.keep and key.startswith(("probe.", "rf.")) and key not in RF_INDEPENDENT:
-        raise ConfigError(f"{place}: {key} cannot be swept if RF is kept: leave rf.keep empty")
 
 
 def _value_of(config: Config, key: str, place: str) -> Any:
@@ -157,37 +124,31 @@ def _value_of(config: Config, key: str, place: str) -> Any:
     try:
         return value_of(config, key)
     except (KeyError, TypeError, ValueError):
-        raise ConfigError(f"{place}: {key[:80]} is not a key: {_suggestion(config, key)}") from None
-
-
-def _suggestion(config: Config, key: str) -> str:
-    close = get_close_matches(key[:200], list(_all_keys(config)), n=1, cutoff=0.8)
-    if close:
-        return f"did you mean {close[0]}?"
-    return "write it in full, such as fibres.endo_deg" if "." in key else f"write {LABEL}{key[:40]} if it is a label"
+        remedy = "write it in full, such as fibres.endo_deg"
+        if "." not in key:
+            remedy = f"write {LABEL}{key[:40]} if it is a label"
+        if close := get_close_matches(key[:200], list(_all_keys(config)), n=1, cutoff=0.8):
+            remedy = f"did you mean {close[0]}?"
+        raise ConfigError(f"{place}: {key[:80]} is not a key: {remedy}") from None
 
 
 def _all_keys(config: Config) -> Iterator[str]:
-    for key, value in dotted_values(config):
-        if key == "views":
-            yield from (key for view, section in value.items() for key, _ in dotted_values(section, f"views.{view}."))
-        else:
-            yield key
+    yield from (key for key, _ in dotted_values(config) if key != "views")
+    for name, view in config.views.items():
+        yield from (key for key, _ in dotted_values(view, f"views.{name}."))
 
 
-def _distinct(hearts: Iterable[tuple[Combination, Case]], name: str) -> list[tuple[Any, Combination]]:
-    """Each section that occurs, and the first combination with it; cases share those in which they do not differ."""
-    found: dict[int, tuple[Any, Combination]] = {}
+def _distinct(hearts: list[tuple[Combination, Case]], name: str, source: str) -> list[tuple[Any, str, Combination]]:
+    """Each section of a name that occurs, its place for errors, and the first combination with it.
+
+    Cases share the sections in which they do not differ. The place has the row too, if keys of the section are swept.
+    """
+    found: dict[int, tuple[Any, str, Combination]] = {}
     for heart, case in hearts:
         section = getattr(case.config, name)
-        found.setdefault(id(section), (section, heart))
+        is_swept = heart.origin and any(key.startswith(f"{name}.") for key in heart.parameters)
+        found.setdefault(id(section), (section, f"{source}: {heart.origin}" if is_swept else source, heart))
     return list(found.values())
-
-
-def _place(heart: Combination, prefix: str, source: str) -> str:
-    """What errors name: the row too, if keys of a section are swept there."""
-    swept = heart.origin and any(key.startswith(prefix) for key in heart.parameters)
-    return f"{source}: {heart.origin}" if swept else source
 
 
 def _check_loop(loop: Any, place: str) -> None:

@@ -1,37 +1,20 @@
 """Conditions that leave out cases: comparisons of dotted keys, as Python writes them, and nothing else of Python."""
 
 import ast
-import operator
 from collections.abc import Callable
 from typing import Any
 
-from echotruth.config.limits import MAX_CONDITION
+from echotruth.config.loading import ConfigError
 
-Lookup = Callable[[str], Any]
-"""Dotted key -> its value in a case."""
-Evaluation = Callable[[Lookup], Any]
-"""Value of an expression in a case."""
+MAX_CONDITION = 1000
+"""Longest condition, characters."""
 
-_ARITHMETIC: dict[type, Callable[[float, float], float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Mod: operator.mod,
-    ast.Pow: operator.pow,
-}
-_ORDER: dict[type, Callable[[Any, Any], bool]] = {
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
-}
+_ALLOWED = (
+    *(ast.BoolOp, ast.boolop, ast.Not, ast.USub, ast.UAdd, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Mod, ast.Pow),
+    *(ast.Compare, ast.cmpop, ast.UnaryOp, ast.List, ast.Tuple, ast.Load),
+)
 _CONSTANTS = {"true": True, "false": False, "null": None}
 WHOLE = "write comparisons of keys and numbers, joined by and, or and not"
-
-
-class ConditionError(ValueError):
-    """Raised if a condition cannot be read or has no value; the message says what would be right."""
 
 
 class Condition:
@@ -42,170 +25,106 @@ class Condition:
     Parameters
     ----------
     text : str
+    source : str
+        What errors name.
 
     Attributes
     ----------
-    text : str
+    place : str
+        What errors begin with.
     keys : set of str
         Dotted keys in it.
 
     Raises
     ------
-    ConditionError
+    ConfigError
         If it has anything else.
     """
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self, text: str, source: str) -> None:
+        self.place = f"{source}: cases.where = {text[:80]!r}"
         if len(text) > MAX_CONDITION:
-            raise ConditionError(f"has {len(text)} characters: write at most {MAX_CONDITION}, or several conditions")
+            remedy = f"write at most {MAX_CONDITION}, or several conditions"
+            raise ConfigError(f"{self.place}: has {len(text)} characters: {remedy}")
+        checked = _Checked()
         try:
-            tree = ast.parse(text.strip(), mode="eval").body
-            compiler = _Compiler()
-            self._holds: Evaluation = compiler.visit(tree)
-            self.keys = compiler.keys
-        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-            if isinstance(error, ConditionError):
-                raise
-            raise ConditionError(f"cannot be read: {WHOLE}, such as loop.edv_uL > 40 and seed < 3") from None
+            tree = ast.Expression(checked.visit(ast.parse(text.strip(), mode="eval").body))
+            self._code = compile(ast.fix_missing_locations(tree), "condition", "eval")
+        except _NotAllowed as error:
+            raise ConfigError(f"{self.place}: has {error}: {WHOLE}") from None
+        except (SyntaxError, RecursionError, MemoryError, ValueError):
+            example = "such as loop.edv_uL > 40 and seed < 3"
+            raise ConfigError(f"{self.place}: cannot be read: {WHOLE}, {example}") from None
+        self.keys = checked.keys
 
-    def holds(self, lookup: Lookup) -> bool:
+    def holds(self, lookup: Callable[[str], Any], case: object) -> bool:
         """Whether a case meets the condition.
 
         Parameters
         ----------
         lookup : callable
             From a dotted key to its value in the case.
+        case : object
+            What errors call it.
 
         Raises
         ------
-        ConditionError
+        ConfigError
             If what is compared cannot be, or the result is neither true nor false.
         """
+        values = {key: lookup(key) for key in self.keys}
         try:
-            found = self._holds(lookup)
+            found = eval(self._code, {"__builtins__": {}}, values)  # it has what _Checked allows
         except (ZeroDivisionError, OverflowError):
-            raise ConditionError("divides by zero or exceeds all numbers") from None
-        except RecursionError:
-            raise ConditionError("is nested too deeply: write several conditions") from None
+            raise ConfigError(f"{self.place}: in {case}: divides by zero or exceeds all numbers") from None
+        except TypeError:
+            given = ", ".join(f"{key} = {'null' if value is None else repr(value)}" for key, value in values.items())
+            raise ConfigError(f"{self.place}: in {case}: needs numbers to compute or compare: {given:.200}") from None
         if not isinstance(found, bool):
-            raise ConditionError(f"is {found!r:.80} and neither true nor false: compare it with a value")
+            wrong = f"is {found!r:.80} and neither true nor false: compare it with a value"
+            raise ConfigError(f"{self.place}: in {case}: {wrong}")
         return found
 
 
-class _Compiler(ast.NodeVisitor):
-    """Turns a syntax tree into an evaluation, if it has nothing that a condition may not contain."""
+class _NotAllowed(Exception):
+    """Raised for what a condition may not contain, which the message names."""
+
+
+class _Checked(ast.NodeTransformer):
+    """Makes one name of each dotted key, and refuses what a condition may not contain."""
 
     def __init__(self) -> None:
         self.keys: set[str] = set()
 
-    def generic_visit(self, node: ast.AST) -> Evaluation:
-        raise ConditionError(f"has {_name(node)}: {WHOLE}")
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        if not isinstance(node, _ALLOWED):
+            names = {ast.Call: "a call of a function", ast.Subscript: "square brackets after a value"}
+            raise _NotAllowed(names.get(type(node), f"what is not allowed ({type(node).__name__})"))
+        return super().generic_visit(node)
 
-    def visit_Constant(self, node: ast.Constant) -> Evaluation:
-        value = node.value
-        if value is not None and not isinstance(value, bool | int | float | str):
-            raise ConditionError(f"has {value!r:.40}: {WHOLE}")
-        return lambda lookup: value
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        if node.value is not None and not isinstance(node.value, bool | int | float | str):
+            raise _NotAllowed(f"{node.value!r:.40}")
+        return node
 
-    def visit_Name(self, node: ast.Name | ast.Attribute) -> Evaluation:
-        key = _dotted(node)
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        # As a fraction, of which no power takes long; text and lists have none.
+        left = ast.BinOp(self.visit(node.left), ast.Mult(), ast.Constant(1.0))
+        return ast.BinOp(left, self.visit(node.op), self.visit(node.right))
+
+    def visit_Is(self, node: ast.Is) -> ast.AST:
+        return ast.Eq()  # equal numbers need not be the same object
+
+    def visit_IsNot(self, node: ast.IsNot) -> ast.AST:
+        return ast.NotEq()
+
+    def visit_Name(self, node: ast.expr) -> ast.AST:
+        key = ast.unparse(node)
         if key in _CONSTANTS:
-            constant = _CONSTANTS[key]
-            return lambda lookup: constant
+            return ast.Constant(_CONSTANTS[key])
+        if not all(part.isidentifier() for part in key.split(".")):
+            raise _NotAllowed("a dot after a value, where dots only join the parts of keys")
         self.keys.add(key)
-        return lambda lookup: lookup(key)
+        return ast.Name(key, ast.Load())
 
     visit_Attribute = visit_Name
-
-    def visit_List(self, node: ast.List | ast.Tuple) -> Evaluation:
-        items = [self.visit(item) for item in node.elts]
-        return lambda lookup: [item(lookup) for item in items]
-
-    visit_Tuple = visit_List
-
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> Evaluation:
-        operand = self.visit(node.operand)
-        if isinstance(node.op, ast.Not):
-            return lambda lookup: not _truth(operand(lookup))
-        if isinstance(node.op, ast.Invert):
-            raise ConditionError(f"has ~: {WHOLE}")
-        sign = -1 if isinstance(node.op, ast.USub) else 1
-        return lambda lookup: sign * _number(operand(lookup))
-
-    def visit_BinOp(self, node: ast.BinOp) -> Evaluation:
-        operation = _ARITHMETIC.get(type(node.op))
-        if operation is None:
-            raise ConditionError(f"has {_name(node.op)}: {WHOLE}")
-        left, right = self.visit(node.left), self.visit(node.right)
-        return lambda lookup: _real(operation(_number(left(lookup)), _number(right(lookup))))
-
-    def visit_BoolOp(self, node: ast.BoolOp) -> Evaluation:
-        parts, joined = [self.visit(value) for value in node.values], all if isinstance(node.op, ast.And) else any
-        return lambda lookup: joined(_truth(part(lookup)) for part in parts)
-
-    def visit_Compare(self, node: ast.Compare) -> Evaluation:
-        values = [self.visit(value) for value in (node.left, *node.comparators)]
-        tests = [_test(kind) for kind in node.ops]
-        steps = list(zip(tests, values, values[1:], strict=False))
-        return lambda lookup: all(test(left(lookup), right(lookup)) for test, left, right in steps)
-
-
-def _dotted(node: ast.AST) -> str:
-    """The dotted key that Python would read as a name and its attributes."""
-    if isinstance(node, ast.Name):
-        return node.id
-    if isinstance(node, ast.Attribute):
-        return f"{_dotted(node.value)}.{node.attr}"
-    raise ConditionError(f"has a dot after {_name(node)}: dots only join the parts of keys, such as loop.edv_uL")
-
-
-def _test(kind: ast.cmpop) -> Callable[[Any, Any], bool]:
-    match kind:
-        case ast.Eq() | ast.Is():
-            return _equal
-        case ast.NotEq() | ast.IsNot():
-            return lambda left, right: not _equal(left, right)
-        case ast.In():
-            return _contains
-        case ast.NotIn():
-            return lambda left, right: not _contains(left, right)
-        case _:
-            compare = _ORDER[type(kind)]
-            return lambda left, right: compare(_number(left), _number(right))
-
-
-def _equal(left: Any, right: Any) -> bool:
-    """Whether two values are the same; true is not 1."""
-    return isinstance(left, bool) == isinstance(right, bool) and bool(left == right)
-
-
-def _contains(item: Any, items: Any) -> bool:
-    if not isinstance(items, list):
-        raise ConditionError(f"looks for a value in {items!r:.80}, which is not a list: write a list, such as [1, 2]")
-    return any(_equal(item, other) for other in items)
-
-
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        shown = "null, a key without a value" if value is None else f"{value!r:.80}"
-        raise ConditionError(f"needs a number in place of {shown}")
-    return float(value)  # of which no power is too long to compute
-
-
-def _real(value: Any) -> float:
-    """The result of arithmetic, of which a root of a negative number is none."""
-    if isinstance(value, complex):
-        raise ConditionError("takes a root of a negative number")
-    return value
-
-
-def _truth(value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise ConditionError(f"joins {value!r:.80}, which is neither true nor false: compare it with a value")
-    return value
-
-
-def _name(node: ast.AST) -> str:
-    names = {ast.Call: "a call of a function", ast.Subscript: "square brackets after a value", ast.Lambda: "lambda"}
-    return names.get(type(node), f"what is not allowed ({type(node).__name__})")

@@ -3,14 +3,14 @@
 They are the rows of the table, times the grid, times draws, without those that conditions leave out.
 """
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 
 from echotruth.cases import rows
 from echotruth.cases.case import Case, Combination
 from echotruth.cases.checks import check_condition_key, check_files, check_ids, check_keys
-from echotruth.cases.conditions import Condition, ConditionError
+from echotruth.cases.conditions import Condition
 from echotruth.cases.sections import Sweep
 from echotruth.config import Config
 from echotruth.config.building import Source, configure
@@ -81,12 +81,9 @@ def combinations(config: Config, source: str) -> Iterator[Combination]:
         If a cell of the table is not valid.
     """
     grid, draws = config.cases.grid, _draws(config)
-    for row in rows.combinations(config, source):
-        for values in itertools.product(*grid.values()):
-            for number, draw in draws:
-                parameters = row.parameters | dict(zip(grid, values, strict=True)) | draw
-                origin = ", ".join(filter(None, [row.origin, number]))
-                yield replace(row, parameters=parameters, origin=origin)
+    for row, values, (number, draw) in product(rows.combinations(config, source), product(*grid.values()), draws):
+        parameters = row.parameters | dict(zip(grid, values, strict=True)) | draw
+        yield replace(row, parameters=parameters, origin=", ".join(filter(None, [row.origin, number])))
 
 
 def _hearts(config: Config, source: str, errors: Errors) -> Iterator[tuple[Combination, Case]]:
@@ -114,16 +111,10 @@ def _draws(config: Config) -> list[tuple[str, dict]]:
 
 def _conditions(config: Config, source: str) -> list[Condition]:
     """The conditions, whose keys exist."""
-    table = config.cases.rows
-    conditions = []
-    for text in config.cases.where:
-        place = f"{source}: cases.where = {text[:80]!r}"
-        try:
-            conditions.append(Condition(text))
-        except ConditionError as error:
-            raise ConfigError(f"{place}: {error}") from None
-        for key in sorted(conditions[-1].keys):
-            check_condition_key(config, key, table.labels if table else [], place)
+    conditions = [Condition(text, source) for text in config.cases.where]
+    for condition in conditions:
+        for key in sorted(condition.keys):
+            check_condition_key(config, key, condition.place)
     return conditions
 
 
@@ -131,11 +122,4 @@ def _meets(conditions: list[Condition], sweep: Sweep, heart: Combination) -> boo
     def lookup(key: str) -> object:
         return heart.labels.get(key.removeprefix(LABEL)) if key.startswith(LABEL) else sweep.value(key, heart)
 
-    for condition in conditions:
-        try:
-            if not condition.holds(lookup):
-                return False
-        except ConditionError as error:
-            place = f"{sweep.source}: cases.where = {condition.text[:80]!r}"
-            raise ConfigError(f"{place}: in {heart.origin or heart.parameters}: {error}") from None
-    return True
+    return all(condition.holds(lookup, heart.origin or heart.parameters) for condition in conditions)

@@ -42,7 +42,7 @@ def extended_id(given: str, parameters: dict[str, Any]) -> str:
     """Id of a row of the table with values of the grid or of a draw: its own, and theirs if they differ.
 
     >>> extended_id("patient7", {"seed": 2})
-    'patient7_seed2_a38f3c'
+    'patient7_seed2_b105c5'
     """
     return f"{given}_{case_id(parameters)}" if parameters else given
 

@@ -3,7 +3,8 @@
 from math import nan
 from typing import Any
 
-from echotruth.cases.case import Case
+from echotruth.cases.case import Case, Label
+from echotruth.cases.ids import integer_if_whole
 from echotruth.config import Config
 from echotruth.config.table import LABEL
 
@@ -41,3 +42,13 @@ def columns(cases: list[Case]) -> dict[str, list[Any]]:
     if any(case.note for case in cases):
         found["note"] = [case.note for case in cases]
     return found
+
+
+def heart_of(case: Case) -> str:
+    """Heart of a case: its label `heart`, or the id of its heart if it has none."""
+    return label_text(case.labels.get("heart")) or case.heart
+
+
+def label_text(label: Label) -> str:
+    """A label as text, a whole number without a decimal point; "" if there is none."""
+    return "" if label is None else str(integer_if_whole(label))

@@ -1,9 +1,9 @@
 """Rows of the table as values of swept keys, ids, labels and notes; and hearts as such a table."""
 
-import csv
-import io
+from __future__ import annotations
+
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from echotruth.cases import cells
 from echotruth.cases.case import Case, Combination, Label
@@ -11,8 +11,11 @@ from echotruth.cases.ids import GIVEN, GIVEN_LENGTH, LONGEST, integer_if_whole
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError
 from echotruth.config.reading import Errors
-from echotruth.config.table import CASE, LABEL, NOTE, Table
+from echotruth.config.table import CASE, LABEL, NOTE, labels, swept
 from echotruth.section import value_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _LABEL = re.compile(r"label\.[A-Za-z][A-Za-z0-9_]{0,39}")
 
@@ -37,19 +40,18 @@ def combinations(config: Config, source: str) -> list[Combination]:
     ConfigError
         With file, row and column of a cell that is not valid, or of an id that is given twice.
     """
-    table = config.cases.rows
+    table, name = config.cases.rows, source_of(config)
     if table is None:
         return [Combination({})]
-    name = source_of(config)
-    labels = _labels(table, f"{source}: {name}")
+    place = f"{source}: {name}"
+    carried = _labels(table, place)
     # A table that stands alone may hold the ids that another one's draws gave, as that of merged repositories does.
     is_extended = config.cases.draw is not None or bool(config.cases.grid)
-    ids = _ids(table, f"{source}: {name}", GIVEN_LENGTH if is_extended else LONGEST)
-    notes = _column(table, NOTE)
-    parameters = _parameters(config, table, f"{source}: {name}")
+    ids = _ids(table, place, GIVEN_LENGTH if is_extended else LONGEST)
+    parts = zip(_parameters(config, table, place), ids, table.index, carried, _column(table, NOTE), strict=True)
     return [
-        Combination(values, ids[i], frozenset(values), f"{name}, row {table.numbers[i]}", labels[i], notes[i])
-        for i, values in enumerate(parameters)
+        Combination(values, id, frozenset(values), f"{name}, row {number}", labels, note)
+        for values, id, number, labels, note in parts
     ]
 
 
@@ -60,80 +62,67 @@ def as_table(cases: list[Case]) -> str:
     ----------
     cases : list of Case
     """
-    keys = list(dict.fromkeys(key for case in cases for key in case.parameters))
-    labels = list(dict.fromkeys(name for case in cases for name in case.labels))
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([CASE, *keys, *(f"{LABEL}{name}" for name in labels), NOTE])
+    import pandas as pd
+
+    rows = []
     for case in cases:
-        values = [cells.written(case.parameters[key]) if key in case.parameters else "" for key in keys]
-        carried = [_written_label(case.labels.get(name)) for name in labels]
-        writer.writerow([case.id, *values, *carried, case.note])
-    return text.getvalue()
+        values = {key: cells.written(value) for key, value in case.parameters.items()}
+        # A whole number has no decimal point, as it stays so among labels that are text.
+        values |= {f"{LABEL}{name}": _written_label(value) for name, value in case.labels.items()}
+        rows.append({CASE: case.id, NOTE: case.note} | values)
+    keys = dict.fromkeys(key for case in cases for key in case.parameters)
+    names = dict.fromkeys(f"{LABEL}{name}" for case in cases for name in case.labels)
+    return pd.DataFrame(rows, columns=[CASE, *keys, *names, NOTE]).to_csv(index=False, lineterminator="\n")
 
 
 def _written_label(label: Label) -> str:
-    """Cell with a label; a whole number without a decimal point, as it stays so among labels that are text."""
     return "" if label is None else cells.written(integer_if_whole(label))
 
 
-def _parameters(config: Config, table: Table, source: str) -> list[dict[str, Any]]:
+def _parameters(config: Config, table: pd.DataFrame, place: str) -> list[dict[str, Any]]:
     """Dotted key -> value of the cells that are not empty, in each row."""
-    parameters: list[dict[str, Any]] = [{} for _ in table.cells]
+    parameters: list[dict[str, Any]] = [{} for _ in table.index]
     errors = Errors()
-    for key in table.keys:
-        allowed = _types(config, key)
-        for number, values, cell in zip(table.numbers, parameters, _column(table, key), strict=True):
-            if cell:
-                with errors.collecting():
-                    values[key] = _cell(cell, allowed, f"{source}, row {number}: {key}")
-    errors.raise_all(source)
+    for key in swept(table):
+        section, _, name = key.rpartition(".")
+        allowed = cells.types(value_of(config, section) if section else config, name)
+        for number, values, cell in zip(table.index, parameters, table[key], strict=True):
+            try:
+                if cell:
+                    values[key] = cells.value(cell, allowed)
+            except ValueError as error:
+                errors.messages.append(f"{place}, row {number}: {key} = {cell[:80]!r}: {error}")
+    errors.raise_all(place)
     return parameters
 
 
-def _cell(text: str, allowed: frozenset[type], place: str) -> Any:
-    try:
-        return cells.value(text, allowed)
-    except cells.CellError as error:
-        raise ConfigError(f"{place} = {text[:80]!r}: {error}") from None
-
-
-def _types(config: Config, dotted_key: str) -> frozenset[type]:
-    section, _, key = dotted_key.rpartition(".")
-    return cells.types(value_of(config, section) if section else config, key)
-
-
-def _ids(table: Table, source: str, longest: int) -> list[str]:
+def _ids(table: pd.DataFrame, place: str, longest: int) -> list[str]:
     """Id of each row, empty if it has none; of so many letters at most."""
     rows: dict[str, int] = {}
     ids = _column(table, CASE)
-    for number, id in zip(table.numbers, ids, strict=True):
+    for number, id in zip(table.index, ids, strict=True):
         if id and (len(id) > longest or not re.fullmatch(GIVEN, id)):
             remedy = "use at most 80 letters without accents, digits, _, - and ., and begin with a letter or digit"
-            raise ConfigError(f"{source}, row {number}: case = {id[:80]!r}: {remedy}")
+            raise ConfigError(f"{place}, row {number}: case = {id[:80]!r}: {remedy}")
         if id and rows.setdefault(id, number) != number:
-            raise ConfigError(f"{source}, row {number}: case = {id} is the id of row {rows[id]} too: give it another")
+            raise ConfigError(f"{place}, row {number}: case = {id} is the id of row {rows[id]} too: give it another")
     return ids
 
 
-def _labels(table: Table, source: str) -> list[dict[str, Label]]:
+def _labels(table: pd.DataFrame, place: str) -> list[dict[str, Label]]:
     """Name -> value of the labels of each row."""
-    labels: list[dict[str, Label]] = [{} for _ in table.cells]
-    for column in table.labels:
+    found: dict[str, list[Label]] = {}
+    for column in labels(table):
         if not _LABEL.fullmatch(column):
             remedy = "name it label. and at most 40 letters without accents, digits and _, such as label.group"
-            raise ConfigError(f"{source}, column {column[:80]!r}: {remedy}")
-        texts = _column(table, column)
-        numbers = [cells.number(text) for text in texts]
-        numeric = all(number is not None or not text for number, text in zip(numbers, texts, strict=True))
-        for row, number, text in zip(labels, numbers, texts, strict=True):
-            row[column.removeprefix(LABEL)] = (number if numeric else text) if text else None
-    return labels
+            raise ConfigError(f"{place}, column {column[:80]!r}: {remedy}")
+        values: list[Label] = [cells.number(cell) for cell in table[column]]
+        if any(cell and value is None for cell, value in zip(table[column], values, strict=True)):
+            values = [cell or None for cell in table[column]]
+        found[column.removeprefix(LABEL)] = values
+    return [{name: values[row] for name, values in found.items()} for row in range(len(table))]
 
 
-def _column(table: Table, name: str) -> list[str]:
+def _column(table: pd.DataFrame, name: str) -> list[str]:
     """Cells of a column; empty ones if there is no such column."""
-    if name not in table.columns:
-        return [""] * len(table.cells)
-    index = table.columns.index(name)
-    return [row[index] for row in table.cells]
+    return table[name].tolist() if name in table else [""] * len(table)

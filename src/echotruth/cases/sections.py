@@ -9,7 +9,14 @@ from pydantic import ValidationError
 from echotruth.cases.case import Case, Combination
 from echotruth.cases.ids import case_id, exact, extended_id
 from echotruth.config import Cases, Config, Section
-from echotruth.config.loading import ConfigError, override, replace_values
+from echotruth.config.loading import ConfigError, override
+from echotruth.config.merging import VALUES, merged, nested
+
+Keys = dict[str, Any]
+"""Dotted key -> value."""
+
+MOTION = ("geometry.", "fibres.", "pathology.", "loop.", "mechanics.", "motion.")
+"""Keys on which the motion of a heart depends."""
 
 
 class Sweep:
@@ -26,8 +33,7 @@ class Sweep:
         self.source = source
         self._config = config.model_copy(update={"cases": Cases()})
         self._values = {name: getattr(self._config, name) for name in type(config).model_fields}
-        self._sections: dict[tuple[str, str], Any] = {}
-        self._differing: dict[tuple[str, str], frozenset[str]] = {}
+        self._known: dict[str, tuple[Any, frozenset[str]]] = {}
 
     def case(self, heart: Combination) -> Case:
         """The case with some values of the swept keys.
@@ -38,9 +44,11 @@ class Sweep:
             If they are not valid together.
         """
         with self._explained(heart):
-            sections = {name: self._section(name, keys) for name, keys in _by_section(heart.parameters).items()}
+            sections = {name: self._swept(name, keys)[0] for name, keys in _by_section(heart.parameters).items()}
             config = Config.model_validate(self._values | sections)
-            return Case(self.id(heart), heart.parameters, config, heart.labels, heart.note)
+            moving = {key: value for key, value in heart.parameters.items() if _moves(key, config)}
+            own = case_id({key: moving[key] for key in moving if key in self._differing(moving)})
+            return Case(self.id(heart), heart.parameters, config, heart.labels, heart.note, own)
 
     def id(self, heart: Combination) -> str:
         """Id of the case with some values of the swept keys: given by its row, or a hash of the others that differ.
@@ -52,11 +60,9 @@ class Sweep:
         """
         if heart.given_id and heart.parameters.keys() <= heart.own:
             return heart.given_id
-        sections = _by_section(heart.parameters).items()
         with self._explained(heart):
-            differing = frozenset[str]().union(*(self._differing_keys(name, changes) for name, changes in sections))
-        if heart.given_id:
-            differing -= heart.own
+            differing = self._differing(heart.parameters)
+        differing -= heart.own if heart.given_id else frozenset()
         parameters = {key: value for key, value in heart.parameters.items() if key in differing}
         return extended_id(heart.given_id, parameters) if heart.given_id else case_id(parameters)
 
@@ -72,12 +78,11 @@ class Sweep:
         """
         if heart.parameters.get(key) is not None:
             return heart.parameters[key]
-        name, _, rest = key.partition(".")
-        changes = _by_section(heart.parameters).get(name)
+        name = key.partition(".")[0]
         with self._explained(heart):
-            section = self._section(name, changes) if changes else self._values[name]
+            section, _ = self._swept(name, _by_section(heart.parameters).get(name, {}))
         try:
-            return _value(section, rest) if rest else section
+            return _value(section, key)
         except AttributeError:
             return None  # a parameter of another law
 
@@ -91,58 +96,61 @@ class Sweep:
             override(self._config, heart.parameters, where)
             raise ConfigError(f"{where}: {heart.parameters} are not valid together: leave them out") from None
 
-    def _section(self, name: str, changes: dict[str, Any]) -> Any:
-        """A section, or a key outside of sections, with some keys replaced."""
-        known = (name, repr(changes))
-        if known not in self._sections:
-            base = self._values[name]
-            is_section = isinstance(base, Section | dict)
-            self._sections[known] = _replaced(base, changes) if is_section else changes[name]
-        return self._sections[known]
+    def _swept(self, name: str, keys: Keys) -> tuple[Any, frozenset[str]]:
+        """A section, or a key outside of sections, with some keys replaced, and those that make it another.
 
-    def _differing_keys(self, name: str, changes: dict[str, Any]) -> frozenset[str]:
-        """Keys of a section whose value is not the one it would have if it were not swept.
-
-        That is the value of the configuration, unless it follows other swept keys, as the parameters of a law and the
-        lengths of a preset do.
+        Those are the keys whose value is not the one they would have if they were not swept: that of the
+        configuration, unless it follows other swept keys, as the parameters of a law and the lengths of a preset do.
         """
-        known = (name, repr(changes))
-        if known not in self._differing:
-            base, section = self._values[name], self._section(name, changes)
-            if isinstance(base, Section | dict):
-                self._differing[known] = frozenset(key for key in changes if _differs(base, section, changes, key))
-            else:
-                self._differing[known] = frozenset(changes if exact(section) != exact(base) else ())
-        return self._differing[known]
+        known = f"{name}: {keys!r}"
+        if known not in self._known:
+            section = self._replaced(name, keys)
+            self._known[known] = section, frozenset(key for key in keys if self._differs(name, section, keys, key))
+        return self._known[known]
+
+    def _replaced(self, name: str, keys: Keys) -> Any:
+        return _replaced(self._values[name], nested(keys)[name]) if keys else self._values[name]
+
+    def _differs(self, name: str, section: Any, keys: Keys, key: str) -> bool:
+        try:
+            without = self._replaced(name, {other: value for other, value in keys.items() if other != key})
+            return exact(_value(without, key)) != exact(_value(section, key))
+        except (ValidationError, AttributeError, KeyError):
+            return True  # without the key there is no such section
+
+    def _differing(self, parameters: Keys) -> frozenset[str]:
+        """Swept keys whose value is not the one it would have if it were not swept."""
+        swept = [self._swept(name, keys)[1] for name, keys in _by_section(parameters).items()]
+        return frozenset[str]().union(*swept)
 
 
-def _by_section(parameters: dict[str, Any]) -> dict[str, dict[str, Any]]:
+def _moves(key: str, config: Config) -> bool:
+    """Whether the motion of a heart depends on a key."""
+    if key == "seed":
+        return bool(config.fibres.disarray_deg)
+    return key.startswith(MOTION) or (key == "rf.focus_mm" and config.motion.kind != "beat")
+
+
+def _by_section(keys: Keys) -> dict[str, Keys]:
     """Name of each swept section, or of a swept key outside of sections -> its dotted keys and their values."""
-    by_section: dict[str, dict[str, Any]] = {}
-    for key, value in parameters.items():
+    by_section: dict[str, Keys] = {}
+    for key, value in keys.items():
         by_section.setdefault(key.partition(".")[0], {})[key] = value
     return by_section
 
 
-def _replaced(base: Any, changes: dict[str, Any]) -> Any:
-    """Section, or mapping of names to sections, with the values of some dotted keys, named from the top, replaced."""
-    keys = {key.partition(".")[2]: value for key, value in changes.items()}
+def _replaced(base: Any, changes: Any) -> Any:
+    """A section, or a mapping of names to sections, with changes laid over it; they are a key's value elsewhere."""
+    if isinstance(base, Section):
+        return type(base).model_validate(merged(base.given(), changes, VALUES))
     if isinstance(base, dict):
-        return base | {name: _replaced(base[name], own) for name, own in _by_section(keys).items()}
-    return type(base).model_validate(replace_values(base.given(), keys))
-
-
-def _differs(base: Any, section: Any, changes: dict[str, Any], key: str) -> bool:
-    others = {other: value for other, value in changes.items() if other != key}
-    try:
-        without, inner = _replaced(base, others) if others else base, key.partition(".")[2]
-        return exact(_value(without, inner)) != exact(_value(section, inner))
-    except (ValidationError, AttributeError, KeyError):
-        return True  # without the key there is no such section
+        return base | {name: _replaced(base[name], own) for name, own in changes.items()}
+    return changes
 
 
 def _value(section: Any, dotted_key: str) -> Any:
+    """Value of a dotted key, whose first part names the section or is a key outside of sections."""
     value = section
-    for part in dotted_key.split("."):
+    for part in dotted_key.split(".")[1:]:
         value = value[part] if isinstance(value, dict) else getattr(value.resolved(), part)
     return value.model_dump(mode="json") if isinstance(value, Section) else value

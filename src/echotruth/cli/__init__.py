@@ -9,19 +9,7 @@ from echotruth.cli.command import Parser, add_command, did_you_mean, fail
 
 COMMANDS = (
     *("new", "check", "cases", "run", "status", "info", "show"),
-    *(
-        "draw",
-        "track",
-        "evaluate",
-        "infer",
-        "export",
-        "describe",
-        "release",
-        "merge",
-        "upload",
-        "validate",
-        "completion",
-    ),
+    *("draw", "track", "evaluate", "infer", "export", "describe", "release", "merge", "validate", "completion"),
 )
 """Commands, and their modules and functions, in the order of `echotruth --help`."""
 

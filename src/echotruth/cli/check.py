@@ -20,11 +20,6 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "YAML file, a name of `echotruth new --list`, or folder of a repository, such as out/demo"
     parser.add_argument("path", type=_path, help=f"{text}; sample is the repository of that name")
     parser.add_argument(
-        "--heal",
-        action="store_true",
-        help="delete damaged files and their records, so that the next run makes just these",
-    )
-    parser.add_argument(
         "--quick", action="store_true", help="compare the checksums of the files only, and leave out their values"
     )
 
@@ -38,7 +33,6 @@ def check(arguments: argparse.Namespace) -> int:
     examples:
       echotruth check config/demo.yaml
       echotruth check out/demo
-      echotruth check out/demo --heal
       echotruth check sample
 
     exit status:
@@ -46,21 +40,20 @@ def check(arguments: argparse.Namespace) -> int:
       1  the configuration is not valid, a run would refuse it, or something is damaged
       2  it cannot be checked
     """
-    if arguments.heal or Path(arguments.path).is_dir():
-        return _check_repository(Path(arguments.path), arguments.heal, arguments.quick)
+    if Path(arguments.path).is_dir():
+        return _check_repository(Path(arguments.path), arguments.quick)
     from echotruth.cli.configuration import LISTED, load_cases
 
     config, cases = load_cases(arguments.path, f"a YAML file, {LISTED}, or the folder of a repository")
     if errors := [*_of_files(cases), *_of_inference(config, cases)]:
         sys.exit(named("\n".join(f"{arguments.path}: {error}" for error in errors)))
     print(f"{arguments.path}: valid; cases: {len(cases)}, views per case: {len(config.views)}")
-    from echotruth.cli.estimation import estimated, print_concerns
-    from echotruth.workflow.estimate import short
+    from echotruth.cli.run import print_concerns
+    from echotruth.workflow.concerns import concerns
 
-    found, concerns = estimated(config, cases, [])
-    print(f"A run takes {short(found)}.")
-    print_concerns(concerns)
-    return int(any(concern.is_absurd for concern in concerns))
+    found = list(concerns(config))
+    print_concerns(found)
+    return int(any(concern.is_absurd for concern in found))
 
 
 def _path(path: str) -> str:
@@ -70,21 +63,34 @@ def _path(path: str) -> str:
     return shipped.found(str(shipped.repository(path)))
 
 
-def _check_repository(folder: Path, healing: bool, quick: bool) -> int:
-    from echotruth.config import shipped
-    from echotruth.workflow.integrity import check_repository
+def _check_repository(folder: Path, quick: bool) -> int:
+    """Print what is wrong with a repository; return the exit status."""
+    from echotruth.config.loading import ConfigError
+    from echotruth.repository.check import check
 
-    if healing and shipped.is_sample(folder):
-        return fail(f"{folder}: {shipped.NOT_WRITTEN}")
-    return check_repository(folder, healing, quick)
+    def progress(done: int, number: int) -> None:
+        if sys.stderr.isatty():
+            print(f"\r\033[K{done} of {number} groups" if done < number else "\r\033[K", end="", file=sys.stderr)
+
+    try:
+        found = check(folder.parent if folder.suffix == ".zarr" else folder, progress, quick)
+    except (ConfigError, FileNotFoundError, ValueError) as error:
+        return fail(str(error))
+    print("\n".join(map(str, [*found.faults, *found.notes])) or f"{folder}: nothing is wrong")
+    print(f"{found.files} files, {found.groups} groups, {len(found.faults)} faults")
+    return int(bool(found.faults))
 
 
 def _of_inference(config: Config, cases: list[Case]) -> Iterator[str]:
     """What is wrong with that from which the muscle is inferred: the errors of the tracker, and the priors."""
-    from echotruth.workflow.plan import errors_version
+    if not config.inference.tracker:
+        return
+    from echotruth.inference import tracker_errors
+    from echotruth.inference.parameters import check_prior
 
     try:
-        errors_version(config, cases)
+        check_prior(config.inference.prior)
+        tracker_errors.check(case.config for case in cases)
     except ValueError as error:
         yield f"inference: {error}"
 

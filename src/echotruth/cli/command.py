@@ -89,6 +89,13 @@ def add_repeated(parser: argparse.ArgumentParser, *options: tuple[str, type, str
         parser.add_argument(f"--{name}", type=kind, action="append", default=[], help=text)
 
 
+def count(text: str) -> int:
+    """Whole number above 0, as an option gives it."""
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number above 0")
+    return int(text)
+
+
 def fail(message: str) -> int:
     """Print why a command cannot be done, a line for each reason; return its exit status."""
     print(named(message), file=sys.stderr)

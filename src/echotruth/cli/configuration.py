@@ -26,7 +26,4 @@ def load_cases(path: str, expected: str = f"a YAML file, or {LISTED}") -> tuple[
         config = load(path)
         return config, expand(config, path)
     except ConfigError as error:
-        message = str(error)
-        if Path(path).parent == shipped.folder() and "cases.file" in message:
-            message += f"\n{path}: echotruth new {Path(path).stem} writes it here, with the table that it reads"
-        sys.exit(named(message))
+        sys.exit(named(str(error)))

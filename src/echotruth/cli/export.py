@@ -45,8 +45,8 @@ def export(arguments: argparse.Namespace) -> int:
       0  all files are written
       2  they cannot be exported
     """
-    from echotruth.export import Export, Selection
     from echotruth.repository.reader import Repository
+    from echotruth.sharing.export import Export, Selection
 
     chosen = Selection(arguments.case, arguments.view, arguments.size, arguments.tracker)
     try:

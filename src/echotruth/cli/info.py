@@ -42,7 +42,7 @@ def info(arguments: argparse.Namespace) -> int:
         return 0
     from echotruth.config import shipped
     from echotruth.config.loading import ConfigError
-    from echotruth.repository.ledger import repository_folder
+    from echotruth.repository.places import repository_folder
     from echotruth.repository.reader import Repository
 
     place = arguments.repository
@@ -76,7 +76,7 @@ def _installation() -> dict[str, str]:
     """What is installed, and the machine."""
     import psutil
 
-    from echotruth.repository.provenance import packages
+    from echotruth.repository.version import packages
 
     memory = psutil.virtual_memory()
     disk = shutil.disk_usage(Path.cwd())
@@ -106,7 +106,7 @@ def _repository(found: Repository) -> dict[str, str]:
         "cases": f"{len(cases)}: {statuses}",
         "views": f"{len(views)}: {', '.join(views)}",
         "sizes": f"{sizes} px, {config.bmode.field_of_view_mm:g} mm wide; array {config.probe.preset}",
-        "RF": ", ".join(config.rf.keep) or "not kept",
+        "RF": ", ".join(["lines", *config.rf.keep]),
         "trackers": ", ".join(config.tracking.trackers),
         "from outside": ", ".join(sorted(external)),
         "on disk": f"{_bytes(size)} in {files} files",
@@ -116,11 +116,10 @@ def _repository(found: Repository) -> dict[str, str]:
 
 def _size(folder: Path) -> tuple[int, int]:
     """Number and size of the files below a folder; those that vanish meanwhile are left out."""
-    from echotruth.repository.inventory import files_below
-
     number = size = 0
-    for path in files_below(folder):
-        with suppress(FileNotFoundError):
-            size += os.lstat(f"{folder}/{path}").st_size
-            number += 1
+    for at, _, names in os.walk(folder):
+        for name in names:
+            with suppress(FileNotFoundError):
+                size += os.lstat(f"{at}/{name}").st_size
+                number += 1
     return number, size

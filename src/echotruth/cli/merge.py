@@ -1,33 +1,48 @@
-"""`echotruth merge`: the hearts of other repositories taken over into one."""
+"""`echotruth merge`: hearts and clips of other repositories taken over into one."""
 
 import argparse
 from pathlib import Path
 
-from echotruth.cli.command import fail
+from echotruth.cli.command import add_configuration, fail
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth merge`."""
-    parser.add_argument("into", type=Path, help="folder of the repository that receives them; made if need be")
+    add_configuration(parser)
     parser.add_argument("sources", type=Path, nargs="+", help="folders of repositories, which stay as they are")
 
 
 def merge(arguments: argparse.Namespace) -> int:
-    """Take over the hearts of other repositories of the same settings.
+    """Copy what a configuration asks for from repositories that have it; echotruth run makes the rest.
 
-    Their configurations may differ in their cases and their name only.
+    The configuration has the cases of all. A heart or a clip that was made with other settings, or by
+    other code, is made anew by the run.
 
     examples:
-      echotruth merge out/both out/first out/second
-      echotruth merge out/mine sample
+      echotruth merge both.yaml out/first out/second
+      echotruth run both.yaml
 
     exit status:
-      0  all hearts are taken over
-      2  they cannot be merged
+      0  it is copied
+      1  the configuration is not valid
+      2  a folder is no repository, or a run works on the one that is made
     """
+    from echotruth.cli.configuration import load_cases
     from echotruth.config import shipped
-    from echotruth.workflow.merging import merge_repositories
+    from echotruth.repository.places import repository_folder
+    from echotruth.workflow.lock import LockError, is_held
+    from echotruth.workflow.merging import merge
+    from echotruth.workflow.plan import Plan
 
-    if shipped.is_sample(arguments.into):
-        return fail(f"{arguments.into}: {shipped.NOT_WRITTEN}")
-    return merge_repositories(arguments.into, [Path(shipped.repository(source)) for source in arguments.sources])
+    config, _ = load_cases(arguments.config)
+    plan = Plan(config.model_dump(), arguments.config)
+    try:
+        sources = [repository_folder(shipped.repository(source)) for source in arguments.sources]
+        if busy := [source for source in sources if is_held(source)]:
+            return fail(f"{busy[0]}: a run works on it: wait for it")
+        plan.begin()
+        copied = merge(plan, sources)
+    except (FileNotFoundError, LockError) as error:
+        return fail(str(error))
+    print(f"{plan.folder}: {copied} hearts and clips are copied: echotruth run {arguments.config} makes the rest")
+    return 0

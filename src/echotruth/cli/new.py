@@ -1,4 +1,4 @@
-"""`echotruth new`: a commented configuration to begin with."""
+"""`echotruth new`: a copy of a shipped configuration to begin with."""
 
 import argparse
 import re
@@ -17,20 +17,18 @@ def add(parser: argparse.ArgumentParser) -> None:
     text = "mouse, rat, human or another of --list (default: mouse)"
     parser.add_argument("preset", nargs="?", default="mouse", help=text)
     parser.add_argument("-o", "--output", metavar="FILE", help="file to write (default: PRESET.yaml; - prints it)")
-    parser.add_argument("--all", action="store_true", help="write all keys, with their defaults commented out")
     parser.add_argument("--list", action="store_true", help="list the presets")
 
 
 def new(arguments: argparse.Namespace) -> int:
     """Write a commented configuration to begin with.
 
-    It has the keys that most people want to see first, with their meaning, unit, limits and default;
-    what is commented out has its default. A file that is there already is never replaced.
+    mouse, rat and human have the keys that most people change, with their meaning and unit; config/README.md
+    lists all keys. A file that is there already is never replaced.
 
     examples:
       echotruth new
       echotruth new human -o patient.yaml
-      echotruth new sweep --all
       echotruth new --list
 
     exit status:
@@ -49,48 +47,43 @@ def new(arguments: argparse.Namespace) -> int:
         return fail(f"{arguments.preset} is not a preset: {remedy}")
     output = arguments.output or f"{arguments.preset}.yaml"
     if output == STANDARD_OUTPUT:
-        sys.stdout.write(_texts(arguments.preset, Path(f"{arguments.preset}.yaml"), arguments.all)[0])
+        sys.stdout.write(_files(arguments.preset, Path(f"{arguments.preset}.yaml")).popitem()[1])
         return 0
-    return _write(arguments.preset, Path(output), arguments.all)
+    return _write(_files(arguments.preset, Path(output)))
 
 
-def _write(preset: str, path: Path, everything: bool) -> int:
-    """Write a configuration and the table that it reads, if there is one; return the exit status."""
-    text, tables = _texts(preset, path, everything)
-    files = tables | {path: text}
-    for file, table in tables.items():
-        if file.is_file() and file.read_bytes() == table.encode():
-            del files[file]  # the same table is there already
-    for file in files:
+def _write(files: dict[Path, str]) -> int:
+    """Write a configuration, the last of some files, and the tables that it reads; return the exit status."""
+    path = [*files][-1]
+    # The same table may be there already.
+    new = {file: text for file, text in files.items() if file == path or not _holds(file, text)}
+    for file in new:
         if file.exists() or file.is_symlink():
             return fail(f"{file}: is there already: give a file in another folder with --output, or remove it")
     try:
-        for file, content in files.items():
+        for file, text in new.items():
             with file.open("x", encoding="utf-8") as opened:
-                opened.write(content)
+                opened.write(text)
     except OSError as error:
         return fail(f"{error.filename or path}: cannot be written ({error.strerror}): give a file in a folder of yours")
-    for file in files:
+    for file in new:
         print(file)
     print(f"Edit it, then: echotruth check {quote(str(path))}; echotruth run {quote(str(path))}")
     return 0
 
 
-def _texts(preset: str, path: Path, everything: bool) -> tuple[str, dict[Path, str]]:
-    """Text of a configuration under the name of its file, and of the tables that it reads, by the files to write."""
+def _holds(file: Path, text: str) -> bool:
+    return file.is_file() and file.read_bytes() == text.encode()
+
+
+def _files(preset: str, path: Path) -> dict[Path, str]:
+    """Texts of the tables that a configuration reads, and last its own, under the name of its file."""
     from echotruth.config import shipped
-    from echotruth.config.commented import commented
 
     text = shipped.path_of(preset).read_text(encoding="utf-8")
     if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,59}", path.stem):
-        text = re.sub(r"(?m)^name: .*$", f"name: {path.stem}", text)
+        text = re.sub(r"(?m)^name: \S+", f"name: {path.stem}", text)
     tables = {}
-    for name in re.findall(r"(?m)^ *file: config/(\S+\.csv)", text):
-        source = shipped.folder() / name
-        tables[path.parent / name] = source.read_text(encoding="utf-8")
-        # The table is read where it is, and named where it will be.
-        text = text.replace(f"config/{name}", str(source))
-    written = commented(text, everything)
-    for file in tables:
-        written = written.replace(str(shipped.folder() / file.name), file.as_posix())
-    return written, tables
+    for name in re.findall(r"(?m)^ *file: (\S+\.csv)", text):
+        tables[path.parent / name] = (shipped.folder() / name).read_text(encoding="utf-8")
+    return tables | {path: text}

@@ -3,9 +3,8 @@
 import argparse
 from pathlib import Path
 
-from echotruth.cli.command import fail
-from echotruth.cli.describe import add_attribution
-from echotruth.cli.run import count
+from echotruth.cli.attribution import add_attribution, attribution
+from echotruth.cli.command import count, fail
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -21,7 +20,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def release(arguments: argparse.Namespace) -> int:
     """Write the files that one would upload to give a repository away.
 
-    These are archives of whole hearts, of a stated size, a registry of their checksums for pooch, a data
+    These are archives of whole hearts and clips, of a stated size, a registry of their checksums for pooch, a data
     card that Hugging Face reads, .zenodo.json, Croissant, a citation, the clips as NumPy archives and an
     evaluator of trackers in one file. echotruth.fetch reads them from wherever they are. It needs the
     extra description of echotruth.
@@ -36,20 +35,17 @@ def release(arguments: argparse.Namespace) -> int:
     """
     from echotruth.config import shipped
     from echotruth.config.loading import ConfigError
-    from echotruth.release import ReleaseError
-    from echotruth.release import release as write
-    from echotruth.repository.description import DescriptionError, attribution
     from echotruth.repository.reader import Repository
-    from echotruth.workflow import lease
+    from echotruth.sharing.description import DescriptionError
+    from echotruth.sharing.release import ReleaseError
+    from echotruth.sharing.release import release as write
 
     try:
-        given = attribution(arguments.author, arguments.license, arguments.url, arguments.release, arguments.date)
         repository = Repository(shipped.repository(arguments.repository))
-        lease.follow(repository.folder)
         name = f"{repository.config.name}-release"
         folder = arguments.to or (Path("out") if repository.is_sample else repository.folder.parent) / name
-        files = write(repository, folder, given, arguments.part_mb * 10**6)
-    except (ReleaseError, DescriptionError, ConfigError, FileNotFoundError, lease.LeaseError) as error:
+        files = write(repository, folder, attribution(arguments), arguments.part_mb * 10**6)
+    except (ReleaseError, DescriptionError, ConfigError, FileNotFoundError) as error:
         return fail(str(error))
     for path in files:
         print(path)

@@ -11,41 +11,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echotruth.cli.command import add_configuration, fail
-from echotruth.cli.snakemake import executor_error, is_query, option_errors, split_targets, with_profiles
+from echotruth.cli.snakemake import cores, executor_error, is_query, option_errors, split_targets, with_profiles
 
 if TYPE_CHECKING:
     from echotruth.cases import Case
     from echotruth.config import Config
 
-WRONG_OPTION = 2
-"""Exit status of Snakemake, and of the command, if it does not take an option."""
-
-WRITABLE = "the working folder must be writable and have space"
+REFUSED = 2
+"""Exit status of Snakemake if it does not understand its command line."""
+NO_HEART = 4
+"""Exit status of a run that made everything, of which no heart is imaged."""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth run`."""
     add_configuration(parser)
     parser.allow_abbrev = False  # what looks like the beginning of an option may be one of Snakemake
-    text = "upload each result when it is finished; exit status 3 if all is made but not uploaded"
-    parser.add_argument(
-        "--estimate", action="store_true", help="only print what it will take: CPU time, GB, files, jobs"
-    )
-    parser.add_argument(
-        "--yes", action="store_true", help="run it even if the estimate says that it does not fit or makes no sense"
-    )
-    text_of_block = "a larger sweep is planned by Snakemake in blocks of so many hearts (default: %(default)s)"
-    parser.add_argument("--hearts-per-block", type=count, default=50, metavar="N", help=text_of_block)
-    text_of_number = "blocks that are made side by side, each with --cores or --jobs of its own (default: %(default)s)"
-    parser.add_argument("--blocks-at-once", type=count, default=1, metavar="N", help=text_of_number)
-    parser.add_argument("--upload", metavar="s3://BUCKET/FOLDER", help=text)
-
-
-def count(text: str) -> int:
-    """Whole number above 0, as an option gives it."""
-    if not text.isdigit() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text} is not a whole number above 0")
-    return int(text)
+    parser.add_argument("--estimate", action="store_true", help="only print what it will take: jobs, CPU time, GB")
+    parser.add_argument("--yes", action="store_true", help="run it even if its images make no sense")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -58,135 +41,94 @@ def run(arguments: argparse.Namespace) -> int:
       --cores N             number of processor cores (default: all)
       -n                    only list the jobs
       --profile NAME        where jobs run: default, slurm, or a folder with a config.yaml of Snakemake
-      --rerun-triggers mtime  do not make again what other settings or code would change
+      repository --batch repository=1/4
+                            plan and make a quarter of a large sweep; then 2/4, 3/4, 4/4
 
     examples:
       echotruth run config/demo.yaml
       echotruth run config/sweep.yaml --estimate
       echotruth run config/sweep.yaml --cores 8
-      echotruth run config/demo.yaml --upload s3://bucket/demo
 
     exit status:
       0  everything is made
       1  the configuration is not valid, or jobs failed
-      2  an option is wrong, or it does not fit this machine or makes no sense; --yes runs the latter nevertheless
-      3  everything is made, but not everything is uploaded
+      2  an option is wrong, or the images make no sense; --yes runs the latter nevertheless
       4  everything is made, but no heart is complete: each failed or is implausible, and none is imaged
     """
     from echotruth.cli.configuration import load_cases
+    from echotruth.workflow.concerns import concerns
 
     if errors := option_errors(arguments.options):
         return fail("\n".join(errors))
     config, cases = load_cases(arguments.config)
-    expected: dict[str, float] = {}
+    if arguments.estimate:
+        from echotruth.workflow.cost import table
+
+        hearts = len({case.heart for case in cases})
+        print(f"{arguments.config}: hearts: {hearts}, cases: {len(cases)}, views of each: {len(config.views)}\n")
+        print(table(config, hearts, len(cases), cores(arguments.options)))
+        return 0
+    if any(map(is_query, arguments.options)):
+        return subprocess.call(_command(arguments))
+    if missing := executor_error(arguments.options):
+        return fail(missing)
+    found = list(concerns(config))
+    print_concerns(found, arguments.yes)
+    if any(concern.is_absurd for concern in found) and not arguments.yes:
+        return 2
     try:
-        if arguments.estimate or not any(map(is_query, arguments.options)):
-            from echotruth.cli.estimation import estimated, print_concerns
-
-            found, concerns = estimated(config, cases, arguments.options)
-            expected = {rule: part.seconds for rule, part in found.parts.items()}
-            is_absurd = any(concern.is_absurd for concern in concerns)
-            if arguments.estimate:
-                from echotruth.workflow.estimate import table
-
-                print(f"{arguments.config}: hearts: {len(cases)}, views of each: {len(config.views)}\n")
-                print(table(found, Path("out") / config.name))
-            print_concerns(concerns, arguments.yes)
-            if is_absurd and not arguments.yes:
-                return 2
-            if arguments.estimate:
-                return 0
-        return _started(arguments, config, cases, expected)
+        return _make(arguments, config, cases)
     except KeyboardInterrupt:
         sys.exit("echotruth: interrupted; run the same command again to continue")
     except OSError as error:
-        sys.exit(f"echotruth: {error.filename or arguments.config}: {error.strerror or error}: {WRITABLE}")
+        remedy = "the working folder must be writable and have space"
+        sys.exit(f"echotruth: {error.filename or arguments.config}: {error.strerror or error}: {remedy}")
 
 
-def _started(arguments: argparse.Namespace, config: Config, cases: list[Case], expected: dict[str, float]) -> int:
-    """Make a repository, unless the package that starts jobs elsewhere is missing; return the exit status."""
-    from echotruth.cli.estimation import profile_content
-    from echotruth.workflow.snakemake_process import snakemake_command
-
-    if error := executor_error((profile_content(arguments.options) or {}).get("executor")):
-        return fail(error)
-    if any(map(is_query, arguments.options)):
-        return subprocess.call(snakemake_command(arguments.config, with_profiles(arguments.options)))
-    return make_repository(arguments, config, cases, expected)
+def print_concerns(found: list, is_accepted: bool = False) -> None:
+    """Print what speaks against a run, a line each, less what the user accepts."""
+    for concern in found:
+        if not concern.is_absurd:
+            print(f"echotruth: warning: {concern.text}", file=sys.stderr)
+        elif not is_accepted:
+            print(f"echotruth: {concern.text} (`echotruth run --yes` runs it all the same)", file=sys.stderr)
 
 
-def make_repository(
-    arguments: argparse.Namespace, config: Config, cases: list[Case], expected: dict[str, float]
-) -> int:
-    """Run the workflow of a configuration and write its report; return the exit status of Snakemake.
+def _command(arguments: argparse.Namespace) -> list[str]:
+    from echotruth.workflow.run import snakemake_command
 
-    If all jobs went well, the status is :data:`echotruth.workflow.summary.NO_HEART` if no heart is complete, and
-    :data:`echotruth.workflow.uploading.NOT_UPLOADED` if not everything is uploaded.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Options for Snakemake, such as `--cores 4`; the address in object storage to which everything is uploaded, or
-        None; hearts in a block, and blocks at once.
-    config : Config
-    cases : list of Case
-        Its hearts.
-    expected : dict
-        Rule -> expected duration of one of its jobs, s.
-    """
-    from echotruth.workflow import lease
-
-    folder, url = Path("out") / config.name, arguments.upload
-    if url is None:
-        with lease.held(folder) as name:
-            return _make(arguments, config, cases, os.environ | {lease.VARIABLE: name}, expected)
-    from echotruth.repository.remote import Remote, RemoteError
-    from echotruth.workflow.uploading import uploading
-
-    try:
-        remote = Remote(url)
-    except RemoteError as error:
-        return fail(str(error))
-    with lease.held(folder) as name, uploading(folder, remote) as upload:
-        status = _make(arguments, config, cases, os.environ | {lease.VARIABLE: name}, expected)
-        not_uploaded = upload.finish()
-    return status or not_uploaded
+    options, targets = split_targets(arguments.options)
+    return snakemake_command(arguments.config, with_profiles(options), targets)
 
 
-def _make(
-    arguments: argparse.Namespace,
-    config: Config,
-    cases: list[Case],
-    environment: dict[str, str],
-    expected: dict[str, float],
-) -> int:
+def _make(arguments: argparse.Namespace, config: Config, cases: list[Case]) -> int:
     """Make a repository and its report; return the exit status."""
-    from echotruth.mechanics.geometry import GeometryError
-    from echotruth.mechanics.prescribed import MotionError
-    from echotruth.repository.layout import lay_out
+    from echotruth.repository.status import imaged
+    from echotruth.workflow import cost, lock
     from echotruth.workflow.progress import Progress
-    from echotruth.workflow.running import Running
-    from echotruth.workflow.snakemake_process import execute, snakemake_command
-    from echotruth.workflow.summary import finished, unfinished
+    from echotruth.workflow.run import execute
+    from echotruth.workflow.status import status_of, verdicts
 
     start, folder = time.time(), Path("out") / config.name
-    try:
-        lay_out(folder, config, cases)
-    except (GeometryError, MotionError) as error:
-        return fail(f"{arguments.config}: {error}")
-    # The copy in the repository: the file may change while jobs wait in a queue.
-    options, targets = split_targets(arguments.options)
-    command = snakemake_command(folder / "config.yaml", with_profiles(options))
-    running = Running(folder, config, command, targets, arguments.hearts_per_block)
-    progress = Progress(expected, running.waiting())
-    status = execute(running.hearts(), config.name, progress, environment, arguments.blocks_at_once)
-    if not status:
-        status = execute(running.end(), config.name, progress, environment)
-    if status == WRONG_OPTION:
-        print("\nechotruth: Snakemake does not take these options: see echotruth run --help", file=sys.stderr)
-    elif status:
-        print(f"\nechotruth: {unfinished(folder)}", file=sys.stderr)
-    elif (folder / "report.html").is_file():
-        lines, status = finished(folder, start, config.physiology.exclude_implausible)
-        print(lines)
-    return status
+    if lock.is_held(folder):
+        return fail(f"{folder}: another run works on it: wait for it, or stop it")
+    progress = Progress({rule: cost.seconds(rule, config) for rule in cost.SECONDS})
+    status = execute(_command(arguments), folder / "logs/snakemake.log", config.name, progress)
+    if status == REFUSED:
+        return fail("Snakemake does not take these options: see echotruth run --help")
+    if status:
+        print(
+            f"\nechotruth: not finished: run the same command again to go on (echotruth status {folder})",
+            file=sys.stderr,
+        )
+        return status
+    if not (folder / "report.html").is_file():  # only a part was asked for
+        return 0
+    found, spent = status_of(folder), sum(os.times()[2:4])
+    print("\n".join(verdicts(found)))
+    print(f"Time:       {cost.duration(time.time() - start)} ({cost.duration(spent)} of CPU time on this machine)")
+    print(f"Repository: {folder / f'{folder.name}.zarr'}\nReport:     {folder / 'report.html'}")
+    if any(found["verdicts"].get(name) for name in imaged(config.physiology.exclude_implausible)):
+        return 0
+    print("No heart is complete, so there are no images.")
+    return NO_HEART

@@ -1,12 +1,18 @@
 """Options of `echotruth run` that go to Snakemake."""
 
+import argparse
+import os
 import re
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 
+import yaml
+
 from echotruth.config import shipped
-from echotruth.workflow.jobs import TARGETS
+
+TARGETS = ("all", "repository", "report")
+"""Rules that can be asked for by their names: they are for all hearts."""
 
 FOLDER = shipped.ROOT / "workflow/profiles"
 PROFILES = sorted(path.name for path in FOLDER.iterdir())
@@ -101,14 +107,9 @@ def _is_profile(name: str) -> bool:
     return not Path(name).is_file() or Path(name).name.startswith(("config", "profile"))
 
 
-def executor_error(executor: object) -> str | None:
-    """Say which package to install if that of an executor is missing; None if it is there.
-
-    Parameters
-    ----------
-    executor : object
-        The `executor` of a profile.
-    """
+def executor_error(options: list[str]) -> str | None:
+    """Say which package to install if that of the executor of a profile is missing; None if it is there."""
+    executor = _profile(options).get("executor")
     if not isinstance(executor, str) or executor in OWN_EXECUTORS:
         return None
     package = f"snakemake-executor-plugin-{executor}"
@@ -116,3 +117,22 @@ def executor_error(executor: object) -> str | None:
         return None
     wanted = "'echotruth[slurm]'" if executor == "slurm" else package
     return f"executor {executor}: needs the package {package}: pip install {wanted}"
+
+
+def cores(options: list[str]) -> int:
+    """Jobs at the same time: as the options say, else the profile, else the cores of this machine."""
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    parser.add_argument("--cores", "-c", "--jobs", "-j", dest="cores", nargs="?")
+    given = parser.parse_known_args(options)[0].cores or str(_profile(options).get("jobs"))
+    return int(given) if given.isdigit() else len(os.sched_getaffinity(0))
+
+
+def _profile(options: list[str]) -> dict[str, object]:
+    """Content of the profile that the options name; empty without one, or if it cannot be read."""
+    for flag, name in pairwise([*with_profiles(options), ""]):
+        if flag in PROFILE_OPTIONS:
+            for folder in (Path(name), FOLDER / name):
+                if (folder / "config.yaml").is_file():
+                    content = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
+                    return content if isinstance(content, dict) else {}
+    return {}

@@ -3,10 +3,13 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from echotruth.cli import recording
 from echotruth.cli.command import fail, named
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 VIEWS = "basal, mid or apical; four_chamber, two_chamber or three_chamber; short_axis or long_axis without segments"
 
@@ -26,9 +29,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 def track(arguments: argparse.Namespace) -> int:
     """Track the wall in recorded clips, and take its strain.
 
-    Of each clip it writes a page (NAME.png) and its curves (NAME.csv), and of all together the table strain.csv, into
-    the folder. The wall is drawn at end-diastole: by `echotruth draw`, or by another program as a table of columns
-    part (endocardium, epicardium, anterior_insertion, inferior_insertion), lateral_px and axial_px.
+    Of each clip it writes a page (NAME.png) and its curves (NAME.csv) into the folder, and a row into strain.csv, the
+    table of all clips that are there. The wall is drawn at end-diastole: by `echotruth draw`, or by another program as
+    a table of columns part (endocardium, epicardium, anterior_insertion, inferior_insertion), lateral_px and axial_px.
 
     examples:
       echotruth track mouse.dcm
@@ -47,9 +50,12 @@ def track(arguments: argparse.Namespace) -> int:
     if arguments.wall and len(clips) > 1:
         return fail(f"--wall {arguments.wall}: suits one clip: name those of {len(clips)} clips CLIP.wall.csv")
     walls = [arguments.wall or default_output(path) for path in clips]
-    names = [default_output(path).name.removesuffix(".wall.csv") for path in clips]
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        return fail(f"{twice}: two clips have this name: track them into folders of their own (--output)")
+    table = arguments.output / "strain.csv"
+    try:
+        before = _rows(table)
+        names = _names(clips, walls, arguments.output, before)
+    except EchoError as error:
+        return fail(str(error))
     arguments.output.mkdir(parents=True, exist_ok=True)
     rows: list[dict[str, Any]] = []
     for number, (path, wall, name) in enumerate(zip(clips, walls, names, strict=True), 1):
@@ -61,8 +67,62 @@ def track(arguments: argparse.Namespace) -> int:
             print(named(str(error)), file=sys.stderr)
     if not rows:
         return 2
-    _write_table(rows, arguments.output / "strain.csv")
+    _write_table(rows, before, table)
     return 0 if len(rows) == len(clips) else 1
+
+
+def _name(clip: str | Path) -> str:
+    """Name of a clip without its folder and ending."""
+    from echotruth.echo.drawing import default_output
+
+    return default_output(Path(clip)).name.removesuffix(".wall.csv")
+
+
+def _names(clips: list[Path], walls: list[Path], output: Path, before: "pd.DataFrame") -> list[str]:
+    """Names of what is written of the clips: none may take the place of another, of the table or of what is read.
+
+    Raises
+    ------
+    EchoError
+        If one would.
+    """
+    from echotruth.echo.failure import EchoError
+
+    taken = {_name(source): Path(source) for source in before["source"].astype(str)}
+    kept = {path.resolve() for path in (*clips, *walls, output / "strain.csv")}
+    names: list[str] = []
+    for path in clips:
+        name = _name(path)
+        if taken.setdefault(name, path).resolve() != path.resolve() or name in names:
+            raise EchoError(f"{path}: has the name of {taken[name]}: track it into another folder (--output)")
+        for written in (output / f"{name}.png", output / f"{name}.csv"):
+            if written.resolve() in kept:
+                raise EchoError(f"{path}: would be written to {written}, which is another file: give another --output")
+        names.append(name)
+    return names
+
+
+def _rows(table: Path) -> "pd.DataFrame":
+    """Rows of clips that were tracked into a folder before.
+
+    Raises
+    ------
+    EchoError
+        If there is another table.
+    """
+    import pandas as pd
+
+    from echotruth.echo.failure import EchoError
+
+    if not table.exists():
+        return pd.DataFrame({"source": []})
+    try:
+        rows = pd.read_csv(table)
+    except (OSError, ValueError):
+        rows = pd.DataFrame()
+    if "source" not in rows:
+        raise EchoError(f"{table}: is no table of tracked clips: track into another folder (--output)")
+    return rows
 
 
 def _tracked(path: Path, drawn: Path, name: str, arguments: argparse.Namespace) -> dict[str, Any]:
@@ -84,8 +144,10 @@ def _tracked(path: Path, drawn: Path, name: str, arguments: argparse.Namespace) 
     return row
 
 
-def _write_table(rows: list[dict[str, Any]], path: Path) -> None:
-    """Write the table of all clips."""
+def _write_table(rows: list[dict[str, Any]], before: "pd.DataFrame", path: Path) -> None:
+    """Write the table of all clips, in which new rows of a clip take the place of earlier ones."""
     import pandas as pd
 
-    pd.DataFrame(rows).to_csv(path, index=False, float_format="%.3f")
+    tracked = {_name(row["source"]) for row in rows}
+    others = before[[_name(source) not in tracked for source in before["source"].astype(str)]]
+    pd.DataFrame([*others.to_dict("records"), *rows]).to_csv(path, index=False, float_format="%.3f")

@@ -1,4 +1,7 @@
-"""Checks of what keys of several sections amount to together, by the bounds of :mod:`echotruth.config.limits`."""
+"""Checks of what keys of several sections amount to together.
+
+The bounds lie several times and more above the default heart, and are checked before anything is made.
+"""
 
 from math import floor, isqrt, pi
 
@@ -6,10 +9,17 @@ from echotruth.config.anatomy import Lengths
 from echotruth.config.cases import Cases
 from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import Bmode, Phantom
-from echotruth.config.limits import MAX_CASES, MAX_CLIP_PIXELS, MAX_ECHO_SAMPLES, MAX_LINE_SAMPLES, MAX_SCATTERERS
 from echotruth.config.probe import Probe
 from echotruth.config.realism import Realism
+from echotruth.config.table import MAX_CASES
 from echotruth.section import invalid
+
+MAX_CLIP_PIXELS = 10**9
+"""Largest number of pixels of a clip; the truth takes some 50 bytes a pixel."""
+MAX_SAMPLES = 2 * 10**9
+"""Largest number of samples of one frame's RF in all pairs of elements, 4 bytes each, and of a clip's lines, 8 each."""
+MAX_SCATTERERS = 5 * 10**7
+"""Largest number of scatterers of a view; the default heart has 2 x 10^5."""
 
 
 def check_cases(cases: Cases) -> None:
@@ -35,45 +45,35 @@ def check_samples(probe: Probe, bmode: Bmode, lines: int, frames: int) -> None:
     # Both ways, in samples per mm; the corners of the image are 1.12 times as deep.
     per_mm = 2 * 1.12 * probe.sampling_MHz * 1e3 / probe.sound_speed_m_per_s
     pairs = probe.elements * (probe.elements + 1) // 2
-    amounts = (
-        (pairs, MAX_ECHO_SAMPLES, f"{probe.elements} elements"),
-        (frames * lines, MAX_LINE_SAMPLES, f"{frames} frames of {lines} lines"),
-    )
-    for number, most, what in amounts:
-        if number * side * per_mm > most:
-            remedy = f"must be at most {most / number / per_mm:.3g} with {what} sampled at {probe.sampling_MHz:g} MHz"
+    for number, what in ((pairs, f"{probe.elements} elements"), (frames * lines, f"{frames} frames of {lines} lines")):
+        most = MAX_SAMPLES / number / per_mm
+        if side > most:
+            remedy = f"must be at most {most:.3g} with {what} sampled at {probe.sampling_MHz:g} MHz"
             raise invalid("bmode.field_of_view_mm", side, remedy)
 
 
-def check_scatterers(phantom: Phantom, realism: Realism, geometry: Geometry, beam_mm3: float) -> None:
-    """Check the number of scatterers of a view, whose beam has a volume (:func:`imaged_mm3`)."""
-    density = phantom.density_per_mm3
-    volume = 0.0 if phantom.in_plane_only else _tissue_mm3(realism, geometry, beam_mm3)
-    if density * volume > MAX_SCATTERERS:
+def check_scatterers(phantom: Phantom, realism: Realism, geometry: Geometry, probe: Probe, side: float) -> None:
+    """Check the number of scatterers of a view, whose image has a side (mm)."""
+    density, volume = phantom.density_per_mm3, _tissue_mm3(realism, geometry, probe, side)
+    if not phantom.in_plane_only and density * volume > MAX_SCATTERERS:
         most = floor(MAX_SCATTERERS / volume * 1000) / 1000
-        remedy = (
-            f"must be at most {most:g}, because {volume:.3g} mm^3 are filled with at most {MAX_SCATTERERS} scatterers"
-        )
-        raise invalid("phantom.density_per_mm3", density, remedy)
+        filled = f"because {volume:.3g} mm^3 are filled with at most {MAX_SCATTERERS} scatterers"
+        raise invalid("phantom.density_per_mm3", density, f"must be at most {most:g}, {filled}")
 
 
-def _tissue_mm3(realism: Realism, geometry: Geometry, beam_mm3: float) -> float:
-    """Estimate of the volume that is filled with scatterers, each part times its density relative to muscle, mm^3."""
+def _tissue_mm3(realism: Realism, geometry: Geometry, probe: Probe, side: float) -> float:
+    """Upper estimate of the volume that is filled with scatterers, each part times its density relative to muscle."""
     blood, surroundings, volume = realism.blood, realism.surroundings, 0.0
     if geometry.file is None:
         cavity, whole = ventricle_mm3(geometry.lengths(), geometry.scale * max(geometry.dilation, 1))
         volume = (whole - cavity) * max(geometry.hypertrophy, 1)
         volume += cavity * blood.density if blood.level_dB is not None else 0
     if surroundings.level_dB is not None:
-        volume += surroundings.density * beam_mm3
+        # The square image, as thick as the beam at its lower edge.
+        wavelength = probe.sound_speed_m_per_s / probe.frequency_MHz / 1e3
+        rays = probe.height_mm * max(1.0, side / probe.elevation_focus_mm - 1)
+        volume += surroundings.density * 1.5 * side**2 * (rays + 2 * wavelength * side / probe.height_mm)
     return volume
-
-
-def imaged_mm3(probe: Probe, side: float) -> float:
-    """Upper estimate of the volume of the beam: the square image, as thick as the beam at its lower edge, mm^3."""
-    wavelength = probe.sound_speed_m_per_s / probe.frequency_MHz / 1e3
-    rays = probe.height_mm * max(1.0, side / probe.elevation_focus_mm - 1)
-    return 1.5 * side**2 * (rays + 2 * wavelength * side / probe.height_mm)
 
 
 def ventricle_mm3(lengths: Lengths, scale: float = 1.0) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from echotruth.config import shipped
-from echotruth.config.loading import ConfigError, read_yaml, validate
+from echotruth.config.loading import ConfigError, beside, read_yaml, validate
 from echotruth.config.merging import difference, merged, nested
 from echotruth.config.sections import Config
 from echotruth.config.tracking import External
@@ -50,11 +50,11 @@ def configure(source: Source = None, **keys: Any) -> Config:
         if not path.exists():
             remedy = shipped.meant(path) or f"give a YAML file, or one of {', '.join(shipped.names())}"
             raise ConfigError(f"{name}: does not exist: {remedy}")
-        values = read_yaml(path)
+        values = beside(read_yaml(path), path)
     else:
         values, name = source or {}, "configuration"
     for key, value in keys.items():
-        values = merged(values, nested(key, value))
+        values = merged(values, nested({key: value}))
     return validate(values, name)
 
 

@@ -1,23 +1,19 @@
 """Section `cases`: which hearts a configuration makes, by a grid, a table, random draws and conditions."""
 
+from __future__ import annotations
+
 from math import prod
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import (
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    FiniteFloat,
-    WithJsonSchema,
-    model_serializer,
-    model_validator,
-)
+from pydantic import BeforeValidator, ConfigDict, Field, FiniteFloat, WithJsonSchema, model_serializer, model_validator
 
-from echotruth.config.limits import MAX_CASES, MAX_CONDITIONS, MAX_DRAWN_KEYS, MAX_TABLE_BYTES
 from echotruth.config.reading import ConfigError, read_text
-from echotruth.config.table import Table, TableError, parse
+from echotruth.config.table import MAX_BYTES, MAX_CASES, TableError, parse, swept
 from echotruth.section import Section, check, invalid
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Pair = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
 
@@ -123,7 +119,7 @@ class Draw(Section):
     method: Literal["sobol", "latin_hypercube", "random"] = "sobol"
     """`sobol`: quasi-random, the most even in all keys together; `latin_hypercube`: even in each key alone; `random`:
     independent."""
-    keys: Annotated[dict[str, Distribution], Field(min_length=1, max_length=MAX_DRAWN_KEYS)]
+    keys: Annotated[dict[str, Distribution], Field(min_length=1, max_length=64)]
     """Distribution of each dotted key; those given take precedence over those of `preset`."""
 
     @model_validator(mode="before")
@@ -157,7 +153,7 @@ class Cases(Section):
     where: Annotated[
         list[str],
         BeforeValidator(_as_list),
-        Field(max_length=MAX_CONDITIONS),
+        Field(max_length=100),
         WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
     ] = Field(default=[])
     """Conditions that all hearts must meet, such as `loop.esv_uL < 0.6 * loop.edv_uL`."""
@@ -168,22 +164,22 @@ class Cases(Section):
         return dict(self.__pydantic_extra__ or {})
 
     @property
-    def rows(self) -> Table | None:
-        """Rows of the table, if there is one."""
+    def rows(self) -> pd.DataFrame | None:
+        """Rows of the table, if there is one, as :func:`echotruth.config.table.parse` gives them."""
         return None if self.table is None else parse(self.table)
 
     @property
     def keys(self) -> list[str]:
         """All dotted keys that differ between the hearts, or may."""
         rows, draw = self.rows, self.draw
-        return list(dict.fromkeys([*(rows.keys if rows else ()), *self.grid, *(draw.keys if draw else ())]))
+        return list(dict.fromkeys([*(() if rows is None else swept(rows)), *self.grid, *(draw.keys if draw else ())]))
 
     @property
     def shape(self) -> list[int]:
         """Number of rows, values of each key of the grid, and draws, whose product is the number of hearts."""
-        rows, draws = self.rows, self.draw
+        rows, draw = self.rows, self.draw
         lengths = [len(values) for values in self.grid.values()]
-        return [*([len(rows.cells)] if rows else ()), *lengths, *([draws.number] if draws else ())]
+        return [*(() if rows is None else [len(rows)]), *lengths, *([draw.number] if draw else ())]
 
     @property
     def number(self) -> int:
@@ -203,7 +199,7 @@ class Cases(Section):
         if "table" in values:
             raise invalid("file", path, "give either file or table and leave the other out")
         try:
-            return values | {"table": read_text(Path(path), MAX_TABLE_BYTES, "CSV file", "a table")}
+            return values | {"table": read_text(Path(path), MAX_BYTES, "CSV file", "a table")}
         except ConfigError as error:
             raise invalid("file", path, str(error).partition(": ")[2] or "cannot be read") from None
 
@@ -212,8 +208,8 @@ class Cases(Section):
         key, shown = ("table", self.table) if self.file is None else ("file", self.file)
         if self.table is None:
             return
-        if len(self.table.encode()) > MAX_TABLE_BYTES:
-            raise invalid(key, shown, f"must have at most {MAX_TABLE_BYTES // 2**20} MiB: give fewer rows or columns")
+        if len(self.table.encode()) > MAX_BYTES:
+            raise invalid(key, shown, f"must have at most {MAX_BYTES // 2**20} MiB: give fewer rows or columns")
         try:
             parse(self.table)
         except TableError as error:

@@ -5,7 +5,7 @@ from the field of view.
 from typing import Any
 
 from echotruth.config.merging import merged, nested
-from echotruth.config.tracking import DEFAULT, METHODS, default_trackers, name_of
+from echotruth.config.tracking import METHODS, PhaseCorrelation, default_trackers, name_of
 from echotruth.config.transducers import ARRAY_DEFAULTS, ARRAY_PRESETS
 
 HEART_DEFAULTS: dict[str, dict[str, Any]] = {
@@ -72,83 +72,67 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
     dict
         A new mapping with the defaults added.
     """
-    values = _fill(values, HEART_DEFAULTS.get(_preset(values, "geometry"), HEART_DEFAULTS["mouse"]))
-    values = _fill(values, _scanner(values))
-    values = _fill(values, ARRAY_DEFAULTS.get(_preset(values, "probe"), {}))
-    values = _fill(values, _mesh_of_motion(values.get("motion")))
-    return _scale_trackers(values, _length_scale(values))
+    heart = str(_value(values, "geometry.preset"))
+    values = _filled(values, HEART_DEFAULTS.get(heart, HEART_DEFAULTS["mouse"]))
+    array = str(_value(values, "probe.preset"))
+    values = _filled(values, _scanner(values, array))
+    values = _filled(values, ARRAY_DEFAULTS.get(array, {}))
+    path = _value(values, "motion.file.path")
+    if _value(values, "motion.kind") == "file" and isinstance(path, str) and not path.lower().endswith(ARRAY_SUFFIXES):
+        values = _filled(values, {"geometry.file": path})
+    return _with_lengths(values)
 
 
-def _scanner(values: dict[str, Any]) -> dict[str, Any]:
+def _filled(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
+    """Values with defaults of dotted keys for those that are not given."""
+    return merged(nested(defaults), values)
+
+
+def _value(values: dict[str, Any], dotted_key: str) -> Any:
+    """Value of a dotted key, in mappings and models, also if it is not valid; None if there is none."""
+    found: Any = values
+    for key in dotted_key.split("."):
+        found = found.get(key) if isinstance(found, dict) else getattr(found, key, None)
+    return found
+
+
+def _scanner(values: dict[str, Any], array: str) -> dict[str, Any]:
     """Defaults of dotted keys by which a scanner makes realistic images: its image, and a narrow band.
 
     The density of scatterers suits that band; a bandwidth that is given leaves both as they are.
     """
-    name, array = _preset(values, "realism"), _preset(values, "probe")
+    name, size = str(_value(values, "realism.preset")), _value(values, "bmode.size_px") or 512
     if name not in REALISM_BANDWIDTHS:
         return {}
-    size = _value(values.get("bmode", {}), "size_px") or 512
     width = REALISM_SMOOTHING[name] * size if isinstance(size, int | float) else 2.0
     found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)}
-    if array not in ARRAY_PRESETS or _value(values.get("probe", {}), "bandwidth") is not None:
+    if array not in ARRAY_PRESETS or _value(values, "probe.bandwidth") is not None:
         return found
     share, density = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3"
     bandwidth = round(share * ARRAY_PRESETS[array]["bandwidth"], 3)
     return found | {"probe.bandwidth": bandwidth, density: round(share * ARRAY_DEFAULTS[array][density], 3)}
 
 
-def _mesh_of_motion(motion: Any) -> dict[str, Any]:
-    """`geometry.file` of a motion from files that hold meshes too."""
-    path = _value(_value(motion, "file"), "path")
-    holds_mesh = (
-        _value(motion, "kind") == "file" and isinstance(path, str) and not path.lower().endswith(ARRAY_SUFFIXES)
-    )
-    return {"geometry.file": path} if holds_mesh else {}
-
-
-def _preset(values: dict[str, Any], name: str) -> str:
-    """Preset of a section as text, even if invalid: the models refuse it later."""
-    return str(_value(values.get(name, {}), "preset"))
-
-
-def _value(section: Any, key: str) -> Any:
-    """Value of a key of a mapping or a model; None if it has none."""
-    return section.get(key) if isinstance(section, dict) else getattr(section, key, None)
-
-
-def _fill(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
-    """Values with defaults of dotted keys for those that are not given."""
-    for dotted_key, default in defaults.items():
-        values = merged(nested(dotted_key, default), values)
-    return values
-
-
-def _length_scale(values: dict[str, Any]) -> float:
-    """Field of view over the reference one; 1 if it is invalid, because the models refuse it later."""
-    side = _value(values.get("bmode", {}), "field_of_view_mm")
-    return side / REFERENCE_FIELD_OF_VIEW_MM if isinstance(side, int | float) and side > 0 else 1.0
-
-
-def _scale_trackers(values: dict[str, Any], scale: float) -> dict[str, Any]:
-    tracking = values.get("tracking", {})
-    if scale == 1 or not isinstance(tracking, dict):
+def _with_lengths(values: dict[str, Any]) -> dict[str, Any]:
+    """Values with the default lengths of trackers that suit the field of view, if that is valid."""
+    side, tracking = _value(values, "bmode.field_of_view_mm"), values.get("tracking", {})
+    if not isinstance(side, int | float) or not side > 0 or not isinstance(tracking, dict):
         return values
-    trackers = tracking.get("trackers")
-    if trackers is None:
+    scale, trackers = side / REFERENCE_FIELD_OF_VIEW_MM, tracking.get("trackers")
+    if scale != 1 and trackers is None:
         standard = default_trackers(scale).items()
         trackers = {name: {"method": model.method} | model.model_dump(exclude_unset=True) for name, model in standard}
-    if not isinstance(trackers, dict):
+    if scale == 1 or not isinstance(trackers, dict):
         return values
-    scaled = {name: _scaled_lengths(t, scale) | t if isinstance(t, dict) else t for name, t in trackers.items()}
+    scaled = {name: _lengths(t, scale) | t if isinstance(t, dict) else t for name, t in trackers.items()}
     return values | {"tracking": tracking | {"trackers": scaled}}
 
 
-def _scaled_lengths(tracker: dict[str, Any], scale: float) -> dict[str, Any]:
+def _lengths(tracker: dict[str, Any], scale: float) -> dict[str, Any]:
     """Scaled default lengths of a tracker's method."""
-    name = tracker.get("method", DEFAULT)
-    method = next((section for section in METHODS if name_of(section) == name), METHODS[0])
-    defaults = {key: method.model_fields[key].get_default() for key in TRACKER_LENGTHS if key in method.model_fields}
+    section = {name_of(section): section for section in METHODS}.get(str(tracker.get("method")), PhaseCorrelation)
+    lengths = {key: field.default for key, field in section.model_fields.items() if key in TRACKER_LENGTHS}
     return {
         key: [length * scale for length in value] if isinstance(value, list) else value * scale
-        for key, value in defaults.items()
+        for key, value in lengths.items()
     }

@@ -5,7 +5,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat
 
-from echotruth.config.limits import MAX_VIEWS
 from echotruth.section import Fraction, Name, Positive, Section, check, invalid
 
 
@@ -96,9 +95,9 @@ class Rf(Section):
     tall. The error of the RF against the exact sum (relative, L2) is 1.5 % beyond one aperture, or beyond two with the
     tall lens of a human's array, and some per cent nearer or, with attenuation, far from the plane; without the lens it
     is 2e-5 within 32 degrees (24 degrees for `mouse_30MHz` and `mouse_40MHz`)."""
-    keep: list[Literal["lines", "channels"]] = Field(default=[])
-    """RF to keep in the repository: `lines`, demodulated, and `channels`, the echoes in every element of each element
-    transmitting alone (full matrix), from which any transmit can be synthesised."""
+    keep: list[Literal["channels"]] = Field(default=[])
+    """RF to keep beside the demodulated lines: `channels`, the echoes in every element of each element transmitting
+    alone (full matrix), from which any transmit can be synthesised."""
 
     @property
     def focal_half_span_mm(self) -> float:
@@ -261,7 +260,7 @@ def _with_preset(schema: dict[str, Any]) -> None:
 
 Views = Annotated[
     dict[Name, View],
-    Field(min_length=1, max_length=MAX_VIEWS, json_schema_extra=_with_preset),
+    Field(min_length=1, max_length=64, json_schema_extra=_with_preset),
     BeforeValidator(named_views),
 ]
 """Imaging planes by name, or a preset of them."""

@@ -5,18 +5,17 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
-from reprlib import Repr
 from typing import Any, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from echotruth.config.reading import ConfigError, Errors, check_size, read_yaml, shown_key
+from echotruth.config.merging import VALUES, merged, nested
+from echotruth.config.reading import MAX_ERRORS, ConfigError, check_size, joined, read_yaml, shown_key
 from echotruth.config.sections import Config
-from echotruth.materials import Material
 from echotruth.section import Section, discriminator, section_in, variants
 
-__all__ = ["ConfigError", "load", "override", "read_yaml", "replace_values", "validate"]
+__all__ = ["ConfigError", "beside", "load", "override", "read_yaml", "validate"]
 
 
 def load(path: str | Path) -> Config:
@@ -33,7 +32,24 @@ def load(path: str | Path) -> Config:
         If the file cannot be read or its configuration is not valid.
     """
     path = Path(path)
-    return validate(read_yaml(path), str(path))
+    return validate(beside(read_yaml(path), path), str(path))
+
+
+def beside(values: dict[str, Any], *paths: Path) -> dict[str, Any]:
+    """Values of configuration files, with the table in `cases.file` sought beside the file that names it, the last one.
+
+    A table that none of the files names, as an option of Snakemake may, is sought in the working folder.
+    """
+    name = _table(values)
+    folder = next((path.parent for path in reversed(paths) if name and _table(read_yaml(path)) == name), None)
+    return values | {"cases": values["cases"] | {"file": str(folder / name)}} if name and folder else values
+
+
+def _table(values: dict[str, Any]) -> str | None:
+    """Value of `cases.file`, if it may be that of a file."""
+    cases = values.get("cases")
+    name = cases.get("file") if isinstance(cases, dict) else None
+    return name if isinstance(name, str) else None
 
 
 def validate(values: dict[str, Any], source: str) -> Config:
@@ -43,90 +59,68 @@ def validate(values: dict[str, Any], source: str) -> Config:
     try:
         return Config.model_validate(_without_empty(values, Config))
     except ValidationError as error:
-        errors = Errors()
-        for each in _distinct(error.errors()):
-            errors.add(f"{source}: {_message(each)}")
-        raise errors.joined(source) from None
+        enough = _distinct(error.errors())[: 10 * MAX_ERRORS]
+        raise joined([f"{source}: {_message(each)}" for each in enough], source) from None
 
 
 def override(config: Config, changes: dict[str, Any], source: str = "cases") -> Config:
     """Configuration with the values of some dotted keys (such as `fibres.endo_deg`) replaced."""
-    return validate(replace_values(config.given(), changes), source)
-
-
-def replace_values(values: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Replace the values of some dotted keys in a dumped section, in place.
-
-    Another law leaves out the parameters of the present one, so that its own take their defaults.
-    """
-    # The law comes first, because it determines which other keys the section has.
-    for dotted_key, value in sorted(changes.items(), key=lambda change: not change[0].endswith(".law")):
-        *parents, key = dotted_key.split(".")
-        section = values
-        for parent in parents:
-            section = section[parent]
-        if key == "law" and value != section[key]:
-            for parameter in set(section) - set(Material.model_fields):
-                del section[parameter]
-        section[key] = value
-    return values
+    return validate(merged(config.given(), nested(changes), VALUES), source)
 
 
 def _without_empty(values: Any, model: type[BaseModel]) -> Any:
     """Leave out sections of which nothing is given, as YAML has them if all their keys are commented out."""
     if not isinstance(values, dict):
         return values
-    found = {}
-    for key, value in values.items():
-        annotation = model.model_fields[key].annotation if key in model.model_fields else None
-        section = annotation if isinstance(annotation, type) and issubclass(annotation, Section) else None
-        if value is not None or not (section or (variants(annotation) and get_origin(annotation) is not dict)):
-            found[key] = _without_empty(value, section) if section else value
-    return found
+    sections = {key: type(field.default) for key, field in model.model_fields.items()}
+    sections = {key: section for key, section in sections.items() if issubclass(section, Section)}
+    return {
+        key: _without_empty(value, sections[key]) if key in sections else value
+        for key, value in values.items()
+        if value is not None or key not in sections
+    }
 
 
 def _distinct(errors: list[ErrorDetails]) -> list[ErrorDetails]:
     """One error of each value: pydantic tells one for each type that it may have."""
-    found: dict[tuple[Any, ...], ErrorDetails] = {}
+    found: dict[Any, ErrorDetails] = {}
     for number, error in enumerate(errors):
-        location = _without_type(list(error["loc"]))
-        found.setdefault((number,) if error["type"] == "invalid" else tuple(location), error)
+        found.setdefault(number if error["type"] == "invalid" else tuple(_without_type(error["loc"])), error)
     # A key that is not one explains what else is wrong.
     return sorted(found.values(), key=lambda error: error["type"] != "extra_forbidden")
 
 
-def _without_type(location: list[Any]) -> list[Any]:
+def _without_type(location: tuple[Any, ...]) -> list[Any]:
     """Location without the type that follows the number of an entry of a list, if it may have several."""
     *place, last = location or [None]
-    return place if last in ("int", "str") and place and isinstance(place[-1], int) else location
+    return place if last in ("int", "str") and place and isinstance(place[-1], int) else list(location)
 
 
 def _message(error: ErrorDetails) -> str:
-    context = error.get("ctx", {})
-    keys, model, sections = _locate([part for part in _without_type(list(error["loc"])) if part != "[key]"])
-    if error["type"] == "invalid":
-        keys.append(context["key"])
-    if error["type"] in _UNKNOWN_VARIANT:
-        selector = discriminator(sections)
-        value = _shown_value(error["input"][selector])
-        return f"{shown_key(keys)}.{selector} = {value}: should be {_joined([repr(name) for name in sections])}"
+    kind, context, value = error["type"], error.get("ctx", {}), error["input"]
+    keys, model, sections = _locate([part for part in _without_type(error["loc"]) if part != "[key]"])
+    if kind == "invalid":
+        keys, value = [*keys, context["key"]], context["value"]
     dotted_key = shown_key(keys)
-    if error["type"] == "extra_forbidden":
+    if kind.startswith("union_tag"):
+        selector = discriminator(sections)
+        names = _either([repr(name) for name in sections])
+        return f"{dotted_key}.{selector} = {_shown_value(value[selector])}: should be {names}"
+    if kind == "extra_forbidden":
         return f"{dotted_key} is not a key{_variant(model, sections)}{_suggestion(keys, model, bool(sections))}"
-    if error["type"] == "missing":
+    if kind == "missing":
         return f"{dotted_key} is missing: it must be given"
-    value = context["value"] if error["type"] == "invalid" else error["input"]
     given = f"{dotted_key} = {_shown_value(value)}" if keys else _shown_value(value)
-    if error["type"].startswith("string_") and error["loc"][-1:] == ("[key]",):
+    if kind.startswith("string_") and error["loc"][-1:] == ("[key]",):
         given = f"{shown_key(keys[:-1])}: the name {_shown_value(value)}"
-    return f"{given}: {_remedy(error, context)}"
+    return f"{given}: {_remedy(kind, value, context, error['msg'])}"
 
 
 def _shown_value(value: Any) -> str:
     """The value in one line of at most 80 characters, as it is in the file."""
     if value is None or isinstance(value, bool):
         return "null" if value is None else str(value).lower()
-    text = _REPR.repr(value)
+    text = repr(value)
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
@@ -139,41 +133,32 @@ def _variant(model: type[BaseModel], sections: dict[str, type[Section]]) -> str:
     return f" of the {selector} {current} (others: {', '.join(name for name in sections if name != current)})"
 
 
-def _remedy(error: ErrorDetails, context: dict[str, Any]) -> str:
-    message = _MESSAGES.get(context.get("class_name", "")) or _MESSAGES.get(error["type"], error["msg"])
-    if error["type"] in ("int_type", "float_type", "bool_type", "string_type"):
-        return f"{message}{_written(error['type'], error['input'])}"
-    if error["type"] == "list_type" and isinstance(error["input"], str | int | float):
-        return f"must be a list, such as [{_shown_value(error['input'])}]"
-    if error["type"] == "string_pattern_mismatch":
-        is_file_name = ".-]" in context["pattern"]
-        signs, first = ("`_`, `.` and `-`", "letter or digit") if is_file_name else ("underscores", "letter")
-        return f"use letters, digits{',' if is_file_name else ' and'} {signs} only, and begin with a {first}"
-    if error["type"] == "too_long":
-        return f"must have at most {context['max_length']} entries"
-    if error["type"] == "too_short" and context["min_length"] > 1:
-        return f"must have {context['min_length']} entries or more"
-    return message.removeprefix("Input ").removeprefix("String ").removeprefix("Value error, ")
+def _remedy(kind: str, value: Any, context: dict[str, Any], message: str) -> str:
+    """What would be right, given what pydantic says of a value."""
+    if kind == "string_pattern_mismatch":
+        return _NAMES[".-]" in context["pattern"]]
+    if kind == "list_type" and isinstance(value, str | int | float):
+        return f"must be a list, such as [{_shown_value(value)}]"
+    message = _MESSAGES.get(context.get("class_name", "")) or _MESSAGES.get(kind, message)
+    if kind == "too_short" and context["min_length"] > 1:
+        message = "must have {min_length} entries or more"
+    message = re.sub(r"^(Input|String|Value error,) ", "", message)
+    return (message.format(**context) if kind.startswith("too_") else message) + _written(kind, value)
 
 
-def _written(wanted: str, value: Any) -> str:
+def _written(kind: str, value: Any) -> str:
     """How YAML writes what was probably meant by a value of the wrong type; "" if that is not known."""
-    if wanted == "string_type" and isinstance(value, bool | int | float):
+    if kind == "string_type" and isinstance(value, bool | int | float):
         return ": put it in quotes"
     text = value.strip() if isinstance(value, str) else ""
-    if wanted == "int_type" and _NUMBER.fullmatch(text) and float(text).is_integer():
-        return f": write {float(text):.0f} without quotes"
-    quoted = (wanted == "float_type" and _NUMBER.fullmatch(text)) or (wanted == "bool_type" and text in _BOOLEANS)
-    return f": write {text} without quotes" if quoted else ""
+    is_number = kind in ("int_type", "float_type") and _NUMBER.fullmatch(text) is not None
+    if kind == "int_type" and is_number:
+        text, is_number = f"{float(text):.0f}", float(text).is_integer()
+    return f": write {text} without quotes" if is_number or (kind == "bool_type" and text in ("true", "false")) else ""
 
 
-_BOOLEANS = ("true", "false")
 _NUMBER = re.compile(r"[-+]?\d{1,15}(\.\d{0,15})?([eE][-+]?\d{1,2})?")
 """Text that people read as a number."""
-
-_REPR = Repr()
-_REPR.maxlevel, _REPR.maxlist, _REPR.maxdict, _REPR.maxtuple = 4, 12, 12, 12
-_REPR.maxstring = _REPR.maxother = _REPR.maxlong = 80
 
 _MESSAGES = {
     "int_type": "must be a whole number",
@@ -186,39 +171,38 @@ _MESSAGES = {
     "list_type": "must be a list, such as [1, 2]",
     "tuple_type": "must be a list, such as [1, 2, 4]",
     "too_short": "must have at least one entry",
+    "too_long": "must have at most {max_length} entries",
     "invalid_key": "is not a key: keys are text",
 }
 """Error type of pydantic, or the section that it is not -> message in the terms of YAML."""
 
+_NAMES = (
+    "use letters, digits and underscores only, and begin with a letter",
+    "use letters, digits, `_`, `.` and `-` only, and begin with a letter or digit",
+)
+"""What names are made of, and those of files."""
 
-_UNKNOWN_VARIANT = ("union_tag_invalid", "union_tag_not_found")
+MAX_SUGGESTIONS = 5
+"""Largest number of keys of other sections that are named in place of one that is not known."""
 
 
 def _suggestion(keys: list[Any], model: type[BaseModel], is_variant: bool) -> str:
     known = list(model.model_fields)
     key, place = str(keys[-1])[:200], "".join(f"{part}." for part in keys[:-1])
     close = get_close_matches(key, known, n=1, cutoff=0.6)
-    if close and (close[0].startswith(f"{key}_") or get_close_matches(key, close, cutoff=0.8)):
-        return f": did you mean {place}{close[0]}?"
-    # It may be a key of another section, one in this section before others; or of another variant, which were named.
-    elsewhere = [] if is_variant else _places().get(key, [])
-    elsewhere = [found for found in elsewhere if found.startswith(place)] or elsewhere
-    if 0 < len(elsewhere) <= MAX_SUGGESTIONS:
-        return f": did you mean {_joined(elsewhere)}?"
+    found = [name for name in close if name.startswith(f"{key}_") or get_close_matches(key, close, cutoff=0.8)]
+    if not found and not is_variant:
+        # It may be a key of another section, one in this section before others.
+        elsewhere = [dotted for dotted in _all_keys() if dotted.rpartition(".")[2] == key]
+        elsewhere = [dotted for dotted in elsewhere if dotted.startswith(place)] or elsewhere
+        if 0 < len(elsewhere) <= MAX_SUGGESTIONS:
+            return f": did you mean {_either(elsewhere)}?"
     return f": did you mean {place}{close[0]}?" if close else f": the keys here are {', '.join(known)}"
 
 
-MAX_SUGGESTIONS = 5
-"""Largest number of keys of other sections that are named in place of one that is not known."""
-
-
 @cache
-def _places() -> dict[str, list[str]]:
-    """Last part of every dotted key -> the keys that end in it."""
-    found: dict[str, list[str]] = {}
-    for dotted in dict.fromkeys(_dotted_keys(Config, "")):
-        found.setdefault(dotted.rpartition(".")[2], []).append(dotted)
-    return found
+def _all_keys() -> list[str]:
+    return list(dict.fromkeys(_dotted_keys(Config, "")))
 
 
 def _dotted_keys(model: type[BaseModel], prefix: str) -> Iterator[str]:
@@ -231,7 +215,7 @@ def _dotted_keys(model: type[BaseModel], prefix: str) -> Iterator[str]:
             yield from _dotted_keys(inner, f"{prefix}{key}.{name}")
 
 
-def _joined(names: list[str]) -> str:
+def _either(names: list[str]) -> str:
     *first, last = names
     return f"{', '.join(first)} or {last}" if first else last
 

@@ -1,4 +1,4 @@
-"""Read YAML files; what is malformed, or too large to be a configuration, is refused before it is expanded."""
+"""Read text and YAML files; what is malformed, or too large to be a configuration, is refused before it is expanded."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -15,8 +15,6 @@ MAX_DEPTH = 30
 """Largest depth of mappings and lists within each other; the deepest key of the configuration lies at 6."""
 MAX_VALUES = 100_000
 """Largest number of values of a file, keys included, each counted as often as aliases repeat it."""
-
-
 MAX_ERRORS = 20
 """Largest number of errors that are told at once."""
 
@@ -26,7 +24,7 @@ class ConfigError(ValueError):
 
 
 class Errors:
-    """Collects the errors of a configuration, so that all are told at once.
+    """Collects the errors of a configuration, so that all are told at once, each once.
 
     Examples
     --------
@@ -42,13 +40,7 @@ class Errors:
     """
 
     def __init__(self) -> None:
-        self.lines: dict[str, None] = {}
-        self.number = 0
-
-    def add(self, message: str) -> None:
-        """Keep an error; one that is known already is not told twice."""
-        self.number += 1
-        self.lines |= dict.fromkeys(message.splitlines())
+        self.messages: list[str] = []
 
     @contextmanager
     def collecting(self) -> Iterator[None]:
@@ -56,36 +48,25 @@ class Errors:
         try:
             yield
         except ConfigError as error:
-            self.add(str(error))
+            self.messages.append(str(error))
 
     @property
     def are_enough(self) -> bool:
         """Whether there are more than are told, or so many alike that a search for others takes long."""
-        return len(self.lines) > MAX_ERRORS or self.number >= 10 * MAX_ERRORS
-
-    def joined(self, source: str) -> ConfigError:
-        """The errors as one, a line each.
-
-        Parameters
-        ----------
-        source : str
-            What the line names that says how many more there are.
-        """
-        lines = list(self.lines)
-        if len(lines) > MAX_ERRORS:
-            more = f"{source}: at least {len(lines) - MAX_ERRORS} more errors: correct these first"
-            lines = [*lines[:MAX_ERRORS], more]
-        return ConfigError("\n".join(lines))
+        return len(self.messages) >= 10 * MAX_ERRORS or len(set(self.messages)) > MAX_ERRORS
 
     def raise_all(self, source: str) -> None:
-        """Raise the errors as one, if there are any; `source` as in :meth:`joined`.
+        """Raise what was kept, if there is anything, as :func:`joined`."""
+        if self.messages:
+            raise joined(self.messages, source)
 
-        Raises
-        ------
-        ConfigError
-        """
-        if self.lines:
-            raise self.joined(source)
+
+def joined(messages: list[str], source: str) -> ConfigError:
+    """The error with several messages, a line each; the last names the source if it says how many more there are."""
+    lines = list(dict.fromkeys(chain.from_iterable(map(str.splitlines, messages))))
+    if len(lines) > MAX_ERRORS:
+        lines[MAX_ERRORS:] = [f"{source}: at least {len(lines) - MAX_ERRORS} more errors: correct these first"]
+    return ConfigError("\n".join(lines))
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -111,7 +92,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return values
 
 
-def check_size(values: Any, source: str) -> None:
+def check_size(values: dict[str, Any], source: str) -> None:
     """Check that values are no deeper and no more than those of a file may be.
 
     Lists that occur several times, as aliases make them, are counted each time; so whoever reads the values later does
@@ -131,12 +112,10 @@ def check_size(values: Any, source: str) -> None:
     """
     count = 0
     for key, value in values.items():
-        level = [value]
-        for _ in range(MAX_DEPTH):
-            level = list(islice(chain.from_iterable(map(_children, level)), MAX_VALUES + 1))
+        level, depth = [value], 0
+        while level and depth < MAX_DEPTH:
+            level, depth = list(islice(chain.from_iterable(map(_children, level)), MAX_VALUES + 1)), depth + 1
             count += len(level)
-            if not level:
-                break
             if count > MAX_VALUES:
                 remedy = f"give at most {MAX_VALUES} values, each counted as often as its aliases repeat it"
                 raise ConfigError(f"{source}: {shown_key([key])} holds too much: {remedy}")
@@ -173,25 +152,23 @@ def read_text(path: Path, most: int, file: str, what: str) -> str:
     ConfigError
         If it is no file, cannot be read, is too large, or is not UTF-8.
     """
-    # A pipe or a device could be read for ever.
     try:
+        # A pipe or a device could be read for ever.
         if path.exists() and not path.is_file():
-            raise ConfigError(f"{path}: is not a file: give the path of a {file}")
-        with path.open("rb") as opened:
-            content = opened.read(most + 1)
+            problem = "is not a file"
+        else:
+            with path.open("rb") as opened:
+                content = opened.read(most + 1)
+            if len(content) <= most:
+                return content.decode("utf-8-sig")
+            problem = f"holds {path.stat().st_size / 2**20:.1f} MiB, and {what} at most {most // 2**20} MiB"
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}): give the path of a {file}") from None
-    except ConfigError:
-        raise
-    except ValueError:
-        raise ConfigError(f"{str(path)!r}: cannot be read: give the path of a {file}") from None
-    if len(content) > most:
-        size = path.stat().st_size / 2**20
-        raise ConfigError(f"{path}: holds {size:.1f} MiB: {what} has at most {most // 2**20} MiB")
-    try:
-        return content.decode("utf-8-sig")
+        problem = f"cannot be read ({error.strerror})"
     except UnicodeDecodeError:
-        raise ConfigError(f"{path}: is not UTF-8 text: give the path of a {file}") from None
+        problem = "is not UTF-8 text"
+    except ValueError:  # a path that no file can have
+        problem = "cannot be read"
+    raise ConfigError(f"{path}: {problem}: give the path of a {file}")
 
 
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -199,53 +176,34 @@ _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _Loader(_Base):
-    """YAML loader of mappings with unique text or numbers as keys; a value that is not what its tag says is refused."""
+    """YAML loader of mappings in which each key is given once."""
 
-    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
-        try:
-            value = super().construct_object(node, deep)
-            if isinstance(value, int) and abs(value) >= 2**64:
-                raise ValueError
-            return value
-        except (ValueError, TypeError, KeyError, AttributeError) as error:
-            kind = node.tag.removeprefix("tag:yaml.org,2002:")
-            text = f"{str(node.value)[:40]!r}" if isinstance(node, yaml.ScalarNode) else "this"
-            raise yaml.MarkedYAMLError(
-                problem=f"{text} is not a valid {kind}: write a plain value", problem_mark=node.start_mark
-            ) from error
-
-    def construct_unique_mapping(self, node: yaml.Node) -> dict[Any, Any]:
-        """Mapping whose keys are plain, each given once."""
-        if not isinstance(node, yaml.MappingNode):
-            raise TypeError
-        values: dict[Any, Any] = {}
-        for key_node, value_node in node.value:
-            if not isinstance(key_node, yaml.ScalarNode):
-                problem = "a list or a mapping is used as a key: write the name of a key"
-                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
-            if key_node.tag == "tag:yaml.org,2002:merge":
-                problem = "<< would merge another mapping: write its keys out"
-                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
-            key = self.construct_object(key_node, deep=True)
-            if key in values:
-                problem = f"key {shown_key([key])!r} is given twice: give it once"
-                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
-            values[key] = self.construct_object(value_node, deep=True)
+    def construct_mapping(self, node: yaml.Node, deep: bool = False) -> dict[Any, Any]:
+        values = super().construct_mapping(node, deep=True)
+        if len(values) < len(node.value):
+            names = [key.value for key, _ in node.value]
+            key = next((key for n, (key, _) in enumerate(node.value) if key.value in names[:n]), node.value[0][0])
+            problem = f"key {shown_key([key.value])!r} is given twice: give it once"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
         return values
 
-    def refuse_tag(self, node: yaml.Node) -> Any:
-        """No key takes what other tags make."""
-        problem = f"the tag {shown_key([node.tag.removeprefix('tag:yaml.org,2002:')])} is not read: leave it out"
-        raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+    def construct_yaml_int(self, node: yaml.Node) -> int:
+        """Whole number of at most 64 bits."""
+        try:
+            value = super().construct_yaml_int(node)
+        except ValueError:
+            value = 2**64  # Python converts no more than some thousand digits.
+        if abs(value) >= 2**64:
+            problem = f"{str(node.value)[:40]!r} is not a valid int: write a plain value"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+        return value
 
 
-_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _Loader.construct_unique_mapping)
-_Loader.add_constructor(None, _Loader.refuse_tag)
-for _kind in ("binary", "omap", "pairs", "set", "timestamp"):
-    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.refuse_tag)
-# A date without quotes is the text that it is in the file.
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
+# Dates, and the << of another mapping, are the text that they are in the file.
+_KINDS = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float"))
 _Loader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers if not tag.endswith(":timestamp")]
+    first: [(tag, pattern) for tag, pattern in resolvers if tag in _KINDS]
     for first, resolvers in _Base.yaml_implicit_resolvers.items()
 }
 SHORT_FLOAT = ("tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$"), list("-+0123456789"))
@@ -254,18 +212,31 @@ _Loader.add_implicit_resolver(*SHORT_FLOAT)
 
 
 def _check_events(text: str) -> None:
-    """Check the depth and the number of values from the sequence of events, before any value is made."""
+    """Check tags, depth and number of values from the sequence of events, before any value is made."""
     depth = count = 0
     event: Any
     for event in yaml.parse(text, Loader=_Loader):
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         count += isinstance(event, yaml.NodeEvent)
+        problem = ""
         if depth > MAX_DEPTH:
             problem = f"lists or mappings are nested too deeply: use at most {MAX_DEPTH} levels"
-            raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
-        if count > MAX_VALUES:
+        elif count > MAX_VALUES:
             problem = f"the file holds too much: give at most {MAX_VALUES} values, keys included"
+        elif tag := getattr(event, "tag", None):
+            problem = f"the tag {shown_key([tag.removeprefix('tag:yaml.org,2002:')])} is not read: leave it out"
+        if problem:
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
+
+
+_REMEDIES = {
+    "start any token": "indent by spaces, not tabs, and put text that begins with a special character in quotes",
+    "another document": "write one document, without a second line of ---",
+    "expected <document start>": "write one document, without a second line of ---",
+    "recursive": "an alias must not lie within its own anchor",
+    "used as a key": "write the name of a key",
+}
+"""Part of the problem that PyYAML tells -> remedy."""
 
 
 def _sentence(error: yaml.YAMLError, lines: int) -> str:
@@ -273,18 +244,9 @@ def _sentence(error: yaml.YAMLError, lines: int) -> str:
     if isinstance(error, yaml.reader.ReaderError):
         return ": holds a control character, which is not text: write plain UTF-8 text"
     mark: yaml.Mark | None = getattr(error, "problem_mark", None)
-    problem = getattr(error, "problem", None) or "is not YAML"
+    problem: str = getattr(error, "problem", None) or "is not YAML"
+    problem = problem.replace("found unhashable key", "a list or a mapping is used as a key")
     line = f", line {min(mark.line + 1, lines)}" if mark else ""
     if ": " in problem:
         return f"{line}: {problem}"
-    return f"{line}: {problem}: {_remedy(problem)}"
-
-
-def _remedy(problem: str) -> str:
-    if "start any token" in problem:
-        return "indent by spaces, not tabs, and put text that begins with a special character in quotes"
-    if "another document" in problem or "expected <document start>" in problem:
-        return "write one document, without a second line of ---"
-    if "recursive" in problem:
-        return "an alias must not lie within its own anchor"
-    return "correct the YAML"
+    return f"{line}: {problem}: {next((_REMEDIES[part] for part in _REMEDIES if part in problem), 'correct the YAML')}"

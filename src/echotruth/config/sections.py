@@ -3,6 +3,7 @@
 from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints, model_validator
+from pydantic_core import PydanticCustomError
 
 from echotruth.config import amounts
 from echotruth.config.cases import Cases
@@ -17,9 +18,9 @@ from echotruth.config.motion import Motion
 from echotruth.config.pathology import Pathology
 from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
-from echotruth.config.realism import Realism
+from echotruth.config.realism import Neighbours, Realism
 from echotruth.config.tracking import PhaseCorrelation, Tracking
-from echotruth.section import Section, check, invalid
+from echotruth.section import Section, check, invalid, value_of
 
 _TRACKER_LENGTHS = ("window_mm", "windows_mm", "subset_mm", "knots_mm")
 """Keys of trackers that must not exceed the image."""
@@ -64,49 +65,46 @@ class Config(Section):
     def _apply_presets(cls, values: Any) -> Any:
         return apply_presets(values) if isinstance(values, dict) else values
 
+    def _refused(self, key: str, remedy: str) -> PydanticCustomError:
+        return invalid(key, value_of(self, key), remedy)
+
     @check
     def _check_lengths(self) -> None:
-        side, rf = self.bmode.field_of_view_mm, self.rf
-        for name, tracker in self.tracking.trackers.items():
+        side, rf, tracking, largest = self.bmode.field_of_view_mm, self.rf, self.tracking, self.bmode.size_px
+        for name, tracker in tracking.trackers.items():
             self._check_tracker(f"tracking.trackers.{name}", tracker)
-        if self.tracking.frame_step >= self.loop.frames:
+        if tracking.frame_step >= self.loop.frames:
             remedy = f"must be smaller than loop.frames = {self.loop.frames}, so that trackers are given two frames"
-            raise invalid("tracking.frame_step", self.tracking.frame_step, remedy)
-        if self.tracking.grid_px > self.bmode.size_px:
-            remedy = f"must not exceed the largest image, {self.bmode.size_px} px"
-            raise invalid("tracking.grid_px", self.tracking.grid_px, remedy)
+            raise self._refused("tracking.frame_step", remedy)
+        if tracking.grid_px > largest:
+            raise self._refused("tracking.grid_px", f"must not exceed the largest image, {largest} px")
         if rf.focus_mm >= side:
-            raise invalid("rf.focus_mm", rf.focus_mm, f"must be smaller than bmode.field_of_view_mm = {side:g}")
+            raise self._refused("rf.focus_mm", f"must be smaller than bmode.field_of_view_mm = {side:g}")
         if rf.focus_mm + rf.focal_half_span_mm >= side:
             foci = f"its focal_zones = {rf.focal_zones} foci, focal_spacing_mm = {rf.focal_spacing_mm:g} apart"
             remedy = f"must be smaller than {side - rf.focal_half_span_mm:g}, so that {foci}, lie in the field of view"
-            raise invalid("rf.focus_mm", rf.focus_mm, remedy)
+            raise self._refused("rf.focus_mm", remedy)
 
     def _check_tracker(self, path: str, tracker: Section) -> None:
         smallest, side = self.bmode.sizes[-1], self.bmode.field_of_view_mm
         if isinstance(tracker, PhaseCorrelation) and (tracker.window_px or 0) > smallest:
-            remedy = f"must not exceed the smallest image, {smallest} px"
-            raise invalid(f"{path}.window_px", tracker.window_px, remedy)
+            raise self._refused(f"{path}.window_px", f"must not exceed the smallest image, {smallest} px")
         for key in filter(type(tracker).model_fields.__contains__, _TRACKER_LENGTHS):
             length = getattr(tracker, key)
             if max(length if isinstance(length, list) else [length or 0]) > side:
-                raise invalid(f"{path}.{key}", length, f"must not exceed bmode.field_of_view_mm = {side:g}")
+                raise self._refused(f"{path}.{key}", f"must not exceed bmode.field_of_view_mm = {side:g}")
 
     @check
     def _check_inference(self) -> None:
-        inference = self.inference
-        if inference.tracker is None:
-            return
-        if inference.tracker not in self.tracking.trackers:
-            raise invalid("inference.tracker", inference.tracker, f"use one of {', '.join(self.tracking.trackers)}")
-        if inference.size_px not in (None, *self.bmode.sizes):
+        tracker, size, kind = self.inference.tracker, self.inference.size_px, self.motion.kind
+        if tracker is not None and tracker not in self.tracking.trackers:
+            raise self._refused("inference.tracker", f"use one of {', '.join(self.tracking.trackers)}")
+        if tracker is not None and size not in (None, *self.bmode.sizes):
             sizes = ", ".join(map(str, self.bmode.sizes))
-            raise invalid("inference.size_px", inference.size_px, f"is no image size: use one of {sizes}")
-        if self.motion.kind != "beat":
-            remedy = (
-                f"needs a loop of pressure and volume, which motion.kind = {self.motion.kind} has not: leave it out"
-            )
-            raise invalid("inference.tracker", inference.tracker, remedy)
+            raise self._refused("inference.size_px", f"is no image size: use one of {sizes}")
+        if tracker is not None and kind != "beat":
+            remedy = f"needs a loop of pressure and volume, which motion.kind = {kind} has not: leave it out"
+            raise self._refused("inference.tracker", remedy)
 
     @check
     def _check_view_names(self) -> None:
@@ -119,84 +117,81 @@ class Config(Section):
         radius = 0.0 if self.geometry.file else self.geometry.outer_radius_mm()
         if self.rf.focus_mm <= radius:
             remedy = f"must exceed {radius:g}, the radius of the heart, whose axis is at the focus"
-            raise invalid("rf.focus_mm", self.rf.focus_mm, remedy)
+            raise self._refused("rf.focus_mm", remedy)
 
     @check
     def _check_shape(self) -> None:
         kind, shape = self.motion.kind, self.geometry.shape
         if kind == "tube" and shape != "tube":
-            raise invalid("motion.kind", kind, "needs geometry.shape = tube")
+            raise self._refused("motion.kind", "needs geometry.shape = tube")
         if shape == "tube" and kind == "beat":
             remedy = "has no closed cavity and cannot beat: set motion.kind to rigid, affine or tube"
-            raise invalid("geometry.shape", shape, remedy)
+            raise self._refused("geometry.shape", remedy)
 
     @check
     def _check_motion_file(self) -> None:
         if self.motion.kind != "file":
             return
-        path, rate = self.motion.file.path, self.loop.heart_rate_per_min
-        if path is None:
-            remedy = "must be given with motion.kind = file: the files of the series, such as heart_*.vtu or heart.pvd"
-            raise invalid("motion.file.path", None, remedy)
+        given = "must be given with motion.kind = file"
+        if self.motion.file.path is None:
+            remedy = f"{given}: the files of the series, such as heart_*.vtu or heart.pvd"
+            raise self._refused("motion.file.path", remedy)
         if self.geometry.file is None:
-            raise invalid("geometry.file", None, f"must be given, because {path} holds positions and no tetrahedra")
+            remedy = f"must be given, because {self.motion.file.path} holds positions and no tetrahedra"
+            raise self._refused("geometry.file", remedy)
         if self.geometry.remesh:
             remedy = "must be false with motion.kind = file, because the elements that move are those of the file"
-            raise invalid("geometry.remesh", True, remedy)
-        if rate is None:
-            remedy = "must be given with motion.kind = file: 60000 over the period in ms, which the series is scaled to"
-            raise invalid("loop.heart_rate_per_min", None, remedy)
+            raise self._refused("geometry.remesh", remedy)
+        if self.loop.heart_rate_per_min is None:
+            remedy = f"{given}: 60000 over the period in ms, which the series is scaled to"
+            raise self._refused("loop.heart_rate_per_min", remedy)
 
     @check
     def _check_tissues(self) -> None:
-        realism = self.realism
-        levels = {f"{name}.level_dB": getattr(realism, name).level_dB for name in ("blood", "surroundings")}
-        levels |= {f"neighbours.{name}": level for name, level in realism.neighbours.model_dump().items()}
-        for name, level in levels.items():
-            key = f"realism.{name}"
-            if self.phantom.in_plane_only and level is not None:
-                remedy = "must be null if phantom.in_plane_only is true, because it fills a volume"
-                raise invalid(key, level, remedy)
-            if self.geometry.shape == "tube" and level is not None:
-                remedy = "must be null if geometry.shape is tube, because an open tube has no closed cavity"
-                raise invalid(key, level, remedy)
+        keys = ("blood.level_dB", "surroundings.level_dB", *(f"neighbours.{key}" for key in Neighbours.model_fields))
+        reasons = (
+            (self.phantom.in_plane_only, "phantom.in_plane_only is true, because it fills a volume"),
+            (self.geometry.shape == "tube", "geometry.shape is tube, because an open tube has no closed cavity"),
+        )
+        for key in keys:
+            for applies, reason in reasons:
+                if applies and value_of(self.realism, key) is not None:
+                    raise self._refused(f"realism.{key}", f"must be null if {reason}")
 
     @check
     def _check_neighbours(self) -> None:
-        realism = self.realism
-        for name, level in realism.neighbours.around.items():
-            if level is not None and realism.surroundings.level_dB is None:
+        for name, level in self.realism.neighbours.around.items():
+            if level is not None and self.realism.surroundings.level_dB is None:
                 remedy = "needs realism.surroundings.level_dB, the echo power of what lies between the neighbours"
-                raise invalid(f"realism.neighbours.{name}", level, remedy)
+                raise self._refused(f"realism.neighbours.{name}", remedy)
 
     @check
     def _check_width(self) -> None:
         length, width = self.probe.elements * self.probe.pitch_um / 1e3, self.rf.width_mm
         if self.rf.scan == "linear" and width is not None and width > length:
-            raise invalid("rf.width_mm", width, f"must not exceed {length:g}, the length of the array")
+            raise self._refused("rf.width_mm", f"must not exceed {length:g}, the length of the array")
 
     @check
     def _check_fibres(self) -> None:
         if self.fibres.source == "file" and self.geometry.fibre is None:
             remedy = "give the name of the array in the mesh file as geometry.fibre, or set this key to rule"
-            raise invalid("fibres.source", self.fibres.source, remedy)
+            raise self._refused("fibres.source", remedy)
 
     @check
     def _check_stiffness(self) -> None:
-        key, stiffness = "mechanics.material.stiffness_kPa", self.mechanics.material.stiffness_kPa
         prescribed, end_diastolic = self.loop.prescribed, self.geometry.given_state == "end_diastole"
         if self.motion.kind != "beat":
             return
-        if prescribed != "pressure_volume" and stiffness is None:
-            raise invalid(
-                key, None, f"must be given, because it cannot be solved for with loop.prescribed = {prescribed}"
-            )
-        if end_diastolic and stiffness is None:
-            remedy = "must be given if geometry.given_state is end_diastole, because the unloaded volume is not known"
-            raise invalid(key, None, remedy)
+        if self.mechanics.material.stiffness_kPa is None and (end_diastolic or prescribed != "pressure_volume"):
+            remedy = f"must be given, because it cannot be solved for with loop.prescribed = {prescribed}"
+            if prescribed == "pressure_volume":
+                remedy = (
+                    "must be given if geometry.given_state is end_diastole, because the unloaded volume is not known"
+                )
+            raise self._refused("mechanics.material.stiffness_kPa", remedy)
         if end_diastolic and prescribed == "volume":
             remedy = "needs geometry.given_state = unloaded, because there is no pressure to unload from"
-            raise invalid("loop.prescribed", prescribed, remedy)
+            raise self._refused("loop.prescribed", remedy)
 
     @check
     def _check_amounts(self) -> None:
@@ -204,4 +199,4 @@ class Config(Section):
         amounts.check_cases(self.cases)
         amounts.check_pixels(self.bmode, frames)
         amounts.check_samples(self.probe, self.bmode, self.rf.lines, frames)
-        amounts.check_scatterers(self.phantom, self.realism, self.geometry, amounts.imaged_mm3(self.probe, side))
+        amounts.check_scatterers(self.phantom, self.realism, self.geometry, self.probe, side)

@@ -7,6 +7,9 @@ import textwrap
 from difflib import get_close_matches
 from itertools import takewhile
 from pathlib import Path
+from typing import Any
+
+import yaml
 
 _PLACES = (Path(__file__).parents[1] / "shipped", Path(__file__).parents[3])
 ROOT = next((place for place in _PLACES if (place / "Snakefile").is_file()), _PLACES[0])
@@ -14,7 +17,7 @@ ROOT = next((place for place in _PLACES if (place / "Snakefile").is_file()), _PL
 
 SAMPLE = "sample"
 """Name of the repository that is shipped, which the configuration of that name makes."""
-NOT_WRITTEN = "comes with the package and is not written to: echotruth merge out/mine sample makes a copy of your own"
+NOT_WRITTEN = "comes with the package and is not written to: echotruth merge sample sample copies it to out/sample"
 """What an error says of the shipped repository, whose name or path stands before it."""
 
 
@@ -36,6 +39,11 @@ def path_of(name: str) -> Path:
 def found(path: str) -> str:
     """The path itself, or the file of a shipped configuration if nothing has this path and it is the name of one."""
     return str(path_of(path)) if path in names() and not Path(path).exists() else path
+
+
+def citation() -> dict[str, Any]:
+    """How to cite echotruth, and under `preferred-citation` the paper whose method is used, as CITATION.cff has it."""
+    return dict(yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8")))
 
 
 def sample() -> Path:

@@ -1,96 +1,103 @@
 """The table of hearts as it is written: the cells of a CSV text, whose columns are named by its first row."""
 
-import csv
-import io
-from dataclasses import dataclass
-from functools import lru_cache
+from __future__ import annotations
 
-from echotruth.config.limits import MAX_CASES, MAX_CELL, MAX_TABLE_COLUMNS
+import io
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 CASE, NOTE, LABEL = "case", "note", "label."
 """Columns of the id and of a note, and how the names of labels begin."""
+MAX_CASES = 100_000
+"""Largest number of cases of a repository, also of those that conditions leave out."""
+MAX_BYTES = 2 * 2**20
+"""Size of the largest table of hearts: 10 000 rows of 200 characters."""
+MAX_COLUMNS = 256
+"""Largest number of columns of a table; each may become an array of the repository."""
+MAX_CELL = 4000
+"""Longest cell of a table, as a note may be, characters."""
 
 
 class TableError(ValueError):
     """Raised if a text is not a table of hearts; the message names row, column and remedy."""
 
 
-@dataclass(frozen=True)
-class Table:
-    """Cells of a table."""
-
-    columns: tuple[str, ...]
-    """Their names."""
-    cells: list[tuple[str, ...]]
-    """Cells of each row, without blanks around them; rows without any are left out."""
-    numbers: list[int]
-    """Number of each row in the file: 1 is the first below the names of the columns."""
-
-    @property
-    def keys(self) -> list[str]:
-        """Columns that are dotted keys."""
-        return [name for name in self.columns if name not in (CASE, NOTE) and not name.startswith(LABEL)]
-
-    @property
-    def labels(self) -> list[str]:
-        """Columns that are labels."""
-        return [name for name in self.columns if name.startswith(LABEL)]
-
-
 @lru_cache(maxsize=4)
-def parse(text: str) -> Table:
-    """Split a CSV text into cells.
+def parse(text: str) -> pd.DataFrame:
+    """Cells of a CSV text.
 
     Parameters
     ----------
     text : str
         Comma-separated values as RFC 4180 describes them.
 
+    Returns
+    -------
+    DataFrame of str
+        Cells without blanks around them; rows without any are left out. The index is the number of each row in the
+        file: 1 is the first below the names of the columns.
+
     Raises
     ------
     TableError
         If it has no columns or rows, or a row has not as many cells as there are columns.
     """
-    lines = csv.reader(io.StringIO(text, newline=""), strict=True)
-    numbers: list[int] = []
-    cells: list[tuple[str, ...]] = []
+    import pandas as pd
+
+    # The engine of Python alone tells a cell that is missing, which is NaN, from an empty one.
+    how = {"dtype": str, "keep_default_na": False, "skip_blank_lines": False, "engine": "python", "header": None}
     try:
-        columns = tuple(name.strip() for name in next(lines, []))
-        _check_columns(columns)
-        for number, line in enumerate(lines, 1):
-            row = tuple(cell.strip() for cell in line)
-            if any(row):
-                _check_row(number, row, columns)
-                numbers.append(number)
-                cells.append(row)
-            if len(cells) > MAX_CASES:
-                raise TableError(f"has more than {MAX_CASES} rows, as many as a repository has cases: give fewer")
-    except csv.Error as error:
-        raise TableError(f"is not a table of comma-separated values ({error}): save it as CSV") from None
-    if not cells:
+        table = pd.read_csv(io.StringIO(text, newline=""), nrows=MAX_CASES + 2, **how)
+    except pd.errors.EmptyDataError:
+        raise TableError("has no columns: begin with a row of their names, such as case,fibres.endo_deg,note") from None
+    except pd.errors.ParserError as error:
+        remedy = "save it as CSV, with text that has commas in quotes"
+        raise TableError(f"is not a table of comma-separated values ({error}): {remedy}") from None
+    table = table.apply(lambda column: column.str.strip())
+    names = table.iloc[0].fillna("").tolist()
+    _check_columns(names)
+    table = table[1:].set_axis(names, axis="columns")
+    table = table[(table.fillna("") != "").any(axis="columns")]
+    if table.empty:
         raise TableError("has no rows: write a row for each heart below the names of the columns")
-    return Table(columns, cells, numbers)
+    if len(table) > MAX_CASES:
+        raise TableError(f"has more than {MAX_CASES} rows, as many as a repository has cases: give fewer")
+    _check_cells(table)
+    return table
 
 
-def _check_columns(columns: tuple[str, ...]) -> None:
-    if not any(columns):
-        raise TableError("has no columns: begin with a row of their names, such as case,fibres.endo_deg,note")
+def swept(table: pd.DataFrame) -> list[str]:
+    """Columns of a table that are dotted keys."""
+    return [name for name in table if name not in (CASE, NOTE) and not name.startswith(LABEL)]
+
+
+def labels(table: pd.DataFrame) -> list[str]:
+    """Columns of a table that are labels."""
+    return [name for name in table if name.startswith(LABEL)]
+
+
+def _check_columns(names: list[str]) -> None:
     for separator, name in ((";", "semicolons"), ("\t", "tabs")):
-        if len(columns) == 1 and separator in columns[0]:
+        if len(names) == 1 and separator in names[0]:
             raise TableError(f"has its columns separated by {name}: separate them by commas")
-    if len(columns) > MAX_TABLE_COLUMNS:
-        raise TableError(f"has {len(columns)} columns: give at most {MAX_TABLE_COLUMNS}")
-    for number, name in enumerate(columns, 1):
+    if len(names) > MAX_COLUMNS:
+        raise TableError(f"has {len(names)} columns: give at most {MAX_COLUMNS}")
+    for number, name in enumerate(names, 1):
         if not name:
             raise TableError(f"column {number} has no name: name it in the first row")
-        if name in columns[: number - 1]:
+        if name in names[: number - 1]:
             raise TableError(f"column {name[:80]!r} is given twice: give it once")
 
 
-def _check_row(number: int, row: tuple[str, ...], columns: tuple[str, ...]) -> None:
-    if len(row) != len(columns):
-        remedy = "leave cells empty rather than out, and put text with commas in quotes"
-        raise TableError(f"row {number} has {len(row)} cells and not {len(columns)}, as many as columns: {remedy}")
-    for name, cell in zip(columns, row, strict=True):
-        if len(cell) > MAX_CELL:
-            raise TableError(f"row {number}, column {name}: has {len(cell)} characters: write at most {MAX_CELL}")
+def _check_cells(table: pd.DataFrame) -> None:
+    for number in table.index[table.isna().any(axis="columns")]:
+        row = f"row {number} has {table.loc[number].count()} cells and not {len(table.columns)}, as many as columns"
+        raise TableError(f"{row}: leave cells empty rather than out, and put text with commas in quotes")
+    for name in table:
+        lengths = table[name].str.len()
+        if lengths.max() > MAX_CELL:
+            row = f"row {lengths.idxmax()}, column {name}"
+            raise TableError(f"{row}: has {lengths.max()} characters: write at most {MAX_CELL}")

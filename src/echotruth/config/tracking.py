@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat
 
-from echotruth.config.limits import MAX_TRACKERS
 from echotruth.section import Name, Positive, Section, check, invalid, tagged
 
 Reference = Annotated[
@@ -283,7 +282,7 @@ class Tracking(Section):
     """Trackers are given every n-th frame, as of a scanner with an n-th of the frame rate. Displacement and quality in
     the frames between are interpolated linearly in time; the cycle closes, so that after the last given frame they lead
     back to those of end-diastole one period later."""
-    trackers: Annotated[dict[Name, Tracker], Field(min_length=1, max_length=MAX_TRACKERS)] = Field(
+    trackers: Annotated[dict[Name, Tracker], Field(min_length=1, max_length=64)] = Field(
         default_factory=default_trackers
     )
     """Settings by name: `as_published` is the tracker as the paper prints it; `corrected` has tapered windows with the

@@ -11,10 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from echotruth.arrays import Floats
 from echotruth.echo import files
 from echotruth.echo.failure import EchoError
-from echotruth.echo.recording import Recording
+from echotruth.echo.recording import Recording, check_size
 
 SQUARE = 1e-3
 """Relative difference of the sides of a pixel from which an image is resampled to square pixels."""
+SIDES_MM, STEPS_MS = (0.001, 10.0), (0.01, 1000.0)
+"""Shortest and longest side of a pixel, and time from frame to frame, of an echo of any heart."""
+LARGEST_RATIO = 100.0
+"""Longer side of a pixel over the shorter."""
 
 
 def read_clip(
@@ -30,8 +34,10 @@ def read_clip(
     Parameters
     ----------
     source : str, Path or array_like
-        DICOM, video (.mp4, .avi, .mov, .mkv), .gif, NIfTI, .npy, a folder of images, or grey levels
-        (frame, axial, lateral).
+        DICOM, video (.mp4, .avi, .mov, .mkv), .gif, .tif of several pages, NIfTI, .npy, a folder of images, or grey
+        levels (frame, axial, lateral). Images of a folder are frames in the order of the numbers in their names.
+        Levels of 8 bits are taken as they are; those of more bits, or real, are scaled so that the least of the clip
+        becomes 0 and the largest 255. Images in colour of more bits keep the upper 8.
     spacing_mm : float, optional
         Distance of pixel centres. Default: what the file says; videos and images say nothing.
     frame_time_ms : float, optional
@@ -52,7 +58,8 @@ def read_clip(
     Raises
     ------
     EchoError
-        If it is no clip, or its spacing or frame time is neither given nor in the file.
+        If it is no clip, its levels are not finite, or its spacing or frame time is neither given nor in the file, or
+        is that of no echo: beyond 0.001 to 10 mm, or 0.01 to 1000 ms.
 
     Examples
     --------
@@ -64,8 +71,9 @@ def read_clip(
     """
     is_path = isinstance(source, str | PathLike)
     name = str(source) if is_path else "array"
-    recording = files.read(Path(source)) if is_path else files.of_array(source)  # type: ignore[arg-type]
-    time = _time(recording, frame_time_ms, name)
+    with np.errstate(all="ignore"):  # whatever is not finite is told below
+        recording = files.read(Path(source)) if is_path else files.of_array(source)  # type: ignore[arg-type]
+        time = _time(recording, frame_time_ms, name)
     first, stop = _cycle(recording, time, cycle, name)
     height, width = recording.frames.shape[1:]
     left, top, right, bottom = crop or (0, 0, width, height)
@@ -95,25 +103,40 @@ def read_clip(
 def _time(recording: Recording, frame_time_ms: float | None, name: str) -> Floats:
     """Times (frame,), s."""
     if frame_time_ms is not None:
-        if not (np.isfinite(frame_time_ms) and frame_time_ms > 0):
-            raise EchoError(f"frame_time_ms = {frame_time_ms}: give a positive number, the time from frame to frame")
+        if not STEPS_MS[0] <= frame_time_ms <= STEPS_MS[1]:
+            wanted = _wanted("the time from frame to frame", STEPS_MS, "ms")
+            raise EchoError(f"frame_time_ms = {frame_time_ms:g}: {wanted}")
         return np.arange(len(recording.frames), dtype=float) * frame_time_ms * 1e-3
     if not len(recording.time):
         raise EchoError(f"{name}: does not say the time from frame to frame: give frame_time_ms")
-    if not (np.diff(recording.time) > 0).all():
+    steps = 1e3 * np.diff(recording.time)
+    if not (steps > 0).all():
         raise EchoError(f"{name}: has frames of which the times do not increase: give frame_time_ms")
+    for step in (steps.min(initial=STEPS_MS[1]), steps.max(initial=STEPS_MS[0])):
+        if not STEPS_MS[0] <= step <= STEPS_MS[1]:
+            wanted = _wanted("the right one", STEPS_MS, "ms")
+            raise EchoError(f"{name}: has a time from frame to frame of {step:g} ms: {wanted}, as frame_time_ms")
     return recording.time
+
+
+def _wanted(what: str, bounds: tuple[float, float], unit: str) -> str:
+    return f"give {what}, from {bounds[0]:g} to {bounds[1]:g} {unit}"
 
 
 def _spacing(recording: Recording, spacing_mm: float | None, name: str) -> tuple[float, float]:
     """Axial and lateral distance of pixel centres, m."""
     if spacing_mm is not None:
-        if not (np.isfinite(spacing_mm) and spacing_mm > 0):
-            raise EchoError(f"spacing_mm = {spacing_mm}: give a positive number, the side of a pixel")
+        if not SIDES_MM[0] <= spacing_mm <= SIDES_MM[1]:
+            raise EchoError(f"spacing_mm = {spacing_mm:g}: {_wanted('the side of a pixel', SIDES_MM, 'mm')}")
         return spacing_mm * 1e-3, spacing_mm * 1e-3
     if not recording.spacing or not min(recording.spacing) > 0:
         raise EchoError(f"{name}: does not say the side of its pixels: give spacing_mm")
     axial, lateral = recording.spacing
+    sides = f"{name}: has pixels of {1e3 * axial:g} x {1e3 * lateral:g} mm"
+    if not all(SIDES_MM[0] <= 1e3 * side <= SIDES_MM[1] for side in (axial, lateral)):
+        raise EchoError(f"{sides}: {_wanted('their right side', SIDES_MM, 'mm')}, as spacing_mm")
+    if max(axial, lateral) > LARGEST_RATIO * min(axial, lateral):
+        raise EchoError(f"{sides}, more than {LARGEST_RATIO:g} to 1: if they are square give spacing_mm")
     return axial, lateral
 
 
@@ -147,4 +170,5 @@ def _square(frames: NDArray[np.uint8], spacing: tuple[float, float]) -> tuple[ND
     if max(spacing) - side <= SQUARE * side:
         return frames, side
     height, width = (round(size * length / side) for size, length in zip(frames.shape[1:], spacing, strict=True))
+    check_size(len(frames) * height * width, "the clip with square pixels")
     return np.stack([cv2.resize(frame, (width, height), interpolation=cv2.INTER_LINEAR) for frame in frames]), side

@@ -4,6 +4,7 @@ Attributes are those of DICOM PS3.3: US Region Calibration (C.8.5.5), Cine (C.7.
 Cardiac Synchronization.
 """
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -44,20 +45,27 @@ def read(path: Path) -> Recording:
     if pixels.ndim != 3 + colours:
         raise EchoError(f"{path}: holds one image: give a clip of two or more frames")
     try:
-        return _recording(image, pixels)
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        return _recording(image, pixels, path)
+    except EchoError:
+        raise
+    except Exception as error:  # values are decoded when they are asked for
         what = f"its region, scale or times cannot be read: {one_line(error)}"
         raise EchoError(f"{path}: is a damaged DICOM clip: {what}") from None
 
 
-def _recording(image: Any, pixels: NDArray[Any]) -> Recording:
+def _recording(image: Any, pixels: NDArray[Any], path: Path) -> Recording:
     """The largest region of the pixels (frame, axial, lateral), or with colours last, with its scale and times."""
+    if image.PhotometricInterpretation == "PALETTE COLOR":
+        pixels = import_module("pydicom.pixels").apply_color_lut(pixels, image)
     region = _region(image)
     if region is not None:
         top, left = int(region.RegionLocationMinY0), int(region.RegionLocationMinX0)
         pixels = pixels[:, top : int(region.RegionLocationMaxY1) + 1, left : int(region.RegionLocationMaxX1) + 1]
     waves = np.atleast_1d(np.asarray(getattr(image, "RWaveTimeVector", []), float)) * 1e-3
-    return Recording(grey(pixels), _spacing(image, region), _times(image, len(pixels)), waves)
+    frames = grey(pixels, str(path))
+    # MONOCHROME1 shows 0 as white.
+    frames = 255 - frames if image.PhotometricInterpretation == "MONOCHROME1" else frames
+    return Recording(frames, _spacing(image, region), _times(image, len(pixels)), waves)
 
 
 def _region(image: Any) -> Any:

@@ -1,8 +1,10 @@
-"""Recorded clips in files of other kinds than DICOM: video, animation, folder of images, NIfTI, NumPy."""
+"""Recorded clips in files of other kinds than DICOM: video, animation, images, NIfTI, NumPy."""
 
+import os
+import warnings
 from collections.abc import Callable
 from pathlib import Path
-from tokenize import TokenError
+from typing import Any
 
 import imageio_ffmpeg
 import numpy as np
@@ -11,12 +13,12 @@ from PIL import Image, ImageSequence
 
 from echotruth.echo import dicom
 from echotruth.echo.failure import EchoError, one_line, optional
-from echotruth.echo.recording import Recording, grey
+from echotruth.echo.recording import Recording, check_size, grey
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
-"""Endings of the images of a folder, of which each is a frame, in the order of their names."""
-UNREADABLE = (OSError, ValueError, SyntaxError, EOFError, LookupError, TokenError, Image.DecompressionBombError)
-"""What Pillow and NumPy raise for files that are damaged, hold something else, or images of an impossible size."""
+"""Endings of the images of a folder, of which each is a frame, in the order of the numbers in their names."""
+PHOTOMETRIC = 262
+"""Tag of a TIFF that says whether 0 is black."""
 
 
 def read(path: Path) -> Recording:
@@ -35,10 +37,10 @@ def read(path: Path) -> Recording:
     EchoError
         If there is no such file, or it holds no clip.
     """
-    if not path.exists():
-        raise EchoError(f"{path}: is not there: give the path of a clip")
-    if path.is_dir():
+    if os.path.isdir(path):  # which is False of a name that is too long, where a Path raises
         return _folder(path)
+    if not os.path.isfile(path):
+        raise EchoError(f"{path}: is not there, or no file: give the path of a clip")
     suffix = ".nii.gz" if path.name.lower().endswith(".nii.gz") else path.suffix.lower()
     if suffix not in READERS:
         raise EchoError(f"{path}: use a file of {', '.join(name for name in READERS if name)}, or a folder of images")
@@ -47,29 +49,62 @@ def read(path: Path) -> Recording:
 
 def _folder(path: Path) -> Recording:
     """Frames of a folder of images."""
-    files = sorted(file for file in path.iterdir() if file.suffix.lower() in IMAGES)
-    if len(files) < 2:
-        raise EchoError(f"{path}: has {len(files)} images: a clip needs two or more ({', '.join(IMAGES)})")
-    images = []
-    for file in files:
-        try:
-            images.append(np.asarray(Image.open(file).convert("RGB")))
-        except UNREADABLE:
-            raise EchoError(f"{file}: is no image that can be read") from None
-        if images[-1].shape != images[0].shape:
-            sizes = "{1} x {0}".format(*images[-1].shape), "{1} x {0}".format(*images[0].shape)
-            raise EchoError(f"{file}: has {sizes[0]} px, and {files[0].name} {sizes[1]}: frames must be of one size")
-    return Recording(grey(np.stack(images)))
+    from echotruth.mechanics.motion_file.files import natural_order
+
+    images = (file for file in path.iterdir() if file.suffix.lower() in IMAGES and file.is_file())
+    files = sorted(images, key=natural_order)
+    frames = [(file, page) for file in files for page in _pages(file)]
+    if len(frames) < 2:
+        raise EchoError(f"{path}: has {len(frames)} images: a clip needs two or more ({', '.join(IMAGES)})")
+    return _clip(frames, path)
 
 
 def _animation(path: Path) -> Recording:
-    """Frames of a GIF."""
-    try:
-        with Image.open(path) as file:
-            frames = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(file)]
-    except UNREADABLE:
-        raise EchoError(f"{path}: is no animation that can be read") from None
-    return Recording(grey(np.stack(frames)))
+    """Frames of a GIF, or pages of a TIFF."""
+    return _clip([(path, page) for page in _pages(path)], path)
+
+
+def _clip(frames: list[tuple[Path, NDArray[Any]]], path: Path) -> Recording:
+    """Clip of frames, each with the file that it is of."""
+    name, first = frames[0][0].name, frames[0][1]
+    for file, frame in frames:
+        if frame.shape != first.shape:
+            sizes = "{1} x {0}".format(*frame.shape), "{1} x {0}".format(*first.shape)
+            raise EchoError(f"{file}: has {sizes[0]} px, and {name} {sizes[1]}: frames must be of one size")
+        if frame.dtype != first.dtype:
+            kinds = f"levels of {frame.dtype}, and {name} of {first.dtype}"
+            raise EchoError(f"{file}: has {kinds}: frames must be of one kind")
+    return Recording(grey(np.stack([frame for _, frame in frames]), str(path)))
+
+
+def _pages(path: Path) -> list[NDArray[Any]]:
+    """Images (axial, lateral) of a file: the frames of an animation, the pages of a TIFF, or one."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Image.DecompressionBombWarning)
+        try:
+            with Image.open(path) as image:
+                check_size(image.width * image.height * getattr(image, "n_frames", 1), str(path))
+                return [_levels(page, path) for page in ImageSequence.Iterator(image)]
+        except EchoError:
+            raise
+        except (Image.DecompressionBombError, Image.DecompressionBombWarning):
+            what = f"has images of more than {Image.MAX_IMAGE_PIXELS:.1g} pixels, as no echo has"
+            raise EchoError(f"{path}: {what}: make them smaller") from None
+        except Exception:  # Pillow has no common type for what is wrong with a file
+            raise EchoError(f"{path}: is no image that can be read") from None
+
+
+def _levels(page: Image.Image, path: Path) -> NDArray[Any]:
+    """Levels (axial, lateral) of an image: uint8, or as they are where they have more bits, which Pillow cuts off."""
+    page.load()
+    if page.mode == "P" and (most := int(np.asarray(page).max())) >= (colours := len(page.getpalette() or []) // 3):
+        raise EchoError(f"{path}: has a pixel of colour {most}, and a palette of {colours}: save it again")
+    if not page.mode.startswith(("I", "F")):
+        return grey(np.asarray(page.convert("RGB"))[None], str(path))[0]
+    levels = np.asarray(page)
+    # Pillow inverts images of up to 8 bits in which 0 is white.
+    is_white_0 = getattr(page, "tag_v2", {}).get(PHOTOMETRIC) == 0
+    return -levels.astype(float) if is_white_0 else levels
 
 
 def _video(path: Path) -> Recording:
@@ -91,9 +126,9 @@ def _nifti(path: Path) -> Recording:
     try:
         image = nibabel.load(path)
         pixels = np.asarray(image.dataobj)
+        sizes, units = [float(size) for size in image.header.get_zooms()], image.header.get_xyzt_units()
     except Exception as error:  # nibabel has no common type for what is wrong with a file
         raise EchoError(f"{path}: is no NIfTI file that can be read: {one_line(error)}") from None
-    sizes, units = [float(size) for size in image.header.get_zooms()], image.header.get_xyzt_units()
     if pixels.ndim == 4 and pixels.shape[2] == 1:
         pixels, sizes = pixels[:, :, 0], [*sizes[:2], *sizes[3:]]
     if pixels.ndim != 3:
@@ -101,16 +136,20 @@ def _nifti(path: Path) -> Recording:
     length = {"mm": 1e-3, "micron": 1e-6, "meter": 1.0}.get(units[0], 1e-3)
     second = {"sec": 1.0, "msec": 1e-3, "usec": 1e-6}.get(units[1])
     times = np.arange(pixels.shape[2], dtype=float) * sizes[2] * second if second and sizes[2] > 0 else np.empty(0)
-    return Recording(grey(pixels.transpose(2, 1, 0)), (sizes[1] * length, sizes[0] * length), times)
+    return Recording(grey(pixels.transpose(2, 1, 0), str(path)), (sizes[1] * length, sizes[0] * length), times)
 
 
 def _array(path: Path) -> Recording:
     """Frames of a NumPy file, (frame, axial, lateral)."""
+    return of_array(_loaded(path), str(path))
+
+
+def _loaded(path: Path) -> NDArray[Any]:
+    """Array of a NumPy file, which is not read before its header is known to tell no more than the file holds."""
     try:
-        pixels = np.load(path, allow_pickle=False)
-    except UNREADABLE:
-        raise EchoError(f"{path}: is no array that numpy.load reads") from None
-    return of_array(pixels, str(path))
+        return np.lib.format.open_memmap(path, mode="r")
+    except Exception as error:  # NumPy parses the header as Python, and raises whatever that does
+        raise EchoError(f"{path}: is no array that numpy.load reads: {one_line(error)}") from None
 
 
 def of_image(path: Path) -> NDArray[np.bool_]:
@@ -121,14 +160,10 @@ def of_image(path: Path) -> NDArray[np.bool_]:
     EchoError
         If it holds no image.
     """
-    try:
-        is_array = path.suffix.lower() == ".npy"
-        pixels = np.load(path, allow_pickle=False) if is_array else np.asarray(Image.open(path).convert("L"))
-    except UNREADABLE:
-        raise EchoError(f"{path}: is no image that can be read: give a .csv, an image or a .npy") from None
-    if pixels.ndim != 2:
-        raise EchoError(f"{path}: has the shape {pixels.shape}: give one image (axial, lateral)")
-    return pixels != 0
+    pixels = _loaded(path) if path.suffix.lower() == ".npy" else _pages(path)[0]
+    if pixels.ndim != 2 or pixels.dtype.kind not in "uifb":
+        raise EchoError(f"{path}: has the shape {pixels.shape} of {pixels.dtype}: give one image (axial, lateral)")
+    return np.asarray(pixels != 0)
 
 
 def of_array(pixels: object, name: str = "array") -> Recording:
@@ -139,18 +174,13 @@ def of_array(pixels: object, name: str = "array") -> Recording:
     EchoError
         If it has another shape, or values that are not finite.
     """
-    given = np.asarray(pixels)
-    if given.ndim not in (3, 4) or (given.ndim == 4 and given.shape[-1] > 4) or given.dtype.kind not in "uifb":
-        raise EchoError(f"{name}: has the shape {given.shape}: give numbers (frame, axial, lateral), or colours last")
-    if not np.isfinite(given).all():
-        raise EchoError(f"{name}: has values that are not finite: give grey levels")
-    return Recording(grey(given))
+    return Recording(grey(np.asarray(pixels), name))
 
 
 READERS: dict[str, Callable[[Path], Recording]] = {
     **dict.fromkeys((".dcm", ".dicom", ""), dicom.read),
     **dict.fromkeys((".mp4", ".avi", ".mov", ".mkv"), _video),
-    ".gif": _animation,
+    **dict.fromkeys((".gif", ".tif", ".tiff"), _animation),
     **dict.fromkeys((".nii", ".nii.gz"), _nifti),
     ".npy": _array,
 }

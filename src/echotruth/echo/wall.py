@@ -15,10 +15,10 @@ from scipy.spatial import cKDTree
 from skimage.draw import polygon2mask
 from skimage.measure import find_contours, label
 
+from echotruth import files
 from echotruth.arrays import Floats
 from echotruth.echo.failure import EchoError, one_line
 from echotruth.echo.files import of_image
-from echotruth.repository import durable
 
 View = Literal["basal", "mid", "apical", "four_chamber", "two_chamber", "three_chamber", "short_axis", "long_axis"]
 """Views: three levels of the short axis, three apical views in the usual display, and either without AHA segments."""
@@ -329,7 +329,7 @@ def write_wall(path: str | PathLike[str], wall: Wall, clicked: dict[str, NDArray
         table["clicked"] = np.concatenate([marks[part] for part in parts]).astype(int)
     head = f"# view: {wall.view}\n" + (f"# part: {wall.part}\n" if wall.part else "")
     text = head + table.to_csv(index=False, float_format="%.2f", lineterminator="\n")
-    durable.write(Path(path), text.encode())
+    files.write(Path(path), text.encode())
 
 
 def _of_table(file: Path, view: str) -> Wall:

@@ -141,9 +141,9 @@ def make_clip(case: Case, view: str, frames: np.ndarray, labels: np.ndarray, ins
 
 def read_clips(repository: Repository, case: str, view: str) -> dict[int, Clip]:
     """Clips of one view of a repository, by image size."""
-    found, place = repository.case(case), repository.place(case, view)
+    found = repository.case(case)
     images = {size: repository.arrays(f"bmode/{size}", case, view, "image")["image"] for size in repository.sizes}
-    labels = {size: repository.read(f"truth/{size}/labels", *place, 0) for size in repository.sizes}
+    labels = {size: repository.read(f"truth/{size}/labels", case, view, 0) for size in repository.sizes}
     inside = unpack(labels[repository.sizes[0]])["mask"][grid_pixels(found.config)]
     return {size: make_clip(found, view, images[size], labels[size], inside) for size in repository.sizes}
 

@@ -1,7 +1,7 @@
 """Metrics of all clips of a repository by every tracker, as tables.
 
-They are made when they are read, from the displacement, the quality and the strain that are stored: a repository of an
-earlier version has them too, and one that is not finished has those of its finished clips.
+They are made when they are read, from the displacement, the quality and the strain that are stored: a repository that
+is not finished has those of its finished clips.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.cases import Case, diagnosis
+from echotruth.cases.labels import heart_of, label_text
 from echotruth.evaluation import point_tracks, reliability, segment_strain
 from echotruth.evaluation.agreement import REFERENCES
 from echotruth.evaluation.courses import rate, systolic_rate
 from echotruth.evaluation.curves import REFERENCE
-from echotruth.evaluation.hearts import hearts_of, label_text
 from echotruth.evaluation.leaderboard import KEYS, SCORES, failures_of, scores_of_guests
 from echotruth.evaluation.scoring import metrics
 from echotruth.evaluation.segment_strain import Row
@@ -103,12 +103,11 @@ def clip_metrics(
     guests = scores_of_guests(repository)
     known = dict.fromkeys([*repository.trackers, *guests["tracker"].unique()])
     chosen_trackers = chosen("tracker", trackers, known)
-    hearts = hearts_of(repository.every)
     found: tuple[list[Row], list[Row], list[Row]] = ([], [], [])
     for case, complete in repository.finished(cases, views, "tracking"):
         for view in complete:
             keys: Row = {"case": case.id, "view": view, "plane": case.config.views[view].plane}
-            keys |= _sorts(case, hearts[case.id])
+            keys |= _sorts(case)
             for rows in _of_view(repository, case.id, view, chosen_sizes, chosen_trackers, guests):
                 for table, more in zip(found, rows, strict=True):
                     table += [keys | row for row in more]
@@ -134,7 +133,7 @@ def clip_truth(repository: Repository, case: str, view: str) -> ClipTruth:
     unit, plane = config.bmode.si().field_of_view / point_tracks.SIDE, config.views[view].plane
     stored = estimates.true(repository, case, view, "true_displacement", *(f"true_{name}" for name in COURSES))
     # Only those of frame 0, of which each frame is a chunk.
-    at_ed = unpack(repository.read(f"truth/{config.bmode.sizes[0]}/labels", *repository.place(case, view), 0))
+    at_ed = unpack(repository.read(f"truth/{config.bmode.sizes[0]}/labels", case, view, 0))
     tissue = {name: values[grid_pixels(config)] for name, values in at_ed.items()}
     inside = np.asarray(tissue["mask"], bool) & np.isfinite(stored["true_displacement"]).all((0, -1))
     displacement = stored["true_displacement"][:, inside].astype(float)
@@ -149,7 +148,7 @@ def clip_truth(repository: Repository, case: str, view: str) -> ClipTruth:
         tissue=segment_strain.Tissue(**named, layers=config.fibres.layers),
         plane=plane,
         time=read_loop(config.loop).time,
-        es=int(repository.arrays("mechanics", case, None, "es_frame")["es_frame"]),
+        es=int(repository.read("mechanics/es_frame", case)),
         curves={"segment_strain": segments, "line_strain": stored["true_line_strain"].astype(float)},
     )
 
@@ -196,9 +195,6 @@ def _of_view(
     stored = [name for name in repository.trackers if name in trackers]
     names = ("displacement", "quality", *SCORES, *(f"tracked_{name}" for name in COURSES))
     for size, tracker, found in estimates.each(repository, case, view, sizes, stored, *names):
-        # One from outside may have been evaluated at other sizes only.
-        if tracker not in repository.config.tracking.trackers and not np.isfinite(found["nrmse_all"]).any():
-            continue
         keys: Row = {"size_px": size, "tracker": tracker}
         of_guest = told.pop((size, tracker), {})
         reason = failures.get((tracker, size), str(of_guest.get("failure", "")))
@@ -259,10 +255,10 @@ def _truth_metrics(truth: ClipTruth) -> Row:
     return {"points": len(elevation), "through_plane_rms_um": rms}
 
 
-def _sorts(case: Case, heart: str) -> Row:
+def _sorts(case: Case) -> Row:
     """Labels of a case as text, its heart, and its diagnosis."""
     return {
         **{name: label_text(case.labels.get(name)) for name in SORTS},
-        "heart": heart,
+        "heart": heart_of(case),
         "diagnosis": diagnosis(case.config),
     }

@@ -37,7 +37,7 @@ def strain_curves(
     values |= estimates.true(repository, case, view, *(f"true_{name}" for name in NAMES))
     for name in ("true_region_strain", "true_segment_strain"):
         values[name] = values[name][REFERENCES.index(reference)]
-    es, time = int(repository.arrays("mechanics", case, None, "es_frame")["es_frame"]), read_loop(config.loop).time
+    es, time = int(repository.read("mechanics/es_frame", case)), read_loop(config.loop).time
     return _dataset(values, time, config).assign_attrs(
         case=case,
         view=view,
@@ -113,7 +113,7 @@ def twist_curves(repository: Repository, case: str, tracker: str, size: int | No
     if views is None:
         raise ValueError("Twist needs two short-axis views at different positions, and the repository has not.")
     base, apex = (strain_curves(repository, case, view, tracker, size) for view in views)
-    return twist_of(base, apex, repository.arrays("physiology", case, None, "twist")["twist"])
+    return twist_of(base, apex, repository.read("physiology/twist", case))
 
 
 def twist_of(base: xr.Dataset, apex: xr.Dataset, heart_twist: np.ndarray | None = None) -> xr.Dataset:
@@ -142,13 +142,11 @@ def twist_of(base: xr.Dataset, apex: xr.Dataset, heart_twist: np.ndarray | None 
 
 def _dataset(values: dict[str, np.ndarray], time: np.ndarray, config: Config) -> xr.Dataset:
     """Arrays of one clip and their rates, with dimensions, coordinates and units."""
-    arrays = {
-        array.name: array for array in (*schema.named("evaluation/SIZE"), *schema.named("evaluation/SIZE/TRACKER"))
-    }
+    arrays = schema.arrays_of("tracking/SIZE")
     found: dict[str, tuple[list[str], np.ndarray, dict[str, str]]] = {}
     for name, value in values.items():
         array = arrays[name]
-        dims = [dim for dim in array.dims if dim not in ("case", "view", "size", "tracker", "reference")]
+        dims = [dim for dim in array.dims if dim not in ("tracker", "reference")]
         order = ["frame", *(dim for dim in dims if dim != "frame")]
         curve = np.asarray(value, float).transpose([dims.index(dim) for dim in order])
         found[name] = (order, curve, {"units": array.units, "long_name": array.long_name})

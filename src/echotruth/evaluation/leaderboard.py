@@ -1,6 +1,6 @@
 """Leaderboard of trackers: means over the hearts of a repository, with bootstrap intervals, and ranks.
 
-Cases are hearts, unless they are said to be of one: the heart then has the mean over the clips of all of them.
+Of several cases of one heart, the heart has the mean over the clips of all of them.
 
 Trackers are ranked by `nrmse_all_percent`, in which a point without an estimate counts as one that did not move: a
 tracker gains nothing by leaving out difficult points, and one that fails has 100 %. Where every point has an estimate
@@ -19,10 +19,8 @@ import pandas as pd
 from echotruth.config.imaging import ALL_VIEWS
 from echotruth.evaluation.resampling import draws, interval, means_of_hearts, percentiles, ranks
 from echotruth.evaluation.scoring import metrics
-from echotruth.repository import estimates
-from echotruth.repository.digest import digest
+from echotruth.repository import estimates, schema
 from echotruth.repository.reader import Repository
-from echotruth.repository.schema import PACKS
 from echotruth.tracking.external_program import in_one_line
 
 log = logging.getLogger("echotruth")
@@ -30,7 +28,11 @@ log = logging.getLogger("echotruth")
 KEYS = ("case", "view", "size_px", "tracker")
 """Columns that identify a row of :func:`rows`."""
 
-SCORES = next(pack.names for pack in PACKS["evaluation/SIZE/TRACKER"] if pack.array.name == "scores")
+SCORES = tuple(
+    name
+    for name, array in schema.arrays_of("tracking/SIZE").items()
+    if "tracker" in array.dims and "frame" not in array.dims
+)
 """Arrays from which the metrics are made."""
 
 HEART = "heart"
@@ -46,7 +48,7 @@ def rows(repository: Repository) -> pd.DataFrame:
     Parameters
     ----------
     repository : Repository
-        Its ledger says which tracker failed, its folder `external` holds scores of external trackers.
+        Its folder `external` holds scores of external trackers.
 
     Returns
     -------
@@ -66,7 +68,7 @@ def rows(repository: Repository) -> pd.DataFrame:
     clip, tables = ["case", "view", "size_px"], [builtin]
     known = pd.MultiIndex.from_frame(builtin[clip])
     for file in _files_of_guests(repository):
-        table = _external_rows(file, builtin.columns)
+        table = _external_rows(repository, file, builtin.columns)
         table = table[~table["tracker"].isin(builtin["tracker"]) & pd.MultiIndex.from_frame(table[clip]).isin(known)]
         tables += [table] if len(table) else []
     return pd.concat(tables, ignore_index=True)
@@ -141,8 +143,8 @@ def _table(clips: pd.DataFrame, clips_of: pd.Series, resamples: np.ndarray) -> p
 
 def failures_of(repository: Repository, case: str, view: str) -> dict[tuple[str, int], str]:
     """Why trackers of a repository failed on a view of a heart, by tracker and image size; others are not in it."""
-    records = {size: repository.record("tracking", case, view, size) for size in repository.sizes}
-    return {(name, size): why for size, found in records.items() for name, why in found.get("failures", {}).items()}
+    about = {size: repository.attributes(f"tracking/{size}", case, view) for size in repository.sizes}
+    return {(name, size): why for size, found in about.items() for name, why in found.get("failures", {}).items()}
 
 
 def _builtin_rows(repository: Repository, case: str, view: str) -> Iterator[dict]:
@@ -174,8 +176,14 @@ def scores_of_guests(repository: Repository) -> pd.DataFrame:
         If a table cannot be read or lacks a column.
     """
     files = [file for file in _files_of_guests(repository) if file.stem not in repository.config.tracking.trackers]
-    tables = [_external_rows(file, _columns(file)) for file in files]
+    tables = [_external_rows(repository, file, _columns(file)) for file in files]
     return pd.concat([pd.DataFrame(columns=[*KEYS, "failure"]), *(table for table in tables if len(table))])
+
+
+def is_current(repository: Repository, case: str, view: str, version: str) -> bool:
+    """Whether a clip is there in a version (:meth:`.Repository.version`)."""
+    known = case in repository.rows and view in repository.views
+    return known and repository.version(case, view) == version
 
 
 def _files_of_guests(repository: Repository) -> list[Path]:
@@ -192,7 +200,7 @@ def _columns(file: Path) -> pd.Index:
     return pd.Index([*KEYS, *(name for name in given if name not in (*KEYS, "failure")), "failure"])
 
 
-def _external_rows(file: Path, columns: pd.Index) -> pd.DataFrame:
+def _external_rows(repository: Repository, file: Path, columns: pd.Index) -> pd.DataFrame:
     """Scores of an external tracker, named by the file, on clips that have not changed since they were scored."""
     text = ("case", "view", "tracker", "failure", "clip")
     types = {name: str if name in text else float for name in (*columns, "clip")} | {"size_px": int}
@@ -206,8 +214,8 @@ def _external_rows(file: Path, columns: pd.Index) -> pd.DataFrame:
     if missing:
         raise ValueError(f"{file}: has no column {missing[0]}: evaluate that tracker again")
     clips = zip(table["case"], table["view"], table.get("clip", [""] * len(table)), strict=True)
-    current = np.array([clip == digest(file.parents[1], case, view) for case, view, clip in clips], bool)
+    current = np.array([is_current(repository, *one) for one in clips], bool)
     if not current.all():
-        older = f"{(~current).sum()} of {len(current)} rows are of older images"
+        older = f"{(~current).sum()} of {len(current)} rows are of older images or other points"
         log.warning("external/%s: %s: evaluate that tracker again", file.name, older)
     return table[current].assign(tracker=file.stem)[list(columns)]

@@ -1,12 +1,12 @@
 """Evaluation of one tracker on the clips of a published repository, scored as the workflow scores its own trackers.
 
 The scores are written to `external/NAME.csv` in the folder of the repository, one row per clip, and, if asked for, the
-displacement and the curves to `external/NAME.zarr` (:mod:`echotruth.evaluation.kept`); nothing else changes.
+displacement and the curves to `external/NAME.zarr` (:mod:`echotruth.repository.estimates`); nothing else changes.
 """
 
 from __future__ import annotations
 
-import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,15 +17,18 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from echotruth import files
 from echotruth.config import shipped
 from echotruth.config.loading import validate
-from echotruth.evaluation import kept
 from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.scoring import Truth, metrics, read_truth, score
 from echotruth.evaluation.tracker_options import EvaluationError
+from echotruth.repository import estimates, group, metadata
 from echotruth.repository.choice import chosen
-from echotruth.repository.digest import digest
+from echotruth.repository.coordinates import coordinates_of
+from echotruth.repository.estimates import external_store
+from echotruth.repository.places import place
 from echotruth.section import Name, Section
 from echotruth.tracking.external_program import in_one_line
 from echotruth.tracking.failure import TrackerFailed
@@ -38,7 +41,7 @@ if TYPE_CHECKING:
     from echotruth.repository.reader import Repository
 
 Row = dict[str, Any]
-"""Case, view, size_px, tracker and digest (`clip`) of a clip, its metrics, and why the tracker failed (or "")."""
+"""Case, view, size_px, tracker and version (`clip`) of a clip, its metrics, and why the tracker failed (or "")."""
 
 
 @dataclass(frozen=True)
@@ -106,12 +109,8 @@ class EvaluationRun:
             If `jobs` is less than 1, or the tracker ends its process without an exception.
         """
         ended = f"{self.name} ended its process and cannot be scored: run it as a program, with --command"
-        try:
-            for rows in in_processes(partial(_score_view, self, sizes), case_views, jobs, ended):
-                yield from rows
-        except BaseException:  # also when nobody asks for the rest of the rows
-            self.keeping.discard()
-            raise
+        for rows in in_processes(partial(_score_view, self, sizes), case_views, jobs, ended):
+            yield from rows
 
     def check_writable(self) -> None:
         """Make the folder of the scores, and the arrays to be kept; EvaluationError if they cannot be written there."""
@@ -121,35 +120,48 @@ class EvaluationRun:
             self.file.parent.mkdir(exist_ok=True)
             with TemporaryFile(dir=self.file.parent):
                 pass
+            shutil.rmtree(self._draft.parent, ignore_errors=True)  # of an evaluation that was broken off
             if self.keep:
-                self.keeping.begin()
+                about = {"settings": self.settings.model_dump(mode="json")}
+                metadata.write(self._draft, about, consolidated=False)
 
     def write(self, rows: list[Row]) -> pd.DataFrame:
-        """Write the scores atomically, and give what is kept its name; they replace earlier ones of the same name.
+        """Write the scores, and move the motion that is kept beside them; they replace earlier ones of the same name.
 
-        What an earlier evaluation of this name kept is removed also if nothing is kept now, and so are its
-        scores on variants of the clips, NAME.*.json (benchmarks/suite/results.py): they are not of what was scored.
+        Scores of an earlier evaluation on variants of the clips, NAME.*.json (benchmarks/suite/results.py), are
+        removed: they are not of what was scored.
         """
         import pandas as pd
 
         table = pd.DataFrame(rows)
-        draft = self.file.with_name(f".{self.file.name}.{os.getpid()}")
         with self._writing():
-            table.to_csv(draft, index=False)
-            if self.keep:
-                clips = {f"{row['case']}/{row['view']}": row["clip"] for row in rows}
-                self.keeping.publish(clips, self.settings.model_dump(mode="json"))
-            else:
-                kept.remove(self.repository.folder, self.name)
             for earlier in self.file.parent.glob(f"{self.name}.*.json"):
                 earlier.unlink()
-            draft.replace(self.file)
+            shutil.rmtree(store := external_store(self.repository.folder, self.name), ignore_errors=True)
+            if self.keep:
+                self._draft.replace(store)
+            shutil.rmtree(self._draft.parent, ignore_errors=True)
+            files.write(self.file, table.to_csv(index=False).encode())
         return table
 
+    def keep_found(self, case_view: tuple[str, str], found: dict[int, dict[str, np.ndarray]]) -> None:
+        """Store what the tracker found in the clips of a view, by image size."""
+        case, about = self.repository.case(case_view[0]), {"clip": self.repository.version(*case_view)}
+        groups = {}
+        for size, arrays in found.items():
+            name = f"tracking/{size}"
+            values = {key: value[None] for key, value in arrays.items() if key in estimates.names_of_trackers()}
+            coordinates = coordinates_of(name, case.config) | {"tracker": [self.name]}
+            groups[place(name, case.heart, *case_view)] = partial(
+                group.write, group=name, values=values, coordinates=coordinates, config=case.config, attributes=about
+            )
+        with self._writing():
+            group.write_groups(self._draft, groups)
+
     @property
-    def keeping(self) -> kept.Keeping:
-        """Store of what the tracker finds, in the making."""
-        return kept.Keeping(self.repository.folder, self.repository.config, self.name)
+    def _draft(self) -> Path:
+        """Store of what is kept until the evaluation is at its end, alone in a folder that no reader looks into."""
+        return self.file.parent / f".{self.name}" / f"{self.name}.zarr"
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -208,11 +220,7 @@ def _score_view(run: EvaluationRun, sizes: list[int], case_view: tuple[str, str]
             truth = read_truth(run.repository, *case_view)
         found = {size: _score_clip(run, case_view, clip_of_size[size], truth, *tracked[size]) for size in tracked}
         if run.keep:
-            try:
-                arrays = {size: arrays for size, (_, arrays) in found.items()}
-                run.keeping.write(run.repository.place(*case_view), arrays)
-            except OSError as error:
-                raise EvaluationError(f"{run.file.parent} cannot hold the displacement: {error.strerror}") from error
+            run.keep_found(case_view, {size: arrays for size, (_, arrays) in found.items()})
         return [row for row, _ in found.values()]
 
 
@@ -221,7 +229,7 @@ def _reading(run: EvaluationRun, case_view: tuple[str, str]) -> Iterator[None]:
     """EvaluationError if a clip or its truth cannot be read."""
     try:
         yield
-    except (ValueError, KeyError, OSError) as error:
+    except Exception as error:  # Zarr raises many kinds of what is damaged
         remedy = f"run it again ({in_one_line(str(error))})"
         raise EvaluationError(f"{run.repository.folder} cannot be read at {' '.join(case_view)}: {remedy}") from error
 
@@ -241,14 +249,14 @@ def _score_clip(
     truth: Truth,
     estimate: tuple[np.ndarray, np.ndarray],
     failure: str,
-) -> tuple[Row, kept.Found]:
-    """Row of a clip, and the arrays of the tracker by group."""
+) -> tuple[Row, dict[str, np.ndarray]]:
+    """Row of a clip, and the arrays of the tracker."""
     keys = {"case": case_view[0], "view": case_view[1], "size_px": clip.size, "tracker": run.name}
-    keys["clip"] = digest(run.repository.folder, *case_view)
+    keys["clip"] = run.repository.version(*case_view)
     displacement, quality = clip.on_grid(*estimate)
     scored = score(displacement, truth)
     row = keys | metrics(scored, truth.wall.plane) | {"failure": failure}
-    return row, {"tracking": {"displacement": displacement, "quality": quality}, "evaluation": scored}
+    return row, {"displacement": displacement, "quality": quality} | scored
 
 
 def format_row(row: Row) -> str:

@@ -4,6 +4,8 @@ The formulas stand in :mod:`.displacement_error` (NRMSE and others), :mod:`.agre
 :mod:`.contours` (strain and rotation over the cycle) and :mod:`.statistics`.
 """
 
+import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,6 +14,7 @@ import numpy as np
 from echotruth.config import Config
 from echotruth.evaluation import statistics
 from echotruth.evaluation.agreement import REFERENCES, compare
+from echotruth.evaluation.clip import Clip
 from echotruth.evaluation.contours import Contours, contours
 from echotruth.evaluation.courses import motion_courses, peak, strain_courses
 from echotruth.evaluation.displacement_error import WallPoints, evaluate
@@ -24,7 +27,12 @@ from echotruth.loop.cycle import read_loop
 from echotruth.repository import rounding, schema
 from echotruth.repository.reader import Repository
 from echotruth.repository.rounding import length_quantum
+from echotruth.section import Section
+from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.point_grid import grid_positions
+from echotruth.tracking.tracker import track
+
+log = logging.getLogger("echotruth")
 
 DISTANCE_ROUNDING = 1e-9
 """Standard deviation of distances that rounding can cause if they are not rounded to a quantum, m: that of a motion of
@@ -82,7 +90,7 @@ class Truth:
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """Arrays of the truth in the group `evaluation` of the store, on the grid."""
+        """Arrays of the truth in the group `tracking`, on the grid."""
         operator = compare(self.strain[-1], self.strain, self.wall, self.es)
         return {
             "true_displacement": self.on_grid(np.dstack([self.displacement, self.through_plane]), 1),
@@ -192,6 +200,38 @@ def score(tracked: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
         "through_plane_correlation": correlation[0, 0],
         **curves(displacement, strain, truth),
     }
+
+
+def scored(clip: Clip, truth: Truth, trackers: Mapping[str, Section]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Track a clip with every tracker, and compare what each finds with the truth.
+
+    Parameters
+    ----------
+    clip : Clip
+    truth : Truth
+        True motion in the same view.
+    trackers : mapping
+        Name -> settings.
+
+    Returns
+    -------
+    arrays : dict of ndarray
+        displacement (tracker, frame, grid rows, grid columns, 2), m, quality (tracker, frame, grid rows, grid columns),
+        and the results of :func:`score` with a leading dimension of the trackers.
+    failures : dict
+        Tracker -> why it found nothing.
+    """
+    found: list[dict[str, np.ndarray]] = []
+    failures: dict[str, str] = {}
+    for name, settings in trackers.items():
+        log.info("%s", name)
+        try:
+            motion = clip.on_grid(*track(*clip.tracker_arguments, settings))
+        except TrackerFailed as error:
+            log.warning("%s: %s", name, error)
+            failures[name], motion = str(error), clip.on_grid(*clip.no_estimate)
+        found.append({"displacement": motion[0], "quality": motion[1]} | score(motion[0], truth))
+    return {name: np.stack([one[name] for one in found]) for name in found[0]}, failures
 
 
 def curves(displacement: np.ndarray, strain: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:

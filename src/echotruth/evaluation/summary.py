@@ -16,7 +16,7 @@ from echotruth.evaluation.leaderboard import failures_of
 from echotruth.evaluation.no_estimate import reason
 from echotruth.evaluation.segment_strain import Row
 from echotruth.repository.choice import Names, Sizes, chosen, image_size
-from echotruth.repository.kept import NotEvaluated
+from echotruth.repository.estimates import NotEvaluated
 from echotruth.repository.reader import Repository
 
 

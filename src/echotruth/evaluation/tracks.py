@@ -11,7 +11,7 @@ from echotruth.imaging.labels import unpack
 from echotruth.repository import estimates
 from echotruth.repository.choice import chosen
 from echotruth.repository.datasets import dataset
-from echotruth.repository.kept import NotEvaluated
+from echotruth.repository.estimates import NotEvaluated
 from echotruth.repository.reader import Repository
 from echotruth.tracking.point_grid import grid_pixels, grid_positions
 
@@ -35,13 +35,13 @@ def tracks(
     true = estimates.true(repository, case, view, "true_displacement", "true_strain", "wall_axes")
     strain, tracked = _strain(true.pop("wall_axes"), grid, found.config), {}
     for name, arrays in values.items():
-        tracked[name] = dataset(found, {"tracking/SIZE/TRACKER": arrays}, points)
+        tracked[name] = dataset(found, {"tracking/SIZE": arrays}, points)
         tracked[name]["strain"] = (_STRAIN, strain(arrays["displacement"]), _ABOUT)
     # As trackers find them, the points are pixel centres of the largest image.
-    labels = unpack(repository.read(f"truth/{repository.sizes[0]}/labels", *repository.place(case, view), 0))
+    labels = unpack(repository.read(f"truth/{repository.sizes[0]}/labels", case, view, 0))
     at_points = {name: (_STRAIN[1:3], labels[name][grid_pixels(found.config)], _ABOUT) for name in ("layer", "segment")}
     together = xr.concat(list(tracked.values()), xr.Variable("tracker", list(tracked)), combine_attrs="override")
-    truth = dataset(found, {"evaluation/SIZE": true}, points)
+    truth = dataset(found, {"tracking/SIZE": true}, points)
     return together.assign(truth.data_vars).assign(at_points).assign_attrs(case=case, view=view, size_px=size)
 
 

@@ -73,7 +73,7 @@ class Acquisition:
     def _signal_to_unit_noise(self) -> float:
         """RMS of the echo of muscle over that of unit noise, in the lines where muscle is at end-diastole."""
         scanner = self._scanner
-        muscle = self._medium.in_wall(0, *sample_positions(scanner.scan, scanner.range))
+        muscle = self._medium.wall.contains(0, *sample_positions(scanner.scan, scanner.range))
         if not muscle.any():
             raise ValueError("There is no muscle in the image at end-diastole, so realism.noise.snr_dB has no meaning.")
         echo, noise = scanner.lines(*self._medium.wall(0)), scanner.beamform(self.unit_noise(0))

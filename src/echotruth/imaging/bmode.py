@@ -6,7 +6,6 @@ images comes last, before they are rounded to eight bits: persistence, smoothing
 """
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 from echotruth.config import Bmode, Probe
 from echotruth.imaging import spline
@@ -219,6 +218,8 @@ def enhance_edges(level: np.ndarray, inside: np.ndarray, amount: float, width_px
 
 def _detail(level: np.ndarray, inside: np.ndarray, width_px: float) -> np.ndarray:
     """Difference of an image from its Gaussian mean over the pixels of the scan; parameters as of :func:`smooth`."""
+    from scipy.ndimage import gaussian_filter  # takes longer to import than all else here
+
     weight = gaussian_filter(inside.astype(level.dtype), width_px)
     return level - gaussian_filter(np.where(inside, level, 0), width_px) / np.where(inside, weight, 1)
 

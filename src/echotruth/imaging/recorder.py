@@ -5,6 +5,7 @@ diverging transmit would have recorded: the sum of its elements' channels, delay
 than 64 focused transmits.
 """
 
+from math import ceil, log2
 from typing import Any
 
 import numpy as np
@@ -30,29 +31,42 @@ class RfRecorder:
 
     Parameters
     ----------
-    keep : list of str
-        Value of `rf.keep`.
-    matrix : FullMatrix
+    config : Config
+    scanner : Scanner
     frames : int
+
+    Attributes
+    ----------
+    arrays : dict of ndarray
+        Channels, if `rf.keep` has them, and how the RF was made: coordinates and transmitted waves.
+    settings : dict
+        All else that is needed to focus it again, in SI units.
     """
 
-    def __init__(self, keep: list[str], matrix: FullMatrix, frames: int) -> None:
-        elements = len(matrix.centres)
-        self._matrix, self._keep_lines, self._arrays = matrix, "lines" in keep, Arrays()
-        if "channels" in keep:
+    def __init__(self, config: Config, scanner: Scanner, frames: int) -> None:
+        self._matrix = scanner.matrix
+        self.arrays, self.settings = metadata(config, scanner)
+        if "channels" in config.rf.keep:
+            elements = len(scanner.matrix.centres)
+            shape = (frames, elements, elements, decimated_samples(scanner.matrix))
             # Integers, because all frames stay in memory until the job writes them together.
-            self._arrays["channels"] = np.zeros((frames, elements, elements, decimated_samples(matrix)), np.int16)
-            self._arrays["channels_step"] = np.zeros(frames)
+            self.arrays |= {"channels": np.zeros(shape, np.int16), "channels_step": np.zeros(frames)}
 
     def add(self, frame: int, matrix: NDArray[np.complex64]) -> None:
         """Record the channels of a frame, from its full matrix (bins, receivers, transmitters)."""
-        if "channels" in self._arrays:
+        if "channels" in self.arrays:
             numbers, step = quantise(channels(self._matrix, matrix))
-            self._arrays["channels"][frame], self._arrays["channels_step"][frame] = numbers, step
+            self.arrays["channels"][frame], self.arrays["channels_step"][frame] = numbers, step
 
-    def finish(self, lines: NDArray[np.complex64]) -> Arrays:
-        """All arrays that were recorded, with the lines (frames, lines, ranges) if they are to be kept."""
-        return ({"lines": lines} if self._keep_lines else {}) | self._arrays
+
+def sixteen_bit(lines: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    """Lines of any shape, rounded to 16 bits: both parts are multiples of a power of two, 2^15 of which hold them all.
+
+    The bits below are zero, and so take next to no place once they are compressed.
+    """
+    largest = float(np.abs(lines.view(np.float32)).max(initial=0))
+    step = np.float32(2.0 ** ceil(log2(largest / 2**15))) if largest else np.float32(1)
+    return (np.rint(lines.view(np.float32) / step) * step + np.float32(0)).view(np.complex64)
 
 
 def decimated_samples(full: FullMatrix) -> int:
@@ -92,7 +106,7 @@ def quantise(echoes: NDArray[np.float32]) -> tuple[NDArray[np.int16], float]:
     return np.rint(echoes / np.float32(step)).astype(np.int16), step
 
 
-def metadata(config: Config, scanner: Scanner) -> tuple[Arrays, dict[str, int], dict[str, Any]]:
+def metadata(config: Config, scanner: Scanner) -> tuple[Arrays, dict[str, Any]]:
     """Describe how the RF was made: all that is needed to focus it again.
 
     Parameters
@@ -104,8 +118,8 @@ def metadata(config: Config, scanner: Scanner) -> tuple[Arrays, dict[str, int], 
 
     Returns
     -------
-    arrays, sizes, attributes : dict
-        The group `rf` of the repository: coordinates and transmits, lengths of dimensions, settings in SI units.
+    arrays, attributes : dict
+        The group `rf` of the repository: coordinates and transmits, settings in SI units.
     """
     scan, matrix = scanner.scan, scanner.matrix
     waves = TRANSMIT_SEQUENCES[config.rf.transmit](config.probe, config.rf, scan)
@@ -114,14 +128,13 @@ def metadata(config: Config, scanner: Scanner) -> tuple[Arrays, dict[str, int], 
     arrays |= dict.fromkeys(("element", "transmitter", "receiver"), matrix.centres)
     sampling = matrix.sampling * decimated_samples(matrix) / matrix.samples
     arrays["sample"] = np.arange(decimated_samples(matrix)) / sampling
-    sizes = {"line": len(scan.angle), "transmit": len(waves.delay)}
     settings = _settings(config) | {
         "sampling_frequency": float(sampling),
         "demodulation_frequency": scanner.frequency,
         "foci": waves.foci.tolist(),
         "accuracy_from": matrix.accurate_from,
     }
-    return arrays, sizes, settings
+    return arrays, settings
 
 
 def _settings(config: Config) -> dict[str, Any]:

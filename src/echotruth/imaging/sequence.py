@@ -10,7 +10,8 @@ from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.acquisition import Acquisition
 from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
-from echotruth.imaging.medium.medium import Arrays, Medium, seed_medium
+from echotruth.imaging.medium.body import Arrays, Scene
+from echotruth.imaging.medium.medium import Medium, seed_medium
 from echotruth.imaging.medium.random_process import Random
 from echotruth.imaging.recorder import RfRecorder
 from echotruth.imaging.view import Plane
@@ -40,21 +41,20 @@ class Sequence:
     """
 
     def __init__(self, config: Config, heart: Heart, plane: Plane, random: Random, time: Floats | None = None) -> None:
-        self._config, self._heart, self._plane, self._random = config, heart, plane, random
-        self._time = read_loop(config.loop).time if time is None else time
+        self._scene = Scene(config, heart, plane, random, read_loop(config.loop).time if time is None else time)
         self.scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
 
     def scatterers(self) -> Arrays:
         """Draw the scatterers of the view; see :func:`echotruth.imaging.medium.medium.seed_medium`."""
-        return seed_medium(self._config, self._heart, self._plane, self._random, self.scanner.matrix.in_beam)
+        return seed_medium(self._scene, self.scanner.matrix.in_beam)
 
     def acquisition(self, scatterers: Arrays) -> Acquisition:
         """Return what makes the full matrix of any frame."""
-        return Acquisition(self._config, self.scanner, self.medium(scatterers), self._random)
+        return Acquisition(self._scene.config, self.scanner, self.medium(scatterers), self._scene.random)
 
     def medium(self, scatterers: Arrays) -> Medium:
         """Return the scatterers of any frame."""
-        return Medium(self._config, self._heart, self._plane, time=self._time, seeded=scatterers, random=self._random)
+        return Medium(self._scene, scatterers)
 
     def lines(self, scatterers: Arrays, recorder: RfRecorder | None = None) -> NDArray[np.complex64]:
         """Image all frames.
@@ -71,7 +71,7 @@ class Sequence:
         ndarray of shape (frame, lines, ranges), complex64
             Demodulated lines, as of :meth:`echotruth.imaging.beamforming.scanner.Scanner.lines`.
         """
-        acquire, frames, lines = self.acquisition(scatterers), len(self._heart.displacement), []
+        acquire, frames, lines = self.acquisition(scatterers), len(self._scene.heart.displacement), []
         for frame in range(frames):
             # The matrix has no name here, so that its memory is free for beamforming.
             lines.append(self.scanner.beamform(_recorded(acquire(frame), frame, recorder)))

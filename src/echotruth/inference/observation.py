@@ -12,14 +12,13 @@ import xarray as xr
 from echotruth.aha import APEX_SEGMENT
 from echotruth.arrays import Floats
 from echotruth.cases import Case
-from echotruth.evaluation.hearts import label_text
+from echotruth.cases.labels import heart_of
 from echotruth.evaluation.segment_strain import SHOWN
 from echotruth.inference import tracker_errors
 from echotruth.inference.imaged_wall import ROTATION, quantity
 from echotruth.inference.tracker_errors import TrackerError
-from echotruth.repository import settings
 from echotruth.repository.choice import image_size
-from echotruth.repository.kept import NotEvaluated
+from echotruth.repository.estimates import NotEvaluated
 from echotruth.repository.reader import Repository
 
 FOLLOWED = 0.5
@@ -115,8 +114,8 @@ def observe(
 
 
 def heart_name(repository: Repository, case: Case) -> str:
-    """Name of the heart of a case that no other repository has; cases of one motion are of one heart."""
-    return f"{repository.config.name}/{label_text(case.labels.get('heart')) or settings.mechanics(case.config)}"
+    """Name of the heart of a case that no other repository has."""
+    return f"{repository.config.name}/{heart_of(case)}"
 
 
 def seen_of(repository: Repository, case: Case, tracker: str, size: int) -> Iterator[Seen]:

@@ -44,11 +44,8 @@ class Clips(Items):
         for name in self.names:
             if name not in TRUTH:
                 raise ValueError(f"truth = {name!r}: use any of {', '.join(TRUTH)}.")
+        self.stages = ("bmode", "truth") if self.names else ("bmode",)
         super().__init__(repository, cases, views, size)
-
-    @property
-    def arrays(self) -> tuple[str, ...]:
-        return (*super().arrays, *(f"truth/{self.size}/{name}" for name in self.names))
 
     def item(self, place: Place, within: int) -> Item:
         found = {name: self.truth(place, name) for name in self.names}

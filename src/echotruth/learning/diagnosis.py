@@ -7,7 +7,6 @@ import numpy as np
 
 from echotruth.learning.items import Item, Items, Place
 from echotruth.learning.measurements import scar_size
-from echotruth.learning.table import cases as read_cases
 from echotruth.repository.choice import Names
 
 
@@ -39,6 +38,8 @@ class Diagnosis(Items):
     (['healthy'], 0)
     """
 
+    stages = ("bmode",)
+
     def __init__(
         self,
         repository: str | Path,
@@ -48,24 +49,25 @@ class Diagnosis(Items):
         classes: Names = None,
     ) -> None:
         super().__init__(repository, cases, views, size)
-        known = read_cases(repository, measurements=False)["diagnosis"]
+        known = self.repository.distinctions["diagnosis"]
         found = sorted(set(known) - {""}, key=lambda name: (name != "healthy", name))
         self.classes = found if classes is None else list(classes)
-        self._scar_sizes: dict[int, np.float32] = {}
-        self._diagnosis = {place.case: str(known[place.case]) for place in self.places}
+        self._scar_sizes: dict[str, np.float32] = {}
+        self._diagnosis = {case: str(known[case]) for case, _ in self.places}
         for case, name in self._diagnosis.items():
             if name not in self.classes:
                 raise ValueError(f"classes = {self.classes}: the diagnosis of {case} is {name}: add it, or omit it.")
 
     def item(self, place: Place, within: int) -> Item:
-        name = self._diagnosis[place.case]
-        if place.row not in self._scar_sizes:
-            self._scar_sizes[place.row] = np.float32(scar_size(self.repository, place.row))
+        case, _ = place
+        name = self._diagnosis[case]
+        if case not in self._scar_sizes:
+            self._scar_sizes[case] = np.float32(scar_size(self.repository, case))
         return {
             "image": self.image(place),
             "time": self.time(place),
-            "es_frame": int(self.repository.read("mechanics/es_frame", place.row)),
+            "es_frame": int(self.repository.read("mechanics/es_frame", case)),
             "diagnosis": name,
             "label": self.classes.index(name),
-            "scar_size": self._scar_sizes[place.row],
+            "scar_size": self._scar_sizes[case],
         }

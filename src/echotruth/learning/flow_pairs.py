@@ -1,10 +1,12 @@
 """Pairs of frames with the true motion between them."""
 
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from echotruth.arrays import Floats
+from echotruth.imaging.beamforming.scan import scan_lines
+from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.flow import STEPS, out_of_slice, slice_thickness
 from echotruth.learning.items import Item, Items, Place
 
@@ -39,9 +41,7 @@ class FlowPairs(Items):
     ((2, 128, 128), (2, 128, 128))
     """
 
-    @property
-    def arrays(self) -> tuple[str, ...]:
-        return (*super().arrays, f"truth/{self.size}/flow")
+    _slice: tuple[Any, Floats] = None, np.zeros(0)
 
     @property
     def per_clip(self) -> int:
@@ -64,14 +64,11 @@ class FlowPairs(Items):
         }
 
     def _thickness(self, place: Place) -> Floats:
-        """Thickness of the slice at every pixel, (axial, lateral), m."""
-        key = self.beams.key(place.case)
-        if key not in self._thicknesses:
-            axial, lateral = (self.repository.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
-            range_ = self.beams.range_(place.case, lateral, axial[:, None])
-            self._thicknesses[key] = slice_thickness(self.beams.config(place.case), range_)
-        return self._thicknesses[key]
-
-    @cached_property
-    def _thicknesses(self) -> dict[str, Floats]:
-        return {}
+        """Thickness of the slice at every pixel, (axial, lateral), m; that of the last beam is kept."""
+        config = self.repository.case(place[0]).config
+        beam = config.probe, config.rf, config.phantom.in_plane_only
+        if self._slice[0] != beam:
+            axial, lateral = pixel_centres(config.bmode, self.size)
+            _, range_ = scan_lines(config.probe, config.rf).to_scan_coordinates(lateral, axial[:, None])
+            self._slice = beam, slice_thickness(config, range_)
+        return self._slice[1]

@@ -2,36 +2,20 @@
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.learning.beams import Beams
 from echotruth.repository.choice import Names, image_size, require_known
 from echotruth.repository.reader import Repository
 
 Item = dict[str, Any]
 """Name -> array, number or text."""
 
-
-@dataclass(frozen=True)
-class Place:
-    """Where a clip is in the store.
-
-    Attributes
-    ----------
-    case, view : str
-    row, index : int
-        Row of the case, and index of the view.
-    """
-
-    case: str
-    view: str
-    row: int
-    index: int
+Place = tuple[str, str]
+"""Case and view of a clip."""
 
 
 class Items(Sequence[Item]):
@@ -67,9 +51,11 @@ class Items(Sequence[Item]):
     ['base', 'mid', 'apex', 'long_axis']
     """
 
+    stages: tuple[str, ...] = ("bmode", "truth")
+    """Stages of which the groups of a clip are read."""
+
     def __init__(self, repository: str | Path, cases: Any = None, views: Names = None, size: int | None = None) -> None:
         self.repository = Repository(repository)
-        self.beams = Beams(self.repository)
         config = self.repository.config
         self.size = image_size(config, size)
         self.frames = config.loop.frames
@@ -81,20 +67,15 @@ class Items(Sequence[Item]):
         self.places = self._places(ids, [require_known("view", name, list(config.views)) for name in names])
 
     def _places(self, cases: list[str], views: list[str]) -> list[Place]:
-        places = [Place(case, view, *self.repository.place(case, view)) for case in cases for view in views]
-        for place in places:
-            for path in self.arrays:
-                if not self.repository.is_written(path, place.case, place.view):
+        places = [(case, view) for case in cases for view in views]
+        for case, view in places:
+            for stage in self.stages:
+                if self.repository.attributes(f"{stage}/{self.size}", case, view).get("status") != "complete":
                     raise ValueError(
-                        f"{self.repository.location}: {place.case} has no {path} in the view {place.view}: "
+                        f"{self.repository.location}: {case} has no {stage}/{self.size} in the view {view}: "
                         "finish the run, or choose cases of status complete."
                     )
         return places
-
-    @property
-    def arrays(self) -> tuple[str, ...]:
-        """Paths of the arrays that an item is read from."""
-        return (f"bmode/{self.size}/image",)
 
     @property
     def per_clip(self) -> int:
@@ -116,8 +97,8 @@ class Items(Sequence[Item]):
         if not 0 <= number < len(self):
             raise IndexError(f"item {index} of {len(self)}")
         clip, within = divmod(number, self.per_clip)
-        place = self.places[clip]
-        return {"case": place.case, "view": place.view} | self.item(place, within)
+        case, view = place = self.places[clip]
+        return {"case": case, "view": view} | self.item(place, within)
 
     def __iter__(self) -> Iterator[Item]:
         return (self[number] for number in range(len(self)))
@@ -128,16 +109,16 @@ class Items(Sequence[Item]):
 
     def image(self, place: Place, frames: int | slice = slice(None)) -> NDArray[np.float32]:
         """Grey levels of one frame (axial, lateral) or several (frame, axial, lateral), from 0 to 1."""
-        grey = self.repository.read(f"bmode/{self.size}/image", place.row, place.index, frames)
+        grey = self.repository.read(f"bmode/{self.size}/image", *place, frames)
         return np.divide(grey, 255, dtype=np.float32)
 
     def truth(self, place: Place, name: str, *index: Any) -> NDArray[Any]:
         """Part of an array of the truth of a clip."""
-        return self.repository.read(f"truth/{self.size}/{name}", place.row, place.index, *index)
+        return self.repository.read(f"truth/{self.size}/{name}", *place, *index)
 
     def time(self, place: Place) -> NDArray[np.float32]:
         """Time of each frame since end-diastole, (frame,), s."""
-        return self.repository.read(f"bmode/{self.size}/time", place.row).astype(np.float32)
+        return self.repository.read(f"bmode/{self.size}/time", *place).astype(np.float32)
 
 
 def _listed(names: Any) -> list[str]:

@@ -2,6 +2,7 @@
 
 from echotruth.arrays import Floats
 from echotruth.fem.volume import cell_volumes
+from echotruth.repository.group import NotWritten
 from echotruth.repository.reader import Repository
 
 PHYSIOLOGY = (
@@ -13,39 +14,44 @@ INFARCT = 1
 """Region of an infarct in `pathology/region`."""
 
 
-def physiology(
-    repository: Repository, row: int | slice = slice(None), names: tuple[str, ...] = PHYSIOLOGY
-) -> dict[str, Floats]:
-    """Measured function of one heart, or of all of a repository.
+def measurements(repository: Repository, case: str) -> dict[str, Floats | float]:
+    """Measured function of a heart and its `scar_size`; nothing of one that was not solved."""
+    try:
+        return physiology(repository, case) | {"scar_size": scar_size(repository, case)}
+    except NotWritten:
+        return {}
+
+
+def physiology(repository: Repository, case: str, names: tuple[str, ...] = PHYSIOLOGY) -> dict[str, Floats]:
+    """Measured function of a heart.
 
     Parameters
     ----------
     repository : Repository
-    row : int or slice
-        Row of the case. Default: all.
+    case : str
     names : tuple of str
         Scalars of the group `physiology`.
 
     Returns
     -------
-    dict of ndarray of shape () or (case,)
-        By name, in the units of docs/schema.md; NaN for hearts that were not measured.
+    dict of ndarray of shape ()
+        By name, in the units of docs/schema.md.
     """
-    labels, packed = repository.labels("physiology/scalar"), repository.read("physiology/scalars", row)
-    return {name: packed[..., labels.index(name)] for name in names}
+    return repository.arrays("physiology", case, None, *names)
 
 
-def scar_size(repository: Repository, row: int) -> float:
+def scar_size(repository: Repository, case: str) -> float:
     """Fraction of the wall's volume, unloaded, that is infarcted; without the border zone.
 
     Parameters
     ----------
     repository : Repository
-    row : int
-        Row of the case, whose mechanics were solved.
+    case : str
+        Of which the mechanics were solved.
     """
-    infarct = repository.read("pathology/region", row) == INFARCT
+    infarct = repository.arrays("pathology", case, None, "region")["region"] == INFARCT
     if not infarct.any():
         return 0.0
-    volume = cell_volumes(repository.read("geometry/node_position", row), repository.read("geometry/cell_node", row))
+    mesh = repository.arrays("geometry", case, None, "node_position", "cell_node")
+    volume = cell_volumes(mesh["node_position"], mesh["cell_node"])
     return float(volume[infarct].sum() / volume.sum())

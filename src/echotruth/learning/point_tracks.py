@@ -5,12 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
+from echotruth.heart import Heart
+from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.labels import LABELS
 from echotruth.imaging.tracks import follow, visible
-from echotruth.imaging.view import Plane
+from echotruth.imaging.view import imaging_plane
 from echotruth.learning.items import Item, Items, Place
 from echotruth.repository.choice import Names
 
@@ -64,46 +65,39 @@ class PointTracks(Items):
         if start is not None and not 0 <= start < self.frames:
             raise ValueError(f"start = {start}: give a frame from 0 to {self.frames - 1}.")
         self.points, self.start, self.seed = points, start, seed
-        self._heart: tuple[int, dict[str, NDArray[Any]]] = (-1, {})
+        self._heart: tuple[str, Heart] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_heart": (-1, {})}
-
-    @property
-    def arrays(self) -> tuple[str, ...]:
-        return (*super().arrays, f"truth/{self.size}/labels")
+        return self.__dict__ | {"_heart": None}
 
     def item(self, place: Place, within: int) -> Item:
-        name = sha256(f"{self.seed} {place.case} {place.view}".encode()).digest()
+        case, view = place
+        name = sha256(f"{self.seed} {case} {view}".encode()).digest()
         random = np.random.default_rng(np.frombuffer(name[:16], np.uint32))
         start = int(random.integers(self.frames)) if self.start is None else self.start
         wall = np.argwhere(self.truth(place, "labels", start, LABELS.index("layer")))
         pixels = wall[random.choice(len(wall), self.points, replace=len(wall) < self.points)]
-        axial, lateral = (self.repository.read(f"truth/{self.size}/{name}", ...) for name in ("axial", "lateral"))
+        axial, lateral = pixel_centres(self.repository.config.bmode, self.size)
         followed = self._followed(place, start, np.column_stack([lateral[pixels[:, 1]], axial[pixels[:, 0]]]))
         position = (followed[..., :2] - [lateral[0], axial[0]]) / self.spacing
-        range_ = self.beams.range_(place.case, followed[..., 0], followed[..., 1])
         return {
             "image": self.image(place),
             "time": self.time(place),
             "start": start,
             "position": position.astype(np.float32),
             "position_m": followed.astype(np.float32),
-            "visible": visible(self.beams.config(place.case), followed, self.beams.thickness(place.case, range_)),
+            "visible": visible(self.repository.case(case).config, followed),
         }
 
     def _followed(self, place: Place, start: int, points: Floats) -> Floats:
         """Positions of the tissue in all frames, (frame, point, 3), m, that is at points (n, 2) of the image in one."""
-        heart = self._motion(place.row)
-        positions = heart["node_position"] + heart["displacement"]
-        return follow(positions, heart["cell_node"], self._plane(place), points, start)
+        case, view = place
+        heart, config = self._heart_of(case), self.repository.case(case).config
+        plane = imaging_plane(config.views[view], config.rf, heart.endo_at_ed)
+        return follow(heart.nodes + heart.displacement, heart.cells, plane, points, start)
 
-    def _motion(self, row: int) -> dict[str, NDArray[Any]]:
-        """Mesh and motion of a heart; that of the last is kept, for its other views."""
-        if self._heart[0] != row:
-            paths = ("geometry/node_position", "geometry/cell_node", "mechanics/displacement")
-            self._heart = row, {path.rpartition("/")[2]: self.repository.read(path, row) for path in paths}
+    def _heart_of(self, case: str) -> Heart:
+        """A heart; the last is kept, for its other views."""
+        if self._heart is None or self._heart[0] != case:
+            self._heart = case, self.repository.heart(case)
         return self._heart[1]
-
-    def _plane(self, place: Place) -> Plane:
-        return Plane(*(self.repository.read(f"phantom/{name}", place.row, place.index) for name in ("origin", "axes")))

@@ -47,10 +47,6 @@ class Segmentation(Items):
         super().__init__(repository, cases, views, size)
 
     @property
-    def arrays(self) -> tuple[str, ...]:
-        return (*super().arrays, f"truth/{self.size}/{'tissue' if self.target == 'tissue' else 'labels'}")
-
-    @property
     def per_clip(self) -> int:
         return self.frames
 

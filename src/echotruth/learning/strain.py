@@ -30,13 +30,16 @@ class Strain(Items):
     (True, 6)
     """
 
+    stages = ("bmode",)
+
     def item(self, place: Place, within: int) -> Item:
+        case, _ = place
         kinematics = ("strain_mean", "layer_strain")
-        mean, layers = (self.repository.read(f"kinematics/{name}", place.row).astype(np.float32) for name in kinematics)
+        mean, layers = (self.repository.read(f"kinematics/{name}", case).astype(np.float32) for name in kinematics)
         return {
             "image": self.image(place),
             "time": self.time(place),
             "strain": mean,
             "layer_strain": layers,
-            "es_frame": int(self.repository.read("mechanics/es_frame", place.row)),
-        } | {name: np.float32(value) for name, value in physiology(self.repository, place.row, INDICES).items()}
+            "es_frame": int(self.repository.read("mechanics/es_frame", case)),
+        } | {name: np.float32(value) for name, value in physiology(self.repository, case, INDICES).items()}

@@ -1,16 +1,17 @@
 """Table of the cases of a repository, with what is known of each heart."""
 
 import re
+from concurrent.futures import ThreadPoolExecutor
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from echotruth.learning.measurements import physiology, scar_size
+from echotruth.learning.measurements import PHYSIOLOGY
+from echotruth.learning.measurements import measurements as measured
 from echotruth.repository.reader import Repository
-from echotruth.repository.table import constants, is_label
+from echotruth.repository.status import ALWAYS, is_label
 
 
 def cases(repository: str | Path, query: str | None = None, measurements: bool = True) -> pd.DataFrame:
@@ -30,8 +31,8 @@ def cases(repository: str | Path, query: str | None = None, measurements: bool =
     Returns
     -------
     DataFrame
-        A row a case, indexed by `case`: `status` (complete, implausible, failed, retired or unfinished), `reason`,
-        `heart` (the first case with the same motion: cases that differ only in speckle, array or image share one),
+        A row a case, indexed by `case`: `status` (complete, implausible, failed or unfinished), `reason`,
+        `heart` (its id: cases that differ only in speckle, array or image share one),
         `diagnosis` and `label.*`; measurements of the group physiology in its units (docs/schema.md), `scar_size`
         (fraction of the wall's volume that is infarcted), NaN where a heart was not solved; and the keys whose value
         differs among the cases.
@@ -54,28 +55,27 @@ def cases(repository: str | Path, query: str | None = None, measurements: bool =
     found = opened.cases
     if measurements:
         known = _measurements(opened, found)
-        first = ["status", "reason", "heart", *(name for name in found if is_label(name))]
+        first = [*ALWAYS, *filter(is_label, found)]
         found = found.join(known)[[*first, *known, *(name for name in found if name not in first)]]
-    return found if query is None else found.loc[_selected(found, constants(opened), query)]
+    return found if query is None else found.loc[_selected(found, opened.parameters, query)]
 
 
 def _measurements(repository: Repository, found: pd.DataFrame) -> pd.DataFrame:
-    known = pd.DataFrame(physiology(repository), index=found.index)
-    sizes = [
-        scar_size(repository, row) if repository.is_written("pathology/region", case) else np.nan
-        for row, case in enumerate(found.index)
-    ]
-    return known.assign(scar_size=sizes)
+    """Measurements of each case; a heart is read once, several at a time, since object storage is slow to answer."""
+    first = found.index.to_series().groupby(found["heart"]).first()
+    with ThreadPoolExecutor() as pool:
+        known = dict(zip(first.index, pool.map(partial(measured, repository), first), strict=True))
+    columns = [*PHYSIOLOGY, "scar_size"]
+    return pd.DataFrame([known[heart] for heart in found["heart"]], found.index, columns, dtype=float)
 
 
-def _selected(found: pd.DataFrame, constants: dict[str, Any], query: str) -> pd.Index:
+def _selected(found: pd.DataFrame, parameters: pd.DataFrame, query: str) -> pd.Index:
     """Cases for which a condition holds."""
-    same = pd.DataFrame({key: value for key, value in constants.items() if key not in found}, index=found.index)
+    known = found.join(parameters[[key for key in parameters if key not in found]])
     try:
-        return found.join(same).query(query).index
+        return known.query(query).index
     except Exception as error:  # pandas, its parser and its engine have many kinds
-        columns = [str(name) for name in (*found, *same)]
-        raise ValueError(f"query = {query!r}: {_reason(error, query, columns)}") from None
+        raise ValueError(f"query = {query!r}: {_reason(error, query, list(known))}") from None
 
 
 def _reason(error: Exception, query: str, columns: list[str]) -> str:

@@ -1,14 +1,20 @@
 """A recorded cycle, read from a CSV file whose columns have their units in their names."""
 
-import csv
+from __future__ import annotations
+
+import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.section import UNITS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COLUMNS = {
     "time": ("ms", "s"),
@@ -69,41 +75,48 @@ def read(path: Path, purpose: str, needed: tuple[str, ...], optional: tuple[str,
     LoopError
         If the file cannot be read, lacks a column or gives a quantity twice, or a cell is no number.
     """
-    header, rows = _table(_text(path))
-    names = {quantity: _column(path, header, quantity) for quantity in (*needed, *optional)}
+    table = _table(path)
+    names = {quantity: _column(path, list(table), quantity) for quantity in (*needed, *optional)}
     for quantity in needed:
         if not names[quantity]:
             choice = " or ".join(f"{quantity}_{unit}" for unit in COLUMNS[quantity])
             need = f"there is no column of the {quantity}, which {purpose} needs"
             raise LoopError(f"{path}: {need}; add one and name it {choice}.")
     names = {quantity: name for quantity, name in names.items() if name}
-    if len(rows) < _MIN_ROWS:
-        raise LoopError(f"{path}: there are {len(rows)} rows; a cycle needs {_MIN_ROWS} or more.")
+    if len(table) < _MIN_ROWS:
+        raise LoopError(f"{path}: there are {len(table)} rows; a cycle needs {_MIN_ROWS} or more.")
     columns = {
-        quantity: np.array([_number(f"{path}, line {line}", name, row.get(name, "")) for line, row in rows.items()])
+        quantity: np.array([_number(f"{path}, line {line}", name, cell) for line, cell in table[name].items()])
         for quantity, name in names.items()
     }
     return Recording(path, names, columns)
 
 
-def _table(text: list[str]) -> tuple[list[str], dict[int, dict[str, str]]]:
-    """Names of the columns, and number of each line with its cells by these names."""
-    lines = {i: line for i, line in enumerate(text, 1) if line.strip() and not line.startswith("#")}
-    delimiter = next((mark for mark in "\t;" if mark in next(iter(lines.values()), "")), ",")
-    cells = dict(zip(lines, csv.reader(lines.values(), delimiter=delimiter), strict=True))
-    cells = {i: [cell.strip() for cell in row] for i, row in cells.items()}
+def _table(path: Path) -> pd.DataFrame:
+    """Cells of the file by the names of its columns; the index is the number of each line."""
+    import pandas as pd
+
+    lines = {i: line for i, line in enumerate(_text(path), 1) if line.strip() and not line.startswith("#")}
+    if not lines:
+        raise LoopError(f"{path}: is empty; give a CSV file.")
+    separator = next((mark for mark in "\t;" if mark in next(iter(lines.values()))), ",")
+    columns = range(1 + max(line.count(separator) for line in lines.values()))
+    text = io.StringIO("\n".join(lines.values()))
+    try:
+        cells = pd.read_csv(text, sep=separator, header=None, names=columns, dtype=str, keep_default_na=False)
+    except pd.errors.ParserError as error:
+        raise LoopError(f"{path}: is no table ({error}); give a CSV file.") from None
+    cells = cells.set_axis(list(lines)[: len(cells)]).apply(lambda column: column.str.strip())
     # LabChart writes lines such as "ChannelTitle=", then rows of the time in seconds and the channels.
-    about = {row[0]: row[1:] for row in cells.values() if row and row[0].endswith("=")}
-    rows = {i: row for i, row in cells.items() if not (row and row[0].endswith("="))}
+    is_about = cells[0].str.endswith("=")
+    about, cells = cells[is_about].set_index(0).T, cells[~is_about]
     if "ChannelTitle=" in about:
-        units = [*about.get("UnitName=", []), *[""] * len(about["ChannelTitle="])]
-        header = ["time_s", *(f"{title} ({unit})" for title, unit in zip(about["ChannelTitle="], units, strict=False))]
+        header = ["time_s", *(about["ChannelTitle="] + " (" + about.get("UnitName=", "") + ")")]
     else:
-        header = rows.pop(min(rows)) if rows else []
-    header = [_standard_name(name) for name in header]
-    if delimiter != ",":
-        rows = {i: [cell.replace(",", ".") for cell in row] for i, row in rows.items()}
-    return header, {i: dict(zip(header, row, strict=False)) for i, row in rows.items()}
+        header, cells = cells[:1].squeeze("index"), cells[1:]
+    if separator != ",":
+        cells = cells.replace(",", ".", regex=True)
+    return cells.set_axis(map(_standard_name, header), axis="columns")
 
 
 def _standard_name(name: str) -> str:

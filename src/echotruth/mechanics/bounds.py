@@ -26,13 +26,18 @@ class Bound(NamedTuple):
         Values of the group `physiology`, or of a course that they leave out, in the unit of the key; the most extreme
         counts.
     healthy : bool
-        Whether it is that of healthy hearts alone; what could not be measured violates no such bound.
+        Whether it is that of healthy hearts alone.
     """
 
     key: str
     description: str
     value: Callable[[Mapping[str, ArrayLike]], ArrayLike]
     healthy: bool = False
+
+    @property
+    def may_lack(self) -> bool:
+        """Whether a heart may have no such measure, so that one that is not a number violates nothing."""
+        return any(name in self.key for name in ("_ivc_", "tei_index", "filling_ratio", "fibre_strain_spread"))
 
 
 def _at(measure: str, component: int | list[int]) -> Callable[[Mapping[str, ArrayLike]], ArrayLike]:
@@ -151,26 +156,20 @@ def bounded(measured: Mapping[str, ArrayLike], healthy: bool = True) -> dict[str
     Returns
     -------
     dict
-        Key of the section `physiology` -> the most extreme value; none of what could not be measured, and not a number
-        where there is no healthy bound to violate.
+        Key of the section `physiology` -> the most extreme value; none of what a heart may lack and this one does.
     """
     values = {}
     for bound in BOUNDS:
         found = np.atleast_1d(bound.value(measured)).astype(float)
-        if bound.healthy:
+        if bound.may_lack:
             found = found[np.isfinite(found)]
         if found.size and (healthy or not bound.healthy):
             values[bound.key] = float(np.max(found) if "_max" in bound.key else np.min(found))
     return values
 
 
-def violated_bound(measured: Mapping[str, ArrayLike], bounds: Physiology, healthy: bool = True) -> str:
-    """The first bound that a heart violates, in one sentence; empty where there is none; parameters as of `bounded`."""
-    return violation(bounded(measured, healthy), bounds)
-
-
 def violation(values: dict[str, float], bounds: Physiology) -> str:
-    """The first bound that values violate, in one sentence; empty where there is none.
+    """The first bound that values violate, in one sentence; empty where there is none. Not a number violates any.
 
     Parameters
     ----------
@@ -184,6 +183,6 @@ def violation(values: dict[str, float], bounds: Physiology) -> str:
             continue
         holds, rule = (le, "at most") if "_max" in bound.key else (ge, "at least")
         if not holds(values[bound.key], limit):
-            value = values[bound.key]
-            return f"{bound.description} is {value:.3g} and must be {rule} {limit:g} (physiology.{bound.key})."
+            value = "not a number" if np.isnan(values[bound.key]) else f"{values[bound.key]:.3g}"
+            return f"{bound.description} is {value} and must be {rule} {limit:g} (physiology.{bound.key})."
     return ""

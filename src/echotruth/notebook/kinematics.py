@@ -45,7 +45,7 @@ def kinematics(heart: Heart) -> xr.Dataset:
         raise ValueError("The heart has no fibres: make it by echotruth.beat, or read one of a Repository.")
     values = centroid_kinematics(heart) | fibre_angles(heart)
     variables = {
-        array.name: (array.dims[1:], values[array.name], {"units": array.units, "long_name": array.long_name})
+        array.name: (array.dims, values[array.name], {"units": array.units, "long_name": array.long_name})
         for array in schema.DERIVED
     }
     labels = {name: list(schema.LABELS[name]) for name in ("strain_component", "fibre_component")}

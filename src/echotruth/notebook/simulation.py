@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from echotruth.cases import Case
@@ -28,8 +27,8 @@ from echotruth.imaging.view import imaging_plane
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat as mechanics_beat
 from echotruth.mechanics.beat import simulate
-from echotruth.mechanics.bounds import violated_bound
-from echotruth.mechanics.physiology import measures
+from echotruth.mechanics.bounds import violation
+from echotruth.mechanics.physiology import measured_heart
 from echotruth.notebook.arguments import check_clip, check_heart, check_whole
 from echotruth.repository.choice import image_size
 from echotruth.repository.datasets import as_stored, case_of, clip_dataset, dataset, plane_of
@@ -83,12 +82,8 @@ def beat(config: Source = None, progress: bool = True, *, frames: Iterable[int] 
         arrays = simulate(settings) if frames is None else mechanics_beat(settings, list(frames))
     if frames is not None:
         return Heart.of(arrays, settings)
-    depth = arrays["fibres"]["wall_depth"]
-    arrays["physiology"] = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"], depth)
-    healthy = not arrays["pathology"]["region"].any()
-    judged: dict[str, ArrayLike] = {**arrays["physiology"], "active_tension": arrays["mechanics"]["active_tension"]}
-    reason = violated_bound(judged, settings.physiology, healthy)
-    if reason and settings.motion.kind == "beat":
+    arrays["physiology"], bounded = measured_heart(arrays, settings)
+    if reason := violation(bounded, settings.physiology):
         warnings.warn(f"implausible heart: {reason}", stacklevel=2)
     return Heart.of(arrays, settings)
 
@@ -262,7 +257,7 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
         warnings.warn(doubt, stacklevel=2)
     displacement, quality = arguments.on_grid(*found)
     coordinates = {"axial": clip["grid_axial"].values, "lateral": clip["grid_lateral"].values}
-    values = {"tracking/SIZE/TRACKER": {"displacement": displacement, "quality": quality}}
+    values = {"tracking/SIZE": {"displacement": displacement, "quality": quality}}
     return dataset(case, as_stored(case, values), coordinates).assign_attrs(clip.attrs, tracker=_name(tracker))
 
 

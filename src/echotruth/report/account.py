@@ -1,6 +1,6 @@
 """What a page tells of a repository: how much was made, what failed, and what the stages took."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -8,18 +8,14 @@ from typing import Any
 import pandas as pd
 
 from echotruth.config.imaging import ALL_VIEWS
+from echotruth.evaluation.leaderboard import failures_of
 from echotruth.evaluation.no_estimate import FAILED
-from echotruth.repository import inferred
-from echotruth.repository.benchmark_files import total
+from echotruth.repository import inferred, status
 from echotruth.repository.choice import image_size
-from echotruth.repository.ledger import STAGES, imaged_statuses, read
-from echotruth.repository.reader import Repository
+from echotruth.repository.reader import STAGES, Repository
 
 LISTED = 20
 """Largest number of failures of a kind that are listed."""
-
-SAMPLE = 500
-"""Records of a stage that are read for the versions of its code."""
 
 MAX_FILES = 200_000
 """Files up to which the size of a repository is measured."""
@@ -27,7 +23,7 @@ MAX_FILES = 200_000
 
 def imaged(repository: Repository) -> int:
     """Number of hearts of which there are images."""
-    wanted = imaged_statuses(repository.config.physiology.exclude_implausible)
+    wanted = status.imaged(repository.config.physiology.exclude_implausible)
     return int(repository.cases["status"].isin(wanted).sum())
 
 
@@ -39,7 +35,7 @@ def size_on_disk(store: Path) -> int:
 
 def failures(repository: Repository) -> dict[str, Any]:
     """Hearts that are not complete, and what trackers did not find, with the reasons."""
-    rows = repository.cases[~repository.cases["status"].isin(["complete", "retired"])]
+    rows = repository.cases[~repository.cases["status"].isin(["complete"])]
     lost = list(islice(_lost(repository), LISTED + 1))
     return {
         "cases": rows[["status", "reason"]].head(LISTED).reset_index().to_dict("records"),
@@ -96,20 +92,36 @@ def _not_estimated(repository: Repository) -> Iterator[dict[str, str]]:
 
 def _lost(repository: Repository) -> Iterator[dict[str, str]]:
     """Trackers without a result on a clip."""
-    for path in sorted((repository.folder / "ledger/tracking").glob("*/*/[!.]*.json")):
-        case, view, size = (*path.parts[-3:-1], path.stem)
-        if view in repository.config.views:
-            for tracker, reason in sorted(read(path).get("failures", {}).items()):
-                yield {"tracker": tracker, "clip": f"{case}, {view}, {size} px", "reason": str(reason)}
+    for case in repository.shown:
+        for view in repository.views:
+            for (tracker, size), reason in failures_of(repository, case, view).items():
+                yield {"tracker": tracker, "clip": f"{case}, {view}, {size} px", "reason": reason}
 
 
 def stages(folder: Path) -> list[dict[str, Any]]:
-    """What every stage took: its name, number of jobs, CPU time (s) and versions of the code."""
+    """What every stage took: its name, number of jobs and CPU time, s."""
     found = []
     for name in STAGES:
-        paths = sorted((folder / "ledger" / name).glob("**/[!.]*.json"))
-        if paths:
-            sample = paths[:: -(-len(paths) // SAMPLE)]
-            codes = sorted({str(read(path).get("code", "")) for path in sample})
-            found.append({"name": name, "jobs": len(paths), "cpu": total(folder, name), "codes": codes})
+        if files := list((folder / "benchmarks" / name).rglob("*.tsv")):
+            found.append({"name": name, "jobs": len(files), "cpu": float(took(files)["cpu_time"].sum())})
     return found
+
+
+def took(files: Iterable[Path]) -> pd.DataFrame:
+    """What jobs took, a row each, by the files that Snakemake's `benchmark` wrote.
+
+    The CPU time in them lacks the end of a job, because Snakemake looks every half second and later every half minute.
+    So the time itself counts where it is more: that of jobs of one thread.
+
+    Parameters
+    ----------
+    files : iterable of Path
+
+    Returns
+    -------
+    DataFrame
+        Columns `s`, seconds of the clock, `cpu_time`, s, and `max_rss`, MB.
+    """
+    tables = [pd.read_csv(file, sep="\t", na_values="-")[["s", "cpu_time", "max_rss"]] for file in files]
+    found = pd.concat(tables).apply(pd.to_numeric, errors="coerce")
+    return found.assign(cpu_time=found[["s", "cpu_time"]].max(axis=1))

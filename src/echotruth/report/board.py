@@ -28,7 +28,7 @@ def of(standings: pd.DataFrame, size: int, cases: int) -> dict[str, Any]:
     table = standings[(standings["view"] == ALL_VIEWS) & (standings["size_px"] == size)]
     table = table.sort_values("rank", kind="stable", na_position="last")
     hearts = int(table["hearts"].max())
-    of_cases = f" (label.heart) of the {cases} cases" if hearts < cases else ""
+    of_cases = f" of the {cases} cases" if hearts < cases else ""
     bootstrap = f"Bars are 95 % intervals of a bootstrap over the {hearts} hearts{of_cases}."
     return {
         "size": size,

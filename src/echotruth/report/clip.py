@@ -25,6 +25,9 @@ GREY_SPREAD = 6
 FRAME_RATE = 20
 """Frames per second of the animation, which is in slow motion."""
 
+BEATS = 3
+"""Repetitions of the clip in its video."""
+
 
 @dataclass(frozen=True)
 class ClipWithMotion:
@@ -177,7 +180,7 @@ def round_length(side: float) -> float:
     return float(max(step * power for step in (1, 2, 5) if step * power <= side / 5))
 
 
-def gif(path: Path, frames: np.ndarray, rate: float = FRAME_RATE) -> Path:
+def gif(path: Path, frames: np.ndarray) -> Path:
     """Write a looping GIF with as many colours as its size allows; grey pixels stay grey.
 
     Parameters
@@ -185,8 +188,6 @@ def gif(path: Path, frames: np.ndarray, rate: float = FRAME_RATE) -> Path:
     path : Path
     frames : ndarray of shape (frame, height, width, 3), uint8
         RGB.
-    rate : float
-        Frames per second.
 
     Returns
     -------
@@ -194,9 +195,8 @@ def gif(path: Path, frames: np.ndarray, rate: float = FRAME_RATE) -> Path:
     """
     for colours in (64, 40, 28, 20, 14):
         pictures = _with_palette(frames, colours)
-        pictures[0].save(
-            path, save_all=True, append_images=pictures[1:], duration=round(1000 / rate), loop=0, optimize=False
-        )
+        duration = round(1000 / FRAME_RATE)
+        pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=duration, loop=0, optimize=False)
         if path.stat().st_size <= MAX_GIF_BYTES:
             break
     return path
@@ -223,18 +223,14 @@ def _with_palette(frames: np.ndarray, colours: int) -> list[Image.Image]:
     return pictures
 
 
-def mp4(path: Path, frames: np.ndarray, rate: float = FRAME_RATE, beats: int = 3) -> Path:
-    """Write an H.264 video that browsers play.
+def mp4(path: Path, frames: np.ndarray) -> Path:
+    """Write an H.264 video that browsers play, of `BEATS` repetitions of the clip.
 
     Parameters
     ----------
     path : Path
     frames : ndarray of shape (frame, height, width, 3), uint8
         RGB, height and width even.
-    rate : float
-        Frames per second.
-    beats : int
-        Number of repetitions of the clip.
 
     Returns
     -------
@@ -242,10 +238,10 @@ def mp4(path: Path, frames: np.ndarray, rate: float = FRAME_RATE, beats: int = 3
     """
     size = frames.shape[2], frames.shape[1]
     video = imageio_ffmpeg.write_frames(
-        str(path), size, fps=rate, codec="libx264", pix_fmt_out="yuv420p", quality=6, macro_block_size=2
+        str(path), size, fps=FRAME_RATE, codec="libx264", pix_fmt_out="yuv420p", quality=6, macro_block_size=2
     )
     video.send(None)
-    for frame in np.concatenate([frames] * beats):
+    for frame in np.concatenate([frames] * BEATS):
         video.send(np.ascontiguousarray(frame))
     video.close()
     return path

@@ -78,7 +78,7 @@ def with_motion(repository: Repository, case: str, view: str, size: int) -> tupl
     """
     config, group = repository.case(case).config, f"bmode/{size}"
     image = repository.arrays(group, case, view, "image")["image"]
-    time = repository.read(f"{group}/time", *repository.place(case))
+    time = repository.read(f"{group}/time", case, view)
     motion = estimates.true(repository, case, view, "true_displacement")["true_displacement"][..., :2]
     inside = np.isfinite(motion[0]).all(-1)
     spacing = config.bmode.si().field_of_view / size

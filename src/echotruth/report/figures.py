@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from echotruth.evaluation.hearts import hearts_of
+from echotruth.cases.labels import heart_of
 from echotruth.evaluation.leaderboard import best, standings
 from echotruth.heart import Heart
 from echotruth.mechanics.bounds import CC
@@ -108,7 +108,7 @@ class Figures:
     @property
     def time(self) -> NDArray[np.float64]:
         """Time of the frames since end-diastole, (frame,), s."""
-        return self.repository.read("mechanics/time", *self.repository.place(self.case))
+        return self.repository.read("mechanics/time", self.case)
 
     def heart(self) -> Figure:
         """The heart in space, unloaded, at end-diastole and end-systole."""
@@ -168,10 +168,9 @@ class Figures:
 
     @cached_property
     def standings(self) -> pd.DataFrame:
-        """The leaderboard, including external trackers; without a label `heart`, every case is one."""
-        cases = self.repository.every
-        labelled = any(case.labels.get("heart") is not None for case in cases.values())
-        return standings(self.repository.scores, self.config.seed, hearts_of(cases) if labelled else None)
+        """The leaderboard, including external trackers."""
+        hearts = {case.id: heart_of(case) for case in self.repository.every.values()}
+        return standings(self.repository.scores, self.config.seed, hearts)
 
     @property
     def order(self) -> list[str]:

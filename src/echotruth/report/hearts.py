@@ -67,9 +67,9 @@ def subjects(repository: Repository, view: str, size: int) -> list[dict[str, Any
             "case": case,
             "status": str(repository.cases.at[case, "status"]),
             "diagnosis": str(repository.cases.at[case, "diagnosis"]),
-            "volume": float(repository.read("mechanics/volume", *repository.place(case), 0)) / UNIT_OF_VOLUME,
+            "volume": float(repository.read("mechanics/volume", case, None, 0)) / UNIT_OF_VOLUME,
             "measures": [float(values[k]) for values in found.values()],
-            "picture": picture(repository.read(f"bmode/{size}/image", *repository.place(case, view), 0)),
+            "picture": picture(repository.read(f"bmode/{size}/image", case, view, 0)),
         }
         for k, case in enumerate(chosen)
     ]

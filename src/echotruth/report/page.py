@@ -8,15 +8,16 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from echotruth import files
 from echotruth.cases.labels import diagnosis
+from echotruth.config import shipped
 from echotruth.evaluation.leaderboard import best
 from echotruth.report import account, board, style, vector
 from echotruth.report.clips import STRAIN_LIMIT, clips
 from echotruth.report.comparison import Comparison
 from echotruth.report.hearts import MEASURES, subjects
-from echotruth.repository import durable, inferred
+from echotruth.repository import inferred
 from echotruth.repository.choice import main_view
-from echotruth.repository.description.citation import PAPER
 from echotruth.repository.reader import Repository
 
 HERE = Path(__file__).parent
@@ -39,7 +40,7 @@ def write(repository: Repository) -> Path:
     )
     text = environment.get_template("page.html.jinja").render(_context(repository))
     path = repository.folder / "report.html"
-    durable.write(path, text.encode())
+    files.write(path, text.encode())
     return path
 
 
@@ -75,7 +76,7 @@ def _context(repository: Repository) -> dict[str, Any]:
         "failures": account.failures(repository),
         "stages": account.stages(folder),
         "configuration": (folder / "config.yaml").read_text(encoding="utf-8"),
-        "paper": PAPER,
+        "paper": shipped.citation()["preferred-citation"],
     }
 
 

@@ -13,6 +13,8 @@ import numpy as np
 
 AMBIENT = 0.42
 """Fraction of the light that is ambient."""
+SUPERSAMPLING = 2
+"""Number of samples along the side of a pixel, which are averaged."""
 
 
 @dataclass(frozen=True)
@@ -66,15 +68,13 @@ class Camera:
         return np.stack([right, np.cross(eye, right), eye])
 
 
-def render(surface: Surface, camera: Camera, supersampling: int = 2) -> tuple[np.ndarray, np.ndarray]:
+def render(surface: Surface, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Draw a surface with ambient and diffuse light from the eye.
 
     Parameters
     ----------
     surface : Surface
     camera : Camera
-    supersampling : int
-        Number of samples along the side of a pixel, which are averaged.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def render(surface: Surface, camera: Camera, supersampling: int = 2) -> tuple[np
     alpha : ndarray of shape (height, width)
         Fraction of the pixel that the surface covers.
     """
-    width, height = (supersampling * n for n in camera.size)
+    width, height = (SUPERSAMPLING * n for n in camera.size)
     axes, scale = camera.axes, height / (2 * camera.half_height)
     right, up, depth = axes @ (surface.points - camera.centre).T * scale
     screen = np.stack([width / 2 + right, height / 2 - up, depth], -1)
@@ -91,7 +91,7 @@ def render(surface: Surface, camera: Camera, supersampling: int = 2) -> tuple[np
     light = AMBIENT + (1 - AMBIENT) * np.abs(surface.normals @ axes[2])
     image = np.zeros((height, width, 4))
     _fill(screen, surface.triangles.astype(np.int64), surface.colours * light[:, None], image)
-    n = supersampling
+    n = SUPERSAMPLING
     image = image.reshape(height // n, n, width // n, n, 4).mean((1, 3))
     return image[..., :3], image[..., 3]
 

@@ -1,1 +1,1 @@
-"""The repository: its arrays, their store on disk, and the ledger of finished jobs."""
+"""The repository: its arrays and groups on disk, and what reads, publishes and checks them."""

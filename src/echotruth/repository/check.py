@@ -1,26 +1,32 @@
-"""Check of a repository: every file against its checksum, the metadata against the schema, and the values.
-
-The records of the ledger vouch for the shards of their jobs, and `ledger/structure.json` for all other files of the
-hierarchy. The check goes on to the end and names every fault with what heals it; :mod:`.healing` does so.
-"""
+"""Check of a repository: its files against their checksums, every chunk of its arrays, and the values in them."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
-from echotruth.repository.check_jobs import check_job, check_loop
-from echotruth.repository.check_structure import (
-    Listed,
-    check_configuration,
-    check_metadata,
-    check_others,
-    check_registries,
-    check_structure,
-    unrecorded_files,
-)
-from echotruth.repository.inventory import Fault, Inventory, JobRecord
+from echotruth.config import Config
+from echotruth.repository import group, values
+from echotruth.repository.group import NotWritten, path_in
+from echotruth.repository.places import METADATA
+from echotruth.repository.publication import CHECKSUMS, checksum, published_files
+from echotruth.repository.reader import NOT_NEEDED, SIZED, Repository
+
+REMEDY = "delete {} and run the configuration again"
+TEXTS = ("cases.csv", "config.yaml")
+
+
+class Fault(NamedTuple):
+    """What is wrong with a file or a group, and what mends it."""
+
+    path: str
+    problem: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.path} {self.problem}: {self.remedy}"
 
 
 @dataclass
@@ -31,9 +37,7 @@ class Report:
     notes: list[str] = field(default_factory=list)
     """What is to be known and is no damage, such as jobs that were not run yet."""
     files: int = 0
-    """Number of checked files."""
-    jobs: int = 0
-    """Number of records."""
+    groups: int = 0
 
 
 def check(folder: Path, progress: Callable[[int, int], None] | None = None, quick: bool = False) -> Report:
@@ -44,58 +48,94 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
     folder : Path
         Folder of the repository, `out/NAME`.
     progress : callable, optional
-        Called with the number of records that are done, and of all.
+        Called with the number of groups that are done, and of all.
     quick : bool, optional
-        Whether to leave out the values in the files of the jobs, which takes much longer than reading the files.
+        Whether to leave out the values, which takes longer than reading the files.
 
     Raises
     ------
-    CheckError
+    FileNotFoundError
         If the folder is not a repository.
     """
-    repository, report = Inventory(folder), Report()
-    if edited := check_configuration(repository):
-        report.faults = edited
-        report.notes = ["nothing else was checked, because the configuration says what must be there"]
+    repository, report = Repository(folder), Report()
+    folder = repository.folder
+    store = Path(repository.store)  # type: ignore[arg-type]  # it is a folder
+    _check_files(folder, store, report)
+    if quick:
         return report
+    places = sorted(path.parent.relative_to(store).as_posix() for path in store.rglob(METADATA) if _is_made(path))
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        structure, report.faults = check_structure(repository, pool)
-        is_whole = not report.faults
-        if is_whole:
-            report.faults += check_registries(repository)
-            report.faults += check_metadata(repository)
-        repository.distrust({path for fault in report.faults for path in fault.files})
-        report.faults += check_others(repository)
-        records = repository.records()
-        listed: Listed = {}
-        jobs = pool.map(lambda record: check_job(repository, record, quick), records)
-        for done, (record, found) in enumerate(zip(records, jobs, strict=True), 1):
-            report.faults += found.faults
-            report.files += found.files
-            row = repository.row(record)
-            if found.arrays is not None and row is not None:
-                listed[record.stage, record.size, row] = found.arrays
+        found = pool.map(lambda place: list(_faults(repository, store, place)), places)
+        for done, faults in enumerate(found, 1):
+            report.faults += faults
             if progress:
-                progress(done, len(records))
-        damaged = {path for fault in report.faults for path in fault.records}
-        solved = [record for record in records if record.stage == "mechanics" and record.path not in damaged]
-        report.faults += [
-            fault for faults in pool.map(lambda one: check_loop(repository, one), solved) for fault in faults
-        ]
-    report.faults += unrecorded_files(repository, listed, structure)
-    # What is wrong with the metadata of an array is found by every job that has written it.
-    report.faults = sorted(dict.fromkeys(report.faults), key=lambda fault: fault.path)
-    report.notes = _notes(repository, records)
-    report.files += len(structure or ())
-    report.jobs = len(records)
+                progress(done, len(places))
+    report.groups = len(places)
     return report
 
 
-def _notes(repository: Inventory, records: list[JobRecord]) -> list[str]:
-    notes = []
-    wanted, found = repository.wanted(), {record.path for record in records}
-    if missing := sum(path not in found for path in wanted):
-        notes.append(f"{missing} of {len(wanted)} jobs have not been run yet: echotruth run makes them")
-    elif not repository.publication_record.is_file():
-        notes.append("the repository has not been published yet: echotruth run does so")
-    return notes
+def _check_files(folder: Path, store: Path, report: Report) -> None:
+    """Compare all files with the list of checksums."""
+    present = {path.relative_to(folder).as_posix(): path for path in published_files(folder, store) if path.is_file()}
+    report.files = len(present)
+    if not (folder / CHECKSUMS).is_file():
+        report.notes.append(f"{folder / CHECKSUMS} is not there: the run has not ended: files have no checksums")
+        return
+    listed = {}
+    for line in (folder / CHECKSUMS).read_text(encoding="utf-8", errors="replace").splitlines():
+        hash, _, name = line.partition("  ")
+        listed[name] = hash
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        hashes = dict(zip(present, pool.map(checksum, present.values()), strict=True))
+    for name in sorted({*listed, *present}):
+        if name not in present:
+            report.faults.append(Fault(name, "is missing", REMEDY.format(_group_of(name))))
+        elif name not in listed:
+            report.faults.append(Fault(name, f"is not listed in {CHECKSUMS}", f"delete it, or {CHECKSUMS}, and run"))
+        elif hashes[name] != listed[name]:
+            report.faults.append(Fault(name, "is not what was written", REMEDY.format(_group_of(name))))
+
+
+def _group_of(name: str) -> str:
+    """Folder of the group that one job made, of which a file is a part; the checksums if no job made it."""
+    parts = PurePosixPath(name).parts
+    depths = {"hearts": 3, "inference": 3, "clips": 5}
+    depth = depths.get(parts[1], 0) if len(parts) > 1 else 0
+    if depth == 5 and len(parts) > 5 and parts[4] in SIZED:
+        depth = 6
+    if depth and len(parts) > depth:
+        group = "/".join(parts[:depth])
+        return f"{group} and {CHECKSUMS}" if parts[depth - 1] in NOT_NEEDED else group
+    return name if name in TEXTS else CHECKSUMS  # without them the rule repository writes what no job made
+
+
+def _is_made(path: Path) -> bool:
+    """Whether the metadata are those of a group that has arrays."""
+    return any((child / METADATA).is_file() and (child / "c").is_dir() for child in path.parent.iterdir())
+
+
+def _faults(repository: Repository, store: Path, place: str) -> Iterator[Fault]:
+    """What is wrong with a group: chunks that cannot be read, and values that cannot be."""
+    where, remedy = f"{store.name}/{place}", REMEDY.format(_group_of(f"{store.name}/{place}/{METADATA}"))
+    try:
+        arrays = group.read(store, place)
+    except (NotWritten, ValueError, OSError, RuntimeError) as error:
+        yield Fault(where, f"cannot be read ({type(error).__name__}: {str(error)[:100]})", remedy)
+        return
+    if (config := _config_of(repository, place)) is None:
+        return
+    try:
+        found = list(values.faults(path_in(place), arrays, config))
+    except (ValueError, LookupError, TypeError) as error:
+        yield Fault(where, f"has arrays that do not belong together ({str(error)[:100]})", remedy)
+        return
+    for name, problem in found:
+        yield Fault(f"{where}/{name}", problem, "its numbers are wrong: report it with the configuration")
+
+
+def _config_of(repository: Repository, place: str) -> Config | None:
+    """Configuration of the case of a group; None if it is not one of the repository any more."""
+    top, id, *_ = place.split("/")
+    hearts = repository.parameters["heart"]
+    cases = [str(case) for case, heart in hearts.items() if (heart if top == "hearts" else case) == id]
+    return repository.case(cases[0]).config if cases else None

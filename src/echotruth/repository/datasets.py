@@ -57,9 +57,9 @@ def as_stored(case: Case, groups: dict[str, dict[str, Any]]) -> dict[str, dict[s
     """Arrays of groups that were just made, rounded as a repository has them; what is read from one is so already."""
     return {
         group: {
-            array.name: rounding.as_stored(values[array.name], array, case.config)
-            for array in schema.named(group)
-            if array.name in values
+            name: rounding.as_stored(values[name], array, case.config)
+            for name, array in schema.arrays_of(group).items()
+            if name in values
         }
         for group, values in groups.items()
     }
@@ -71,9 +71,9 @@ def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str
 
     found = {}
     for group, values in groups.items():
-        for array in schema.named(group):
+        for array in schema.arrays_of(group).values():
             if array.name in values:
-                dims = [dim for dim in array.dims if dim not in ("case", "view", "size", "tracker")]
+                dims = [dim for dim in array.dims if dim != "tracker"]
                 about: dict[str, Any] = {"units": array.units, "long_name": array.long_name}
                 step = rounding.quantum(array, case.config)
                 about |= {} if step is None else {"quantum": step}

@@ -1,61 +1,111 @@
-"""Publication of a repository: verification of its files against the ledger, verdicts and attributes."""
+"""Publication of a repository: its table of cases, the metadata of its folders, and the checksums of its files."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+from hashlib import file_digest
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from echotruth.cases import expand
+from echotruth import files
+from echotruth.cases import Case, table
 from echotruth.config import Config
-from echotruth.config.loading import load
-from echotruth.repository import ledger
-from echotruth.repository.checksums import verify, verify_structure
-from echotruth.repository.ledger import record_paths
-from echotruth.repository.provenance import packages
-from echotruth.repository.store import Store
-from echotruth.repository.verdict import Verdict, verdict
+from echotruth.repository import metadata
+from echotruth.repository.metadata import OUTDATED
+from echotruth.repository.status import verdict
+from echotruth.repository.version import packages
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CHECKSUMS = "SHA256SUMS"
+"""File with the checksums of the store and of the files beside it that describe it, as `sha256sum -c` reads it."""
+
+SIZED = ("truth", "bmode", "tracking")
+"""Groups of a clip that hold one for each image size."""
 
 
-def publish(folder: Path) -> dict[str, Any]:
-    """Verify every file of the store against the ledger, then write the verdicts and the attributes of the repository.
+def publish(folder: Path, config: Config, cases: list[Case]) -> dict[str, int]:
+    """Write what belongs to no job, and last the checksums.
 
     Parameters
     ----------
     folder : Path
         Folder of the repository, `out/NAME`.
+    config : Config
+    cases : list of Case
 
     Returns
     -------
     dict
-        Number of complete, implausible and failed cases, and of verified files.
-
-    Raises
-    ------
-    ChecksumError
-        If a file is missing or differs from what was written.
+        Number of cases by their status.
     """
-    config = load(folder / "config.yaml")
-    store = Store(folder / f"{config.name}.zarr")
-    rows = ledger.rows(folder / "registry.txt")
-    cases = expand(config)
-    records = {case.id: record_paths(folder, case.id, config) for case in cases}
-    files = verify_structure(store.path, store.record)
-    files += sum(verify(store.path, path, ledger.read(path)) for paths in records.values() for path in paths)
-    verdicts = {case.id: verdict(ledger.read(records[case.id][0]), case.config.physiology) for case in cases}
-    retired = Verdict("retired", "not a case of this configuration")
-    for column in ("status", "reason"):
-        store.write_column(column, [getattr(verdicts.get(case, retired), column) for case in rows])
-    store.describe(_attributes(config, records))
-    statuses = [found.status for found in verdicts.values()]
-    return {status: statuses.count(status) for status in ("complete", "implausible", "failed")} | {"files": files}
+    store = folder / f"{config.name}.zarr"
+    summary = table_of(store, cases)
+    files.update(folder / "cases.csv", as_csv(summary))
+    _write_groups(store, config, cases)
+    metadata.write(store, _attributes(config), consolidated=False)
+    write_checksums(folder, store)
+    return {str(status): int(number) for status, number in summary["status"].value_counts(sort=False).items()}
 
 
-def _attributes(config: Config, records: dict[str, list[Path]]) -> dict[str, Any]:
-    first = next(iter(records.values()))
+def table_of(store: Path, cases: list[Case]) -> pd.DataFrame:
+    """Table of the cases, with what became of their hearts until now."""
+    found = [verdict(metadata.attributes(store / "hearts" / case.heart), case.config.physiology) for case in cases]
+    columns = table(cases)
+    columns.insert(1, "heart", [case.heart for case in cases])
+    columns.insert(2, "status", [one.status for one in found])
+    columns.insert(3, "reason", [one.reason for one in found])
+    return columns
+
+
+def as_csv(summary: pd.DataFrame) -> bytes:
+    """Content of cases.csv."""
+    return summary.to_csv(index=False).encode()
+
+
+def _write_groups(store: Path, config: Config, cases: Iterable[Case]) -> None:
+    """Write the groups that hold those of the jobs; a clip has the metadata of all that it holds."""
+    holders = {store / "hearts", store / "clips"}
+    for case in cases:
+        holders.add(store / "clips" / case.id)
+        for view in config.views:
+            clip = store / "clips" / case.id / view
+            for stage in SIZED:
+                metadata.write(clip / stage, {}, consolidated=False)
+            metadata.write(clip, {"case": case.id, "view": view, "heart": case.heart})
+    if config.inference.tracker:
+        holders.add(store / "inference")
+    for folder in holders:
+        metadata.write(folder, {}, consolidated=False)
+
+
+def _attributes(config: Config) -> dict[str, Any]:
     return {
         "title": f"echotruth repository {config.name}: synthetic echocardiograms with their true motion",
         "summary": "Finite-element hearts, B-mode clips, the true motion of every pixel, and trackers scored by it",
         "references": "Mukherjee et al., Synthetic ultrasound images to benchmark echocardiography-based biomechanics",
         "config": config.model_dump(mode="json"),
         "seed": config.seed,
-        "code": {record["stage"]: record["code"] for record in map(ledger.read, first)},
         "packages": packages(),
     }
+
+
+def published_files(folder: Path, store: Path) -> list[Path]:
+    """Files that have a checksum: all of the store, the configuration and the table of the cases."""
+    below = (
+        path for path in store.rglob("*") if path.is_file() and path.name != OUTDATED and path.suffix != ".partial"
+    )
+    return sorted([*below, folder / "cases.csv", folder / "config.yaml"])
+
+
+def checksum(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return file_digest(file, "sha256").hexdigest()
+
+
+def write_checksums(folder: Path, store: Path) -> None:
+    """Write the checksums of all files of a repository."""
+    lines = [f"{checksum(path)}  {path.relative_to(folder).as_posix()}\n" for path in published_files(folder, store)]
+    files.write(folder / CHECKSUMS, "".join(lines).encode())

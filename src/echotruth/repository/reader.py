@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from contextlib import suppress
 from functools import cached_property
+from hashlib import sha256
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import zarr
 from numpy.typing import NDArray
 
@@ -16,14 +16,12 @@ from echotruth.cases import Case, all_cases, find_case
 from echotruth.config import Config, shipped
 from echotruth.config.loading import load, validate
 from echotruth.heart import Heart
-from echotruth.imaging.view import Plane
-from echotruth.repository import estimates, ledger, packing, schema
+from echotruth.imaging.view import Plane, imaging_plane
+from echotruth.repository import estimates, group, metadata, schema, status
 from echotruth.repository.choice import Names, Sizes, chosen, image_size, main_view, require_known
-from echotruth.repository.ledger import STAGES, imaged_statuses, repository_folder
+from echotruth.repository.group import NotWritten
+from echotruth.repository.places import place, repository_folder
 from echotruth.repository.remote import Remote, hierarchy, is_url
-from echotruth.repository.store import NotWritten
-from echotruth.repository.table import table_of
-from echotruth.repository.tree import open_tree
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,6 +29,15 @@ if TYPE_CHECKING:
     from zarr.storage import ObjectStore
 
     from echotruth.evaluation.clip_metrics import ClipMetrics
+
+STAGES = ("mechanics", "phantom", "rf", "truth", "bmode", "tracking", "inference")
+"""Stages in the order of their jobs."""
+FEW = 4
+"""Cases that are looked up one by one, before all are made."""
+SIZED = ("truth", "bmode", "tracking")
+"""Stages that make a group for each image size."""
+NOT_NEEDED = ("phantom", "rf")
+"""Stages whose groups may be deleted once the images are made: a run does not make them again."""
 
 
 class Repository:
@@ -74,12 +81,11 @@ class Repository:
 
     def _forget(self) -> None:
         """Forget what is opened: Zarr has a thread for reading, which a forked process does not inherit."""
-        self._opened: dict[tuple[str, str], zarr.Array[Any]] = {}
-        self._labels: dict[tuple[str, str], list[str]] = {}
+        self._opened: dict[str, zarr.Array[Any]] = {}
         self._process = os.getpid()
 
     def __getstate__(self) -> dict[str, Any]:
-        emptied: dict[str, dict[str, Any]] = {name: {} for name in ("_opened", "_labels", "_known")}
+        emptied: dict[str, dict[str, Any]] = {name: {} for name in ("_opened", "_known")}
         return {name: value for name, value in vars(self).items() if name not in ("tree", "every")} | emptied
 
     def __repr__(self) -> str:
@@ -131,38 +137,57 @@ class Repository:
 
     @cached_property
     def tree(self) -> xr.DataTree:
-        """All of it as one xarray DataTree, read when used.
+        """All of it as one xarray DataTree, read when used (docs/schema.md): `hearts/HEART`, `clips/CASE/VIEW`."""
+        import xarray as xr
 
-        It has one group per stage (docs/schema.md); `tree["cases"].to_dataset().to_dataframe()` is the table of cases
-        with all keys that can be swept. Cases and views that have left the configuration stay: the status of such a
-        case is `retired`, and `tree.attrs["config"]["views"]` are the present views.
-        """
-        return open_tree(self.store)
+        opened = {"engine": "zarr", "zarr_format": 3, "consolidated": False, "create_default_indexes": False}
+        return xr.open_datatree(self.store, **opened)  # type: ignore[arg-type]  # it may be a store
 
     @cached_property
     def cases(self) -> pd.DataFrame:
         """Table of the cases, a row each, indexed by `case`.
 
-        Columns are `status` (complete, implausible, failed, retired or unfinished), `reason`, `heart` (the first case
-        with the same motion: cases that differ only in speckle, array or image share one), `diagnosis` and `label.*`,
-        and the keys whose value differs among the cases.
+        Columns are `status` (complete, implausible, failed or unfinished), `reason`, `heart` (cases that differ only in
+        speckle, array or image share one), `diagnosis` and `label.*`, and the keys whose value differs among the cases.
         """
-        return table_of(self)
+        return self.parameters[[*status.ALWAYS, *self.distinctions]]
+
+    @cached_property
+    def distinctions(self) -> pd.DataFrame:
+        """Columns of :attr:`cases` that do not tell what became of the hearts, and for which no heart is read."""
+        table = self._table.drop(columns=list(status.ALWAYS), errors="ignore")
+        labels = [*filter(status.is_label, table)]
+        differ = [name for name in table if name not in labels and table[name].nunique(dropna=False) > 1]
+        return table[[*labels, *differ]]
+
+    @cached_property
+    def parameters(self) -> pd.DataFrame:
+        """The table of the cases with all keys that can be swept, also those that are the same in all cases."""
+        verdicts = [self.verdict(case) for case in self.rows]
+        return self._table.assign(status=[one.status for one in verdicts], reason=[one.reason for one in verdicts])
+
+    @cached_property
+    def _table(self) -> pd.DataFrame:
+        """The table as it is on disk; what became of the hearts is in it once the repository is published."""
+        return status.read_table(BytesIO(self._text("cases.csv").encode()), self.location)
+
+    def verdict(self, case: str) -> status.Verdict:
+        """What became of the heart of a case, which is read for it, but in object storage, where the table tells."""
+        if self._remote:
+            return status.Verdict(*self._table.loc[case, ["status", "reason"]])
+        differs = any(name.startswith("physiology.") for name in self.distinctions)
+        bounds = (self.every[case].config if differs else self.config).physiology
+        return status.verdict(self.attributes("heart", case), bounds)
 
     @cached_property
     def rows(self) -> dict[str, int]:
-        """Row of every case that was ever registered."""
-        return self._registered("registry.txt")
-
-    @cached_property
-    def indices(self) -> dict[str, int]:
-        """Index of every view that was ever registered."""
-        return self._registered("views.txt")
+        """Row of every case in the table."""
+        return {str(case): row for row, case in enumerate(self._table.index)}
 
     @property
     def views(self) -> list[str]:
-        """Views of the configuration that have a place in the store."""
-        return [view for view in self.config.views if view in self.indices]
+        """Views of the configuration."""
+        return list(self.config.views)
 
     @property
     def sizes(self) -> list[int]:
@@ -178,16 +203,16 @@ class Repository:
     def _tracker(self) -> str:
         return list(self.config.tracking.trackers)[-1]
 
-    @cached_property
+    @property
     def present(self) -> list[str]:
-        """Cases of the configuration, in the order of their rows."""
-        return [str(case) for case in self.cases.index[self.cases["status"] != "retired"]]
+        """Cases of the configuration, in the order of the table."""
+        return list(self.rows)
 
     @cached_property
     def shown(self) -> list[str]:
         """Cases that scores and figures take in: those that are complete, or implausible ones if these were imaged."""
-        for status in imaged_statuses(self.config.physiology.exclude_implausible):
-            if len(found := self.cases.index[self.cases["status"] == status]):
+        for wanted in status.imaged(self.config.physiology.exclude_implausible):
+            if len(found := self.cases.index[self.cases["status"] == wanted]):
                 return [str(case) for case in found]
         return []
 
@@ -208,7 +233,7 @@ class Repository:
         """
         found = self.case(case)
         groups = ("geometry", "fibres", "pathology", "mechanics")
-        return Heart.of({group: self.arrays(group, found.id) for group in groups}, found.config)
+        return Heart.of({name: self.arrays(name, found.id) for name in groups}, found.config)
 
     def clip(
         self, case: str | None = None, view: str | None = None, size: int | None = None, variables: Names = None
@@ -240,10 +265,10 @@ class Repository:
         from echotruth.repository.derived import stored_names
 
         found, view, size = self.case(case), self.view(view), image_size(self.config, size)
-        arrays = {f"{stage}/{size}": schema.SIZED[stage] for stage in ("bmode", "truth")}
-        wanted = stored_names(variables, {array.name for group in arrays.values() for array in group})
-        names = {group: [array.name for array in members if array.name in wanted] for group, members in arrays.items()}
-        values = {group: self.arrays(group, found.id, view, *members) for group, members in names.items() if members}
+        arrays = {path: schema.arrays_of(path) for path in (f"bmode/{size}", f"truth/{size}")}
+        wanted = stored_names(variables, {name for members in arrays.values() for name in members})
+        names = {path: [name for name in members if name in wanted] for path, members in arrays.items()}
+        values = {path: self.arrays(path, found.id, view, *members) for path, members in names.items() if members}
         return clip_dataset(self.heart(found.id), found, view, self.plane(found.id, view), values)
 
     def tracks(
@@ -426,7 +451,7 @@ class Repository:
             segment and component of strain; `reliability` one per clip, tracker and tenth of quality. docs/metrics.md
             tells their columns, which name their units. All begin with case, view, plane, size_px and tracker, and with
             heart, split, group, acoustics and variation, which are labels of the table of cases, "" where it has none
-            (without a label, heart is that of the first case with the same motion), and the diagnosis.
+            (without a label, heart is the column of that name), and the diagnosis.
 
         Examples
         --------
@@ -477,8 +502,7 @@ class Repository:
     @cached_property
     def every(self) -> dict[str, Case]:
         """All cases of the configuration by id, each with its own."""
-        self._known = all_cases(self.config)
-        return self._known
+        return all_cases(self.config)
 
     def case(self, case: str | None = None) -> Case:
         """A case by its id, with its configuration; that of the only heart if none is given.
@@ -494,7 +518,9 @@ class Repository:
                 raise ValueError(f"case: {self._place} has {len(self.present)} hearts: give one of {choices}.")
             case = self.present[0]
         if case not in self._known:
-            self._known[case] = find_case(self.config, require_known("case", case, self.rows))
+            require_known("case", case, self.rows)
+            # A sweep is gone through for each that is looked up alone.
+            self._known |= {case: find_case(self.config, case)} if len(self._known) < FEW else self.every
         return self._known[case]
 
     def view(self, view: str | None = None) -> str:
@@ -510,141 +536,118 @@ class Repository:
     def problem(self, case: str, view: str | None, *stages: str) -> str:
         """Why stages of a heart, or of one of its views, are not complete, in one sentence; "" if they are."""
         for stage in stages:
-            for size in self.sizes if "size" in STAGES[stage] else [None]:
-                if problem := self._problem(case, view if "view" in STAGES[stage] else None, stage, size):
+            of_view = view if stage not in ("mechanics", "inference") else None
+            for size in self.sizes if stage in SIZED else [None]:
+                if problem := self._problem(case, of_view, stage, size):
                     return problem
         return ""
 
     def _problem(self, case: str, view: str | None, stage: str, size: int | None) -> str:
         what = " ".join(filter(None, [case, view]))
-        try:
-            record = self.record(stage, case, view, size)
-        except ValueError:
-            path = ledger.record_path(Path(self._place), stage, case, view, size)
-            return f"{path} is damaged: run echotruth check {self._place} --heal, and the configuration again"
-        if not record:
+        of = "heart" if stage == "mechanics" else stage if size is None else f"{stage}/{size}"
+        found = self.attributes(of, case, view)
+        if not found:
             return f"{self._place} has no {stage} of {what} yet: run it to its end, or fetch this heart too"
-        if record.get("status") != "complete":
-            return f"{what} of {self._place} is {record.get('status')}: {record.get('reason')}"
+        if found.get("status") != "complete":
+            return f"{what} of {self._place} is {found.get('status')}: {found.get('reason')}"
         return ""
-
-    def record(self, stage: str, case: str, view: str | None = None, size: int | None = None) -> dict[str, Any]:
-        """Record of a job in the ledger; empty if it is not done."""
-        text = self._text(ledger.record_path(Path(), stage, case, view, size).as_posix())
-        return ledger.parse(text) if text else {}
 
     def plane(self, case: str, view: str) -> Plane:
         """The imaging plane of a view in the heart frame."""
-        return Plane(**self.arrays("phantom", case, view, "origin", "axes"))
+        config = self.case(case).config
+        return imaging_plane(config.views[view], config.rf, self.heart(case).endo_at_ed)
 
-    def place(self, case: str, view: str | None = None) -> tuple[int, ...]:
-        """Row of a case, and index of a view: their places in the store, which never change."""
-        row = self.rows[require_known("case", case, self.rows)]
-        return (row,) if view is None else (row, self.indices[require_known("view", view, self.indices)])
-
-    def arrays(
-        self,
-        group: str,
-        case: str,
-        view: str | None = None,
-        *names: str,
-        store: Path | None = None,
-    ) -> dict[str, NDArray[Any]]:
-        """Arrays of a group for one case (and view).
+    def path(self, group: str, case: str, view: str | None = None) -> str:
+        """Path of a group below the store.
 
         Parameters
         ----------
         group : str
-            As "bmode/512".
+            As `mechanics`, `bmode/512` or `inference/fit`.
+        case : str
+        view : str, optional
+            For the groups of a clip.
+        """
+        row = self.rows[require_known("case", case, self.rows)]
+        if view is not None:
+            require_known("view", view, self.views)
+        return place(group, str(self._table["heart"].iloc[row]), case, view)
+
+    def arrays(self, group_name: str, case: str, view: str | None = None, *names: str) -> dict[str, NDArray[Any]]:
+        """Arrays of a group for one case (and view).
+
+        Parameters
+        ----------
+        group_name : str
+            As `bmode/512`.
         case : str
         view : str, optional
         *names : str
-            Names of arrays and of members of packs. Default: all.
-        store : Path, optional
-            Another hierarchy with the same rows.
+            Names of arrays. Default: all.
 
         Raises
         ------
         NotWritten
-            If the job of this case (and view) did not write one of them.
+            If one of them is not there.
         """
-        place, packs = self.place(case, view), schema.packs_of(group)
-        holder = schema.holders(group)
-        wanted = dict.fromkeys(holder.get(name, name) for name in names) if names else self.names(group)
-        found = {}
-        for array in (array for array in schema.arrays_of(group) if array.name in wanted):
-            path = f"{group}/{array.name}"
-            if not (store or self.is_written(path, case, view)):
-                what = " ".join(filter(None, [case, view]))
-                remedy = "run it to its end, or fetch this heart too"
-                raise NotWritten(f"{self._place}: {path} has no data of {what}: {remedy}")
-            found[array.name] = self.read(path, *place[: array.leading], store=store)
-        labels = {
-            pack.dimension: self.labels(f"{group}/{pack.dimension}", store)
-            for pack in packs
-            if pack.array.name in found
-        }
-        values = packing.unpack(packs, found, labels)
-        return {name: values[name] for name in names} if names else values
+        return group.read(self.store, self.path(group_name, case, view), *names)
 
-    def array(self, path: str, store: Path | None = None) -> zarr.Array[Any]:
-        """An array by its path, as "bmode/256/image"; opened once in each process."""
+    def array(self, path: str, case: str, view: str | None = None) -> zarr.Array[Any]:
+        """An array by its group and name, as `bmode/256/image`; opened once in each process.
+
+        Raises
+        ------
+        NotWritten
+            If it is not there.
+        """
         if self._process != os.getpid():
             self._forget()
-        key = str(store or ""), path
-        if key not in self._opened:
+        parent, _, name = path.rpartition("/")
+        whole = f"{self.path(parent, case, view)}/{name}"
+        if whole not in self._opened:
             try:
-                self._opened[key] = zarr.open_array(store or self.store, path=path, mode="r", zarr_format=3)
+                self._opened[whole] = zarr.open_array(self.store, path=whole, mode="r", zarr_format=3)
             except FileNotFoundError:
-                remedy = "run its configuration again with this version of echotruth"
-                raise FileNotFoundError(f"{self._place}: has no array {path}: {remedy}") from None
-        return self._opened[key]
+                what, remedy = " ".join(filter(None, [case, view])), "run it to its end, or fetch this heart too"
+                raise NotWritten(f"{self._place}: {path} has no data of {what}: {remedy}") from None
+        return self._opened[whole]
 
-    def read(self, path: str, *index: Any, store: Path | None = None) -> NDArray[Any]:
+    def read(self, path: str, case: str, view: str | None = None, *index: Any) -> NDArray[Any]:
         """Part of an array, given its indices and slices; only the chunks that hold it are read."""
-        return np.asarray(self.array(path, store)[index])
+        return group.part(self.array(path, case, view), *index)
 
-    def labels(self, path: str, store: Path | None = None) -> list[str]:
-        """Values of a coordinate or column that is text, as "physiology/scalar"; read once."""
-        key = str(store or ""), path
-        if key not in self._labels:
-            self._labels[key] = [str(value) for value in self.read(path, ..., store=store)]
-        return self._labels[key]
-
-    def names(self, group: str) -> list[str]:
-        """Names of the arrays of a group, sorted; none if there is no such group."""
-        with suppress(FileNotFoundError):
-            return sorted(zarr.open_group(self.store, path=group, mode="r", zarr_format=3).array_keys())
-        return []
-
-    def attributes(self, group: str) -> dict[str, Any]:
+    def attributes(self, group_name: str, case: str = "", view: str | None = None) -> dict[str, Any]:
         """Attributes of a group, those of the repository for ""; none if there is no such group."""
-        with suppress(FileNotFoundError):
-            return zarr.open_group(self.store, path=group, mode="r", zarr_format=3).attrs.asdict()
-        return {}
+        path = self.path(group_name, case, view) if group_name else ""
+        if not self._remote:
+            return metadata.attributes(Path(self.store) / path)  # type: ignore[arg-type]  # it is a folder
+        try:
+            return zarr.open_group(self.store, path=path, mode="r", zarr_format=3).attrs.asdict()
+        except FileNotFoundError:
+            return {}
 
     def is_written(self, path: str, case: str, view: str | None = None) -> bool:
-        """Whether the job of a case (and view) wrote its part of an array; of others Zarr reads fill values."""
-        group, _, name = path.rpartition("/")
-        array = next(array for array in schema.arrays_of(group) if array.name == name)
-        file = f"{group}/{array.shard(self.place(case, view)[: array.leading])}"
-        if self._remote:
-            return self._remote.has(f"{self.config.name}.zarr/{file}")
-        shard = self.folder / f"{self.config.name}.zarr" / file
-        return shard.is_file() and shard.stat().st_size > 0
+        """Whether an array is there, given its group and name."""
+        try:
+            self.array(path, case, view)
+        except NotWritten:
+            return False
+        return True
 
-    def _registered(self, name: str) -> dict[str, int]:
-        """Place of each case or view: the number of its line."""
-        return {id: row for row, id in enumerate(self._text(name).split())}
+    def version(self, case: str, view: str) -> str:
+        """Version of a view as trackers get it: its images and truth, and the frames and points that are tracked."""
+        found = [self.attributes(f"{stage}/{self.sizes[0]}", case, view).get("version") for stage in ("truth", "bmode")]
+        tracking = self.case(case).config.tracking
+        return sha256(repr((*found, tracking.frame_step, tracking.grid_px)).encode()).hexdigest()[:16]
 
     def _text(self, name: str) -> str:
-        """Content of a text file in the folder; empty if there is none, or a pipe, which would be waited for."""
+        """Content of a text file in the folder."""
         if self._remote:
-            with suppress(FileNotFoundError, NotADirectoryError):
-                return self._remote.get(name).decode(errors="replace")
-            return ""
+            return self._remote.get(name).decode(errors="replace")
         path = self.folder / name
-        return path.read_bytes().decode(errors="replace") if path.is_file() else ""
+        if not path.is_file():  # nor a pipe, which would be waited for
+            raise FileNotFoundError(f"{path}: is not there: run the configuration again, which writes it")
+        return path.read_bytes().decode(errors="replace")
 
 
 def sample() -> Repository:
@@ -656,7 +659,7 @@ def sample() -> Repository:
     Returns
     -------
     Repository
-        Its folder is part of the package; `echotruth merge out/mine sample` makes a copy that can be written.
+        Its folder is part of the package; `echotruth merge sample sample` makes a copy that can be written, out/sample.
 
     Examples
     --------

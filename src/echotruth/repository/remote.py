@@ -1,16 +1,14 @@
-"""A folder in object storage (S3): objects by their name, each with the SHA-256 of what was sent as its metadata.
+"""A folder in object storage (S3), to be read: objects by their name.
 
-Requests are signed over their content (AWS Signature Version 4), so that the server refuses what changed on the way; an
-object is there as a whole or not at all. Where it is, and who asks, is said by the environment variables of AWS that
-:class:`obstore.store.S3Store` reads: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION, AWS_ENDPOINT_URL and others.
+Where it is, and who asks, is said by the environment variables of AWS that :class:`obstore.store.S3Store` reads:
+AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION, AWS_ENDPOINT_URL and others.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import timedelta
-from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -20,8 +18,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-CHECKSUM = "sha256"
-"""Name of the metadata with the checksum, x-amz-meta-sha256."""
 MAX_RETRIES, RETRY_SECONDS = 3, 60
 """Failed requests are sent again so often, and no longer than that."""
 CONNECT_SECONDS, REQUEST_SECONDS = 10, 300
@@ -65,41 +61,9 @@ class Remote:
         """Another process opens the address anew."""
         return type(self), (self.url,)
 
-    def has(self, name: str) -> bool:
-        """Whether an object is there."""
-        try:
-            self._asked(lambda: self._api.head(self.store, name))
-        except FileNotFoundError:
-            return False
-        return True
-
-    def checksum(self, name: str) -> str:
-        """SHA-256 of an object as it was sent; empty if it is not there, or was sent by another program."""
-        try:
-            found = self._asked(lambda: self._api.get(self.store, name, options={"head": True}))
-        except FileNotFoundError:
-            return ""
-        return found.attributes.get(CHECKSUM, "")
-
-    def put(self, name: str, content: bytes) -> None:
-        """Send an object; it is there when this returns."""
-        attributes = {CHECKSUM: sha256(content).hexdigest()}
-        try:
-            self._asked(lambda: self._api.put(self.store, name, content, attributes=attributes))
-        except FileNotFoundError as error:  # of the bucket
-            raise RemoteError(f"{self.url}: {_reason(error)}: {REMEDY}") from None
-
     def get(self, name: str) -> bytes:
         """Read an object; a FileNotFoundError is raised if it is not there."""
         return self._asked(lambda: bytes(self._api.get(self.store, name).bytes()))
-
-    def delete(self, name: str) -> None:
-        """Remove an object, if it is there."""
-        self._asked(lambda: self._api.delete(self.store, name))
-
-    def names(self) -> Iterator[str]:
-        """Names of all objects."""
-        return (entry["path"] for page in self._asked(lambda: list(self._api.list(self.store))) for entry in page)
 
     def hierarchies(self) -> list[str]:
         """Names of the Zarr hierarchies, as `demo.zarr`."""

@@ -16,7 +16,7 @@ from echotruth.imaging.labels import TissueLabel, unpack
 from echotruth.repository import rounding, schema
 
 Arrays = dict[str, NDArray[Any]]
-"""Arrays of a group for one case (and view), by name; those with frames may be a part of them."""
+"""Arrays of a group by name."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +61,11 @@ RANGES = {
 LOWEST_STRAIN = -0.5 - rounding.STRAIN
 """E = (F^T F - I) / 2 along an axis is above -1/2, because F^T F is positive; with the rounding of the store."""
 
-NORMAL_STRAINS = {
-    "kinematics": {"strain": 3},
-    "truth": {"strain": 3},
-    "evaluation": {"true_strain": 2},
-}
+NORMAL_STRAINS = {"kinematics": {"strain": 3}, "truth": {"strain": 3}, "tracking": {"true_strain": 2}}
 """Number of leading components that are strains along an axis."""
 
 
-def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+def faults(group: str, arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
     """What is wrong with the values of a group.
 
     Parameters
@@ -77,10 +73,7 @@ def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[t
     group : str
         As "truth/512".
     arrays : dict of ndarray
-        All arrays of the group for one case (and view), the members of packs among them; of those with frames, frames
-        from `first` on.
-    first : int
-        Number of their first frame.
+        All arrays of the group.
     config : Config
         Configuration of the case.
 
@@ -89,7 +82,7 @@ def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[t
     name, problem : str
         Name of the array, and what is wrong with it.
     """
-    stage, kinds = group.partition("/")[0], {array.name: array.values for array in schema.named(group)}
+    stage, kinds = group.partition("/")[0], {name: array.values for name, array in schema.arrays_of(group).items()}
     kind = schema.kind(group)
     for name, values in arrays.items():
         for problem in _in_range(values, RANGES[kinds[name]]):
@@ -99,7 +92,7 @@ def faults(group: str, arrays: Arrays, first: int, config: Config) -> Iterator[t
             yield name, "has a strain below -1/2 along an axis"
     yield from _labels(arrays, config)
     if kind in RELATIONS:
-        yield from RELATIONS[kind](arrays, first, config)
+        yield from RELATIONS[kind](arrays, config)
 
 
 def _in_range(values: NDArray[Any], range: Range) -> Iterator[str]:
@@ -123,14 +116,14 @@ def _labels(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
         yield "es_frame", f"is {int(arrays['es_frame'])}, but loop.frames is {frames}"
 
 
-def _geometry(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+def _geometry(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
     nodes = len(arrays["node_position"])
     for name in ("cell_node", "endo", "epi", "base"):
         if int(arrays[name].max(initial=0)) >= nodes:
             yield name, f"names node {arrays[name].max()} of {nodes}"
 
 
-def _fibres(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+def _fibres(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
     for name in ("fibre", "sheet"):
         if not _is_one(np.linalg.norm(arrays[name], axis=-1)):
             yield name, "has vectors whose length is not 1"
@@ -138,7 +131,7 @@ def _fibres(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, s
         yield "sheet", "has sheets that are not normal to the fibres"
 
 
-def _mechanics(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+def _mechanics(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
     if config.motion.kind != "beat":
         return
     for name in ("pressure", "volume", "active_tension", "residual", "stiffness"):
@@ -146,18 +139,18 @@ def _mechanics(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str
             yield name, "has values that are not numbers, although the heart is solved"
 
 
-def _kinematics(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
-    if first == 0 and np.abs(arrays["strain"][0]).max(initial=0) > COMPLEMENT:
+def _kinematics(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
+    if np.abs(arrays["strain"][0]).max(initial=0) > COMPLEMENT:
         yield "strain", "is not 0 at end-diastole, from which it is taken"
 
 
-def _phantom(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+def _phantom(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
     axes = arrays["axes"]
     if not np.allclose(axes @ axes.T, np.eye(3), atol=COMPLEMENT):
         yield "axes", "are not unit vectors normal to each other"
 
 
-def _truth(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+def _truth(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
     label = unpack(arrays["labels"])
     mask = label["mask"]
     for name in ("displacement", "strain", "wall_depth"):
@@ -171,35 +164,32 @@ def _truth(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, st
             yield "labels", f"has a {name} of {label[name].max()}, above {highest}"
     if "tissue" in arrays and bool(((arrays["tissue"] == TissueLabel.WALL) != mask).any()):
         yield "tissue", "is not the wall in a pixel of the wall, or is it outside"
-    if bool((np.isfinite(arrays["flow"]).all(-1) != _has_flow(mask, first, config.loop.frames)).any()):
+    if bool((np.isfinite(arrays["flow"]).all(-1) != _has_flow(mask)).any()):
         yield "flow", "is not a number in a pixel of the wall from which there is a frame, or is one elsewhere"
-    yield from _still_at_ed("displacement", arrays, first)
+    yield from _still_at_ed("displacement", arrays)
 
 
-def _has_flow(mask: NDArray[np.bool_], first: int, frames: int) -> NDArray[np.bool_]:
-    """Where there is a flow to the previous and to the next frame, given the wall in frames from `first` on."""
-    frame = np.arange(first, first + len(mask))
-    exists = np.stack([frame > 0, frame < frames - 1], axis=1)
+def _has_flow(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where there is a flow to the previous and to the next frame, given the wall in all frames."""
+    frame = np.arange(len(mask))
+    exists = np.stack([frame > 0, frame < len(mask) - 1], axis=1)
     return mask[:, None] & exists[..., None, None]
 
 
-def _evaluation(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
+def _tracking(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
     wall = np.isfinite(arrays["wall_axes"]).all((-2, -1))
     if bool((np.isfinite(arrays["true_displacement"]).all(-1) != wall).any()):
         yield "true_displacement", "is not a number at a point of the wall, or is one outside"
-    yield from _still_at_ed("true_displacement", arrays, first)
+    yield from _still_at_ed("true_displacement", arrays)
     if not _is_one(np.linalg.norm(arrays["wall_axes"][wall], axis=-1)):
         yield "wall_axes", "has axes whose length is not 1 in the wall"
-
-
-def _tracking(arrays: Arrays, first: int, config: Config) -> Iterator[tuple[str, str]]:
     if bool((np.isfinite(arrays["displacement"]).all(-1) != np.isfinite(arrays["quality"])).any()):
         yield "quality", "is given where there is no displacement, or the reverse"
 
 
-def _still_at_ed(name: str, arrays: Arrays, first: int) -> Iterator[tuple[str, str]]:
+def _still_at_ed(name: str, arrays: Arrays) -> Iterator[tuple[str, str]]:
     """Displacement is taken from end-diastole, which is frame 0."""
-    if first == 0 and bool(np.nan_to_num(arrays[name][0]).any()):
+    if bool(np.nan_to_num(arrays[name][0]).any()):
         yield name, "is not 0 at end-diastole, from which it is taken"
 
 
@@ -207,43 +197,13 @@ def _is_one(values: NDArray[Any]) -> bool:
     return bool((np.abs(values - 1) <= COMPLEMENT).all())
 
 
-RELATIONS: dict[str, Callable[[Arrays, int, Config], Iterator[tuple[str, str]]]] = {
+RELATIONS: dict[str, Callable[[Arrays, Config], Iterator[tuple[str, str]]]] = {
     "geometry": _geometry,
     "fibres": _fibres,
     "mechanics": _mechanics,
     "kinematics": _kinematics,
     "phantom": _phantom,
     "truth/SIZE": _truth,
-    "tracking/SIZE/TRACKER": _tracking,
-    "evaluation/SIZE": _evaluation,
+    "tracking/SIZE": _tracking,
 }
 """Kind of a group -> faults of its arrays in relation to each other."""
-
-
-def loop_faults(arrays: Arrays, measured: Arrays, config: Config) -> Iterator[tuple[str, str]]:
-    """Whether a heart that was found complete follows its loop, by its curves and not by what was measured then.
-
-    Parameters
-    ----------
-    arrays : dict of ndarray
-        pressure, volume, pressure_target and volume_target of `mechanics`, and volume_ratio_min of `kinematics`,
-        all (frame,).
-    measured : dict of ndarray
-        loop_error and volume_ratio_min of `physiology`, scalars.
-    config : Config
-        Configuration of the case.
-    """
-    error = max(_largest_error(arrays[name], arrays[f"{name}_target"]) for name in ("pressure", "volume"))
-    limit = config.physiology.loop_error_max
-    if not np.isclose(error, measured["loop_error"], rtol=1e-6, atol=1e-12):
-        yield "loop_error", f"is {float(measured['loop_error']):g}, but the curves give {error:g}"
-    if limit is not None and config.motion.kind == "beat" and error > limit:
-        yield "loop_error", f"is {error:g} in a complete heart, above physiology.loop_error_max = {limit:g}"
-    lowest = float(arrays["volume_ratio_min"].min())
-    if lowest != float(measured["volume_ratio_min"]):
-        yield "volume_ratio_min", f"is {float(measured['volume_ratio_min']):g}, but kinematics has {lowest:g}"
-
-
-def _largest_error(solved: NDArray[Any], target: NDArray[Any]) -> float:
-    prescribed = np.isfinite(target)
-    return float(np.max(np.abs(solved[prescribed] / target[prescribed] - 1), initial=0.0))

@@ -4,7 +4,7 @@ Near means within 1/256 of the side of the image, the distance of 1 px of TAP-Vi
 arXiv:2211.03726). The error of a point is taken to be Gaussian in the plane. Its standard deviation follows from what a
 tracker can tell of itself: the correlation of the images along the path of the point, how far the paths forwards and
 backwards are apart, and how far the point has moved. The constants of each method are fitted by maximum likelihood
-(benchmarks/calibration.py); docs/tracking.md says on which hearts.
+(benchmarks/calibration.py of 02d7c8a); docs/tracking.md says on which hearts.
 """
 
 from dataclasses import dataclass

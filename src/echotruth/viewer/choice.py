@@ -59,8 +59,8 @@ class Choice:
 
 def first(repository: Repository) -> Choice:
     """What is shown at first: the first case that is complete, or the first of all."""
-    complete = repository.cases.query("status == 'complete'").index
-    case = str(complete[0]) if len(complete) else repository.present[0]
+    cases = repository.present
+    case = next((case for case in cases if repository.verdict(case).status == "complete"), cases[0])
     return Choice(case, repository.views[0], repository.sizes[0], repository.trackers[-1])
 
 

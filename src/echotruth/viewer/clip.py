@@ -10,22 +10,13 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.imaging.labels import LABELS
-from echotruth.learning.beams import Beams
 from echotruth.repository import estimates, schema
+from echotruth.repository.group import NotWritten
 from echotruth.repository.reader import Repository
 
 Floats32 = NDArray[np.float32]
-PARTS = {"images": "bmode/{size}/image", "truth": "truth/{size}/displacement"}
-"""Part of a clip to the array by which it is known to be written."""
-ESTIMATES = {"tracking": "displacement", "evaluation": "true_displacement"}
-"""Part of what was tracked to the array by which it is known to be written."""
-MISSING = {
-    "images": "images",
-    "truth": "truth at the pixels",
-    "tracking": "tracked motion",
-    "evaluation": "scores and strain",
-}
-"""Part of a clip to what is said to be missing without it."""
+PARTS = {"bmode": "images", "truth": "truth at the pixels", "tracking": "tracked motion and its scores"}
+"""Stage that makes a part of a clip, and what is said to be missing without it."""
 
 
 @dataclass(frozen=True)
@@ -46,24 +37,14 @@ class Clip:
     size: int
 
     @cached_property
-    def place(self) -> tuple[int, ...]:
-        """Row of the case, and index of the view."""
-        return self.repository.place(self.case, self.view)
-
-    @cached_property
-    def missing(self) -> list[str]:
-        """Parts of the clip that no job has written."""
-        return [part for part in MISSING if not self.has(part)]
-
-    def has(self, part: str) -> bool:
-        """Whether a part of the clip is written."""
-        if part in ESTIMATES:
-            return estimates.is_written(self.repository, self.case, self.view, ESTIMATES[part])
-        return self.repository.is_written(PARTS[part].format(size=self.size), self.case, self.view)
+    def parts(self) -> list[str]:
+        """Parts of the clip that were made."""
+        made = [self.repository.attributes(f"{part}/{self.size}", self.case, self.view) for part in PARTS]
+        return [part for part, found in zip(PARTS, made, strict=True) if found.get("status") == "complete"]
 
     def read(self, path: str, *index: Any) -> NDArray[Any]:
         """Part of an array of this case and view."""
-        return self.repository.read(path, *self.place, *index)
+        return self.repository.read(path, self.case, self.view, *index)
 
     def true(self, *names: str) -> dict[str, NDArray[Any]]:
         """What is true at the points of the trackers, by name."""
@@ -75,8 +56,8 @@ class Clip:
 
     @cached_property
     def config(self) -> Config:
-        """Configuration of the case, as far as its probe and its image go."""
-        return Beams(self.repository).config(self.case)
+        """Configuration of the case."""
+        return self.repository.case(self.case).config
 
     @cached_property
     def side(self) -> float:
@@ -86,26 +67,33 @@ class Clip:
     @cached_property
     def is_short_axis(self) -> bool:
         """Whether the view is a short axis."""
-        return self.repository.config.views[self.view].plane == "short_axis"
+        return self.config.views[self.view].plane == "short_axis"
 
     @property
     def frames(self) -> int:
         """Number of frames."""
-        return self.repository.config.loop.frames
+        return self.config.loop.frames
 
     @cached_property
     def time(self) -> Floats:
         """Time since end-diastole, (frame,), s; numbers of frames where the heart has none yet."""
         try:
-            return np.asarray(self.repository.read(f"bmode/{self.size}/time", self.place[0]), float)
-        except FileNotFoundError:
+            return self.read(f"bmode/{self.size}/time").astype(float)
+        except NotWritten:
             return np.arange(self.frames, dtype=float)
 
     @cached_property
     def es_frame(self) -> int | None:
         """Frame of end-systole; None for a heart that was not solved."""
-        known = self.repository.is_written("mechanics/es_frame", self.case)
-        return int(self.repository.read("mechanics/es_frame", self.place[0])) if known else None
+        found = self.of_heart("mechanics", "es_frame")
+        return int(found["es_frame"]) if found else None
+
+    def of_heart(self, group: str, *names: str) -> dict[str, NDArray[Any]]:
+        """Arrays of a group of the heart by name; none of one that was not solved."""
+        try:
+            return self.repository.arrays(group, self.case, None, *names)
+        except NotWritten:
+            return {}
 
     @cached_property
     def image(self) -> NDArray[np.uint8]:

@@ -75,25 +75,21 @@ def no_estimate(clip: Clip, plot: Plot, tracker: str, failure: str) -> str:
     tracked, true = plot.curves[tracker][1:], plot.curves[TRUE][1:]
     if np.isfinite(tracked).any():
         return ""
-    return reason(tracked, true, clip.repository.case(clip.case).config, failure)
+    return reason(tracked, true, clip.config, failure)
 
 
 def rotation(clip: Clip, found: dict[str, xr.Dataset]) -> Plot:
     """Rotation of a short axis, tracked and true; the twist of the heart in a long axis; degrees."""
     if clip.is_short_axis and found:
         return Plot("rotation in this view (°)", _tracked_and_true(found, "rotation", np.degrees(1), {}))
-    if not clip.repository.is_written("physiology/courses", clip.case):
-        return Plot("twist of the heart (°)", {})
-    shown = {"base": "rotation_base", "apex": "rotation_apex", "twist": "twist"}
-    heart = clip.repository.arrays("physiology", clip.case, None, *shown.values())
-    return Plot("rotation of the heart (°)", {name: np.degrees(heart[label]) for name, label in shown.items()})
+    heart = clip.of_heart("physiology", "rotation_base", "rotation_apex", "twist")
+    shown = {name.removeprefix("rotation_"): np.degrees(values) for name, values in heart.items()}
+    return Plot("rotation of the heart (°)", shown)
 
 
 def volume(clip: Clip) -> Plot:
     """Volume of the cavity, µL or mL."""
-    if not clip.repository.is_written("mechanics/volume", clip.case):
-        return Plot("volume of the cavity (µL)", {})
-    values = clip.repository.read("mechanics/volume", clip.place[0])
+    values = clip.of_heart("mechanics", "volume").get("volume", np.full(clip.frames, np.nan))
     factor, unit = (1e9, "µL") if np.nanmax(values, initial=0.0) < MAX_VOLUME_IN_UL else (1e6, "mL")
     return Plot(f"volume of the cavity ({unit})", {TRUE: factor * values})
 
@@ -102,7 +98,7 @@ def parts(clip: Clip, component: str, segments: list[int]) -> list[str]:
     """Parts of the wall of which there are curves: contours, or the wall, its layers and the segments of the view."""
     if component == LINE:
         return list(CONTOURS)
-    layers = range(1, clip.repository.config.fibres.layers + 1)
+    layers = range(1, clip.config.fibres.layers + 1)
     return [WALL, *(f"layer {number}" for number in layers), *(f"segment {number}" for number in segments)]
 
 

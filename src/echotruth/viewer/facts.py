@@ -25,16 +25,15 @@ def text(clip: Clip, trackers: list[str]) -> str:
     trackers : list of str
         Names that the repository does not know are left out.
     """
-    repository, known = clip.repository, clip.repository.cases.loc[clip.case].to_dict()
-    status, reason, _ = (known.pop(name) for name in ("status", "reason", "heart"))
+    repository = clip.repository
+    status, reason = repository.verdict(clip.case)
     verdict = status if status == "complete" else f"<b>{escape(status)}</b>"
     lines = [f"{escape(clip.case)}: {verdict}" + (f" ({escape(reason)})" if reason else "")]
-    if repository.is_written("physiology/scalars", clip.case):
-        lines.append(_numbers(repository.arrays("physiology", clip.case), MEASURES))
+    lines.append(_numbers(clip.of_heart("physiology", *MEASURES), MEASURES))
     lines += [f"{escape(name)}: {_scores(clip, name)}" for name in trackers if name in repository.trackers]
     particular = [
         f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}"
-        for name, value in known.items()
+        for name, value in repository.distinctions.loc[clip.case].items()
         if value not in ("", None)
     ]
     lines.append(escape(", ".join(particular)))
@@ -42,7 +41,7 @@ def text(clip: Clip, trackers: list[str]) -> str:
 
 
 def _scores(clip: Clip, tracker: str) -> str:
-    if not clip.has("evaluation"):
+    if "tracking" not in clip.parts:
         return "not tracked yet"
     try:
         return _numbers(clip.tracked(tracker, *SCORES), SCORES) or "unknown"
@@ -55,5 +54,5 @@ def _numbers(values: dict[str, Any], shown: dict[str, tuple[str, float, str]]) -
     return ", ".join(
         f"{name} {factor * float(values[label]):.3g} {unit}"
         for label, (name, factor, unit) in shown.items()
-        if np.isfinite(values[label])
+        if label in values and np.isfinite(values[label])
     )

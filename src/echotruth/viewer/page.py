@@ -16,7 +16,7 @@ from echotruth.evaluation.leaderboard import failures_of
 from echotruth.repository.reader import Repository
 from echotruth.viewer import arrows, curves, facts, script
 from echotruth.viewer.choice import NOTHING, TRUTH, Choice, inputs
-from echotruth.viewer.clip import MISSING, Clip
+from echotruth.viewer.clip import PARTS, Clip
 from echotruth.viewer.graph import Graph
 from echotruth.viewer.panel import ARROWS, Panel
 from echotruth.viewer.points import Points
@@ -162,7 +162,7 @@ class Page:
         found = self._once("found", (*place, choice.tracker, choice.other), lambda: self._curves(clip))
         self._show_graphs(clip, found)
         self.facts.text = facts.text(clip, [choice.tracker, choice.other])
-        if lacking := ", ".join(name for part, name in MISSING.items() if not clip.has(part)):
+        if lacking := ", ".join(name for part, name in PARTS.items() if part not in clip.parts):
             said = f"Not made for this case and view: {lacking}. The run is not finished, or the heart not complete."
             self._problems[said] = None
         self._say(" ".join(self._problems))
@@ -193,7 +193,7 @@ class Page:
         shown = self.panels[0].figure
         for axis, start, end in ((shown.x_range, -side / 2, side / 2), (shown.y_range, side, 0)):
             axis.update(start=start, end=end, reset_start=start, reset_end=end)
-        if clip.has("evaluation"):
+        if "tracking" in clip.parts:
             lateral, axial, half = (1e3 * value for value in points.extent)
             half = min(MARGIN * half, side / 2)
             lateral = min(max(lateral, half - side / 2), side / 2 - half)
@@ -201,7 +201,7 @@ class Page:
             shown.x_range.update(start=lateral - half, end=lateral + half)
             shown.y_range.update(start=axial + half, end=axial - half)
         black = np.zeros((clip.frames, clip.size, clip.size), np.uint8)
-        self.clip.data = {"grey": [clip.image if clip.has("images") else black]}
+        self.clip.data = {"grey": [clip.image if "bmode" in clip.parts else black]}
         time = 1e3 * clip.time
         self.times.data = {"time": time, "text": [f"{value:.1f} ms" for value in time]}
 
@@ -232,7 +232,7 @@ class Page:
     def _curves(self, clip: Clip) -> dict[str, Any]:
         """Tracker -> curves, of those that have any."""
         found = {}
-        for tracker in (self.choice.tracker, self.choice.other) if clip.has("evaluation") else ():
+        for tracker in (self.choice.tracker, self.choice.other) if "tracking" in clip.parts else ():
             with suppress(ValueError):  # not evaluated on this clip, which the picture says
                 if tracker not in (TRUTH, NOTHING):
                     found[tracker] = self.repository.curves(clip.case, clip.view, tracker, clip.size)
@@ -276,10 +276,10 @@ class Page:
 def _move(panel: Panel, kind: str, points: Points, tracker: str | None, wanted: bool) -> None:
     """Show arrows of a kind if they are wanted, and if what they are made of is written."""
     clip, found = points.clip, None
-    if wanted and kind == "true" and clip.has("evaluation"):
+    if wanted and kind == "true" and "tracking" in clip.parts:
         found = arrows.true_motion(points)
-    elif wanted and kind == "tracked" and tracker and clip.has("tracking"):
+    elif wanted and kind == "tracked" and tracker and "tracking" in clip.parts:
         found = arrows.tracked_motion(points, tracker)
-    elif wanted and kind == "flow" and clip.has("truth"):
+    elif wanted and kind == "flow" and "truth" in clip.parts:
         found = arrows.flow(clip)
     panel.move(kind, found)

@@ -26,7 +26,7 @@ class Points:
     Attributes
     ----------
     clip : Clip
-        Of which `tracking` and `evaluation` are written.
+        Of which `tracking` was made.
     """
 
     clip: Clip

@@ -2,14 +2,20 @@
 
 import signal
 from collections.abc import Callable, Mapping, Sequence
+from html import escape
 from pathlib import Path
 
 from bokeh.application import Application
 from bokeh.application.handlers import FunctionHandler
 from bokeh.document import Document
-from bokeh.server.server import Server
+from bokeh.models import Div
+from bokeh.server.server import BaseServer
+from tornado.httpserver import HTTPServer
+from tornado.ioloop import IOLoop
 
+from echotruth.config.loading import ConfigError
 from echotruth.repository.reader import Repository
+from echotruth.viewer.access import Access
 from echotruth.viewer.choice import asked
 from echotruth.viewer.page import Page
 
@@ -20,7 +26,7 @@ class ShowError(ValueError):
     """Raised if a repository cannot be shown."""
 
 
-def serve(repository: str | Path, port: int = 0) -> Server:
+def serve(repository: str | Path, port: int = 0) -> BaseServer:
     """Start a server that answers to this machine alone.
 
     Parameters
@@ -32,28 +38,33 @@ def serve(repository: str | Path, port: int = 0) -> Server:
 
     Returns
     -------
-    Server
+    BaseServer
         Listening; its `io_loop` is to be started.
 
     Raises
     ------
-    FileNotFoundError
-        If the folder holds no repository.
-    ShowError
-        If there is nothing to show, or the port is in use.
+    ConfigError, OSError, ShowError
+        If there is nothing to show that can be read, or the port is in use.
     """
     opened(repository)  # so that what cannot be shown is said at once
 
     def page(document: Document) -> None:
         context = document.session_context
         query = context.request.arguments if context is not None and context.request is not None else {}
-        now = opened(repository)  # a run may be going on
-        Page(now, asked(now, texts(query)), document)
+        try:
+            now = opened(repository)  # a run may be going on
+            Page(now, asked(now, texts(query)), document)
+        except Exception as error:  # the folder may be gone, and what is damaged fails in many ways
+            said = str(error).removeprefix(f"{repository}: ")
+            document.add_root(Div(text=escape(f"{repository} cannot be shown: {said}"), name="message"))
 
+    access = Access(Application(FunctionHandler(page)))
+    http = HTTPServer(access, max_body_size=0)
     try:
-        server = Server({"/": Application(FunctionHandler(page))}, port=port, address=LOCAL)
+        http.listen(port, LOCAL)
     except OSError as error:
         raise ShowError(f"port {port}: {error.strerror or error}: give another with --port, or leave it out") from None
+    server = BaseServer(IOLoop.current(), access, http)
     server.start()
     return server
 
@@ -68,27 +79,33 @@ def opened(repository: str | Path) -> Repository:
 
     Raises
     ------
-    FileNotFoundError, ShowError
-        If the folder holds no repository, or one without cases.
+    ConfigError, OSError, ShowError
+        If the folder holds no repository, or one that is damaged or without cases.
     """
-    found = Repository(repository)
-    laid_out = found.is_remote or Path(str(found.store)).is_dir()
-    if not laid_out or not found.present or not found.views:
-        raise ShowError(f"{repository}: has no cases or no views yet: run its configuration first")
+    try:
+        found = Repository(repository)
+        is_empty = not found.present
+    except (ConfigError, OSError):
+        raise
+    except Exception as error:  # Zarr raises many kinds of what is damaged
+        said = str(error).partition("\n")[0] or type(error).__name__
+        raise ShowError(f"{repository}: cannot be read ({said}): run echotruth check {repository}") from error
+    if is_empty:
+        raise ShowError(f"{repository}: has no cases: run its configuration, which writes them into cases.csv")
     return found
 
 
-def address(server: Server) -> str:
+def address(server: BaseServer) -> str:
     """Address of the page."""
     return f"http://{LOCAL}:{server.port}/"
 
 
-def run(server: Server, ready: Callable[[], None]) -> None:
+def run(server: BaseServer, ready: Callable[[], None]) -> None:
     """Answer until the process is interrupted or told to end.
 
     Parameters
     ----------
-    server : Server
+    server : BaseServer
     ready : callable
         Called once the server answers.
     """

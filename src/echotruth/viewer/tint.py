@@ -30,11 +30,10 @@ COLOURS = {
 }
 """What the colour can show, and its name."""
 NEEDS = {
-    "none": (),
-    **dict.fromkeys(("strain", "layer", "segment", "region", "wall_depth", "flow", "tissue"), ("truth",)),
-    **dict.fromkeys(("tracked_strain", "strain_error", "displacement_error"), ("tracking", "evaluation")),
+    **dict.fromkeys(("strain", "layer", "segment", "region", "wall_depth", "flow", "tissue"), "truth"),
+    **dict.fromkeys(("tracked_strain", "strain_error", "displacement_error"), "tracking"),
 }
-"""Parts of a clip that a colour is made of."""
+"""Part of a clip that a colour is made of."""
 LABELLED = ("layer", "segment", "region", "tissue")
 """Colours of what has a number and a name."""
 ENTRIES = 255
@@ -87,9 +86,9 @@ def tint(clip: Clip, points: Points, colour: str, component: str, tracker: str |
     tracker : str or None
         None for the truth at the points of the trackers.
     """
-    if colour == "none" or not all(clip.has(part) for part in NEEDS[colour]):
+    if colour == "none" or NEEDS[colour] not in clip.parts:
         return None
-    if colour in ("tracked_strain", "strain_error", "displacement_error"):
+    if NEEDS[colour] == "tracking":
         return _of_points(points, colour, component, tracker)
     if colour in LABELLED:
         return _labels(clip, colour)
@@ -153,7 +152,7 @@ def _labels(clip: Clip, name: str) -> Tint:
     if name == "segment":
         return _segments(label)
     if name == "layer":
-        layers = clip.repository.config.fibres.layers
+        layers = clip.config.fibres.layers
         palette = [to_hex(colour) for colour in layer_colours(layers)]
         names, title = {number: str(number) for number in range(1, layers + 1)}, "Layer, 1 at the endocardium"
     else:

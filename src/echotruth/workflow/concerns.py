@@ -1,15 +1,10 @@
-"""What speaks against a run: it does not fit this machine, or its images cannot show the heart or its strain."""
+"""What speaks against a run: its images cannot show the heart or its strain, or a file holds no wall."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import NamedTuple
-
-import psutil
 
 from echotruth.config import Config
 from echotruth.evaluation.strain import largest_grid
-from echotruth.workflow.estimate import Estimate, format_bytes, free_bytes
-from echotruth.workflow.imaged_tissue import ellipsoids
 
 MAX_PIXEL_WAVELENGTHS = 2.0
 """Pixel of the largest image over the wavelength from which on speckle is lost between pixels: it is about one
@@ -23,44 +18,17 @@ class Concern(NamedTuple):
     is_absurd: bool
 
 
-def concerns(config: Config, estimate: Estimate, folder: Path, is_local: bool = True) -> list[Concern]:
-    """What speaks against a run.
-
-    Parameters
-    ----------
-    config : Config
-    estimate : Estimate
-    folder : Path
-        Folder of the repository, `out/NAME`; it need not exist.
-    is_local : bool
-        Whether the jobs run on this machine.
-    """
-    found = [*_of_the_images(config), *_of_the_file(config), *(_of_the_memory(estimate) if is_local else ())]
-    free, needed = free_bytes(folder), estimate.bytes * estimate.seconds_left / estimate.seconds
-    if needed > 0.95 * free:
-        text = f"{folder}: its disk has {format_bytes(free)} free, and the run needs {format_bytes(needed)}"
-        remedy = "make space, ask for fewer cases, views or frames, a smaller bmode.size_px, or an empty rf.keep"
-        found.append(Concern(f"{text}: {remedy}", True))
-    return found
-
-
-def _of_the_memory(estimate: Estimate) -> Iterator[Concern]:
-    memory = psutil.virtual_memory().total / 1e6
-    rule, most = max(estimate.megabytes.items(), key=lambda entry: entry[1])
-    takes, has = format_bytes(1e6 * most), format_bytes(1e6 * memory)
-    text = f"a job of {rule} takes {takes} of memory, and this machine has {has}"
-    if most > memory:
-        keys = "the elements of geometry" if rule == "mechanics" else "bmode.size_px, phantom.density_per_mm3"
-        yield Concern(f"{text}: decrease {keys} or loop.frames", True)
-    elif min(estimate.cores, estimate.parts[rule].jobs) * most > memory:
-        yield Concern(f"--cores {estimate.cores}: {text}: use --cores {max(1, int(memory / most))}", False)
+def concerns(config: Config) -> Iterator[Concern]:
+    """What speaks against a run."""
+    yield from _of_the_images(config)
+    yield from _of_the_file(config)
 
 
 def _of_the_images(config: Config) -> Iterator[Concern]:
     side, probe = config.bmode.field_of_view_mm, config.probe
     wavelength = probe.sound_speed_m_per_s / probe.frequency_MHz / 1e3
-    width = 2 * ellipsoids(config)[1].radius
-    if config.geometry.file is None and config.motion.kind != "file" and width > side:
+    if config.geometry.file is None and config.motion.kind != "file" and 2 * config.geometry.outer_radius_mm() > side:
+        width = 2 * config.geometry.outer_radius_mm()
         text = f"the heart is {width:.3g} mm wide, so that the image does not show its wall"
         remedy = "use a larger one, and an array and rf.focus_mm that suit it, or leave all to geometry.preset"
         yield Concern(f"bmode.field_of_view_mm = {side:g}: {text}: {remedy}", True)
@@ -72,9 +40,7 @@ def _of_the_images(config: Config) -> Iterator[Concern]:
     most = largest_grid(config.bmode.size_px)
     if config.tracking.grid_px > most >= 1:
         apart = config.tracking.grid_px * side / config.bmode.size_px
-        text = (
-            f"points {apart:.2g} mm apart are too few through the wall for strain at its borders, which is left empty"
-        )
+        text = f"points {apart:.2g} mm apart are too few through the wall for strain at its borders, which stays empty"
         yield Concern(f"tracking.grid_px = {config.tracking.grid_px}: {text}: use {most} or less", False)
 
 

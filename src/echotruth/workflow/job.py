@@ -1,11 +1,11 @@
-"""Execution of one stage for one case, view and image size, and the record that commits its result.
+"""Execution of one stage for a heart, a view or an image size.
 
-A stage is a script: it reads the configuration of its case and what it needs from the store, calls one function, and
-writes the arrays to the store. Last of all it commits a record with their checksums to the ledger, which is the output
-that Snakemake knows of. A job that was killed has no record, and is run again.
+A stage is a script: it reads the configuration of its case and the groups that are inputs of its rule, calls one
+function, and writes groups. A group is moved to its place when it is whole; a job that was killed leaves none.
 """
 
 import argparse
+import json
 import logging
 import sys
 from collections.abc import Callable, Mapping
@@ -14,36 +14,63 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import zarr
 from numpy.typing import ArrayLike
-from threadpoolctl import threadpool_limits
 
 from echotruth.cases.case import Case
-from echotruth.config import View
-from echotruth.config.loading import ConfigError
+from echotruth.config import Config, View
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane, imaging_plane
-from echotruth.repository import ledger, packing, schema, settings
-from echotruth.repository.case_file import read_case
-from echotruth.repository.checksums import ChecksumError, checksums
-from echotruth.repository.ledger import STAGES, record_path, repository_folder
-from echotruth.repository.provenance import code_version
-from echotruth.repository.store import NotWritten, Store
-from echotruth.repository.verdict import excluded
+from echotruth.repository import group, metadata, schema
+from echotruth.repository.coordinates import coordinates_of
+from echotruth.repository.places import place, repository_folder
+from echotruth.repository.reader import SIZED
+from echotruth.repository.status import excluded
+from echotruth.repository.version import version_of
 from echotruth.seeds import generator
-from echotruth.workflow import instructions, lease
+from echotruth.workflow import lock
 from echotruth.workflow.failure import CaseFailed
-from echotruth.workflow.processes import lock_cache_writes, script
+from echotruth.workflow.processes import lock_cache_writes
 
 Result = Mapping[str, Mapping[str, ArrayLike]]
-"""Arrays by group."""
+"""Arrays, and coordinates of their own, by group."""
 
 Work = Callable[["Job"], Result]
 log = logging.getLogger("echotruth")
 
+OF_HEART = ("mechanics", "inference")
+"""Stages that have a job for a heart, and not for its views."""
+
+
+def case_file(folder: Path, case: str) -> Path:
+    """File with the configuration of one case, which its jobs read."""
+    return folder / "cases" / f"{case}.json"
+
+
+def case_text(case: Case) -> str:
+    """Content of the file of a case."""
+    return json.dumps({"heart": case.heart, "config": case.config.model_dump(mode="json")})
+
+
+def read_case(folder: Path, case: str) -> Case:
+    """The case of a job.
+
+    Raises
+    ------
+    FileNotFoundError
+        If it has no configuration, or one that is damaged.
+    """
+    path, remedy = case_file(folder, case), "the ids are in cases.csv; run the repository again, which writes the file"
+    try:
+        found = json.loads(path.read_bytes())
+        return Case(case, {}, Config.model_validate(found["config"], strict=False), heart=found["heart"])
+    except FileNotFoundError:
+        raise FileNotFoundError(f"{path}: is not there: {remedy}") from None
+    except (ValueError, KeyError, TypeError):
+        raise FileNotFoundError(f"{path}: is damaged: {remedy}") from None
+
 
 class Job:
-    """Inputs, results and record of one stage for one case, view and image size.
+    """Inputs and results of one stage for one case, view and image size.
 
     Parameters
     ----------
@@ -51,53 +78,26 @@ class Job:
         Folder of the repository, `out/NAME`.
     stage : str
     case : str
-        Id of the case, whose configuration is `cases/CASE.json`.
+        Id of the case; of mechanics, of any that has the heart.
     view : str, optional
         Name of the view, for stages that are run per view.
     size : int, optional
-        Image size, px, for stages that are run per size.
-    code : str, optional
-        Version of the code of the stage (default: that of its script).
-    same_as : Path, optional
-        Record of the case whose motion is taken over.
+        Image size, px, for tracking.
 
     Attributes
     ----------
     config : Config
         Configuration of the case.
-    scatterers, lines : Path
-        Files that the stages of a view pass on, and Snakemake deletes when they are not needed any more.
-    earlier : dict
-        Record of an earlier run; empty if there is none.
+    notes : dict
+        Further attributes of the groups that are written.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        stage: str,
-        case: str,
-        view: str | None = None,
-        size: int | None = None,
-        code: str = "",
-        same_as: Path | None = None,
-    ) -> None:
-        self.folder, self.stage, self.view_name, self.size, self.same_as = folder, stage, view, size or 0, same_as
+    def __init__(self, folder: Path, stage: str, case: str, view: str | None = None, size: int | None = None) -> None:
+        self.folder, self.stage, self.view_name, self.size = folder, stage, view, size or 0
         self.case: Case = read_case(folder, case)
         self.config = self.case.config
-        self.code = code or code_version(script(stage))
-        self.store = Store(folder / f"{self.config.name}.zarr")
-        self.record = record_path(folder, stage, case, view, size)
-        self.earlier = self._read_earlier()
-        scratch = folder / "scratch" / case / str(view)
-        self.scatterers, self.lines = scratch / "scatterers.npz", scratch / "lines.npz"
-        self._notes: dict[str, Any] = {}
-        self.row = ledger.rows(folder / "registry.txt")[case]
-
-    def _read_earlier(self) -> dict[str, Any]:
-        try:
-            return ledger.read(self.record)
-        except (FileNotFoundError, ValueError):
-            return {}
+        self.store = folder / f"{self.config.name}.zarr"
+        self.notes: dict[str, Any] = {}
 
     @property
     def view(self) -> View:
@@ -109,127 +109,88 @@ class Job:
         """Function from what is drawn to its random numbers for this case and view."""
         return partial(generator, self.case, str(self.view_name))
 
-    @property
-    def index(self) -> tuple[int, ...]:
-        """Row of the case, and index of the view if there is one: their places in the store, which never change."""
-        if self.view_name is None:
-            return (self.row,)
-        return self.row, ledger.rows(self.folder / "views.txt")[self.view_name]
-
     @cached_property
     def heart(self) -> Heart:
         """Solved heart of this case."""
-        groups = ("geometry", "fibres", "pathology", "mechanics")
-        return Heart.of({group: self.store.read(group, self.row) for group in groups}, self.config)
+        return Heart.of(
+            {name: self.read(name) for name in ("geometry", "fibres", "pathology", "mechanics")}, self.config
+        )
 
     @cached_property
     def plane(self) -> Plane:
         """Imaging plane of the view."""
         return imaging_plane(self.view, self.config.rf, self.heart.endo_at_ed)
 
-    def read(self, group: str, *names: str) -> dict[str, Any]:
-        """Arrays of a group for this case (and view)."""
-        return self.store.read(group, *self.index, names=names or None)
+    def read(self, name: str, *arrays: str) -> dict[str, Any]:
+        """Arrays of a group for this case (and view), all if none is named."""
+        return group.read(self.store, self._place(name), *arrays)
 
-    def coordinates(self, group: str, *names: str) -> dict[str, Any]:
-        """Coordinates of a group, which all cases share."""
-        paths = {name: self.store.path / group / name for name in names}
-        return {name: np.asarray(zarr.open_array(path, mode="r", zarr_format=3)[...]) for name, path in paths.items()}
+    def coordinate(self, name: str, coordinate: str) -> Any:
+        """Values of a coordinate of a group."""
+        return np.asarray(group.open_group(self.store, self._place(name))[coordinate][...])  # type: ignore[index]
 
-    def files(self, group: str) -> list[Path]:
-        """Files of this job in a group."""
-        return self.store.files(group, *self.index)
-
-    def pass_on(self, file: Path, arrays: Mapping[str, np.ndarray]) -> None:
-        """Write the file with which a stage of a view passes arrays on."""
-        file.parent.mkdir(parents=True, exist_ok=True)
-        np.savez(file, **arrays)  # type: ignore[arg-type]  # no array has the name of an option
-
-    def passed_on(self, file: Path) -> dict[str, np.ndarray]:
-        """Arrays that an earlier stage of the view passed on.
-
-        Raises
-        ------
-        FileNotFoundError
-            If they are not there, or not any more: a damaged file is deleted, so that the next run makes it anew.
-        """
-        if not file.is_file():
-            stage = {self.scatterers: "phantom", self.lines: "rf"}[file]
-            raise FileNotFoundError(f"{file}: is not there: run the stage {stage} first")
-        try:
-            # A .npz has a CRC-32 of every array.
-            with np.load(file, allow_pickle=False) as opened:
-                arrays = dict(opened)
-            # What is no array comes as the bytes that stand there.
-            if not all(isinstance(values, np.ndarray) for values in arrays.values()):
-                raise ValueError
-            return arrays
-        except Exception:  # a damaged archive raises one of many errors
-            file.unlink()
-            remedy = "it is deleted, and the next run makes it anew"
-            raise FileNotFoundError(f"{file}: is not what was written: {remedy}") from None
-
-    def note(self, **entries: Any) -> None:
-        """Add entries to the record of this job."""
-        self._notes |= entries
-
+    @cached_property
     def excluded(self) -> str:
         """Why this stage is not run for this heart; empty if it is to be run."""
-        return "" if self.stage == "mechanics" else excluded(self.folder, self.case.id, self.config)
+        found = metadata.attributes(self.store / self._place("heart"))
+        return "" if self.stage == "mechanics" else excluded(found, self.config.physiology)
 
-    def commit(self, result: Result) -> None:
-        """Write the result, then the record."""
-        self.withdraw()
-        files: list[Path] = []
-        for group, values in result.items():
-            # Coordinates, such as the times of a motion, belong to no job: they stand since the arrays were laid out.
-            stored = packing.pack(schema.packs_of(group), values)
-            own = {array.name for array in schema.arrays_of(group)} & stored.keys()
-            for file in self.files(group):
-                # Zarr would read a damaged shard before it replaces all of its chunks.
-                if file.relative_to(self.store.path / group).parts[0] in own:
-                    file.unlink()
-            self.store.write(group, {name: stored[name] for name in own}, *self.index)
-            files += self.files(group)
-        self._commit(status="complete", sha256=checksums(files, self.store.path), **self._notes)
+    @cached_property
+    def version(self) -> str:
+        """What the groups are made with; to be asked for first, as code and files may change while the job works."""
+        return version_of(self.stage, self.config, self.view_name, self.excluded)
 
-    def withdraw(self) -> None:
-        """Withdraw the record of an earlier run, because the files for which it vouches are about to change.
+    def groups(self) -> list[str]:
+        """Groups that this job writes: those of which Snakemake knows."""
+        if self.stage in OF_HEART:
+            return ["heart" if self.stage == "mechanics" else "inference"]
+        if self.stage not in SIZED:
+            return [self.stage]
+        return [f"{self.stage}/{size}" for size in ([self.size] if self.size else self.config.bmode.sizes)]
 
-        So are those of the whole repository; and if this job is killed, Snakemake makes a record that is lost again
-        only for what lacks its own output.
-        """
-        (self.folder / "ledger/repository.json").unlink(missing_ok=True)
-        self.record.unlink(missing_ok=True)
+    def write(self, result: Result) -> None:
+        """Write the groups of a result, each as a whole."""
+        about = {"status": "complete", "reason": "", "version": self.version} | self.notes
+        if self.stage in OF_HEART:
+            self._write({name: partial(_write_groups, result, self.config, about) for name in self.groups()})
+        else:
+            self._write(
+                {name: partial(_write_group, name, values, self.config, about) for name, values in result.items()}
+            )
 
-    def commit_without_result(self, status: str, reason: str) -> None:
-        """Record that there is no result, and why; delete the result of an earlier run."""
-        self.withdraw()
-        for group in schema.written_by(self.stage, self.config, self.size or None):
-            for file in self.files(group):
-                file.unlink()
-        passed_on = {"phantom": [self.scatterers], "rf": [self.lines]}
-        for file in passed_on.get(self.stage, []):
-            self.pass_on(file, {})
-        self._commit(status=status, reason=reason)
+    def write_nothing(self, status: str, reason: str) -> None:
+        """Write groups that say why there is no result."""
+        about = {"status": status, "reason": reason, "version": self.version}
+        self._write({name: partial(group.write_nothing, attributes=about) for name in self.groups()})
 
-    def _commit(self, **entries: Any) -> None:
-        lease.confirm()
-        place = {"case": self.case.id, "view": self.view_name, "size": self.size or None}
-        made = {"seed": self.config.seed, "code": self.code, "instructions": instructions.kind()}
-        made["settings"] = settings.of_job(self.config, self.stage, self.view_name)
-        ledger.commit(self.record, {"stage": self.stage} | place | made | entries)
+    def _write(self, groups: dict[str, Callable[[Path], None]]) -> None:
+        group.write_groups(self.store, {self._place(name): write for name, write in groups.items()})
+
+    def _place(self, name: str) -> str:
+        return place(name, self.case.heart, self.case.id, self.view_name)
+
+
+def _write_group(name: str, values: Mapping[str, ArrayLike], config: Config, about: dict[str, Any], to: Path) -> None:
+    own = {coordinate: values[coordinate] for coordinate in values if coordinate in schema.COORDINATES}
+    group.write(to, name, values, coordinates_of(name, config) | own, config, about)
+
+
+def _write_groups(result: Result, config: Config, about: dict[str, Any], folder: Path) -> None:
+    """Write several groups into one, which has their metadata too."""
+    for name, values in result.items():
+        _write_group(name, values, config, {}, folder / name.rpartition("/")[2])
+    metadata.write(folder, about)
 
 
 def main(stage: str, work: Work, description: str | None) -> None:
-    """Run a stage with the arguments of its command line, and record its result, or that the heart has none."""
+    """Run a stage with the arguments of its command line, and write its groups, or why there are none."""
     arguments = vars(_parser(stage, description).parse_args())
     folder = arguments.pop("folder")
-    _prepare(arguments.pop("threads"), " ".join(str(arguments[name]) for name in STAGES[stage]))
+    _prepare(arguments.pop("threads"), " ".join(str(value) for value in arguments.values()))
     try:
-        lease.follow(folder)
+        lock.share(folder)
         job = Job(repository_folder(folder), stage, **arguments)
-    except (ConfigError, FileNotFoundError, KeyError, lease.LeaseError) as error:
+    except (FileNotFoundError, lock.LockError) as error:
         sys.exit(f"{stage}: {error}")
     if job.view_name is not None and job.view_name not in job.config.views:
         sys.exit(f"{stage}: {job.view_name} is not a view of {job.folder}: use {', '.join(job.config.views)}")
@@ -240,44 +201,46 @@ def main(stage: str, work: Work, description: str | None) -> None:
 
 
 def run(job: Job, work: Work) -> None:
-    """Do the work of a job and record its result, or that the heart has none."""
-    if reason := job.excluded():
-        log.warning("skipped: %s", reason)
-        return job.commit_without_result("skipped", reason)
+    """Do the work of a job and write its groups, or why the heart has none."""
+    from threadpoolctl import threadpool_limits
+
     try:
+        log.info("version %s", job.version)
+        if job.excluded:
+            log.warning("skipped: %s", job.excluded)
+            return job.write_nothing("skipped", job.excluded)
         # The rounding of BLAS sums depends on the number of threads, but results must not.
         with threadpool_limits(1):
-            result = work(job)
-            job.commit(result)
-    except (NotWritten, ChecksumError, FileNotFoundError) as error:
+            return job.write(work(job))
+    except (group.NotWritten, FileNotFoundError) as error:
         sys.exit(f"{job.stage}: {error}")
     except OSError as error:
         remedy = "the folder must be writable, on a disk that has space and no errors"
         sys.exit(f"{job.stage}: {error.filename or job.folder}: {error.strerror or error}: {remedy}")
     except CaseFailed as error:
         log.warning("failed: %s", error)
-        job.commit_without_result("failed", str(error))
+        job.write_nothing("failed", str(error))
 
 
 def _prepare(threads: int, place: str) -> None:
-    """Give the log the name of a job, and its number of threads to numba."""
-    import numba
+    """Give the log the name of a job, and its number of threads to Numba if the stage has compiled functions."""
+    if "numba" in sys.modules:
+        import numba
 
-    lock_cache_writes()
-    numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))  # type: ignore[attr-defined]  # set at run time
+        lock_cache_writes()
+        numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))  # type: ignore[attr-defined]
+        logging.getLogger("numba").setLevel(logging.WARNING)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format=f"{place}: %(message)s", force=True)
-    logging.getLogger("numba").setLevel(logging.WARNING)
 
 
 def _parser(stage: str, description: str | None) -> argparse.ArgumentParser:
     """Command line of a stage."""
     parser = argparse.ArgumentParser(prog=f"{stage}.py", description=description)
     parser.add_argument("folder", type=Path, help="folder of the repository, such as out/demo")
-    helps = {"case": "case id from cases.csv", "view": "name of the view", "size": "image size in pixels"}
-    for name in STAGES[stage]:
-        parser.add_argument(name, type=int if name == "size" else str, help=helps[name])
+    parser.add_argument("case", help="case id from cases.csv")
+    if stage not in OF_HEART:
+        parser.add_argument("view", help="name of the view")
+    if stage == "tracking":
+        parser.add_argument("size", type=int, help="image size in pixels")
     parser.add_argument("--threads", type=int, default=1, help="number of threads; results do not depend on it")
-    parser.add_argument("--code", default="", help="version of the code, for the record (default: that of the script)")
-    if stage == "mechanics":
-        parser.add_argument("--same-as", type=Path, nargs="?", help="record of a heart whose motion is taken over")
     return parser

@@ -1,44 +1,34 @@
-"""What the rules ask of a configuration: its hearts, and what the job of a rule depends on and needs."""
+"""What the Snakefile asks of a configuration: its hearts, cases, views and sizes, and what of them stands already."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from copy import copy
+import atexit
+import shutil
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import yaml
+
+from echotruth import files
 from echotruth.cases import Case, expand
-from echotruth.config import Cases, Config
-from echotruth.config.loading import ConfigError, load, validate
-from echotruth.repository import ledger, settings
-from echotruth.repository.choice import image_size
-from echotruth.repository.ledger import record_path, record_paths
-from echotruth.repository.provenance import code_version, settings_version
-from echotruth.repository.verdict import excluded
-from echotruth.workflow import lease, resources
-from echotruth.workflow.blocks import Block
-from echotruth.workflow.processes import script
-from echotruth.workflow.sharing import first_with_same
+from echotruth.config import Config
+from echotruth.config.loading import validate
+from echotruth.config.reading import SHORT_FLOAT
+from echotruth.repository import metadata
+from echotruth.repository.places import METADATA, place
+from echotruth.repository.publication import CHECKSUMS, as_csv, table_of
+from echotruth.repository.reader import SIZED
+from echotruth.repository.status import excluded
+from echotruth.repository.version import BEFORE, version_of
+from echotruth.workflow import cost, lock
+from echotruth.workflow.job import case_file, case_text
+
+OUTDATED_CHECKSUMS = f".{CHECKSUMS}.outdated"
+"""Name of the checksums of a repository that is to be published anew."""
 
 Wildcards = Any
-"""Wildcards of a job: its `case`, and its `view` and `size` if there are."""
-
-
-def errors_version(config: Config, cases: Iterable[Case]) -> str:
-    """Hash of the errors of the tracker from which the muscle of cases is inferred, "" if none is named.
-
-    Raises
-    ------
-    NoErrors, PriorError
-        If they are not known, or the priors cannot be used.
-    """
-    if not config.inference.tracker:
-        return ""
-    from echotruth.inference.parameters import check_prior
-    from echotruth.inference.tracker_errors import version
-
-    check_prior(config.inference.prior)
-    return version(case.config for case in cases)
+"""Wildcards of a job: its `heart` or `case`, and its `view` and `size` if there are."""
 
 
 class Plan:
@@ -47,8 +37,7 @@ class Plan:
     Parameters
     ----------
     values : dict
-        The configuration, as Snakemake has it. Its key `block`, such as "3/40", takes one part of the hearts; "0/40"
-        takes none, and so leaves the repository and its report.
+        The configuration, as Snakemake has it.
     source : str, optional
         Where it comes from, for errors.
 
@@ -58,7 +47,7 @@ class Plan:
     folder : Path
         Folder of the repository, `out/NAME`.
     cases : dict
-        Hearts of this plan, by id.
+        Id -> case.
 
     Raises
     ------
@@ -67,127 +56,116 @@ class Plan:
     """
 
     def __init__(self, values: dict[str, Any], source: str = "configuration") -> None:
-        given = dict(values)
-        block = given.pop("block", None)
-        self._is_block = block is not None
-        self.config: Config = validate(given, source)
+        self.config: Config = validate(dict(values), source)
         self.folder = Path("out") / self.config.name
-        self._every = {case.id: case for case in expand(self.config, source)}
-        self._errors = self._errors_version(source)
-        self._motions = settings.motions({id: case.config for id, case in self._every.items()})
-        self._same = first_with_same(self._motions, ledger.rows(self.folder / "registry.txt"))
-        self._choose(Block.parse(block, source))
-
-    def _choose(self, block: Block) -> None:
-        self._block = block
-        self.cases: dict[str, Case] = {id: self._every[id] for id in block.of(self._motions)}
-
-    def block(self, number: int, count: int) -> Plan:
-        """The plan of a block of the hearts, which numbers from 1 to `count`."""
-        plan = copy(self)
-        plan._choose(Block(number, count))
-        return plan
+        self.cases: dict[str, Case] = {case.id: case for case in expand(self.config, source)}
+        self._aside: dict[Path, Path] = {}
 
     @property
-    def mark(self) -> Path:
-        """File that says that the hearts of this plan were made, with these settings and this code."""
-        code = [self.code(stage) for stage in ledger.stages(self.config)]
-        hearts = [[id, case.parameters, self._motions[id]] for id, case in self.cases.items()]
-        common = self.config.model_copy(update={"cases": Cases()})
-        return self.folder / "blocks" / f"{settings_version(common, code, hearts)}.made"
+    def store(self) -> Path:
+        """The Zarr hierarchy, `out/NAME/NAME.zarr`."""
+        return self.folder / f"{self.config.name}.zarr"
 
-    def stands(self) -> bool:
-        """Whether the hearts of this plan were made, and all their records are there."""
-        return self.mark.is_file() and all(path.is_file() for path in self._record_paths())
+    @cached_property
+    def hearts(self) -> dict[str, str]:
+        """Heart -> a case that has it."""
+        return {case.heart: id for id, case in reversed(self.cases.items())}
+
+    def case_of(self, wildcards: Wildcards) -> str:
+        """A case of a heart, whose configuration says how it beats."""
+        return self.hearts[wildcards.heart]
+
+    def heart(self, wildcards: Wildcards) -> str:
+        """Metadata of the heart of a case: an input of the jobs of its views."""
+        return f"{self.store}/hearts/{self.cases[wildcards.case].heart}/{METADATA}"
+
+    def resources(self, rule: str) -> dict[str, Any]:
+        """Time (min) and memory (MB) that a job asks for; one that failed asks for more."""
+        asked = cost.resources(rule, self.config)
+        return {name: lambda wildcards, attempt, value=value: attempt * value for name, value in asked.items()}
+
+    def settle(self) -> None:
+        """Set aside what was made with other settings or by other code, so that Snakemake makes it again.
+
+        What a group was made with is in the group: a copy of the folder is judged as the original is, whatever the
+        dates of its files. Whoever holds the lock does it, and removes what a killed run left. At the end of a process
+        that did not begin a run, as one that only lists jobs, all is as before.
+
+        Raises
+        ------
+        LockError
+            If another run works on the folder.
+        """
+        if not self.folder.is_dir() or not lock.hold(self.folder):
+            return
+        shutil.rmtree(self.folder / "drafts", ignore_errors=True)
+        atexit.register(self._take_back)
+        for heart, id in self.hearts.items():
+            self._settle(self.store / "hearts" / heart, version_of("mechanics", self.cases[id].config))
+        for case in self.cases.values():
+            self._settle_clips(case)
+        if not all(path.is_file() and path.read_bytes() == text for path, text in self._texts().items()):
+            self._set_checksums_aside()  # so that the rule repository writes them
+
+    def _settle(self, folder: Path, version: str) -> None:
+        was_there = (folder / METADATA).is_file()
+        if not metadata.settle(folder, version) and was_there:
+            self._aside[folder / METADATA] = folder / metadata.OUTDATED
+
+    def _set_checksums_aside(self) -> None:
+        path, aside = self.folder / CHECKSUMS, self.folder / OUTDATED_CHECKSUMS
+        if path.is_file():
+            path.replace(aside)
+            self._aside[path] = aside
+
+    def _take_back(self) -> None:
+        """Take back what was set aside for a run that did not begin: one that only lists its jobs."""
+        for path, aside in self._aside.items():
+            if aside.exists() and not path.exists():
+                aside.replace(path)
+
+    def _settle_clips(self, case: Case) -> None:
+        found = metadata.attributes(self.store / "hearts" / case.heart)
+        why = excluded(found, case.config.physiology)
+        for stage in (stage for stage in BEFORE if stage not in ("mechanics", "inference")):
+            for view in self.config.views:
+                version = version_of(stage, case.config, view, why)
+                for size in self.config.bmode.sizes if stage in SIZED else [None]:
+                    group = stage if size is None else f"{stage}/{size}"
+                    self._settle(self.store / place(group, case.heart, case.id, view), version)
+        if self.config.inference.tracker:
+            version = version_of("inference", case.config, None, why)
+            self._settle(self.store / place("inference", case.heart, case.id), version)
 
     def begin(self) -> None:
-        """Hold the lease of the folder until this process ends, and lay the repository out.
+        """Write the configuration, that of each case, and the table of the cases."""
+        lock.hold(self.folder)
+        self._aside.clear()
+        (self.folder / f".{CHECKSUMS}.outdated").unlink(missing_ok=True)
+        (self.folder / OUTDATED_CHECKSUMS).unlink(missing_ok=True)
+        for case in self.cases.values():
+            files.update(case_file(self.folder, case.id), case_text(case).encode())
+        for path, text in self._texts().items():
+            files.update(path, text)
 
-        For the blocks of a sweep that is done once.
-        """
-        lease.hold(self.folder)
-        if not (self._is_block and self._is_laid_out()):
-            from echotruth.repository.layout import lay_out
+    def _texts(self) -> dict[Path, bytes]:
+        """Configuration and table of the cases, as they are to be."""
+        cases = as_csv(table_of(self.store, list(self.cases.values())))
+        return {self.folder / "config.yaml": as_yaml(self.config).encode(), self.folder / "cases.csv": cases}
 
-            lay_out(self.folder, self.config, list(self._every.values()))
 
-    def _is_laid_out(self) -> bool:
-        """Whether the repository is laid out for this configuration."""
-        try:
-            return load(self.folder / "config.yaml") == self.config
-        except ConfigError:
-            return False
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]  # which of them is not known
+    """Writer of YAML in which the table of hearts keeps its lines."""
 
-    def code(self, stage: str) -> str:
-        """Version of the code of a stage; if it changes, the stage is run again."""
-        return code_version(script(stage))
 
-    def settings(self, stage: str) -> Callable[[Wildcards], str]:
-        """Hash of the settings of a stage, besides those of the stages before it; as a function of wildcards."""
-        if stage == "mechanics":
-            return lambda wildcards: self._motions[wildcards.case]
-        if stage == "inference":
-            return lambda wildcards: settings_version(*settings.inference(self.config), self._errors)
-        if stage == "repository":
-            return lambda wildcards: settings_version(self.config, list(self._every))
-        return lambda wildcards: self._settings(stage, wildcards.case, wildcards.view)
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style="|" if "\n" in text else None)
 
-    def _settings(self, stage: str, case: str, view: str) -> str:
-        return settings_version(*settings.OF_VIEW[stage](self._every[case].config, view))
 
-    def _errors_version(self, source: str) -> str:
-        try:
-            return errors_version(self.config, self._every.values())
-        except ValueError as error:
-            raise ConfigError(f"{source}: inference: {error}") from None
+_Dumper.add_representer(str, _text)
+_Dumper.add_implicit_resolver(*SHORT_FLOAT)  # so that such a text is written in quotes
 
-    def same_motion(self, wildcards: Wildcards) -> list[str]:
-        """Record of the heart from which a heart takes over its motion, if there is one."""
-        first = self._same.get(wildcards.case)
-        return [] if first is None else [str(record_path(self.folder, "mechanics", first))]
 
-    def excluded(self, wildcards: Wildcards) -> str:
-        """Why a heart is not imaged; empty if it is. Other bounds run again only what they decide otherwise."""
-        return excluded(self.folder, wildcards.case, self._every[wildcards.case].config)
-
-    def tracked(self, wildcards: Wildcards) -> list[str]:
-        """Records of what was tracked in the views of a heart, in the images from which is inferred."""
-        size = image_size(self.config, self.config.inference.size_px)
-        return [str(record_path(self.folder, "tracking", wildcards.case, view, size)) for view in self.config.views]
-
-    def bmode_source(self, wildcards: Wildcards) -> list[str]:
-        """What a clip is made from: lines, kept or not, or the largest clip."""
-        case, view, largest = wildcards.case, wildcards.view, self.config.bmode.sizes[0]
-        if int(wildcards.size) != largest:
-            return [str(record_path(self.folder, "bmode", case, view, largest))]
-        rf = record_path(self.folder, "rf", case, view)
-        lines = self.folder / "scratch" / case / view / "lines.npz"
-        return [str(rf)] if "lines" in self.config.rf.keep else [str(rf), str(lines)]
-
-    def records(self, wildcards: Wildcards) -> list[str]:
-        """Records of all jobs, so that a lost one is made again; for what follows the blocks, their marks."""
-        number, count = self._block
-        if number:
-            return [str(path) for path in self._record_paths()]
-        blocks = [self.block(number, count) for number in range(1, count + 1)]
-        return [str(block.mark) for block in blocks if block.cases]
-
-    def _record_paths(self) -> list[Path]:
-        return [path for case in self.cases for path in record_paths(self.folder, case, self.config)]
-
-    def external_scores(self, wildcards: Wildcards) -> list[str]:
-        """Scores of trackers from outside."""
-        return [str(path) for path in sorted(self.folder.glob("external/*.csv"))]
-
-    def runtime(self, rule: str) -> Callable[..., int]:
-        """Time that a job asks for, min; one that failed asks for more."""
-        return lambda wildcards, attempt: attempt * self._resource(resources.minutes, rule, wildcards)
-
-    def mem_mb(self, rule: str) -> Callable[..., int]:
-        """Memory that a job asks for, MB; one that failed asks for more."""
-        return lambda wildcards, attempt: attempt * self._resource(resources.megabytes, rule, wildcards)
-
-    def _resource(self, of: Callable[..., int], rule: str, wildcards: Wildcards) -> int:
-        place = dict(wildcards.items())
-        config = self._every[place["case"]].config if "case" in place else self.config
-        return of(rule, config, place.get("view", ""), int(place.get("size", 0)))
+def as_yaml(config: Config) -> str:
+    """Text of config.yaml."""
+    return yaml.dump(config.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False, allow_unicode=True)

@@ -3,28 +3,37 @@
 import fcntl
 import os
 import sys
+from hashlib import sha256
 from pathlib import Path
 from shlex import quote
 from typing import Any
 
-from echotruth.config import shipped
-from echotruth.repository.provenance import code_version
+from echotruth.repository.version import PACKAGE
 from echotruth.workflow import instructions
 
-SCRIPTS_THAT_COMPILE = ("mechanics", "phantom", "rf", "truth", "bmode", "tracking", "inference", "report")
-"""Scripts that call compiled functions."""
 
+def prefix(root: Path) -> str:
+    """Beginning of the shell commands of all rules.
 
-def prefix(folder: Path) -> str:
-    """Beginning of the shell commands of all rules, given the folder of the repository, `out/NAME`."""
+    Parameters
+    ----------
+    root : Path
+        Folder of the Snakefile: a checkout, whose package is used whatever is installed, or the installed package.
+    """
     variables = {
-        "SCRIPTS": str(shipped.ROOT / "workflow/scripts"),
-        "REPOSITORY": str(folder),
+        "SCRIPTS": str(root / "workflow/scripts"),
         "PATH": f"{Path(sys.executable).parent}:{os.environ.get('PATH', '')}",  # the Python of this process comes first
         "NUMBA_CACHE_DIR": str(Path(".snakemake/numba", cache_name()).absolute()),
     }
+    forbidden = ""
+    if os.environ.get("PYTHONDONTWRITEBYTECODE"):
+        # A process compiles what it imports for longer than most jobs take: it does so once, in a folder of its own.
+        forbidden = "unset PYTHONDONTWRITEBYTECODE; "
+        variables["PYTHONPYCACHEPREFIX"] = str(Path(".snakemake/pycache").absolute())
+    if (root / "src").is_dir():
+        variables["PYTHONPATH"] = f"{root / 'src'}:{os.environ.get('PYTHONPATH', '')}".rstrip(":")
     exports = " ".join(f"{name}={quote(value)}" for name, value in variables.items())
-    return f"set -euo pipefail; {instructions.exports()}export {exports}; "
+    return f"set -euo pipefail; {forbidden}{instructions.exports()}export {exports}; "
 
 
 def cache_name() -> str:
@@ -33,12 +42,10 @@ def cache_name() -> str:
     Numba checks only the file of a cached function for changes, not those of the functions that it calls. Therefore
     each version of the code has a cache of its own.
     """
-    return code_version(*map(script, SCRIPTS_THAT_COMPILE))
-
-
-def script(stage: str) -> str:
-    """Path of the script of a stage."""
-    return str(shipped.ROOT / f"workflow/scripts/{stage}.py")
+    digest = sha256()
+    for file in sorted(PACKAGE.rglob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def lock_cache_writes() -> None:

@@ -38,15 +38,13 @@ COLUMNS = (
 Row = dict[str, str | int | float]
 
 
-def difficulty(repository: Repository, case: str, view: str, parameters: int = PARAMETERS) -> list[Row]:
+def difficulty(repository: Repository, case: str, view: str) -> list[Row]:
     """Determine how difficult a clip is to track.
 
     Parameters
     ----------
     repository : Repository
     case, view : str
-    parameters : int
-        Parameters for each component of the smooth motion of the Cramer-Rao bound.
 
     Returns
     -------
@@ -57,8 +55,8 @@ def difficulty(repository: Repository, case: str, view: str, parameters: int = P
     paths = [_paths(scene, given, order) for order in scene.orders]
     rows: list[Row] = []
     for size, clip in given.items():
-        ways = [_way(scene, clip, path, parameters) for path in paths]
-        keys: Row = {"case": case, "view": view, "size_px": size, "crb_parameters": parameters}
+        ways = [_way(scene, clip, path) for path in paths]
+        keys: Row = {"case": case, "view": view, "size_px": size, "crb_parameters": PARAMETERS}
         rows.append(keys | _plane(scene, ways) | _bound(scene, ways) | _correlations(scene, ways))
         rows[-1]["floor_percent"] = float(np.hypot(rows[-1]["floor_plane_percent"], rows[-1]["floor_crb_percent"]))
     return [{name: row[name] for name in COLUMNS} for row in rows]
@@ -155,12 +153,12 @@ def _paths(scene: _Scene, given: dict[int, Clip], order: list[int]) -> _Paths:
     return _Paths(order, points, dict(zip(given, pixels, strict=True)))
 
 
-def _way(scene: _Scene, clip: Clip, paths: _Paths, parameters: int) -> _Way:
+def _way(scene: _Scene, clip: Clip, paths: _Paths) -> _Way:
     """Displacement, images and bound of one way."""
     visits = np.argsort(paths.order)
     images = _aligned(scene, clip, paths)
-    steps = [np.trace(images.variance(visit, visit + 1, parameters)) for visit in range(len(visits) - 1)]
-    variance = images.path_variance(parameters)[visits]
+    steps = [np.trace(images.variance(visit, visit + 1, PARAMETERS)) for visit in range(len(visits) - 1)]
+    variance = images.path_variance(PARAMETERS)[visits]
     return _Way(paths.points[visits] - scene.truth.wall.position, images, variance, np.array(steps))
 
 

@@ -7,10 +7,9 @@ from math import isnan
 import numpy as np
 import pandas as pd
 
+from echotruth import files
 from echotruth.evaluation.difficulty.floors import COLUMNS, PARAMETERS, Row, difficulty
-from echotruth.repository import durable
 from echotruth.repository.choice import Names
-from echotruth.repository.digest import digest
 from echotruth.repository.reader import Repository
 
 _VERSION = 1
@@ -47,8 +46,7 @@ def difficulties(repository: Repository, cases: Names = None, views: Names = Non
 def _kept(repository: Repository, case: str, view: str) -> list[Row]:
     """Rows of a clip, as they were kept of the same images, truth and points, or determined now and kept."""
     path = repository.folder / "scratch" / case / view / "difficulty.json"
-    tracking = repository.case(case).config.tracking
-    key = [_VERSION, PARAMETERS, tracking.frame_step, tracking.grid_px, digest(repository.folder, case, view)]
+    key = [_VERSION, PARAMETERS, repository.version(case, view)]
     with suppress(OSError, ValueError, KeyError, TypeError):  # there is none, or it is damaged
         kept = json.loads(path.read_text())
         if kept["key"] == key:
@@ -58,5 +56,5 @@ def _kept(repository: Repository, case: str, view: str) -> list[Row]:
     content = [{n: None if isinstance(v, float) and isnan(v) else v for n, v in row.items()} for row in rows]
     with suppress(OSError):  # a repository that cannot be written can be read
         if not repository.is_sample:
-            durable.write(path, json.dumps({"key": key, "rows": content}).encode())
+            files.write(path, json.dumps({"key": key, "rows": content}).encode())
     return rows

@@ -30,6 +30,8 @@ def variation(backscatter: Backscatter, position: Floats, random: np.random.Gene
     & Recht 2007, Random features for large-scale kernel machines). The mean power is that without it.
     """
     std, level = backscatter.variation_dB, np.zeros(len(position))
+    if std == 0:
+        return np.ones(len(position))
     wave_vectors = random.standard_normal((WAVES, 3)) / backscatter.si().variation_length
     for wave_vector, phase in zip(wave_vectors, random.uniform(0, 2 * np.pi, WAVES), strict=True):
         level += std * sqrt(2 / WAVES) * np.cos(position @ wave_vector + phase)

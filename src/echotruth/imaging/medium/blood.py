@@ -6,16 +6,21 @@ centre of the base.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 
-from echotruth.config import Config
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, Integers, MaterialPoints, interpolate, jacobian
-from echotruth.heart import Heart
-from echotruth.imaging.medium.random_process import RandomProcess
-from echotruth.imaging.medium.wall import cube_to_simplex, max_jacobian
+from echotruth.imaging.medium.body import Body, Echoes, Scene, echoes
+from echotruth.imaging.medium.random_process import RandomProcess, brownian, diffusion_std
+from echotruth.imaging.medium.wall import draw_in_cells, max_jacobian
+from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.geometry.boundary import triangle_edges
+
+MAX_DIFFUSION = 5
+"""Offset that blood is assumed not to exceed over a cycle, in standard deviations."""
 
 
 class Cavity:
@@ -53,75 +58,85 @@ class Cavity:
         return np.vstack([centre, wall, (wall[self._vertices] + centre) / 2])
 
 
-@dataclass(frozen=True)
-class Blood:
+@dataclass(frozen=True, eq=False)
+class Blood(Body):
     """Scatterers in the cavity.
 
     Attributes
     ----------
-    points : MaterialPoints of length n
-        In the cells of the cavity.
+    cell : ndarray of shape (n,)
+        Cell of the cavity that each is in.
+    xi : ndarray of shape (n, 3)
+        Local coordinates in it.
     jacobian_threshold : ndarray of shape (n,), m^3
         A scatterer is present in a frame while det(dx / dxi) at its point exceeds this, so that blood is equally dense
         in every frame, whatever the volume of the cavity.
     amplitude : ndarray of shape (n,)
     """
 
-    points: MaterialPoints
+    name, level = "blood", "blood.level_dB"
+    cell: Integers
+    xi: Floats
     jacobian_threshold: Floats
     amplitude: Floats
 
-    def at(self, frame: int, heart: Heart, diffusion: RandomProcess) -> tuple[Floats, Floats]:
-        """Blood in a frame.
+    @classmethod
+    def seed(cls, scene: Scene) -> Self:
+        """Draw scatterers uniformly over the cavity, enough for the fullest.
 
-        Parameters
-        ----------
-        frame : int
-        heart : Heart
-        diffusion : RandomProcess of ndarray of shape (n, 3), m
-            Random offsets. One that leads into the wall or beyond the centre of the base is reversed; if the reversed
-            one does so too, it is set to zero.
-
-        Returns
-        -------
-        position : ndarray of shape (m, 3), m
-            In the heart frame.
-        amplitude : ndarray of shape (m,)
+        Their amplitudes are normally distributed; the variance in a volume is that of muscle times the level.
         """
-        cavity = Cavity(heart.endo)
-        nodes = cavity.positions(heart.positions(frame))
-        present = self.jacobian_threshold < np.linalg.det(jacobian(nodes, cavity.cells, self.points))
-        points = MaterialPoints(self.points.cell[present], self.points.xi[present])
-        carried, offset = interpolate(nodes, cavity.cells, points), diffusion(frame)[present]
+        config, heart, random = scene.config, scene.heart, scene.random(cls.name)
+        blood, cavity = config.realism.blood, Cavity(heart.endo)
+        frames = range(len(heart.displacement))
+        bound = np.max([max_jacobian(cavity.positions(heart.positions(k)), cavity.cells) for k in frames], axis=0)
+        points, threshold = draw_in_cells(blood.density * config.phantom.si().density, bound, random)
+        amplitude = blood.amplitude_std * random.standard_normal(len(points))
+        return cls(scene, points.cell, points.xi, threshold, amplitude)
+
+    def positions(self, frame: int) -> Floats:
+        """Positions in the image (n, 3), m, without diffusion."""
+        carried = interpolate(self._nodes(frame), self._cavity.cells, MaterialPoints(self.cell, self.xi))
+        return self.scene.plane.to_image(carried)
+
+    def nearest(self, frame: int) -> Floats:
+        position = self.positions(frame)
+        offset = MAX_DIFFUSION * diffusion_std(read_loop(self.scene.config.loop).period, *self._decorrelation)
+        return np.column_stack([position[:, :2], np.maximum(np.abs(position[:, 2]) - offset, 0)])
+
+    def __call__(self, frame: int) -> Echoes:
+        """Those that are present in a frame.
+
+        A random offset that leads into the wall or beyond the centre of the base is reversed; if the reversed one does
+        so too, it is set to zero.
+        """
+        heart, cells, nodes = self.scene.heart, self._cavity.cells, self._nodes(frame)
+        determinant = np.linalg.det(jacobian(nodes, cells, MaterialPoints(self.cell, self.xi)))
+        present = self.jacobian_threshold < determinant
+        points = MaterialPoints(self.cell[present], self.xi[present])
+        carried, offset = interpolate(nodes, cells, points), self._diffusion(frame)[present]
         pending = np.arange(len(points))
         for factor in (-1, 0):
             position = carried[pending] + offset[pending]
             in_wall = locate(heart.positions(frame), heart.cells, position).cell >= 0
             pending = pending[in_wall | (position[:, 2] > nodes[0, 2])]
             offset[pending] *= factor
-        return carried + offset, self.amplitude[present]
+        position = self.scene.plane.to_image(carried + offset)
+        return echoes(self.scene.config.realism.blood, position, self.amplitude[present])
 
+    @cached_property
+    def _cavity(self) -> Cavity:
+        return Cavity(self.scene.heart.endo)
 
-def seed_blood(config: Config, heart: Heart, random: np.random.Generator) -> Blood:
-    """Draw scatterers uniformly over the cavity.
+    def _nodes(self, frame: int) -> Floats:
+        return self._cavity.positions(self.scene.heart.positions(frame))
 
-    Parameters
-    ----------
-    config : Config
-    heart : Heart
-    random : Generator
+    @property
+    def _decorrelation(self) -> tuple[float, float]:
+        """Time constant of the echo of blood, s, and wavelength, m."""
+        probe = self.scene.config.probe.si()
+        return self.scene.config.realism.blood.si().decorrelation_time, probe.sound_speed / probe.frequency
 
-    Returns
-    -------
-    Blood
-        Enough scatterers for the fullest cavity. Their amplitudes are normally distributed; the variance in a volume is
-        that of muscle times the level.
-    """
-    blood, cavity = config.realism.blood, Cavity(heart.endo)
-    frames = range(len(heart.displacement))
-    bound = np.max([max_jacobian(cavity.positions(heart.positions(k)), cavity.cells) for k in frames], axis=0)
-    number = random.poisson(blood.density * config.phantom.si().density * bound.sum() / 6)
-    cell = random.choice(len(bound), size=number, p=bound / bound.sum()).astype(np.int32)
-    points = MaterialPoints(cell, cube_to_simplex(random.random((number, 3))))
-    jacobian_threshold = random.random(number) * bound[cell]
-    return Blood(points, jacobian_threshold, blood.amplitude_std * random.standard_normal(number))
+    @cached_property
+    def _diffusion(self) -> RandomProcess:
+        return brownian(len(self.cell), self.scene.time, *self._decorrelation, self.scene.random)

@@ -8,14 +8,17 @@ so that the echo of a border is that of its area.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi, sqrt
+from typing import ClassVar, Self
 
 import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.fem.tetrahedra import Integers, shape, shape_gradient
-from echotruth.heart import Heart
+from echotruth.imaging.medium.backscatter import variation
+from echotruth.imaging.medium.body import Body, Echoes, Scene, echoes
 from echotruth.imaging.medium.wall import cube_to_simplex
 
 BEAM_STD, PULSE_STD = 0.376, 0.375
@@ -23,9 +26,9 @@ BEAM_STD, PULSE_STD = 0.376, 0.375
 envelope of a Gaussian pulse over 1 / bandwidth."""
 
 
-@dataclass(frozen=True)
-class Border:
-    """Scatterers on one surface of the wall.
+@dataclass(frozen=True, eq=False)
+class Border(Body):
+    """Scatterers spread uniformly over a surface of the unloaded wall.
 
     Attributes
     ----------
@@ -33,45 +36,51 @@ class Border:
         Nodes of the quadratic triangle of each.
     xi : ndarray of shape (n, 2)
         Local coordinates in it.
-    amplitude : float or ndarray of shape (n,)
-        At the unloaded area of the surface, relative to the standard deviation of those of muscle.
     """
 
+    surface: ClassVar[str]
     facets: Integers
     xi: Floats
-    amplitude: float | Floats
 
-    def positions(self, nodes: Floats) -> Floats:
+    @classmethod
+    def seed(cls, scene: Scene) -> Self:
+        facets, random = scene.heart.arrays["geometry"][cls.surface], scene.random(cls.name)
+        middle = np.full((len(facets), 2), 1 / 3)
+        area = _area(scene.heart.nodes, facets, middle) / 2
+        number = random.poisson(border_density(scene.config) * area.sum())
+        chosen = random.choice(len(facets), size=number, p=area / area.sum())
+        return cls(scene, facets[chosen].astype(np.int32), cube_to_simplex(random.random((number, 2))))
+
+    def positions(self, frame: int) -> Floats:
+        return self.scene.plane.to_image(self._carried(self.scene.heart.positions(frame)))
+
+    def __call__(self, frame: int) -> Echoes:
+        area = _area(self.scene.heart.positions(frame), self.facets, self.xi)
+        amplitude = self._amplitude * area / _area(self.scene.heart.nodes, self.facets, self.xi)
+        return echoes(self.scene.config.phantom, self.positions(frame), amplitude)
+
+    def _carried(self, nodes: Floats) -> Floats:
         """Positions (n, 3), m, for nodes (n_nodes, 3), m."""
         return np.einsum("na,nai->ni", shape(self.xi), nodes[self.facets])
 
-    def amplitudes(self, nodes: Floats, unloaded: Floats) -> Floats:
-        """Amplitudes (n,) for nodes (n_nodes, 3), m, in a frame and unloaded."""
-        return self.amplitude * _area(nodes, self.facets, self.xi) / _area(unloaded, self.facets, self.xi)
+    @cached_property
+    def _amplitude(self) -> Floats:
+        """Amplitudes (n,) at the unloaded area, relative to the standard deviation of those of muscle."""
+        config, unloaded = self.scene.config, self._carried(self.scene.heart.nodes)
+        varied = variation(config.realism.backscatter, unloaded, self.scene.random("variation"))
+        return border_amplitude(config, self.level_dB(config)) * varied
 
 
-def seed_border(config: Config, heart: Heart, surface: str, random: np.random.Generator) -> tuple[Integers, Floats]:
-    """Draw scatterers uniformly over a surface of the unloaded wall.
+class Endocardium(Border):
+    """Scatterers on the endocardium."""
 
-    Parameters
-    ----------
-    config : Config
-    heart : Heart
-    surface : {"endo", "epi"}
-    random : Generator
+    name, level, surface = "endocardium", "borders.endocardium_dB", "endo"
 
-    Returns
-    -------
-    facets : ndarray of shape (n, 6)
-        Nodes of the triangle of each.
-    xi : ndarray of shape (n, 2)
-    """
-    facets = heart.arrays["geometry"][surface]
-    middle = np.full((len(facets), 2), 1 / 3)
-    area = _area(heart.nodes, facets, middle) / 2
-    number = random.poisson(border_density(config) * area.sum())
-    chosen = random.choice(len(facets), size=number, p=area / area.sum())
-    return facets[chosen].astype(np.int32), cube_to_simplex(random.random((number, 2)))
+
+class Epicardium(Border):
+    """Scatterers on the epicardium."""
+
+    name, level, surface = "epicardium", "borders.epicardium_dB", "epi"
 
 
 def border_amplitude(config: Config, level_dB: float) -> float:

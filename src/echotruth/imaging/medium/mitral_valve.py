@@ -10,15 +10,18 @@ scatterers lie on their middle surfaces and have equal amplitudes, which add up 
 and not where it is oblique (:mod:`echotruth.imaging.medium.borders`).
 """
 
+from dataclasses import dataclass
+from functools import cached_property
 from math import pi
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.medium.anatomy import rim
+from echotruth.imaging.medium.body import CavityBody, Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
 from echotruth.imaging.medium.filling import opening, volumes
 
@@ -73,12 +76,12 @@ class MitralValve:
         return inside
 
 
-class Leaflets:
+@dataclass(frozen=True, eq=False)
+class Leaflets(CavityBody):
     """Scatterers in the leaflets.
 
-    Parameters
+    Attributes
     ----------
-    heart : Heart
     place : ndarray of shape (n, 3)
         Coordinate along the line on which the leaflets meet, over the radius of the rim, -1 to 1; 1 in the anterior and
         -1 in the posterior leaflet; share of the length from the rim.
@@ -86,13 +89,29 @@ class Leaflets:
         At end-diastole.
     """
 
-    def __init__(self, heart: Heart, place: Floats, amplitude: Floats) -> None:
-        self._valve, self._place, self._amplitude = MitralValve(heart), place, amplitude
+    name, level = "leaflets", "neighbours.leaflets_dB"
+    place: Floats
+    amplitude: Floats
 
-    def positions(self, frame: int) -> Floats:
-        """Positions in a frame, (n, 3), m, in the heart frame."""
+    @classmethod
+    def seed(cls, scene: Scene) -> Self:
+        """Draw scatterers uniformly over the middle surfaces of the leaflets, as many in an area as on a border.
+
+        Their amplitudes are equal: those of a border of the level.
+        """
+        random = scene.random(cls.name)
+        _, radius = rim(scene.heart.positions(0), scene.heart.endo)
+        # Both together are as long as the chord; of the square around the rim, candidates in the circle are kept.
+        number = random.poisson(border_density(scene.config) * 4 / np.cos(SHUT) * radius**2)
+        along = random.uniform(-1, 1, number)
+        side = np.where(random.random(number) < (1 - MEETING) / 2, 1.0, -1.0)
+        kept = random.random(number) < np.sqrt(1 - along**2)
+        place = np.column_stack([along, side, random.random(number)])[kept]
+        return cls(scene, place, np.full(len(place), border_amplitude(scene.config, cls.level_dB(scene.config))))
+
+    def in_heart(self, frame: int) -> Floats:
         centre, radius, angle = self._valve.hinge(frame)
-        along, side, share = self._place.T
+        along, side, share = self.place.T
         chord = np.sqrt(1 - along**2)
         length = _length(side, chord) * share
         x, z = side * (chord - length * np.cos(angle)), -length * np.sin(angle)
@@ -100,35 +119,13 @@ class Leaflets:
 
     def amplitudes(self, frame: int) -> Floats:
         """Amplitudes in a frame, (n,): in proportion to the area of the leaflets, which that of the rim sets."""
-        return self._amplitude * (self._valve.hinge(frame)[1] / self._valve.hinge(0)[1]) ** 2
+        return self.amplitude * (self._valve.hinge(frame)[1] / self._valve.hinge(0)[1]) ** 2
+
+    @cached_property
+    def _valve(self) -> MitralValve:
+        return MitralValve(self.scene.heart)
 
 
 def _length(side: Floats | int, chord: Floats) -> Floats:
     """Length of the leaflets over the radius of the rim: shut, they are as long as it takes to meet."""
     return (1 - side * MEETING) * chord / np.cos(SHUT)
-
-
-def seed_leaflets(config: Config, heart: Heart, random: np.random.Generator) -> dict[str, Floats]:
-    """Draw scatterers uniformly over the middle surfaces of the leaflets, as many in an area as on a border.
-
-    Parameters
-    ----------
-    config : Config
-    heart : Heart
-    random : Generator
-
-    Returns
-    -------
-    dict of ndarray
-        place and amplitude, as :class:`Leaflets` has them. The amplitudes are equal: those of a border of the level.
-    """
-    level = config.realism.neighbours.leaflets_dB
-    assert level is not None
-    _, radius = rim(heart.positions(0), heart.endo)
-    # Both together are as long as the chord; of the square around the rim, candidates in the circle are kept.
-    number = random.poisson(border_density(config) * 4 / np.cos(SHUT) * radius**2)
-    along = random.uniform(-1, 1, number)
-    side = np.where(random.random(number) < (1 - MEETING) / 2, 1.0, -1.0)
-    kept = random.random(number) < np.sqrt(1 - along**2)
-    place = np.column_stack([along, side, random.random(number)])[kept]
-    return {"place": place, "amplitude": np.full(len(place), border_amplitude(config, level))}

@@ -5,17 +5,19 @@ posteromedial one at half past seven, as seen in echoes. In adults they are 19 +
 variations of mitral papillary muscles, Madras Medical College). Width, height and azimuth were chosen by eye.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
 from math import pi
-from typing import Any
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.config import Config
 from echotruth.fem.location import locate
 from echotruth.heart import Heart
 from echotruth.imaging.medium.blood import Cavity
+from echotruth.imaging.medium.body import CavityBody, Scene
 
 AZIMUTHS = (7 * pi / 6, 7 * pi / 4)
 """Of the anterolateral and of the posteromedial muscle, rad."""
@@ -27,12 +29,12 @@ NEAREST = 8
 """Nodes of the endocardium whose mean motion a muscle has."""
 
 
-class PapillaryMuscles:
+@dataclass(frozen=True, eq=False)
+class PapillaryMuscles(CavityBody):
     """Scatterers in the two muscles, each of which moves as the endocardium at its root.
 
-    Parameters
+    Attributes
     ----------
-    heart : Heart
     position : ndarray of shape (n, 3), m
         At end-diastole in the heart frame.
     muscle : ndarray of shape (n,), uint8
@@ -40,17 +42,40 @@ class PapillaryMuscles:
     amplitude : ndarray of shape (n,)
     """
 
-    def __init__(self, heart: Heart, position: Floats, muscle: NDArray[np.uint8], amplitude: Floats) -> None:
-        self._position, self._muscle, self._amplitude = position, muscle, amplitude
-        self._displacement = np.stack([_displacement(heart, azimuth) for azimuth in AZIMUTHS], axis=1)
+    name, level = "papillary_muscles", "neighbours.papillary_muscles_dB"
+    position: Floats
+    muscle: NDArray[np.uint8]
+    amplitude: Floats
 
-    def positions(self, frame: int) -> Floats:
-        """Positions in a frame, (n, 3), m, in the heart frame."""
-        return self._position + self._displacement[frame, self._muscle]
+    @classmethod
+    def seed(cls, scene: Scene) -> Self:
+        """Draw scatterers uniformly over the two muscles in the cavity, as many in a volume as in the wall.
+
+        Their amplitudes are normally distributed; their variance in a volume is that of muscle times the level.
+        """
+        random, heart = scene.random(cls.name), scene.heart
+        cavity, parts = Cavity(heart.endo), []
+        nodes = cavity.positions(heart.positions(0))
+        for muscle, azimuth in enumerate(AZIMUTHS):
+            middle, axes, half = _body(heart, azimuth)
+            number = random.poisson(scene.config.phantom.si().density * 8 * half.prod())
+            ball = random.uniform(-1, 1, (number, 3))
+            position = middle + (ball[np.linalg.norm(ball, axis=1) < 1] * half) @ axes
+            position = position[locate(nodes, cavity.cells, position).cell >= 0]
+            parts.append((position, np.full(len(position), muscle, np.uint8)))
+        position, muscles = map(np.concatenate, zip(*parts, strict=True))
+        amplitude = 10 ** (cls.level_dB(scene.config) / 20) * random.standard_normal(len(position))
+        return cls(scene, position, muscles, amplitude)
+
+    def in_heart(self, frame: int) -> Floats:
+        return self.position + self._displacement[frame, self.muscle]
 
     def amplitudes(self, frame: int) -> Floats:
-        """Amplitudes in a frame, (n,): they do not change."""
-        return self._amplitude
+        return self.amplitude
+
+    @cached_property
+    def _displacement(self) -> Floats:
+        return np.stack([_displacement(self.scene.heart, azimuth) for azimuth in AZIMUTHS], axis=1)
 
 
 class PapillaryMuscle:
@@ -90,37 +115,6 @@ def _displacement(heart: Heart, azimuth: float) -> Floats:
     start, moved = heart.positions(0)[endo], (heart.displacement - heart.displacement[0])[:, endo]
     distance = np.linalg.norm(start - _root(heart, azimuth), axis=1)
     return moved[:, np.argsort(distance, kind="stable")[:NEAREST]].mean(axis=1)
-
-
-def seed_papillary_muscles(config: Config, heart: Heart, random: np.random.Generator) -> dict[str, NDArray[Any]]:
-    """Draw scatterers uniformly over the two muscles, as many in a volume as in the wall.
-
-    Parameters
-    ----------
-    config : Config
-    heart : Heart
-    random : Generator
-
-    Returns
-    -------
-    dict of ndarray
-        position, in the cavity, muscle and amplitude, as :class:`PapillaryMuscles` has them. The amplitudes are
-        normally distributed; their variance in a volume is that of muscle times the level.
-    """
-    level = config.realism.neighbours.papillary_muscles_dB
-    assert level is not None
-    cavity, parts = Cavity(heart.endo), []
-    nodes = cavity.positions(heart.positions(0))
-    for muscle, azimuth in enumerate(AZIMUTHS):
-        middle, axes, half = _body(heart, azimuth)
-        number = random.poisson(config.phantom.si().density * 8 * half.prod())
-        ball = random.uniform(-1, 1, (number, 3))
-        position = middle + (ball[np.linalg.norm(ball, axis=1) < 1] * half) @ axes
-        position = position[locate(nodes, cavity.cells, position).cell >= 0]
-        parts.append((position, np.full(len(position), muscle, np.uint8)))
-    position, muscles = map(np.concatenate, zip(*parts, strict=True))
-    amplitude = 10 ** (level / 20) * random.standard_normal(len(position))
-    return {"position": position, "muscle": muscles, "amplitude": amplitude}
 
 
 def _root(heart: Heart, azimuth: float) -> Floats:

@@ -1,6 +1,9 @@
 """Surroundings: scatterers around the heart, in the part of space that the probe images."""
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +23,14 @@ from echotruth.imaging.medium.anatomy import (
     Anatomy,
     Place,
     chest_wall_depth,
+    rim,
     strata_dB,
 )
 from echotruth.imaging.medium.blood import Cavity
+from echotruth.imaging.medium.body import Body, Echoes, Scene
 from echotruth.imaging.medium.filling import emptied, volumes
+from echotruth.imaging.medium.random_process import ar1
 from echotruth.imaging.view import Plane
-
-Arrays = dict[str, NDArray[Any]]
 
 NEIGHBOURS = 8
 """Epicardial nodes from which the motion of a scatterer is interpolated."""
@@ -103,42 +107,94 @@ class SurroundingsMotion:
         return position if self._inward is None else position + self._emptied[frame] * self._inward
 
 
-class AroundHeart:
-    """What is around the heart, frame by frame, in the image.
+@dataclass(frozen=True, eq=False)
+class Surroundings(Body):
+    """Scatterers around the heart; they keep their distance from the imaging plane, whatever the heart does.
 
-    It keeps its distance from the imaging plane, whatever the heart does.
-
-    Parameters
+    Attributes
     ----------
-    config : Config
-    heart : Heart
-    plane : Plane
     position : ndarray of shape (n, 3), m
-        Scatterers at end-diastole, in the heart frame.
+        At end-diastole, in the heart frame: in the scan from `start_mm` to the imaging depth, and in the beam in
+        elevation; those inside the heart are hidden until it moves away.
+    amplitude : ndarray of shape (n,)
     tissue : ndarray of shape (n,), uint8
         A :class:`echotruth.imaging.labels.TissueLabel`.
     """
 
-    def __init__(self, config: Config, heart: Heart, plane: Plane, position: Floats, tissue: NDArray[np.uint8]) -> None:
-        self._heart, self._plane = heart, plane
-        self._motion = SurroundingsMotion(heart, position, config.realism.surroundings.si().motion_decay, tissue)
-        self._elevation = plane.to_image(position)[:, 2]
-        self._scan = scan_lines(config.probe, config.rf)
-        self._atria_scatter = config.realism.neighbours.chambers_dB is not None
+    name, level = "surroundings", "surroundings.level_dB"
+    position: Floats
+    amplitude: Floats
+    tissue: NDArray[np.uint8]
+
+    @classmethod
+    def seed(cls, scene: Scene) -> Self:
+        """Draw scatterers evenly over the resolution cells of what the probe images.
+
+        A cell is as wide as its range is long and as thick as the beam, so that scatterers are drawn uniformly over
+        angle and range, and across the plane as a Gaussian with half the beam's half thickness, where they are seen
+        best. Where they are sparser they are stronger: the mean echo power of a volume is that of muscle times the
+        level of its tissue. Their amplitudes have one magnitude in a place and a random sign, which takes fewer of them
+        for developed speckle than normally distributed ones: the SNR of the envelope is 1.68 to 1.73 at 3 to 12 mm in
+        the default array with a density of 0.15, and 1.81 to 1.84 with 0.3; with normally distributed ones it is 1.42
+        to 1.48 and 1.62 to 1.72. The wall has 1.82, and 1.91 is fully developed.
+        """
+        config, plane, random = scene.config, scene.plane, scene.random(cls.name)
+        position, density = _drawn_evenly(config, random)
+        in_heart = plane.to_heart(position)
+        tissue, power = tissues(config, scene.heart, plane, in_heart)
+        sign = np.where(random.random(len(position)) < 0.5, -1.0, 1.0)
+        amplitude = sign * np.sqrt(power * config.phantom.si().density / density)
+        present = power > 0
+        return cls(scene, in_heart[present], amplitude[present], tissue[present])
 
     def positions(self, frame: int) -> Floats:
-        """Positions in the image, (n, 3), m."""
-        position = self._plane.to_image(self._motion(frame))
-        position[:, 2] = self._elevation
+        position = self.scene.plane.to_image(self._motion(frame))
+        position[:, 2] = self.scene.plane.to_image(self.position)[:, 2]
         return position
 
     def present(self, frame: int, position: Floats) -> NDArray[np.bool_]:
         """Whether those at positions in the image (n, 3), m, are in the scan and not in the heart: (n,)."""
-        line, _ = self._scan.to_scan_coordinates(position[:, 0], position[:, 1])
-        present = (np.abs(2 * line / (len(self._scan.angle) - 1) - 1) < SHOWN) & (position[:, 1] > 0)
-        in_heart_frame = self._plane.to_heart(position[present])
-        present[present] = outside_heart(self._heart, frame, in_heart_frame, column=self._atria_scatter)
+        config = self.scene.config
+        scan, column = scan_lines(config.probe, config.rf), config.realism.neighbours.chambers_dB is not None
+        line, _ = scan.to_scan_coordinates(position[:, 0], position[:, 1])
+        present = (np.abs(2 * line / (len(scan.angle) - 1) - 1) < SHOWN) & (position[:, 1] > 0)
+        in_heart = self.scene.plane.to_heart(position[present])
+        present[present] = outside_heart(self.scene.heart, frame, in_heart, column=column)
         return present
+
+    def __call__(self, frame: int) -> Echoes:
+        position = self.positions(frame)
+        present = self.present(frame, position)
+        return position[present], self._amplitudes(frame)[present], self._exponents[present]
+
+    @cached_property
+    def _motion(self) -> SurroundingsMotion:
+        decay = self.scene.config.realism.surroundings.si().motion_decay
+        return SurroundingsMotion(self.scene.heart, self.position, decay, self.tissue)
+
+    @cached_property
+    def _amplitudes(self) -> Callable[[int], Floats]:
+        """Amplitudes (n,) by frame: blood changes as that in the cavity."""
+        scene, sign, blood = self.scene, np.sign(self.amplitude), np.isin(self.tissue, CAVITIES)
+        constant = scene.config.realism.blood.si().decorrelation_time
+        flowing = ar1(sign[blood], scene.time, constant, "chambers", scene.random)
+        fading = scene.fading(sign[~blood], self.name)
+
+        def of_frame(frame: int) -> Floats:
+            signs = np.empty_like(sign)
+            signs[~blood], signs[blood] = fading(frame), flowing(frame)
+            return np.abs(self.amplitude) * signs
+
+        return of_frame
+
+    @property
+    def _exponents(self) -> Floats:
+        """Powers of the frequency (n,) that echoes follow: those of blood, of muscle, or of the rest."""
+        config = self.scene.config
+        exponents = np.full(len(self.tissue), config.realism.surroundings.scattering_exponent)
+        exponents[np.isin(self.tissue, CAVITIES)] = config.realism.blood.scattering_exponent
+        exponents[np.isin(self.tissue, WALLS)] = config.phantom.scattering_exponent
+        return exponents
 
 
 def epicardial_nodes(heart: Heart) -> NDArray[np.int64]:
@@ -152,48 +208,11 @@ def outside_heart(heart: Heart, frame: int, position: Floats, *, column: bool = 
     That column is the atrium; `column` says whether it counts as outside, because its blood and its walls scatter.
     """
     nodes, cavity = heart.positions(frame), Cavity(heart.endo)
-    rim = nodes[cavity.rim]
-    centre = rim.mean(axis=0)
-    radius = np.hypot(*(rim - centre)[:, :2].T).mean()
-    outside = (position[:, 2] < centre[2]) | (np.hypot(*(position - centre)[:, :2].T) > radius)
-    outside |= column
+    centre, radius = rim(nodes, heart.endo)
+    outside = column | (position[:, 2] < centre[2]) | (np.hypot(*(position - centre)[:, :2].T) > radius)
     outside[outside] = locate(nodes, heart.cells, position[outside]).cell < 0
     outside[outside] = locate(cavity.positions(nodes), cavity.cells, position[outside]).cell < 0
     return outside
-
-
-def seed_surroundings(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> Arrays:
-    """Draw scatterers evenly over the resolution cells of what the probe images.
-
-    A cell is as wide as its range is long and as thick as the beam, so that scatterers are drawn uniformly over angle
-    and range, and across the plane as a Gaussian with half the beam's half thickness, where they are seen best. Where
-    they are sparser they are stronger: the mean echo power of a volume is that of muscle times the level of its tissue.
-    Their amplitudes have one magnitude in a place and a random sign, which takes fewer of them for developed speckle
-    than normally distributed ones: the SNR of the envelope is 1.68 to 1.73 at 3 to 12 mm in the default array with a
-    density of 0.15, and 1.81 to 1.84 with 0.3; with normally distributed ones it is 1.42 to 1.48 and 1.62 to 1.72.
-    The wall has 1.82, and 1.91 is fully developed.
-
-    Parameters
-    ----------
-    config : Config
-    heart : Heart
-    plane : Plane
-    random : Generator
-
-    Returns
-    -------
-    dict of ndarray
-        position (n, 3), m, at end-diastole in the heart frame: in the scan from `start_mm` to the imaging depth, and in
-        the beam in elevation; those inside the heart are hidden until it moves away. amplitude (n,), and tissue (n,),
-        uint8, a :class:`echotruth.imaging.labels.TissueLabel`.
-    """
-    position, density = _drawn_evenly(config, random)
-    in_heart = plane.to_heart(position)
-    tissue, power = tissues(config, heart, plane, in_heart)
-    sign = np.where(random.random(len(position)) < 0.5, -1.0, 1.0)
-    amplitude = sign * np.sqrt(power * config.phantom.si().density / density)
-    present = power > 0
-    return {"position": in_heart[present], "amplitude": amplitude[present], "tissue": tissue[present]}
 
 
 def _drawn_evenly(config: Config, random: np.random.Generator) -> tuple[Floats, Floats]:
@@ -261,14 +280,6 @@ def _set_lung(config: Config, plane: Plane, of: tuple[NDArray[np.uint8], Floats]
     power = behind * lung + (1 - behind) * 10 ** (level / 10)
     tissue[behind > LUNG_SHARE] = TissueLabel.LUNG
     level[:] = 10 * np.log10(np.maximum(power, 1e-30))
-
-
-def exponents(config: Config, tissue: NDArray[np.uint8]) -> Floats:
-    """Power of the frequency (n,) that the echoes of tissues (n,) follow: those of blood, of muscle, or of the rest."""
-    of_tissue = np.full(len(tissue), config.realism.surroundings.scattering_exponent)
-    of_tissue[np.isin(tissue, CAVITIES)] = config.realism.blood.scattering_exponent
-    of_tissue[np.isin(tissue, WALLS)] = config.phantom.scattering_exponent
-    return of_tissue
 
 
 def _decibels(level: float | None) -> float:

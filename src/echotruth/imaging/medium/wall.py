@@ -1,64 +1,94 @@
 """The wall: scatterers seeded in it, carried by the shape functions of their elements."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.config import Config, Phantom
+from echotruth.config import Phantom
 from echotruth.fem.location import locate
-from echotruth.fem.tetrahedra import EDGES, MaterialPoints, interpolate, jacobian
-from echotruth.heart import Heart
-from echotruth.imaging.view import Plane
+from echotruth.fem.tetrahedra import EDGES, Integers, MaterialPoints, interpolate, jacobian
+from echotruth.imaging.medium.backscatter import FibreEcho, variation
+from echotruth.imaging.medium.body import Body, Echoes, Scene, echoes
 
 
-@dataclass(frozen=True)
-class Scatterers:
-    """Point scatterers fixed in the material.
+@dataclass(frozen=True, eq=False)
+class Wall(Body):
+    """Scatterers fixed in the wall; with `phantom.in_plane_only`, they stay in the imaging plane, whatever it does.
 
     Attributes
     ----------
-    points : MaterialPoints of length n
+    cell : ndarray of shape (n,)
+        Cell that each is in.
+    xi : ndarray of shape (n, 3)
+        Local coordinates in it.
     amplitude : ndarray of shape (n,)
-        Normally distributed, of unit variance.
-    in_plane_only : bool
-        Whether they stay in the imaging plane, whatever the tissue does.
+        At end-diastole: normally distributed, of unit variance.
     """
 
-    points: MaterialPoints
+    name = "wall"
+    cell: Integers
+    xi: Floats
     amplitude: Floats
-    in_plane_only: bool
 
-    def image_positions(self, nodes: Floats, cells: NDArray[np.int32], plane: Plane) -> Floats:
-        """Positions of the scatterers in the image.
+    @classmethod
+    def seed(cls, scene: Scene) -> Self:
+        """Seed the wall, or its section by the imaging plane if `phantom.in_plane_only`."""
+        phantom, random = scene.config.phantom, scene.random("phantom")
+        if phantom.in_plane_only:
+            points = seed_section(scene, random)
+        else:
+            points = seed_volume(phantom, scene.heart.nodes, scene.heart.cells, random)
+        return cls(scene, points.cell, points.xi, random.standard_normal(len(points)))
 
-        Parameters
-        ----------
-        nodes : ndarray of shape (n_nodes, 3), m
-            In the frame.
-        cells : ndarray of shape (n_cells, 10)
-        plane : Plane
+    @cached_property
+    def points(self) -> MaterialPoints:
+        """The scatterers."""
+        return MaterialPoints(self.cell, self.xi)
 
-        Returns
-        -------
-        ndarray of shape (n, 3), m
-            Lateral, axial, elevation.
-        """
-        position = plane.to_image(interpolate(nodes, cells, self.points))
-        if self.in_plane_only:
+    def positions(self, frame: int) -> Floats:
+        heart = self.scene.heart
+        position = self.scene.plane.to_image(interpolate(heart.positions(frame), heart.cells, self.points))
+        if self.scene.config.phantom.in_plane_only:
             position[:, 2] = 0
         return position
 
+    def __call__(self, frame: int) -> Echoes:
+        position, amplitude = self.positions(frame), self._fading(frame) * self._variation
+        if self._fibre_echo is not None:
+            amplitude = amplitude * self._fibre_echo(frame, position)
+        return echoes(self.scene.config.phantom, position, amplitude)
 
-def seed_wall(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> Scatterers:
-    """Seed the wall, or its section by the imaging plane if `phantom.in_plane_only`."""
-    if config.phantom.in_plane_only:
-        return seed_section(config, heart, plane, random)
-    return seed_volume(config.phantom, heart.nodes, heart.cells, random)
+    def contains(self, frame: int, lateral: Floats, axial: Floats) -> NDArray[np.bool_]:
+        """Whether points of the image lie in the wall in a frame; all arrays of one shape, coordinates in m."""
+        position = np.stack([lateral, axial, np.zeros_like(lateral)], axis=-1).reshape(-1, 3)
+        heart = self.scene.heart
+        points = locate(heart.positions(frame), heart.cells, self.scene.plane.to_heart(position))
+        return (points.cell >= 0).reshape(lateral.shape)
+
+    @cached_property
+    def _fading(self) -> Callable[[int], Floats]:
+        return self.scene.fading(self.amplitude, self.name)
+
+    @cached_property
+    def _variation(self) -> Floats:
+        unloaded = interpolate(self.scene.heart.nodes, self.scene.heart.cells, self.points)
+        return variation(self.scene.config.realism.backscatter, unloaded, self.scene.random("variation"))
+
+    @cached_property
+    def _fibre_echo(self) -> FibreEcho | None:
+        backscatter = self.scene.config.realism.backscatter
+        depends = backscatter.anisotropy_dB or backscatter.fibre_strain_dB
+        return FibreEcho(backscatter, self.scene.heart, self.scene.plane, self.points) if depends else None
 
 
-def seed_volume(phantom: Phantom, nodes: Floats, cells: NDArray[np.int32], random: np.random.Generator) -> Scatterers:
+def seed_volume(
+    phantom: Phantom, nodes: Floats, cells: NDArray[np.int32], random: np.random.Generator
+) -> MaterialPoints:
     """Draw scatterers uniformly over the volume of the unloaded wall.
 
     Parameters
@@ -71,46 +101,41 @@ def seed_volume(phantom: Phantom, nodes: Floats, cells: NDArray[np.int32], rando
 
     Returns
     -------
-    Scatterers
+    MaterialPoints of length n
         Their number is Poisson distributed about density times volume, as in a uniform random medium.
     """
-    bound = max_jacobian(nodes, cells)
-    candidates = random.poisson(phantom.si().density * bound.sum() / 6)
-    cell = random.choice(len(cells), size=candidates, p=bound / bound.sum()).astype(np.int32)
-    points = MaterialPoints(cell, cube_to_simplex(random.random((candidates, 3))))
+    points, threshold = draw_in_cells(phantom.si().density, max_jacobian(nodes, cells), random)
     # Elements are curved: rejection by the local Jacobian makes the density uniform within each.
-    accepted = random.random(candidates) * bound[cell] < np.linalg.det(jacobian(nodes, cells, points))
-    points = MaterialPoints(points.cell[accepted], points.xi[accepted])
-    return Scatterers(points, random.standard_normal(len(points)), in_plane_only=False)
+    accepted = threshold < np.linalg.det(jacobian(nodes, cells, points))
+    return MaterialPoints(points.cell[accepted], points.xi[accepted])
 
 
-def seed_section(config: Config, heart: Heart, plane: Plane, random: np.random.Generator) -> Scatterers:
+def draw_in_cells(density: float, bound: Floats, random: np.random.Generator) -> tuple[MaterialPoints, Floats]:
+    """Draw points in cells, more than enough for a density, 1/m^3, in each of which det(dx / dxi) has a bound, m^3.
+
+    Those at which it exceeds the thresholds that are returned too, (n,), m^3, have that density.
+    """
+    number = random.poisson(density * bound.sum() / 6)
+    cell = random.choice(len(bound), size=number, p=bound / bound.sum()).astype(np.int32)
+    points = MaterialPoints(cell, cube_to_simplex(random.random((number, 3))))
+    return points, random.random(number) * bound[cell]
+
+
+def seed_section(scene: Scene, random: np.random.Generator) -> MaterialPoints:
     """Draw scatterers uniformly over the wall in the imaging plane at end-diastole, as the paper's phantom is printed.
 
     Their areal density is the volumetric one times the thickness of the beam at its elevation focus,
     wavelength x focus / height.
-
-    Parameters
-    ----------
-    config : Config
-    heart : Heart
-    plane : Plane
-    random : Generator
-
-    Returns
-    -------
-    Scatterers
     """
-    array = config.probe.si()
+    heart, plane, array = scene.heart, scene.plane, scene.config.probe.si()
     thickness = array.sound_speed / array.frequency * array.elevation_focus / array.height
     nodes = plane.to_image(heart.positions(0))[:, :2]
     low, size = nodes.min(axis=0), np.ptp(nodes, axis=0)
-    candidates = random.poisson(config.phantom.si().density * thickness * size.prod())
+    candidates = random.poisson(scene.config.phantom.si().density * thickness * size.prod())
     position = np.column_stack([low + size * random.random((candidates, 2)), np.zeros(candidates)])
     points = locate(heart.positions(0), heart.cells, plane.to_heart(position))
     inside = points.cell >= 0
-    points = MaterialPoints(points.cell[inside], points.xi[inside])
-    return Scatterers(points, random.standard_normal(len(points)), in_plane_only=True)
+    return MaterialPoints(points.cell[inside], points.xi[inside])
 
 
 def cube_to_simplex(cube: Floats) -> Floats:

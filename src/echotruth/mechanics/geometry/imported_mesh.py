@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -92,7 +93,13 @@ def read(geometry: Geometry) -> ImportedMesh:
 def fingerprint(geometry: Geometry) -> str:
     """Hash of the file's content, or an empty string where there is none: a changed file is a changed heart."""
     path = Path(geometry.file) if geometry.file else None
-    return sha256(path.read_bytes()).hexdigest()[:16] if path and path.is_file() else ""
+    return _hash(path, path.stat().st_mtime_ns, path.stat().st_size) if path and path.is_file() else ""
+
+
+@lru_cache(maxsize=100)
+def _hash(path: Path, changed: int, size: int) -> str:
+    """Hash of a file's content, which is read once as long as its date and size stay."""
+    return sha256(path.read_bytes()).hexdigest()[:16]
 
 
 def read_file(source: str) -> ImportedMesh:

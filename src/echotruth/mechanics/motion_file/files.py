@@ -37,7 +37,7 @@ def series_files(path: str) -> list[Path]:
     """
     if Path(path).is_file():
         return [Path(path)]
-    files = sorted((Path(file) for file in glob.glob(path) if Path(file).is_file()), key=_natural_order)
+    files = sorted((Path(file) for file in glob.glob(path) if Path(file).is_file()), key=natural_order)
     if not files:
         remedy = "give its path, or a pattern such as heart_*.vtu, relative to the working directory"
         raise MotionError(f"motion.file.path = {path!r}: there is no such file: {remedy}.")
@@ -77,6 +77,6 @@ def _file_hash(file: Path, _modified_ns: int, _size: int) -> bytes:
     return sha256(file.read_bytes()).digest()
 
 
-def _natural_order(file: Path) -> list[tuple[int, str]]:
+def natural_order(file: Path) -> list[tuple[int, str]]:
     """Key by which frame_9 comes before frame_10."""
-    return [(int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", str(file))]
+    return [(int(part), "") if part.isdecimal() else (0, part) for part in re.split(r"(\d+)", str(file))]

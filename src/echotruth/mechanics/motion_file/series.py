@@ -83,7 +83,7 @@ def read_series(section: FileMotion, points: Floats | None = None) -> MeshSeries
     except (MotionError, GeometryError):
         raise
     except Exception as error:  # the libraries do not document what they raise
-        reason = (str(error).splitlines() or ["it does not begin as one"])[0].rstrip(".")
+        reason = (str(error).splitlines() or ["it does not begin as one"])[0].rstrip(".")[:200]
         raise MotionError(f"{source}: cannot be read as {suffix} ({reason}): write the file again.") from None
     return _stack(source, frames, np.array(times, float) if times else None, section.displacement)
 

@@ -1,6 +1,5 @@
 """The wall that a series moves: its tetrahedra, its sides and its cavity, in the heart frame of end-diastole."""
 
-import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,8 +25,6 @@ from echotruth.mechanics.motion_file.cycle import RecordedCycle, one_cycle
 from echotruth.mechanics.motion_file.series import MeshSeries, is_series, read_series
 from echotruth.mechanics.prescribed import MotionError
 from echotruth.mechanics.solver.cavity import cavity_volume
-
-logger = logging.getLogger("echotruth.mechanics")
 
 WALL_VOLUMES = (1e-9, 1e-3)
 """Smallest and largest volume of a wall, m^3: a hundredth of a mouse's, and several times a human's."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from echotruth.config.tracking import TRACKER_ARGUMENTS, External
 from echotruth.tracking import external_program
-from echotruth.tracking.external_program import in_one_line
+from echotruth.tracking.external_program import check_real, in_one_line
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker_input import TrackerInput
 
@@ -24,6 +24,9 @@ ENTRY_POINT_GROUP = "echotruth.trackers"
 
 QUALITY_TOLERANCE = 1e-6
 """Distance of a quality outside 0 to 1 that is accepted as rounding in single precision."""
+
+MAX_DISPLACEMENT_PX = 1e6
+"""Largest displacement, which no tissue in an image comes near."""
 
 MAX_INITIAL_DISPLACEMENT_PX = 1.0
 """Median displacement in frame 0, where it is 0 by definition, above which the result is not a displacement."""
@@ -39,14 +42,14 @@ def track(clip: TrackerInput, settings: External) -> tuple[np.ndarray, np.ndarra
     """
     arrays = clip.frames.copy(), clip.points.copy(), clip.mask.copy()
     arguments = (*arrays, float(clip.spacing), clip.frame_time.copy(), int(clip.seed))
-    command = settings.command or []
+    command, shape = settings.command or [], (len(clip.frames), len(clip.points))
     try:
         if settings.track is not None:
             result = _call(settings.track, arguments, settings.options)
         else:
             entries = dict(zip(TRACKER_ARGUMENTS, arguments, strict=True)) | settings.options
-            result = external_program.run(command, entries, settings.timeout_s)
-        return _checked(result, (len(clip.frames), len(clip.points)))
+            result = external_program.run(command, entries, settings.timeout_s, shape)
+        return _checked(result, shape)
     except TrackerFailed as error:
         name = getattr(settings.track, "__name__", settings.track) or " ".join(command)
         raise TrackerFailed(f"{name} {error}") from error.__cause__
@@ -100,6 +103,9 @@ def _checked(result: Any, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarra
     known = np.isfinite(displacement).all(-1)
     if not known[1:].any():
         raise TrackerFailed("returned no finite displacement after frame 0")
+    largest = np.abs(displacement[known]).max()
+    if largest > MAX_DISPLACEMENT_PX:
+        raise TrackerFailed(f"returned a displacement of {largest:.3g} px: give px, {MAX_DISPLACEMENT_PX:g} at most")
     initial = np.median(np.hypot(*displacement[0][known[0]].T)) if known[0].any() else 0.0
     if initial > MAX_INITIAL_DISPLACEMENT_PX:
         raise TrackerFailed(
@@ -121,9 +127,6 @@ def _real_array(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
         array = np.ma.asarray(values)
     except Exception as error:
         raise TrackerFailed(f"returned a {name} that is not an array of shape {shape} ({_describe(error)})") from error
-    if array.dtype.kind not in "fiub":
-        kind = type(values).__name__ if array.dtype.kind == "O" else array.dtype
-        raise TrackerFailed(f"returned a {name} of {kind}, not of real numbers of shape {shape}")
-    if array.shape != shape:
-        raise TrackerFailed(f"returned a {name} of shape {array.shape}, not {shape}")
+    kind = type(values).__name__ if array.dtype.kind == "O" else array.dtype
+    check_real(f"returned a {name}", kind, array.shape, shape)
     return np.ma.filled(array.astype(float), np.nan)

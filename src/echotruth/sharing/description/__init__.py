@@ -1,0 +1,50 @@
+"""Documents by which others find, judge, read and cite a repository."""
+
+from pathlib import Path
+
+from echotruth import files
+from echotruth.repository.reader import Repository
+from echotruth.sharing.description import citation, statements
+from echotruth.sharing.description.attribution import Attribution
+from echotruth.sharing.description.facts import CLIPS, DescriptionError, read_facts
+
+__all__ = ["DescriptionError", "describe"]
+
+
+def describe(repository: Repository, output: Path | None = None, given: Attribution | None = None) -> list[Path]:
+    """Write the documents of a finished repository; the same one, with the same times, gives the same bytes.
+
+    Parameters
+    ----------
+    repository : Repository
+    output : Path, optional
+        Folder for the documents (default: that of the repository). They name files by their path in the repository.
+    given : Attribution, optional
+        Authors, licence, address.
+
+    Raises
+    ------
+    DescriptionError
+        If it is not finished, damaged, or holds a README.md or CITATION.cff of somebody else, or a package is missing.
+    """
+    try:
+        from echotruth.sharing.description.croissant import croissant
+    except ModuleNotFoundError as error:
+        remedy = "pip install 'echotruth[description]'"
+        raise DescriptionError(f"describe needs the package {error.name}: {remedy}") from None
+    folder = output or repository.folder
+    for name, mark in {"README.md": statements.MARK, "CITATION.cff": citation.MARK}.items():
+        if (folder / name).is_file() and not (folder / name).read_bytes().startswith(mark.encode()):
+            remedy = "move it away, or choose another --output"
+            raise DescriptionError(f"{folder / name}: was not made by echotruth describe: {remedy}")
+    facts = read_facts(repository, given or Attribution())
+    said = statements.statements(facts)
+    documents = {
+        CLIPS: facts.clips_table,
+        "README.md": statements.card(facts, said),
+        "CITATION.cff": citation.citation(facts, said),
+        "croissant.json": croissant(facts, said),
+    }
+    for name, content in documents.items():
+        files.update(folder / name, content)
+    return [folder / name for name in documents]

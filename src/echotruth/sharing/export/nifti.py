@@ -1,0 +1,54 @@
+"""NIfTI-1 (https://nifti.nimh.nih.gov/nifti-1): a plane over time, placed in the frame of the heart."""
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.error import optional
+
+MM = 1e3
+"""Millimetres in a metre."""
+
+ALIGNED = 2
+"""`NIFTI_XFORM_ALIGNED_ANAT`: the world is neither that of a scanner nor a template."""
+
+
+def write(clip: Clip, path: Path) -> None:
+    """Write grey levels, (lateral, axial, 1, frame), with the affine to the frame of the heart.
+
+    The plane is given the thickness of a pixel, since the format needs one. The frame of the heart stands in place of
+    the patient's (right, anterior, superior): x is septal, y anterior, and z points from apex to base.
+
+    Parameters
+    ----------
+    clip : Clip
+    path : Path
+
+    Raises
+    ------
+    ExportError
+        If nibabel is not installed.
+    """
+    nibabel = optional("nibabel")
+    data = np.ascontiguousarray(clip.image.transpose(2, 1, 0)[:, :, None])
+    image = nibabel.Nifti1Image(data, None)
+    image.header.set_xyzt_units("mm", "sec")
+    image.set_sform(affine(clip), ALIGNED)
+    image.set_qform(affine(clip), ALIGNED)
+    image.header.set_zooms((MM * clip.spacing,) * 3 + (clip.frame_time,))
+    image.header["descrip"] = f"echotruth, synthetic: {clip.name}".encode()[:79]
+    # The compressed file has neither name nor date, so that it is the same twice.
+    with path.open("wb") as file, gzip.GzipFile("", "wb", 6, file, mtime=0) as packed:
+        packed.write(image.to_bytes())
+
+
+def affine(clip: Clip) -> NDArray[np.float64]:
+    """Matrix from voxel (lateral, axial, 0, 1) to the frame of the heart, mm, (4, 4)."""
+    corner = clip.plane.to_heart(np.array([clip.lateral[0], clip.axial[0], 0.0]))
+    matrix = np.eye(4)
+    matrix[:3, :3] = MM * clip.spacing * clip.plane.axes.T
+    matrix[:3, 3] = MM * corner
+    return matrix

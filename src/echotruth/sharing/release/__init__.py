@@ -1,0 +1,141 @@
+"""A repository as the files that one would upload: parts with their checksums, a card, metadata and an evaluator."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from shutil import rmtree
+from typing import Any
+
+import yaml
+
+from echotruth import files
+from echotruth.config import shipped
+from echotruth.repository.reader import Repository
+from echotruth.sharing.description.attribution import Attribution
+from echotruth.sharing.description.citation import citation, filled
+from echotruth.sharing.description.facts import CLIPS, DescriptionError, Facts, read_facts
+from echotruth.sharing.description.statements import card, statements
+from echotruth.sharing.fetching import PARTS, REGISTRY
+from echotruth.sharing.release import evaluate
+from echotruth.sharing.release.parts import Part, registry, table, write_parts
+
+PART_BYTES = 2 * 10**9
+"""Largest size of a part unless another is asked for."""
+HUB_TASKS = ["image-segmentation", "keypoint-detection"]
+"""What Hugging Face calls the tasks that the truth is for."""
+HUB_SIZES = {1_000: "n<1K", 10_000: "1K<n<10K", 100_000: "10K<n<100K", 1_000_000: "100K<n<1M"}
+"""Number of clips -> what Hugging Face calls fewer."""
+
+
+Croissant = Callable[..., bytes]
+
+
+class ReleaseError(ValueError):
+    """Raised if a repository cannot be released; the message says why, and what to do."""
+
+
+def release(
+    repository: Repository, folder: Path, given: Attribution | None = None, part_bytes: int = PART_BYTES
+) -> list[Path]:
+    """Write the files of a release; the same repository, with the same time of its checksums, gives the same bytes.
+
+    Parameters
+    ----------
+    repository : Repository
+        Finished, in a folder.
+    folder : Path
+        Folder for the files, which is not there yet; it has its name only when all of them are written.
+    given : Attribution, optional
+        Authors, licence, address.
+    part_bytes : int, optional
+        Largest size of a part.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    ReleaseError, DescriptionError
+        If the repository is not finished or is damaged, the folder is there already, or a package is missing.
+    """
+    if folder.exists() or folder.is_symlink():
+        raise ReleaseError(f"{folder}: is there already: give another folder with --to, or remove it")
+    try:
+        from echotruth.sharing.description.croissant import croissant
+    except ModuleNotFoundError as error:
+        remedy = "pip install 'echotruth[description]'"
+        raise DescriptionError(f"release needs the package {error.name}: {remedy}") from None
+    facts = read_facts(repository, given or Attribution())
+    draft = folder.with_name(f".partial-{folder.name}")
+    rmtree(draft, ignore_errors=True)
+    draft.mkdir(parents=True)
+    try:
+        found = write_parts(repository, draft, part_bytes)
+        texts = _documents(facts, found, croissant)
+        texts[REGISTRY] = registry(found, texts)
+        for name, content in texts.items():
+            files.write(draft / name, content)
+        draft.rename(folder)
+    except BaseException:
+        rmtree(draft, ignore_errors=True)
+        raise
+    return [folder / name for name in (*(part.path.name for part in found), *texts)]
+
+
+def _documents(facts: Facts, found: list[Part], croissant: Croissant) -> dict[str, bytes]:
+    """Content of the files beside the parts, by their names."""
+    said, parts = statements(facts), [(part.path.name, part.bytes, part.sha256) for part in found]
+    hub = yaml.safe_dump(_hub(facts, said), sort_keys=False, allow_unicode=True)
+    return {
+        CLIPS: facts.clips_table,
+        PARTS: table(found),
+        "README.md": f"---\n{hub}---\n\n".encode() + card(facts, said, is_release=True),
+        "CITATION.cff": citation(facts, said),
+        "croissant.json": croissant(facts, said, parts),
+        ".zenodo.json": (json.dumps(_zenodo(facts, said), indent=1, ensure_ascii=False) + "\n").encode(),
+        "cases.csv": (facts.repository.folder / "cases.csv").read_bytes(),
+        "evaluate.py": Path(evaluate.__file__).read_bytes(),
+    }
+
+
+def _hub(facts: Facts, said: dict[str, Any]) -> dict[str, Any]:
+    """Head of the card, as Hugging Face reads it."""
+    given, number = facts.attribution, facts.clips_table.count(b"\n") - 1
+    other = {"license": "other", "license_name": "custom", "license_link": given.terms} if given.terms else {}
+    terms = {"license": given.spdx.lower()} if given.spdx else other
+    return filled(
+        pretty_name=facts.title,
+        **terms,
+        language=["en"],
+        tags=said["keywords"],
+        task_categories=HUB_TASKS,
+        size_categories=[next((name for size, name in HUB_SIZES.items() if number < size), "n>1M")],
+        configs=[{"config_name": name, "data_files": f"{name}.csv"} for name in ("clips", "cases")],
+    )
+
+
+def _zenodo(facts: Facts, said: dict[str, Any]) -> dict[str, Any]:
+    """What Zenodo asks for of a record."""
+    given, paper = facts.attribution, shipped.citation()["preferred-citation"]
+    people = [
+        filled(name=", ".join(filter(None, [one.family, one.given])), orcid=one.orcid, affiliation=one.affiliation)
+        for one in given.authors
+    ]
+    return filled(
+        title=facts.title,
+        upload_type="dataset",
+        description=said["summary"],
+        creators=people,
+        license=given.spdx.lower(),
+        access_right="open" if given.spdx else "",
+        version=given.release,
+        publication_date=facts.published.isoformat(),
+        language="eng",
+        keywords=said["keywords"],
+        related_identifiers=[{"identifier": paper["doi"], "relation": "cites"}] if paper.get("doi") else [],
+    )
+
+
+__all__ = ["PART_BYTES", "ReleaseError", "release"]

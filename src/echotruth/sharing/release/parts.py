@@ -1,0 +1,165 @@
+"""Parts in which a repository is given away: archives of whole folders, so that a few hearts can be had without others.
+
+A part is a .zip whose files are not compressed again. The first holds what belongs to no job: the configuration, the
+table of cases, the checksums, the metadata of the folders. Others hold whole folders of hearts and clips, case by case.
+All parts are unpacked into the same folder. Times are left out, so that the same repository gives the same bytes.
+"""
+
+import csv
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from hashlib import sha256
+from io import StringIO
+from pathlib import Path, PurePosixPath
+from zipfile import ZIP_STORED, ZipFile, ZipInfo
+
+from echotruth.repository.publication import CHECKSUMS, checksum, published_files
+from echotruth.repository.reader import Repository
+from echotruth.sharing.release.clips import clips_of
+
+STRUCTURE, HEARTS, CLIPS = "structure", "hearts", "clips"
+"""What a part holds; clips are NumPy archives for whoever reads no Zarr."""
+
+DEPTHS = {"hearts": 2, "inference": 2, "clips": 3}
+"""Folder of the store -> number of names of the folders of its jobs, as clips/CASE/VIEW."""
+
+EPOCH = (1980, 1, 1, 0, 0, 0)
+"""Earliest time that a .zip can have."""
+
+Files = dict[str, bytes | Path]
+"""Name in an archive -> content, or the file that has it."""
+
+
+@dataclass
+class Part:
+    """One archive.
+
+    Attributes
+    ----------
+    path : Path
+    holds : str
+        One of `STRUCTURE`, `HEARTS` and `CLIPS`.
+    cases : list of str
+        Cases of which it holds files.
+    size : int
+        Of the files in it, bytes.
+    """
+
+    path: Path
+    holds: str
+    cases: list[str] = field(default_factory=list)
+    size: int = 0
+
+    def add(self, cases: list[str], files: Files) -> None:
+        """Append files of some cases, given their names in the archive."""
+        with ZipFile(self.path, "a", ZIP_STORED) as archive:
+            for name, content in files.items():
+                about = ZipInfo(name, EPOCH)
+                about.external_attr = 0o644 << 16
+                about.create_system = 3  # the same on every system
+                archive.writestr(about, content if isinstance(content, bytes) else content.read_bytes())
+        self.size += size_of(files)
+        self.cases += [case for case in cases if case not in self.cases]
+
+    @property
+    def bytes(self) -> int:
+        """Size of the archive."""
+        return self.path.stat().st_size
+
+    @cached_property
+    def sha256(self) -> str:
+        """Checksum of the archive, to be asked for once it is full."""
+        return checksum(self.path)
+
+
+def size_of(files: Files) -> int:
+    """Size of files, bytes."""
+    return sum(len(one) if isinstance(one, bytes) else one.stat().st_size for one in files.values())
+
+
+def write_parts(repository: Repository, folder: Path, limit: int) -> list[Part]:
+    """Write all parts of a finished repository.
+
+    Parameters
+    ----------
+    repository : Repository
+    folder : Path
+        An empty folder.
+    limit : int
+        Largest size of a part, bytes, unless a single folder of a heart or a clip is larger.
+    """
+    name, folders = repository.config.name, folders_of(repository)
+    structure = Part(folder / f"{name}-{STRUCTURE}.zip", STRUCTURE)
+    structure.add([], folders.pop(""))
+    hearts = filled(folder / f"{name}-{HEARTS}", HEARTS, by_case(repository, folders), limit)
+    clips = filled(folder / f"{name}-{CLIPS}", CLIPS, clip_files(repository), limit)
+    return [structure, *hearts, *clips]
+
+
+def folders_of(repository: Repository) -> dict[str, Files]:
+    """Files that have a checksum by the folder below the store that a job made, "" for those that no job made."""
+    home, store = repository.folder, Path(str(repository.store))
+    found: dict[str, Files] = {"": {}}
+    for path in [*published_files(home, store), home / CHECKSUMS]:
+        names = PurePosixPath(path.relative_to(home)).parts[1:]
+        depth = DEPTHS.get(names[0], 0) if names else 0
+        place = "/".join(names[:depth]) if len(names) > depth else ""
+        found.setdefault(place, {})[f"{repository.config.name}/{path.relative_to(home).as_posix()}"] = path
+    return found
+
+
+def by_case(repository: Repository, folders: dict[str, Files]) -> Iterator[tuple[list[str], Files]]:
+    """Each folder with the cases whose arrays are in it, in the order of the cases; last those of no case any more."""
+    owners: dict[str, list[str]] = {}
+    for case, heart in repository.parameters["heart"].items():
+        clips = [f"clips/{case}/{view}" for view in repository.views]
+        for place in (f"hearts/{heart}", *clips, f"inference/{case}"):
+            owners.setdefault(place, []).append(str(case))
+    for place in dict.fromkeys([*owners, *folders]):
+        if place in folders:
+            yield owners.get(place, []), folders[place]
+
+
+def clip_files(repository: Repository) -> Iterator[tuple[list[str], Files]]:
+    """The archives of the clips of each view that was tracked."""
+    for case, views in repository.finished(None, None, "mechanics", "truth", "bmode", "tracking"):
+        for view in views:
+            yield [case.id], {f"clips/{name}": text for name, text in clips_of(repository, case.id, view).items()}
+
+
+def filled(stem: Path, holds: str, folders: Iterable[tuple[list[str], Files]], limit: int) -> list[Part]:
+    """Fill parts with folders, one after the other.
+
+    Parameters
+    ----------
+    stem : Path
+        Beginning of the paths of the parts.
+    holds : str
+    folders : iterable
+        Each with its cases and files, which stay together.
+    limit : int
+        Largest size of a part, bytes.
+    """
+    parts: list[Part] = []
+    for cases, files in folders:
+        if not parts or (parts[-1].size and parts[-1].size + size_of(files) > limit):
+            parts.append(Part(stem.with_name(f"{stem.name}-{len(parts) + 1:04d}.zip"), holds))
+        parts[-1].add(cases, files)
+    return parts
+
+
+def table(found: list[Part]) -> bytes:
+    """Table of the parts, with a row for every case of which they hold files."""
+    text = StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(["part", "holds", "case"])
+    rows.writerows([part.path.name, part.holds, case] for part in found for case in part.cases or [""])
+    return text.getvalue().encode()
+
+
+def registry(found: list[Part], texts: dict[str, bytes]) -> bytes:
+    """Checksums of all files, as pooch reads them."""
+    known = {part.path.name: part.sha256 for part in found}
+    known |= {name: sha256(content).hexdigest() for name, content in texts.items()}
+    return "".join(f"{name} sha256:{one}\n" for name, one in known.items()).encode()
