@@ -45,9 +45,8 @@ def execute(command: list[str], log: Path, name: str, progress: Progress) -> int
     line = ProgressLine(name, sys.stderr)
     with log.open("w") as output, log.open(errors="replace") as told:
         process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
-        signals = (signal.SIGTERM, signal.SIGHUP)
         # What is ignored, as by nohup, stays so.
-        signals = tuple(number for number in signals if signal.getsignal(number) != signal.SIG_IGN)
+        signals = [one for one in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(one) != signal.SIG_IGN]
         handlers = [signal.signal(number, _raise_exit) for number in signals]
         try:
             incomplete = ""
