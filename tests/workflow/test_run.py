@@ -127,17 +127,20 @@ def test_without_a_failed_job_the_output_itself_is_shown(tmp_path, capfd):
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_signal_ends_snakemake_with_all_that_it_started(tmp_path, number):
     code = "import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(99)'])"
-    mine = psutil.Process()
+    before = set(psutil.Process().children(recursive=True))
+
+    def started():
+        return set(psutil.Process().children(recursive=True)) - before
 
     def send():
-        while len(mine.children(recursive=True)) < 2:
+        while len(started()) < 2:
             time.sleep(0.05)
         os.kill(os.getpid(), number)
 
     threading.Thread(target=send, daemon=True).start()
     with pytest.raises(SystemExit) as ended:
         executed(tmp_path, f"{code}; time.sleep(99)")
-    assert ended.value.code == 128 + number and not mine.children(recursive=True)
+    assert ended.value.code == 128 + number and not started()
 
 
 def test_file_in_the_place_of_the_folder_is_told_in_one_line(tmp_path):

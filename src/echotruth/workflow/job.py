@@ -188,8 +188,9 @@ def main(stage: str, work: Work, description: str | None) -> None:
     folder = arguments.pop("folder")
     _prepare(arguments.pop("threads"), " ".join(str(value) for value in arguments.values()))
     try:
+        folder = repository_folder(folder)
         lock.share(folder)
-        job = Job(repository_folder(folder), stage, **arguments)
+        job = Job(folder, stage, **arguments)
     except (FileNotFoundError, lock.LockError) as error:
         sys.exit(f"{stage}: {error}")
     if job.view_name is not None and job.view_name not in job.config.views:
