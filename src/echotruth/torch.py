@@ -2,7 +2,7 @@
 
 >>> from echotruth import learning
 >>> from echotruth.torch import FlowPairs, loader
->>> parts = learning.split(learning.cases("sample"), {"train": 0.5, "test": 0.5}, seed=3)
+>>> parts = learning.split(learning.cases("sample"), {"train": 0.7, "test": 0.3}, seed=3)
 >>> batch = next(iter(loader(FlowPairs("sample", parts["train"]), 8)))
 >>> batch["image"].shape, batch["flow"].shape
 (torch.Size([8, 2, 256, 256]), torch.Size([8, 2, 256, 256]))
