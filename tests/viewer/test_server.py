@@ -1,8 +1,10 @@
 """Who is answered by the server of the viewer, and how many."""
 
+import asyncio
 import json
 import re
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
@@ -25,15 +27,21 @@ OTHERS = [
 
 @pytest.fixture
 def server(monkeypatch):
-    """Server of the repository that comes with the package, of which the page is left empty to be quick."""
+    """Server of the repository that comes with the package, of which the page is left empty to be quick.
+
+    It answers in a thread of its own: where another module has a browser, an event loop runs in that of the tests.
+    """
     monkeypatch.setattr("echotruth.viewer.server.Page", lambda *_: None)
     monkeypatch.setattr(access, "UNUSED", 1_500)
     monkeypatch.setattr(access, "CHECKED", 50)
     monkeypatch.setattr(access, "MAX_PAGES", 5)
-    server = serve("sample")
-    yield server
-    server.stop()
-    server.unlisten()
+    with ThreadPoolExecutor(1) as thread:
+        server = thread.submit(serve, "sample").result()
+        thread.submit(server.io_loop.start)
+        yield server
+        server.io_loop.add_callback(server.stop)
+        server.io_loop.add_callback(server.unlisten)
+        server.io_loop.add_callback(server.io_loop.stop)
 
 
 def request(server, path, headers, scheme="http"):
@@ -41,10 +49,17 @@ def request(server, path, headers, scheme="http"):
     return HTTPRequest(f"{scheme}://127.0.0.1:{server.port}{path}", headers=headers)
 
 
+def run(server, coroutine):
+    return asyncio.run_coroutine_threadsafe(coroutine, server.io_loop.asyncio_loop).result(30)
+
+
 def ask(server, path="/", headers=()):
     """Status and text of the answer."""
-    asked = request(server, path, dict(headers))
-    answer = server.io_loop.run_sync(lambda: AsyncHTTPClient().fetch(asked, raise_error=False))
+
+    async def answered():
+        return await AsyncHTTPClient().fetch(request(server, path, dict(headers)), raise_error=False)
+
+    answer = run(server, answered())
     return answer.code, answer.body.decode()
 
 
@@ -59,7 +74,7 @@ def connect(server, token, **headers):
         return message
 
     try:
-        return server.io_loop.run_sync(acknowledged, timeout=30)
+        return run(server, acknowledged())
     except HTTPClientError as error:
         return error.code
 
@@ -104,8 +119,7 @@ def test_only_so_many_pages_are_alive_and_those_without_a_connection_are_forgott
     assert len(server.get_sessions()) == access.MAX_PAGES
     end = time.monotonic() + 30
     while server.get_sessions() and time.monotonic() < end:
-        server.io_loop.call_later(0.1, server.io_loop.stop)
-        server.io_loop.start()
+        time.sleep(0.1)
     assert server.get_sessions() == [] and ask(server)[0] == 200
 
 
