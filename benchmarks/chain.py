@@ -50,7 +50,8 @@ from echotruth.imaging.truth import pixel_truth
 from echotruth.report.account import took
 from echotruth.repository import estimates, group
 from echotruth.repository.coordinates import coordinates_of
-from echotruth.repository.reader import SIZED, STAGES, Repository
+from echotruth.repository.places import OF_HEART, STAGES, groups_of
+from echotruth.repository.reader import Repository
 from echotruth.section import Section
 from echotruth.seeds import generator
 from echotruth.tracking.failure import TrackerFailed
@@ -143,7 +144,7 @@ class Parts:
 
     def writing(self, stage: str) -> float:
         """What it takes to write what is stored of a stage, to another folder."""
-        groups = [f"{stage}/{size}" for size in self._config.bmode.sizes] if stage in SIZED else [stage]
+        groups = groups_of(stage, self._config.bmode.sizes)
         arrays = {name: self._repository.arrays(name, *self._place) for name in groups}
         return sum(timed(partial(_write, name, values, self._config)) for name, values in arrays.items())
 
@@ -207,7 +208,7 @@ def beside(folder: Path) -> list[list[Any]]:
     repository = Repository(folder)
     case, view = repository.shown[0], repository.views[0]
     parts, rows = Parts(folder, case, view), []
-    for stage in (stage for stage in STAGES if stage not in ("mechanics", "inference")):
+    for stage in (stage for stage in STAGES if stage not in OF_HEART):
         at = folder / "benchmarks" / stage / case
         files = [*at.glob(f"{view}.tsv"), *at.glob(f"{view}/*.tsv")]
         spent = took(files)["cpu_time"].sum() - START * len(files)

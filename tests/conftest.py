@@ -56,6 +56,19 @@ def finished(tmp_path_factory) -> Path:
         return finished_repository.finish(folder, finished_repository.FINISHED, finished_repository.solved)
 
 
+@pytest.fixture(scope="module")
+def done(request, tmp_path_factory) -> Path:
+    """Folder of the repository of a module's `CONFIG`, made by its `result` if it has one; nobody writes to it."""
+    result = getattr(request.module, "result", finished_repository.blank)
+    return finished_repository.finish(tmp_path_factory.mktemp("done") / "small", request.module.CONFIG, result)
+
+
+@pytest.fixture
+def folder(done, tmp_path) -> Path:
+    """A copy of it."""
+    return shutil.copytree(done, tmp_path / "small")
+
+
 @pytest.fixture(scope="session")
 def textured(tmp_path_factory) -> Path:
     """Folder of the repository of `learning_repository.made`, which nobody writes to."""

@@ -4,11 +4,10 @@ import errno
 import os
 import re
 import shutil
-from shutil import copytree
 
 import numpy as np
 import pytest
-from finished_repository import SIZE, blank, configured, content, do, finish, jobs, remake
+from finished_repository import SIZE, blank, configured, content, do, jobs, remake
 
 from echotruth.cases import expand
 from echotruth.repository.check import Fault, check
@@ -16,16 +15,6 @@ from echotruth.repository.check import Fault, check
 CONFIG = configured(views=("mid",))
 FIRST, SECOND = (case.id for case in expand(CONFIG))
 CLIP = f"small.zarr/clips/{FIRST}/mid"
-
-
-@pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    return finish(tmp_path_factory.mktemp("done") / "small", CONFIG)
-
-
-@pytest.fixture
-def folder(done, tmp_path):
-    return copytree(done, tmp_path / "small")
 
 
 def flip(path, random):

@@ -15,7 +15,7 @@ from echotruth.config import Bmode, Tracking
 from echotruth.repository import group, rounding, schema
 from echotruth.repository.coordinates import coordinates_of
 from echotruth.repository.group import NotWritten
-from echotruth.repository.places import place
+from echotruth.repository.places import group_of, place
 
 CONFIG = configured(tracking=Tracking(grid_px=2, trackers={name: {"method": "dis"} for name in ("one", "two")}))
 SIZE = CONFIG.bmode.size_px
@@ -134,7 +134,7 @@ def test_what_holds_fill_values_alone_is_on_disk_all_the_same(tmp_path):
 
 @pytest.mark.parametrize("name", ["mechanics", "phantom", "truth/64", "inference/fit"])
 def test_name_of_a_group_is_that_of_its_path(name):
-    assert group.path_in(path(name)) == name
+    assert group_of(path(name)) == name
 
 
 @pytest.mark.parametrize(("field_of_view_mm", "size_px"), [(12, 512), (12, 128), (160, 512), (10.24, 1024)])

@@ -2,12 +2,11 @@
 
 import re
 from contextlib import chdir
-from shutil import copytree
 
 import pandas as pd
 import pytest
 import xarray as xr
-from finished_repository import blank, configured, content, finish, remake
+from finished_repository import blank, configured, content, remake
 
 import echotruth as et
 from echotruth.cases import expand, table
@@ -28,16 +27,6 @@ def result(job):
     if job.stage == "mechanics" and job.case.id == "two":
         job.notes["bounded"] = {"longitudinal_strain_max": 0.04}
     return found
-
-
-@pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    return finish(tmp_path_factory.mktemp("done") / "small", CONFIG, result)
-
-
-@pytest.fixture
-def folder(done, tmp_path):
-    return copytree(done, tmp_path / "small")
 
 
 def changed(**sections):

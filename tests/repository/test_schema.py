@@ -5,7 +5,7 @@ import pytest
 import zarr
 
 from echotruth.repository import schema
-from echotruth.repository.group import path_in
+from echotruth.repository.places import group_of
 
 ALL = [*schema.COORDINATES.values(), *schema.DERIVED, *(array for arrays in schema.KINDS.values() for array in arrays)]
 UNITS = {"1", "m", "m3", "s", "s-1", "Pa", "Pa s-1", "rad", "rad s-1", "percent"}
@@ -29,7 +29,7 @@ def test_names_stand_once_in_a_group_and_labels_belong_to_coordinates():
 def test_finished_repository_has_the_arrays_of_the_schema_and_no_others(finished):
     store, seen = zarr.open_group(next(finished.glob("*.zarr")), mode="r", use_consolidated=False), set()
     for path, group in store.members(max_depth=None):
-        kind = schema.kind(path_in(path)) if isinstance(group, zarr.Group) and path.count("/") > 1 else ""
+        kind = schema.kind(group_of(path)) if isinstance(group, zarr.Group) and path.count("/") > 1 else ""
         if kind in schema.KINDS:
             arrays = dict(group.arrays())
             known = schema.COORDINATES | schema.arrays_of(kind)

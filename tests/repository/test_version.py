@@ -125,6 +125,20 @@ def test_setting_changes_the_versions_of_the_stages_that_depend_on_it_and_no_oth
         assert version_of("bmode", before, "mid") != version_of("bmode", before, "long_axis")
 
 
+def test_file_that_the_command_of_a_tracker_names_changes_its_tracking_alone(tmp_path):
+    def versions(text):
+        program = tmp_path / text / "program.py"
+        program.parent.mkdir()
+        program.write_text(text)
+        tracker = {"method": "external", "command": ["python", "program.py", "{input}", "{output}"]}
+        with chdir(program.parent):
+            config = configured(tracking={"trackers": {"own": tracker}})
+            return {stage: version_of(stage, config, "mid") for stage in BEFORE if stage != "inference"}
+
+    one, other = versions("one"), versions("other")
+    assert {stage for stage in one if one[stage] != other[stage]} == {"tracking"}
+
+
 def test_reason_for_which_a_heart_is_not_imaged_is_in_the_version():
     assert version_of("rf", configured(), "mid", "failed") != version_of("rf", configured(), "mid")
 

@@ -2,11 +2,10 @@
 
 import errno
 import os
-from shutil import copytree
 
 import numpy as np
 import pytest
-from finished_repository import SIZE, begin, blank, configured, content, do, finish, jobs, remake
+from finished_repository import SIZE, begin, blank, configured, content, do, jobs, remake
 
 from echotruth.cases import expand
 from echotruth.repository.group import read
@@ -14,16 +13,6 @@ from echotruth.workflow.failure import CaseFailed
 from echotruth.workflow.job import Job, main, read_case
 
 CONFIG = configured(views=("mid",), cases={})
-
-
-@pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    return finish(tmp_path_factory.mktemp("done") / "small", CONFIG)
-
-
-@pytest.fixture
-def folder(done, tmp_path):
-    return copytree(done, tmp_path / "small")
 
 
 def job(folder, stage):

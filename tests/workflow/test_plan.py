@@ -6,9 +6,12 @@ from types import SimpleNamespace
 
 import pytest
 import yaml
-from finished_repository import begin, configured, finish, plan_of
+from finished_repository import begin, configured, content, finish, plan_of, remake
 
+import echotruth as et
+from echotruth.config import Bmode, Cases
 from echotruth.config.loading import ConfigError
+from echotruth.repository.check import check
 from echotruth.repository.metadata import OUTDATED
 from echotruth.workflow import lock
 from echotruth.workflow.plan import Plan, as_yaml
@@ -66,6 +69,18 @@ def test_what_was_made_otherwise_is_set_aside_and_taken_back_with_its_settings(d
     after = {path for path in done.rglob("*") if path.is_file() and path.name != ".SHA256SUMS.outdated"}
     assert outdated(done) == set() and before - after <= {done / "SHA256SUMS"} and after <= before
     finish(done, config)
+
+
+def test_what_the_configuration_has_no_more_is_set_aside_and_is_no_part_of_the_repository(tmp_path):
+    more = configured(bmode={"size_px": 64, "downsampling": (1, 2)}, cases={"fibres.endo_deg": [60.0, 70.0]})
+    one = {"views": {"mid": more.views["mid"]}, "bmode": Bmode(size_px=64, downsampling=(1,))}
+    fewer = more.model_copy(update=one | {"cases": Cases.model_validate({"fibres.endo_deg": [70.0]})})
+    folder, before = finish(tmp_path / "small", more), content(tmp_path / "small")
+    assert remake(folder, fewer) == ["repository"] and check(folder).faults == []
+    at_once = finish(tmp_path / "fewer" / "small", fewer) / "SHA256SUMS"
+    assert (folder / "SHA256SUMS").read_bytes() == at_once.read_bytes()
+    assert len(et.Repository(folder).tree["clips"].children) == 1
+    assert remake(folder, more) == ["repository"] and content(folder) == before
 
 
 def test_process_that_only_lists_jobs_leaves_all_as_it_was(done, monkeypatch):

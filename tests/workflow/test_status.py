@@ -1,10 +1,9 @@
 """`echotruth status` tells what is made, whether a run works on it, and what failed and why."""
 
 import shutil
-from shutil import copytree
 
 import pytest
-from finished_repository import SIZE, blank, configured, do, finish, jobs
+from finished_repository import SIZE, blank, configured, do, jobs
 
 from echotruth.cases import expand
 from echotruth.workflow import lock
@@ -20,16 +19,6 @@ def result(job):
     if job.stage == "mechanics" and job.case.id == "b":
         job.notes["bounded"] = {"longitudinal_strain_max": 0.04}
     return found
-
-
-@pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    return finish(tmp_path_factory.mktemp("done") / "small", CONFIG, result)
-
-
-@pytest.fixture
-def folder(done, tmp_path):
-    return copytree(done, tmp_path / "small")
 
 
 def test_finished_repository_is_finished_and_names_the_hearts_that_are_not_complete(done):

@@ -12,7 +12,8 @@ from echotruth.evaluation.leaderboard import failures_of
 from echotruth.evaluation.no_estimate import FAILED
 from echotruth.repository import inferred, status
 from echotruth.repository.choice import image_size
-from echotruth.repository.reader import STAGES, Repository
+from echotruth.repository.places import STAGES
+from echotruth.repository.reader import Repository
 
 LISTED = 20
 """Largest number of failures of a kind that are listed."""

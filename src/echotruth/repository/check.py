@@ -1,18 +1,19 @@
 """Check of a repository: its files against their checksums, every chunk of its arrays, and the values in them."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import NamedTuple
 
 from echotruth.config import Config
 from echotruth.repository import group, values
-from echotruth.repository.group import NotWritten, path_in
-from echotruth.repository.places import METADATA
+from echotruth.repository.group import NotWritten
+from echotruth.repository.metadata import files_of
+from echotruth.repository.places import METADATA, NOT_NEEDED, group_of, job_of
 from echotruth.repository.publication import CHECKSUMS, checksum, published_files
-from echotruth.repository.reader import NOT_NEEDED, SIZED, Repository
+from echotruth.repository.reader import Repository
 
 REMEDY = "delete {} and run the configuration again"
 TEXTS = ("cases.csv", "config.yaml")
@@ -63,9 +64,10 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
     _check_files(folder, store, report)
     if quick:
         return report
-    places = sorted(path.parent.relative_to(store).as_posix() for path in store.rglob(METADATA) if _is_made(path))
+    groups = sorted(path.parent for path in files_of(store) if path.name == METADATA and _has_arrays(path.parent))
+    places, configs = [path.relative_to(store).as_posix() for path in groups], _configs(repository)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        found = pool.map(lambda place: list(_faults(repository, store, place)), places)
+        found = pool.map(lambda place: list(_faults(store, place, configs)), places)
         for done, faults in enumerate(found, 1):
             report.faults += faults
             if progress:
@@ -98,23 +100,17 @@ def _check_files(folder: Path, store: Path, report: Report) -> None:
 
 def _group_of(name: str) -> str:
     """Folder of the group that one job made, of which a file is a part; the checksums if no job made it."""
-    parts = PurePosixPath(name).parts
-    depths = {"hearts": 3, "inference": 3, "clips": 5}
-    depth = depths.get(parts[1], 0) if len(parts) > 1 else 0
-    if depth == 5 and len(parts) > 5 and parts[4] in SIZED:
-        depth = 6
-    if depth and len(parts) > depth:
-        group = "/".join(parts[:depth])
-        return f"{group} and {CHECKSUMS}" if parts[depth - 1] in NOT_NEEDED else group
+    store, _, path = name.partition("/")
+    if group := job_of(path):
+        return f"{store}/{group} and {CHECKSUMS}" if group_of(group) in NOT_NEEDED else f"{store}/{group}"
     return name if name in TEXTS else CHECKSUMS  # without them the rule repository writes what no job made
 
 
-def _is_made(path: Path) -> bool:
-    """Whether the metadata are those of a group that has arrays."""
-    return any((child / METADATA).is_file() and (child / "c").is_dir() for child in path.parent.iterdir())
+def _has_arrays(folder: Path) -> bool:
+    return any((child / METADATA).is_file() and (child / "c").is_dir() for child in folder.iterdir())
 
 
-def _faults(repository: Repository, store: Path, place: str) -> Iterator[Fault]:
+def _faults(store: Path, place: str, configs: Mapping[str, Config]) -> Iterator[Fault]:
     """What is wrong with a group: chunks that cannot be read, and values that cannot be."""
     where, remedy = f"{store.name}/{place}", REMEDY.format(_group_of(f"{store.name}/{place}/{METADATA}"))
     try:
@@ -122,10 +118,11 @@ def _faults(repository: Repository, store: Path, place: str) -> Iterator[Fault]:
     except (NotWritten, ValueError, OSError, RuntimeError) as error:
         yield Fault(where, f"cannot be read ({type(error).__name__}: {str(error)[:100]})", remedy)
         return
-    if (config := _config_of(repository, place)) is None:
+    config = configs.get("/".join(place.split("/")[:2]))
+    if config is None:  # it was put there by hand
         return
     try:
-        found = list(values.faults(path_in(place), arrays, config))
+        found = list(values.faults(group_of(place), arrays, config))
     except (ValueError, LookupError, TypeError) as error:
         yield Fault(where, f"has arrays that do not belong together ({str(error)[:100]})", remedy)
         return
@@ -133,9 +130,10 @@ def _faults(repository: Repository, store: Path, place: str) -> Iterator[Fault]:
         yield Fault(f"{where}/{name}", problem, "its numbers are wrong: report it with the configuration")
 
 
-def _config_of(repository: Repository, place: str) -> Config | None:
-    """Configuration of the case of a group; None if it is not one of the repository any more."""
-    top, id, *_ = place.split("/")
-    hearts = repository.parameters["heart"]
-    cases = [str(case) for case, heart in hearts.items() if (heart if top == "hearts" else case) == id]
-    return repository.case(cases[0]).config if cases else None
+def _configs(repository: Repository) -> dict[str, Config]:
+    """Beginning of the paths of all groups, as `clips/CASE`, -> configuration of a case that has them."""
+    found = {}
+    for case, heart in repository.parameters["heart"].items():
+        config = repository.case(str(case)).config
+        found |= dict.fromkeys([f"hearts/{heart}", f"clips/{case}", f"inference/{case}"], config)
+    return found

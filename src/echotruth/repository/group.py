@@ -22,7 +22,7 @@ from zarr.codecs import BloscCodec, Crc32cCodec, ZstdCodec
 from echotruth.config import Config
 from echotruth.repository import rounding, schema
 from echotruth.repository.array import Array
-from echotruth.repository.places import METADATA
+from echotruth.repository.places import METADATA, group_of
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -95,9 +95,10 @@ def write(
     for name, array in arrays.items():
         step = rounding.quantum(array, config)
         stored = rounding.rounded(np.asarray(values[name], dtype=array.dtype), step)
-        auxiliary = "time" if "frame" in array.dims else ""
-        about = {"quantum": step} if step is not None else {}
-        _create(opened, array, stored, alone, about | ({"coordinates": auxiliary} if auxiliary else {}))
+        about: dict[str, Any] = {"quantum": step} if step is not None else {}
+        if "frame" in array.dims:
+            about["coordinates"] = "time"
+        _create(opened, array, stored, alone, about)
     for name, array in schema.COORDINATES.items():
         if name in coordinates and name not in arrays and dims >= set(array.dims):
             _create(opened, array, np.asarray(coordinates[name]), (), {})
@@ -136,7 +137,7 @@ def read(store: Any, path: str, *names: str) -> Arrays:
     """
     group = open_group(store, path)
     present = set() if names else set(group.array_keys())
-    wanted = names or [name for name in schema.arrays_of(path_in(path)) if name in present]
+    wanted = names or [name for name in schema.arrays_of(group_of(path)) if name in present]
     for name in wanted:
         if name not in group:
             why = group.attrs.get("reason")
@@ -157,12 +158,6 @@ def part(array: zarr.Array[Any], *index: Any) -> NDArray[Any]:
     if values.size and np.all(is_fill) and not array.nchunks_initialized:
         raise NotWritten(f"{array.store_path}: its data are lost: delete the group, and run the configuration again")
     return values
-
-
-def path_in(path: str) -> str:
-    """Name of a group by its path: of `clips/CASE/VIEW/truth/512`, `truth/512`."""
-    top, *rest = path.split("/")
-    return "/".join(["inference", *rest[1:]] if top == "inference" else rest[1 if top == "hearts" else 2 :])
 
 
 def _create(

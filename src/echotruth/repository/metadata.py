@@ -1,6 +1,8 @@
 """Metadata of groups: what a group says of itself, and for readers that list, the metadata of all below it."""
 
 import json
+import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +10,8 @@ from echotruth import files
 from echotruth.repository.places import METADATA
 
 OUTDATED = "outdated.json"
-"""Name of the metadata of a group that was made with other settings or by other code: it is no group until it is made
-anew, or until the settings are again those that it was made with."""
+"""Name of the metadata of a group that was made with other settings or by other code, or that the configuration has no
+more: it is no group until it is made anew, or until the settings are again those that it was made with."""
 
 
 def attributes(folder: Path) -> dict[str, Any]:
@@ -29,11 +31,20 @@ def write(folder: Path, attributes: dict[str, Any], consolidated: bool = True) -
     """
     document: dict[str, Any] = {"attributes": attributes, "zarr_format": 3, "node_type": "group"}
     if consolidated:
-        below = sorted(path for path in folder.rglob(METADATA) if path.parent != folder)
+        below = sorted(path for path in files_of(folder) if path.name == METADATA and path.parent != folder)
         found = {path.parent.relative_to(folder).as_posix(): json.loads(path.read_bytes()) for path in below}
         inline = {"kind": "inline", "must_understand": False, "metadata": found}
         document["consolidated_metadata"] = inline
     files.update(folder / METADATA, json.dumps(document).encode())
+
+
+def files_of(folder: Path) -> Iterator[Path]:
+    """Files of a group and of all below it, without groups that were set aside."""
+    for at, folders, names in os.walk(folder):
+        if OUTDATED in names:
+            folders.clear()
+        else:
+            yield from (Path(at) / name for name in names)
 
 
 def settle(folder: Path, version: str) -> bool:
@@ -44,7 +55,7 @@ def settle(folder: Path, version: str) -> bool:
     folder : Path
         Of the group.
     version : str
-        What it is to be made with.
+        What it is to be made with; empty if it is not to be there.
 
     Returns
     -------

@@ -1,11 +1,24 @@
 """Where the groups of a repository are: `hearts/HEART`, `clips/CASE/VIEW` and `inference/CASE` below `NAME.zarr`."""
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from echotruth.repository import schema
 
 METADATA = "zarr.json"
 """File of a group, which is written last: without it there is no group."""
+
+STAGES = ("mechanics", "phantom", "rf", "truth", "bmode", "tracking", "inference")
+"""Stages in the order of their jobs."""
+OF_HEART = ("mechanics", "inference")
+"""Stages that have a job for a heart, and not for its views."""
+SIZED = ("truth", "bmode", "tracking")
+"""Stages that make a group for each image size."""
+NOT_NEEDED = ("phantom", "rf")
+"""Stages whose groups may be deleted once the images are made: a run does not make them again."""
+
+DEPTHS = {"hearts": 2, "clips": 3, "inference": 2}
+"""Folder of the store -> number of names in the path of a heart, a clip or an inference."""
 
 NOT_A_REPOSITORY = "is not a repository: give the folder that a run made, such as out/demo"
 """What an error says of a folder, whose path stands before it."""
@@ -35,6 +48,41 @@ def place(group: str, heart: str, case: str, view: str | None = None) -> str:
     if stage == "inference":
         return f"inference/{case}/{rest}".rstrip("/")
     return f"clips/{case}/{view}/{group}"
+
+
+def groups_of(stage: str, sizes: Iterable[object]) -> list[str]:
+    """Groups that a stage makes for a heart or a view, given the image sizes: those of which Snakemake knows."""
+    if stage in SIZED:
+        return [f"{stage}/{size}" for size in sizes]
+    return ["heart" if stage == "mechanics" else stage]
+
+
+def group_of(path: str) -> str:
+    """Name of a group by its path: of `clips/CASE/VIEW/truth/512`, `truth/512`."""
+    top, *rest = path.split("/")
+    return "/".join(["inference"] * (top == "inference") + rest[DEPTHS[top] - 1 :])
+
+
+def job_of(path: str) -> str:
+    """Path of the group that a job wrote, as a whole, in which a path below the store is; empty if it is in none.
+
+    Examples
+    --------
+    >>> job_of("clips/patient7/mid/truth/512/flow/c/0"), job_of("hearts/endo70_17059c/zarr.json")
+    ('clips/patient7/mid/truth/512', 'hearts/endo70_17059c')
+    """
+    names = path.split("/")
+    depth = DEPTHS.get(names[0], len(names))
+    if names[0] == "clips":
+        depth += 2 if names[depth : depth + 1] and names[depth] in SIZED else 1
+    return "/".join(names[:depth]) if len(names) > depth else ""
+
+
+def made(store: Path) -> Iterator[str]:
+    """Paths of all groups of a store that jobs wrote."""
+    clips = [f"clips/*/*/{name}" for stage in STAGES if stage not in OF_HEART for name in groups_of(stage, "*")]
+    for pattern in ("hearts/*", *clips, "inference/*"):
+        yield from (path.parent.relative_to(store).as_posix() for path in store.glob(f"{pattern}/{METADATA}"))
 
 
 def repository_folder(repository: str | Path) -> Path:

@@ -11,7 +11,7 @@ from echotruth import files
 from echotruth.cases import Case, table
 from echotruth.config import Config
 from echotruth.repository import metadata
-from echotruth.repository.metadata import OUTDATED
+from echotruth.repository.places import METADATA, SIZED
 from echotruth.repository.status import verdict
 from echotruth.repository.version import packages
 
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
 CHECKSUMS = "SHA256SUMS"
 """File with the checksums of the store and of the files beside it that describe it, as `sha256sum -c` reads it."""
-
-SIZED = ("truth", "bmode", "tracking")
-"""Groups of a clip that hold one for each image size."""
 
 
 def publish(folder: Path, config: Config, cases: list[Case]) -> dict[str, int]:
@@ -65,19 +62,23 @@ def as_csv(summary: pd.DataFrame) -> bytes:
 
 
 def _write_groups(store: Path, config: Config, cases: Iterable[Case]) -> None:
-    """Write the groups that hold those of the jobs; a clip has the metadata of all that it holds."""
-    holders = {store / "hearts", store / "clips"}
-    for case in cases:
-        holders.add(store / "clips" / case.id)
-        for view in config.views:
-            clip = store / "clips" / case.id / view
-            for stage in SIZED:
-                metadata.write(clip / stage, {}, consolidated=False)
-            metadata.write(clip, {"case": case.id, "view": view, "heart": case.heart})
+    """Write the groups that hold those of the jobs, and remove those of cases and views that are no more.
+
+    A clip has the metadata of all that it holds.
+    """
+    clips = {store / "clips" / case.id / view: case for case in cases for view in config.views}
+    holders = {store / "hearts", store / "clips", *(clip.parent for clip in clips)}
+    holders |= {clip / stage for clip in clips for stage in SIZED}
     if config.inference.tracker:
         holders.add(store / "inference")
+    for pattern in ("inference", "clips/*", "clips/*/*", *(f"clips/*/*/{stage}" for stage in SIZED)):
+        for path in store.glob(f"{pattern}/{METADATA}"):
+            if path.parent not in {*holders, *clips}:
+                path.unlink()
     for folder in holders:
         metadata.write(folder, {}, consolidated=False)
+    for clip, case in clips.items():
+        metadata.write(clip, {"case": case.id, "view": clip.name, "heart": case.heart})
 
 
 def _attributes(config: Config) -> dict[str, Any]:
@@ -92,10 +93,8 @@ def _attributes(config: Config) -> dict[str, Any]:
 
 
 def published_files(folder: Path, store: Path) -> list[Path]:
-    """Files that have a checksum: all of the store, the configuration and the table of the cases."""
-    below = (
-        path for path in store.rglob("*") if path.is_file() and path.name != OUTDATED and path.suffix != ".partial"
-    )
+    """Files that have a checksum: all groups of the store, the configuration and the table of the cases."""
+    below = (path for path in metadata.files_of(store) if path.suffix != ".partial")
     return sorted([*below, folder / "cases.csv", folder / "config.yaml"])
 
 

@@ -20,7 +20,7 @@ from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.repository import estimates, group, metadata, schema, status
 from echotruth.repository.choice import Names, Sizes, chosen, image_size, main_view, require_known
 from echotruth.repository.group import NotWritten
-from echotruth.repository.places import place, repository_folder
+from echotruth.repository.places import OF_HEART, groups_of, place, repository_folder
 from echotruth.repository.remote import Remote, hierarchy, is_url
 
 if TYPE_CHECKING:
@@ -30,14 +30,8 @@ if TYPE_CHECKING:
 
     from echotruth.evaluation.clip_metrics import ClipMetrics
 
-STAGES = ("mechanics", "phantom", "rf", "truth", "bmode", "tracking", "inference")
-"""Stages in the order of their jobs."""
 FEW = 4
 """Cases that are looked up one by one, before all are made."""
-SIZED = ("truth", "bmode", "tracking")
-"""Stages that make a group for each image size."""
-NOT_NEEDED = ("phantom", "rf")
-"""Stages whose groups may be deleted once the images are made: a run does not make them again."""
 
 
 class Repository:
@@ -536,20 +530,13 @@ class Repository:
     def problem(self, case: str, view: str | None, *stages: str) -> str:
         """Why stages of a heart, or of one of its views, are not complete, in one sentence; "" if they are."""
         for stage in stages:
-            of_view = view if stage not in ("mechanics", "inference") else None
-            for size in self.sizes if stage in SIZED else [None]:
-                if problem := self._problem(case, of_view, stage, size):
-                    return problem
-        return ""
-
-    def _problem(self, case: str, view: str | None, stage: str, size: int | None) -> str:
-        what = " ".join(filter(None, [case, view]))
-        of = "heart" if stage == "mechanics" else stage if size is None else f"{stage}/{size}"
-        found = self.attributes(of, case, view)
-        if not found:
-            return f"{self._place} has no {stage} of {what} yet: run it to its end, or fetch this heart too"
-        if found.get("status") != "complete":
-            return f"{what} of {self._place} is {found.get('status')}: {found.get('reason')}"
+            place = (case,) if stage in OF_HEART or view is None else (case, view)
+            for name in groups_of(stage, self.sizes):
+                found, what = self.attributes(name, *place), " ".join(place)
+                if not found:
+                    return f"{self._place} has no {stage} of {what} yet: run it to its end, or fetch this heart too"
+                if found.get("status") != "complete":
+                    return f"{what} of {self._place} is {found.get('status')}: {found.get('reason')}"
         return ""
 
     def plane(self, case: str, view: str) -> Plane:

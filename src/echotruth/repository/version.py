@@ -55,14 +55,14 @@ NO_RF = ("imaging/bmode.py", "imaging/truth.py", "imaging/flow.py", "imaging/tra
 
 BEFORE = {
     "mechanics": (),
-    "phantom": (),
-    "rf": ("phantom",),
-    "truth": (),
-    "bmode": ("phantom",),
-    "tracking": ("phantom", "truth", "bmode"),
-    "inference": ("phantom", "truth", "bmode", "tracking"),
+    "phantom": ("mechanics",),
+    "rf": ("mechanics", "phantom"),
+    "truth": ("mechanics",),
+    "bmode": ("mechanics", "phantom", "rf"),
+    "tracking": ("mechanics", "phantom", "rf", "truth", "bmode"),
+    "inference": ("mechanics", "phantom", "rf", "truth", "bmode", "tracking"),
 }
-"""Stages -> those before them, besides mechanics, whose settings they do not share."""
+"""Stages -> those before them."""
 
 Settings = tuple[Any, ...]
 
@@ -85,8 +85,7 @@ def version_of(stage: str, config: Config, view: str | None = None, excluded: st
     str of 16 hexadecimal digits
     """
     views = [view] if view is not None else list(config.views) if stage == "inference" else []
-    stages = () if stage == "mechanics" else (*BEFORE[stage], stage)
-    settings = [SETTINGS[one](config, name) for name in views for one in stages if one in SETTINGS]
+    settings = [SETTINGS[one](config, name) for name in views for one in (*BEFORE[stage], stage) if one in SETTINGS]
     own: Settings = (config.bmode.sizes[0],) if stage in ("truth", "bmode", "tracking") else ()
     if stage == "inference":
         # The table of errors leaves out the rows of the heart itself, by these names.
@@ -108,7 +107,7 @@ def code_hash(stage: str) -> str:
     """Hash of the scripts of a stage and of those before it, and of the files of the package on which it depends."""
     left_out = {PACKAGE / name for name in NO_RF} if stage in ("phantom", "rf") else set()
     digest = sha256()
-    for name in dict.fromkeys(["mechanics", *BEFORE[stage], *(["rf"] if "phantom" in BEFORE[stage] else []), stage]):
+    for name in (*BEFORE[stage], stage):
         digest.update((shipped.ROOT / f"workflow/scripts/{name}.py").read_bytes())
     for part in CODE[stage]:
         path = PACKAGE / part
@@ -158,7 +157,7 @@ def _content(config: Config) -> Settings:
 
 
 def _phantom(config: Config, view: str) -> Settings:
-    """What the scatterers of a view depend on, and their echoes."""
+    """What the scatterers of a view depend on, and their echoes: the group `rf` has no settings of its own."""
     depth = config.bmode.field_of_view_mm
     levels = config.realism.model_dump(mode="json", exclude={"preset"})
     return config.seed, config.views[view], config.phantom, config.probe.resolved(), config.rf, levels, depth
@@ -185,13 +184,13 @@ def _bmode(config: Config, view: str) -> Settings:
 
 
 def _tracking(config: Config, view: str) -> Settings:
-    """What trackers find in a view."""
-    return config.seed, config.tracking
+    """What trackers find in a view: also what the files hold that the command of a tracker names."""
+    words = [word for tracker in config.tracking.trackers.values() for word in getattr(tracker, "command", None) or []]
+    return config.seed, config.tracking, [_file_hash(Path(word).absolute()) for word in words if Path(word).is_file()]
 
 
 SETTINGS: dict[str, Callable[[Config, str], Settings]] = {
     "phantom": _phantom,
-    "rf": _phantom,
     "truth": _truth,
     "bmode": _bmode,
     "tracking": _tracking,
@@ -202,7 +201,12 @@ SETTINGS: dict[str, Callable[[Config, str], Settings]] = {
 def errors_of(config: Config) -> str:
     """Hash of the table of the tracker's errors that is used in inference; "" if it is that of the package, or none."""
     path = Path(config.inference.errors or "")
-    return sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else ""
+    return _file_hash(path.absolute()) if path.is_file() else ""
+
+
+@cache
+def _file_hash(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest()[:16]
 
 
 @lru_cache(maxsize=1000)

@@ -22,8 +22,7 @@ from echotruth.heart import Heart
 from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.repository import group, metadata, schema
 from echotruth.repository.coordinates import coordinates_of
-from echotruth.repository.places import place, repository_folder
-from echotruth.repository.reader import SIZED
+from echotruth.repository.places import OF_HEART, groups_of, place, repository_folder
 from echotruth.repository.status import excluded
 from echotruth.repository.version import version_of
 from echotruth.seeds import generator
@@ -36,9 +35,6 @@ Result = Mapping[str, Mapping[str, ArrayLike]]
 
 Work = Callable[["Job"], Result]
 log = logging.getLogger("echotruth")
-
-OF_HEART = ("mechanics", "inference")
-"""Stages that have a job for a heart, and not for its views."""
 
 
 def case_file(folder: Path, case: str) -> Path:
@@ -132,8 +128,9 @@ class Job:
     @cached_property
     def excluded(self) -> str:
         """Why this stage is not run for this heart; empty if it is to be run."""
-        found = metadata.attributes(self.store / self._place("heart"))
-        return "" if self.stage == "mechanics" else excluded(found, self.config.physiology)
+        if self.stage == "mechanics":
+            return ""
+        return excluded(metadata.attributes(self.store / self._place("heart")), self.config.physiology)
 
     @cached_property
     def version(self) -> str:
@@ -142,11 +139,7 @@ class Job:
 
     def groups(self) -> list[str]:
         """Groups that this job writes: those of which Snakemake knows."""
-        if self.stage in OF_HEART:
-            return ["heart" if self.stage == "mechanics" else "inference"]
-        if self.stage not in SIZED:
-            return [self.stage]
-        return [f"{self.stage}/{size}" for size in ([self.size] if self.size else self.config.bmode.sizes)]
+        return groups_of(self.stage, [self.size] if self.size else self.config.bmode.sizes)
 
     def write(self, result: Result) -> None:
         """Write the groups of a result, each as a whole."""

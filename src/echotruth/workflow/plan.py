@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import atexit
 import shutil
+from collections.abc import Iterator
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +18,10 @@ from echotruth.config import Config
 from echotruth.config.loading import validate
 from echotruth.config.reading import SHORT_FLOAT
 from echotruth.repository import metadata
-from echotruth.repository.places import METADATA, place
+from echotruth.repository.places import METADATA, OF_HEART, STAGES, groups_of, made, place
 from echotruth.repository.publication import CHECKSUMS, as_csv, table_of
-from echotruth.repository.reader import SIZED
 from echotruth.repository.status import excluded
-from echotruth.repository.version import BEFORE, version_of
+from echotruth.repository.version import version_of
 from echotruth.workflow import cost, lock
 from echotruth.workflow.job import case_file, case_text
 
@@ -87,6 +88,7 @@ class Plan:
     def settle(self) -> None:
         """Set aside what was made with other settings or by other code, so that Snakemake makes it again.
 
+        So is what the configuration has no more, which is then no part of the repository.
         What a group was made with is in the group: a copy of the folder is judged as the original is, whatever the
         dates of its files. Whoever holds the lock does it, and removes what a killed run left. At the end of a process
         that did not begin a run, as one that only lists jobs, all is as before.
@@ -100,14 +102,31 @@ class Plan:
             return
         shutil.rmtree(self.folder / "drafts", ignore_errors=True)
         atexit.register(self._take_back)
-        for heart, id in self.hearts.items():
-            self._settle(self.store / "hearts" / heart, version_of("mechanics", self.cases[id].config))
-        for case in self.cases.values():
-            self._settle_clips(case)
+        wanted = set()
+        for path, version in self._versions():
+            self._settle(path, version)
+            wanted.add(path)
+        for path in {*made(self.store)} - wanted:
+            self._settle(path, "")
         if not all(path.is_file() and path.read_bytes() == text for path, text in self._texts().items()):
             self._set_checksums_aside()  # so that the rule repository writes them
 
-    def _settle(self, folder: Path, version: str) -> None:
+    def _versions(self) -> Iterator[tuple[str, str]]:
+        """Path and version of every group, those of hearts first."""
+        for heart, id in self.hearts.items():
+            yield f"hearts/{heart}", version_of("mechanics", self.cases[id].config)
+        stages = [stage for stage in STAGES if stage not in OF_HEART]
+        for case in self.cases.values():
+            why = excluded(metadata.attributes(self.store / "hearts" / case.heart), case.config.physiology)
+            for stage, view in product(stages, self.config.views):
+                version = version_of(stage, case.config, view, why)
+                for group in groups_of(stage, self.config.bmode.sizes):
+                    yield place(group, case.heart, case.id, view), version
+            if self.config.inference.tracker:
+                yield place("inference", case.heart, case.id), version_of("inference", case.config, None, why)
+
+    def _settle(self, path: str, version: str) -> None:
+        folder = self.store / path
         was_there = (folder / METADATA).is_file()
         if not metadata.settle(folder, version) and was_there:
             self._aside[folder / METADATA] = folder / metadata.OUTDATED
@@ -124,24 +143,10 @@ class Plan:
             if aside.exists() and not path.exists():
                 aside.replace(path)
 
-    def _settle_clips(self, case: Case) -> None:
-        found = metadata.attributes(self.store / "hearts" / case.heart)
-        why = excluded(found, case.config.physiology)
-        for stage in (stage for stage in BEFORE if stage not in ("mechanics", "inference")):
-            for view in self.config.views:
-                version = version_of(stage, case.config, view, why)
-                for size in self.config.bmode.sizes if stage in SIZED else [None]:
-                    group = stage if size is None else f"{stage}/{size}"
-                    self._settle(self.store / place(group, case.heart, case.id, view), version)
-        if self.config.inference.tracker:
-            version = version_of("inference", case.config, None, why)
-            self._settle(self.store / place("inference", case.heart, case.id), version)
-
     def begin(self) -> None:
         """Write the configuration, that of each case, and the table of the cases."""
         lock.hold(self.folder)
         self._aside.clear()
-        (self.folder / f".{CHECKSUMS}.outdated").unlink(missing_ok=True)
         (self.folder / OUTDATED_CHECKSUMS).unlink(missing_ok=True)
         for case in self.cases.values():
             files.update(case_file(self.folder, case.id), case_text(case).encode())

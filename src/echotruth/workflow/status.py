@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import product
 from pathlib import Path
 from typing import Any
 
-from echotruth.repository.places import METADATA
+from echotruth.repository.places import METADATA, NOT_NEEDED, OF_HEART, STAGES, groups_of
 from echotruth.repository.publication import CHECKSUMS
-from echotruth.repository.reader import NOT_NEEDED, SIZED, STAGES, Repository
+from echotruth.repository.reader import Repository
 from echotruth.workflow import lock
 
 MAX_SHOWN = 10
@@ -56,14 +57,8 @@ def _infers(repository: Repository) -> bool:
 
 def _done(repository: Repository, store: Path, stage: str) -> tuple[int, int]:
     """Number of the groups of a stage that are made, and of all."""
-    if stage == "mechanics":
-        places = {repository.path("heart", case) for case in repository.present}
-    elif stage == "inference":
-        places = {repository.path(stage, case) for case in repository.present}
-    else:
-        groups = [f"{stage}/{size}" for size in repository.sizes] if stage in SIZED else [stage]
-        clips = [(case, view) for case in repository.present for view in repository.views]
-        places = {repository.path(group, *clip) for group in groups for clip in clips}
+    views, groups = [None] if stage in OF_HEART else repository.views, groups_of(stage, repository.sizes)
+    places = {repository.path(*one) for one in product(groups, repository.present, views)}
     return sum((store / place / METADATA).is_file() for place in places), len(places)
 
 

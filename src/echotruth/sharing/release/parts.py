@@ -14,15 +14,13 @@ from io import StringIO
 from pathlib import Path, PurePosixPath
 from zipfile import ZIP_STORED, ZipFile, ZipInfo
 
+from echotruth.repository.places import DEPTHS
 from echotruth.repository.publication import CHECKSUMS, checksum, published_files
 from echotruth.repository.reader import Repository
 from echotruth.sharing.release.clips import clips_of
 
 STRUCTURE, HEARTS, CLIPS = "structure", "hearts", "clips"
 """What a part holds; clips are NumPy archives for whoever reads no Zarr."""
-
-DEPTHS = {"hearts": 2, "inference": 2, "clips": 3}
-"""Folder of the store -> number of names of the folders of its jobs, as clips/CASE/VIEW."""
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 """Earliest time that a .zip can have."""
