@@ -132,7 +132,7 @@ def _faults(store: Path, place: str, configs: Mapping[str, Config]) -> Iterator[
 
 def _configs(repository: Repository) -> dict[str, Config]:
     """Beginning of the paths of all groups, as `clips/CASE`, -> configuration of a case that has them."""
-    found = {}
+    found: dict[str, Config] = {}
     for case, heart in repository.parameters["heart"].items():
         config = repository.case(str(case)).config
         found |= dict.fromkeys([f"hearts/{heart}", f"clips/{case}", f"inference/{case}"], config)
