@@ -30,21 +30,10 @@ RANGE = np.linspace(7.7e-6, 13.5e-3, 900)
 SECTOR = Sector(ANGLE)
 
 
-def test_envelope_is_the_magnitude():
-    found = envelope(np.array([[3 + 4j, -2j]], np.complex64))
-    assert found.dtype == np.float32
-    assert np.allclose(found, [[5, 2]])
-
-
 def test_log_compression_by_hand():
     levels = np.array([1, 10 ** (-27.5 / 20), 10 ** (-55 / 20), 1e-6, 0])
     assert np.allclose(log_compress(7 * levels, 55), [1, 0.5, 0, 0, 0])
     assert np.allclose(log_compress(np.array([2.0, 1.0]), 60), [1, 1 - 6.0206 / 60])
-
-
-def test_one_reference_serves_the_whole_clip():
-    images = np.array([[[1.0]], [[0.1]]])
-    assert np.allclose(log_compress(images, 40).ravel(), [1, 0.5])
 
 
 @pytest.mark.parametrize(("gain", "expected"), [(10, [1, 1, 0.75, 0.5]), (-10, [0.75, 0.75, 0.25, 0])])
@@ -202,14 +191,6 @@ def test_persistence_is_the_average_over_all_that_was_before_in_a_cycle_without_
     assert np.allclose(turned, np.roll(persist(levels, weight), 2, axis=0), atol=1e-6)
     assert np.allclose(persist(levels, weight).mean(axis=0), levels.mean(axis=0), atol=1e-6)
     assert np.allclose(persist(levels[:1], weight), levels[:1], atol=1e-6)
-
-
-def test_persistence_lags_by_the_frames_that_the_schema_names():
-    """The centre of a Gaussian that passes a pixel at frame 20 passes w / (1 - w) frames later."""
-    frames = np.arange(60)
-    passing = np.exp(-(((frames - 20) / 4) ** 2))[:, None, None]
-    shown = persist(passing, 0.6)[:, 0, 0]
-    assert (shown * frames).sum() / shown.sum() == pytest.approx(20 + 0.6 / 0.4, abs=0.01)
 
 
 def test_edges_are_enhanced_within_the_scan_alone():

@@ -1,6 +1,5 @@
 """Cells under motions whose answer is known."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -134,13 +133,3 @@ def test_viscous_force_does_the_work_of_the_strain_increment(mesh):
     state, wall = cell_state(mesh, 0.0, 0.0, 0.0, rate=0.2), np.sum(elements(mesh).weight)
     work = np.sum(summed(mesh, response(mesh, 1.1 * mesh.nodes, state).force[:, TOTAL]) * mesh.nodes)
     assert work == pytest.approx(3 * (1.1**2 - 1.05**2) / 2 * 1.1 * wall, rel=1e-12)
-
-
-def test_bytes_do_not_depend_on_the_number_of_threads(mesh):
-    nodes = mesh.nodes + 1e-5 * np.random.default_rng(6).normal(size=mesh.nodes.shape)
-    before, results = numba.get_num_threads(), []
-    for threads in {1, before}:
-        numba.set_num_threads(threads)
-        results.append(response(mesh, nodes, cell_state(mesh, pressure=1e3)))
-    numba.set_num_threads(before)
-    assert all(a.tobytes() == b.tobytes() for a, b in zip(results[0], results[-1], strict=True))
