@@ -1,5 +1,6 @@
 """The parts of the B-spline tracker against other libraries and closed forms."""
 
+import cv2
 import numpy as np
 import pytest
 from scipy import interpolate, ndimage
@@ -12,6 +13,7 @@ from echotruth.tracking.bspline import lattice_around
 from echotruth.tracking.evidence import Match
 from echotruth.tracking.ncc import NormalizedCrossCorrelation
 from echotruth.tracking.region import FLOW_SMOOTHNESS, wall_region
+from echotruth.tracking.trackers.bspline_dic import block_mean
 
 MASK = np.zeros((60, 80), bool)
 MASK[12:45, 15:70] = True
@@ -154,6 +156,14 @@ def test_alignment_with_a_reused_matrix_converges_to_that_with_a_new_one_in_ever
     )
     assert np.abs(held - fresh).max() < 0.002
     np.testing.assert_allclose(held.mean(0), [2.7, 1.4], atol=0.01)
+
+
+def test_coarse_image_has_the_means_of_blocks(random):
+    image = random.uniform(size=(36, 48)).astype(np.float32)
+    for times in (1, 2, 3):
+        expected = cv2.resize(image, None, fx=1 / times, fy=1 / times, interpolation=cv2.INTER_AREA)
+        np.testing.assert_allclose(block_mean(image, times), expected, atol=1e-6)
+    np.testing.assert_array_equal(block_mean(image[:35, :47], 2), block_mean(image, 2)[:17, :23])
 
 
 @pytest.mark.parametrize("transmural_scale", [1.0, 0.25])

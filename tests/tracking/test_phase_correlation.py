@@ -31,6 +31,13 @@ def test_bias_of_sub_pixel_shifts_is_below_a_tenth_of_a_pixel(shifted, shift, ta
     assert np.abs(error.mean((0, 1))).max() < 0.12
 
 
+def test_subpixel_offset_is_exact_for_the_peak_of_a_shifted_texture():
+    shift = np.linspace(-0.49, 0.49, 21)
+    np.testing.assert_allclose(
+        phase_correlation.subpixel_offset(*(np.sinc(k - shift) for k in (-1, 0, 1))), shift, atol=1e-12
+    )
+
+
 @pytest.mark.parametrize("spectral_threshold, found", [(0.0, False), (0.05, True)])
 def test_shift_of_noisy_coarse_speckle_is_found_by_the_frequencies_above_a_threshold(spectral_threshold, found):
     """Phase-only correlation gives frequencies that contain only noise the same weight as those of the speckle."""

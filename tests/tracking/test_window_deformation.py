@@ -44,6 +44,14 @@ def test_deformed_windows_find_a_turn_that_rigid_ones_blur(speckle, inner):
     assert error[1] < 0.1 and error[1] < 0.6 * error[0]
 
 
+def test_position_of_a_gaussian_peak_is_exact():
+    lag = np.arange(-3, 4)
+    lateral, axial = np.meshgrid(lag - 0.37, lag + 1.21)
+    shift, peak = subpixel_peaks(np.exp(-(lateral**2) / 3 - axial**2 / 5)[None])
+    np.testing.assert_allclose(shift[0], [0.37, -1.21], atol=1e-12)
+    assert 0.9 < peak[0] < 1
+
+
 def test_peak_at_the_border_or_beside_negative_correlation_is_unknown():
     edge, lone, unknown = np.full((3, 5, 5), -0.2)
     edge[2, 0], lone[2, 2] = 0.9, 0.9

@@ -4,6 +4,12 @@ import pytest
 from echotruth.tracking.windows import Windows, arrange, grid
 
 
+def test_remainder_is_split_between_the_borders():
+    windows = arrange((30, 45), 8, 0.5)
+    assert windows.top[0] == 1 and windows.top[-1] + 8 == 29
+    assert windows.left[0] == 0 and windows.left[-1] + 8 == 44
+
+
 def test_interpolation_is_exact_for_linear_fields_and_nearest_outside():
     windows = arrange((64, 96), 16, 0.5)
     lateral, axial = np.meshgrid(windows.left + 7.5, windows.top + 7.5)
