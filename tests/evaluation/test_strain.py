@@ -83,6 +83,7 @@ def test_strain_where_points_are_lost_is_that_of_a_wall_without_them(wall):
     for frame, fraction in ((1, 0.01), (2, 0.1), (3, 0.6)):
         moved[frame, random.random(len(wall.position)) < fraction] = np.nan
     found = wall.strain(moved)
+    assert np.isnan(found[~np.isfinite(moved).all(-1)]).all()
     for frame in range(4):
         known = np.isfinite(moved[frame]).all(-1)
         without = StrainOperator(wall.position[known], wall.axes[known], wall.radius).strain(

@@ -18,7 +18,6 @@ from echotruth.imaging.bmode import (
     largest_clip,
     line_loss,
     log_compress,
-    persist,
     pixel_centres,
     smooth,
     time_gain_compensation,
@@ -177,20 +176,6 @@ def test_dropout_does_not_depend_on_the_number_of_lines_and_keeps_the_time_gain(
     fine, coarse = (clip_gain(Probe(), bmode, lines, RANGE, np.random.default_rng(5)) for lines in (257, 65))
     assert np.allclose(fine[::4], coarse, rtol=1e-5)
     assert np.allclose(fine / line_loss(bmode, 257, np.random.default_rng(5))[:, None], fine.max(axis=0), rtol=1e-4)
-
-
-def test_persistence_is_the_average_over_all_that_was_before_in_a_cycle_without_end():
-    levels = np.random.default_rng(3).random((5, 4, 3)).astype(np.float32)
-    weight = 0.7
-    past = np.tile(levels, (40, 1, 1)).astype(float)
-    shown = past[0]
-    for level in past:
-        shown = (1 - weight) * level + weight * shown
-    assert np.allclose(persist(levels, weight)[-1], shown, atol=1e-6)
-    turned = persist(np.roll(levels, 2, axis=0), weight)
-    assert np.allclose(turned, np.roll(persist(levels, weight), 2, axis=0), atol=1e-6)
-    assert np.allclose(persist(levels, weight).mean(axis=0), levels.mean(axis=0), atol=1e-6)
-    assert np.allclose(persist(levels[:1], weight), levels[:1], atol=1e-6)
 
 
 def test_edges_are_enhanced_within_the_scan_alone():

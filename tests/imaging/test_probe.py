@@ -22,6 +22,10 @@ def test_spectrum_is_half_at_half_the_bandwidth(bandwidth):
     assert np.allclose(pulse_spectrum(probe, edge), [0.5, 1, 0.5])
 
 
+def test_spectrum_is_cut_below_nyquist_and_above_zero():
+    assert (pulse_spectrum(Probe(bandwidth=0.7), np.array([-1e6, 0.0, 50e6])) == 0).all()
+
+
 def test_pulse_is_the_sinusoid_in_a_gaussian_window():
     time = np.linspace(-80e-9, 80e-9, 161)
     deviation = 12.5e6 / np.sqrt(8 * np.log(2))

@@ -70,6 +70,13 @@ def test_correction_leaves_no_error_that_grows_with_how_much_segments_differ():
     np.testing.assert_allclose(mean - mean.mean(), apart, atol=0.006)
 
 
+def test_view_that_shows_fewer_segments_tells_the_mean_less_well():
+    found = tracker_errors.error_of(table(np.random.default_rng(1), 100), *ABOUT, "another")
+    all_, few = (np.mean(found.covariance(np.full(number, -0.15))) for number in (SEGMENTS, 2))
+    assert all_ == pytest.approx(found.common_sd**2)
+    assert few == pytest.approx(found.common_sd**2 + found.segment_variance * (1 / 2 - 1 / 6) / found.gain**2)
+
+
 def test_tracker_that_shows_no_contrast_tells_next_to_nothing_of_it():
     found = tracker_errors.error_of(table(np.random.default_rng(1), 50, gain=0.0, own=0.02), *ABOUT, "another")
     assert found.gain == tracker_errors.LEAST_GAIN
