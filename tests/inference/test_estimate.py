@@ -128,14 +128,6 @@ def test_what_no_view_shows_keeps_its_prior(found):
     assert (unseen["sd"] / unseen["prior_sd"] > 0.8).all()
 
 
-@pytest.mark.slow
-def test_interval_widens_where_no_view_shows_the_segment_any_more(observed, found):
-    without = infer(chosen(observed, np.flatnonzero(observed["view"] != "mid")), KNOWN, mesh=(12, 6, 1))
-    seen, unseen = (result.sel(parameter="contractility.8") for result in (found, without))
-    assert unseen["sd"] > 2 * seen["sd"]
-    assert seen["identifiable"]
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -62,9 +62,8 @@ def coloured(picture, colour):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("species", ["mouse", "none"])
-def test_physiology(tmp_path, species):
-    published = physiology.PUBLISHED.get(species, {})
+def test_physiology(tmp_path):
+    published = physiology.PUBLISHED["mouse"]
     assert set(published) <= {"twist", *physiology.COMPONENTS}
     drawn = seen(
         style.save(physiology.draw(cycle(500 + 13000 * WAVE, (6e-3, 9e-3, 4e-3)), published), tmp_path / "a.png")
