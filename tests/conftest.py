@@ -3,11 +3,14 @@
 import fcntl
 import os
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import cores  # noqa: F401 - before whatever multiplies or compiles
 import finished_repository
+import known_repository
 import learning_repository
 import numpy as np
 import pytest
@@ -46,20 +49,35 @@ def browser():
         opened.close()
 
 
-@pytest.fixture(scope="session")
-def finished(tmp_path_factory) -> Path:
-    """Folder of `finished_repository.FINISHED` as the scripts make it: one for all workers, which nobody writes to."""
+@contextmanager
+def once(tmp_path_factory, name: str) -> Iterator[Path]:
+    """Folder of a repository that is made once for all workers, and that nobody writes to."""
     own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "finished"
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / name
     with folder.with_suffix(".lock").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
+        yield folder
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory) -> Path:
+    """Folder of `finished_repository.FINISHED` as the scripts make it."""
+    with once(tmp_path_factory, "finished") as folder:
         return finished_repository.finish(folder, finished_repository.FINISHED, finished_repository.solved)
 
 
 @pytest.fixture(scope="session")
 def textured(tmp_path_factory) -> Path:
-    """Folder of the repository of `learning_repository.made`, which nobody writes to."""
-    return learning_repository.made(tmp_path_factory.mktemp("textured") / "small")
+    """Folder of the repository of `learning_repository.made`."""
+    with once(tmp_path_factory, "textured") as folder:
+        return learning_repository.made(folder)
+
+
+@pytest.fixture(scope="session")
+def known(tmp_path_factory) -> known_repository.Known:
+    """The repository of a heart that moves as a rigid body."""
+    with once(tmp_path_factory, "known") as folder:
+        return known_repository.make(folder, known_repository.SETTINGS)
 
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)

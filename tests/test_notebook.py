@@ -4,7 +4,6 @@ import subprocess
 import sys
 from dataclasses import replace
 
-import learning_repository
 import numpy as np
 import pytest
 import xarray as xr
@@ -85,9 +84,9 @@ def test_flow_of_a_clip_is_the_change_of_its_displacement_where_all_tissue_moves
 
 
 @pytest.fixture(scope="module")
-def repository(tmp_path_factory):
+def repository(textured):
     """Hearts whose wall is lifted out of the short-axis plane on one side and lowered on the other."""
-    return learning_repository.made(tmp_path_factory.mktemp("clips") / "small")
+    return textured
 
 
 @pytest.fixture(scope="module")

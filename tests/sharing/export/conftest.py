@@ -1,17 +1,12 @@
-"""The repository that all exports are read from."""
+"""Exports of the repository `known`."""
 
 from functools import partial
 
 import pytest
-from known_repository import SETTINGS, SIZES, Known, make
+from known_repository import SIZES
 
 from echotruth.repository.reader import Repository
 from echotruth.sharing.export import Export, Selection
-
-
-@pytest.fixture(scope="session")
-def known(tmp_path_factory) -> Known:
-    return make(tmp_path_factory.mktemp("known") / "known", SETTINGS)
 
 
 def write(known, folder, name, view="mid", size=SIZES[0], **options):
