@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from echotruth.cases import case_id, expand, find_case
+from echotruth.cases import case_id, expand
 from echotruth.config import Cases, Config
 from echotruth.config.loading import ConfigError, override
 from echotruth.seeds import generator
@@ -118,12 +118,6 @@ def test_ids_of_drawn_values_have_four_digits_of_each_and_differ_if_only_others_
 
 def test_order_of_axes_and_spelling_of_numbers_do_not_enter_the_id():
     assert case_id({"seed": 1, "fibres.endo_deg": 60}) == case_id({"fibres.endo_deg": 60.0, "seed": 1})
-
-
-def test_every_case_has_its_values():
-    cases = expand(Config(cases=SWEEP))
-    assert [(case.config.fibres.endo_deg, case.config.seed) for case in cases] == [(60, 1), (60, 2), (84, 1), (84, 2)]
-    assert find_case(Config(cases=SWEEP), cases[2].id) == cases[2]
 
 
 def test_random_numbers_differ_between_views_and_repeat_in_any_order():

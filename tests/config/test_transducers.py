@@ -77,9 +77,3 @@ def test_a_configuration_written_and_read_is_the_same():
     again = validate(config.model_dump(), "b.yaml")
     assert again == config
     assert override(again, {"probe.preset": "mouse_30MHz"}).probe.pitch_um == 50
-
-
-def test_resolved_probe_has_every_value():
-    written = Probe(preset="rat_15MHz").resolved().model_dump()
-    assert written["pitch_um"] == 77 and written["sampling_MHz"] == 60
-    assert Probe(**written) == Probe(preset="rat_15MHz")

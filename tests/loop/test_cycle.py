@@ -47,13 +47,6 @@ def test_twitch_has_the_volume_of_the_mouse_and_the_tension_solved_for_it():
     assert twitch.tension[es_frame(mouse.pressure, mouse.volume)] == pytest.approx(46.9e3, rel=0.01)
 
 
-def test_default_frames_reach_from_ed_to_es_in_about_twenty():
-    loop = read_loop(Loop())
-    assert len(loop.time) == 40
-    assert 20 <= es_frame(loop.pressure, loop.volume) <= 22
-    np.testing.assert_allclose(loop.time, np.arange(40) * 3e-3)
-
-
 def test_volumes_and_heart_rate_are_mapped():
     loop = read_loop(Loop(edv_uL=60.0, esv_uL=24.0, heart_rate_per_min=600.0, frames=400))
     assert (loop.volume[0], loop.volume.min()) == pytest.approx((60 * UL, 24 * UL))
