@@ -3,14 +3,18 @@
 import fcntl
 import os
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import cores  # noqa: F401 - before whatever multiplies or compiles
 import finished_repository
+import known_repository
 import learning_repository
 import numpy as np
 import pytest
+import shown_repository
 
 from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Mesh
@@ -46,14 +50,24 @@ def browser():
         opened.close()
 
 
-@pytest.fixture(scope="session")
-def finished(tmp_path_factory) -> Path:
-    """Folder of `finished_repository.FINISHED` as the scripts make it: one for all workers, which nobody writes to."""
+def once(tmp_path_factory, name: str, make: Callable[[Path], object]) -> Path:
+    """Folder of a repository that is made once for all workers, and that nobody writes to."""
     own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "finished"
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / name
+    made = folder.with_suffix(".made")
     with folder.with_suffix(".lock").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        return finished_repository.finish(folder, finished_repository.FINISHED, finished_repository.solved)
+        if not made.exists():
+            make(folder)
+            made.touch()
+    return folder
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory) -> Path:
+    """Folder of `finished_repository.FINISHED` as the scripts make it."""
+    make = partial(finished_repository.finish, config=finished_repository.FINISHED, result=finished_repository.solved)
+    return once(tmp_path_factory, "finished", make)
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +85,21 @@ def folder(done, tmp_path) -> Path:
 
 @pytest.fixture(scope="session")
 def textured(tmp_path_factory) -> Path:
-    """Folder of the repository of `learning_repository.made`, which nobody writes to."""
-    return learning_repository.made(tmp_path_factory.mktemp("textured") / "small")
+    """Folder of the repository of `learning_repository.made`."""
+    return once(tmp_path_factory, "textured", learning_repository.made)
+
+
+@pytest.fixture(scope="session")
+def known(tmp_path_factory) -> known_repository.Known:
+    """The repository of a heart that moves as a rigid body."""
+    make = partial(known_repository.make, settings=known_repository.SETTINGS)
+    return known_repository.known_at(once(tmp_path_factory, "known", make), known_repository.SETTINGS)
+
+
+@pytest.fixture(scope="session")
+def shown(tmp_path_factory) -> shown_repository.Shown:
+    """A ring that moves by whole pixels, as the viewer and the report show it."""
+    return shown_repository.shown_at(once(tmp_path_factory, "shown", shown_repository.make_shown))
 
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)

@@ -122,16 +122,20 @@ def known_images(size: int) -> np.ndarray:
     return images[:, ::step, ::step]
 
 
+def known_at(folder: Path, settings: dict) -> Known:
+    """The repository that is made of the settings in a folder."""
+    return Known(folder, et.configure(settings), et.beat(et.configure(settings, cases={}), progress=False))
+
+
 def make(folder: Path, settings: dict, **tracking: np.ndarray) -> Known:
     """Write a repository as the workflow does, with known images, and other arrays of tracking if they are given."""
-    config = et.configure(settings)
-    known = Known(folder, config, et.beat(et.configure(settings, cases={}), progress=False))
+    known = known_at(folder, settings)
 
     def result(job: Job) -> Result:
         arrays = known.arrays(job)
         return overlaid(job, {name: values | tracking for name, values in arrays.items()})
 
-    finished_repository.finish(folder, config, result)
+    finished_repository.finish(folder, known.config, result)
     return known
 
 

@@ -27,13 +27,21 @@ class Shown:
     inside: np.ndarray
 
 
-def shown_repository(folder: Path) -> Shown:
-    """Write the repository, in its folder."""
-    settings = SETTINGS | {"tracking": SETTINGS["tracking"] | {"grid_px": 2}}
-    grid = grid_positions(et.configure(settings))
+OF_GRID = SETTINGS | {"tracking": SETTINGS["tracking"] | {"grid_px": 2}}
+
+
+def shown_at(folder: Path) -> Shown:
+    """The repository that is made in a folder."""
+    grid = grid_positions(et.configure(OF_GRID))
     radius = np.hypot(grid[..., 0], grid[..., 1] - SIDE / 2)
     inside = (radius > RADII[0]) & (radius < RADII[1])
+    return Shown(folder, grid[inside], inside)
+
+
+def make_shown(folder: Path) -> None:
+    """Write the repository, in its folder."""
+    inside = shown_at(folder).inside
     share = np.arange(FRAMES)[:, None, None, None] / (FRAMES - 1)
     moved = np.where(inside[..., None], share * SHIFT, np.nan)
     axes = np.where(inside[..., None, None], np.eye(2), np.nan)
-    return Shown(make(folder, settings, true_displacement=moved, wall_axes=axes).folder, grid[inside], inside)
+    make(folder, OF_GRID, true_displacement=moved, wall_axes=axes)

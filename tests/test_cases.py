@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from echotruth.cases import case_id, expand, find_case, table
+from echotruth.cases import case_id, expand
 from echotruth.config import Cases, Config
 from echotruth.config.loading import ConfigError, override
 from echotruth.seeds import generator
@@ -97,12 +97,6 @@ def test_cases_have_the_configuration_that_each_has_alone():
         assert case.config.model_dump() == override(Config(), case.parameters).model_dump()
 
 
-def test_cases_share_the_sections_in_which_they_do_not_differ():
-    first, second, third, _ = (case.config for case in expand(Config(cases=SWEEP)))
-    assert first.fibres is second.fibres is not third.fibres
-    assert first.loop is third.loop
-
-
 def test_cases_are_valid_together_even_if_each_value_is_valid_alone():
     sweep = {"rf.focus_mm": [6.5, 9.0], "rf.focal_spacing_mm": [1.0, 2.0]}
     with pytest.raises(ConfigError, match=r"rf.focus_mm = 9.0: must be smaller than 8"):
@@ -126,12 +120,6 @@ def test_order_of_axes_and_spelling_of_numbers_do_not_enter_the_id():
     assert case_id({"seed": 1, "fibres.endo_deg": 60}) == case_id({"fibres.endo_deg": 60.0, "seed": 1})
 
 
-def test_every_case_has_its_values():
-    cases = expand(Config(cases=SWEEP))
-    assert [(case.config.fibres.endo_deg, case.config.seed) for case in cases] == [(60, 1), (60, 2), (84, 1), (84, 2)]
-    assert find_case(Config(cases=SWEEP), cases[2].id) == cases[2]
-
-
 def test_random_numbers_differ_between_views_and_repeat_in_any_order():
     first, second = expand(Config(cases=SWEEP))[:2]
     draws = {
@@ -141,13 +129,6 @@ def test_random_numbers_differ_between_views_and_repeat_in_any_order():
     }
     assert len({tuple(values) for values in draws.values()}) == 4
     assert np.array_equal(generator(first, "mid", "phantom").random(4), draws[first.id, "mid"])
-
-
-def test_table_has_a_row_a_case_and_a_column_a_parameter():
-    frame = table(expand(Config(cases=SWEEP)))
-    assert list(frame["fibres.endo_deg"]) == [60, 60, 84, 84]
-    assert list(frame["seed"]) == [1, 2, 1, 2]
-    assert {"case", "probe.frequency_MHz", "mechanics.material.fibre"} <= set(frame.columns)
 
 
 @pytest.mark.parametrize(

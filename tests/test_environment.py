@@ -83,14 +83,6 @@ def test_no_tracked_file_names_a_registry_or_a_folder_of_one_machine():
         assert not absolute.search(text), path
 
 
-def test_licence_is_the_one_declared():
-    text = (ROOT / "LICENSE").read_text()
-    assert PROJECT["license"] == "BSD-3-Clause"
-    assert text.startswith("BSD 3-Clause License") and "Neither the name of the copyright holder" in " ".join(
-        text.split()
-    )
-
-
 def test_citation_names_the_paper_and_the_version():
     import echotruth
 

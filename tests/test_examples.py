@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import echotruth as et
 from echotruth.config import Config
 from echotruth.loop.cycle import read_loop
 
@@ -91,8 +90,3 @@ def test_block_of_the_page_about_motion_from_files_runs_on_a_series(tmp_path, mo
     volume = names["heart"].arrays["mechanics"]["volume"]
     assert volume[4] / volume[0] == pytest.approx(0.8 * 0.8 * 0.9, rel=1e-6)
     assert 0 < names["et"].evaluate(names["tracked"], names["heart"])["nrmse_percent"] < 40
-
-
-def test_page_about_python_names_all_that_is_public():
-    page = (EXAMPLES.parent / "docs/python.md").read_text()
-    assert {name for name in et.__all__ if f"et.{name}" not in page} <= {"Config", "ConfigError", "TrackerFailed"}

@@ -4,7 +4,6 @@ import subprocess
 import sys
 from dataclasses import replace
 
-import learning_repository
 import numpy as np
 import pytest
 import xarray as xr
@@ -85,9 +84,9 @@ def test_flow_of_a_clip_is_the_change_of_its_displacement_where_all_tissue_moves
 
 
 @pytest.fixture(scope="module")
-def repository(tmp_path_factory):
+def repository(textured):
     """Hearts whose wall is lifted out of the short-axis plane on one side and lowered on the other."""
-    return learning_repository.made(tmp_path_factory.mktemp("clips") / "small")
+    return textured
 
 
 @pytest.fixture(scope="module")
@@ -269,14 +268,12 @@ def test_repeated_frame_and_lengths_for_another_heart_are_told(clip):
     ("call", "error", "words"),
     [
         (lambda heart, clip: et.image(heart, "front"), ValueError, "view = 'front': use one of mid"),
-        (lambda heart, clip: et.image(heart, size=100), ValueError, "size = 100: use one of 128, 64"),
         (lambda heart, clip: et.track(clip, "dic"), ConfigError, "method = 'dic': should be"),
         (lambda heart, clip: et.track(clip, "dis", window=3), ConfigError, "window is not a key"),
         (lambda heart, clip: et.configure(geometry={"preset": "cat"}), ConfigError, "geometry.preset = 'cat'"),
         (lambda heart, clip: et.track(clip.isel(frame=slice(1, None)), "dis"), ValueError, "has 2 of 3 frames"),
         (lambda heart, clip: et.track(clip.isel(frame=[0, 2, 1]), "dis"), ValueError, "clip's time is not that of its"),
         (lambda heart, clip: et.track(reverse(clip, "frame"), "dis"), ValueError, "clip's time is reversed: give all"),
-        (lambda heart, clip: et.track(reverse(clip, "axial"), "dis"), ValueError, "clip's axial is reversed: give all"),
         (lambda heart, clip: et.track(reverse(clip, "lateral"), "dis"), ValueError, "clip's lateral is reversed"),
         (
             lambda heart, clip: et.track(clip.isel(axial=slice(9, 99)), "dis"),

@@ -13,8 +13,6 @@ import echotruth as et
             lambda: et.kinematics("out/demo"),
             "heart = 'out/demo': must be a Heart: a Repository has one",
         ),
-        (lambda: et.image("out/demo"), "heart = 'out/demo': must be a Heart"),
-        (lambda: et.heart_dataset("out/demo", "mechanics"), "heart = 'out/demo': must be a Heart"),
         (lambda: et.point_tracks("out/demo", "mid", []), "heart = 'out/demo': must be a Heart"),
         (
             lambda: et.track("out/demo"),

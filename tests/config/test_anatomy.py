@@ -29,16 +29,6 @@ def test_cavity_and_wall_have_the_published_volumes(species):
     assert (cavity, wall) == pytest.approx(VOLUMES[species], rel=5e-3)
 
 
-def test_mouse_is_the_one_of_the_science():
-    assert Geometry().lengths() == {
-        "endo_radius_mm": 1.45,
-        "endo_length_mm": 5.4,
-        "wall_mm": 1.05,
-        "apex_wall_mm": 0.45,
-        "base_mm": 1.4,
-    }
-
-
 def test_apical_wall_keeps_its_proportion():
     assert Geometry(wall_mm=0.7).lengths()["apex_wall_mm"] == pytest.approx(0.3)
     assert Geometry(wall_mm=0.7, apex_wall_mm=0.3).lengths()["apex_wall_mm"] == 0.3

@@ -6,7 +6,7 @@ import pytest
 
 from echotruth.config import Bmode, Config, Geometry, Probe, Rf, anatomy
 from echotruth.config.loading import ConfigError, validate
-from echotruth.config.transducers import ARRAY_DEFAULTS, ARRAY_PRESETS
+from echotruth.config.transducers import ARRAY_PRESETS
 
 
 def configured(**sections):
@@ -74,10 +74,6 @@ def test_lengths_of_trackers_follow_the_field_of_view():
     assert (
         configured(geometry={"preset": "human"}, tracking={"trackers": fixed}).tracking.trackers["one"].knots_mm == 0.3
     )
-
-
-def test_scans_there_are_for_all_arrays():
-    assert set(ARRAY_DEFAULTS) == set(ARRAY_PRESETS)
 
 
 @pytest.mark.parametrize("sections", [{"probe": {"preset": "mouse_25MHz"}}, {"rf": {"focus_mm": 31.0}}])

@@ -9,14 +9,6 @@ from echotruth.config.loading import ConfigError, load
 from echotruth.config.realism import Realism
 
 
-def test_nothing_is_on_by_default():
-    realism = Config().realism
-    assert realism.blood.level_dB is realism.surroundings.level_dB is realism.haze.level_dB is None
-    assert not any(level is not None for level in realism.neighbours.model_dump().values())
-    assert realism.decorrelation.time_ms is realism.noise.snr_dB is None
-    assert realism.shadow.side == "none"
-
-
 @pytest.mark.parametrize("tissue", ["blood", "surroundings"])
 def test_what_fills_a_space_is_refused_beside_a_phantom_in_a_plane(tissue, tmp_path):
     file = tmp_path / "flat.yaml"

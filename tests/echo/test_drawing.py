@@ -167,20 +167,13 @@ def test_mask_is_corrected_and_saved_as_a_table(serve, tmp_path):
         (ring("middle"), "view = 'middle': use one of basal, mid,"),
         (ring(anterior_insertion=[33.0, 28.0]), "inferior_insertion: is missing: click both insertions, or none"),
         (
-            ring(anterior_insertion=[1e9, 0.0], inferior_insertion=[0.0, 0.0]),
-            "insertions: has the point 1e+09, 0: stay within 120 x 90 px",
-        ),
-        (
             ring() | {"epicardium": [[0, 0], [1e300, 0], [0, 1]]},
             "epicardium: has the point 1e+300, 0: stay within 120 x 90 px",
         ),
         (ring() | {"epicardium": [["0", 1], [2, 3], [4, 5]]}, "epicardium.0.0: Input should be a valid number"),
-        (ring() | {"epicardium": [[0, 1, 2], [2, 3], [4, 5]]}, "epicardium.0: "),
-        (ring() | {"endocardium": [[True, 1], [2, 3], [4, 5]]}, "endocardium.0.0: Input should be a valid number"),
         (ring() | {"path": "/etc/passwd"}, "path: Extra inputs are not permitted"),
         ({"view": "mid"}, "endocardium: Field required"),
         (json.dumps(ring()).replace("80.0,", "NaN,"), "endocardium.0.0: Input should be a finite number"),
-        ([], "what is sent: "),
         ("{", "what is sent: Invalid JSON"),
     ],
 )

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.stats import pearsonr
 
 from benchmarks.suite.comparison import bland_altman
 from echotruth.evaluation.agreement import compare, limits_of_agreement
@@ -47,15 +46,6 @@ def test_a_constant_error_is_bias_and_leaves_the_correlation(strains):
     np.testing.assert_allclose(found["frame_strain_rms"][0], np.tile([0.1, 0.2, 0.05], (4, 1)))
     np.testing.assert_allclose(found["segment_strain_error"][0], [0.1, 0.2, 0.05])
     np.testing.assert_allclose(found["segment_agreement"][0, 2] - found["segment_agreement"][0, 1], 0, atol=1e-12)
-
-
-def test_correlation_is_that_of_scipy(strains):
-    tracked, true = strains
-    found = compare(tracked, true, WALL, 2)["strain_correlation"]
-    for reference, region, component in ((0, 0, 0), (2, 3, 1)):
-        mask = WALL.regions[region]
-        expected = pearsonr(tracked[2, mask, component], true[reference, 2, mask, component]).statistic
-        assert found[reference, region, component] == pytest.approx(expected, abs=1e-12)
 
 
 def test_parts_of_the_error_add_up(strains):

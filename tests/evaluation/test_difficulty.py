@@ -2,10 +2,12 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
-from known_repository import FRAMES, SETTINGS, SHIFT, SIZES, make
+from known_repository import FRAMES, SHIFT, SIZES
 from scipy import fft
 
 import echotruth as et
@@ -209,8 +211,9 @@ def test_images_without_anything_in_common_bound_nothing():
 
 
 @pytest.fixture(scope="module")
-def known(tmp_path_factory):
-    return make(tmp_path_factory.mktemp("difficulty") / "known", SETTINGS)
+def known(known, tmp_path_factory):
+    """A copy, in which the table of difficulties is kept."""
+    return replace(known, folder=Path(copytree(known.folder, tmp_path_factory.mktemp("difficulty") / "known")))
 
 
 def carried(known, fades):

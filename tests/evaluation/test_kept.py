@@ -15,7 +15,6 @@ import echotruth as et
 from benchmarks.suite.detection import COLUMNS, detection
 from benchmarks.suite.reliability import calibration_error, curve
 from echotruth.evaluation.run import prepare
-from echotruth.evaluation.tracker_options import EvaluationError
 
 pytestmark = pytest.mark.slow
 
@@ -85,14 +84,6 @@ def test_kept_curves_are_read_like_those_of_the_repository(repository):
     assert set(table["tracker"]) == {"mine"} and set(table["view"]) == {"mid", "long", "all"}
 
 
-def test_kept_trackers_stand_after_those_of_the_repository(repository):
-    assert et.Repository(repository).trackers == ["one", "two"]
-    evaluate(repository)
-    assert et.Repository(repository).trackers == ["one", "two", "mine"]
-    with pytest.raises(ValueError, match=r"^tracker = 'other': use one of one, two, mine\.$"):
-        et.Repository(repository).curves(tracker="other")
-
-
 def test_what_was_not_evaluated_is_unknown_or_refused(repository):
     evaluate(repository, sizes=[128], views=["mid"])
     with pytest.raises(ValueError, match=r"^tracker = 'mine': it was not evaluated on heart mid\.$"):
@@ -154,13 +145,6 @@ def test_evaluation_that_is_broken_off_leaves_what_was_kept_before(repository):
     assert np.isfinite(et.Repository(repository).tracks(view="mid", trackers=["mine"])["displacement"]).any()
 
 
-def test_folder_that_cannot_hold_the_displacement_is_refused_in_one_sentence(repository):
-    (repository / "external").write_text("")
-    run = prepare(et.Repository(repository), "mine", {"method": "external", "track": "mine:steps"}, keep=True)
-    with pytest.raises(EvaluationError, match="external cannot hold the scores"):
-        run.check_writable()
-
-
 def px256(clips, tracker, view="mid"):
     """Metrics of one tracker by size."""
     return clips[(clips["tracker"] == tracker) & (clips["view"] == view)].set_index("size_px")
@@ -211,14 +195,6 @@ def test_metrics_of_a_tracker_that_was_not_kept_are_those_of_its_scores(reposito
     assert len(clips) == 4 and (clips["failure"] == "").all() and (clips["points"] > 0).all()
     everything = et.Repository(repository).metrics().clips
     assert everything.loc[everything["tracker"] == "mine", "delta_avg_percent"].isna().all()
-
-
-def test_one_name_may_be_given_for_a_list_of_one(repository):
-    of_lists = et.Repository(repository).metrics(["heart"], ["mid"], trackers=["one"])
-    for table, of_list in zip(et.Repository(repository).metrics("heart", "mid", trackers="one"), of_lists, strict=True):
-        pd.testing.assert_frame_equal(table, of_list)
-    with pytest.raises(ValueError, match=r"^case = 'other': use one of heart\.$"):
-        et.Repository(repository).metrics("other")
 
 
 def test_tables_without_a_row_have_their_columns_and_nothing_to_say(repository):

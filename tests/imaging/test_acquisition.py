@@ -57,13 +57,6 @@ def test_frames_come_out_the_same_in_any_order_and_again(acquire):
     assert forwards == backwards[::-1]
 
 
-def test_the_scatterers_of_the_wall_are_the_same_whatever_is_around_them(acquire):
-    bare, full = acquire()[1], acquire(**(ALL | {"decorrelation": {}}))[1]
-    for alone, together in zip(bare(1), full(1), strict=True):
-        assert np.array_equal(alone, together[: len(alone)])
-        assert len(together) > 1.4 * len(alone)
-
-
 def test_every_tissue_has_the_exponent_of_its_own_key(twisting_heart, scanner):
     keys = {"phantom": {"scattering_exponent": 1.5, "density_per_mm3": 300.0}}
     tissues = {"blood": {"scattering_exponent": 2.0}, "surroundings": {"scattering_exponent": 0.5}}

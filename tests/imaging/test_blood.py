@@ -86,9 +86,3 @@ def test_its_power_in_a_volume_is_that_of_muscle_times_the_level(blood, twisting
     _, amplitude, _ = blood(0)
     power = (amplitude**2).sum() / cavity_volume(twisting_heart.positions(0), twisting_heart.endo)
     assert 10 * np.log10(power / CONFIG.phantom.si().density) == pytest.approx(-20, abs=0.1)
-
-
-def test_diffusion_leaves_the_seeded_blood_as_it_is(blood, diffusing):
-    diffusing(1)
-    assert np.array_equal(blood.amplitude, diffusing.amplitude)
-    assert np.array_equal(blood.xi, diffusing.xi)

@@ -18,7 +18,6 @@ from echotruth.imaging.bmode import (
     largest_clip,
     line_loss,
     log_compress,
-    persist,
     pixel_centres,
     smooth,
     time_gain_compensation,
@@ -30,21 +29,10 @@ RANGE = np.linspace(7.7e-6, 13.5e-3, 900)
 SECTOR = Sector(ANGLE)
 
 
-def test_envelope_is_the_magnitude():
-    found = envelope(np.array([[3 + 4j, -2j]], np.complex64))
-    assert found.dtype == np.float32
-    assert np.allclose(found, [[5, 2]])
-
-
 def test_log_compression_by_hand():
     levels = np.array([1, 10 ** (-27.5 / 20), 10 ** (-55 / 20), 1e-6, 0])
     assert np.allclose(log_compress(7 * levels, 55), [1, 0.5, 0, 0, 0])
     assert np.allclose(log_compress(np.array([2.0, 1.0]), 60), [1, 1 - 6.0206 / 60])
-
-
-def test_one_reference_serves_the_whole_clip():
-    images = np.array([[[1.0]], [[0.1]]])
-    assert np.allclose(log_compress(images, 40).ravel(), [1, 0.5])
 
 
 @pytest.mark.parametrize(("gain", "expected"), [(10, [1, 1, 0.75, 0.5]), (-10, [0.75, 0.75, 0.25, 0])])
@@ -188,28 +176,6 @@ def test_dropout_does_not_depend_on_the_number_of_lines_and_keeps_the_time_gain(
     fine, coarse = (clip_gain(Probe(), bmode, lines, RANGE, np.random.default_rng(5)) for lines in (257, 65))
     assert np.allclose(fine[::4], coarse, rtol=1e-5)
     assert np.allclose(fine / line_loss(bmode, 257, np.random.default_rng(5))[:, None], fine.max(axis=0), rtol=1e-4)
-
-
-def test_persistence_is_the_average_over_all_that_was_before_in_a_cycle_without_end():
-    levels = np.random.default_rng(3).random((5, 4, 3)).astype(np.float32)
-    weight = 0.7
-    past = np.tile(levels, (40, 1, 1)).astype(float)
-    shown = past[0]
-    for level in past:
-        shown = (1 - weight) * level + weight * shown
-    assert np.allclose(persist(levels, weight)[-1], shown, atol=1e-6)
-    turned = persist(np.roll(levels, 2, axis=0), weight)
-    assert np.allclose(turned, np.roll(persist(levels, weight), 2, axis=0), atol=1e-6)
-    assert np.allclose(persist(levels, weight).mean(axis=0), levels.mean(axis=0), atol=1e-6)
-    assert np.allclose(persist(levels[:1], weight), levels[:1], atol=1e-6)
-
-
-def test_persistence_lags_by_the_frames_that_the_schema_names():
-    """The centre of a Gaussian that passes a pixel at frame 20 passes w / (1 - w) frames later."""
-    frames = np.arange(60)
-    passing = np.exp(-(((frames - 20) / 4) ** 2))[:, None, None]
-    shown = persist(passing, 0.6)[:, 0, 0]
-    assert (shown * frames).sum() / shown.sum() == pytest.approx(20 + 0.6 / 0.4, abs=0.01)
 
 
 def test_edges_are_enhanced_within_the_scan_alone():

@@ -158,15 +158,6 @@ def test_composed_flow_ends_where_the_displacement_since_end_diastole_says(beati
     assert np.nanmax(error[elevation < 1e-6]) <= 0.05
 
 
-def test_forth_and_back_again_returns(beating):
-    for frame in (1, 5, beating.heart.es):
-        start = beating.pixels(frame)
-        again = beating.step(beating.step(start, frame, NEXT), frame + 1, PREVIOUS)
-        off = np.linalg.norm(again - start, axis=-1)
-        assert np.isfinite(off).mean() > 0.9
-        assert np.nanmax(off) < 0.05
-
-
 def test_flow_carries_scatterers_as_the_phantom_does(beating):
     """Scatterers that are within 2 um of the plane, and the flow at the place of their echo."""
     heart = beating.heart

@@ -48,14 +48,6 @@ def correlation(a, b):
 
 
 @pytest.mark.parametrize("frame", [1, 4])
-def test_rf_of_ar1_amplitudes_decorrelates_with_the_time_constant(cloud, frame):
-    matrix, position, amplitude = cloud
-    process = ar1(amplitude, TIME, CONSTANT, "wall", random)
-    echoes = [matrix(position, process(k)) for k in (0, frame)]
-    assert correlation(*echoes) == pytest.approx(np.exp(-TIME[frame] / CONSTANT), abs=0.05)
-
-
-@pytest.mark.parametrize("frame", [1, 4])
 def test_rf_of_diffusing_scatterers_decorrelates_with_the_time_constant(cloud, frame):
     matrix, position, amplitude = cloud
     process = brownian(len(position), TIME, CONSTANT, WAVELENGTH, random)

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from echotruth.config import Probe, Rf
-from echotruth.imaging.beamforming.aperture import Aperture
 from echotruth.imaging.beamforming.interpolation import PHASE_BITS
 from echotruth.imaging.beamforming.receive import BLOCK_RANGES, echo_times
 from echotruth.imaging.beamforming.resampling import LEFT_OUT
@@ -140,20 +139,6 @@ def test_line_bytes_do_not_depend_on_threads(matrix, keys):
     assert results[0] == results[1]
 
 
-def test_a_line_of_two_zones_is_that_of_two_foci_faded_over(matrix):
-    blended = Scanner(Probe(), Rf(lines=16, focal_zones=2, focal_spacing_mm=2.0), 10e-3)
-    near, far = (
-        Scanner(Probe(), Rf(lines=16, focal_zones=1, focus_mm=mm), 10e-3).beamform(matrix) for mm in (5.5, 7.5)
-    )
-    weight = np.clip((blended.range - 5.5e-3) / 2e-3, 0, 1)
-    found = blended.beamform(matrix)
-    error = np.abs(found - (near + weight * (far - near)))
-    # Interpolation over range rounds the kinks of the fade at the foci.
-    at_focus = np.abs(np.abs(blended.range - 6.5e-3) - 1e-3) < 0.15e-3
-    assert error[:, ~at_focus].max() < 1e-5 * np.abs(found).max()
-    assert error.max() < 2e-4 * np.abs(found).max()
-
-
 def test_times_just_before_a_sample_belong_to_the_sample_before():
     """Right to the last bit: rounded up, they would ask for an interpolator beyond the table."""
     early = np.nextafter(np.arange(1.0, BLOCK_RANGES + 1), 0)
@@ -182,22 +167,3 @@ def test_blocks_of_transmits_change_nothing(matrix):
     """Every other line of a linear scan, of which all lines are focused, is a line of a scan with half as many."""
     few, many = (Scanner(Probe(), Rf(lines=n, scan="linear"), 10e-3).beamform(matrix) for n in (65, 129))
     assert np.linalg.norm(many[::2] - few) < 1e-5 * np.linalg.norm(few)
-
-
-@pytest.mark.parametrize("lines", [16, 200])
-def test_the_echoes_of_a_frame_are_made_once_however_many_lines(phantom, lines):
-    scanner, calls = Scanner(Probe(), Rf(lines=lines), 10e-3), []
-    matrix = np.zeros((len(scanner.matrix.frequency), 64, 64), np.complex64)
-    scanner.matrix = lambda *scatterers: calls.append(scatterers) or matrix
-    assert scanner.lines(*phantom).shape[0] == lines
-    assert len(calls) == 1
-
-
-def test_a_whole_aperture_is_the_array_and_one_of_an_f_number_stays_within_it():
-    full = Aperture(Probe(), Rf()).centre_and_width(np.array([0.0, 1e-3]), np.array([1e-3, 9e-3]))
-    assert np.allclose(full, [[0, 0], [LENGTH, LENGTH]])
-    middle, width = Aperture(Probe(), Rf(f_number=2.0)).centre_and_width(
-        np.array([0, 1.4e-3, 1.4e-3]), np.array([2e-3, 2e-3, 9])
-    )
-    assert np.allclose(width, [1e-3, 1e-3, LENGTH])
-    assert np.allclose(middle, [0, LENGTH / 2 - 0.5e-3, 0])

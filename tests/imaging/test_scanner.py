@@ -79,16 +79,6 @@ def test_lateral_and_axial_width_are_those_of_the_exact_sum(narrow, depth):
     assert found == pytest.approx(full_width(narrow.range[near], axial), rel=0.02)
 
 
-def test_in_focus_the_widths_are_those_of_aperture_and_pulse(narrow):
-    """Lateral: the square of the transform of the Hann aperture. Axial: 4 ln 2 / (pi B) in time (both within 5 %)."""
-    image = np.abs(narrow.lines(at(6.5e-3), np.ones(1)))
-    sine = np.linspace(-0.05, 0.05, 2001)
-    beam = np.abs(np.exp(2j * np.pi * np.outer(sine, X) / WAVELENGTH) @ np.cos(np.pi * X / LENGTH) ** 2) ** 2
-    lateral = full_width(6.5e-3 * np.sin(narrow.angle), image[:, np.abs(narrow.range - 6.5e-3).argmin()])
-    assert lateral == pytest.approx(full_width(6.5e-3 * sine, beam), rel=0.05)
-    assert full_width(narrow.range, image[30]) == pytest.approx(4 * np.log(2) / (np.pi * 12.5e6) * SPEED / 2, rel=0.05)
-
-
 @pytest.mark.parametrize(("depth", "degrees"), [(4e-3, -20), (6.5e-3, 0), (8.5e-3, 11)])
 def test_a_point_lands_where_it_is(wide, depth, degrees):
     line = np.abs(wide.angle - np.radians(degrees)).argmin()
@@ -114,45 +104,11 @@ def test_every_transmit_puts_a_point_where_it_is(keys):
     assert peak_position(scanner.angle, image[:, sample]) == pytest.approx(angle, abs=WAVELENGTH / 20 / 5e-3)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("transmit", ["focused", "plane"])
-@pytest.mark.usefixtures("exact_record")
-def test_a_linear_scan_puts_a_point_where_it_is(transmit):
-    probe = Probe(elements=128)
-    rf = Rf(lines=25, width_mm=1.0, scan="linear", f_number=2.0, transmit=transmit, focus_mm=4.0, angle_span_deg=16.0)
-    scanner = Scanner(probe, rf, 4.3e-3)
-    lateral = scanner.scan.line_origin[15] + 5e-6
-    image = np.abs(scanner.lines(np.array([[lateral, 4e-3, 0]]), np.ones(1)))
-    line, sample = np.unravel_index(image.argmax(), image.shape)
-    assert line == 15
-    assert peak_position(scanner.range, image[line]) == pytest.approx(4e-3, abs=WAVELENGTH / 20)
-    assert peak_position(scanner.scan.line_origin, image[:, sample]) == pytest.approx(lateral, abs=WAVELENGTH / 20)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("exact_record")
-def test_a_synthetic_aperture_is_in_focus_everywhere():
-    """Two ways in focus at every depth: the width grows with the depth, where a focused beam is widest off focus."""
-    widths = []
-    scanner = Scanner(FLAT, Rf(lines=31, sector_deg=12, transmit="synthetic_aperture"), 9e-3)
-    for depth in (4e-3, 6.5e-3, 8.5e-3):
-        image = np.abs(scanner.lines(at(depth), np.ones(1)))
-        widths.append(full_width(np.sin(scanner.angle), image[:, np.abs(scanner.range - depth).argmin()]))
-    assert np.allclose(widths, np.mean(widths), rtol=0.02)
-
-
 def slab(seed, number):
     """Scatterers in a part of the image plane about the focus, as strong as each other and of either sign."""
     random = np.random.default_rng(seed)
     position = random.uniform([-1.9e-3, 5.4e-3, 0], [1.9e-3, 7.6e-3, 0], (number, 3))
     return position, random.choice([-1.0, 1.0], number)
-
-
-@pytest.mark.parametrize("shift", [-3e-6, 5e-6])
-def test_the_phase_of_the_rf_recovers_an_axial_shift_of_a_point(narrow, shift):
-    lines = [narrow.lines(at(6.5e-3 + s), np.ones(1))[30] for s in (0, shift)]
-    found = -np.angle(np.vdot(*lines)) * SPEED / (4 * np.pi * narrow.frequency)
-    assert found == pytest.approx(shift, abs=WAVELENGTH / 500)
 
 
 def test_the_phase_of_the_rf_recovers_an_axial_shift_of_speckle(narrow):
@@ -185,13 +141,13 @@ def correlation(still, moved, lag):
     return np.corrcoef(*(part.ravel() for part in parts))[0, 1]
 
 
-def recovered_shift(depth, pivot, shift, **keys):
-    """Lateral motion of speckle over that of its scatterers, by the correlation of the images of 24 blocks."""
+def recovered_shift(depth, pivot, shift, blocks=24, **keys):
+    """Lateral motion of speckle over that of its scatterers, by the correlation of the images of blocks."""
     rf = Rf(lines=TURN_LINES, sector_deg=18, elevation_beam=False, **keys)
     scanner = Scanner(Probe(elements=32, pitch_um=92.0), rf, depth + 1e-3)
     near = np.abs(scanner.range - depth) < 0.3e-3
     match = np.zeros(len(TURN_LAGS))
-    for seed in range(24):
+    for seed in range(blocks):
         pair = [np.abs(scanner.lines(*turned(seed, depth, pivot, s)))[:, near] for s in (-shift / 2, shift / 2)]
         match += [correlation(*pair, lag) for lag in TURN_LAGS]
     return peak_position(TURN_LAGS * (scanner.angle[1] - scanner.angle[0]) * depth, match) / shift
@@ -202,16 +158,7 @@ def test_speckle_that_turns_off_the_middle_focus_moves_as_its_tissue_with_zones_
     """Blocks turned by 70 um about a point 2 mm away (Kallel, Bertrand & Meunier 1994, IEEE Trans UFFC 41:105)."""
     depth, pivot = 4.5e-3, 6.5e-3
     assert recovered_shift(depth, pivot, 70e-6) == pytest.approx(1, abs=0.05)
-    assert recovered_shift(depth, pivot, 70e-6, focal_zones=1) < 0.85
-
-
-@pytest.mark.parametrize("transmit", ["focused", "plane"])
-def test_mirrored_scatterers_give_mirrored_lines(transmit):
-    scanner = Scanner(FLAT, Rf(lines=31, sector_deg=24, transmit=transmit, transmits=3), 9e-3)
-    position, amplitude = slab(5, 1000)
-    lines = scanner.lines(position, amplitude)
-    mirrored = scanner.lines(position * [-1, 1, 1], amplitude)[::-1]
-    assert np.linalg.norm(lines - mirrored) < 1e-3 * np.linalg.norm(lines)
+    assert recovered_shift(depth, pivot, 70e-6, blocks=8, focal_zones=1) < 0.85
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ from scipy.stats import kstest
 from echotruth.config import Probe, Rf
 from echotruth.imaging.beamforming.scanner import Scanner
 
-WAVELENGTH = 1540.0 / 25e6
 LOW, HIGH = np.array([-1.9e-3, 5.4e-3]), np.array([1.9e-3, 7.6e-3])
 
 

@@ -7,14 +7,12 @@ import pytest
 from scipy.stats import kstest, norm, truncnorm
 
 import echotruth as et
-from echotruth.inference import draws, modes
+from echotruth.inference import modes
 from echotruth.inference.draws import MATERIAL, TENSION, normal_within, of_posterior, of_prior, standard_normal
 from echotruth.inference.laplace import Posterior, Prediction
 from echotruth.inference.modes import Mode, Modes, weights
 from echotruth.inference.parameters import (
     CONTRACTILITY,
-    SCAR_CONTRACTILITY,
-    SCAR_STIFFNESS,
     parameters,
     prior_of,
     scar_parameters,
@@ -152,14 +150,3 @@ def test_what_was_seen_weak_may_be_a_scar_the_weakest_first(segments):
         mean[[one.key for one in FREE].index(f"{CONTRACTILITY}.{number}")] = value
     weak = Mode((), FREE, single.model, Posterior(**{**vars(single.found), "mean": mean}))
     assert list(modes._candidates(weak, segments)) == [(8,), (8, 9)]
-
-
-def test_scar_replaces_the_factors_of_its_segments():
-    keys = [one.key for one in scar_parameters(FREE, SCARRED)]
-    assert keys[-2:] == [SCAR_CONTRACTILITY, SCAR_STIFFNESS] and len(keys) == len(FREE) - 2 * len(SCARRED) + 2
-    assert f"{CONTRACTILITY}.8" not in keys and f"{CONTRACTILITY}.10" in keys
-
-
-def test_shares_of_draws_sum_to_all():
-    assert draws._shares(np.array([0.5, 0.3, 0.2]), 7) == [4, 2, 1]
-    assert sum(draws._shares(np.full(3, 1 / 3), 512)) == 512

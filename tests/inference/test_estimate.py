@@ -99,11 +99,8 @@ def test_derivatives_are_those_of_what_the_model_shows(observed, tmp_path):
     ("own", "mesh", "added"),
     [
         ((18, 10, 2), (12, 6, 1), True),
-        ((18, 10, 2), (18, 10, 1), True),
         ((18, 10, 2), (12, 8, 2), False),
-        ((18, 10, 2), (24, 12, 3), False),
         ((18, 10, 2), None, False),
-        ((12, 8, 1), (12, 8, 2), True),
         ((12, 8, 1), None, False),
         ((18, 6, 1), (12, 6, 1), False),
     ],
@@ -131,14 +128,6 @@ def test_what_no_view_shows_keeps_its_prior(found):
     assert (unseen["sd"] / unseen["prior_sd"] > 0.8).all()
 
 
-@pytest.mark.slow
-def test_interval_widens_where_no_view_shows_the_segment_any_more(observed, found):
-    without = infer(chosen(observed, np.flatnonzero(observed["view"] != "mid")), KNOWN, mesh=(12, 6, 1))
-    seen, unseen = (result.sel(parameter="contractility.8") for result in (found, without))
-    assert unseen["sd"] > 2 * seen["sd"]
-    assert seen["identifiable"]
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -163,10 +152,8 @@ def test_observations_that_cannot_be_used_are_refused_in_a_sentence(observed, ch
     [
         ({"fibres.endo": (80, 8)}, "fibres.endo is not inferred: the keys are .*fibres.endo_deg"),
         ({"fibres.endo_deg": (95, 8)}, "give a mean from -90 to 90"),
-        ({"fibres.endo_deg": (80, 0)}, "positive standard deviation"),
         ({"mechanics.regional.contractility": (1, 1000)}, "standard deviation of at most"),
         ({"fibres.endo_deg": 80}, "give a mean and a standard deviation, or None"),
-        ({"mechanics.regional.contractility": (0.01, 0.1)}, "give a mean from 0.05 to 20"),
     ],
 )
 def test_priors_that_cannot_be_used_are_refused_in_a_sentence(observed, prior, said):

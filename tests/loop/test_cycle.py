@@ -47,13 +47,6 @@ def test_twitch_has_the_volume_of_the_mouse_and_the_tension_solved_for_it():
     assert twitch.tension[es_frame(mouse.pressure, mouse.volume)] == pytest.approx(46.9e3, rel=0.01)
 
 
-def test_default_frames_reach_from_ed_to_es_in_about_twenty():
-    loop = read_loop(Loop())
-    assert len(loop.time) == 40
-    assert 20 <= es_frame(loop.pressure, loop.volume) <= 22
-    np.testing.assert_allclose(loop.time, np.arange(40) * 3e-3)
-
-
 def test_volumes_and_heart_rate_are_mapped():
     loop = read_loop(Loop(edv_uL=60.0, esv_uL=24.0, heart_rate_per_min=600.0, frames=400))
     assert (loop.volume[0], loop.volume.min()) == pytest.approx((60 * UL, 24 * UL))
@@ -72,13 +65,11 @@ def test_sampling_goes_through_the_rows_without_overshoot(tmp_path):
     ("rows", "message"),
     [
         (["0,4,50", "30,x,40", *GOOD[2:]], "line 4: pressure_mmHg is 'x'; give a finite number"),
-        (["0,4,50", "30,nan,40", *GOOD[2:]], "line 4: pressure_mmHg is 'nan'"),
         (["0,4,50", "30,100", *GOOD[2:]], "line 4: volume_uL is ''"),
         (GOOD[:3], "there are 3 rows"),
         (["5,4,50", *GOOD[1:]], "row 1: time_ms is 5; begin at 0"),
         (["0,4,50", "30,100,40", "30,100,20", *GOOD[3:]], "row 3: time_ms is 30 and must increase"),
         (["0,4,50", "30,-1,40", *GOOD[2:]], "row 2: pressure_mmHg is -1 and must be positive"),
-        (["0,4,50", "30,100,0", *GOOD[2:]], "row 2: volume_uL is 0 and must be positive"),
         ([*GOOD[:4], "120,9,50"], "pressure_mmHg begins at 4 and ends at 9"),
         (["0,4,50", "30,100,50", "60,100,50", "90,5,50", "120,4,50"], "must not be flat"),
         (["0,4,30", "30,100,50", "60,100,20", "90,5,25", "120,4,30"], "begin the loop at end-diastole"),

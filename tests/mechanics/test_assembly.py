@@ -1,4 +1,4 @@
-"""Sums over cells against dense ones, and the support of the base."""
+"""The support of the base."""
 
 import numpy as np
 import pytest
@@ -28,22 +28,3 @@ def test_fixed_base_does_not_move(mesh):
     assert np.all(moved[mesh.base] == 0)
     assert assembly.n_equations == 3 * (len(mesh.nodes) - len(np.unique(mesh.base)))
     assert Assembly(mesh, base_support(mesh, "elastic")).n_equations == 3 * len(mesh.nodes)
-
-
-def test_sums_are_those_of_dense_matrices(mesh):
-    rng = np.random.default_rng(1)
-    assembly = Assembly(mesh, base_support(mesh, "radial_free"))
-    n = assembly.n_equations
-    matrix, vector = np.zeros((n + 1, n + 1)), np.zeros(n + 1)
-    packed, forces = [], []
-    for group in (mesh.cells, mesh.endo):
-        equations = assembly.equation[group].reshape(len(group), -1)
-        blocks = rng.normal(size=(len(group), equations.shape[1], equations.shape[1]))
-        blocks = blocks + blocks.swapaxes(1, 2)
-        forces.append(rng.normal(size=equations.shape))
-        packed.append(blocks[:, *np.triu_indices(equations.shape[1])])
-        np.add.at(matrix, (equations[:, :, None], equations[:, None, :]), blocks)
-        np.add.at(vector, equations, forces[-1])
-    np.testing.assert_allclose(assembly.matrix(*packed).toarray(), np.triu(matrix[:n, :n]), atol=1e-13)
-    total = assembly.vector(forces[0]) + assembly.vector(forces[1], group=1)
-    np.testing.assert_allclose(total, vector[:n], atol=1e-13)

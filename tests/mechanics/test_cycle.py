@@ -81,17 +81,6 @@ def test_infarct_stretches_where_healthy_wall_shortens():
     assert fibre[region == 0].mean() < -0.08
 
 
-@pytest.mark.slow
-def test_late_wall_is_stretched_first():
-    late = CONFIG.model_copy(update={"pathology": Pathology(late_activation={"preset": "lbbb"}), "loop": Loop()})
-    arrays = beat(late)
-    fibre = centroid_kinematics(Heart.of(arrays, late))["fibre_strain"][..., 0]
-    delay = arrays["pathology"]["activation_delay"]
-    early = fibre[2]
-    assert early[delay == delay.max()].mean() > 0.02
-    assert early[delay == 0].mean() < 0
-
-
 def test_heart_that_is_asked_for_more_than_muscle_bears_is_told_so():
     active = {"length_dependence": 2.0}
     config = CONFIG.model_copy(update={"loop": Loop(frames=20, esv_uL=6.0), "mechanics": Mechanics(active=active)})

@@ -40,13 +40,6 @@ def hemisphere():
     return Hemisphere()
 
 
-def test_nothing_ails_a_heart_by_default(hemisphere):
-    healthy = hemisphere.with_()
-    assert healthy.region.dtype == np.uint8
-    assert not healthy.region.any() and not healthy.activation_delay.any()
-    assert np.all(healthy.stiffness_scale == 1) and np.all(healthy.tension_scale == 1)
-
-
 def test_a_ball_is_centred_in_the_wall_and_has_the_volume_of_a_ball(hemisphere):
     infarct = Infarct(radius_mm=0.95, position=0.5, azimuth_deg=-120.0)
     centre = infarct_centre(hemisphere.mesh, hemisphere.depth, infarct)
@@ -95,10 +88,6 @@ def test_the_border_zone_fades_linearly_with_the_distance(hemisphere):
     assert np.all((ill.tension_scale[border] > 0.2) & (ill.tension_scale[border] < 1))
     assert np.all(ill.region[beyond > 0.81e-3] == 0)
     assert np.std(ill.stiffness_scale[border] - 1 - 7 * weight[border]) < 0.15
-
-
-def test_without_a_border_the_edge_is_sharp(hemisphere):
-    assert set(hemisphere.with_(radius_mm=1.0).region) == {0, 1}
 
 
 def test_delays_are_those_of_the_middles_of_segments_and_linear_between(hemisphere):

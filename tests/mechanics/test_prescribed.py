@@ -68,25 +68,14 @@ def tube_strain(section, radius):
     return (np.stack(c, axis=-1) - [1, 1, 1, 0, 0, 0]) / 2
 
 
-@pytest.mark.parametrize("name", ["cosine", "triangle"])
-@pytest.mark.parametrize("frames", [2, 5, 20])
-def test_cycles_begin_at_rest_and_are_whole_at_mid_cycle(name, frames):
-    amplitude = motion_amplitude(name, frames)
-    assert (
-        amplitude[0] == 0
-        and amplitude[frames // 2] == pytest.approx(1, abs=1e-15)
-        and amplitude.argmax() == frames // 2
-    )
-    if frames == 20:
-        np.testing.assert_allclose(amplitude[1:10], amplitude[:10:-1], atol=1e-15)
-
-
-def test_triangle_and_ramp_go_in_equal_steps_and_the_cosine_is_smooth():
+def test_triangle_and_ramp_go_in_equal_steps_the_cosine_is_smooth_and_all_are_whole_at_mid_cycle():
     np.testing.assert_allclose(motion_amplitude("triangle", 20)[:11], np.arange(11) / 10)
     np.testing.assert_allclose(motion_amplitude("ramp", 11), np.arange(11) / 10)
     np.testing.assert_allclose(
         motion_amplitude("cosine", 40), (1 - np.cos(2 * np.pi * np.arange(40) / 40)) / 2, atol=1e-15
     )
+    for name in ("cosine", "triangle"):
+        assert motion_amplitude(name, 5)[[0, 2]] == pytest.approx([0, 1], abs=1e-15)  # whole at mid-cycle of odd cycles
 
 
 @pytest.mark.parametrize("kind", ["rigid", "affine", "tube"])
@@ -192,13 +181,11 @@ def test_elements_carry_rigid_and_affine_motion_to_the_last_bits(kind):
     np.testing.assert_allclose(found, displacement_at(setting, mesh, place, 1.0), rtol=0, atol=1e-17)
 
 
-def test_torsion_twists_as_a_healthy_heart_does_and_there_is_no_loop():
-    """The nodes of the slices at 0.2 and 0.8 lie about 5/24 and 19/24; there is nothing else to measure."""
+def test_torsion_twists_as_a_healthy_heart_does():
+    """The nodes of the slices at 0.2 and 0.8 lie about 5/24 and 19/24."""
     arrays = prescribed_motion(config("tube", (24, 12, 1), torsion_deg=20.0, endo_rotation_deg=0.0))
     found = measures(arrays["geometry"], arrays["mechanics"], arrays["kinematics"])
     assert np.degrees(found["twist"][1]) == pytest.approx(20 * 14 / 24)
-    assert np.isnan([found["ejection_fraction"], found["tension_min"], found["tension_es"]]).all()
-    assert np.isnan(arrays["mechanics"]["pressure"]).all() and np.isnan(arrays["mechanics"]["volume"]).all()
 
 
 def test_a_motion_into_the_array_is_refused_in_one_sentence():

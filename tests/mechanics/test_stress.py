@@ -1,91 +1,9 @@
-"""The isochoric split, the pressure and the active stress against finite differences and formulas derived by hand."""
+"""The active stress and the force of a muscle that shortens against formulas derived by hand."""
 
 import numpy as np
 import pytest
 
-from echotruth.mechanics.solver import stress as material
 from echotruth.mechanics.solver.active_stress import ActiveLaw, active_stress, force_velocity
-
-
-def voigt(tensor):
-    return np.array([tensor[i, j] for i, j in material.PAIRS])
-
-
-def full(c):
-    return np.array([[c[0], c[3], c[4]], [c[3], c[1], c[5]], [c[4], c[5], c[2]]])
-
-
-def strained(seed=0):
-    f = np.eye(3) + 0.15 * np.random.default_rng(seed).normal(size=(3, 3))
-    return voigt(f.T @ f)
-
-
-def difference(function, c, step=1e-6):
-    """Derivative by the Green-Lagrange strain, shear doubled."""
-    columns = []
-    for k in range(6):
-        d = np.zeros(6)
-        d[k] = step * (2 if k < 3 else 1)
-        columns.append((function(c + d) - function(c - d)) / (2 * step))
-    return np.array(columns).T
-
-
-def isochoric(c):
-    """Energy e : A e / 2 + (tr e)^3 of the isochoric strain e, with its stress and its tangent."""
-    inverse, e, tangent = np.empty(6), np.empty(6), np.empty((6, 6))
-    scale = material.isochoric_strain(c, material.invert(c, inverse), e)
-    trace, stress = e[:3].sum(), np.array([2.0, 1.0, 3.0, 0.5, 0.7, 0.2]) * e
-    energy = np.sum(material.MULTIPLICITY * stress * e) / 2 + trace**3
-    stress[:3] += 3 * trace**2
-    tangent[:] = np.diag(np.array([2.0, 1.0, 3.0, 0.5, 0.7, 0.2]) / material.MULTIPLICITY)
-    tangent[:3, :3] += 6 * trace
-    contraction = material.isochoric_stress(c, inverse, scale, stress)
-    material.isochoric_tangent(c, inverse, scale, contraction, stress, tangent)
-    return energy, stress, tangent
-
-
-def test_inverse_and_determinant():
-    c, inverse = strained(), np.empty(6)
-    assert material.invert(c, inverse) ** 2 == pytest.approx(np.linalg.det(full(c)))
-    np.testing.assert_allclose(inverse, voigt(np.linalg.inv(full(c))))
-
-
-def test_isochoric_strain_has_no_change_of_volume():
-    c, strain = strained(), np.empty(6)
-    j = np.sqrt(np.linalg.det(full(c)))
-    assert material.isochoric_strain(c, j, strain) == pytest.approx(j ** (-2 / 3))
-    assert np.linalg.det(2 * full(strain) + np.eye(3)) == pytest.approx(1)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_projected_stress_and_tangent_are_derivatives(seed):
-    c = strained(seed)
-    _, stress, tangent = isochoric(c)
-    np.testing.assert_allclose(stress, difference(lambda x: isochoric(x)[0], c), rtol=1e-7, atol=1e-8)
-    slope, upper = difference(lambda x: isochoric(x)[1], c), np.triu_indices(6)
-    np.testing.assert_allclose(tangent[upper], slope[upper], atol=1e-8 * np.abs(slope).max())
-    np.testing.assert_allclose(slope, slope.T, atol=1e-8 * np.abs(slope).max())
-
-
-@pytest.mark.parametrize("bulk", [0.0, 20.0])
-def test_volumetric_stress_and_tangent_are_derivatives_of_the_volume(bulk):
-    """Of the energy 3 J + bulk (J - 1)^2 / 2."""
-
-    def energy(c):
-        j = material.invert(c, np.empty(6))
-        return 3 * j + bulk * (j - 1) ** 2 / 2
-
-    def stress(c):
-        inverse = np.empty(6)
-        j = material.invert(c, inverse)
-        return (3 + bulk * (j - 1)) * j * inverse
-
-    c, inverse, tangent = strained(), np.empty(6), np.zeros((6, 6))
-    j = material.invert(c, inverse)
-    material.add_volumetric(inverse, j, 3 + bulk * (j - 1), bulk, tangent)
-    np.testing.assert_allclose(stress(c), difference(energy, c), rtol=1e-7, atol=1e-8)
-    slope = difference(stress, c)
-    np.testing.assert_allclose(tangent, np.triu(slope), atol=1e-8 * np.abs(slope).max())
 
 
 @pytest.mark.parametrize("stretch", [0.8, 1.0, 1.2])

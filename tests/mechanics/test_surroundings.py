@@ -7,10 +7,9 @@ from echotruth.config import Config, Geometry, Loop, Mechanics
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat, unloaded_wall
 from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
-from echotruth.mechanics.solver.assembly import BASE, EPI
 from echotruth.mechanics.solver.equilibrium import Load, PreviousState, State
 from echotruth.mechanics.solver.stress_point import VOLUMETRIC
-from echotruth.mechanics.solver.surroundings import axial, circumferential, normal, surface_matrix, surroundings
+from echotruth.mechanics.solver.surroundings import axial, circumferential, normal, surface_matrix
 from echotruth.mechanics.solver.wall import equilibrium
 from echotruth.mechanics.twist import slice_rotation
 from validation.heart import solved_heart
@@ -56,14 +55,6 @@ def test_base_resists_axial_motion_by_its_area_and_turning_by_its_polar_moment(h
     assert total_force(surface_matrix(mesh, mesh.base, circumferential), turn) == pytest.approx(moment, rel=1e-3)
     assert total_force(surface_matrix(mesh, mesh.base, axial), turn) == pytest.approx(0, abs=1e-20)
     assert total_force(surface_matrix(mesh, mesh.base, circumferential), rise) == pytest.approx(0, abs=1e-20)
-
-
-def test_a_heart_on_its_own_has_no_springs_and_one_with_all_has_those_of_its_two_surfaces():
-    mesh = left_ventricle(COARSE)
-    assert surroundings(mesh, Mechanics.model_validate(ALONE)) == ()
-    found = surroundings(mesh, Mechanics.model_validate(EVERYTHING))
-    assert [one.group for one in found] == [EPI, BASE]
-    assert [one.rest_at_end_diastole for one in found] == [True, False]
 
 
 def test_tangent_of_everything_together_is_the_derivative_of_the_forces(monkeypatch):

@@ -18,9 +18,13 @@ def config(**loop):
     return Config(geometry=IMAGE, loop=Loop(frames=2, **loop), mechanics=wall)
 
 
-@pytest.mark.slow
-def test_heart_imaged_at_end_diastole_is_met_there():
-    arrays, image = beat(config()), left_ventricle(IMAGE)
+@pytest.fixture(scope="module")
+def imaged():
+    return beat(config())
+
+
+def test_heart_imaged_at_end_diastole_is_met_there(imaged):
+    arrays, image = imaged, left_ventricle(IMAGE)
     geometry, mechanics = arrays["geometry"], arrays["mechanics"]
     filled = geometry["node_position"] + mechanics["displacement"][0]
     np.testing.assert_allclose(filled, image.nodes, atol=2e-6 * np.ptp(image.nodes))
@@ -28,8 +32,8 @@ def test_heart_imaged_at_end_diastole_is_met_there():
     assert cavity_volume(geometry["node_position"], geometry["endo"]) < 0.9 * mechanics["volume"][0]
 
 
-def test_loop_is_scaled_to_the_image_and_keeps_its_ejection_fraction():
-    volume = beat(config())["mechanics"]["volume_target"]
+def test_loop_is_scaled_to_the_image_and_keeps_its_ejection_fraction(imaged):
+    volume = imaged["mechanics"]["volume_target"]
     unscaled = beat(Config(geometry=IMAGE.model_copy(update={"given_state": "unloaded"}), loop=Loop(frames=2)))[
         "mechanics"
     ]

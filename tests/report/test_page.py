@@ -145,9 +145,9 @@ def test_page_of_a_repository_without_a_complete_heart_says_why(reported, tmp_pa
 
 @pytest.mark.slow
 def test_many_hearts_are_listed_with_their_number_and_one_view_is_enough(tmp_path, monkeypatch):
-    monkeypatch.setattr("echotruth.report.hearts.SHOWN", 2)
+    monkeypatch.setattr("echotruth.report.hearts.SHOWN", 1)
     views = {"long": SETTINGS["views"]["long"]}
-    made = make(tmp_path / "known", SETTINGS | {"views": views, "cases": {"seed": [1, 2, 3]}})
+    made = make(tmp_path / "known", SETTINGS | {"views": views, "cases": {"seed": [1, 2]}})
     elements = Elements(report(made.folder))
-    assert "3 hearts: 3 complete." in elements.said and "2 of those that were imaged are listed" in elements.said
-    assert elements.said.count("healthy") >= 2 and "figure-population" in elements.ids
+    assert "2 hearts: 2 complete." in elements.said and "1 of those that were imaged are listed" in elements.said
+    assert elements.said.count("healthy") >= 1 and "figure-population" in elements.ids

@@ -46,10 +46,6 @@ def test_group_is_what_the_configuration_makes_of_a_heart(table):
     assert (table["group"] == table["diagnosis"]).all()
 
 
-def test_suite_is_that_of_the_benchmark_and_the_small_one_has_another(suite, table):
-    assert (table["suite"] == SUITES[suite[0]]).all()
-
-
 def test_every_heart_has_ideal_acoustics_and_realistic_ones_have_what_clips_have(suite, table):
     for case in suite[1]:
         realism = case.config.realism

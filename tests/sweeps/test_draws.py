@@ -167,10 +167,7 @@ PUBLISHED = {
     ("draw", "sentence"),
     [
         ({"number": 3}, "cases.draw.keys is missing: it must be given"),
-        ({"number": 0, "keys": CONTINUOUS}, "cases.draw.number = 0: should be greater than or equal to 1"),
         ({"number": 10**6, "keys": CONTINUOUS}, "cases.draw.number = 1000000: should be less than or equal to 100000"),
-        ({"number": 3, "keys": {}}, "cases.draw.keys = {}: must have at least one entry"),
-        ({"number": 3, "method": "halton", "keys": CONTINUOUS}, "cases.draw.method = 'halton'"),
         (
             {"number": 3, "keys": {"fibres.endo": {"uniform": [1, 2]}}},
             "cases.draw.keys.fibres.endo: fibres.endo is not",
@@ -181,13 +178,11 @@ PUBLISHED = {
             "uniform = [2.0, 1.0]: must be the lower bound and then",
         ),
         ({"number": 3, "keys": {"seed": {"log_uniform": [0, 1]}}}, "must have positive bounds"),
-        ({"number": 3, "keys": {"seed": {"normal": [0, 0]}}}, "a positive standard deviation"),
         (
             {"number": 3, "keys": {"seed": {"uniform": [0, 1], "limits": [0, 1]}}},
             "limits = [0.0, 1.0]: applies to normal",
         ),
         ({"number": 3, "keys": {"seed": {"choice": [1, 2], "weights": [1]}}}, "one entry for each of the 2 of choice"),
-        ({"number": 3, "keys": {"seed": {"choice": [1, 2], "weights": [0, 0]}}}, "must have a positive entry"),
         ({"number": 9, "keys": {"seed": {"choice": [1, 2]}}}, "are the same heart, heart: draw fewer hearts"),
         ({"number": 3, "keys": {"seed": {"uniform": [1, 9]}}}, "draw 1: seed = "),
         ({"number": 9, "keys": {"fibres.endo_deg": {"uniform": [80, 99]}}}, "should be less than or equal to 90"),

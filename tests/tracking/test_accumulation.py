@@ -35,10 +35,6 @@ def points():
     return np.array([[10.0, 20.0], [30.0, 5.0]])
 
 
-def test_formula_undoes_itself(points):
-    np.testing.assert_allclose(shear(shear(points, 3.0), -3.0), points, atol=1e-12)
-
-
 @pytest.mark.parametrize("reference", ["ED", "previous", "bidirectional"])
 def test_steps_are_measured_at_the_current_position_of_the_tissue(points, reference):
     """The displacement is that of the tissue initially at the point, whichever frames are compared."""
@@ -109,15 +105,3 @@ def test_one_way_has_the_variance_of_its_steps_and_no_disagreement(points):
         path = follow(Formula(shear), FRAMES, points, reference)
         np.testing.assert_allclose(path.variance[:, 0], expected)
         assert np.isnan(path.disagreement).all()
-
-
-def test_every_image_is_prepared_once(points):
-    prepared = []
-
-    class Counted(Formula):
-        def prepare(self, image):
-            prepared.append(image[0, 0])
-            return super().prepare(image)
-
-    accumulate(Counted(shear), FRAMES, points, "previous")
-    assert prepared == list(range(7))

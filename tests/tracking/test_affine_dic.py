@@ -51,69 +51,11 @@ def test_affine_motion_is_found_to_the_thousandth_of_a_pixel(inner):
     assert ncc[0] > 0.9999
 
 
-def test_gradient_of_a_template_is_that_of_its_spline():
-    padded, half, e = texture(), 3, 1e-3
-    values, *gradient = np.empty((3, 7, 7), np.float32)
-    norm = subset.template(padded, np.array([40.3, 51.7]), half, values, *gradient)
-    for axis in (0, 1):
-        there = []
-        for sign in (-1, 1):
-            position = np.array([40.3, 51.7])
-            position[axis] += sign * e
-            offset = np.arange(-half, half + 1)
-            there.append(
-                ndimage.map_coordinates(
-                    padded.astype(float),
-                    np.meshgrid(position[1] + 1 + offset, position[0] + 1 + offset, indexing="ij"),
-                    order=3,
-                    prefilter=False,
-                )
-            )
-        np.testing.assert_allclose(gradient[axis], (there[1] - there[0]) / 2 / e, atol=1e-6)
-        middle = np.mean(there, axis=0)
-    assert norm == pytest.approx(np.linalg.norm(middle - middle.mean()), rel=1e-4)
-    np.testing.assert_allclose(values, middle - middle.mean(), atol=1e-6)
-
-
-def test_factor_and_solution_are_those_of_the_normal_equations():
-    random = np.random.default_rng(1)
-    gradient, values = random.normal(size=(2, 7, 7)).astype(np.float32), random.normal(size=(7, 7)).astype(np.float32)
-    rows = rows_of(*gradient.astype(float))
-    matrix, right = subset.hessian(*gradient), subset.project(*gradient, values)
-    np.testing.assert_allclose(matrix, rows.T @ rows, atol=1e-10)
-    np.testing.assert_allclose(right, rows.T @ values.ravel().astype(float), atol=1e-10)
-    lower, solution = matrix.copy(), right.copy()
-    subset.cholesky(lower)
-    subset.solve_cholesky(lower, solution)
-    np.testing.assert_allclose(np.tril(lower), np.linalg.cholesky(matrix), atol=1e-12)
-    np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), atol=1e-12)
-
-
-def rows_of(gradient_x, gradient_y):
-    """Derivative of each pixel of a subset (side, side) by the six parameters of its warp."""
-    offset = np.arange(len(gradient_x)) - len(gradient_x) // 2
-    dx, dy = np.meshgrid(offset, offset)
-    return np.stack([slope * factor for slope in (gradient_x, gradient_y) for factor in (1, dx, dy)], -1).reshape(-1, 6)
-
-
 def test_factor_of_a_singular_hessian_is_zero():
     gradient = np.random.default_rng(1).normal(size=(7, 7)).astype(np.float32)
     matrix = subset.hessian(gradient, 2 * gradient)
     subset.cholesky(matrix)
     assert (matrix == 0).all()
-
-
-def matrix_of(warp):
-    u, ux, uy, v, vx, vy = warp
-    return np.array([[1 + ux, uy, u], [vx, 1 + vy, v], [0, 0, 1]])
-
-
-def test_inverse_of_a_step_is_composed_with_the_warp():
-    warp = np.array([1.0, 0.1, -0.2, 2.0, 0.05, -0.1])
-    step = np.array([0.3, -0.05, 0.02, -0.4, 0.03, 0.07])
-    expected = matrix_of(warp) @ np.linalg.inv(matrix_of(step))
-    assert subset.compose_inverse(warp, step)
-    np.testing.assert_allclose(matrix_of(warp), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("shift", [0.25, 0.5, 9.4])

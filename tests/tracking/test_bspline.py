@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from scipy import interpolate, linalg, ndimage
+from scipy import interpolate, ndimage
 
 from echotruth.imaging import spline
 from echotruth.tracking import alignment, bending_energy
@@ -51,34 +51,6 @@ def test_field_is_the_tensor_product_spline_of_scipy(random):
     np.testing.assert_allclose(lattice.evaluate(coefficients, points)[:, 0], expected, atol=1e-12)
 
 
-def test_adjoint_is_the_transpose_of_evaluation(random):
-    region = wall_region(MASK, STEP, 3.0, 0.5)
-    values, coefficients = random.normal(size=(len(region.positions), 2)), random.normal(size=(region.lattice.size, 2))
-    direct = np.sum(values * region.cells.evaluate(coefficients))
-    adjoint = np.sum(region.cells.adjoint(values, region.lattice.size) * coefficients)
-    assert direct == pytest.approx(adjoint, rel=1e-12)
-
-
-def test_knots_are_counted_along_the_shorter_side():
-    tall = lattice_around(np.argwhere(MASK), STEP)
-    assert tall.index.shape[0] > tall.index.shape[1]
-    assert np.abs(np.diff(tall.index, axis=0)).max() == tall.index.shape[1]
-    assert np.abs(np.diff(lattice_around(np.argwhere(MASK)[:, ::-1], STEP).index, axis=1)).max() == tall.index.shape[1]
-
-
-def test_image_and_gradient_are_those_of_the_cubic_spline(random):
-    image = random.normal(size=(30, 40)).astype(np.float32)
-    position = random.uniform([1, 1], [38, 28], (60, 2))
-    grey = alignment.interpolate_with_gradient(spline.coefficients(image), position)
-
-    def at(moved):
-        return ndimage.map_coordinates(image.astype(float), (position + moved)[:, ::-1].T, order=3, mode="mirror")
-
-    np.testing.assert_allclose(grey[:, 0], at([0, 0]), atol=1e-5)
-    for axis, step in enumerate(1e-4 * np.eye(2)):
-        np.testing.assert_allclose(grey[:, 1 + axis], (at(step) - at(-step)) / 2e-4, atol=1e-4)
-
-
 def jacobian(region, gradient):
     """Derivative of the grey value of every pixel by every unknown, shape (pixel, unknowns)."""
     weights = region.cells.evaluate(np.eye(region.lattice.size))
@@ -111,17 +83,6 @@ def test_more_of_the_motion_so_far_has_no_bending_energy(random):
     least = min(field @ region.energy.gradient(field) for field in other - shares[:, None] * so_far)
     np.testing.assert_allclose(other @ energy.gradient(other), least, rtol=1e-5)
     assert region.energy.and_without(np.zeros_like(so_far)) is region.energy
-
-
-def test_newton_step_solves_the_equations_with_the_free_fields_taken_out(random):
-    region = wall_region(MASK, STEP, 3.0, 0.5)
-    gradient, weight = random.normal(size=region.positions.shape), random.uniform(size=len(region.positions))
-    energy = region.energy.and_without(random.normal(size=2 * region.lattice.size))
-    band, scale = region._image_matrix(gradient, weight, 1)
-    expected = dense(band) + scale * region_module.REGULARISATION * np.eye(len(band))
-    expected += 50 * np.stack([energy.gradient(unit) for unit in np.eye(len(band))], -1)
-    normal, rhs = region_module._factor(band, scale, 50.0, energy), random.normal(size=len(band))
-    np.testing.assert_allclose(normal.newton_step(rhs), linalg.solve(expected, rhs), rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("stride", [1, 3])
@@ -255,17 +216,6 @@ def test_bending_energy_of_a_ring_is_that_of_its_polar_components():
     # D_s D_s = -9 cos(3 angle) / r^2 and D_n D_s = 3 sin(3 angle) / r^2.
     wave = np.sum((81 * np.cos(3 * angle) ** 2 + transmural_scale**2 * 9 * np.sin(3 * angle) ** 2) / r**4)
     assert waves / wave == pytest.approx(square / (4 * transmural_scale**4 * len(r)), rel=0.02)
-
-
-def test_frame_of_a_straight_wall_is_scaled_through_it_and_does_not_turn():
-    for turned in (False, True):
-        strip = np.zeros((60, 60), bool)
-        strip[20:35] = True
-        strip = strip.T if turned else strip
-        expected = [0.2, 0, 1] if turned else [1, 0, 0.2]
-        metrics, turns = wall_frame(strip, strip, 3.0, 0.2)
-        np.testing.assert_allclose(metrics, np.tile(expected, (strip.sum(), 1)), atol=1e-9)
-        np.testing.assert_allclose(turns, 0, atol=1e-9)
 
 
 def test_frame_of_a_ring_turns_with_its_angle():

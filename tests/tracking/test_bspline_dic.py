@@ -165,14 +165,6 @@ def test_points_beyond_the_wall_and_empty_masks_have_no_displacement(shifted):
     assert np.isnan(displacement).all() and np.isnan(quality).all()
 
 
-def test_images_need_not_be_square_nor_of_whole_numbers(shifted):
-    frames = np.stack([shifted(SIZE, 0, 0), shifted(SIZE, 2, -1)])[:, 20:110].astype(float) / 7
-    mask, points = ring()
-    points = points[(points[:, 1] > 25) & (points[:, 1] < 105)] - [0, 20]
-    displacement, _ = found(frames, mask[20:110], points)
-    assert np.abs(displacement[1] - [2, -1]).max() < 0.1
-
-
 def test_same_bytes_on_one_thread_and_on_two(clip):
     frames = clip(lambda place, t: place + beat(t) * np.array([2, 1]), 4, SIZE)
     mask, points = ring()

@@ -46,12 +46,6 @@ def test_fine_setting_is_the_library_s_own_at_full_size_and_nearer_to_a_shear(cl
     np.testing.assert_allclose(moved[1], library.calc(*frames, None)[row, column], atol=1e-5)
 
 
-def test_shift_of_speckle_is_found(pair):
-    flow = optical_flow(*(pair / np.float32(255)))
-    assert flow.shape == (160, 160, 2)
-    np.testing.assert_allclose(flow[30:-30, 30:-30].mean((0, 1)), SHIFT, atol=0.05)
-
-
 def test_bytes_do_not_depend_on_the_threads_of_the_library(pair):
     images = pair / np.float32(255)
     results = []

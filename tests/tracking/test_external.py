@@ -1,6 +1,5 @@
 """External trackers: what they receive, and one sentence for every way in which they fail."""
 
-import inspect
 import re
 import sys
 import time
@@ -93,10 +92,6 @@ def test_callable_gets_the_clip_and_its_options_and_nothing_else(arguments, exte
         assert np.asarray(seen[name]).dtype == np.asarray(value).dtype
 
 
-def test_order_of_the_arguments_is_that_of_every_tracker():
-    assert tuple(inspect.signature(track_any).parameters) == (*TRACKER_ARGUMENTS, "settings")
-
-
 def test_tracker_cannot_change_the_arguments_of_others(arguments, external):
     def tracker(*arrays):
         for array in arrays:
@@ -160,7 +155,6 @@ BAD = {
     "nothing": (lambda *_: None, "displacement of NoneType, not of real numbers"),
     "other shape": (filled(0, POINTS, TIMES, 2), r"shape \(4, 3, 2\), not \(3, 4, 2\)"),
     "ragged": (lambda *_: [[1, 2], [3]], "displacement that is not an array of shape"),
-    "complex": (filled(0, dtype=complex), "displacement of complex128, not of real numbers"),
     "words": (filled("a", dtype=str), "displacement of <U1, not of real numbers"),
     "nowhere finite": (filled(np.nan), "no finite displacement after frame 0"),
     "positions": (filled(12.0), r"displacement of 17.0 px in frame 0.*not positions"),
@@ -199,18 +193,12 @@ def test_module_of_the_current_directory_is_found(arguments, module):
     "name, expected",
     [
         ("nowhere_at_all:track", "cannot be imported: ModuleNotFoundError"),
-        ("numpy:no_such_function", "cannot be imported: AttributeError"),
         ("numpy:pi", "raised TypeError: 'float' object is not callable"),
         ("nobody", "not an entry point of the group echotruth.trackers .*write package.module:function"),
     ],
 )
 def test_unknown_name_is_explained_in_one_sentence(arguments, name, expected):
     assert re.search(expected, failure(arguments, External(track=name)))
-
-
-def test_module_that_fails_on_import_is_explained_in_one_sentence(arguments, module):
-    name = module("broken", "return )")
-    assert failure(arguments, External(track=name)).startswith("cannot be imported: SyntaxError")
 
 
 def test_installed_package_brings_a_tracker_as_an_entry_point(arguments, module, tmp_path):
@@ -250,7 +238,6 @@ def shell(script):
     "script, expected",
     [
         ("echo first; echo 'ValueError: no wall' >&2; exit 1", "ended with status 1: ValueError: no wall"),
-        ("exit 4", "ended with status 4: nothing on stderr"),
         ("kill -9 $$", "was ended by signal 9"),
         ("true", "wrote no {output}, an .npz file with displacement"),
         ('echo hello > "$1"', "wrote an {output} that cannot be read as .npz"),
@@ -302,12 +289,6 @@ def test_header_that_claims_terabytes_is_refused_before_its_array_is_read(argume
     assert failure(arguments, writing(path)).endswith(expected)
 
 
-def test_array_without_an_archive_is_no_npz_whatever_its_header_claims(arguments, tmp_path):
-    with zipfile.ZipFile(npz(tmp_path / "huge.npz", "displacement", {"shape": (10**12,)})) as archive:
-        (tmp_path / "huge.npy").write_bytes(archive.read("displacement.npy"))
-    assert "wrote an {output} that cannot be read as .npz" in failure(arguments, writing(tmp_path / "huge.npy"))
-
-
 @pytest.mark.parametrize(
     "method, expected", [(zipfile.ZIP_DEFLATED, "of shape"), (zipfile.ZIP_LZMA, "than by deflate")]
 )
@@ -318,18 +299,6 @@ def test_archive_that_unpacks_to_far_more_is_not_unpacked(arguments, tmp_path, m
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 2**22
-
-
-def test_encrypted_archive_is_explained_in_one_sentence(arguments, tmp_path):
-    path = tmp_path / "encrypted.npz"
-    np.savez(path, displacement=np.zeros((TIMES, POINTS, 2)))
-    content = bytearray(path.read_bytes())
-    for signature, flags in ((b"PK\3\4", 6), (b"PK\1\2", 8)):
-        content[content.index(signature) + flags] |= 1
-    path.write_bytes(content)
-    assert re.search(
-        r"wrote an \{output\} that cannot be read as .npz \(.* is encrypted", failure(arguments, writing(path))
-    )
 
 
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
@@ -395,15 +364,11 @@ PROGRAM = {"command": ["prog", "{input}", "{output}"]}
     "settings, expected",
     [
         ({}, "track = null: give either track or command"),
-        ({"track": "a:b", "command": ["c"]}, "track = 'a:b': give either track or command"),
         ({"command": ["prog", "{input}"]}, "must contain {output} where the path of that file belongs"),
         ({"track": "a:b", "options": {"frames": 3}}, "options.frames = 3: must have another name"),
         (PROGRAM | {"options": {"a": {"b": 1}}}, "options.a = {'b': 1}: must be a number"),
-        (PROGRAM | {"options": {"a": [1, "b"]}}, "options.a = [1, 'b']: must be a number"),
         (PROGRAM | {"options": {"a": 2**63}}, "options.a = 9223372036854775808: must be a number of 64 bits"),
         ({"track": "./own.py:track"}, "'./own.py:track': write package.module:function (dots, no path, no .py)"),
-        ({"track": "own.py"}, "track = 'own.py': write package.module:function"),
-        ({"track": "own:track()"}, "track = 'own:track()': write package.module:function"),
         ({"track": "a:b", "options": {"a": [1, "1e999"]}}, "options.a = [1, inf]: must be finite numbers, text"),
         ({"track": "a:b", "options": {"a": date(2026, 1, 1)}}, "options.a = datetime.date(2026, 1, 1): must be finite"),
         ({"track": "a:b", "timeout_s": 0}, "timeout_s = 0: should be greater than 0"),

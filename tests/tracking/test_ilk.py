@@ -4,7 +4,6 @@ from skimage.registration import optical_flow_ilk
 
 from echotruth.config.tracking import Ilk
 from echotruth.tracking import track
-from echotruth.tracking.trackers.ilk import optical_flow
 
 SHIFT = np.array([3.0, -1.5])
 
@@ -20,9 +19,3 @@ def test_motion_at_whole_pixels_is_the_library_s_own(pair, radius):
     moved, _ = track(pair, points, np.ones((96, 96), bool), 3e-5, np.arange(2.0), 0, Ilk(radius_px=radius))
     axial, lateral = optical_flow_ilk(*pair, radius=radius)
     np.testing.assert_allclose(moved[1], np.stack([lateral, axial], -1)[[60, 31], [40, 70]], atol=1e-4)
-
-
-def test_shift_of_speckle_is_found(pair):
-    flow = optical_flow(*(pair / np.float32(255)))
-    assert flow.shape == (96, 96, 2)
-    np.testing.assert_allclose(flow[25:-25, 25:-25].mean((0, 1)), SHIFT, atol=0.05)

@@ -4,10 +4,10 @@ from scipy import ndimage
 
 from echotruth.config.tracking import WindowDeformation
 from echotruth.tracking import track
-from echotruth.tracking.correlation import has_texture, match_windows, subpixel_peaks
-from echotruth.tracking.field import displacement_field, replace_outliers, smooth
+from echotruth.tracking.correlation import subpixel_peaks
+from echotruth.tracking.field import displacement_field, replace_outliers
 from echotruth.tracking.trackers import window_deformation
-from echotruth.tracking.windows import Windows, arrange
+from echotruth.tracking.windows import arrange
 
 SPACING = 3e-5
 
@@ -42,17 +42,6 @@ def test_deformed_windows_find_a_turn_that_rigid_ones_blur(speckle, inner):
     truth = turned(inner) - inner
     error = [np.sqrt(((step(*images, inner, final_passes=n) - truth) ** 2).mean()) for n in (1, 4)]
     assert error[1] < 0.1 and error[1] < 0.6 * error[0]
-
-
-def test_correlation_of_a_window_at_a_lag_is_pearson_s():
-    noise = np.random.default_rng(4).normal(size=(2, 40, 50))
-    first = ndimage.gaussian_filter(noise[0], 1.5).astype(np.float32)
-    second = (np.roll(first, (1, 1), (0, 1)) + 0.02 * noise[1]).astype(np.float32)
-    windows = Windows(8, np.array([12]), np.array([20]))
-    shift, peak = match_windows(first, second, windows, has_texture(first, windows), 3)
-    np.testing.assert_allclose(shift[0, 0], [1, 1], atol=0.5)
-    expected = np.corrcoef(first[12:20, 20:28].ravel(), second[13:21, 21:29].ravel())[0, 1]
-    assert peak[0, 0] == pytest.approx(expected, abs=1e-6)
 
 
 def test_position_of_a_gaussian_peak_is_exact():
@@ -100,33 +89,6 @@ def test_field_between_windows_is_a_cubic_spline_through_their_centres():
     points = np.array([[windows.left[5] + 7.5 + 0.9 * 8, windows.top[3] + 7.5 + 0.3 * 8], [windows.left[4] + 7.5, 2]])
     np.testing.assert_allclose(moved.at(points)[:, 0], between, atol=1e-5)
     assert np.isnan(moved.at(np.array([[-0.1, 5.0], [5.0, 95.1], [np.nan, 5.0]]))).all()
-
-
-def test_mean_motion_under_other_windows_is_that_of_their_pixels():
-    windows, smaller = arrange((90, 128), 16, 0.5), arrange((90, 128), 10, 0.5)
-    field = np.random.default_rng(6).normal(size=(len(windows.top), len(windows.left), 2))
-    moved = displacement_field(field, windows, (90, 128))
-    pixels = np.stack(np.meshgrid(np.arange(128.0), np.arange(90.0)), -1)
-    dense = moved.at(pixels.reshape(-1, 2)).reshape(pixels.shape)
-    expected = np.stack([smaller.extract(component).mean((-2, -1)) for component in np.moveaxis(dense, -1, 0)], -1)
-    np.testing.assert_allclose(moved.mean(smaller), expected, atol=1e-6)
-
-
-def test_smoothing_keeps_linear_motion_and_removes_what_alternates():
-    row, column = np.indices((8, 8))
-    linear = np.stack([column, row], -1).astype(float)
-    ripple = np.where((row + column) % 2, 1.0, -1.0)[..., None]
-    np.testing.assert_allclose(smooth(linear + ripple)[2:-2, 2:-2], linear[2:-2, 2:-2], atol=1e-12)
-
-
-def test_image_warped_back_by_its_displacement_is_the_first(shifted):
-    first, second = shifted(96, 0, 0), shifted(96, 2.5, -1.25)
-    windows = arrange((96, 96), 16, 0.5)
-    field = np.broadcast_to([2.5, -1.25], (len(windows.top), len(windows.left), 2))
-    image = window_deformation.WindowDeformationTracker([windows]).prepare(second.astype(np.float32))
-    warped = window_deformation.warp(image, displacement_field(field, windows, (96, 96)), np.ones((96, 96), bool))
-    # Dark seams of speckle, cut off at black, are no smooth function.
-    assert np.median(np.abs(warped - first.astype(float))[5:-5, 5:-5]) < 1
 
 
 def test_windows_are_the_same_tissue_at_every_size_but_eight_pixels_at_least():

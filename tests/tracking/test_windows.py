@@ -4,29 +4,10 @@ import pytest
 from echotruth.tracking.windows import Windows, arrange, grid
 
 
-def test_paper_windows_cover_every_size():
-    assert [len(arrange((n, n), 64, 0.5).top) for n in (512, 256, 128)] == [15, 7, 3]
-    windows = arrange((512, 512), 64, 0.5)
-    assert windows.top[0] == 0 and windows.top[-1] + 64 == 512
-
-
 def test_remainder_is_split_between_the_borders():
     windows = arrange((30, 45), 8, 0.5)
     assert windows.top[0] == 1 and windows.top[-1] + 8 == 29
     assert windows.left[0] == 0 and windows.left[-1] + 8 == 44
-
-
-def test_window_larger_than_the_image_is_refused():
-    with pytest.raises(ValueError, match="64 px is larger than the image of 100 x 32 px"):
-        arrange((100, 32), 64, 0.5)
-
-
-def test_extracted_windows_have_the_right_pixels():
-    image = np.arange(30 * 45).reshape(30, 45)
-    windows = arrange(image.shape, 8, 0.5)
-    extracted = windows.extract(image)
-    row, column = windows.top[2], windows.left[3]
-    np.testing.assert_array_equal(extracted[2, 3], image[row : row + 8, column : column + 8])
 
 
 def test_interpolation_is_exact_for_linear_fields_and_nearest_outside():
@@ -48,11 +29,6 @@ def test_interpolation_leaves_out_windows_without_a_value():
     field = np.array([[[1.0], [np.nan]], [[3.0], [np.nan]]])
     points = np.array([[3.5, 7.5], [9.0, 7.5], [11.5, 7.5], [np.nan, 1.0]])
     np.testing.assert_allclose(windows.interpolate(field, points)[:, 0], [2, 2, np.nan, np.nan])
-
-
-def test_one_window_serves_the_whole_image():
-    windows = arrange((16, 16), 16, 0.5)
-    assert windows.interpolate(np.full((1, 1, 1), 4.0), np.array([[0.0, 15.0]]))[0, 0] == 4
 
 
 def test_grid_is_lateral_axial_and_starts_half_a_step_in():

@@ -1,15 +1,9 @@
-"""The repository that the viewer shows, and its page."""
+"""The page of the repository `shown`."""
 
 import pytest
 from served_page import served_page
-from shown_repository import Shown, shown_repository
 
 from echotruth.repository.reader import Repository
-
-
-@pytest.fixture(scope="session")
-def shown(tmp_path_factory) -> Shown:
-    return shown_repository(tmp_path_factory.mktemp("shown") / "known")
 
 
 @pytest.fixture

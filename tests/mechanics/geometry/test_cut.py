@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from echotruth.config import Geometry
 from echotruth.config.geometry import CellLabels
 from echotruth.mechanics.geometry.boundary import adjacent_cells, boundary, triangle_edges
 from echotruth.mechanics.geometry.cut import extract_wall, select_cells
-from echotruth.mechanics.geometry.imported_mesh import ImportedMesh, read
+from echotruth.mechanics.geometry.imported_mesh import ImportedMesh
 from echotruth.mechanics.geometry.mesh_quality import GeometryError, straight_volumes
 
 
@@ -117,8 +116,3 @@ def test_folded_mesh(linear):
         GeometryError, match=r"\d+ tetrahedra are inverted, they overlap their neighbours: mesh the wall"
     ):
         extract_wall(as_imported(nodes, cells), None)
-
-
-def test_file_and_memory_agree(file_heart, write_mesh):
-    imported = read(Geometry(file=write_mesh(file_heart.nodes, file_heart.mesh.cells)))
-    assert len(extract_wall(imported, None).cells) == len(file_heart.mesh.cells)

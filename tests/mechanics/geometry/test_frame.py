@@ -5,7 +5,7 @@ import pytest
 
 from echotruth.mechanics.geometry.boundary import boundary
 from echotruth.mechanics.geometry.boundary_labels import BASE, ENDO, EPI, BoundarySurface
-from echotruth.mechanics.geometry.frame import endocardial_apex, heart_axes, heart_frame, rim_centroid
+from echotruth.mechanics.geometry.frame import heart_axes, heart_frame
 
 
 @pytest.fixture
@@ -23,13 +23,6 @@ def test_frame_is_that_in_which_the_heart_was_made(file_heart, surface):
     np.testing.assert_allclose(frame.origin, 1e-3 * file_heart.shift, atol=1e-12)
     np.testing.assert_allclose(frame.transform_points(surface.nodes), file_heart.mesh.nodes, atol=1e-12)
     np.testing.assert_allclose(frame.transform_vectors(file_heart.turn), np.eye(3), atol=1e-12)
-
-
-def test_landmarks(file_heart, surface):
-    np.testing.assert_allclose(rim_centroid(surface), 1e-3 * file_heart.shift, atol=1e-12)
-    np.testing.assert_allclose(
-        endocardial_apex(surface), 1e-3 * (file_heart.shift - 6.8 * file_heart.turn[2]), atol=2e-4
-    )
 
 
 def test_base_that_is_not_plane_leaves_the_axis_to_the_apex(file_heart, surface):

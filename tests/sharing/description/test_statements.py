@@ -4,7 +4,6 @@ from datetime import date
 from types import SimpleNamespace
 
 import pandas as pd
-import pytest
 
 from echotruth.config import Config
 from echotruth.sharing.description.attribution import Attribution, Author
@@ -27,25 +26,6 @@ def texts(value):
     return [text for each in value for text in texts(each)] if isinstance(value, list) else [value]
 
 
-@pytest.mark.parametrize(
-    ("settings", "limit"),
-    [
-        ({"geometry": {"preset": "mouse"}}, "GLS is -12 %"),
-        ({"geometry": {"preset": "rat"}}, "No measured twist of rats"),
-        ({"geometry": {"preset": "human"}}, "In people much of the twist"),
-        (
-            {"motion": {"kind": "file", "file": {"path": "a_*.vtk"}}, "loop": {"heart_rate_per_min": 500}},
-            "depends on the simulation that was read",
-        ),
-        ({"motion": {"kind": "rigid"}}, "is no heart"),
-    ],
-)
-def test_limits_are_those_of_the_heart_and_every_statement_is_text(settings, limit):
-    said = statements(facts(settings))
-    assert sum(limit in text for text in said["limits"]) == 1
-    assert all(isinstance(text, str) and text for text in texts(said))
-
-
 def test_only_what_all_hearts_lack_is_said():
     noisy = {"realism": {"noise": {"snr_dB": 20.0}}}
     lacking = statements(facts({}, noisy))["limits"][-1]
@@ -59,7 +39,3 @@ def test_what_failed_and_was_swept_is_said():
     assert "Hearts: 3 failed, 1 complete;" in said["summary"]
     assert said["biases"][0].startswith("Hearts differ in a_mm, b only: ") and "not at random" in said["biases"][-1]
     assert said["cite"].startswith("Jane Doe. heart: synthetic") and said["cite"].endswith("Release 1.0.0, 2026.")
-
-
-def test_files_of_the_user_are_sources():
-    assert statements(facts({"loop": {"file": "my loop: one.csv"}}))["sources"] == ["my loop: one.csv"]

@@ -1,24 +1,27 @@
-"""The repository that all exports are read from."""
+"""Exports of the repository `known`."""
+
+from functools import partial
 
 import pytest
-from known_repository import SETTINGS, SIZES, Known, make
+from known_repository import SIZES
 
 from echotruth.repository.reader import Repository
 from echotruth.sharing.export import Export, Selection
 
 
-@pytest.fixture(scope="session")
-def known(tmp_path_factory) -> Known:
-    return make(tmp_path_factory.mktemp("known") / "known", SETTINGS)
+def write(known, folder, name, view="mid", size=SIZES[0], **options):
+    work = Export(Repository(known.folder), Selection(["heart"], [view], [size]), name, output=folder, **options)
+    (path,) = work.write(work.clips()[0])
+    return path
 
 
 @pytest.fixture
 def exported(known, tmp_path):
     """A function that exports a format of one view, and gives the path of the file or folder."""
+    return partial(write, known, tmp_path)
 
-    def write(name, view="mid", size=SIZES[0], **options):
-        work = Export(Repository(known.folder), Selection(["heart"], [view], [size]), name, output=tmp_path, **options)
-        (path,) = work.write(work.clips()[0])
-        return path
 
-    return write
+@pytest.fixture(scope="module")
+def exported_once(known, tmp_path_factory):
+    """The same for what the tests of a module share."""
+    return partial(write, known, tmp_path_factory.mktemp("exported"))

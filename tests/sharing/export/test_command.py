@@ -11,10 +11,9 @@ from known_repository import SIZES
 
 from echotruth import cli
 from echotruth.cases import expand
-from echotruth.cli.export import EXPORTED
 from echotruth.repository import metadata
 from echotruth.repository.reader import Repository
-from echotruth.sharing.export import FORMATS, OVERLAYS, Export, ExportError, Selection, destination, png
+from echotruth.sharing.export import Export, ExportError, Selection, destination, png
 
 
 def call(monkeypatch, *arguments):
@@ -23,13 +22,6 @@ def call(monkeypatch, *arguments):
     with pytest.raises(SystemExit) as done:
         cli.main()
     return done.value.code
-
-
-def test_command_and_page_have_all_formats():
-    assert tuple(FORMATS) == EXPORTED
-    page = (Path(__file__).parents[3] / "docs/export.md").read_text()
-    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
-    assert re.findall(r"`(\w+)`", "".join(rows)) == list(FORMATS)
 
 
 @pytest.mark.slow
@@ -58,19 +50,10 @@ def test_one_clip_can_be_given_its_file(known, monkeypatch, tmp_path, capsys):
 
 REFUSED = {
     "case": (["--case", "hart"], "case = 'hart': use one of heart"),
-    "view": (["--view", "middle"], "view = 'middle': use one of "),
-    "size": (["--size", "512"], "size = 512: use one of 128, 64"),
     "tracker": (["--format", "csv", "--tracker", "three"], "tracker = 'three': use one of one, two"),
     "tracker of a video": (["--tracker", "one"], "--tracker does nothing for mp4: it is for matlab, csv"),
     "overlay": (["--overlay", "strain"], "--overlay strain: use wall, segments, tissue, displacement, scale"),
-    "overlay of tracks": (
-        ["--format", "tap", "--overlay", "wall"],
-        "--overlay does nothing for tap: it is for mp4, gif, png",
-    ),
     "rate": (["--rate", "0"], "--rate 0: give 0.1 to 1000 frames per second"),
-    "rate of images": (["--format", "png", "--rate", "5"], "--rate does nothing for png: it is for mp4, gif"),
-    "view of a heart": (["--format", "vtk", "--view", "mid"], "--view does nothing for vtk: it is for mp4, gif"),
-    "size of RF": (["--format", "zea", "--size", "64"], "--size does nothing for zea: it is for mp4, gif"),
 }
 
 
@@ -134,13 +117,6 @@ def test_heart_without_a_row_is_told_in_one_sentence(copy, monkeypatch, capsys, 
     assert call(monkeypatch, copy, "--format", name, "-o", tmp_path / "out") == 2
     said = capsys.readouterr().err
     assert "case = 'heart': use one of other" in said and said.count("\n") == 1
-
-
-def test_what_was_read_of_a_clip_goes_when_it_is_written(known, tmp_path):
-    work = Export(Repository(known.folder), Selection(sizes=[SIZES[1]]), "tap", output=tmp_path)
-    clips = work.clips()[0]
-    assert len(list(work.write(clips))) == len(clips) == 2
-    assert not {"image", "heart", "plane"} & {name for clip in clips for name in vars(clip)}
 
 
 def test_failure_half_way_leaves_nothing_new_and_what_was_there(known, monkeypatch, tmp_path):
@@ -226,12 +202,6 @@ def test_video_that_ffmpeg_gave_up_is_an_error(known, monkeypatch, tmp_path, cap
     assert call(monkeypatch, known.folder, "--format", "mp4", "-o", tmp_path) == 2
     assert "the video could not be written: the folder must have space" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-
-
-def test_every_overlay_is_drawn():
-    from echotruth.sharing.export.overlay import DRAWINGS
-
-    assert set(DRAWINGS) == set(OVERLAYS)
 
 
 def test_interruption_says_so_and_leaves_whole_files(known, monkeypatch, tmp_path, capsys):

@@ -9,9 +9,9 @@ from echotruth.repository.reader import Repository
 from echotruth.sharing.export import Export, Selection
 
 
-@pytest.fixture
-def table(exported):
-    return pd.read_csv(exported("csv"), keep_default_na=False, na_values={"tracked": "", "true": ""})
+@pytest.fixture(scope="module")
+def table(exported_once):
+    return pd.read_csv(exported_once("csv"), keep_default_na=False, na_values={"tracked": "", "true": ""})
 
 
 def curve(table, quantity, place="", component="", measure="", tracker=""):

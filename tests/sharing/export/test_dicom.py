@@ -10,9 +10,9 @@ from known_repository import FRAMES, SIZES
 pydicom = pytest.importorskip("pydicom")
 
 
-@pytest.fixture
-def image(exported):
-    return pydicom.dcmread(exported("dicom"))
+@pytest.fixture(scope="module")
+def image(exported_once):
+    return pydicom.dcmread(exported_once("dicom"))
 
 
 def test_grey_levels_are_those_of_the_repository(image, known):

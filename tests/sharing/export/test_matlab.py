@@ -5,17 +5,12 @@ import pytest
 from known_repository import FRAMES, SHIFT, SIZES
 from scipy.io import loadmat
 
-from echotruth.repository.reader import Repository
 from echotruth.sharing.export import ExportError, matlab
 
 
 @pytest.fixture(scope="module")
-def clip(known, tmp_path_factory):
-    from echotruth.sharing.export import Export, Selection
-
-    work = Export(Repository(known.folder), Selection(views=["mid"]), "matlab", output=tmp_path_factory.mktemp("mat"))
-    (file,) = work.write(work.clips()[0])
-    return loadmat(file, simplify_cells=True)["clip"]
+def clip(exported_once):
+    return loadmat(exported_once("matlab"), simplify_cells=True)["clip"]
 
 
 def test_images_are_rows_by_columns_by_frame(clip, known):

@@ -11,9 +11,9 @@ STEP = SHIFT / (FRAMES - 1)
 """Shift from frame to frame: lateral, axial, elevation, m."""
 
 
-@pytest.fixture
-def tap(exported):
-    with np.load(exported("tap")) as archive:
+@pytest.fixture(scope="module")
+def tap(exported_once):
+    with np.load(exported_once("tap")) as archive:
         return dict(archive)
 
 
