@@ -613,14 +613,6 @@ class Repository:
         except FileNotFoundError:
             return {}
 
-    def is_written(self, path: str, case: str, view: str | None = None) -> bool:
-        """Whether an array is there, given its group and name."""
-        try:
-            self.array(path, case, view)
-        except NotWritten:
-            return False
-        return True
-
     def version(self, case: str, view: str) -> str:
         """Version of a view as trackers get it: its images and truth, and the frames and points that are tracked."""
         found = [self.attributes(f"{stage}/{self.sizes[0]}", case, view).get("version") for stage in ("truth", "bmode")]
