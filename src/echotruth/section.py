@@ -83,18 +83,8 @@ def unit_of(key: str) -> str:
     return max((unit for unit in UNITS if key.endswith(f"_{unit}")), key=len, default="")
 
 
-def shown_unit(key: str) -> str:
-    """Unit of a configuration key as people write it; empty if it has none."""
-    return unit_of(key).replace("_per_", "/").replace("per_", "1/")
-
-
-def meaning(section: type[BaseModel], key: str) -> str:
-    """What a key of a section means, in one line."""
-    return " ".join((section.model_fields[key].description or _docstrings(section).get(key, "")).split())
-
-
 @cache
-def _docstrings(section: type[BaseModel]) -> dict[str, str]:
+def docstrings(section: type[BaseModel]) -> dict[str, str]:
     """Key -> the text below it. pydantic would read all sources at each import, which takes a third of its time."""
     found: dict[str, str] = {}
     for kind in reversed(section.mro()[: section.mro().index(BaseModel)]):
@@ -170,7 +160,7 @@ class Section(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        schema, texts = handler(core_schema), _docstrings(cls)
+        schema, texts = handler(core_schema), docstrings(cls)
         for key, options in handler.resolve_ref_schema(schema).get("properties", {}).items():
             if key in texts and handler.resolve_ref_schema(options).get("description") != texts[key]:
                 options.setdefault("description", texts[key])

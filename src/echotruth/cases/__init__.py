@@ -7,13 +7,11 @@ from echotruth.cases.case import Case
 from echotruth.cases.expansion import all_cases, expand, find_case
 from echotruth.cases.ids import case_id
 from echotruth.cases.labels import diagnosis
-from echotruth.cases.rows import as_table
 from echotruth.cases.tabulation import table
 
 __all__ = [
     "Case",
     "all_cases",
-    "as_table",
     "case_id",
     "diagnosis",
     "expand",

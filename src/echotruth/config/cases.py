@@ -32,7 +32,7 @@ class Distribution(Section):
     """Mean and standard deviation."""
     limits: Pair | None = None
     """With `normal`: lower and upper bound at which the distribution is truncated."""
-    integers: Annotated[list[int], Field(min_length=2, max_length=2)] | None = None
+    integers: Annotated[list[Annotated[int, Field(ge=0, lt=2**63)]], Field(min_length=2, max_length=2)] | None = None
     """First and last of the whole numbers, which are equally likely; for keys such as `seed`."""
     choice: Annotated[list[Any], Field(min_length=1)] | None = None
     """Values of which one is drawn."""
@@ -112,13 +112,10 @@ class Draw(Section):
     gain and grey map, each over its published or chosen range (docs/realism.md), so that the looks of a training set
     differ; use it with a `realism.preset`."""
     number: Annotated[int, Field(ge=1, le=MAX_CASES)]
-    """Number of hearts (of each row of the table and each combination of the grid). With `sobol` and `random` a larger
-    number adds hearts, and those that were there stay; with `latin_hypercube` it changes all of them."""
+    """Number of hearts (of each row of the table and each combination of the grid). A larger number adds hearts, and
+    those that were there stay; a power of 2 is the most even."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
-    """Seed of the draws; it is not that of the images."""
-    method: Literal["sobol", "latin_hypercube", "random"] = "sobol"
-    """`sobol`: quasi-random, the most even in all keys together; `latin_hypercube`: even in each key alone; `random`:
-    independent."""
+    """Seed of the draws, points of Sobol's sequence; it is not that of the images."""
     keys: Annotated[dict[str, Distribution], Field(min_length=1, max_length=64)]
     """Distribution of each dotted key; those given take precedence over those of `preset`."""
 

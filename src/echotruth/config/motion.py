@@ -11,7 +11,7 @@ Kind = Literal["beat", "rigid", "affine", "tube", "file"]
 TimeCourse = Literal["cosine", "triangle", "ramp"]
 Translation = Annotated[FiniteFloat, Field(ge=-1e5, le=1e5)]
 Rotation = Annotated[FiniteFloat, Field(ge=-180, le=180)]
-FrameNumber = Annotated[int, Field(ge=0)]
+FrameNumber = Annotated[int, Field(ge=0, le=10**9)]
 Row = Annotated[list[Annotated[FiniteFloat, Field(ge=-5, le=5)]], Field(min_length=3, max_length=3)]
 
 _IMAGINARY_TOLERANCE = 1e-6
