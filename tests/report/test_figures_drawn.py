@@ -16,7 +16,6 @@ from echotruth.report import (
     loop,
     physiology,
     population,
-    resolutions,
     strain,
     style,
     vector,
@@ -96,12 +95,6 @@ def test_physiology_of_a_prescribed_motion_has_words_in_place_of_pressure_and_vo
     curves = style.save(physiology.draw(cycle(500 + 13000 * WAVE, (np.nan,) * 3), {}), tmp_path / "b.png")
     of_curve = [coloured(seen(path)[500:], style.SOLVED) for path in (nothing, curves)]
     assert of_curve[1] > 500 + of_curve[0]
-
-
-def test_resolutions(tmp_path):
-    images = [np.random.default_rng(0).integers(0, 256, (n, n)).astype(np.uint8) for n in (64, 32, 16)]
-    seen(style.save(resolutions.draw(images, 12e-3), tmp_path / "resolutions.png"))
-    seen(style.save(resolutions.draw(images[:1], 120e-3), tmp_path / "one.png"))
 
 
 @pytest.mark.slow
