@@ -5,17 +5,12 @@ from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from bokeh.application import Application
-from bokeh.application.handlers import FunctionHandler
 from bokeh.document import Document
 from bokeh.models import Div
-from bokeh.server.server import BaseServer
-from tornado.httpserver import HTTPServer
-from tornado.ioloop import IOLoop
+from bokeh.server.server import Server
 
 from echotruth.config.loading import ConfigError
 from echotruth.repository.reader import Repository
-from echotruth.viewer.access import Access
 from echotruth.viewer.choice import asked
 from echotruth.viewer.page import Page
 
@@ -26,7 +21,7 @@ class ShowError(ValueError):
     """Raised if a repository cannot be shown."""
 
 
-def serve(repository: str | Path, port: int = 0) -> BaseServer:
+def serve(repository: str | Path, port: int = 0) -> Server:
     """Start a server that answers to this machine alone.
 
     Parameters
@@ -38,7 +33,7 @@ def serve(repository: str | Path, port: int = 0) -> BaseServer:
 
     Returns
     -------
-    BaseServer
+    Server
         Listening; its `io_loop` is to be started.
 
     Raises
@@ -58,13 +53,10 @@ def serve(repository: str | Path, port: int = 0) -> BaseServer:
             said = str(error).removeprefix(f"{repository}: ")
             document.add_root(Div(text=escape(f"{repository} cannot be shown: {said}"), name="message"))
 
-    access = Access(Application(FunctionHandler(page)))
-    http = HTTPServer(access, max_body_size=0)
     try:
-        http.listen(port, LOCAL)
+        server = Server(page, port=port, address=LOCAL)
     except OSError as error:
         raise ShowError(f"port {port}: {error.strerror or error}: give another with --port, or leave it out") from None
-    server = BaseServer(IOLoop.current(), access, http)
     server.start()
     return server
 
@@ -95,17 +87,17 @@ def opened(repository: str | Path) -> Repository:
     return found
 
 
-def address(server: BaseServer) -> str:
+def address(server: Server) -> str:
     """Address of the page."""
     return f"http://{LOCAL}:{server.port}/"
 
 
-def run(server: BaseServer, ready: Callable[[], None]) -> None:
+def run(server: Server, ready: Callable[[], None]) -> None:
     """Answer until the process is interrupted or told to end.
 
     Parameters
     ----------
-    server : BaseServer
+    server : Server
     ready : callable
         Called once the server answers.
     """
