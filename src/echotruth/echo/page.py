@@ -97,13 +97,8 @@ def draw(clip: xr.Dataset, strain: xr.Dataset, path: Path) -> None:
     panels = figure.add_gridspec(2, 6, height_ratios=[1.2, 1])
     frames = {"end-diastole": 0, "end-systole": strain.attrs["es_frame"], "last frame": strain.sizes["frame"] - 1}
     for column, (name, frame) in enumerate(frames.items()):
-        _image(
-            figure.add_subplot(panels[0, 2 * column : 2 * column + 2]),
-            clip,
-            strain,
-            frame,
-            f"{name}, {1e3 * float(strain['time'][frame]):.0f} ms",
-        )
+        title = f"{name}, {1e3 * float(strain['time'][frame]):.0f} ms"
+        _image(figure.add_subplot(panels[0, 2 * column : 2 * column + 2]), clip, strain, frame, title)
     table = curves(strain)
     lines, segments = figure.add_subplot(panels[1, :3]), figure.add_subplot(panels[1, 3:])
     _curves(lines, table, [name for name in table if name.startswith(("gcs", "gls"))], strain, COLOURS)
@@ -155,11 +150,5 @@ def _curves(
     if names:
         axis.legend(fontsize=7)
     else:
-        axis.text(
-            0.5,
-            0.5,
-            "no AHA segments: this view or its wall does not tell them",
-            ha="center",
-            fontsize=8,
-            transform=axis.transAxes,
-        )
+        why = "no AHA segments: this view or its wall does not tell them"
+        axis.text(0.5, 0.5, why, ha="center", fontsize=8, transform=axis.transAxes)
