@@ -183,6 +183,11 @@ class Section(BaseModel):
         sections = {key: value for key in type(self).model_fields if isinstance(value := getattr(self, key), Section)}
         return self.model_dump() | {key: section.given() for key, section in sections.items()}
 
+    def require(self, holds: object, key: str, remedy: str) -> None:
+        """Raise :func:`invalid` of a dotted key, with its value, unless a condition holds."""
+        if not holds:
+            raise invalid(key, value_of(self, key), remedy)
+
     def resolved(self) -> Section:
         """The section with every value filled in that follows from a preset."""
         return self

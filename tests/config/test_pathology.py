@@ -13,7 +13,6 @@ INFARCT, LATE = "pathology.infarct", "pathology.late_activation"
 BAD = [
     (INFARCT, {"segments": [7, 18]}, "segments.1 = 18: should be less than or equal to 17"),
     (INFARCT, {"segments": []}, "segments = []: should have at least 1 item"),
-    (INFARCT, {"segments": [7, 7]}, "segments = [7, 7]: list each segment once"),
     (INFARCT, {"segments": [7], "radius_mm": 1}, "radius_mm = 1.0: give either segments or radius_mm"),
     (INFARCT, {"tension_scale": 1.2}, "tension_scale = 1.2: should be less than or equal to 1"),
     (INFARCT, {"transmurality": 0}, "transmurality = 0: should be greater than 0"),

@@ -55,28 +55,23 @@ class Distribution(Section):
             remedy = f"give one of {', '.join(KINDS)}"
             raise invalid(given[1] if given else "uniform", getattr(self, given[1]) if given else None, remedy)
         for key, needs in (("limits", "normal"), ("weights", "choice")):
-            if getattr(self, key) is not None and given != [needs]:
-                raise invalid(key, getattr(self, key), f"applies to {needs}: leave it out")
+            self.require(getattr(self, key) is None or given == [needs], key, f"applies to {needs}: leave it out")
 
     @check
     def _check_bounds(self) -> None:
         for key in ("uniform", "log_uniform", "integers", "limits"):
-            bounds = getattr(self, key)
-            if bounds is not None and bounds[0] >= bounds[1]:
-                raise invalid(key, bounds, "must be the lower bound and then a greater upper bound")
-        if self.log_uniform is not None and self.log_uniform[0] <= 0:
-            raise invalid("log_uniform", self.log_uniform, "must have positive bounds")
-        if self.normal is not None and self.normal[1] <= 0:
-            raise invalid("normal", self.normal, "must be the mean and a positive standard deviation")
+            low, high = getattr(self, key) or (0, 1)
+            self.require(low < high, key, "must be the lower bound and then a greater upper bound")
+        self.require((self.log_uniform or [1])[0] > 0, "log_uniform", "must have positive bounds")
+        self.require((self.normal or [1])[-1] > 0, "normal", "must be the mean and a positive standard deviation")
 
     @check
     def _check_weights(self) -> None:
         if self.weights is None or self.choice is None:
             return
-        if len(self.weights) != len(self.choice):
-            raise invalid("weights", self.weights, f"must have one entry for each of the {len(self.choice)} of choice")
-        if not 0 < sum(self.weights) < 1e300:
-            raise invalid("weights", self.weights, "must have a positive entry and a finite sum")
+        remedy = f"must have one entry for each of the {len(self.choice)} of choice"
+        self.require(len(self.weights) == len(self.choice), "weights", remedy)
+        self.require(0 < sum(self.weights) < 1e300, "weights", "must have a positive entry and a finite sum")
 
 
 ACOUSTICS: dict[str, dict[str, Any]] = {

@@ -120,7 +120,7 @@ def _shown_value(value: Any) -> str:
     """The value in one line of at most 80 characters, as it is in the file."""
     if value is None or isinstance(value, bool):
         return "null" if value is None else str(value).lower()
-    text = repr(value)
+    text = repr(list(value) if isinstance(value, tuple) else value)
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
