@@ -324,7 +324,7 @@ REFUSED = {
         "cannot be imported: ModuleNotFoundError: No module named 'custon'",
     ),
     "function": (["--tracker", "custom:exat"], "has no attribute 'exat'"),
-    "not a function": (["--tracker", "custom:np.pi"], "is no function but a float: name a function"),
+    "not a function": (["--tracker", "custom:np.pi"], "is not a callable object"),
     "needs an option": (["--tracker", "custom:exact"], "missing a required argument: 'course': it gets frames, points"),
     "an option": (["--tracker", "custom:still", "--option", "shif=0"], "got an unexpected keyword argument 'shif'"),
     "program": (["--command", "trakk {input} {output}"], "trakk: is not there or cannot be run"),

@@ -1,6 +1,6 @@
 """The heart in three dimensions: fibres and circumferential strain, unloaded, at end-diastole and at end-systole."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,18 +71,12 @@ def draw(cells: np.ndarray, helix: np.ndarray, states: Sequence[State]) -> Figur
     panels = figure.subplots(2, len(states), squeeze=False, subplot_kw={"projection": "3d", "computed_zorder": False})
     for column, state in zip(panels.T, states, strict=True):
         wall = _cut(_grid(state.nodes, cells, {"strain": 100 * state.strain, "helix": np.degrees(helix)}))
-        _add(column[0], wall, scales[0], "helix", GROUND)
-        _add(column[0], _rods(state, cells, helix), scales[0], "helix")
-        _add(column[1], wall, scales[1], "strain")
+        add(column[0], wall, GROUND * scales[0].to_rgba(wall.point_data["helix"])[:, :3])
+        rods = _rods(state, cells, helix)
+        add(column[0], rods, scales[0].to_rgba(rods.point_data["helix"])[:, :3])
+        add(column[1], wall, scales[1].to_rgba(wall.point_data["strain"])[:, :3])
         column[0].set_title(state.name, y=1.25)
-    nodes = 1e3 * np.concatenate([state.nodes for state in states])
-    low, high = nodes.min(0), nodes.max(0)
-    for panel in panels.flat:
-        panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-        panel.set_proj_type("ortho")
-        panel.set_box_aspect(high - low, zoom=1.5)
-        panel.view_init(ELEVATION, AZIMUTH)
-        panel.axis("off")
+    show(panels.flat, np.concatenate([state.nodes for state in states]))
     labels = "Helix angle (°)", "Circumferential strain $E_{CC}$\nfrom unloaded (%)"
     for row, scale, label in zip(panels, scales, labels, strict=True):
         figure.colorbar(scale, ax=row, shrink=0.75, aspect=25).set_label(label)
@@ -116,8 +110,19 @@ def _rods(state: State, cells: np.ndarray, helix: np.ndarray) -> pyvista.PolyDat
     return points.glyph(orient="direction", scale=False, factor=length, geom=rod).triangulate()
 
 
-def _add(axes: Axes3D, mesh: pyvista.PolyData, scale: ScalarMappable, name: str, brightness: float = 1.0) -> None:
-    """Add the triangles of a surface in the colours of a scale, lit from the eye: a + (1 - a) |n . e|."""
+def show(panels: Iterable[Axes3D], nodes: np.ndarray) -> None:
+    """Show what is within the bounds of nodes (n, 3), m, on one scale from one direction."""
+    low, high = 1e3 * nodes.min(0), 1e3 * nodes.max(0)
+    for panel in panels:
+        panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        panel.set_proj_type("ortho")
+        panel.set_box_aspect(high - low, zoom=1.5)
+        panel.view_init(ELEVATION, AZIMUTH)
+        panel.axis("off")
+
+
+def add(axes: Axes3D, mesh: pyvista.PolyData, colours: np.ndarray) -> None:
+    """Add triangles with the colours (point, 3), RGB, of their corners, lit from the eye: a + (1 - a) |n . e|."""
     corners = mesh.faces.reshape(-1, 4)[:, 1:]
     triangles = 1e3 * np.asarray(mesh.points, float)[corners]
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -125,9 +130,8 @@ def _add(axes: Axes3D, mesh: pyvista.PolyData, scale: ScalarMappable, name: str,
     eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
     area = np.linalg.norm(normal, axis=1)
     kept = area > 1e-3 * area.mean()  # slivers of the cut have no direction
-    triangles, corners, facing = triangles[kept], corners[kept], np.abs(normal @ eye)[kept] / area[kept]
-    colours = scale.to_rgba(np.asarray(mesh.point_data[name])[corners].mean(axis=1))
-    colours[:, :3] *= brightness * (AMBIENT + (1 - AMBIENT) * facing)[:, None]
-    surface = Poly3DCollection(triangles, facecolors=colours, edgecolors=colours, linewidths=0.3, clip_on=False)
+    light = AMBIENT + (1 - AMBIENT) * np.abs(normal @ eye)[kept] / area[kept]
+    lit = light[:, None] * colours[corners[kept]].mean(axis=1)
+    surface = Poly3DCollection(triangles[kept], facecolors=lit, edgecolors=lit, linewidths=0.3, clip_on=False)
     surface.set_rasterized(True)  # thousands of triangles would make a large SVG
     axes.add_collection3d(surface)
