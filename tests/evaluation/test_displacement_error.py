@@ -38,11 +38,6 @@ def test_long_axis_is_transverse_and_longitudinal():
     np.testing.assert_allclose(moved, [[0.1, 0.2], [-0.1, 0.2]])
 
 
-def test_unknown_plane_is_refused():
-    with pytest.raises(ValueError, match="short_axis or long_axis"):
-        directions(ORIGIN[None], ORIGIN, "oblique")
-
-
 def test_rotation_is_tangential_and_scaling_radial():
     wall, arm = ring()
     turned = 0.1 * np.stack([arm[:, 1], -arm[:, 0]], -1)

@@ -143,7 +143,7 @@ def test_interval_widens_where_no_view_shows_the_segment_any_more(observed, foun
     ("change", "said"),
     [
         (lambda seen: chosen(seen, []), "holds no observation"),
-        (lambda seen: seen.drop_vars("volume"), "the loop of known: has no volume"),
+        (lambda seen: seen.drop_vars("volume"), "lacks a variable"),
         (lambda seen: seen.assign(pressure=seen["pressure"] * np.nan), "pressure or volume is not finite"),
         (lambda seen: seen.assign(volume=seen["volume"] * 0 + 5e-8), "the loop of known: volume"),
         (lambda seen: seen.assign(value=seen["value"].where(seen["aha"] != 8)), "needs finite values"),

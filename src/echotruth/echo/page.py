@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+
+from echotruth.report import style
 
 COLOURS = ("#f5b942", "#5ec8d8", "#e0607e")
 """Of the endocardial, middle and epicardial line."""
@@ -91,8 +91,7 @@ def draw(clip: xr.Dataset, strain: xr.Dataset, path: Path) -> None:
     path : Path
         PNG to write.
     """
-    figure = Figure(figsize=(11, 7.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.figure(11, 7.6)
     figure.suptitle(_title(strain), fontsize=10)
     panels = figure.add_gridspec(2, 6, height_ratios=[1.2, 1])
     frames = {"end-diastole": 0, "end-systole": strain.attrs["es_frame"], "last frame": strain.sizes["frame"] - 1}

@@ -128,10 +128,8 @@ def check(observed: xr.Dataset) -> None:
     """
     if not isinstance(observed, xr.Dataset):
         raise TypeError(f"observed = {observed!r:.80}: must be a Dataset: echotruth.observe makes one.")
-    if (
-        not {"value", "covariance", "quantity", "view", "aha"} <= set(observed.variables)
-        or "config" not in observed.attrs
-    ):
+    needed = {"value", "covariance", "quantity", "view", "aha", "pressure", "volume"}
+    if not needed <= set(observed.variables) or "config" not in observed.attrs:
         raise ObservationError("observed: lacks a variable or an attribute: keep all that echotruth.observe gave it")
     value, covariance = observed["value"].values, observed["covariance"].values
     if not len(value):
