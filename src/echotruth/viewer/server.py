@@ -5,12 +5,17 @@ from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from bokeh.application import Application
+from bokeh.application.handlers import FunctionHandler
 from bokeh.document import Document
 from bokeh.models import Div
-from bokeh.server.server import Server
+from bokeh.server.server import BaseServer
+from tornado.httpserver import HTTPServer
+from tornado.ioloop import IOLoop
 
 from echotruth.config.loading import ConfigError
 from echotruth.repository.reader import Repository
+from echotruth.viewer.access import Access
 from echotruth.viewer.choice import asked
 from echotruth.viewer.page import Page
 
@@ -21,7 +26,7 @@ class ShowError(ValueError):
     """Raised if a repository cannot be shown."""
 
 
-def serve(repository: str | Path, port: int = 0) -> Server:
+def serve(repository: str | Path, port: int = 0) -> BaseServer:
     """Start a server that answers to this machine alone.
 
     Parameters
@@ -33,7 +38,7 @@ def serve(repository: str | Path, port: int = 0) -> Server:
 
     Returns
     -------
-    Server
+    BaseServer
         Listening; its `io_loop` is to be started.
 
     Raises
@@ -53,10 +58,13 @@ def serve(repository: str | Path, port: int = 0) -> Server:
             said = str(error).removeprefix(f"{repository}: ")
             document.add_root(Div(text=escape(f"{repository} cannot be shown: {said}"), name="message"))
 
+    access = Access(Application(FunctionHandler(page)))
+    http = HTTPServer(access, max_body_size=0)
     try:
-        server = Server(page, port=port, address=LOCAL)
+        http.listen(port, LOCAL)
     except OSError as error:
         raise ShowError(f"port {port}: {error.strerror or error}: give another with --port, or leave it out") from None
+    server = BaseServer(IOLoop.current(), access, http)
     server.start()
     return server
 
@@ -87,17 +95,17 @@ def opened(repository: str | Path) -> Repository:
     return found
 
 
-def address(server: Server) -> str:
+def address(server: BaseServer) -> str:
     """Address of the page."""
     return f"http://{LOCAL}:{server.port}/"
 
 
-def run(server: Server, ready: Callable[[], None]) -> None:
+def run(server: BaseServer, ready: Callable[[], None]) -> None:
     """Answer until the process is interrupted or told to end.
 
     Parameters
     ----------
-    server : Server
+    server : BaseServer
     ready : callable
         Called once the server answers.
     """
