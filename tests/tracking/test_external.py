@@ -4,6 +4,8 @@ import inspect
 import re
 import sys
 import time
+import tracemalloc
+import zipfile
 from datetime import date
 from pathlib import Path
 
@@ -272,13 +274,50 @@ def test_output_that_holds_no_displacement_is_explained_in_one_sentence(argument
     assert "wrote an {output} that cannot be read as .npz" in failure(arguments, writing(path))
     for arrays, expected in (
         ({"motion": none}, "wrote an {output} without displacement"),
-        ({"displacement": np.array([None])}, "wrote an {output} that cannot be read as .npz (Object arrays"),
+        ({"displacement": np.array([None])}, "wrote an {output} with a displacement of object, not of"),
         ({"displacement": none[0]}, "displacement of shape (4, 2), not (3, 4, 2)"),
     ):
         np.savez(path, **arrays)
         assert expected in failure(arguments, writing(path))
     np.savez(path, displacement=none)
     assert (track(*arguments, writing(path))[1] == 1).all()  # the quality may be left out
+
+
+def npz(path, name, header, content=b"", method=zipfile.ZIP_DEFLATED):
+    """Write an .npz file with one entry, of which the header may be a lie."""
+    with zipfile.ZipFile(path, "w", method) as archive, archive.open(f"{name}.npy", "w") as entry:
+        np.lib.format.write_array_header_1_0(entry, {"descr": "<f8", "fortran_order": False} | header)
+        entry.write(content)
+    return path
+
+
+@pytest.mark.parametrize("name, shape", [("displacement", (TIMES, POINTS, 2)), ("quality", (TIMES, POINTS))])
+def test_header_that_claims_terabytes_is_refused_before_its_array_is_read(arguments, tmp_path, name, shape):
+    path = npz(tmp_path / "huge.npz", name, {"shape": (10**12,)})
+    if name == "quality":
+        np.savez(tmp_path / "displacement.npz", displacement=np.zeros((TIMES, POINTS, 2)))
+        with zipfile.ZipFile(tmp_path / "displacement.npz") as good, zipfile.ZipFile(path, "a") as archive:
+            archive.writestr("displacement.npy", good.read("displacement.npy"))
+    expected = f"wrote an {{output}} with a {name} of shape (1000000000000,), not {shape}"
+    assert failure(arguments, writing(path)).endswith(expected)
+
+
+def test_array_without_an_archive_is_no_npz_whatever_its_header_claims(arguments, tmp_path):
+    with zipfile.ZipFile(npz(tmp_path / "huge.npz", "displacement", {"shape": (10**12,)})) as archive:
+        (tmp_path / "huge.npy").write_bytes(archive.read("displacement.npy"))
+    assert "wrote an {output} that cannot be read as .npz" in failure(arguments, writing(tmp_path / "huge.npy"))
+
+
+@pytest.mark.parametrize(
+    "method, expected", [(zipfile.ZIP_DEFLATED, "of shape"), (zipfile.ZIP_LZMA, "than by deflate")]
+)
+def test_archive_that_unpacks_to_far_more_is_not_unpacked(arguments, tmp_path, method, expected):
+    path = npz(tmp_path / "bomb.npz", "displacement", {"shape": (2**22, 2)}, bytes(2**26), method)
+    tracemalloc.start()
+    assert expected in failure(arguments, writing(path))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2**22
 
 
 def test_encrypted_archive_is_explained_in_one_sentence(arguments, tmp_path):
@@ -319,8 +358,12 @@ def test_output_with_a_wrong_bit_is_read_or_refused_in_one_sentence(arguments, t
 
 
 def test_end_of_stderr_alone_is_kept(arguments):
+    tracemalloc.start()
     script = "head -c 8388608 /dev/zero | tr '\\0' x >&2; echo >&2; echo no wall >&2; exit 3"
     assert failure(arguments, shell(script)) == "ended with status 3: no wall"
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2**20
 
 
 def test_process_that_holds_stderr_open_is_not_waited_for(arguments):

@@ -4,21 +4,28 @@ import os
 import signal
 import subprocess
 from contextlib import suppress
+from io import BytesIO
+from math import prod
 from pathlib import Path
-from tempfile import TemporaryDirectory, TemporaryFile
-from typing import Any
-from zipfile import ZipFile
+from tempfile import TemporaryDirectory
+from threading import Thread
+from typing import IO, Any
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 import numpy as np
 from numpy.lib import format as npy
 
 from echotruth.tracking.failure import TrackerFailed
 
+MAX_HEADER = 65_536
+"""Size of the header of an array, bytes, far above what NumPy writes."""
+MAX_NUMBER = 16
+"""Size of a number of the longest real type, bytes."""
 KEPT_STDERR = 4096
-"""Size of the end of what a program says on stderr that is read, bytes."""
+"""Size of the end of what a program says on stderr that is kept, bytes."""
 
 
-def run(command: list[str], entries: dict[str, Any], timeout: float) -> Any:
+def run(command: list[str], entries: dict[str, Any], timeout: float, shape: tuple[int, int]) -> Any:
     """Run a program on a clip.
 
     Parameters
@@ -29,16 +36,18 @@ def run(command: list[str], entries: dict[str, Any], timeout: float) -> Any:
         Name -> array, number or text of the input file.
     timeout : float
         Longest time that it may take, s.
+    shape : tuple of int
+        Number of frames and of points.
 
     Returns
     -------
     ndarray or tuple of two ndarray
-        Displacement and, if the program writes one, quality, as in the output file.
+        Displacement, (frame, point, 2), and quality, (frame, point), if the program writes one, as in the output file.
 
     Raises
     ------
     TrackerFailed
-        If it does not start, fails, takes too long, or writes no file that can be read.
+        If it does not start, fails, takes too long, or writes no file with real numbers of these shapes.
     """
     with TemporaryDirectory(prefix="echotruth-") as folder:
         paths = {name: Path(folder, f"{name}.npz") for name in ("input", "output")}
@@ -50,7 +59,7 @@ def run(command: list[str], entries: dict[str, Any], timeout: float) -> Any:
             reason = f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"
             message = next((in_one_line(line) for line in reversed(said.split("\n")) if line.strip()), "")
             raise TrackerFailed(f"{reason}: {message or 'nothing on stderr'}")
-        return _read(paths["output"])
+        return _read(paths["output"], shape)
 
 
 def in_one_line(text: str) -> str:
@@ -59,25 +68,58 @@ def in_one_line(text: str) -> str:
     return line if len(line) <= 200 else f"{line[:200]} ..."
 
 
+def check_real(what: str, kind: object, found: tuple[int, ...], shape: tuple[int, ...]) -> None:
+    """Refuse an array that is none of real numbers of a shape.
+
+    Parameters
+    ----------
+    what : str
+        What the tracker did, as "returned a quality".
+    kind : dtype, or object
+        Type of its numbers, or what it is instead.
+    found, shape : tuple of int
+        Its shape, and the one that it must have.
+
+    Raises
+    ------
+    TrackerFailed
+        With the name of the type, or the shapes.
+    """
+    if not (isinstance(kind, np.dtype) and kind.kind in "fiub"):
+        raise TrackerFailed(f"{what} of {kind}, not of real numbers of shape {shape}")
+    if found != shape:
+        raise TrackerFailed(f"{what} of shape {found}, not {shape}")
+
+
 def _ended(command: list[str], timeout: float) -> tuple[int, str]:
     """Exit status of a command, and the end of its stderr; all processes that it has started are ended with it."""
-    with TemporaryFile() as said:
+    try:
         # To file descriptor 2, because standard output of the command line is for its results.
-        streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": 2, "stderr": said}
-        try:
-            process = subprocess.Popen(command, **streams, start_new_session=True)
-        except OSError as error:
-            raise TrackerFailed(f"did not start: {command[0]}: {error.strerror}") from error
-        try:
-            status = process.wait(timeout)
-        except subprocess.TimeoutExpired as error:
-            raise TrackerFailed(f"took longer than timeout_s = {timeout:g}") from error
-        finally:
-            with suppress(ProcessLookupError):  # if all of its group have ended
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-        said.seek(-min(said.seek(0, os.SEEK_END), KEPT_STDERR), os.SEEK_END)
-        return status, said.read().decode(errors="replace")
+        streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": 2, "stderr": subprocess.PIPE}
+        process = subprocess.Popen(command, **streams, bufsize=0, start_new_session=True)
+    except OSError as error:
+        raise TrackerFailed(f"did not start: {command[0]}: {error.strerror}") from error
+    said = bytearray()
+    reading = Thread(target=_keep_end, args=(process.stderr, said), daemon=True)
+    reading.start()
+    try:
+        status = process.wait(timeout)
+    except subprocess.TimeoutExpired as error:
+        raise TrackerFailed(f"took longer than timeout_s = {timeout:g}") from error
+    finally:
+        with suppress(ProcessLookupError):  # if all of its group have ended
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        reading.join(1)  # longer only if a process that left the group holds stderr open
+    return status, bytes(said).decode(errors="replace")
+
+
+def _keep_end(stream: IO[bytes], kept: bytearray) -> None:
+    """Read a stream to its end, and keep what came last: so it neither blocks who writes to it nor fills memory."""
+    with stream:
+        while part := stream.read(KEPT_STDERR):
+            kept += part
+            del kept[:-KEPT_STDERR]
 
 
 def _write(path: Path, entries: dict[str, Any]) -> None:
@@ -88,16 +130,31 @@ def _write(path: Path, entries: dict[str, Any]) -> None:
                 npy.write_array(file, np.asarray(value), allow_pickle=False)
 
 
-def _read(path: Path) -> Any:
+def _read(path: Path, shape: tuple[int, int]) -> Any:
     if not path.is_file():
         raise TrackerFailed("wrote no {output}, an .npz file with displacement and, if known, quality")
     try:
-        with np.load(path) as found:
-            arrays = [found[name] for name in ("displacement", "quality") if name in found.files]
-            lacks_displacement = "displacement" not in found.files
+        with ZipFile(path) as archive:
+            names = archive.namelist()
+            if "displacement.npy" not in names:
+                raise TrackerFailed("wrote an {output} without displacement")
+            displacement = _array(archive, "displacement", (*shape, 2))
+            return (displacement, _array(archive, "quality", shape)) if "quality.npy" in names else displacement
+    except TrackerFailed:
+        raise
     except Exception as error:  # zipfile and NumPy raise many kinds of a file that is damaged
         reason = in_one_line(str(error) or type(error).__name__)
         raise TrackerFailed(f"wrote an {{output}} that cannot be read as .npz ({reason})") from error
-    if lacks_displacement:
-        raise TrackerFailed("wrote an {output} without displacement")
-    return tuple(arrays) if len(arrays) > 1 else arrays[0]
+
+
+def _array(archive: ZipFile, name: str, shape: tuple[int, ...]) -> np.ndarray:
+    """An array of which no more is read than one of the shape can have, whatever its header or the archive says."""
+    if archive.getinfo(f"{name}.npy").compress_type not in (ZIP_STORED, ZIP_DEFLATED):  # others unpack without limit
+        raise ValueError(f"{name} is compressed otherwise than by deflate")
+    with archive.open(f"{name}.npy") as entry:
+        content = BytesIO(entry.read(MAX_HEADER + MAX_NUMBER * prod(shape)))
+    is_first = npy.read_magic(content) == (1, 0)
+    header = (npy.read_array_header_1_0 if is_first else npy.read_array_header_2_0)(content)
+    check_real(f"wrote an {{output}} with a {name}", header[2], header[0], shape)
+    content.seek(0)
+    return npy.read_array(content, allow_pickle=False)

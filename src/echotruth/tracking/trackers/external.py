@@ -15,7 +15,7 @@ import numpy as np
 
 from echotruth.config.tracking import TRACKER_ARGUMENTS, External
 from echotruth.tracking import external_program
-from echotruth.tracking.external_program import in_one_line
+from echotruth.tracking.external_program import check_real, in_one_line
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker_input import TrackerInput
 
@@ -48,7 +48,7 @@ def track(clip: TrackerInput, settings: External) -> tuple[np.ndarray, np.ndarra
             result = _call(settings.track, arguments, settings.options)
         else:
             entries = dict(zip(TRACKER_ARGUMENTS, arguments, strict=True)) | settings.options
-            result = external_program.run(command, entries, settings.timeout_s)
+            result = external_program.run(command, entries, settings.timeout_s, shape)
         return _checked(result, shape)
     except TrackerFailed as error:
         name = getattr(settings.track, "__name__", settings.track) or " ".join(command)
@@ -127,9 +127,6 @@ def _real_array(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
         array = np.ma.asarray(values)
     except Exception as error:
         raise TrackerFailed(f"returned a {name} that is not an array of shape {shape} ({_describe(error)})") from error
-    if array.dtype.kind not in "fiub":
-        kind = type(values).__name__ if array.dtype.kind == "O" else array.dtype
-        raise TrackerFailed(f"returned a {name} of {kind}, not of real numbers of shape {shape}")
-    if array.shape != shape:
-        raise TrackerFailed(f"returned a {name} of shape {array.shape}, not {shape}")
+    kind = type(values).__name__ if array.dtype.kind == "O" else array.dtype
+    check_real(f"returned a {name}", kind, array.shape, shape)
     return np.ma.filled(array.astype(float), np.nan)
