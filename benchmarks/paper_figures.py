@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import paper_resolutions
 import pyvista
+from mpl_toolkits.mplot3d import Axes3D
 from paper_heart import SLICES, Heart
 
-from echotruth.report import bullseye, error, resolutions, style
-from echotruth.report.heart import PIXELS, VIEWPOINT
-from echotruth.report.raster import Camera, Surface, render
+from echotruth.report import bullseye, error, style
+from echotruth.report.heart import add, show
 
 Hearts = Mapping[str, Heart]
 
@@ -23,50 +24,40 @@ GREY, BLUE = (0.80, 0.76, 0.74), (0.16, 0.36, 0.72)
 @style.styled
 def draw_geometry(path: Path, hearts: Hearts) -> None:
     """Half of every heart at end-diastole with its midsection in blue, on one scale (figure 2A)."""
-    nodes = np.concatenate([heart.mesh.positions(0) for heart in hearts.values()])
-    low, high = nodes.min(0), nodes.max(0)
-    half_height = max(0.55 * (high[2] - low[2]), 0.55 * (high[0] - low[0]) * PIXELS[1] / PIXELS[0])
-    camera = Camera(np.array(VIEWPOINT), (low + high) / 2, float(half_height), PIXELS)
     figure = style.figure(2.6 * len(hearts), 4.3)
-    for panel, (name, heart) in zip(figure.subplots(1, len(hearts), squeeze=False)[0], hearts.items(), strict=True):
-        panel.imshow(_picture(heart, camera).clip(0, 1))
-        panel.set_title(name)
-        panel.axis("off")
+    projection = {"projection": "3d", "computed_zorder": False}
+    panels = figure.subplots(1, len(hearts), squeeze=False, subplot_kw=projection)[0]
+    for panel, (name, heart) in zip(panels, hearts.items(), strict=True):
+        _add_half(panel, heart)
+        panel.set_title(name, y=1.25)
+    show(panels, np.concatenate([heart.mesh.positions(0) for heart in hearts.values()]))
     style.save(figure, path, dpi=110)
 
 
-def _picture(heart: Heart, camera: Camera) -> np.ndarray:
-    """Picture of the posterior half on white."""
+def _add_half(panel: Axes3D, heart: Heart) -> None:
+    """Add the posterior half."""
     mesh, apex = heart.mesh, heart.mesh.endo_at_ed[:, 2].min()
     cells = {pyvista.CellType.QUADRATIC_TETRA: mesh.cells.astype(np.int64)}
     grid = pyvista.UnstructuredGrid(cells, mesh.positions(0))
     half = grid.clip("y", origin=(0, 0, 0)).extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2)
-    half = half.triangulate()
+    half = half.triangulate().subdivide_adaptive(max_edge_len=half.length / 40)
     upper, lower = ((0, 0, apex * (0.5 + side * SECTION_HALF_WIDTH)) for side in (-1, 1))
     above, below = half.clip("-z", origin=upper), half.clip("z", origin=lower)
     section = half.clip("z", origin=upper).clip("-z", origin=lower)
-    colour, alpha = render(_merged(((above, GREY), (section, BLUE), (below, GREY))), camera)
-    return colour + (1 - alpha)[..., None]
-
-
-def _merged(parts: Iterable[tuple[pyvista.PolyData, tuple[float, float, float]]]) -> Surface:
-    """One surface of several, each of one colour."""
-    points, normals, triangles, colours, count = [], [], [], [], 0
-    for part, colour in parts:
-        mesh = part.triangulate().compute_normals(cell_normals=False, split_vertices=True, feature_angle=40)
-        points.append(np.asarray(mesh.points, float))
-        normals.append(np.asarray(mesh.point_data["Normals"], float))
-        triangles.append(mesh.faces.reshape(-1, 4)[:, 1:] + count)
-        colours.append(np.tile(colour, (mesh.n_points, 1)))
-        count += mesh.n_points
-    return Surface(*map(np.concatenate, (points, normals, triangles, colours)))
+    parts = [(part.triangulate(), colour) for part, colour in ((above, GREY), (section, BLUE), (below, GREY))]
+    points = np.cumsum([0, *(part.n_points for part, _ in parts)])
+    whole = pyvista.PolyData.from_regular_faces(
+        np.concatenate([part.points for part, _ in parts]),
+        np.concatenate([part.regular_faces + first for (part, _), first in zip(parts, points, strict=False)]),
+    )
+    add(panel, whole, np.concatenate([np.tile(colour, (part.n_points, 1)) for part, colour in parts]))
 
 
 def draw_figures(folder: Path, hearts: Hearts, printed: str, mended: str) -> None:
     """Figures 2B, 3 and 4 of every heart, as the report draws them, for two trackers."""
     for name, heart in hearts.items():
         clips = [heart.read.read(f"bmode/{size}/image", heart.case, "mid", 0) for size in heart.sizes[:2]]
-        style.save(resolutions.draw(clips, heart.field_of_view), folder / f"paper_bmode_{name}.png")
+        style.save(paper_resolutions.draw(clips, heart.field_of_view), folder / f"paper_bmode_{name}.png")
         for tracker in (printed, mended):
             true, tracked = (1e6 * values for values in heart.segments(tracker))
             labels = "Circumferential displacement at ES (µm)", "Difference (µm)"

@@ -20,7 +20,7 @@ from pydantic_core import PydanticUndefined
 from echotruth.config import Config
 from echotruth.repository import schema
 from echotruth.repository.array import Array
-from echotruth.section import discriminator, meaning, section_in, shown_unit, variants
+from echotruth.section import discriminator, docstrings, section_in, unit_of, variants
 
 _CONFIG_HEAD = """# Configuration
 
@@ -154,12 +154,22 @@ def _section(model: type[BaseModel], prefix: str, title: str, about: str = "") -
             continue
         subsection = None if sections else section_in(field.annotation)
         if subsection is None or mapping:
-            rows.append(f"| `{prefix}{key}` | {shown_unit(key)} | {_default(field)} | {meaning(model, key)} |")
+            rows.append(f"| `{prefix}{key}` | {_unit(key)} | {_default(field)} | {_meaning(model, key)} |")
         if subsection is not None:
-            subsections += _section(subsection, path, path.removesuffix("."), "" if mapping else meaning(model, key))
+            subsections += _section(subsection, path, path.removesuffix("."), "" if mapping else _meaning(model, key))
     if rows:
         lines += ["| key | unit | default | meaning |", "|---|---|---|---|", *rows, ""]
     return [*lines, *subsections]
+
+
+def _unit(key: str) -> str:
+    """Unit of a key as people write it; empty if it has none."""
+    return unit_of(key).replace("_per_", "/").replace("per_", "1/")
+
+
+def _meaning(model: type[BaseModel], key: str) -> str:
+    """What a key means, in one line."""
+    return " ".join((model.model_fields[key].description or docstrings(model).get(key, "")).split())
 
 
 def _default(field: FieldInfo) -> str:

@@ -1,7 +1,7 @@
 """The report: figures of the repository, and the page that shows them."""
 
 FIGURES = ["loop", "strain", "physiology", "population", "curves", "segments", "bullseye", "error", "leaderboard"]
-FIGURES += ["heart", "resolutions", "views", *(["inference", "posterior"] if PLAN.config.inference.tracker else [])]
+FIGURES += ["heart", "views", *(["inference"] if PLAN.config.inference.tracker else [])]
 
 
 rule report:

@@ -15,7 +15,7 @@ from echotruth import files
 from echotruth.config.loading import load
 from echotruth.config.reading import ConfigError, read_yaml, shown_key
 from echotruth.evaluation.tracker_options import EvaluationError
-from echotruth.section import Name, Section, meaning
+from echotruth.section import Name, Section, docstrings
 
 from .repositories import opened
 
@@ -152,7 +152,7 @@ def _message(error: ErrorDetails) -> str:
     if key not in keys:
         close = get_close_matches(key, keys, n=1)
         return f"{key} is not a key: " + (f"did you mean {close[0]}?" if close else f"use {', '.join(keys)}")
-    right = meaning(Card, key)
+    right = " ".join(docstrings(Card)[key].split())
     if error["type"] == "missing":
         return f"{key} is missing: it must be given: {right}"
     value = " ".join(str(error["input"]).split())

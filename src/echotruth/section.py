@@ -83,18 +83,8 @@ def unit_of(key: str) -> str:
     return max((unit for unit in UNITS if key.endswith(f"_{unit}")), key=len, default="")
 
 
-def shown_unit(key: str) -> str:
-    """Unit of a configuration key as people write it; empty if it has none."""
-    return unit_of(key).replace("_per_", "/").replace("per_", "1/")
-
-
-def meaning(section: type[BaseModel], key: str) -> str:
-    """What a key of a section means, in one line."""
-    return " ".join((section.model_fields[key].description or _docstrings(section).get(key, "")).split())
-
-
 @cache
-def _docstrings(section: type[BaseModel]) -> dict[str, str]:
+def docstrings(section: type[BaseModel]) -> dict[str, str]:
     """Key -> the text below it. pydantic would read all sources at each import, which takes a third of its time."""
     found: dict[str, str] = {}
     for kind in reversed(section.mro()[: section.mro().index(BaseModel)]):
@@ -170,7 +160,7 @@ class Section(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        schema, texts = handler(core_schema), _docstrings(cls)
+        schema, texts = handler(core_schema), docstrings(cls)
         for key, options in handler.resolve_ref_schema(schema).get("properties", {}).items():
             if key in texts and handler.resolve_ref_schema(options).get("description") != texts[key]:
                 options.setdefault("description", texts[key])
@@ -192,6 +182,11 @@ class Section(BaseModel):
         """Keys and values from which the section can be made again with some of them changed."""
         sections = {key: value for key in type(self).model_fields if isinstance(value := getattr(self, key), Section)}
         return self.model_dump() | {key: section.given() for key, section in sections.items()}
+
+    def require(self, holds: object, key: str, remedy: str) -> None:
+        """Raise :func:`invalid` of a dotted key, with its value, unless a condition holds."""
+        if not holds:
+            raise invalid(key, value_of(self, key), remedy)
 
     def resolved(self) -> Section:
         """The section with every value filled in that follows from a preset."""

@@ -70,6 +70,8 @@ def test_what_cannot_be_inferred_from(check):
     """As a run refuses it: a prior beyond the limits of its key, and a tracker of which no errors are known."""
     sections = {"tracking": {"trackers": {"dis": {"method": "dis"}}}, "bmode": {"size_px": 256, "downsampling": [1]}}
     status, output = check(inference={"tracker": "dis", "prior": {"fibres.endo_deg": [95, 8]}}, **sections)
-    assert status == 1 and "mine.yaml: inference: prior: fibres.endo_deg = (95, 8): give a mean from -90 to" in output
+    assert (
+        status == 1 and "mine.yaml: inference: prior: fibres.endo_deg = [95.0, 8.0]: give a mean from -90 to" in output
+    )
     status, output = check(inference={"tracker": "dis"}, **sections | {"bmode": {"size_px": 512}})
     assert status == 1 and "mine.yaml: inference: tracker: the error of dis at 512 px" in output

@@ -27,9 +27,9 @@ def clip(tmp_path):
         ),
         (
             ["clip.npy", "--spacing-mm", "-1", "--frame-time-ms", "20"],
-            "--spacing-mm = -1: give the side of a pixel, from",
+            "--spacing-mm = -1: give a side from",
         ),
-        (["KNOWN", "--cycle", "2", "1"], "cycle = 2, 1: clip.npy has 4 frames"),
+        (["KNOWN", "--cycle", "2", "1"], "cycle = 2, 1: give two or more of the 4 frames of clip.npy"),
         (["KNOWN", "--crop", "0", "0", "500", "10"], "crop = 0, 0, 500, 10: clip.npy is 120 x 90 px"),
         (["KNOWN", "--wall", "no.csv"], "no.csv: is not there"),
         (["KNOWN", "--wall", "no.csv", "-o", "no.csv"], "no.csv: is not there: give a wall to be corrected"),

@@ -12,8 +12,7 @@ from echotruth.config.loading import ConfigError, validate
 INFARCT, LATE = "pathology.infarct", "pathology.late_activation"
 BAD = [
     (INFARCT, {"segments": [7, 18]}, "segments.1 = 18: should be less than or equal to 17"),
-    (INFARCT, {"segments": []}, "segments = []: must have at least one entry"),
-    (INFARCT, {"segments": [7, 7]}, "segments = [7, 7]: list each segment once"),
+    (INFARCT, {"segments": []}, "segments = []: should have at least 1 item"),
     (INFARCT, {"segments": [7], "radius_mm": 1}, "radius_mm = 1.0: give either segments or radius_mm"),
     (INFARCT, {"segment": [1]}, "segment is not a key: did you mean pathology.infarct.segments?"),
     (LATE, {"delay_ms": {5: -3}}, "delay_ms.5 = -3: should be greater than or equal to 0"),

@@ -119,7 +119,7 @@ def test_region_beyond_the_image_has_lost_its_scale(tmp_path):
 def test_scale_of_no_echo_is_told(tmp_path, delta, said):
     scale = {"SequenceOfUltrasoundRegions": [region((8, 4, 39, 23), (delta, delta))]}
     path = written(tmp_path / "scale.dcm", FILM, FrameTime=20, **scale)
-    with pytest.raises(EchoError, match=f"scale.dcm: has pixels of {said} mm: give their right side, from"):
+    with pytest.raises(EchoError, match=f"scale.dcm: has pixels of {said} mm: give spacing_mm from"):
         et.read_clip(path)
 
 
@@ -134,7 +134,9 @@ def test_value_of_half_a_number_is_told(tmp_path):
 
 def test_time_of_no_echo_is_told(tmp_path):
     path = written(tmp_path / "time.dcm", FILM, FrameTime="1e300", PixelSpacing=[0.3, 0.3])
-    with pytest.raises(EchoError, match=r"time.dcm: has a time from frame to frame of 1e\+300 ms: give the right one"):
+    with pytest.raises(
+        EchoError, match=r"time.dcm: has a time from frame to frame of 1e\+300 ms: give frame_time_ms from"
+    ):
         et.read_clip(path)
     assert et.read_clip(path, frame_time_ms=20)["time"][-1] == pytest.approx(0.1)
 
@@ -189,9 +191,9 @@ def test_what_is_no_clip_is_told(tmp_path, name, content, sentence):
     [
         ({"spacing_mm": None}, "array: does not say the side of its pixels: give spacing_mm"),
         ({"frame_time_ms": None}, "array: does not say the time from frame to frame: give frame_time_ms"),
-        ({"spacing_mm": 60}, "spacing_mm = 60: give the side of a pixel, from 0.001 to 10 mm"),
-        ({"frame_time_ms": float("nan")}, "frame_time_ms = nan: give the time from frame to frame, from 0.01 to"),
-        ({"cycle": (3, 9)}, "cycle = 3, 9: array has 6 frames"),
+        ({"spacing_mm": 60}, "spacing_mm = 60: give a side from 0.001 to 10"),
+        ({"frame_time_ms": float("nan")}, "frame_time_ms = nan: give a time from 0.01 to 1000"),
+        ({"cycle": (3, 9)}, "cycle = 3, 9: give two or more of the 6 frames of array"),
         ({"crop": (0, 0, 60, 10)}, "crop = 0, 0, 60, 10: array is 48 x 32 px"),
     ],
 )
@@ -295,7 +297,7 @@ def test_animation_of_an_impossible_size_is_told_without_decoding(tmp_path):
     size = (20_000).to_bytes(2, "little") * 2
     place = content.index(b",")
     path.write_bytes(content[:6] + size + content[10 : place + 5] + size + content[place + 9 :])
-    with pytest.raises(EchoError, match=r"big.gif: has images of more than 9e.07 pixels, as no echo has"):
+    with pytest.raises(EchoError, match=r"big.gif: is no image that can be read: Image size"):
         et.read_clip(path, **GIVEN)
 
 
@@ -323,9 +325,9 @@ def test_nifti_of_an_unknown_unit_is_told(tmp_path):
 @pytest.mark.parametrize(
     ("zooms", "sentence"),
     [
-        ((60, 60, 0.02), "has pixels of 60 x 60 mm: give their right side, from 0.001 to 10 mm, as spacing_mm"),
+        ((60, 60, 0.02), "has pixels of 60 x 60 mm: give spacing_mm from 0.001 to 10"),
         ((5, 0.01, 0.02), "has pixels of 0.01 x 5 mm, more than 100 to 1: if they are square give spacing_mm"),
-        ((1, 1, 1e30), r"has a time from frame to frame of 1e\+33 ms: give the right one, from 0.01 to 1000 ms"),
+        ((1, 1, 1e30), r"has a time from frame to frame of 1e\+33 ms: give frame_time_ms from 0.01 to 1000"),
         ((1, 1, np.inf), "has frames of which the times do not increase: give frame_time_ms"),
     ],
 )

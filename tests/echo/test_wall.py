@@ -83,7 +83,7 @@ def test_table_and_mask_give_the_same_wall(ring, tmp_path):
         ("part,lateral_px,axial_px\nendo,1,2", "part = endo: use endocardium"),
         ("part,lateral_px,axial_px\nendocardium,1,x", "row 1 has no two numbers"),
         ("part,lateral_px,axial_px\nendocardium,1,2", "endocardium: give three points or more"),
-        ("part,lateral_px,axial_px\nanterior_insertion,1,2", "has 1 anterior and 0 inferior insertions"),
+        ("part,lateral_px,axial_px\nanterior_insertion,1,2", "give one anterior and one inferior insertion, or none"),
     ],
 )
 def test_bad_table_is_told(tmp_path, text, sentence):

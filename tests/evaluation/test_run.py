@@ -323,6 +323,7 @@ REFUSED = {
         ["--tracker", "custon:exact"],
         "cannot be imported: ModuleNotFoundError: No module named 'custon'",
     ),
+    "function": (["--tracker", "custom:exat"], "has no attribute 'exat'"),
     "needs an option": (["--tracker", "custom:exact"], "missing a required argument: 'course': it gets frames, points"),
     "program": (["--command", "trakk {input} {output}"], "trakk: is not there or cannot be run"),
     "case": (["--tracker", "a:b", "--case", "seed9"], "case = 'seed9': use one of heart, seed2_"),

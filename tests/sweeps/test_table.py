@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from echotruth.cases import as_table, diagnosis, expand, find_case, table
+from echotruth.cases import diagnosis, expand, find_case, table
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, load, override, validate
 from echotruth.config.table import MAX_BYTES, MAX_CASES, MAX_COLUMNS
@@ -108,10 +108,9 @@ def test_views_themselves_and_the_trackers_are_the_same_in_all_rows(refusal):
     assert "row 1: views.mid.position = 3" in refusal("views.mid.position\n3\n")
 
 
-def test_delays_of_segments_stand_in_a_cell_as_json_and_are_written_back(hearts):
+def test_delays_of_segments_stand_in_a_cell_as_json(hearts):
     (late,) = hearts('case,pathology.late_activation.delay_ms\na,"{""11"": 6, ""12"": 4.5}"\n')
     assert late.config.pathology.late_activation.delay_ms == {11: 6, 12: 4.5}
-    assert hearts(as_table([late]))[0].config == late.config
 
 
 def test_mesh_and_loop_of_a_row_stay_together(hearts, tmp_path):
@@ -228,31 +227,6 @@ def test_configuration_holds_the_rows_and_not_the_path(hearts, tmp_path):
     assert [(case.id, case.config, case.labels) for case in expand(again)] == [
         (case.id, case.config, case.labels) for case in cases
     ]
-
-
-def test_hearts_written_as_a_table_are_the_same_hearts(hearts):
-    cases = hearts(TABLE, cases="draw: {number: 4, keys: {fibres.epi_deg: {normal: [-42, 3]}}}")
-    again = expand(Config(cases={"table": as_table(cases)}))
-    assert [(case.id, case.config, case.labels, case.note) for case in again] == [
-        (case.id, case.config, case.labels, case.note) for case in cases
-    ]
-
-
-def test_longest_ids_of_draws_stand_in_a_table_of_their_own(hearts):
-    """As in that of merged repositories; where the rows are continued, an id must leave room for what follows."""
-    keys = ("fibres.endo_deg", "fibres.epi_deg", "loop.heart_rate_per_min", "mechanics.material.stiffness_kPa")
-    drawn = ", ".join(f"{key}: {{uniform: [1, 2]}}" for key in keys)
-    cases = hearts(f"case\n{'m' * 80}\n", cases=f"draw: {{number: 2, keys: {{{drawn}}}}}")
-    assert min(len(case.id) for case in cases) > 130
-    assert [case.id for case in expand(Config(cases={"table": as_table(cases)}))] == [case.id for case in cases]
-    with pytest.raises(ConfigError, match="use at most 80 letters"):
-        expand(Config(cases={"table": as_table(cases), "bmode.dynamic_range_dB": [50, 60]}))
-
-
-def test_whole_number_is_the_same_label_among_numbers_and_among_text(hearts):
-    numbers, text = hearts("label.group\n3\n"), hearts("case,label.group\nm1,sham\n")
-    both = expand(Config(cases={"table": as_table([*numbers, *text])}))
-    assert [case.labels["group"] for case in both] == ["3", "sham"]
 
 
 def test_table_of_cases_has_labels_and_notes(hearts):

@@ -3,20 +3,10 @@
 A sweep is a grid of values, the rows of a table, random draws, and conditions on them (docs/cases.md).
 """
 
-from echotruth.cases.case import Case
-from echotruth.cases.expansion import all_cases, expand, find_case
-from echotruth.cases.ids import case_id
-from echotruth.cases.labels import diagnosis
-from echotruth.cases.rows import as_table
-from echotruth.cases.tabulation import table
-
-__all__ = [
-    "Case",
-    "all_cases",
-    "as_table",
-    "case_id",
-    "diagnosis",
-    "expand",
-    "find_case",
-    "table",
-]
+from echotruth.cases.case import Case as Case
+from echotruth.cases.expansion import all_cases as all_cases
+from echotruth.cases.expansion import expand as expand
+from echotruth.cases.expansion import find_case as find_case
+from echotruth.cases.ids import case_id as case_id
+from echotruth.cases.labels import diagnosis as diagnosis
+from echotruth.cases.tabulation import table as table

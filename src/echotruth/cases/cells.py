@@ -68,11 +68,6 @@ def number(cell: str) -> float | None:
     return found if found is not None and isfinite(found) else None
 
 
-def written(value: Any) -> str:
-    """Cell with a value, which is read back as the same."""
-    return value if isinstance(value, str) else json.dumps(value)
-
-
 def _types(annotation: Any) -> list[type]:
     if get_origin(annotation) is Literal:
         return [type(item) for item in get_args(annotation)]

@@ -3,8 +3,7 @@
 Every number is made by arithmetic that does not depend on versions of libraries, and rounded, so that a heart keeps its
 id. The points of Sobol's sequence (Sobol' 1967; direction numbers of Joe & Kuo 2008, doi:10.1137/070709359, as in
 scipy) are shifted by a random number whose bits are added without carry, which keeps their evenness (L'Ecuyer & Lemieux
-2002, doi:10.1007/0-306-48102-2_20). Latin hypercube sampling is that of McKay, Beckman & Conover 1979
-(doi:10.2307/1268522).
+2002, doi:10.1007/0-306-48102-2_20).
 """
 
 import json
@@ -33,8 +32,7 @@ def draws(draw: Draw) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        Dotted key -> value, of length `draw.number`; with `sobol` and `random` its beginning does not depend on its
-        length.
+        Dotted key -> value, of length `draw.number`, on which its beginning does not depend.
     """
     points = unit_points(draw)
     columns = {key: quantiles(distribution, points[key]) for key, distribution in draw.keys.items()}
@@ -54,17 +52,8 @@ def unit_points(draw: Draw) -> dict[str, Floats]:
         Dotted key -> coordinate between 0 and 1. They do not depend on the order in which the keys are given.
     """
     keys = sorted(draw.keys)
-    if draw.method == "sobol":
-        points = sobol(draw.number, len(keys))
-        shifts = [int.from_bytes(_digest(draw, key)[:4], "big") >> (32 - BITS) for key in keys]
-        return {
-            key: ((points[:, axis] ^ shift) + 0.5) / 2**BITS
-            for axis, (key, shift) in enumerate(zip(keys, shifts, strict=True))
-        }
-    generators = {key: np.random.default_rng(np.frombuffer(_digest(draw, key), np.uint32)) for key in keys}
-    if draw.method == "random":
-        return {key: generator.random(draw.number) for key, generator in generators.items()}
-    return {key: _stratified(generator, draw.number) for key, generator in generators.items()}
+    points = sobol(draw.number, len(keys)).T
+    return {key: ((axis ^ _shift(draw, key)) + 0.5) / 2**BITS for key, axis in zip(keys, points, strict=True)}
 
 
 def sobol(number: int, dimensions: int) -> np.ndarray:
@@ -127,10 +116,7 @@ def _rounded(values: Floats, bounds: list[float] | None) -> list[float]:
     return [min(max(float(f"{value:.{DIGITS}g}"), low), high) for value in values.tolist()]
 
 
-def _stratified(generator: np.random.Generator, number: int) -> Floats:
-    """One point in each of as many equal intervals, in random order."""
-    return (generator.permutation(number) + generator.random(number)) / number
-
-
-def _digest(draw: Draw, key: str) -> bytes:
-    return sha256(json.dumps([draw.seed, draw.method, key]).encode()).digest()
+def _shift(draw: Draw, key: str) -> int:
+    """Random number of `BITS` bits by which a key is shifted."""
+    digest = sha256(json.dumps([draw.seed, "sobol", key]).encode()).digest()
+    return int.from_bytes(digest[:4], "big") >> (32 - BITS)

@@ -10,9 +10,7 @@ from echotruth.section import unit_of
 READABLE_LENGTH = 40
 """Longest readable part of an id, letters."""
 GIVEN_LENGTH = 80
-"""Longest id in a table whose rows a grid or draws multiply, letters."""
-LONGEST = GIVEN_LENGTH + 1 + READABLE_LENGTH + 1 + 16
-"""Longest id that :func:`extended_id` makes, letters; names of files have room for it."""
+"""Longest id in a table, letters; names of files have room for it and for what a grid or draws add."""
 GIVEN = r"[A-Za-z0-9][A-Za-z0-9_.-]*"
 """What an id in a table looks like: it is part of the names of files."""
 

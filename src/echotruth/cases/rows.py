@@ -1,4 +1,4 @@
-"""Rows of the table as values of swept keys, ids, labels and notes; and hearts as such a table."""
+"""Rows of the table as values of swept keys, ids, labels and notes."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from echotruth.cases import cells
-from echotruth.cases.case import Case, Combination, Label
-from echotruth.cases.ids import GIVEN, GIVEN_LENGTH, LONGEST, integer_if_whole
+from echotruth.cases.case import Combination, Label
+from echotruth.cases.ids import GIVEN, GIVEN_LENGTH
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError
 from echotruth.config.reading import Errors
@@ -45,38 +45,12 @@ def combinations(config: Config, source: str) -> list[Combination]:
         return [Combination({})]
     place = f"{source}: {name}"
     carried = _labels(table, place)
-    # A table that stands alone may hold the ids that another one's draws gave, as that of merged repositories does.
-    is_extended = config.cases.draw is not None or bool(config.cases.grid)
-    ids = _ids(table, place, GIVEN_LENGTH if is_extended else LONGEST)
+    ids = _ids(table, place)
     parts = zip(_parameters(config, table, place), ids, table.index, carried, _column(table, NOTE), strict=True)
     return [
         Combination(values, id, frozenset(values), f"{name}, row {number}", labels, note)
         for values, id, number, labels, note in parts
     ]
-
-
-def as_table(cases: list[Case]) -> str:
-    """The text of a table that makes the same hearts of the configuration without its sweep, under their ids.
-
-    Parameters
-    ----------
-    cases : list of Case
-    """
-    import pandas as pd
-
-    rows = []
-    for case in cases:
-        values = {key: cells.written(value) for key, value in case.parameters.items()}
-        # A whole number has no decimal point, as it stays so among labels that are text.
-        values |= {f"{LABEL}{name}": _written_label(value) for name, value in case.labels.items()}
-        rows.append({CASE: case.id, NOTE: case.note} | values)
-    keys = dict.fromkeys(key for case in cases for key in case.parameters)
-    names = dict.fromkeys(f"{LABEL}{name}" for case in cases for name in case.labels)
-    return pd.DataFrame(rows, columns=[CASE, *keys, *names, NOTE]).to_csv(index=False, lineterminator="\n")
-
-
-def _written_label(label: Label) -> str:
-    return "" if label is None else cells.written(integer_if_whole(label))
 
 
 def _parameters(config: Config, table: pd.DataFrame, place: str) -> list[dict[str, Any]]:
@@ -96,12 +70,12 @@ def _parameters(config: Config, table: pd.DataFrame, place: str) -> list[dict[st
     return parameters
 
 
-def _ids(table: pd.DataFrame, place: str, longest: int) -> list[str]:
-    """Id of each row, empty if it has none; of so many letters at most."""
+def _ids(table: pd.DataFrame, place: str) -> list[str]:
+    """Id of each row, empty if it has none."""
     rows: dict[str, int] = {}
     ids = _column(table, CASE)
     for number, id in zip(table.index, ids, strict=True):
-        if id and (len(id) > longest or not re.fullmatch(GIVEN, id)):
+        if id and (len(id) > GIVEN_LENGTH or not re.fullmatch(GIVEN, id)):
             remedy = "use at most 80 letters without accents, digits, _, - and ., and begin with a letter or digit"
             raise ConfigError(f"{place}, row {number}: case = {id[:80]!r}: {remedy}")
         if id and rows.setdefault(id, number) != number:

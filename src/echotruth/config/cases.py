@@ -32,7 +32,7 @@ class Distribution(Section):
     """Mean and standard deviation."""
     limits: Pair | None = None
     """With `normal`: lower and upper bound at which the distribution is truncated."""
-    integers: Annotated[list[int], Field(min_length=2, max_length=2)] | None = None
+    integers: Annotated[list[Annotated[int, Field(ge=0, lt=2**63)]], Field(min_length=2, max_length=2)] | None = None
     """First and last of the whole numbers, which are equally likely; for keys such as `seed`."""
     choice: Annotated[list[Any], Field(min_length=1)] | None = None
     """Values of which one is drawn."""
@@ -55,28 +55,23 @@ class Distribution(Section):
             remedy = f"give one of {', '.join(KINDS)}"
             raise invalid(given[1] if given else "uniform", getattr(self, given[1]) if given else None, remedy)
         for key, needs in (("limits", "normal"), ("weights", "choice")):
-            if getattr(self, key) is not None and given != [needs]:
-                raise invalid(key, getattr(self, key), f"applies to {needs}: leave it out")
+            self.require(getattr(self, key) is None or given == [needs], key, f"applies to {needs}: leave it out")
 
     @check
     def _check_bounds(self) -> None:
         for key in ("uniform", "log_uniform", "integers", "limits"):
-            bounds = getattr(self, key)
-            if bounds is not None and bounds[0] >= bounds[1]:
-                raise invalid(key, bounds, "must be the lower bound and then a greater upper bound")
-        if self.log_uniform is not None and self.log_uniform[0] <= 0:
-            raise invalid("log_uniform", self.log_uniform, "must have positive bounds")
-        if self.normal is not None and self.normal[1] <= 0:
-            raise invalid("normal", self.normal, "must be the mean and a positive standard deviation")
+            low, high = getattr(self, key) or (0, 1)
+            self.require(low < high, key, "must be the lower bound and then a greater upper bound")
+        self.require((self.log_uniform or [1])[0] > 0, "log_uniform", "must have positive bounds")
+        self.require((self.normal or [1])[-1] > 0, "normal", "must be the mean and a positive standard deviation")
 
     @check
     def _check_weights(self) -> None:
         if self.weights is None or self.choice is None:
             return
-        if len(self.weights) != len(self.choice):
-            raise invalid("weights", self.weights, f"must have one entry for each of the {len(self.choice)} of choice")
-        if not 0 < sum(self.weights) < 1e300:
-            raise invalid("weights", self.weights, "must have a positive entry and a finite sum")
+        remedy = f"must have one entry for each of the {len(self.choice)} of choice"
+        self.require(len(self.weights) == len(self.choice), "weights", remedy)
+        self.require(0 < sum(self.weights) < 1e300, "weights", "must have a positive entry and a finite sum")
 
 
 ACOUSTICS: dict[str, dict[str, Any]] = {
@@ -112,13 +107,10 @@ class Draw(Section):
     gain and grey map, each over its published or chosen range (docs/realism.md), so that the looks of a training set
     differ; use it with a `realism.preset`."""
     number: Annotated[int, Field(ge=1, le=MAX_CASES)]
-    """Number of hearts (of each row of the table and each combination of the grid). With `sobol` and `random` a larger
-    number adds hearts, and those that were there stay; with `latin_hypercube` it changes all of them."""
+    """Number of hearts (of each row of the table and each combination of the grid). A larger number adds hearts, and
+    those that were there stay; a power of 2 is the most even."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
-    """Seed of the draws; it is not that of the images."""
-    method: Literal["sobol", "latin_hypercube", "random"] = "sobol"
-    """`sobol`: quasi-random, the most even in all keys together; `latin_hypercube`: even in each key alone; `random`:
-    independent."""
+    """Seed of the draws, points of Sobol's sequence; it is not that of the images."""
     keys: Annotated[dict[str, Distribution], Field(min_length=1, max_length=64)]
     """Distribution of each dotted key; those given take precedence over those of `preset`."""
 

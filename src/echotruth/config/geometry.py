@@ -136,8 +136,8 @@ class Geometry(Section):
         self._refuse(_ELLIPSOID_KEYS, "applies to the ellipsoid: leave it out, because geometry.file is given")
         if not self.remesh:
             self._refuse(_REMESH_KEYS, "needs remesh: true if the wall is read from a file")
-        if self.sheet is not None and self.fibre is None:
-            raise invalid("sheet", self.sheet, "needs the fibre directions too: give geometry.fibre")
+        has_fibres = self.sheet is None or self.fibre is not None
+        self.require(has_fibres, "sheet", "needs the fibre directions too: give geometry.fibre")
 
     def _refuse(self, keys: tuple[str, ...], remedy: str) -> None:
         fields = type(self).model_fields

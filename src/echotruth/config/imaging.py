@@ -106,15 +106,9 @@ class Rf(Section):
 
     @check
     def _check_foci(self) -> None:
-        if self.focus_mm <= self.focal_half_span_mm:
-            foci = f"its focal_zones = {self.focal_zones} foci, focal_spacing_mm = {self.focal_spacing_mm:g} apart"
-            remedy = f"must exceed {self.focal_half_span_mm:g}, so that {foci}, lie in front of the array"
-            raise invalid("focus_mm", self.focus_mm, remedy)
-
-    @check
-    def _check_keep(self) -> None:
-        if len(set(self.keep)) < len(self.keep):
-            raise invalid("keep", self.keep, "list each entry once")
+        foci = f"its focal_zones = {self.focal_zones} foci, focal_spacing_mm = {self.focal_spacing_mm:g} apart"
+        remedy = f"must exceed {self.focal_half_span_mm:g}, so that {foci}, lie in front of the array"
+        self.require(self.focus_mm > self.focal_half_span_mm, "focus_mm", remedy)
 
 
 Divisor = Annotated[int, Field(ge=1, le=64)]
@@ -139,11 +133,10 @@ class TimeGain(Section):
 
     @check
     def _check_points(self) -> None:
-        if len(self.gain_dB) != len(self.range_mm):
-            remedy = f"must have one gain for each of the {len(self.range_mm)} ranges in range_mm"
-            raise invalid("gain_dB", self.gain_dB, remedy)
-        if any(next_ <= each for each, next_ in pairwise(self.range_mm)):
-            raise invalid("range_mm", self.range_mm, "every range must be larger than the one before it")
+        remedy = f"must have one gain for each of the {len(self.range_mm)} ranges in range_mm"
+        self.require(len(self.gain_dB) == len(self.range_mm), "gain_dB", remedy)
+        rises = all(each < following for each, following in pairwise(self.range_mm))
+        self.require(rises, "range_mm", "every range must be larger than the one before it")
 
 
 class Dropout(Section):
@@ -204,20 +197,15 @@ class Bmode(Section):
 
     @check
     def _check_sizes(self) -> None:
-        for divisor in self.downsampling:
-            if self.size_px % divisor or self.size_px // divisor < 16:
-                remedy = f"every entry must divide size_px = {self.size_px} and leave 16 px or more"
-                raise invalid("downsampling", list(self.downsampling), remedy)
-        if len(set(self.downsampling)) < len(self.downsampling):
-            raise invalid("downsampling", list(self.downsampling), "entries must differ")
+        remedy = f"every entry must divide size_px = {self.size_px} and leave 16 px or more"
+        divides = all(self.size_px % each == 0 and self.size_px // each >= 16 for each in self.downsampling)
+        self.require(divides, "downsampling", remedy)
+        self.require(len(set(self.sizes)) == len(self.sizes), "downsampling", "entries must differ")
 
     @check
     def _check_gain(self) -> None:
-        if abs(self.gain_dB) >= self.dynamic_range_dB:
-            remedy = (
-                f"must lie within dynamic_range_dB = {self.dynamic_range_dB:g}, or the image is all black or all white"
-            )
-            raise invalid("gain_dB", self.gain_dB, remedy)
+        remedy = f"must lie within dynamic_range_dB = {self.dynamic_range_dB:g}, or the image is all black or all white"
+        self.require(abs(self.gain_dB) < self.dynamic_range_dB, "gain_dB", remedy)
 
 
 VIEWS: dict[str, dict[str, View]] = {

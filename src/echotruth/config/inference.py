@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, FiniteFloat
 
-from echotruth.section import Name, Section, check, invalid
+from echotruth.section import Name, Section, check
 
 MeanAndDeviation = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
 
@@ -27,5 +27,5 @@ class Inference(Section):
     @check
     def _has_tracker(self) -> None:
         for key in ("size_px", "errors", "prior"):
-            if self.tracker is None and getattr(self, key) not in (None, {}):
-                raise invalid(key, getattr(self, key), "needs inference.tracker: name it, or leave this out")
+            is_used = self.tracker is not None or getattr(self, key) in (None, {})
+            self.require(is_used, key, "needs inference.tracker: name it, or leave this out")

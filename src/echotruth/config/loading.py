@@ -113,14 +113,14 @@ def _message(error: ErrorDetails) -> str:
     given = f"{dotted_key} = {_shown_value(value)}" if keys else _shown_value(value)
     if kind.startswith("string_") and error["loc"][-1:] == ("[key]",):
         given = f"{shown_key(keys[:-1])}: the name {_shown_value(value)}"
-    return f"{given}: {_remedy(kind, value, context, error['msg'])}"
+    return f"{given}: {_remedy(kind, context, error['msg'])}"
 
 
 def _shown_value(value: Any) -> str:
     """The value in one line of at most 80 characters, as it is in the file."""
     if value is None or isinstance(value, bool):
         return "null" if value is None else str(value).lower()
-    text = repr(value)
+    text = repr(list(value) if isinstance(value, tuple) else value)
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
@@ -133,45 +133,24 @@ def _variant(model: type[BaseModel], sections: dict[str, type[Section]]) -> str:
     return f" of the {selector} {current} (others: {', '.join(name for name in sections if name != current)})"
 
 
-def _remedy(kind: str, value: Any, context: dict[str, Any], message: str) -> str:
+def _remedy(kind: str, context: dict[str, Any], message: str) -> str:
     """What would be right, given what pydantic says of a value."""
     if kind == "string_pattern_mismatch":
         return _NAMES[".-]" in context["pattern"]]
-    if kind == "list_type" and isinstance(value, str | int | float):
-        return f"must be a list, such as [{_shown_value(value)}]"
     message = _MESSAGES.get(context.get("class_name", "")) or _MESSAGES.get(kind, message)
-    if kind == "too_short" and context["min_length"] > 1:
-        message = "must have {min_length} entries or more"
-    message = re.sub(r"^(Input|String|Value error,) ", "", message)
-    return (message.format(**context) if kind.startswith("too_") else message) + _written(kind, value)
+    return re.sub(r"^(Input|String|List|Dictionary|Value error,) ", "", message)
 
-
-def _written(kind: str, value: Any) -> str:
-    """How YAML writes what was probably meant by a value of the wrong type; "" if that is not known."""
-    if kind == "string_type" and isinstance(value, bool | int | float):
-        return ": put it in quotes"
-    text = value.strip() if isinstance(value, str) else ""
-    is_number = kind in ("int_type", "float_type") and _NUMBER.fullmatch(text) is not None
-    if kind == "int_type" and is_number:
-        text, is_number = f"{float(text):.0f}", float(text).is_integer()
-    return f": write {text} without quotes" if is_number or (kind == "bool_type" and text in ("true", "false")) else ""
-
-
-_NUMBER = re.compile(r"[-+]?\d{1,15}(\.\d{0,15})?([eE][-+]?\d{1,2})?")
-"""Text that people read as a number."""
 
 _MESSAGES = {
     "int_type": "must be a whole number",
     "float_type": "must be a number",
     "bool_type": "must be true or false",
-    "string_type": "must be text",
+    "string_type": "must be text: put it in quotes",
     "model_type": "must be a mapping of keys to values",
     "Distribution": "must be a distribution, such as {uniform: [1, 2]}",
     "dict_type": "must be a mapping of names to settings",
     "list_type": "must be a list, such as [1, 2]",
     "tuple_type": "must be a list, such as [1, 2, 4]",
-    "too_short": "must have at least one entry",
-    "too_long": "must have at most {max_length} entries",
     "invalid_key": "is not a key: keys are text",
 }
 """Error type of pydantic, or the section that it is not -> message in the terms of YAML."""

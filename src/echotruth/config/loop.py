@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
-from echotruth.section import Positive, Section, check, invalid
+from echotruth.section import Positive, Section, check
 
 Volume = Annotated[FiniteFloat, Field(gt=0, le=1e8)]
 Pressure = Annotated[FiniteFloat, Field(gt=0, le=1e4)]
@@ -73,25 +73,24 @@ class Loop(Section):
 
     @check
     def _ejects(self) -> None:
-        if self.edv_uL is not None and self.esv_uL is not None and self.esv_uL >= self.edv_uL:
-            raise invalid("esv_uL", self.esv_uL, f"must be smaller than edv_uL = {self.edv_uL}")
-        if self.edp_mmHg is not None and self.esp_mmHg is not None and self.esp_mmHg <= self.edp_mmHg:
-            raise invalid("esp_mmHg", self.esp_mmHg, f"must be greater than edp_mmHg = {self.edp_mmHg}")
+        ejects = self.edv_uL is None or self.esv_uL is None or self.esv_uL < self.edv_uL
+        self.require(ejects, "esv_uL", f"must be smaller than edv_uL = {self.edv_uL}")
+        rises = self.edp_mmHg is None or self.esp_mmHg is None or self.esp_mmHg > self.edp_mmHg
+        self.require(rises, "esp_mmHg", f"must be greater than edp_mmHg = {self.edp_mmHg}")
 
     @check
     def _circulates(self) -> None:
-        if self.kind == "circulation" and self.prescribed != "pressure_volume":
+        if self.kind == "circulation":
             remedy = "must be pressure_volume with loop.kind = circulation, which is calibrated on both"
-            raise invalid("prescribed", self.prescribed, remedy)
-        altered = self.circulation.model_dump(exclude_defaults=True)
-        if self.kind == "measured" and altered:
-            remedy = "needs loop.kind = circulation, because a measured loop is followed whatever the circulation"
-            raise invalid(f"circulation.{next(iter(altered))}", next(iter(altered.values())), remedy)
+            self.require(self.prescribed == "pressure_volume", "prescribed", remedy)
+            return
+        remedy = "needs loop.kind = circulation, because a measured loop is followed whatever the circulation"
+        for key in self.circulation.model_dump(exclude_defaults=True):
+            self.require(False, f"circulation.{key}", remedy)
 
     @check
     def _maps_what_it_prescribes(self) -> None:
         for key in ("edv_uL", "esv_uL", "edp_mmHg", "esp_mmHg"):
-            missing = "volume" if key.endswith("uL") else "pressure"
-            value, given = getattr(self, key), {"volume": "pressure", "pressure": "volume"}[missing]
-            if self.prescribed == given and value is not None:
-                raise invalid(key, value, f"must be left out, because loop.prescribed = {given} gives no {missing}")
+            given, missing = ("pressure", "volume") if key.endswith("uL") else ("volume", "pressure")
+            remedy = f"must be left out, because loop.prescribed = {given} gives no {missing}"
+            self.require(self.prescribed != given or getattr(self, key) is None, key, remedy)

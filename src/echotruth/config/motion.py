@@ -5,13 +5,13 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, FiniteFloat
 
-from echotruth.section import Fraction, Section, check, invalid
+from echotruth.section import Fraction, Section, check
 
 Kind = Literal["beat", "rigid", "affine", "tube", "file"]
 TimeCourse = Literal["cosine", "triangle", "ramp"]
 Translation = Annotated[FiniteFloat, Field(ge=-1e5, le=1e5)]
 Rotation = Annotated[FiniteFloat, Field(ge=-180, le=180)]
-FrameNumber = Annotated[int, Field(ge=0)]
+FrameNumber = Annotated[int, Field(ge=0, le=10**9)]
 Row = Annotated[list[Annotated[FiniteFloat, Field(ge=-5, le=5)]], Field(min_length=3, max_length=3)]
 
 _IMAGINARY_TOLERANCE = 1e-6
@@ -46,12 +46,8 @@ class Affine(Section):
         # F = I + a (A - I) becomes singular at some fraction a of the motion if A has a real eigenvalue <= 0.
         values = np.linalg.eigvals(self.gradient)
         smallest = min((value.real for value in values if abs(value.imag) < _IMAGINARY_TOLERANCE), default=1.0)
-        if smallest <= 0:
-            remedy = (
-                f"has the eigenvalue {smallest:.3g} and would flatten the wall during the motion: all real eigenvalues "
-                "must be positive (for a rotation by 180 degrees use rigid)"
-            )
-            raise invalid("gradient", self.gradient, remedy)
+        remedy = f"has the eigenvalue {smallest:.3g} and would flatten the wall: all real ones must be positive"
+        self.require(smallest > 0, "gradient", f"{remedy} (for a rotation by 180 degrees use rigid)")
 
 
 class TubeMotion(Section):
@@ -96,10 +92,9 @@ class FileMotion(Section):
         if self.frames is None:
             return
         first, last = self.frames
-        if last <= first:
-            raise invalid("frames", self.frames, "must be the first and, after it, the last frame of the cycle")
-        if self.ed_frame is not None and not first <= self.ed_frame <= last:
-            raise invalid("ed_frame", self.ed_frame, f"must be one of the frames {first} to {last}")
+        self.require(first < last, "frames", "must be the first and, after it, the last frame of the cycle")
+        is_one = self.ed_frame is None or first <= self.ed_frame <= last
+        self.require(is_one, "ed_frame", f"must be one of the frames {first} to {last}")
 
 
 class Motion(Section):

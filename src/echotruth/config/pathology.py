@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, FiniteFloat
 
 from echotruth.config.regional import Segment, SegmentKey
-from echotruth.section import Fraction, Positive, Section, check, invalid
+from echotruth.section import Fraction, Positive, Section, check
 
 Delay = Annotated[FiniteFloat, Field(ge=0, le=1000)]
 
@@ -33,10 +33,8 @@ class Infarct(Section):
 
     @check
     def _check_region(self) -> None:
-        if self.segments is not None and self.radius_mm is not None:
-            raise invalid("radius_mm", self.radius_mm, "give either segments or radius_mm and set the other to null")
-        if self.segments is not None and len(set(self.segments)) < len(self.segments):
-            raise invalid("segments", self.segments, "list each segment once")
+        is_one = self.segments is None or self.radius_mm is None
+        self.require(is_one, "radius_mm", "give either segments or radius_mm and set the other to null")
 
 
 class LateActivation(Section):
@@ -54,8 +52,8 @@ class LateActivation(Section):
 
     @check
     def _check_delays(self) -> None:
-        if self.preset is not None and self.delay_ms:
-            raise invalid("delay_ms", self.delay_ms, "give either preset or delay_ms and leave the other out")
+        is_one = self.preset is None or not self.delay_ms
+        self.require(is_one, "delay_ms", "give either preset or delay_ms and leave the other out")
 
 
 class Pathology(Section):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional, TypeVar
 from pydantic import Field, FiniteFloat, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from echotruth.config.transducers import ARRAY_PRESETS, PRESET_KEYS, ArrayName, sampling_frequency
-from echotruth.section import Positive, Section, invalid
+from echotruth.section import Positive, Section
 
 T = TypeVar("T")
 if TYPE_CHECKING:
@@ -70,12 +70,8 @@ class Probe(Section):
     @model_validator(mode="after")
     def _check_sampling(self) -> Probe:
         highest = self.frequency_MHz * (1 + self.bandwidth)
-        if self.sampling_MHz < 2 * highest:
-            remedy = (
-                f"its band reaches {highest:g} MHz, above the Nyquist frequency of sampling_MHz = "
-                f"{self.sampling_MHz:g}: lower it, or sample at {2 * highest:g} MHz or more"
-            )
-            raise invalid("frequency_MHz", self.frequency_MHz, remedy)
-        if self.width_um > self.pitch_um:
-            raise invalid("width_um", self.width_um, f"must not exceed pitch_um = {self.pitch_um}")
+        above = f"its band reaches {highest:g} MHz, above the Nyquist frequency of sampling_MHz = {self.sampling_MHz:g}"
+        remedy = f"{above}: lower it, or sample at {2 * highest:g} MHz or more"
+        self.require(self.sampling_MHz >= 2 * highest, "frequency_MHz", remedy)
+        self.require(self.width_um <= self.pitch_um, "width_um", f"must not exceed pitch_um = {self.pitch_um}")
         return self

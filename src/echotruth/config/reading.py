@@ -81,7 +81,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
     try:
         _check_events(text)
         values = yaml.load(text, Loader=_Loader)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:  # a number may be too long for Python
         raise ConfigError(f"{path}{_sentence(error, len(text.splitlines()))}") from None
     if values is None:
         return {}
@@ -187,19 +187,7 @@ class _Loader(_Base):
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
         return values
 
-    def construct_yaml_int(self, node: yaml.Node) -> int:
-        """Whole number of at most 64 bits."""
-        try:
-            value = super().construct_yaml_int(node)
-        except ValueError:
-            value = 2**64  # Python converts no more than some thousand digits.
-        if abs(value) >= 2**64:
-            problem = f"{str(node.value)[:40]!r} is not a valid int: write a plain value"
-            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
-        return value
 
-
-_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
 # Dates, and the << of another mapping, are the text that they are in the file.
 _KINDS = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float"))
 _Loader.yaml_implicit_resolvers = {
@@ -229,24 +217,9 @@ def _check_events(text: str) -> None:
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
 
 
-_REMEDIES = {
-    "start any token": "indent by spaces, not tabs, and put text that begins with a special character in quotes",
-    "another document": "write one document, without a second line of ---",
-    "expected <document start>": "write one document, without a second line of ---",
-    "recursive": "an alias must not lie within its own anchor",
-    "used as a key": "write the name of a key",
-}
-"""Part of the problem that PyYAML tells -> remedy."""
-
-
-def _sentence(error: yaml.YAMLError, lines: int) -> str:
+def _sentence(error: Exception, lines: int) -> str:
     """End of the sentence that begins with the path of a file of so many lines: line, problem and remedy."""
-    if isinstance(error, yaml.reader.ReaderError):
-        return ": holds a control character, which is not text: write plain UTF-8 text"
     mark: yaml.Mark | None = getattr(error, "problem_mark", None)
-    problem: str = getattr(error, "problem", None) or "is not YAML"
-    problem = problem.replace("found unhashable key", "a list or a mapping is used as a key")
+    problem: str = getattr(error, "problem", None) or f"is not YAML ({str(error).partition(chr(10))[0]})"
     line = f", line {min(mark.line + 1, lines)}" if mark else ""
-    if ": " in problem:
-        return f"{line}: {problem}"
-    return f"{line}: {problem}: {next((_REMEDIES[part] for part in _REMEDIES if part in problem), 'correct the YAML')}"
+    return f"{line}: {problem}" if ": " in problem else f"{line}: {problem}: correct the YAML"

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat
 
-from echotruth.section import Section, check, invalid
+from echotruth.section import Section, check
 
 
 def _integer(key: Any) -> Any:
@@ -33,5 +33,5 @@ class Regional(Section):
 
     @check
     def _check_preset(self) -> None:
-        if self.preset is not None and self.contractility:
-            raise invalid("contractility", self.contractility, "give either preset or contractility")
+        is_one = self.preset is None or not self.contractility
+        self.require(is_one, "contractility", "give either preset or contractility")

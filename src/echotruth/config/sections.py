@@ -2,8 +2,8 @@
 
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field, StringConstraints, model_validator
-from pydantic_core import PydanticCustomError
 
 from echotruth.config import amounts
 from echotruth.config.cases import Cases
@@ -56,55 +56,49 @@ class Config(Section):
 
     @check
     def _is_no_store(self) -> None:
-        if self.name.endswith(".zarr"):
-            remedy = f"must not end in .zarr, as the store does, which is out/NAME/NAME.zarr: write {self.name[:-5]}"
-            raise invalid("name", self.name, remedy)
+        remedy = f"must not end in .zarr, as the store does, which is out/NAME/NAME.zarr: write {self.name[:-5]}"
+        self.require(not self.name.endswith(".zarr"), "name", remedy)
 
     @model_validator(mode="before")
     @classmethod
     def _apply_presets(cls, values: Any) -> Any:
         return apply_presets(values) if isinstance(values, dict) else values
 
-    def _refused(self, key: str, remedy: str) -> PydanticCustomError:
-        return invalid(key, value_of(self, key), remedy)
-
     @check
     def _check_lengths(self) -> None:
         side, rf, tracking, largest = self.bmode.field_of_view_mm, self.rf, self.tracking, self.bmode.size_px
         for name, tracker in tracking.trackers.items():
             self._check_tracker(f"tracking.trackers.{name}", tracker)
-        if tracking.frame_step >= self.loop.frames:
-            remedy = f"must be smaller than loop.frames = {self.loop.frames}, so that trackers are given two frames"
-            raise self._refused("tracking.frame_step", remedy)
-        if tracking.grid_px > largest:
-            raise self._refused("tracking.grid_px", f"must not exceed the largest image, {largest} px")
-        if rf.focus_mm >= side:
-            raise self._refused("rf.focus_mm", f"must be smaller than bmode.field_of_view_mm = {side:g}")
-        if rf.focus_mm + rf.focal_half_span_mm >= side:
-            foci = f"its focal_zones = {rf.focal_zones} foci, focal_spacing_mm = {rf.focal_spacing_mm:g} apart"
-            remedy = f"must be smaller than {side - rf.focal_half_span_mm:g}, so that {foci}, lie in the field of view"
-            raise self._refused("rf.focus_mm", remedy)
+        remedy = f"must be smaller than loop.frames = {self.loop.frames}, so that trackers are given two frames"
+        self.require(tracking.frame_step < self.loop.frames, "tracking.frame_step", remedy)
+        self.require(
+            tracking.grid_px <= largest, "tracking.grid_px", f"must not exceed the largest image, {largest} px"
+        )
+        self.require(rf.focus_mm < side, "rf.focus_mm", f"must be smaller than bmode.field_of_view_mm = {side:g}")
+        foci = f"its focal_zones = {rf.focal_zones} foci, focal_spacing_mm = {rf.focal_spacing_mm:g} apart"
+        remedy = f"must be smaller than {side - rf.focal_half_span_mm:g}, so that {foci}, lie in the field of view"
+        self.require(rf.focus_mm + rf.focal_half_span_mm < side, "rf.focus_mm", remedy)
 
     def _check_tracker(self, path: str, tracker: Section) -> None:
         smallest, side = self.bmode.sizes[-1], self.bmode.field_of_view_mm
-        if isinstance(tracker, PhaseCorrelation) and (tracker.window_px or 0) > smallest:
-            raise self._refused(f"{path}.window_px", f"must not exceed the smallest image, {smallest} px")
+        if isinstance(tracker, PhaseCorrelation):
+            remedy = f"must not exceed the smallest image, {smallest} px"
+            self.require((tracker.window_px or 0) <= smallest, f"{path}.window_px", remedy)
         for key in filter(type(tracker).model_fields.__contains__, _TRACKER_LENGTHS):
-            length = getattr(tracker, key)
-            if max(length if isinstance(length, list) else [length or 0]) > side:
-                raise self._refused(f"{path}.{key}", f"must not exceed bmode.field_of_view_mm = {side:g}")
+            lengths = np.ravel(getattr(tracker, key) or 0.0)
+            self.require(lengths.max() <= side, f"{path}.{key}", f"must not exceed bmode.field_of_view_mm = {side:g}")
 
     @check
     def _check_inference(self) -> None:
-        tracker, size, kind = self.inference.tracker, self.inference.size_px, self.motion.kind
-        if tracker is not None and tracker not in self.tracking.trackers:
-            raise self._refused("inference.tracker", f"use one of {', '.join(self.tracking.trackers)}")
-        if tracker is not None and size not in (None, *self.bmode.sizes):
-            sizes = ", ".join(map(str, self.bmode.sizes))
-            raise self._refused("inference.size_px", f"is no image size: use one of {sizes}")
-        if tracker is not None and kind != "beat":
-            remedy = f"needs a loop of pressure and volume, which motion.kind = {kind} has not: leave it out"
-            raise self._refused("inference.tracker", remedy)
+        tracker, kind, sizes = self.inference.tracker, self.motion.kind, self.bmode.sizes
+        if tracker is None:
+            return
+        known = self.tracking.trackers
+        self.require(tracker in known, "inference.tracker", f"use one of {', '.join(known)}")
+        remedy = f"is no image size: use one of {', '.join(map(str, sizes))}"
+        self.require(self.inference.size_px in (None, *sizes), "inference.size_px", remedy)
+        remedy = f"needs a loop of pressure and volume, which motion.kind = {kind} has not: leave it out"
+        self.require(kind == "beat", "inference.tracker", remedy)
 
     @check
     def _check_view_names(self) -> None:
@@ -115,83 +109,75 @@ class Config(Section):
     @check
     def _check_focus(self) -> None:
         radius = 0.0 if self.geometry.file else self.geometry.outer_radius_mm()
-        if self.rf.focus_mm <= radius:
-            remedy = f"must exceed {radius:g}, the radius of the heart, whose axis is at the focus"
-            raise self._refused("rf.focus_mm", remedy)
+        remedy = f"must exceed {radius:g}, the radius of the heart, whose axis is at the focus"
+        self.require(self.rf.focus_mm > radius, "rf.focus_mm", remedy)
 
     @check
     def _check_shape(self) -> None:
-        kind, shape = self.motion.kind, self.geometry.shape
-        if kind == "tube" and shape != "tube":
-            raise self._refused("motion.kind", "needs geometry.shape = tube")
-        if shape == "tube" and kind == "beat":
-            remedy = "has no closed cavity and cannot beat: set motion.kind to rigid, affine or tube"
-            raise self._refused("geometry.shape", remedy)
+        kind, is_tube = self.motion.kind, self.geometry.shape == "tube"
+        self.require(kind != "tube" or is_tube, "motion.kind", "needs geometry.shape = tube")
+        remedy = "has no closed cavity and cannot beat: set motion.kind to rigid, affine or tube"
+        self.require(kind != "beat" or not is_tube, "geometry.shape", remedy)
 
     @check
     def _check_motion_file(self) -> None:
         if self.motion.kind != "file":
             return
-        given = "must be given with motion.kind = file"
-        if self.motion.file.path is None:
-            remedy = f"{given}: the files of the series, such as heart_*.vtu or heart.pvd"
-            raise self._refused("motion.file.path", remedy)
-        if self.geometry.file is None:
-            remedy = f"must be given, because {self.motion.file.path} holds positions and no tetrahedra"
-            raise self._refused("geometry.file", remedy)
-        if self.geometry.remesh:
-            remedy = "must be false with motion.kind = file, because the elements that move are those of the file"
-            raise self._refused("geometry.remesh", remedy)
-        if self.loop.heart_rate_per_min is None:
-            remedy = f"{given}: 60000 over the period in ms, which the series is scaled to"
-            raise self._refused("loop.heart_rate_per_min", remedy)
+        given, path = "must be given with motion.kind = file", self.motion.file.path
+        remedy = f"{given}: the files of the series, such as heart_*.vtu or heart.pvd"
+        self.require(path is not None, "motion.file.path", remedy)
+        remedy = f"must be given, because {path} holds positions and no tetrahedra"
+        self.require(self.geometry.file is not None, "geometry.file", remedy)
+        remedy = "must be false with motion.kind = file, because the elements that move are those of the file"
+        self.require(not self.geometry.remesh, "geometry.remesh", remedy)
+        remedy = f"{given}: 60000 over the period in ms, which the series is scaled to"
+        self.require(self.loop.heart_rate_per_min is not None, "loop.heart_rate_per_min", remedy)
 
     @check
     def _check_tissues(self) -> None:
-        keys = ("blood.level_dB", "surroundings.level_dB", *(f"neighbours.{key}" for key in Neighbours.model_fields))
         reasons = (
             (self.phantom.in_plane_only, "phantom.in_plane_only is true, because it fills a volume"),
             (self.geometry.shape == "tube", "geometry.shape is tube, because an open tube has no closed cavity"),
         )
-        for key in keys:
+        for key in (
+            "blood.level_dB",
+            "surroundings.level_dB",
+            *(f"neighbours.{key}" for key in Neighbours.model_fields),
+        ):
+            level = value_of(self.realism, key)
             for applies, reason in reasons:
-                if applies and value_of(self.realism, key) is not None:
-                    raise self._refused(f"realism.{key}", f"must be null if {reason}")
+                self.require(not applies or level is None, f"realism.{key}", f"must be null if {reason}")
 
     @check
     def _check_neighbours(self) -> None:
+        surrounded = self.realism.surroundings.level_dB is not None
+        remedy = "needs realism.surroundings.level_dB, the echo power of what lies between the neighbours"
         for name, level in self.realism.neighbours.around.items():
-            if level is not None and self.realism.surroundings.level_dB is None:
-                remedy = "needs realism.surroundings.level_dB, the echo power of what lies between the neighbours"
-                raise self._refused(f"realism.neighbours.{name}", remedy)
+            self.require(level is None or surrounded, f"realism.neighbours.{name}", remedy)
 
     @check
     def _check_width(self) -> None:
         length, width = self.probe.elements * self.probe.pitch_um / 1e3, self.rf.width_mm
-        if self.rf.scan == "linear" and width is not None and width > length:
-            raise self._refused("rf.width_mm", f"must not exceed {length:g}, the length of the array")
+        fits = self.rf.scan != "linear" or width is None or width <= length
+        self.require(fits, "rf.width_mm", f"must not exceed {length:g}, the length of the array")
 
     @check
     def _check_fibres(self) -> None:
-        if self.fibres.source == "file" and self.geometry.fibre is None:
-            remedy = "give the name of the array in the mesh file as geometry.fibre, or set this key to rule"
-            raise self._refused("fibres.source", remedy)
+        remedy = "give the name of the array in the mesh file as geometry.fibre, or set this key to rule"
+        self.require(self.fibres.source != "file" or self.geometry.fibre is not None, "fibres.source", remedy)
 
     @check
     def _check_stiffness(self) -> None:
         prescribed, end_diastolic = self.loop.prescribed, self.geometry.given_state == "end_diastole"
         if self.motion.kind != "beat":
             return
-        if self.mechanics.material.stiffness_kPa is None and (end_diastolic or prescribed != "pressure_volume"):
-            remedy = f"must be given, because it cannot be solved for with loop.prescribed = {prescribed}"
-            if prescribed == "pressure_volume":
-                remedy = (
-                    "must be given if geometry.given_state is end_diastole, because the unloaded volume is not known"
-                )
-            raise self._refused("mechanics.material.stiffness_kPa", remedy)
-        if end_diastolic and prescribed == "volume":
-            remedy = "needs geometry.given_state = unloaded, because there is no pressure to unload from"
-            raise self._refused("loop.prescribed", remedy)
+        is_solved = not end_diastolic and prescribed == "pressure_volume"
+        remedy = f"must be given with loop.prescribed = {prescribed} and geometry.given_state = "
+        remedy += f"{self.geometry.given_state}, because it cannot be solved for"
+        is_given = self.mechanics.material.stiffness_kPa is not None
+        self.require(is_given or is_solved, "mechanics.material.stiffness_kPa", remedy)
+        remedy = "needs geometry.given_state = unloaded, because there is no pressure to unload from"
+        self.require(not end_diastolic or prescribed != "volume", "loop.prescribed", remedy)
 
     @check
     def _check_amounts(self) -> None:

@@ -53,8 +53,8 @@ class PhaseCorrelation(Section):
 
     @check
     def _one_window(self) -> None:
-        if (self.window_px is None) == (self.window_mm is None):
-            raise invalid("window_mm", self.window_mm, "give either window_px or window_mm and set the other to null")
+        is_one = (self.window_px is None) != (self.window_mm is None)
+        self.require(is_one, "window_mm", "give either window_px or window_mm and set the other to null")
 
 
 class WindowDeformation(Section):
@@ -174,13 +174,12 @@ class External(Section):
 
     @check
     def _track_or_command(self) -> None:
-        if (self.track is None) == (self.command is None):
-            raise invalid("track", self.track, "give either track or command")
-        if self.track is not None and not _is_callable_name(self.track):
-            raise invalid("track", self.track, "write package.module:function (dots, no path, no .py)")
+        self.require((self.track is None) != (self.command is None), "track", "give either track or command")
+        is_name = self.track is None or _is_callable_name(self.track)
+        self.require(is_name, "track", "write package.module:function (dots, no path, no .py)")
         for file in ("{input}", "{output}") if self.command else ():
-            if not any(file in word for word in self.command or ()):
-                raise invalid("command", self.command, f"must contain {file} where the path of that file belongs")
+            is_there = any(file in word for word in self.command or ())
+            self.require(is_there, "command", f"must contain {file} where the path of that file belongs")
 
     @check
     def _valid_options(self) -> None:

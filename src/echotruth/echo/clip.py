@@ -84,57 +84,46 @@ def read_clip(
         {"image": (("frame", "axial", "lateral"), frames, {"units": "1", "long_name": "grey level"})},
         coords={
             "frame": np.arange(len(frames)),
-            "time": (
-                "frame",
-                time[first:stop] - time[first],
-                {"units": "s", "long_name": "time since the first frame"},
-            ),
+            "time": ("frame", time[first:stop] - time[first], {"units": "s", "long_name": "since the first frame"}),
             "axial": ("axial", axial, {"units": "m", "long_name": "distance from the first row"}),
             "lateral": ("lateral", lateral, {"units": "m", "long_name": "distance from the first column"}),
         },
-        attrs={
-            "source": name,
-            "spacing": spacing,
-            "part": f"from frame {first}, column {left} and row {top} on",
-        },
+        attrs={"source": name, "spacing": spacing, "part": f"from frame {first}, column {left} and row {top} on"},
     )
 
 
 def _time(recording: Recording, frame_time_ms: float | None, name: str) -> Floats:
     """Times (frame,), s."""
     if frame_time_ms is not None:
-        if not STEPS_MS[0] <= frame_time_ms <= STEPS_MS[1]:
-            wanted = _wanted("the time from frame to frame", STEPS_MS, "ms")
-            raise EchoError(f"frame_time_ms = {frame_time_ms:g}: {wanted}")
+        _check_within(STEPS_MS, frame_time_ms, f"frame_time_ms = {frame_time_ms:g}: give a time")
         return np.arange(len(recording.frames), dtype=float) * frame_time_ms * 1e-3
     if not len(recording.time):
         raise EchoError(f"{name}: does not say the time from frame to frame: give frame_time_ms")
     steps = 1e3 * np.diff(recording.time)
     if not (steps > 0).all():
         raise EchoError(f"{name}: has frames of which the times do not increase: give frame_time_ms")
-    for step in (steps.min(initial=STEPS_MS[1]), steps.max(initial=STEPS_MS[0])):
-        if not STEPS_MS[0] <= step <= STEPS_MS[1]:
-            wanted = _wanted("the right one", STEPS_MS, "ms")
-            raise EchoError(f"{name}: has a time from frame to frame of {step:g} ms: {wanted}, as frame_time_ms")
+    for step in steps:
+        _check_within(STEPS_MS, step, f"{name}: has a time from frame to frame of {step:g} ms: give frame_time_ms")
     return recording.time
 
 
-def _wanted(what: str, bounds: tuple[float, float], unit: str) -> str:
-    return f"give {what}, from {bounds[0]:g} to {bounds[1]:g} {unit}"
+def _check_within(bounds: tuple[float, float], value: float, said: str) -> None:
+    """Raise an :class:`EchoError` that says the bounds, ms or mm, if a value is not within them."""
+    if not bounds[0] <= value <= bounds[1]:
+        raise EchoError(f"{said} from {bounds[0]:g} to {bounds[1]:g}")
 
 
 def _spacing(recording: Recording, spacing_mm: float | None, name: str) -> tuple[float, float]:
     """Axial and lateral distance of pixel centres, m."""
     if spacing_mm is not None:
-        if not SIDES_MM[0] <= spacing_mm <= SIDES_MM[1]:
-            raise EchoError(f"spacing_mm = {spacing_mm:g}: {_wanted('the side of a pixel', SIDES_MM, 'mm')}")
+        _check_within(SIDES_MM, spacing_mm, f"spacing_mm = {spacing_mm:g}: give a side")
         return spacing_mm * 1e-3, spacing_mm * 1e-3
     if not recording.spacing or not min(recording.spacing) > 0:
         raise EchoError(f"{name}: does not say the side of its pixels: give spacing_mm")
     axial, lateral = recording.spacing
     sides = f"{name}: has pixels of {1e3 * axial:g} x {1e3 * lateral:g} mm"
-    if not all(SIDES_MM[0] <= 1e3 * side <= SIDES_MM[1] for side in (axial, lateral)):
-        raise EchoError(f"{sides}: {_wanted('their right side', SIDES_MM, 'mm')}, as spacing_mm")
+    for side in recording.spacing:
+        _check_within(SIDES_MM, 1e3 * side, f"{sides}: give spacing_mm")
     if max(axial, lateral) > LARGEST_RATIO * min(axial, lateral):
         raise EchoError(f"{sides}, more than {LARGEST_RATIO:g} to 1: if they are square give spacing_mm")
     return axial, lateral
@@ -149,9 +138,7 @@ def _cycle(recording: Recording, time: Floats, cycle: tuple[int, int] | None, na
         cycle = cycle if cycle[1] - cycle[0] > 1 else (0, frames)
     first, stop = cycle or (0, frames)
     if not 0 <= first < first + 1 < stop <= frames:
-        raise EchoError(
-            f"cycle = {first}, {stop}: {name} has {frames} frames: give two frames or more from 0 to {frames}"
-        )
+        raise EchoError(f"cycle = {first}, {stop}: give two or more of the {frames} frames of {name}")
     return first, stop
 
 

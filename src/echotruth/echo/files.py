@@ -87,11 +87,8 @@ def _pages(path: Path) -> list[NDArray[Any]]:
                 return [_levels(page, path) for page in ImageSequence.Iterator(image)]
         except EchoError:
             raise
-        except (Image.DecompressionBombError, Image.DecompressionBombWarning):
-            what = f"has images of more than {Image.MAX_IMAGE_PIXELS:.1g} pixels, as no echo has"
-            raise EchoError(f"{path}: {what}: make them smaller") from None
-        except Exception:  # Pillow has no common type for what is wrong with a file
-            raise EchoError(f"{path}: is no image that can be read") from None
+        except Exception as error:  # Pillow has no common type for what is wrong with a file
+            raise EchoError(f"{path}: is no image that can be read: {one_line(error)}") from None
 
 
 def _levels(page: Image.Image, path: Path) -> NDArray[Any]:

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+
+from echotruth.report import style
 
 COLOURS = ("#f5b942", "#5ec8d8", "#e0607e")
 """Of the endocardial, middle and epicardial line."""
@@ -91,19 +91,13 @@ def draw(clip: xr.Dataset, strain: xr.Dataset, path: Path) -> None:
     path : Path
         PNG to write.
     """
-    figure = Figure(figsize=(11, 7.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.figure(11, 7.6)
     figure.suptitle(_title(strain), fontsize=10)
     panels = figure.add_gridspec(2, 6, height_ratios=[1.2, 1])
     frames = {"end-diastole": 0, "end-systole": strain.attrs["es_frame"], "last frame": strain.sizes["frame"] - 1}
     for column, (name, frame) in enumerate(frames.items()):
-        _image(
-            figure.add_subplot(panels[0, 2 * column : 2 * column + 2]),
-            clip,
-            strain,
-            frame,
-            f"{name}, {1e3 * float(strain['time'][frame]):.0f} ms",
-        )
+        title = f"{name}, {1e3 * float(strain['time'][frame]):.0f} ms"
+        _image(figure.add_subplot(panels[0, 2 * column : 2 * column + 2]), clip, strain, frame, title)
     table = curves(strain)
     lines, segments = figure.add_subplot(panels[1, :3]), figure.add_subplot(panels[1, 3:])
     _curves(lines, table, [name for name in table if name.startswith(("gcs", "gls"))], strain, COLOURS)
@@ -155,11 +149,5 @@ def _curves(
     if names:
         axis.legend(fontsize=7)
     else:
-        axis.text(
-            0.5,
-            0.5,
-            "no AHA segments: this view or its wall does not tell them",
-            ha="center",
-            fontsize=8,
-            transform=axis.transAxes,
-        )
+        why = "no AHA segments: this view or its wall does not tell them"
+        axis.text(0.5, 0.5, why, ha="center", fontsize=8, transform=axis.transAxes)

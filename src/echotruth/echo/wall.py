@@ -95,9 +95,7 @@ class Wall:
         for name in ("endocardium", "epicardium"):
             points = np.asarray(getattr(self, name), float)
             if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 3 or not np.isfinite(points).all():
-                raise EchoError(
-                    f"{name}: give three points or more, (n, 2) lateral and axial in px, not {points.shape}"
-                )
+                raise EchoError(f"{name}: give three points or more, (n, 2) lateral and axial in px")
             object.__setattr__(self, name, points)
         if self.insertions is not None:
             object.__setattr__(self, "insertions", np.asarray(self.insertions, float).reshape(2, 2))
@@ -337,9 +335,7 @@ def _of_table(file: Path, view: str) -> Wall:
     points = {part: table.loc[table["part"] == part, COLUMNS].to_numpy(float) for part in PARTS}
     given = [len(points[part]) for part in PARTS[2:]]
     if given not in ([0, 0], [1, 1]):
-        raise EchoError(
-            f"{file}: has {given[0]} anterior and {given[1]} inferior insertions: give one of each, or none"
-        )
+        raise EchoError(f"{file}: give one anterior and one inferior insertion, or none")
     insertions = np.concatenate([points[part] for part in PARTS[2:]]) if sum(given) else None
     return Wall(points["endocardium"], points["epicardium"], view, insertions, said(file, "part") or "")
 

@@ -61,8 +61,6 @@ def check_runs(settings: Section) -> None:
             function = load_callable(name)
     except TrackerFailed as error:
         raise EvaluationError(f"--tracker {name} {error}") from error.__cause__
-    if not callable(function):
-        raise EvaluationError(f"--tracker {name}: is no function but a {type(function).__name__}: name a function")
     try:
         inspect.signature(function).bind(*TRACKER_ARGUMENTS, **settings.options)
     except TypeError as error:

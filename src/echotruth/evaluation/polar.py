@@ -27,10 +27,8 @@ def directions(position: np.ndarray, origin: np.ndarray, plane: str) -> np.ndarr
         radius = np.hypot(offset[:, 0], offset[:, 1])
         lateral, axial = (offset / np.where(radius > 0, radius, np.nan)[:, None]).T
         return np.stack([np.stack([lateral, axial], -1), np.stack([axial, -lateral], -1)], -2)
-    if plane == "long_axis":
-        sign, zero = np.where(offset[:, 0] >= 0, 1.0, -1.0), np.zeros(len(offset))
-        return np.stack([np.stack([sign, zero], -1), np.stack([zero, zero + 1], -1)], -2)
-    raise ValueError(f"The plane must be short_axis or long_axis, not {plane}.")
+    sign, zero = np.where(offset[:, 0] >= 0, 1.0, -1.0), np.zeros(len(offset))
+    return np.stack([np.stack([sign, zero], -1), np.stack([zero, zero + 1], -1)], -2)
 
 
 def resolve(vector: np.ndarray, position: np.ndarray, origin: np.ndarray, plane: str) -> np.ndarray:

@@ -128,32 +128,16 @@ def check(observed: xr.Dataset) -> None:
     """
     if not isinstance(observed, xr.Dataset):
         raise TypeError(f"observed = {observed!r:.80}: must be a Dataset: echotruth.observe makes one.")
-    needed = ("value", "covariance", "quantity", "view", "aha")
-    if missing := [name for name in needed if name not in observed]:
-        raise ObservationError(f"observed: has no {missing[0]}: give what echotruth.observe returns")
-    if missing := [name for name in ("config", "case") if name not in observed.attrs]:
-        raise ObservationError(
-            f"observed: has lost its attribute {missing[0]}: keep those that echotruth.observe gave it"
-        )
-    _check_values(observed["value"].values, observed["covariance"].values)
-
-
-def _check_values(value: Floats, covariance: Floats) -> None:
-    """Refuse values (n,) and their covariance (n, n) that are not finite, or of which one has no error."""
+    needed = {"value", "covariance", "quantity", "view", "aha", "pressure", "volume"}
+    if not needed <= set(observed.variables) or "config" not in observed.attrs:
+        raise ObservationError("observed: lacks a variable or an attribute: keep all that echotruth.observe gave it")
+    value, covariance = observed["value"].values, observed["covariance"].values
     if not len(value):
         raise ObservationError("observed: holds no observation: a tracker must have seen one segment at least")
-    chosen = "isel(observation=kept, other=kept)"
-    if covariance.shape != 2 * value.shape:
-        raise ObservationError(
-            f"observed: the covariance is {covariance.shape} of {len(value)} values: choose by {chosen}"
-        )
-    if not np.isfinite(value).all():
-        row = int(np.argmax(~np.isfinite(value)))
-        raise ObservationError(f"observed: value {row} is not finite: leave it out by {chosen}")
-    if not (np.isfinite(covariance).all() and np.allclose(covariance, covariance.T)):
-        raise ObservationError("observed: the covariance is not finite and symmetric")
-    if not np.linalg.eigvalsh(covariance)[0] > 0:
-        raise ObservationError("observed: the covariance is not positive definite: each value needs an error")
+    usable = covariance.shape == 2 * value.shape and np.isfinite(value).all() and np.isfinite(covariance).all()
+    if not (usable and np.allclose(covariance, covariance.T) and np.linalg.eigvalsh(covariance)[0] > 0):
+        remedy = "leave observations out by isel(observation=kept, other=kept)"
+        raise ObservationError(f"observed: needs finite values with a positive definite covariance: {remedy}")
 
 
 def _dataset(observed: xr.Dataset, every: Modes, segments: SegmentMeans) -> xr.Dataset:

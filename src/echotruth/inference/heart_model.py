@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from echotruth.arrays import Floats
@@ -87,8 +87,6 @@ def elements(config: Config) -> tuple[int, int, int]:
 def _measured(observed: xr.Dataset, given: Config, folder: Path) -> Loop:
     """Measured loop of the pressure and the volume that were observed, with the four values that have errors."""
     name = f"the loop of {observed.attrs['case']}"
-    if missing := [curve for curve in ("pressure", "volume") if curve not in observed]:
-        raise ObservationError(f"{name}: has no {missing[0]}: both are needed to know the tension of the muscle")
     pressure, volume = (observed[curve].values.astype(float) for curve in ("pressure", "volume"))
     if not (np.isfinite(pressure).all() and np.isfinite(volume).all()):
         raise ObservationError(f"{name}: a pressure or volume is not finite: give all frames of a cycle")
@@ -117,10 +115,8 @@ def _write_loop(path: Path, period: float, pressure: Floats, volume: Floats) -> 
     end = int(np.argmin(volume))
     pressure = np.where(np.arange(frames) > end, np.maximum(pressure, 1e-2 * pressure[0]), pressure)
     columns = [period * np.arange(frames + 1) / frames, *(np.append(curve, curve[0]) for curve in (pressure, volume))]
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["time_s", "pressure_Pa", "volume_m3"])
-        writer.writerows(np.column_stack(columns).tolist())
+    names = ("time_s", "pressure_Pa", "volume_m3")
+    pd.DataFrame(dict(zip(names, columns, strict=True))).to_csv(path, index=False)
 
 
 def with_scar(config: Config, scarred: Sequence[int]) -> Config:

@@ -120,21 +120,20 @@ def check_prior(given: Given) -> None:
             others = [name for name in LIMITS if not name.startswith((CONTRACTILITY, STIFFNESS))]
             shown = ", ".join([f"{CONTRACTILITY}.N", f"{STIFFNESS}.N", *others])
             raise PriorError(f"prior: {key} is not inferred: the keys are {shown}")
-        if pair is not None:
-            _check_pair(key, pair, FACTOR_LIMITS if of_all else LIMITS[key])
+        low, high = FACTOR_LIMITS if of_all else LIMITS[key]
+        if pair is not None and not _is_prior(pair, low, high):
+            remedy = f"a mean from {low:g} to {high:g} and a positive standard deviation of at most their difference"
+            raise PriorError(f"prior: {key} = {pair!r}: give {remedy}, or None")
     if all(given.get(_named(key, given), True) is None for key in LIMITS):
         raise PriorError("prior: leaves nothing to infer: give a mean and a standard deviation of one key")
 
 
-def _check_pair(key: str, pair: Sequence[float], limits: tuple[float, float]) -> None:
+def _is_prior(pair: Sequence[float], low: float, high: float) -> bool:
     try:
         mean, sd = (float(number) for number in pair)
     except (TypeError, ValueError):
-        raise PriorError(f"prior: {key} = {pair!r}: give a mean and a standard deviation, or None") from None
-    low, high = limits
-    if not (low <= mean <= high and np.isfinite(mean) and 0 < sd <= high - low and np.isfinite(sd)):
-        remedy = f"give a mean from {low:g} to {high:g} and a positive standard deviation of at most their difference"
-        raise PriorError(f"prior: {key} = ({mean:g}, {sd:g}): {remedy}")
+        return False
+    return low <= mean <= high and bool(np.isfinite([mean, sd]).all()) and 0 < sd <= high - low
 
 
 def _named(key: str, given: Given) -> str:

@@ -1,8 +1,6 @@
 """Table of the cases of a repository, with what is known of each heart."""
 
-import re
 from concurrent.futures import ThreadPoolExecutor
-from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 
@@ -75,22 +73,6 @@ def _selected(found: pd.DataFrame, parameters: pd.DataFrame, query: str) -> pd.I
     try:
         return known.query(query).index
     except Exception as error:  # pandas, its parser and its engine have many kinds
-        raise ValueError(f"query = {query!r}: {_reason(error, query, list(known))}") from None
-
-
-def _reason(error: Exception, query: str, columns: list[str]) -> str:
-    """Why a query cannot be evaluated, and what would be right."""
-    match = re.search(r"name '(.+?)' is not defined", str(error))
-    if match is None:
-        if re.search(r"(?<![=!<>])=(?!=)", query):
-            return "has a single =: compare by ==."
-        said = re.sub(r" \(<unknown>.*", "", " ".join(str(error).split()))[:200].rstrip(".") or type(error).__name__
-        return f"cannot be evaluated ({said}): write it as status == 'complete' and `fibres.endo_deg` > 60."
-    name = match[1].replace("BACKTICK_QUOTED_STRING_", "").replace("_DOT_", ".")
-    # Without backticks, a name ends for pandas before its first dot.
-    whole = next((word for word in re.findall(r"[\w.]+", query) if word == name or word.startswith(f"{name}.")), name)
-    if whole in columns:
-        return f"{whole} has a dot: write it in backticks, as `{whole}`."
-    close = get_close_matches(whole, columns, n=1)
-    remedy = f"did you mean {close[0]}?" if close else "echotruth.learning.cases lists them."
-    return f"{whole} is not a column: {remedy}"
+        said = " ".join(str(error).split()) or type(error).__name__
+        remedy = "write it as status == 'complete' and `fibres.endo_deg` > 60, with columns of echotruth.learning.cases"
+        raise ValueError(f"query = {query!r}: cannot be evaluated ({said}): {remedy}") from None

@@ -59,22 +59,10 @@ def check_whole(clip: xr.Dataset, config: Config) -> None:
     ValueError
         With the coordinate that is not that of the image.
     """
-    if clip.sizes["frame"] != config.loop.frames:
-        number = f"{clip.sizes['frame']} of {config.loop.frames} frames"
-        raise ValueError(f"The clip has {number}: track a whole cycle.")
-    sizes = clip.sizes["axial"], clip.sizes["lateral"]
-    if sizes[0] != sizes[1] or sizes[0] not in config.bmode.sizes:
-        known = ", ".join(f"{size} x {size}" for size in config.bmode.sizes)
-        raise ValueError(f"The clip has {sizes[0]} x {sizes[1]} pixels: give the whole image, {known}.")
-    axial, lateral = pixel_centres(config.bmode, sizes[0])
-    whole = {
-        "frame": np.arange(config.loop.frames),
-        "time": frame_times(config.loop),
-        "axial": axial,
-        "lateral": lateral,
-    }
-    for name, values in whole.items():
+    size = clip.sizes["axial"]
+    axial, lateral = pixel_centres(config.bmode, size if size in config.bmode.sizes else config.bmode.sizes[0])
+    frame, time = np.arange(config.loop.frames), frame_times(config.loop)
+    for name, values in {"frame": frame, "time": time, "axial": axial, "lateral": lateral}.items():
         found = np.asarray(clip[name].values, float)
-        if not np.allclose(found, values, rtol=1e-6, atol=1e-12):
-            order = "reversed" if np.allclose(found[::-1], values, rtol=1e-6, atol=1e-12) else "not that of its image"
-            raise ValueError(f"The clip's {name} is {order}: give all frames and pixels, in the order of its image.")
+        if found.shape != values.shape or not np.allclose(found, values, rtol=1e-6, atol=1e-12):
+            raise ValueError(f"The clip's {name} is not that of its image: give all frames and pixels, in their order.")

@@ -18,9 +18,6 @@ from echotruth.repository.reader import Repository
 LISTED = 20
 """Largest number of failures of a kind that are listed."""
 
-MAX_FILES = 200_000
-"""Files up to which the size of a repository is measured."""
-
 
 def imaged(repository: Repository) -> int:
     """Number of hearts of which there are images."""
@@ -29,9 +26,8 @@ def imaged(repository: Repository) -> int:
 
 
 def size_on_disk(store: Path) -> int:
-    """Bytes of the files of a store; 0 if there are too many to look at each."""
-    paths = list(islice(store.rglob("*"), MAX_FILES + 1))
-    return sum(path.stat().st_size for path in paths if path.is_file()) if len(paths) <= MAX_FILES else 0
+    """Bytes of the files of a store."""
+    return sum(path.stat().st_size for path in store.rglob("*") if path.is_file())
 
 
 def failures(repository: Repository) -> dict[str, Any]:

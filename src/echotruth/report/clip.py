@@ -19,8 +19,6 @@ MOTION = "#ffb000"
 
 MAX_GIF_BYTES = 3_000_000
 """Size that a GIF should not exceed, bytes."""
-GREY_SPREAD = 6
-"""Largest difference of red, green and blue of a pixel that counts as grey."""
 
 FRAME_RATE = 20
 """Frames per second of the animation, which is in slow motion."""
@@ -181,7 +179,7 @@ def round_length(side: float) -> float:
 
 
 def gif(path: Path, frames: np.ndarray) -> Path:
-    """Write a looping GIF with as many colours as its size allows; grey pixels stay grey.
+    """Write a looping GIF with as many colours as its size allows.
 
     Parameters
     ----------
@@ -193,34 +191,14 @@ def gif(path: Path, frames: np.ndarray) -> Path:
     -------
     Path
     """
-    for colours in (64, 40, 28, 20, 14):
-        pictures = _with_palette(frames, colours)
-        duration = round(1000 / FRAME_RATE)
-        pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=duration, loop=0, optimize=False)
+    sampled = Image.fromarray(frames[:: max(1, len(frames) // 8)].reshape(-1, *frames.shape[2:]))
+    for colours in (64, 32, 16, 8):
+        palette = sampled.quantize(colours, Image.Quantize.FASTOCTREE)
+        first, *others = (Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE) for one in frames)
+        first.save(path, save_all=True, append_images=others, duration=1000 // FRAME_RATE, loop=0, optimize=False)
         if path.stat().st_size <= MAX_GIF_BYTES:
             break
     return path
-
-
-def _with_palette(frames: np.ndarray, colours: int) -> list[Image.Image]:
-    """Frames (frame, height, width, 3) in a palette, of which a quarter is for what is drawn in colour."""
-    sampled = frames.reshape(-1, *frames.shape[2:])[:: max(1, len(frames) // 8)]
-    is_grey = np.ptp(sampled, axis=-1) <= GREY_SPREAD
-    greys = np.linspace(0, 255, colours)
-    if is_grey.any():
-        greys = np.unique(np.quantile(sampled[is_grey].mean(-1), np.linspace(0, 1, colours - colours // 4)).round())
-    drawn = sampled[~is_grey] if not is_grey.all() else np.zeros((1, 3), np.uint8)
-    of_colours = Image.fromarray(drawn[None]).quantize(max(2, colours // 4))
-    palette = [*np.repeat(greys.astype(int), 3).tolist(), *(of_colours.getpalette() or [])]
-    pictures = []
-    for frame in frames:
-        nearest = np.searchsorted((greys[1:] + greys[:-1]) / 2, frame.mean(-1))
-        coloured = np.asarray(Image.fromarray(frame).quantize(palette=of_colours, dither=Image.Dither.NONE))
-        index = np.where(np.ptp(frame, axis=-1) <= GREY_SPREAD, nearest, len(greys) + coloured)
-        picture = Image.fromarray(index.astype(np.uint8), "P")
-        picture.putpalette(palette[: 3 * 256])
-        pictures.append(picture)
-    return pictures
 
 
 def mp4(path: Path, frames: np.ndarray) -> Path:

@@ -11,12 +11,13 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
+from echotruth.aha import SEGMENT_NAMES
 from echotruth.cases import Case
 from echotruth.config import View
 from echotruth.evaluation.curves import twist_of, twist_views
 from echotruth.report import style
 from echotruth.report.bullseye import Segments
-from echotruth.report.curves import Panel, segment_title
+from echotruth.report.curves import Panel
 from echotruth.repository.reader import Repository
 
 FACTORS = {"%": 100.0, "deg": np.degrees(1)}
@@ -110,10 +111,10 @@ class Comparison:
         """
         data, chosen = self.curves[view][tracker], {"measure": "engineering", "wall_component": "TT"}
         known = data["true_segment_strain"].sel(chosen).notnull().any("frame").values
-        panels: list[Panel | None] = [
-            _panel(segment_title(number), "%", {tracker: data}, "segment_strain", chosen | {"aha": number})
-            for number in data.aha.values[known].tolist()
-        ]
+        panels: list[Panel | None] = []
+        for number in data.aha.values[known].tolist():
+            title, place = f"{number} {SEGMENT_NAMES[number - 1]}", chosen | {"aha": number}
+            panels.append(_panel(title, "%", {tracker: data}, "segment_strain", place))
         panels += [None] * (-len(panels) % 3)
         return [panels[k : k + 3] for k in range(0, len(panels), 3)]
 

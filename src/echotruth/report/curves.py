@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from echotruth.aha import SEGMENT_NAMES
 from echotruth.report import style
 
 ROOM = 0.6
@@ -93,18 +92,3 @@ def _legend(figure: Figure, trackers: Sequence[str]) -> None:
         lines.append(Line2D([], [], color=style.series_colour(number), linewidth=1.3, label=name))
     lines += [Line2D([], [], color=style.MUTED, linewidth=0.9, linestyle=":", label="ES")]
     style.legend_below(figure, lines)
-
-
-def segment_title(number: int) -> str:
-    """Title of a segment: its number and its name.
-
-    Parameters
-    ----------
-    number : int
-        1..17.
-
-    Returns
-    -------
-    str
-    """
-    return f"{number} {SEGMENT_NAMES[number - 1]}"

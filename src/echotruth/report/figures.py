@@ -27,8 +27,6 @@ from echotruth.report import (
     loop,
     physiology,
     population,
-    posterior,
-    resolutions,
     strain,
     style,
     views,
@@ -43,15 +41,12 @@ from echotruth.repository.schema import LABELS, observations
 
 NAMES = (
     *("loop", "strain", "physiology", "population", "curves", "segments", "bullseye", "error", "leaderboard"),
-    *("heart", "clip", "resolutions", "views"),
+    *("heart", "clip", "views"),
 )
 """Figures, in the order in which they are drawn."""
 
-INFERRED = ("inference", "posterior")
-"""Those that follow if a tracker is named to infer from."""
-
 NONE_INFERRED = "Nothing was inferred of any heart. The reasons are in the report."
-"""In place of them."""
+"""In place of the figure of what was inferred."""
 
 NONE_COMPLETE = "No heart is complete, so that there is nothing to show. The reasons are in the report."
 """In place of figures."""
@@ -81,7 +76,7 @@ class Figures:
         infers = self.config.inference.tracker is not None
         if infers:
             inferred.write(self.repository.folder / inferred.FILE, self.inferred)
-        for name in (*NAMES, *INFERRED) if infers else NAMES:
+        for name in (*NAMES, "inference") if infers else NAMES:
             figure = getattr(self, name)() if self.case else style.sentence(NONE_COMPLETE)
             if figure is not None:
                 style.save(figure, self.folder / name)
@@ -153,11 +148,6 @@ class Figures:
         clip.gif(self.folder / "clip.gif", clip.render(overlaid, 400))
         clip.mp4(self.folder / "clip.mp4", clip.render(overlaid, 720))
 
-    def resolutions(self) -> Figure:
-        """One frame at every image size."""
-        frames = [self.group(f"bmode/{size}", self.view)["image"][0] for size in self.sizes]
-        return resolutions.draw(frames, self.config.bmode.si().field_of_view)
-
     def views(self) -> Figure:
         """Every view at end-diastole and end-systole."""
         pictures = {}
@@ -206,26 +196,10 @@ class Figures:
         if not case:
             return style.sentence(NONE_INFERRED)
         fit = self.repository.arrays("inference/fit", case)
-        groups = {
-            name: self.repository.arrays(f"inference/{name}", case) for name in ("observed_data", "constant_data")
-        }
-        seen = groups["observed_data"]["value"], groups["constant_data"]["covariance"]
-        true = groups["constant_data"]["true_value"]
-        return inference.draw(fit, inference.Seen(observations(self.config), *seen, true, fit["predicted"]))
-
-    def posterior(self) -> Figure:
-        """What was learned of the parameters of that heart together."""
-        case = inferred.shown(self.repository, self.inferred)
-        if not case:
-            return style.sentence(NONE_INFERRED)
-        fit = self.repository.arrays("inference/fit", case)
-        names = posterior.chosen(fit)
-        at = [LABELS["parameter"].index(name) for name in names]
-        after, before = (
-            self.repository.arrays(f"inference/{name}", case)["value"][0][:, at].astype(float)
-            for name in ("posterior", "prior")
-        )
-        return posterior.draw(names, after, before, fit["true"][at])
+        observed = self.repository.arrays("inference/observed_data", case)
+        constant = self.repository.arrays("inference/constant_data", case)
+        seen = observed["value"], constant["covariance"], constant["true_value"], fit["predicted"]
+        return inference.draw(fit, inference.Seen(observations(self.config), *seen))
 
     def bullseye(self) -> Figure:
         """Strain of the segments at end-systole, true and of the best tracker."""

@@ -1,33 +1,28 @@
 """The heart in three dimensions: fibres and circumferential strain, unloaded, at end-diastole and at end-systole."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pyvista
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from echotruth.fem.tetrahedra import shape
 from echotruth.mechanics.fibres import CENTROID
 from echotruth.report import style
-from echotruth.report.raster import Camera, Surface, render
 
-VIEWPOINT = (-0.75, 1.6, 0.75)
-"""Direction to the eye in the heart frame: anterior and somewhat above, the septum on the left."""
+ELEVATION, AZIMUTH = 23.0, 115.0
+"""Direction to the eye in the heart frame, degrees: anterior and somewhat above, the septum on the left."""
 
-PIXELS = (490, 760)
-"""Width and height of the picture of one heart, px."""
-
-WALL_OPACITY = 0.12
-"""Opacity of the wall in front of its fibres."""
+AMBIENT = 0.42
+"""Fraction of the light that is ambient; the rest comes from the eye."""
 
 GROUND = 0.62
 """Brightness of the wall between its fibres, over theirs."""
-
-MARGIN = 1.03
-"""Half the width of a picture over that of the heart, at least."""
 
 ROD_LENGTH = 0.075
 """Length of the rods that show fibres, over that of the heart."""
@@ -72,17 +67,16 @@ def draw(cells: np.ndarray, helix: np.ndarray, states: Sequence[State]) -> Figur
     states = [State(s.name, np.nan_to_num(s.nodes), s.fibre[real], s.strain[real]) for s in states]
     limit = max(100 * float(np.nanmax(np.abs([state.strain for state in states]))), 0.1)
     scales = ScalarMappable(Normalize(-90, 90), "turbo"), ScalarMappable(Normalize(-limit, limit), "RdBu_r")
-    camera = _camera(states)
     figure = style.figure(8.6, 7.6)
-    panels = figure.subplots(2, len(states), squeeze=False)
+    panels = figure.subplots(2, len(states), squeeze=False, subplot_kw={"projection": "3d", "computed_zorder": False})
     for column, state in zip(panels.T, states, strict=True):
         wall = _cut(_grid(state.nodes, cells, {"strain": 100 * state.strain, "helix": np.degrees(helix)}))
-        rods = _coloured(_rods(state, cells, helix), scales[0], "helix")
-        column[0].imshow(_on_wall(rods, _coloured(wall, scales[0], "helix"), camera))
-        column[1].imshow(_rgba(*render(_coloured(wall, scales[1], "strain"), camera)))
-        column[0].set_title(state.name)
-    for panel in panels.flat:
-        panel.axis("off")
+        add(column[0], wall, GROUND * scales[0].to_rgba(wall.point_data["helix"])[:, :3])
+        rods = _rods(state, cells, helix)
+        add(column[0], rods, scales[0].to_rgba(rods.point_data["helix"])[:, :3])
+        add(column[1], wall, scales[1].to_rgba(wall.point_data["strain"])[:, :3])
+        column[0].set_title(state.name, y=1.25)
+    show(panels.flat, np.concatenate([state.nodes for state in states]))
     labels = "Helix angle (°)", "Circumferential strain $E_{CC}$\nfrom unloaded (%)"
     for row, scale, label in zip(panels, scales, labels, strict=True):
         figure.colorbar(scale, ax=row, shrink=0.75, aspect=25).set_label(label)
@@ -97,11 +91,11 @@ def _grid(nodes: np.ndarray, cells: np.ndarray, values: dict[str, np.ndarray]) -
 
 
 def _cut(grid: pyvista.UnstructuredGrid) -> pyvista.PolyData:
-    """Surface of the wall without the anterior lateral quarter, with sharp edges."""
+    """Surface of the wall without the anterior lateral quarter."""
     anterior_septal = grid.clip("y", origin=(0, 0, 0), invert=False).clip("-x", origin=(0, 0, 0))
     remaining = grid.clip("y", origin=(0, 0, 0)) + anterior_septal
     surface = remaining.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2).triangulate()
-    return surface.compute_normals(cell_normals=False, split_vertices=True, feature_angle=40)
+    return surface.subdivide_adaptive(max_edge_len=surface.length / 40)  # small triangles can be sorted by their depth
 
 
 def _rods(state: State, cells: np.ndarray, helix: np.ndarray) -> pyvista.PolyData:
@@ -113,42 +107,31 @@ def _rods(state: State, cells: np.ndarray, helix: np.ndarray) -> pyvista.PolyDat
     points["helix"] = np.degrees(helix[shown])
     rod = pyvista.Cylinder(radius=0.055, height=1.0, resolution=6)
     length = ROD_LENGTH * np.ptp(state.nodes[:, 2])
-    rods = points.glyph(orient="direction", scale=False, factor=length, geom=rod)
-    return rods.triangulate().compute_normals(cell_normals=False, split_vertices=True, feature_angle=70)
+    return points.glyph(orient="direction", scale=False, factor=length, geom=rod).triangulate()
 
 
-def _coloured(mesh: pyvista.PolyData, scale: ScalarMappable, name: str) -> Surface:
-    colours = scale.to_rgba(np.asarray(mesh.point_data[name]))[:, :3]
-    triangles = mesh.faces.reshape(-1, 4)[:, 1:]
-    return Surface(np.asarray(mesh.points, float), np.asarray(mesh.point_data["Normals"], float), triangles, colours)
+def show(panels: Iterable[Axes3D], nodes: np.ndarray) -> None:
+    """Show what is within the bounds of nodes (n, 3), m, on one scale from one direction."""
+    low, high = 1e3 * nodes.min(0), 1e3 * nodes.max(0)
+    for panel in panels:
+        panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        panel.set_proj_type("ortho")
+        panel.set_box_aspect(high - low, zoom=1.5)
+        panel.view_init(ELEVATION, AZIMUTH)
+        panel.axis("off")
 
 
-def _camera(states: Sequence[State]) -> Camera:
-    """One camera for all pictures, so that they share a scale."""
-    nodes = np.concatenate([state.nodes for state in states])
-    low, high = nodes.min(0), nodes.max(0)
-    half_height = 0.5 * float(high[2] - low[2]) + 0.17 * float(high[0] - low[0])
-    camera = Camera(np.array(VIEWPOINT), (low + high) / 2, half_height, PIXELS)
-    # A wide heart would be cut off at the sides.
-    half_width = MARGIN * float(np.abs((nodes - camera.centre) @ camera.axes[0]).max())
-    return replace(camera, half_height=max(half_height, half_width * PIXELS[1] / PIXELS[0]))
-
-
-def _on_wall(rods: Surface, wall: Surface, camera: Camera) -> np.ndarray:
-    """Rods before the wall, which fills the gaps between them: RGBA.
-
-    The wall is darker than its rods, so that these are told from it. A thin grey haze, where the wall lies before its
-    rods, shows its edges.
-    """
-    colour, alpha = render(replace(wall, colours=GROUND * wall.colours), camera)
-    rod_colour, rod_alpha = render(rods, camera)
-    rod_alpha = rod_alpha * (alpha > 0)  # rods of quadratic cells end a little outside
-    joined = rod_colour * (rod_alpha > 0)[..., None] + (1 - rod_alpha)[..., None] * colour
-    haze = render(replace(wall, colours=np.full_like(wall.colours, 0.75)), camera)[0]
-    return _rgba((1 - WALL_OPACITY) * joined + WALL_OPACITY * haze, alpha)
-
-
-def _rgba(colour: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """Picture of colours that are multiplied by their opacity."""
-    plain = colour / np.maximum(alpha, 1e-6)[..., None]
-    return np.dstack([plain, alpha]).clip(0, 1)
+def add(axes: Axes3D, mesh: pyvista.PolyData, colours: np.ndarray) -> None:
+    """Add triangles with the colours (point, 3), RGB, of their corners, lit from the eye: a + (1 - a) |n . e|."""
+    corners = mesh.faces.reshape(-1, 4)[:, 1:]
+    triangles = 1e3 * np.asarray(mesh.points, float)[corners]
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    up, turn = np.radians([ELEVATION, AZIMUTH])
+    eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+    area = np.linalg.norm(normal, axis=1)
+    kept = area > 1e-3 * area.mean()  # slivers of the cut have no direction
+    light = AMBIENT + (1 - AMBIENT) * np.abs(normal @ eye)[kept] / area[kept]
+    lit = light[:, None] * colours[corners[kept]].mean(axis=1)
+    surface = Poly3DCollection(triangles[kept], facecolors=lit, edgecolors=lit, linewidths=0.3, clip_on=False)
+    surface.set_rasterized(True)  # thousands of triangles would make a large SVG
+    axes.add_collection3d(surface)

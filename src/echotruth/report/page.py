@@ -1,6 +1,5 @@
 """Page of a repository: one file with figures, playing clips, tables and provenance, which needs no network."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +67,7 @@ def _context(repository: Repository) -> dict[str, Any]:
         "best": comparison.trackers[0] if comparison else "",
         "main_view": view,
         "strain_limit": STRAIN_LIMIT,
-        "clips": _json(clips(comparison)) if comparison else "",
+        "clips": clips(comparison) if comparison else None,
         "tally": {name: cases[name].value_counts().sort_index().to_dict() for name in ("status", "diagnosis")},
         "measures": list(MEASURES),
         "hearts": subjects(repository, view, config.bmode.sizes[-1]) if shown else [],
@@ -78,8 +77,3 @@ def _context(repository: Repository) -> dict[str, Any]:
         "configuration": (folder / "config.yaml").read_text(encoding="utf-8"),
         "paper": shipped.citation()["preferred-citation"],
     }
-
-
-def _json(values: dict[str, Any]) -> Markup:
-    """JSON that may stand in a page: no text in it ends the element that holds it."""
-    return Markup(json.dumps(values, separators=(",", ":"), sort_keys=True, allow_nan=False).replace("<", "\\u003c"))

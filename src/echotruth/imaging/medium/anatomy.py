@@ -83,7 +83,7 @@ class Place:
 
 
 class Anatomy:
-    """What lies around the left ventricle in a frame.
+    """What lies around the left ventricle at end-diastole.
 
     Attributes
     ----------
@@ -100,20 +100,15 @@ class Anatomy:
     ----------
     heart : Heart
         With the facets of its epicardium, in `arrays`.
-    frame : int, optional
-    emptied : float, optional
-        Share of the stroke volume that is ejected in the frame (:func:`echotruth.imaging.medium.filling.emptied`).
     """
 
-    def __init__(self, heart: Heart, frame: int = 0, emptied: float = 0.0) -> None:
-        self._facets = heart.arrays["geometry"]["epi"]
-        self._nodes, self._start = heart.positions(frame), heart.positions(0)
-        self._shortening = RIGHT_SHORTENING * emptied
+    def __init__(self, heart: Heart) -> None:
+        self._facets, self._nodes = heart.arrays["geometry"]["epi"], heart.positions(0)
         self.base, self.inner_radius = rim(self._nodes, heart.endo)
-        top, outer_radius = rim(self._start, self._facets)
-        self.radius = float(_radius(self._start[self._facets.ravel()], top).max())
-        self.roof = rim(self._start, heart.endo)[0][2] + ATRIAL_HEIGHT * self.radius
-        self._septal_radius = outer_radius + RIGHT_WIDTH * self.radius * (1 - self._shortening)
+        top, outer_radius = rim(self._nodes, self._facets)
+        self.radius = float(_radius(self._nodes[self._facets.ravel()], top).max())
+        self.roof = self.base[2] + ATRIAL_HEIGHT * self.radius
+        self._septal_radius = outer_radius + RIGHT_WIDTH * self.radius
 
     @cached_property
     def _epicardium(self):
@@ -133,7 +128,7 @@ class Anatomy:
         return Place(
             distance,
             (position - nearest) / np.maximum(distance, 1e-12)[:, None],
-            RIGHT_WIDTH * self.radius * (1 - self._shortening) * width,
+            RIGHT_WIDTH * self.radius * width,
             RIGHT_WALL * self.radius * np.minimum(1, 4 * width),
             position[:, 2] - self.base[2],
         )
