@@ -29,7 +29,7 @@ def at(beside, depth):
     return np.stack([np.zeros_like(beside), np.full_like(beside, depth), beside], axis=1)
 
 
-@pytest.mark.parametrize("depth", [1.1e-3, 6.5e-3])
+@pytest.mark.parametrize("depth", [1.1e-3, 3.7e-3, 6.5e-3, 12e-3])
 def test_table_holds_the_integral_once_its_delay_is_put_back(lens, band, depth):
     row = np.abs(lens.curvature - 1 / depth).argmin()
     columns = np.arange(0, 60, 7)
@@ -70,10 +70,10 @@ def test_log_derivative_is_the_change_of_the_integral_with_range(lens, band):
 def test_scatterers_far_beside_the_plane_are_out_of_the_beam_and_those_in_it_take_one_block(lens):
     beside = at(np.array([0.0, 6e-3, -7e-3]), 6.5e-3)
     assert lens.in_beam(beside).tolist() == [True, False, False]
-    assert lens.blocks_at(lens.lens_terms(beside[:1], 1540.0)[0]).tolist() == [[1]]
+    assert lens.blocks_at(lens.lens_terms(beside[:1], 1540.0)[0]).tolist() == [1]
 
 
-@pytest.mark.parametrize("depth", [3e-3, 10e-3])
+@pytest.mark.parametrize("depth", [3e-3, 5e-3, 6.5e-3, 10e-3])
 def test_echoes_beyond_the_edge_of_the_beam_have_the_energy_that_may_be_left_out(lens, band, depth):
     """Summed over evenly spread elevations with the integral itself, a nearer tail than the tables'."""
     edge = depth * np.interp(1 / depth, lens.curvature, lens.edge_slope)
@@ -87,3 +87,17 @@ def test_either_side_of_the_plane_is_alike(lens):
     beside = np.linspace(0, 1e-3, 50)
     one, other = (lens.lens_terms(at(side * beside, 5e-3), 1540.0) for side in (1, -1))
     np.testing.assert_array_equal(one[0], other[0])
+
+
+def test_it_is_looked_up_between_the_least_and_the_greatest_curvature(lens):
+    half, lateral = 31.5 * Probe().si().pitch, np.array([0.0, 1e-3, -3e-3])
+    _, terms = lens.lens_terms(np.stack([lateral, np.full(3, 5e-3), np.zeros(3)], axis=1), 1540.0)
+    elements = np.linspace(-half, half, 20001)
+    curvature = 1 / np.hypot(lateral[:, None] - elements, 5e-3)
+    np.testing.assert_allclose(terms[:, 0], (curvature.min(axis=1) + curvature.max(axis=1)) / 2, rtol=1e-6)
+
+
+def test_echoes_from_near_the_array_or_far_beside_its_plane_are_not_spread(lens):
+    aside = np.array([3e-3, 0.0, 0.0])
+    assert lens.spreads(at(np.array([0.0, 0.2e-3, 1.4e-3]), 6.5e-3) + aside).tolist() == [True, True, False]
+    assert not lens.spreads(at(np.array([0.0]), 2e-3)).any()

@@ -30,10 +30,10 @@ def traces(scene):
     engine, position, amplitude = scene
     angle = engine._angle_index(position)
     propagation = np.zeros((30, 12), np.int32), *np.zeros((3, 30, 12), np.float32)
-    array = engine.centres, np.zeros(12, int), engine._scales, engine._directivity
-    spreading.one_way(position, engine._mean_exponent[angle], np.empty((0, 1, 4)), array, propagation)
+    array = engine.centres, engine._scales, engine._directivity
+    spreading.one_way(position, engine._mean_exponent[angle], np.empty((0, 4)), array, propagation)
     time, weight, exponent = propagation[0] / 2.0**spreading.FRACTION_BITS, *(a.astype(float) for a in propagation[1:3])
-    counts = spreading.COEFFICIENTS[PLANE][:6]
+    counts = spreading.COEFFICIENTS[PLANE]
     tables = engine._tables.reshape(ANGLES, 1 << spreading.PHASE_BITS[PLANE], sum(counts), TAPS)[angle]
     return nonuniform_fft.spread(engine.samples, amplitude, (time, weight, exponent), tables, counts)
 

@@ -17,8 +17,8 @@ from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES
 from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
 
-LENS_ACCURACY = 0.015
-"""Relative error (L2) of the RF under a lens, from `FullMatrix.accurate_from` on; see docs/conventions.md."""
+LENS_ACCURACY = 0.01
+"""Relative error (L2) of the RF under a lens; see docs/conventions.md."""
 
 MIN_SAMPLES_PER_PERIOD = 2.1
 """Minimum samples per period of the highest frequency; finer records are decimated."""
@@ -132,7 +132,6 @@ def metadata(config: Config, scanner: Scanner) -> tuple[Arrays, dict[str, Any]]:
         "sampling_frequency": float(sampling),
         "demodulation_frequency": scanner.frequency,
         "foci": waves.foci.tolist(),
-        "accuracy_from": matrix.accurate_from,
     }
     return arrays, settings
 

@@ -4,7 +4,8 @@ Scatterers that an array sees at about one angle and range form a cluster. Apart
 echoes change so smoothly from element to element that those of a few skeleton elements determine the others: an
 interpolative decomposition (Cheng, Gimbutas, Martinsson, Rokhlin 2005, SIAM J Sci Comput 26:1389) of what echoes a
 cluster can have, those in the shadow of a rib included. The full matrix is made between skeleton elements, and
-expanded to all pairs after all scatterers of the cluster are in it.
+expanded to all pairs after all scatterers of the cluster are in it. Few scatterers are not worth that: their echoes
+are made between all elements.
 """
 
 from __future__ import annotations
@@ -37,6 +38,9 @@ EXTRA_ELEMENTS = 4
 """Skeleton elements in addition to those that the tolerance requires; their errors average out."""
 RIDGE = 4.0
 """Assumed error of an element, over the tolerance; it regularises the interpolation weights."""
+FEWEST = 12800
+"""Scatterers of a cluster, times elements, from which on its expansion takes less time than their echoes between all
+elements."""
 SAMPLES, SHADOW_SAMPLES = (4, 1.5), (10, 1.5)
 """Angles, and ranges, at which the echoes of a cluster are sampled, and more of them for each cycle by which its delays
 differ at the ends of the array; without and with a rib. The edge of the shadow falls on another part of the array for
@@ -114,6 +118,11 @@ class Clusters:
         if self._rib:
             far &= position[:, 1] > SHADOW_DEPTH * self._rib.depth
         return np.where(far, row * self._sectors + sector, self._rows * self._sectors)
+
+    def worth_expanding(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Numbers of the clusters of all scatterers (n,), the greatest in place of those that have too few."""
+        found, cluster, count = np.unique(numbers, return_inverse=True, return_counts=True)
+        return np.where(count * len(self._centres) < FEWEST, self._rows * self._sectors, found)[cluster]
 
     def __getitem__(self, number: int) -> Cluster:
         """The cluster of a number; the skeleton of the greatest are all elements."""

@@ -33,8 +33,7 @@ def lens_kernels(index, angle, lookup, terms, entries, tables, groups, part):
     Parameters
     ----------
     index
-        Fractional row and column of every scatterer in the tables of the lens, from the centre of each subaperture,
-        shape (scatterers, subapertures, 2).
+        Fractional row and column of every scatterer in the tables of the lens, shape (scatterers, 2).
     angle
         Angle from the centre of the array of each scatterer, as an index, shape (scatterers,).
     lookup
@@ -46,7 +45,7 @@ def lens_kernels(index, angle, lookup, terms, entries, tables, groups, part):
         Terms of the tables, their coefficients as :data:`.spreading.COEFFICIENTS` lists them, and the spectrum under
         the lens and the pair spectrum whose product they are: shape (terms, 4).
     entries
-        Blocks to make, shape (entries, 4): scatterer, block, subapertures of transmitter and of receiver.
+        Blocks to make, shape (entries, 2): scatterer and block.
     tables
         Written: shape (entries, phases, rows, TAPS), float32.
     groups
@@ -56,7 +55,7 @@ def lens_kernels(index, angle, lookup, terms, entries, tables, groups, part):
     """
     responses, pair_spectra, maps = lookup
     nodes, width = pair_spectra.shape[2], tables.shape[1] * TAPS
-    spectra, factors = np.empty((HEIGHT, 3, 2 * nodes), np.float32), np.zeros((2 * nodes, HEIGHT), np.float32)
+    spectra, factors = np.empty((HEIGHT, 2, 2 * nodes), np.float32), np.zeros((2 * nodes, HEIGHT), np.float32)
     second, first = np.empty((HEIGHT, QUADRATIC * width), np.float32), np.empty((HEIGHT, 2 * width), np.float32)
     for group in range(*part):
         members = 0
@@ -64,9 +63,7 @@ def lens_kernels(index, angle, lookup, terms, entries, tables, groups, part):
             members += 1
         # Entry by entry: taking a row apart compiles for longer.
         for n in range(members):
-            entry = groups[group, n]
-            k, transmitter, receiver = entries[entry, 0], entries[entry, 2], entries[entry, 3]
-            lens_spectra(responses, index[k, transmitter], index[k, receiver], transmitter == receiver, spectra[n])
+            lens_spectra(responses, index[entries[groups[group, n], 0]], spectra[n])
         block, row = entries[groups[group, 0], 1], 0
         for term in range(len(terms)):
             count, spectrum, pair = terms[term, 1], terms[term, 2], terms[term, 3]
@@ -99,28 +96,19 @@ def write_rows(table, row, count, coefficients):
 
 
 @numba.njit(cache=True)
-def lens_spectra(responses, transmitter, receiver, same, spectra):
-    """Write E_i E_j, (E_i' E_j + E_i E_j') / 2 and (E_i' E_j - E_i E_j') / 2: shape (3, 2 nodes).
+def lens_spectra(responses, index, spectra):
+    """Write E^2, and E' E, which is multiplied by the sum of the inverse-range offsets of two elements: (2, 2 nodes).
 
-    E' is the residual of the derivative. The first is multiplied by 1, the others by the sum and by the difference of
-    the inverse-range offsets of the two elements. `transmitter` and `receiver` are the indices of their subapertures.
+    E' is the residual of the derivative; both are looked up at a fractional index.
     """
-    sent, sent_slope = interpolate(responses[0], transmitter), interpolate(responses[1], transmitter)
-    received, received_slope = sent, sent_slope
-    if not same:
-        received, received_slope = interpolate(responses[0], receiver), interpolate(responses[1], receiver)
-    nodes = len(sent) // 2
-    half = np.float32(0.5)
+    response, slope = interpolate(responses[0], index), interpolate(responses[1], index)
+    nodes = len(response) // 2
     for n in range(nodes):
         m = nodes + n
-        spectra[0, n] = sent[n] * received[n] - sent[m] * received[m]
-        spectra[0, m] = sent[n] * received[m] + sent[m] * received[n]
-        one = sent_slope[n] * received[n] - sent_slope[m] * received[m]
-        two = sent[n] * received_slope[n] - sent[m] * received_slope[m]
-        spectra[1, n], spectra[2, n] = half * (one + two), half * (one - two)
-        one = sent_slope[n] * received[m] + sent_slope[m] * received[n]
-        two = sent[n] * received_slope[m] + sent[m] * received_slope[n]
-        spectra[1, m], spectra[2, m] = half * (one + two), half * (one - two)
+        spectra[0, n] = response[n] * response[n] - response[m] * response[m]
+        spectra[0, m] = response[n] * response[m] + response[m] * response[n]
+        spectra[1, n] = slope[n] * response[n] - slope[m] * response[m]
+        spectra[1, m] = slope[n] * response[m] + slope[m] * response[n]
 
 
 @numba.njit(cache=True)

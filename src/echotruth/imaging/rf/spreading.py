@@ -23,19 +23,15 @@ LEAD = 32
 """Samples of a row before time 0: padding before time 0 for the leading part of a kernel."""
 
 COEFFICIENTS = {
-    1: (3, 2, 0, 0, 2, 0, 0),
-    2: (3, 3, 2, 2, 1, 1, 0),
-    3: (3, 2, 2, 0, 2, 2, 0),
-    4: (3, 2, 2, 0, 2, 2, 2),
+    1: (3, 2, 0, 0, 2, 0),
+    2: (3, 3, 2, 2, 1, 1),
+    3: (3, 2, 2, 0, 2, 2),
 }
 """Coefficients of the polynomial of each term, by the number of a scheme; each is a row of the table of a phase, the
-highest power first. The terms are multiplied by 1, e, e^2, e^3, g, g e and d: e is the sum of the spectral exponents b
-of the two elements, g the sum of their inverse-range offsets under a lens and (b_i - b_j)^2 in the plane, d the
-difference of these offsets."""
-PHASE_BITS = (0, 2, 4, 2, 2)
+highest power first. The terms are multiplied by 1, e, e^2, e^3, g and g e: e is the sum of the spectral exponents b of
+the two elements, g the sum of their inverse-range offsets under a lens and (b_i - b_j)^2 in the plane."""
+PHASE_BITS = (0, 2, 4, 2)
 """Phase bits of each scheme: a sample is divided into 2^bits phases, with one polynomial for each."""
-SUBAPERTURES = 4
-"""Scheme for echoes with a separate lookup in the tables of the lens for each subaperture."""
 MAX_CORRECTION = 0.3
 """Largest correction of the lens response for an element: logarithm of the amplitude, or phase in radians."""
 TRANSMIT_GROUPS = 32
@@ -55,8 +51,8 @@ def spread_kernel(typing_context, traces, start, tables, scheme, pairs, j):
     """traces[start + sample :][:LANES] += weight * kernel, as vectors, for the pair of receiver `j`.
 
     `pairs` are two arrays over the receivers. The first, (2, receivers), int32, holds the sample where the kernel
-    begins and where its rows begin in the tables; the second, (5, receivers), float32, the weight, the fraction of a
-    sample and the factors e, g and d of :data:`COEFFICIENTS`. `scheme` is a tuple whose length is the number of the
+    begins and where its rows begin in the tables; the second, (4, receivers), float32, the weight, the fraction of a
+    sample and the factors e and g of :data:`COEFFICIENTS`. `scheme` is a tuple whose length is the number of the
     scheme: it is known when this is compiled, and the sums are unrolled.
     """
     single, outputs = types.Array(types.float32, 1, "C"), _matrices(types.int32, types.float32)
@@ -73,14 +69,14 @@ def spread_kernel(typing_context, traces, start, tables, scheme, pairs, j):
             return builder.load(vectors.element_address(outputs[number], matrix, row, j))
 
         sample, row = (builder.sext(of_pair(0, k), j.type) for k in range(2))
-        weight, fraction, exponent, offset, difference = (of_pair(1, k) for k in range(5))
+        weight, fraction, exponent, offset = (of_pair(1, k) for k in range(4))
         rows = vectors.address(kinds[2], tables, row)
         fraction = vectors.broadcast(fraction)
         first, *others = COEFFICIENTS[len(scheme)]
         kernel, at = vectors.polynomial(rows, 0, first, fraction), first
         square = builder.fmul(exponent, exponent)
         cube, product = builder.fmul(square, exponent), builder.fmul(offset, exponent)
-        for count, factor in zip(others, (exponent, square, cube, offset, product, difference), strict=True):
+        for count, factor in zip(others, (exponent, square, cube, offset, product), strict=True):
             if count:
                 term = vectors.polynomial(rows, at, count, fraction)
                 kernel, at = vectors.fma(term, vectors.broadcast(factor), kernel), at + count
@@ -134,7 +130,6 @@ def combine(typing_context, propagation, k, j, transmitter, table, scheme, pairs
                 builder.fmul(rest, unit),
                 total,
                 builder.fsub(builder.fadd(own_offset, offset), square),
-                builder.fsub(own_offset, offset),
             ),
         )
         for number, (kind, rows) in enumerate(zip(outputs, values, strict=True)):
@@ -165,17 +160,17 @@ def one_way(position, mean_exponent, lens_terms, array, propagation):
     mean_exponent
         Spectral exponent that is subtracted from those of each scatterer, shape (scatterers,).
     lens_terms
-        As :meth:`~echotruth.imaging.rf.elevation.Lens.lens_terms` returns them, or shape (0, 1, 4) without a lens.
+        As :meth:`~echotruth.imaging.rf.elevation.Lens.lens_terms` returns them, or shape (0, 4) without a lens.
     array
-        Centres of the elements, shape (elements,), m; the subaperture of each, shape (elements,); the scales: sampling
+        Centres of the elements, shape (elements,), m; the scales: sampling
         frequency over the speed of sound, attenuation at the centre frequency, and 1/wavelength there, all 1/m; and the
         table of :func:`~echotruth.imaging.rf.directivity.directivity_table`.
     propagation
         Written: time, weight, spectral exponent b and inverse-range offset, four of shape (scatterers, elements): int32
-        in 2^-18 samples, and float32, the weight in 1/m. The offset is 1/range less that from the centre of the
-        subaperture, 1/m, under a lens, and else 2 b^2.
+        in 2^-18 samples, and float32, the weight in 1/m. The offset is 1/range less that at which the
+        lens was looked up, 1/m, under a lens, and else 2 b^2.
     """
-    centres, subaperture, scales, directivity = array
+    centres, scales, directivity = array
     time, weight, spectral_exponent, inverse_range_offset = propagation
     samples, loss, waves = scales
     unit = samples * (1 << FRACTION_BITS)
@@ -196,7 +191,7 @@ def one_way(position, mean_exponent, lens_terms, array, propagation):
             if loss > 0:
                 strength *= np.exp(-loss * distance)
             if len(lens_terms):
-                inverse_range, delay, amplitude_slope, phase_slope = lens_terms[k, subaperture[element]]
+                inverse_range, delay, amplitude_slope, phase_slope = lens_terms[k]
                 offset = 1 / np.sqrt(lateral + axial) - inverse_range
                 inverse_range_offset[k, element] = offset
                 # To first order; beyond that, beside the beam, it would grow without bounds.
@@ -212,7 +207,7 @@ def one_way(position, mean_exponent, lens_terms, array, propagation):
 
 
 @numba.njit(nogil=True, cache=True)
-def spread(traces, scatterers, kernel_blocks, tables, bounds, lens, scheme, groups):
+def spread(traces, scatterers, kernel_blocks, tables, elements, lens, scheme, groups):
     """Add the echoes of some scatterers to the traces of all pairs.
 
     Parameters
@@ -224,12 +219,11 @@ def spread(traces, scatterers, kernel_blocks, tables, bounds, lens, scheme, grou
         Their propagation as :func:`one_way` writes it, each of shape (scatterers, elements or more, a multiple of
         LANES), and their amplitude, shape (scatterers,), float32.
     kernel_blocks
-        Blocks of samples to add, shape (blocks, 5): scatterer, where its table begins, first sample from the echo, and
-        the subapertures of the transmitters and of the receivers, the former not after the latter.
+        Blocks of samples to add, shape (blocks, 3): scatterer, where its table begins, first sample from the echo.
     tables
         Tables of kernels, flat, float32, and the numbers in the rows of a phase.
-    bounds
-        First element of every subaperture, and the number of elements: shape (subapertures + 1,).
+    elements
+        Number of elements.
     lens
         Whether the inverse-range offsets are those of a lens; else the square of e is subtracted from their sum, which
         leaves (b_i - b_j)^2.
@@ -241,28 +235,24 @@ def spread(traces, scatterers, kernel_blocks, tables, bounds, lens, scheme, grou
     propagation, amplitude = scatterers
     time, weight, spectral_exponent, inverse_range_offset = propagation
     values, size = tables
-    elements, samples, width = bounds[-1], traces.shape[1], time.shape[1]
+    samples, width = traces.shape[1], time.shape[1]
     flat = traces.reshape(traces.size)
     planar = np.float32(lens == 0)
     for group in range(*groups):
-        pairs = np.empty((2, width), np.int32), np.empty((5, width), np.float32)
+        pairs = np.empty((2, width), np.int32), np.empty((4, width), np.float32)
         for block in range(len(kernel_blocks)):
-            k, base, shift, transmitters, receivers = kernel_blocks[block]
-            first, last, nearest, beyond = 0, elements, 0, elements
-            if len(scheme) == SUBAPERTURES:
-                first, last = bounds[transmitters], bounds[transmitters + 1]
-                nearest, beyond = bounds[receivers], bounds[receivers + 1]
+            k, base, shift = kernel_blocks[block]
             for start in range(0, elements, TRANSMIT_GROUPS):
                 # Up in one round and down in the next: as many pairs for every thread.
                 even = start // TRANSMIT_GROUPS % 2 == 0
                 i = start + (np.int64(group) if even else TRANSMIT_GROUPS - 1 - np.int64(group))
-                if i < first or i >= last:
+                if i >= elements:
                     continue
                 strength = weight[k, i] * amplitude[k]
                 transmitter = time[k, i], strength, spectral_exponent[k, i], inverse_range_offset[k, i], planar
                 table = np.int32(base), np.int32(size)
-                for j in range(max(i, nearest) // LANES * LANES, beyond, LANES):
+                for j in range(i // LANES * LANES, elements, LANES):
                     combine(propagation, k, j, transmitter, table, scheme, pairs)
                 row = (i * elements - i * (i + 1) // 2) * samples + LEAD + shift
-                for j in range(max(i, nearest), beyond):
+                for j in range(i, elements):
                     spread_kernel(flat, row + j * samples, values, scheme, pairs, j)

@@ -1,0 +1,361 @@
+"""Echoes summed frequency by frequency, for scatterers whose echoes cannot be spread.
+
+Near the array, or far beside its plane, the response of the lens differs more from element to element than a kernel
+with corrections of first order allows, or is longer than a kernel. Echoes of such scatterers are summed as the formula
+of :mod:`~echotruth.imaging.rf.full_matrix` stands. Those of neighbours in range arrive within a short time, so that few
+frequencies determine all others.
+
+The Fresnel integral of the lens is, with a and b proportional to frequency, half the integral of exp(-i (a t^2 - b t))
+over t from -1 to 1. It is the sum of three waves: one from the edge of the element at each end, and, if it is inside,
+one from the point t0 = b / 2a where the phase stands still. Apart from the delay of its path, and from the root of the
+frequency, by which it falls, each changes so little with frequency that its values at a few determine all.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from math import ceil, factorial, floor
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.special import wofz
+
+from echotruth.arrays import Floats
+from echotruth.config import Probe
+from echotruth.imaging.rf.directivity import STEPS, sinc
+from echotruth.imaging.rf.probe import pulse_band, spectral_width
+from echotruth.imaging.rf.product import HEIGHT, ROW_PADDING, padded, product
+from echotruth.threads import share
+
+GATE, LEAST, MOST, MARGIN = 48, 64, 1024, 4.5
+"""Samples of two-way time, or half of those in which the first echoes arrive if that is more, in which scatterers lie
+whose echoes are transformed together, if they are not too few or too many; and time before the first and after the last
+echo, in standard deviations of the pulse in time."""
+BLOCK, GROUP = 32, 16
+"""Scatterers whose waves are in the cache at a time; frequencies from each of which phases are turned to the next, and
+for every group computed anew."""
+NODES, WAVES = 6, 3
+"""Frequencies at which the waves of an element are computed, and their number."""
+SKIRT = 0.5
+"""Standard deviations of the pulse's spectrum that are summed on either side of the band: cut off at its end, an echo
+would be long, and few frequencies would not determine all."""
+EDGE_STEPS = 2048
+"""Steps of the table of :func:`edge_wave`; the error of linear interpolation is 1e-7."""
+LOWEST = 0.005
+"""Least frequency of the waves over the highest of the band; those of lower frequencies are nearly the same."""
+LEAST_CURVATURE = 1e-3
+"""Least phase a at the centre frequency, rad; the waves of the edges would be infinite at 0, and their sum is not."""
+
+SINE = tuple(np.float32((-1) ** n / factorial(2 * n + 1)) for n in range(6))
+COSINE = tuple(np.float32((-1) ** n / factorial(2 * n)) for n in range(7))
+"""Coefficients of the Taylor polynomials of the sine, without its factor, and of the cosine."""
+
+Scatterers = tuple[Floats, Floats, Floats, Floats]
+"""Positions (n, 3), m; amplitudes at the centre frequency and exponents (n,); and what passes to elements, (n, few)."""
+
+
+class FrequencySum:
+    """Echoes between elements of a probe under its lens, summed frequency by frequency.
+
+    Parameters
+    ----------
+    probe : Probe
+    sampling : float, Hz
+    samples : int
+        Length of the record.
+    """
+
+    def __init__(self, probe: Probe, sampling: float, samples: int) -> None:
+        self._probe, self._sampling, self._samples = probe, sampling, samples
+        p, (low, high), skirt = probe.si(), pulse_band(probe), SKIRT * spectral_width(probe)
+        self._band = max(low - skirt, 0.0), high + skirt
+        self._waves = low, high = max(low - skirt, LOWEST * high), high + skirt
+        self._node = np.polynomial.legendre.leggauss(NODES)[0]
+        frequency = np.sqrt(low * high) * (high / low) ** (self._node / 2)
+        squares = np.minimum(np.arange(STEPS + 2) / STEPS, 1)
+        width = np.pi * p.width * frequency / p.sound_speed
+        self._tables = edge_wave(EDGE_STEPS), sinc(np.multiply.outer(squares, width**2)).astype(np.float32)
+        self._lens = p.height, p.elevation_focus, LEAST_CURVATURE / (2 * np.pi * p.frequency)
+        self._medium = frequency, p.sound_speed, p.attenuation
+
+    def __call__(self, centres: Floats, delay: Floats, scatterers: Scatterers) -> NDArray[np.float32]:
+        """Traces of all pairs i <= j of some elements, without the delays of both.
+
+        Parameters
+        ----------
+        centres, delay : ndarray of shape (few,), m and s
+            Lateral coordinates of the elements, and the delay of each, about which echoes arrive.
+        scatterers : Scatterers
+
+        Returns
+        -------
+        ndarray of shape (pairs, samples), float32
+            Their spectra are right in the band of the pulse.
+        """
+        traces = np.zeros((len(centres) * (len(centres) + 1) // 2, self._samples), np.float32)
+        range_ = np.linalg.norm(scatterers[0], axis=1)
+        order, stop = np.argsort(range_, kind="stable"), 0
+        while (start := stop) < len(order):
+            _, alone = self._window(scatterers[0][order[start : start + 1]], centres, delay)
+            depth = max(GATE, alone / 2) * self._medium[1] / 2 / self._sampling
+            within = int(np.searchsorted(range_[order], range_[order[start]] + depth)) - start
+            stop = start + min(max(within, LEAST), MOST)
+            position, amplitude, exponent, passes = (each[order[start:stop]] for each in scatterers)
+            first, length = self._window(position, centres, delay)
+            own = position, amplitude, exponent, passes
+            spectra = self._gate(own, centres, delay + first / self._sampling / 2, length)
+            echoes = fft.irfft(spectra, length, axis=1, workers=numba.get_num_threads())
+            # A gate may begin before time 0; what is there stands at the end of the record.
+            begin = first % self._samples
+            head = min(length, self._samples - begin)
+            traces[:, begin : begin + head] += echoes[:, :head]
+            traces[:, : length - head] += echoes[:, head:]
+        return traces
+
+    def _window(self, position: Floats, centres: Floats, delay: Floats) -> tuple[int, int]:
+        """First sample in which echoes of scatterers (n, 3), m, arrive, and number of samples up to the last."""
+        p, beside = self._probe.si(), np.abs(position[:, 2:])
+        range_ = np.hypot(position[:, :1] - centres, position[:, 1:2])
+        # From the nearest and the farthest part of the height of an element, less the path from its centre.
+        half, nearest = p.height / 2, np.minimum(beside, p.height / 2)
+        early = nearest * (beside - nearest / 2) / range_ + half**2 / (2 * p.elevation_focus)
+        late = half * (beside + half / 2) / range_
+        distance, margin = np.hypot(range_, beside), MARGIN / (2 * np.pi * spectral_width(self._probe))
+        first = floor((2 * ((distance - early) / p.sound_speed - delay).min() - margin) * self._sampling)
+        last = ceil((2 * ((distance + late) / p.sound_speed - delay).max() + margin) * self._sampling)
+        return first, min(fft.next_fast_len(min(last - first, self._samples), real=True), self._samples)
+
+    def _gate(self, scatterers: Scatterers, centres: Floats, delay: Floats, length: int) -> NDArray[np.complex64]:
+        """Spectra of a record of so many samples, without the delays of elements: (pairs, length // 2 + 1)."""
+        (low, high), step, few = self._band, self._sampling / length, len(centres)
+        bins = np.arange(max(ceil(low / step), 1), floor(high / step) + 1)
+        frequency, width = np.maximum(bins * step, self._waves[0]), padded(few)
+        position, amplitude, exponent, passes = scatterers
+        blocks = -(-len(position) // BLOCK)
+        waves = np.zeros((blocks, WAVES, 2, NODES, BLOCK * width + ROW_PADDING), np.float32)
+        arrival = np.zeros((blocks, WAVES, BLOCK * width))
+        inputs = (position, passes), (centres, delay), self._lens, self._medium, self._tables
+        share(partial(send, *inputs, waves, arrival), len(position))
+        loss = 2 * self._medium[2] * np.linalg.norm(position, axis=1)
+        ratio = np.log(frequency / self._probe.si().frequency)
+        strength = np.zeros((len(bins), blocks * BLOCK), np.float32)
+        growth = np.multiply.outer(ratio, exponent) - np.multiply.outer(frequency, loss)
+        strength[:, : len(position)] = (self._pulse(frequency) / frequency)[:, None] * amplitude * np.exp(growth)
+        sums, carry = np.zeros((len(bins), 2, padded(few, HEIGHT), width), np.float32), self._carry(frequency)
+        share(partial(add_echoes, waves, arrival, carry, (bins[0] * step, step), strength, sums), len(carry))
+        spectra = np.zeros((few * (few + 1) // 2, length // 2 + 1), np.complex64)
+        i, j = np.triu_indices(few)
+        parts = sums.reshape(len(bins), 2, -1)
+        spectra.real[:, bins] = parts[:, 0].take(i * width + j, axis=1).T
+        spectra.imag[:, bins] = -(parts[:, 1].take(i * width + j, axis=1) + parts[:, 1].take(j * width + i, axis=1)).T
+        if low == 0:
+            spectra[:, 0] = self._pulse(0.0) * _at_rest(scatterers, centres)[i, j]
+        return spectra
+
+    def _pulse(self, frequency: Floats | float) -> Floats:
+        """Spectrum of the pulse, which is not cut off."""
+        return np.exp(-((frequency - self._probe.si().frequency) ** 2) / (2 * spectral_width(self._probe) ** 2))
+
+    def _carry(self, frequency: Floats) -> NDArray[np.float32]:
+        """Weights of the values at the nodes in those at frequencies (n,), Hz: (groups, NODES, GROUP).
+
+        The values are those of the polynomial in the logarithm of the frequency through the nodes.
+        """
+        vander, (low, high) = np.polynomial.legendre.legvander, self._waves
+        place = 2 * np.log(frequency / low) / np.log(high / low) - 1
+        weights = np.zeros((padded(len(frequency), GROUP), NODES), np.float32)
+        weights[: len(frequency)] = vander(place, NODES - 1) @ np.linalg.inv(vander(self._node, NODES - 1))
+        return np.ascontiguousarray(weights.reshape(-1, GROUP, NODES).transpose(0, 2, 1))
+
+
+def _at_rest(scatterers: Scatterers, centres: Floats) -> Floats:
+    """Echoes of all pairs at frequency 0, (few, few), 1/m^2, where neither width nor height of an element matters."""
+    position, amplitude, exponent, passes = scatterers
+    lateral, axial, beside = position.T[..., None]
+    wave = passes * axial / ((lateral - centres) ** 2 + axial**2 + beside**2)
+    echoes: Floats = np.einsum("ki,kj,k->ij", wave, wave, amplitude * (exponent == 0))
+    return echoes
+
+
+def edge_wave(steps: int) -> Floats:
+    """exp(i u^2) times the integral of exp(-i s^2) over s from u on, at 1 / (1 + u) from 0 to 1: (steps + 2, 2).
+
+    Real and imaginary parts; the last row stands twice, for interpolation at u = 0.
+    """
+    inverse = np.minimum(np.arange(1, steps + 2) / steps, 1)
+    turned = np.exp(1j * np.pi / 4)
+    value = np.append(0, np.sqrt(np.pi) / 2 / turned * wofz(1j * turned * (1 / inverse - 1)))
+    return np.stack([value.real, value.imag], axis=1)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def send(scatterers, array, lens, medium, tables, waves, arrival, part):
+    """Write the waves of every element at some scatterers: what they are without phase, and when they arrive.
+
+    Parameters
+    ----------
+    scatterers
+        Positions, m, (scatterers, 3), and what passes between them and elements, (scatterers, elements).
+    array
+        Lateral coordinates of the elements, m, and delays that are taken away, s, each of shape (elements,).
+    lens
+        Height of the elements and focus, m, and least delay of the edges by the curvature alone, s.
+    medium
+        Frequencies, Hz, shape (NODES,); speed of sound, m/s; attenuation, 1/m/Hz.
+    tables
+        Of :func:`edge_wave`, and of directivity without its cosine over the square of the sine, (STEPS + 2, NODES).
+    waves
+        Written: shape (blocks, WAVES, 2, NODES, BLOCK width or more), float32; real and imaginary parts, times the root
+        of the frequency and without the attenuation up to the range of the scatterer, sqrt(Hz)/m.
+    arrival
+        Written: shape (blocks, WAVES, BLOCK width), s.
+    part
+        First of the scatterers, and the one after the last.
+    """
+    (position, passes), (centres, delay), (edge, directivity) = scatterers, array, tables
+    frequency, speed, attenuation = medium
+    width, still = arrival.shape[2] // BLOCK, np.sqrt(np.pi / 2) / 2
+    for k in range(*part):
+        range_ = np.sqrt(position[k, 0] ** 2 + position[k, 1] ** 2 + position[k, 2] ** 2)
+        written, late = waves[k // BLOCK], arrival[k // BLOCK]
+        for e in range(len(centres)):
+            lateral, column = position[k, 0] - centres[e], k % BLOCK * width + e
+            distance, side, size, tilt = phases(lateral, position[k, 1], position[k, 2], lens, speed)
+            time, centre = distance / speed - delay[e], tilt / (2 * size)
+            inside = centre < 1
+            late[0, column] = time - side * tilt * centre / 2 if inside else time
+            late[1, column] = time + side * (size - tilt)
+            late[2, column] = time + side * (size + tilt)
+            place, scale = STEPS * (lateral / distance) ** 2, np.sqrt(2 * np.pi * size)
+            weight, loss = passes[k, e] * position[k, 1] / distance**2 / scale, attenuation * (distance - range_)
+            for n in range(len(frequency)):
+                strength, root = weight * between(directivity, place, n), scale * np.sqrt(frequency[n])
+                if loss:
+                    strength *= np.exp(-loss * frequency[n])
+                written[0, 0, n, column] = still * strength if inside else 0.0
+                written[0, 1, n, column] = -side * still * strength if inside else 0.0
+                for end in range(2):
+                    row = EDGE_STEPS / (1 + root * abs(2 * end - 1 + centre))
+                    value = strength / 2 if end == 0 and not inside else -strength / 2
+                    written[1 + end, 0, n, column] = value * between(edge, row, 0)
+                    written[1 + end, 1, n, column] = value * side * between(edge, row, 1)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def phases(lateral, axial, beside, lens, speed):
+    """Distance of a scatterer, m, and of the phases a and b over 2 pi f: sign and size of a, and b, s."""
+    height, focus, least = lens
+    square = lateral**2 + axial**2
+    curvature = 1 / np.sqrt(square)
+    bend = height * height / 8 * (curvature - 1 / focus) / speed
+    side = 1.0 if bend >= 0 else -1.0
+    return np.sqrt(square + beside**2), side, max(abs(bend), least), height / 2 * abs(beside) * curvature / speed
+
+
+@numba.njit(cache=True)
+def between(table, place, column):
+    """Value of a column of a table (rows, columns) at a fractional row."""
+    row = int(place)
+    return table[row, column] + (place - row) * (table[row + 1, column] - table[row, column])
+
+
+@numba.njit(nogil=True, cache=True)
+def add_echoes(waves, arrival, carry, grid, strength, sums, groups):
+    """Add the echoes of some scatterers: u_i u_j times their strength, u being the sum of the waves of an element.
+
+    Parameters
+    ----------
+    waves, arrival
+        As :func:`send` writes them.
+    carry
+        Weights of the frequencies of the waves in those of the sum, shape (groups, NODES, GROUP), float32.
+    grid
+        First frequency and step, Hz.
+    strength
+        Shape (frequencies, blocks BLOCK), float32.
+    sums
+        Added to: shape (frequencies, 2, elements or more, width), float32. The real parts of pairs i <= j, and what
+        makes the negative of the imaginary part with its transpose.
+    groups
+        First of the groups of frequencies, and the one after the last.
+    """
+    count, width = arrival.shape[2], sums.shape[3]
+    carried = np.empty((WAVES, 2, GROUP, count), np.float32)
+    left, right = np.empty((2 * BLOCK, width), np.float32), np.empty((2 * BLOCK, width), np.float32)
+    phase, turn = np.empty((WAVES, 2, count), np.float32), np.empty((WAVES, 2, count), np.float32)
+    for block in range(len(waves)):
+        for wave in range(WAVES):
+            turn_phase(arrival[block, wave], grid[1], turn[wave, 0], turn[wave, 1])
+        for group in range(*groups):
+            first = group * GROUP
+            for wave in range(WAVES):
+                turn_phase(arrival[block, wave], grid[0] + first * grid[1], phase[wave, 0], phase[wave, 1])
+                for part in range(2):
+                    product(carry[group], waves[block, wave, part], carried[wave, part])
+            for f in range(first, min(first + GROUP, len(sums))):
+                add_waves(carried, f - first, phase, turn, left)
+                multiply_rows(left, strength[f, block * BLOCK : (block + 1) * BLOCK], right)
+                product(left, right, sums[f, 0], True, True)
+                product(left[:BLOCK], right[BLOCK:], sums[f, 1], False, True)
+
+
+@numba.njit(cache=True)
+def add_waves(carried, n, phase, turn, total):
+    """Write the sum of the waves at the n-th frequency of a group, and turn the phase to the next.
+
+    The total (2 BLOCK, width) holds the real parts of BLOCK scatterers and then the imaginary ones.
+    """
+    real, imaginary = total[:BLOCK].ravel(), total[BLOCK:].ravel()
+    real[:], imaginary[:] = np.float32(0), np.float32(0)
+    for wave in range(WAVES):
+        c, s = phase[wave, 0], phase[wave, 1]
+        add_turned(carried[wave, 0, n], carried[wave, 1, n], c, s, real, imaginary)
+        turn_on(c, s, turn[wave, 0], turn[wave, 1])
+
+
+@numba.njit(cache=True)
+def turn_phase(time, frequency, c, s):
+    """Write exp(-2 pi i f t) of a frequency and times (n,) as c + i s, float32.
+
+    By the Taylor polynomials of half the phase, which compilers vectorise.
+    """
+    two = np.float32(2)
+    for n in range(len(time)):
+        cycles = frequency * time[n]
+        x = np.float32(np.pi * (cycles - np.floor(cycles + 0.5)))
+        y = x * x
+        sine = x * (SINE[0] + y * (SINE[1] + y * (SINE[2] + y * (SINE[3] + y * (SINE[4] + y * SINE[5])))))
+        cosine = COSINE[1] + y * (COSINE[2] + y * (COSINE[3] + y * (COSINE[4] + y * (COSINE[5] + y * COSINE[6]))))
+        cosine = COSINE[0] + y * cosine
+        c[n], s[n] = COSINE[0] - two * sine * sine, -two * sine * cosine
+
+
+@numba.njit(cache=True)
+def add_turned(a, b, c, s, real, imaginary):
+    """Add (a + i b) (c + i s) to real + i imaginary, all of shape (n,), float32."""
+    for n in range(len(a)):
+        real[n] += a[n] * c[n] - b[n] * s[n]
+    for n in range(len(a)):
+        imaginary[n] += a[n] * s[n] + b[n] * c[n]
+
+
+@numba.njit(cache=True)
+def turn_on(c, s, p, q):
+    """Multiply c + i s by p + i q, all of shape (n,), float32."""
+    for n in range(len(c)):
+        x = c[n]
+        c[n] = x * p[n] - s[n] * q[n]
+        s[n] = x * q[n] + s[n] * p[n]
+
+
+@numba.njit(cache=True)
+def multiply_rows(waves, strength, out):
+    """Write real parts times the strength (BLOCK,) of their scatterer, and imaginary ones times minus that."""
+    for k in range(BLOCK):
+        factor = strength[k]
+        for n in range(waves.shape[1]):
+            out[k, n] = factor * waves[k, n]
+        for n in range(waves.shape[1]):
+            out[BLOCK + k, n] = -factor * waves[BLOCK + k, n]
