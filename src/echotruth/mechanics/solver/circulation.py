@@ -83,6 +83,7 @@ def steady_beat(
     stepper.tolerance = TOLERANCE if moved < STEADY else ROUGH_TOLERANCE
     states: list[State] = []
     cavity: Cavity | None = None
+    last = np.inf
     for number in range(1, beats_max + 1):
         _fill(stepper, begun, activation.periodic_tension(twitch, 0))
         stepper.state = replace(stepper.state, tension=float(twitch[0]))
@@ -94,7 +95,9 @@ def steady_beat(
         answered, steady = circulation.steady(cavity, stepper.volumes)
         change = _distance(circulation, steady.volumes, begun)
         _log(number, cavity, change)
-        begun = steady.volumes
+        # Where beats alternate about the steady one, half of the way leads to it.
+        begun = steady.volumes if change < last / 2 else (begun + steady.volumes) / 2
+        last = change
         if change < STEADY and stepper.tolerance == TOLERANCE:
             means = steady.mean_pressures[[ARTERIES, RIGHT_ATRIUM, PULMONARY_ARTERIES, LEFT_ATRIUM]] / 1e3
             text = "mean pressures: arteries %.4g, right atrium %.3g, pulmonary arteries %.3g, left atrium %.3g kPa"
