@@ -22,6 +22,20 @@ BAD = [
 ]
 
 
+def test_preset_of_a_disease_sets_growth_and_load_but_not_what_is_given():
+    thick = validate({"pathology": {"preset": "hypertension"}}, "a.yaml")
+    assert thick.geometry.hypertrophy == 1.2
+    assert (thick.loop.kind, thick.loop.circulation.baroreflex) == ("circulation", False)
+    wide = {name: Config(geometry={"preset": name}, pathology={"preset": "dcm"}) for name in ("mouse", "human")}
+    assert wide["mouse"].loop.circulation.contractility < wide["human"].loop.circulation.contractility < 1
+    given = {"pathology": {"preset": "dcm"}, "geometry": {"dilation": 1.3}, "loop": {"circulation": {"resistance": 2}}}
+    dilated = validate(given, "a.yaml")
+    assert (dilated.geometry.dilation, dilated.loop.circulation.resistance) == (1.3, 2)
+    assert dilated.loop.circulation.retained_volume_stroke_volumes == 5
+    # What is stored is read back as it is.
+    assert validate(json.loads(dilated.model_dump_json()), "a.yaml") == dilated
+
+
 @pytest.mark.parametrize(("section", "keys", "sentence"), BAD, ids=lambda part: str(part)[:30])
 def test_a_disease_that_cannot_be_is_refused(section, keys, sentence):
     with pytest.raises(ConfigError) as caught:

@@ -152,13 +152,13 @@ def _distinct(hearts: list[tuple[Combination, Case]], name: str, source: str) ->
 
 
 def _check_loop(loop: Any, place: str) -> None:
-    from echotruth.loop.circulation import calibrate
+    from echotruth.loop.calibration import closed_valves
     from echotruth.loop.cycle import LoopError, check_loop, read_loop
 
     try:
         check_loop(loop)
         if loop.kind == "circulation":
-            calibrate(read_loop(loop), loop.circulation)
+            closed_valves(read_loop(loop))
     except LoopError as error:
         raise ConfigError(f"{place}: loop: {error}") from None
 

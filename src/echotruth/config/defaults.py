@@ -1,5 +1,5 @@
-"""Defaults that follow from other sections: loop and array from the heart, scan from the array, lengths of trackers
-from the field of view.
+"""Defaults that follow from other sections: loop and array from the heart, growth and load from the disease,
+scan from the array, lengths of trackers from the field of view.
 """
 
 from typing import Any
@@ -37,6 +37,29 @@ HEART_DEFAULTS: dict[str, dict[str, Any]] = {
 }
 """`geometry.preset` -> default of dotted keys."""
 
+DISEASE_DEFAULTS: dict[str, dict[str, Any]] = {
+    "hypertension": {
+        "geometry.hypertrophy": 1.2,
+        "loop.kind": "circulation",
+        "loop.circulation.resistance": 1.25,
+        "loop.circulation.compliance": 0.67,
+        "loop.circulation.retained_volume_stroke_volumes": 2.0,
+        "loop.circulation.baroreflex": False,
+    },
+    "dcm": {
+        "geometry.dilation": 1.1,
+        "loop.kind": "circulation",
+        "loop.circulation.contractility": 0.55,
+        "loop.circulation.retained_volume_stroke_volumes": 5.0,
+    },
+}
+"""`pathology.preset` -> default of dotted keys; docs/physiology.md says where each is from."""
+DISEASE_OF_HEART: dict[tuple[str, str], dict[str, Any]] = {
+    ("dcm", "rat"): {"loop.circulation.contractility": 0.7},
+    ("dcm", "human"): {"loop.circulation.contractility": 0.7},
+}
+"""`pathology.preset` and `geometry.preset` -> what differs from that."""
+
 REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.2}
 """`realism.preset` -> default of the bandwidth, and of the density of scatterers, of which a longer pulse needs fewer,
 over those of the array."""
@@ -60,7 +83,7 @@ TRACKER_LENGTHS = ("windows_mm", "subset_mm", "knots_mm", "margin_um", "gain_mm"
 
 
 def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
-    """Fill in the defaults that follow from the heart, the array and the field of view.
+    """Fill in the defaults that follow from the heart, its disease, the array and the field of view.
 
     Parameters
     ----------
@@ -74,6 +97,8 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
     """
     heart = str(_value(values, "geometry.preset"))
     values = _filled(values, HEART_DEFAULTS.get(heart, HEART_DEFAULTS["mouse"]))
+    disease = str(_value(values, "pathology.preset"))
+    values = _filled(_filled(values, DISEASE_OF_HEART.get((disease, heart), {})), DISEASE_DEFAULTS.get(disease, {}))
     array = str(_value(values, "probe.preset"))
     values = _filled(values, _scanner(values, array))
     values = _filled(values, ARRAY_DEFAULTS.get(array, {}))

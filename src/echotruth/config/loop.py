@@ -15,9 +15,9 @@ Factor = Annotated[FiniteFloat, Field(ge=0.05, le=20)]
 
 
 class Circulation(Section):
-    """The circulation of `kind: circulation`: a three-element Windkessel behind the aortic valve and an atrium behind
-    the mitral one. Its resistances and the atrium's pressure are those with which the healthy heart gives its measured
-    loop back; the factors change them and the muscle, as drugs and diseases do."""
+    """The circulation of `kind: circulation`: a closed ring of left ventricle, systemic arteries and veins, right
+    heart, lung and left atrium (docs/physiology.md). It is such that the healthy heart gives its measured loop back;
+    the factors change it and the muscle, as drugs and diseases do."""
 
     contractility: Factor = 1.0
     """Factor on the active tension of the whole wall."""
@@ -25,8 +25,13 @@ class Circulation(Section):
     """Factor on the peripheral resistance of the arteries: afterload."""
     compliance: Factor = 1.0
     """Factor on the compliance of the arteries."""
-    preload: Factor = 1.0
-    """Factor on the pressure of the atrium, and on that of end-diastole with which the first beat begins."""
+    retained_volume_stroke_volumes: Annotated[FiniteFloat, Field(ge=-20, le=50)] = 0.0
+    """Blood that the circulation has gained (or, if negative, lost) since the heart was healthy, in stroke volumes of
+    the healthy heart: what the kidneys retain, and what narrow veins give to the rest. Otherwise the volume of the
+    healthy circulation is kept. A stroke volume is some 1.4 to 2 % of all blood."""
+    baroreflex: bool = True
+    """Peripheral resistance and venous tone answer the mean arterial pressure, as in Zenker et al., PLoS Comput Biol 3
+    (2007) e204. `false` for pressures to which the reflex has adapted."""
     decay_time_periods: Positive = 2.0
     """Time in which the pressure of the healthy arteries decays, resistance times compliance, in periods of the heart
     beat. The ratio is the same in all mammals (Westerhof & Elzinga, Am J Physiol 261 (1991) R126); 2 is somewhat below

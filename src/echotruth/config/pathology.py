@@ -57,8 +57,14 @@ class LateActivation(Section):
 
 
 class Pathology(Section):
-    """Regional disease; hypertrophy and dilation are keys of `geometry`, disarray of `fibres`."""
+    """Disease; hypertrophy and dilation are keys of `geometry`, disarray of `fibres`, load and strength of
+    `loop.circulation`."""
 
+    preset: Literal["hypertension", "dcm"] | None = None
+    """Growth and load of a disease, which let the heart beat in a circulation (docs/physiology.md); keys that are given
+    take precedence. `hypertension`: concentric growth - a wall thicker by a fifth, narrow and stiff arteries, and
+    contractility kept. `dcm`: dilated cardiomyopathy, eccentric growth - a wider cavity, weak muscle and retained
+    fluid."""
     infarct: Infarct = Infarct()
     """Stiff tissue that does not contract: whole AHA segments, or a sphere. There is none if neither is given."""
     late_activation: LateActivation = LateActivation()

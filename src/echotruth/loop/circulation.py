@@ -1,16 +1,27 @@
-"""The circulation into which the heart ejects and from which it fills, and its calibration on a measured loop.
+"""The circulation in which the heart beats: a closed ring of eight compartments.
 
-A three-element Windkessel (Westerhof, Lankhaar & Westerhof, Med Biol Eng Comput 47 (2009) 131) behind the aortic valve,
-and an atrium of given pressure behind the mitral one:
+Blood goes round, from the left ventricle back into it (after Regazzoni et al., J Comput Phys 457 (2022) 111083):
 
-    P = P_a + e(t) + Z Q,    Q >= 0         aortic valve; Z is the characteristic resistance of the aorta
-    C dP_a/dt = Q - P_a / R                 arteries of compliance C and peripheral resistance R
-    R_m Q_m = P_at(t) - P,    Q_m >= 0      mitral valve
-    dV/dt = Q_m - Q.
+    0 left ventricle -> 1 systemic arteries -> 2 systemic veins -> 3 right atrium ->
+    4 right ventricle -> 5 pulmonary arteries -> 6 pulmonary veins -> 7 left atrium -> 0
 
-In time implicit Euler steps, whose dt is that of a frame or a part of it. R, R_m, the pressure P_at(t) of the atrium
-and the wave e(t) are found so that a measured loop is given back: e is what three elements leave of the measured
-pressure while the heart ejects - the reflected waves and the inertia of the blood - and stays the same in disease.
+    P_i = E_i(t) (V_i - V0_i)                            compartment i; P_0 is that of the finite elements
+    q_i = G_i (P_i - P_(i+1) + h_i(t)), not below 0 in a valve           flow out of i into the next
+    dV_i/dt = q_(i-1) - q_i.
+
+Valves are behind 0, 3, 4 and 7. Vessels have an elastance 1 / C and no V0, so that V is their stressed volume; that of
+right ventricle and atria changes as a cosine. The heads h are zero but for those of the valves of the left ventricle,
+which the measured loop gives (:mod:`.calibration`), and which stay the same in disease.
+
+Time goes in implicit Euler steps of a frame or a part of it. What leaves a compartment enters the next, so that the
+volume of all is constant but for round-off; `retained` fluid is added to it once. The arterial baroreflex answers the
+mean pressure of the arteries of a beat:
+
+    S = 1 / (1 + exp(k (P - P_healthy))),    R / R_healthy = .4 + 1.2 S,    V0_2 = (.5 - S) U
+
+Zenker, Rubin & Clermont, PLoS Comput Biol 3 (2007) e204, with their k = .1838 / mmHg, range of resistance (.5335 to
+2.134 mmHg s/mL) and U = 400 mL of unstressed venous volume, here centred on the healthy pressure; the heart's
+period, and the contractility that they let it change as well, stay as configured.
 """
 
 from __future__ import annotations
@@ -19,31 +30,90 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from echotruth.arrays import Floats
 from echotruth.config.loop import Circulation as Settings
-from echotruth.loop.cycle import Cycle
-from echotruth.loop.phases import EJECTION, FILLING, RELAXATION, phases
 from echotruth.loop.recording import LoopError
+
+(
+    LEFT_VENTRICLE,
+    ARTERIES,
+    VEINS,
+    RIGHT_ATRIUM,
+    RIGHT_VENTRICLE,
+    PULMONARY_ARTERIES,
+    PULMONARY_VEINS,
+    LEFT_ATRIUM,
+) = range(8)
+"""The compartments, in the order in which blood passes them."""
+
+VALVES = np.isin(np.arange(8), (LEFT_VENTRICLE, RIGHT_ATRIUM, RIGHT_VENTRICLE, LEFT_ATRIUM))
+"""Whether the flow out of a compartment (8,) passes a valve."""
+
+MMHG = 133.322387415
+"""Pascals in a millimetre of mercury."""
+
+REFERENCE_STROKE_VOLUME = 70.0
+"""Stroke volume, mL, at a period of 0.8 s of the heart of Regazzoni et al., by which parameters scale: that of the
+package `circulation` 0.4."""
+
+REFLEX_STEEPNESS, REFLEX_RANGE = 0.1838 / MMHG, (0.4, 1.6)
+"""k, 1/Pa, of the baroreflex, and the factors on the peripheral resistance between which it acts."""
+
+REFLEX_VOLUME = 400 / REFERENCE_STROKE_VOLUME
+"""U, the unstressed venous volume that it commands, in stroke volumes."""
+
+_MAX_SWITCHES, _MAX_NEWTON_STEPS = 40, 60
 
 
 class Exchange(NamedTuple):
-    """What passes the valves in a step of time.
+    """What a step of time changes.
 
     Attributes
     ----------
-    volume : float, m^3
-        Into the cavity; negative where it ejects.
+    volumes : ndarray of shape (8,), m^3
+        Of the compartments at its end.
     slope : float, m^3/Pa
-        Its derivative by the pressure of the cavity; not positive.
-    arterial_pressure : float, Pa
-        P_a at the end of the step.
+        Derivative of the volume of the left ventricle by its pressure; not positive.
+    tangent : ndarray of shape (8, 8)
+        Derivative of the volumes by those at its beginning.
+    pressures : ndarray of shape (8,), Pa
+        At its end.
     """
 
-    volume: float
+    volumes: Floats
     slope: float
-    arterial_pressure: float
+    tangent: Floats
+    pressures: Floats
+
+
+class Cavity(NamedTuple):
+    """The left ventricle as others see it: P = pressure + elastance (V - volume).
+
+    Attributes
+    ----------
+    pressure, volume, elastance : ndarray of shape (n_frames,), Pa, m^3 and Pa/m^3
+        At the end of each step of a beat; the last is that of end-diastole.
+    """
+
+    pressure: Floats
+    volume: Floats
+    elastance: Floats
+
+
+class Steady(NamedTuple):
+    """A beat that ends as it began.
+
+    Attributes
+    ----------
+    volumes : ndarray of shape (8,), m^3
+        At end-diastole.
+    mean_pressures : ndarray of shape (8,), Pa
+    """
+
+    volumes: Floats
+    mean_pressures: Floats
 
 
 @dataclass(frozen=True)
@@ -54,164 +124,173 @@ class Circulation:
     ----------
     period : float, s
         Of the heart beat.
-    peripheral_resistance, characteristic_resistance, mitral_resistance : float, Pa s/m^3
-        R, Z and R_m.
-    compliance : float, m^3/Pa
-        C of the arteries.
-    reflection, atrial_pressure : ndarray of shape (n_frames,), Pa
-        e and P_at at equal steps of one beat; between them they are linear in time.
-    arterial_pressure : float, Pa
-        P_a at end-diastole, with which the first beat begins.
+    elastance, head : ndarray of shape (n_frames, 8), Pa/m^3 and Pa
+        E and h at equal steps of one beat, between which they are linear in time; E of the left ventricle is zero.
+    unstressed : ndarray of shape (8,), m^3
+        V0.
+    conductance : ndarray of shape (8,), m^3/(Pa s)
+        G of the flow out of each compartment.
+    volumes : ndarray of shape (8,), m^3
+        At end-diastole of the healthy heart, with which the first beat begins.
+    stroke_volume : float, m^3
+        Of the healthy heart.
+    set_pressure : float, Pa
+        Mean pressure of the healthy arteries.
+    reflex : bool
+        Whether the baroreflex acts.
     """
 
     period: float
-    peripheral_resistance: float
-    characteristic_resistance: float
-    mitral_resistance: float
-    compliance: float
-    reflection: Floats
-    atrial_pressure: Floats
-    arterial_pressure: float
+    elastance: Floats
+    head: Floats
+    unstressed: Floats
+    conductance: Floats
+    volumes: Floats
+    stroke_volume: float
+    set_pressure: float
+    reflex: bool = False
 
-    def exchange(self, pressure: float, arterial_pressure: float, time: float, duration: float) -> Exchange:
-        """What passes the valves in a step.
+    def exchange(
+        self,
+        volumes: Floats,
+        time: float,
+        duration: float,
+        pressure: float,
+        elastance: float = 0.0,
+        given: Floats | None = None,
+    ) -> Exchange:
+        """What a step changes.
 
         Parameters
         ----------
-        pressure : float, Pa
-            Of the cavity at the end of the step.
-        arterial_pressure : float, Pa
-            P_a at its beginning.
+        volumes : ndarray of shape (8,), m^3
+            At its beginning.
         time : float, s
             Of its end, since the first end-diastole.
         duration : float, s
+        pressure, elastance : float, Pa and Pa/m^3
+            The pressure of the left ventricle at the end of the step is pressure + elastance V.
+        given : ndarray of shape (8,), m^3/s, optional
+            Flows in addition, out of each compartment.
         """
-        kept, gained = _step(self.peripheral_resistance, self.compliance, duration)
-        aortic = pressure - self.at(self.reflection, time) - kept * arterial_pressure
-        mitral = self.at(self.atrial_pressure, time) - pressure
-        resistance = self.characteristic_resistance + gained
-        outflow, inflow = max(0.0, aortic / resistance), max(0.0, mitral / self.mitral_resistance)
-        slope = (outflow > 0) / resistance + (inflow > 0) / self.mitral_resistance
-        arterial = kept * arterial_pressure + gained * outflow
-        return Exchange(duration * (inflow - outflow), -duration * slope, arterial)
+        stiffness, offset = self.at(self.elastance, time), np.zeros(8)
+        stiffness[LEFT_VENTRICLE], offset[LEFT_VENTRICLE] = elastance, pressure
+        head, added = self.at(self.head, time), np.zeros(8) if given is None else given
+        # A flow is G (P_i - P_(i+1) + h), P = stiffness V + rest: with the valves that are open it is linear in V.
+        rest = offset - stiffness * self.unstressed
+        open_ = np.ones(8, dtype=bool)
+        for _ in range(_MAX_SWITCHES):
+            conductance = duration * self.conductance * open_
+            # dq_i/dP_i = G_i, dq_i/dP_(i+1) = -G_i; V_i gains q_(i-1) and loses q_i.
+            by_pressure = _DIVERGENCE @ (conductance[:, None] * _DIFFERENCE)
+            matrix = np.eye(8) - by_pressure * stiffness
+            constant = _DIVERGENCE @ (conductance * (_DIFFERENCE @ rest + head) + duration * added)
+            inverse = np.asarray(np.linalg.inv(matrix), dtype=float)
+            after = inverse @ (volumes + constant)
+            pressures = stiffness * after + rest
+            now = ~VALVES | (_DIFFERENCE @ pressures + head > 0)
+            if (now == open_).all():
+                break
+            open_ = now
+        # The volumes that the flows leave, which add up to those before.
+        flows = conductance * (_DIFFERENCE @ pressures + head) + duration * added
+        after = volumes + _DIVERGENCE @ flows
+        slope = float(inverse[LEFT_VENTRICLE] @ by_pressure[:, LEFT_VENTRICLE])
+        return Exchange(after, slope, inverse, pressures)
+
+    def pressures(self, volumes: Floats, time: float, pressure: float) -> Floats:
+        """Pressures (8,), Pa, at volumes (8,), m^3, with that of the left ventricle given."""
+        found = self.at(self.elastance, time) * (volumes - self.unstressed)
+        found[LEFT_VENTRICLE] = pressure
+        return found
 
     def scaled(self, factor: float) -> Circulation:
         """The circulation of a heart whose volumes are a factor larger, at the same pressures."""
         return replace(
             self,
-            peripheral_resistance=self.peripheral_resistance / factor,
-            characteristic_resistance=self.characteristic_resistance / factor,
-            mitral_resistance=self.mitral_resistance / factor,
-            compliance=self.compliance * factor,
+            elastance=self.elastance / factor,
+            unstressed=self.unstressed * factor,
+            conductance=self.conductance * factor,
+            volumes=self.volumes * factor,
+            stroke_volume=self.stroke_volume * factor,
         )
 
-    def at(self, curve: Floats, time: float) -> float:
-        """Value of a periodic curve (n_frames,) at a time since end-diastole, s."""
+    def at(self, curve: Floats, time: float) -> Floats:
+        """Value of a periodic curve (n_frames, ...) at a time since end-diastole, s."""
         frame = time / self.period * len(curve)
-        return float(np.interp(frame, np.arange(len(curve)), curve, period=len(curve)))
+        before = int(np.floor(frame + 1e-9))
+        share = max(frame - before, 0.0)
+        first = curve[before % len(curve)]
+        return np.array(first) if share < 1e-9 else (1 - share) * first + share * curve[(before + 1) % len(curve)]
+
+    def answered(self, activity: float) -> Circulation:
+        """The circulation at an activity S of the baroreflex; 0.5 is that of the healthy one."""
+        conductance, unstressed = self.conductance.copy(), self.unstressed.copy()
+        conductance[ARTERIES] /= REFLEX_RANGE[0] + (REFLEX_RANGE[1] - REFLEX_RANGE[0]) * activity
+        unstressed[VEINS] += (0.5 - activity) * REFLEX_VOLUME * self.stroke_volume
+        return replace(self, conductance=conductance, unstressed=unstressed)
+
+    def steady(self, cavity: Cavity, volumes: Floats) -> tuple[Circulation, Steady]:
+        """The circulation with its reflex, and the beat that ends as it begins, with a given left ventricle.
+
+        Parameters
+        ----------
+        cavity : Cavity
+        volumes : ndarray of shape (8,), m^3
+            Their sum is kept; the nearer to those of the beat, the sooner it is found.
+
+        Raises
+        ------
+        LoopError
+            If there is none.
+        """
+        if not self.reflex:
+            return self, _steady(self, cavity, volumes)
+        beat = _steady(self.answered(0.5), cavity, volumes)
+
+        def excess(activity: float) -> float:
+            nonlocal beat
+            beat = _steady(self.answered(activity), cavity, beat.volumes)
+            pressure = beat.mean_pressures[ARTERIES]
+            return activity - 1 / (1 + np.exp(REFLEX_STEEPNESS * (pressure - self.set_pressure)))
+
+        activity = float(brentq(excess, 0.0, 1.0, xtol=1e-4))
+        answered = self.answered(activity)
+        return answered, _steady(answered, cavity, beat.volumes)
 
 
-def calibrate(cycle: Cycle, settings: Settings) -> tuple[Circulation, Cycle]:
-    """The circulation that gives a measured loop back, and the loop as it gives it.
-
-    Parameters
-    ----------
-    cycle : Cycle
-        With pressure and volume.
-    settings : Circulation
-        The section `loop.circulation` of the configuration; of a healthy circulation, whose factors are not used.
-
-    Returns
-    -------
-    circulation : Circulation
-    cycle : Cycle
-        The same pressure; the volume stays where the valves are shut, and that of end-systole is the smallest.
-
-    Raises
-    ------
-    LoopError
-        If the loop has no frame of ejection, or none of filling.
-    """
-    pressure, volume = cycle.pressure, cycle.volume
-    assert pressure is not None and volume is not None
-    step = cycle.period / len(cycle.time)
-    phase = phases(pressure, volume)
-    if not (phase == EJECTION).any() or not (phase == FILLING).any():
-        what = "ejection" if not (phase == EJECTION).any() else "filling"
-        remedy = "raise loop.frames, or leave loop.kind = measured"
-        raise LoopError(f"{cycle.source}: with {len(volume)} frames the loop has none of {what}: {remedy}.")
-    volume = _with_closed_valves(volume, phase)
-    flow = (volume - np.roll(volume, 1)) / step
-    outflow, inflow = np.maximum(-flow, 0), np.maximum(flow, 0)
-    decay_time = settings.decay_time_periods * cycle.period
-    kept, gained = _step(1.0, decay_time, step)
-    before = _periodic(kept, gained, outflow)
-    # Of a peripheral resistance of one: all pressures of the Windkessel grow with it.
-    windkessel = kept * before + (settings.characteristic_share + gained) * outflow
-    ejects = outflow > 0
-    resistance = float(np.sum(pressure[ejects] * windkessel[ejects]) / np.sum(windkessel[ejects] ** 2))
-    excess = pressure - resistance * windkessel
-    mitral_resistance = settings.si().mitral_gradient / inflow.max()
-    fills = pressure + mitral_resistance * inflow
-    circulation = Circulation(
-        cycle.period,
-        resistance,
-        settings.characteristic_share * resistance,
-        mitral_resistance,
-        decay_time / resistance,
-        # Where a valve is shut, the pressure behind it is between those of its last flow and the next, and keeps it so.
-        reflection=np.maximum(_held(excess, ejects), np.where(ejects, -np.inf, excess)),
-        atrial_pressure=np.minimum(_between(fills, inflow > 0), np.where(inflow > 0, np.inf, pressure)),
-        arterial_pressure=resistance * (kept * before[0] + gained * outflow[0]),
-    )
-    return circulation, replace(cycle, volume=volume)
+_DIFFERENCE = np.eye(8) - np.roll(np.eye(8), 1, axis=1)
+"""Pressure of a compartment less that of the next."""
+_DIVERGENCE = np.roll(np.eye(8), 1, axis=0) - np.eye(8)
+"""Flow into a compartment less that out of it."""
 
 
 def altered(circulation: Circulation, settings: Settings) -> Circulation:
-    """A calibrated circulation with the factors of its section: other arteries, another filling pressure."""
+    """A calibrated circulation with the factors of its section: other arteries, retained fluid, a reflex."""
+    conductance, elastance = circulation.conductance.copy(), circulation.elastance.copy()
+    conductance[ARTERIES] /= settings.resistance
+    elastance[:, ARTERIES] /= settings.compliance
+    volumes = circulation.volumes.copy()
+    volumes[VEINS] += settings.retained_volume_stroke_volumes * circulation.stroke_volume
     return replace(
-        circulation,
-        peripheral_resistance=settings.resistance * circulation.peripheral_resistance,
-        compliance=settings.compliance * circulation.compliance,
-        atrial_pressure=settings.preload * circulation.atrial_pressure,
+        circulation, conductance=conductance, elastance=elastance, volumes=volumes, reflex=settings.baroreflex
     )
 
 
-def _with_closed_valves(volume: Floats, phase: NDArray[np.uint8]) -> Floats:
-    """Volume (n_frames,) that stays in the isovolumic phases, falls in ejection and rises in filling."""
-    ejects, fills = phase == EJECTION, phase == FILLING
-    closed = np.full(len(volume), volume[0])
-    closed[ejects] = np.minimum.accumulate(np.minimum(volume[ejects], volume[0]))
-    end_systolic, smallest = closed[ejects][-1], volume.min()
-    closed[phase == RELAXATION] = end_systolic
-    filled = (np.maximum.accumulate(volume[fills]) - smallest) / (volume[0] - smallest)
-    closed[fills] = end_systolic + np.clip(filled, 0, 1) * (volume[0] - end_systolic)
-    return closed
-
-
-def _step(resistance: float, compliance: float, duration: float) -> tuple[float, float]:
-    """Share of P_a that is left after a step, and what it gains from a unit of flow."""
-    kept = 1 / (1 + duration / (resistance * compliance))
-    return kept, kept * duration / compliance
-
-
-def _periodic(kept: float, gained: float, flow: Floats) -> Floats:
-    """P_a (n_frames,) before each frame of a periodic flow (n_frames,)."""
-    arterial = [0.0]
-    for value in flow:
-        arterial.append(kept * arterial[-1] + gained * float(value))
-    # What a beat begins with is left at its end by kept^n.
-    first = arterial[-1] / (1 - kept ** len(flow))
-    return np.array(arterial[:-1]) + first * kept ** np.arange(len(flow))
-
-
-def _held(values: Floats, known: NDArray[np.bool_]) -> Floats:
-    """Values between those known, and before and after them the first and the last."""
-    frames = np.flatnonzero(known)
-    return np.interp(np.arange(len(values)), frames, values[frames])
-
-
-def _between(values: Floats, known: NDArray[np.bool_]) -> Floats:
-    """Values between those known of a periodic curve."""
-    frames = np.flatnonzero(known)
-    return np.interp(np.arange(len(values)), frames, values[frames], period=len(values))
+def _steady(circulation: Circulation, cavity: Cavity, volumes: Floats) -> Steady:
+    """The beat that ends as it begins, by Newton's method on the map from end-diastole to the next."""
+    number = len(cavity.pressure)
+    step = circulation.period / number
+    offset = cavity.pressure - cavity.elastance * cavity.volume
+    for _ in range(_MAX_NEWTON_STEPS):
+        state, tangent, mean = volumes, np.eye(8), np.zeros(8)
+        for k in range(number):
+            passed = circulation.exchange(state, (k + 1) * step, step, offset[k], cavity.elastance[k])
+            state, tangent, mean = passed.volumes, passed.tangent @ tangent, mean + passed.pressures / number
+        # What all contain does not change.
+        matrix = np.vstack([tangent - np.eye(8), np.ones(8)])
+        change = np.linalg.lstsq(matrix, np.append(volumes - state, 0.0), rcond=None)[0]
+        if np.abs(change).max() < 1e-6 * circulation.stroke_volume:
+            return Steady(volumes, mean)
+        volumes = volumes + change
+    raise LoopError("The circulation has no steady beat: change the heart or loop.circulation less.")

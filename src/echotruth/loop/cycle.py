@@ -89,10 +89,6 @@ class Cycle:
     def _curves(self) -> tuple[Floats | None, ...]:
         return self.pressure, self.volume, self.tension
 
-    def filled(self, factor: float) -> Cycle:
-        """The cycle with its pressures times a factor."""
-        return replace(self, pressure=None if self.pressure is None else factor * self.pressure)
-
     def scaled(self, factor: float) -> Cycle:
         """The cycle with its volumes times a factor, and the same ejection fraction."""
         return replace(self, volume=None if self.volume is None else factor * self.volume)

@@ -8,8 +8,10 @@ import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.config import Config, Pathology
+from echotruth.fem.volume import cell_volumes
 from echotruth.loop import phases
-from echotruth.loop.circulation import altered, calibrate
+from echotruth.loop.calibration import calibrate
+from echotruth.loop.circulation import altered
 from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.loop.recording import LoopError
 from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
@@ -17,7 +19,7 @@ from echotruth.mechanics.history import Arrays, collect_outputs
 from echotruth.mechanics.pathology import BORDER, INFARCT, healthy_heart, tissue
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.circulation import steady_beat
+from echotruth.mechanics.solver.circulation import guessed, steady_beat
 from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solve, solved_cycle
 from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
@@ -117,17 +119,30 @@ def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     settings, healthy = config.loop.circulation, healthy_heart(config)
     circulation, cycle = calibrate(cycle, settings)
     logger.info("the healthy heart, in its measured loop")
-    measured = _solve(healthy, unloaded_wall(healthy, cycle), cycle)
+    healthy_wall = unloaded_wall(healthy, cycle)
+    measured = _solve(healthy, healthy_wall, cycle)
     circulation = altered(circulation.scaled(float(measured.volume[0]) / cycle.edv), settings)
     twitch = settings.contractility * measured.active_tension
     logger.info("the heart in its circulation")
     equations = equilibrium(config, unloaded)
     try:
-        stepper = filled_to_end_diastole(equations, cycle.filled(settings.preload), measured.stiffness)
-        frames = steady_beat(stepper, circulation, twitch, activation(unloaded, cycle), settings.beats_max)
+        stepper = filled_to_end_diastole(equations, cycle, measured.stiffness)
+        edv = stepper.load.volume
+        strength = settings.contractility * _strength(unloaded, edv)
+        strength /= _strength(healthy_wall, float(measured.volume[0]))
+        guess = guessed(measured, edv, equations.volume(equations.unloaded_state(0.0)), strength)
+        frames = steady_beat(stepper, circulation, guess, twitch, activation(unloaded, cycle), settings.beats_max)
         return solved_cycle(equations, replace(cycle, pressure=None, volume=None), frames)
     finally:
         equations.close()
+
+
+def _strength(unloaded: Wall, volume: float) -> float:
+    """Pressure over T_Ca at a volume, m^3, of a wall whose fibres bear alike: ln(1 + V_wall / V) / 3 of their mean
+    (Arts et al., J Biomech 24 (1991) 1131)."""
+    cells = cell_volumes(unloaded.mesh.nodes, unloaded.mesh.cells)
+    mean = np.average(unloaded.tissue.tension_scale, weights=cells)
+    return float(mean * np.log(1 + cells.sum() / volume) / 3)
 
 
 def activation(unloaded: Wall, cycle: Cycle) -> Activation:

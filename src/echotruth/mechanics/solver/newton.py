@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from echotruth.arrays import Floats
 from echotruth.fem.sparse import SingularMatrix
-from echotruth.loop.circulation import Circulation
+from echotruth.loop.circulation import LEFT_VENTRICLE, Circulation
 from echotruth.mechanics.solver.equilibrium import (
     Correction,
     Equilibrium,
@@ -86,8 +87,10 @@ class LoadStepper:
     ----------
     state, load
         Last solved state, and the load that it balances.
-    arterial_pressure : float, Pa
-        Of the circulation, at the last solved state; not a number without one.
+    volumes, pressures : ndarray of shape (8,), m^3 and Pa
+        Of the compartments of the circulation, at the last solved state; not numbers without one.
+    tolerance : float
+        Relative residual at which a state counts as solved.
     max_error : float
         Largest relative residual of the state.
     factorizations : int
@@ -100,7 +103,8 @@ class LoadStepper:
         self.equations, self.state, self.factorizations = equations, equations.unloaded_state(stiffness), 0
         self.load = Load(0.0, equations.volume(self.state))
         self.circulation: Circulation | None = None
-        self.arterial_pressure = float("nan")
+        self.volumes, self.pressures = np.full(8, np.nan), np.full(8, np.nan)
+        self.tolerance = TOLERANCE
         self.max_error = 0.0
         self.on_step: Callable[[Step], None] | None = None
         self._tangent: Tangent | None = None
@@ -137,8 +141,8 @@ class LoadStepper:
                     raise
                 continue
             if self.circulation:
-                ended = self.state.cavity_pressure, self.arterial_pressure, target.time, duration
-                self.arterial_pressure = self.circulation.exchange(*ended).arterial_pressure
+                passed = self.circulation.exchange(self.volumes, target.time, duration, self.state.cavity_pressure)
+                self.volumes, self.pressures = passed.volumes, passed.pressures
             if self.on_step:
                 self.on_step(Step(start, load, fraction, fraction + step, unknown, before, self.state))
             fraction, predictors = fraction + step, ()
@@ -159,20 +163,27 @@ class LoadStepper:
         tension = f"T_Ca has risen to {self.state.tension / 1e3:.3g} kPa, which no muscle bears"
         return f"{tension}: let the heart eject less or more slowly, or at a lower pressure"
 
-    def couple(self, circulation: Circulation) -> None:
-        """Let the last solved state be that of end-diastole of a heart in a circulation, from which it goes on."""
-        self.circulation, self.arterial_pressure = circulation, circulation.arterial_pressure
-        self.state = replace(self.state, cavity_pressure=self.load.pressure)
+    def couple(self, circulation: Circulation, volumes: Floats) -> None:
+        """Let the last solved state be that of end-diastole of a heart in a circulation, from which it goes on.
+
+        Parameters
+        ----------
+        circulation : Circulation
+        volumes : ndarray of shape (8,), m^3
+            Of its compartments.
+        """
+        self.circulation, self.volumes = circulation, volumes
+        self.pressures = circulation.pressures(volumes, self.load.time, self.load.pressure)
 
     def _filled(self, time: float, duration: float) -> Callable[[float], VolumeTarget] | None:
         """Volume after a step that ends at a time, by the pressure, if there is a circulation."""
         if self.circulation is None:
             return None
-        circulation, before, arterial = self.circulation, self.equations.volume(self.state), self.arterial_pressure
+        circulation, volumes = self.circulation, self.volumes
 
         def filled(pressure: float) -> VolumeTarget:
-            passed = circulation.exchange(pressure, arterial, time, duration)
-            return VolumeTarget(before + passed.volume, passed.slope, before)
+            passed = circulation.exchange(volumes, time, duration, pressure)
+            return VolumeTarget(float(passed.volumes[LEFT_VENTRICLE]), passed.slope, float(volumes[LEFT_VENTRICLE]))
 
         return filled
 
@@ -184,7 +195,7 @@ class LoadStepper:
         if self._tangent is not None and self._tangent.unknown != unknown:
             self._tangent = None
         for _ in range(_MAX_NEWTON_STEPS):
-            if residual.max_error < TOLERANCE:
+            if residual.max_error < self.tolerance:
                 self.max_error = residual.max_error
                 return state
             state, residual = self._newton(state, residual, load, unknown)
@@ -219,12 +230,12 @@ class LoadStepper:
             last = corrections[-1]
             trial = state.corrected(last, damping, unknown)
             after = self.equations.residual(trial, load, unknown)
-            if after.max_error < TOLERANCE:
+            if after.max_error < self.tolerance:
                 return trial, after
             finite = np.isfinite(after.total_error)
             simplified = _broyden_update(tangent.correction(after), corrections) if finite else None
             ratio = simplified.norm / last.norm if simplified else np.inf
-            keep_factors = _cheaper_than_refactoring(ratio, after)
+            keep_factors = self._keeps_factors(ratio, after)
             if simplified and ratio < 1 - damping / 4 and (fresh or keep_factors):
                 if damping < 1 or not keep_factors:
                     self._tangent = None
@@ -240,6 +251,10 @@ class LoadStepper:
                 if damping < _MIN_DAMPING:
                     self._tangent = None
                     raise Diverged(f"The load step did not converge {_at(load, unknown)}: {self._remedy()}.")
+
+    def _keeps_factors(self, ratio: float, residual: Residual) -> bool:
+        """Whether corrections that shrink by a ratio reach the tolerance sooner than new factors would."""
+        return ratio < 1 and log(self.tolerance / residual.total_error) > REFACTOR_COST * log(max(ratio, 1e-12))
 
     def _factor(self, state: State, load: Load, unknown: Unknown) -> Tangent:
         self.factorizations += 1
@@ -275,11 +290,6 @@ def _broyden_update(correction: Correction, corrections: list[Correction]) -> Co
     for earlier, later in pairwise(corrections):
         correction = correction.plus(correction.projection(earlier), later)
     return correction
-
-
-def _cheaper_than_refactoring(ratio: float, residual: Residual) -> bool:
-    """Whether corrections that shrink by a ratio reach the tolerance sooner than new factors would."""
-    return ratio < 1 and log(TOLERANCE / residual.total_error) > REFACTOR_COST * log(max(ratio, 1e-12))
 
 
 def _at(load: Load, unknown: Unknown) -> str:
