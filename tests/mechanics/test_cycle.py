@@ -11,7 +11,6 @@ from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.cycle import solve
 from echotruth.mechanics.solver.newton import Diverged
 from echotruth.mechanics.solver.wall import equilibrium, wall
@@ -25,10 +24,9 @@ CONFIG = Config(geometry=COARSE, loop=Loop(frames=12), mechanics=ELASTIC)
 
 def solved(cycle, config=CONFIG, stiffness=None):
     body = wall(config, left_ventricle(config.geometry))
-    activation = Activation(body.tissue.tension_scale, body.tissue.activation_delay, cycle.period / len(cycle.time))
     equations = equilibrium(config, body)
     try:
-        return solve(equations, cycle, activation, stiffness)
+        return solve(equations, cycle, body.tissue.tension_scale, stiffness)
     finally:
         equations.close()
 
@@ -79,17 +77,6 @@ def test_infarct_stretches_where_healthy_wall_shortens():
     region = arrays["pathology"]["region"]
     assert fibre[region == 1].mean() > 0
     assert fibre[region == 0].mean() < -0.08
-
-
-@pytest.mark.slow
-def test_late_wall_is_stretched_first():
-    late = CONFIG.model_copy(update={"pathology": Pathology(late_activation={"preset": "lbbb"}), "loop": Loop()})
-    arrays = beat(late)
-    fibre = centroid_kinematics(Heart.of(arrays, late))["fibre_strain"][..., 0]
-    delay = arrays["pathology"]["activation_delay"]
-    early = fibre[2]
-    assert early[delay == delay.max()].mean() > 0.02
-    assert early[delay == 0].mean() < 0
 
 
 def test_heart_that_is_asked_for_more_than_muscle_bears_is_told_so():

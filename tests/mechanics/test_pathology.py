@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Geometry, Pathology
-from echotruth.config.pathology import Infarct, LateActivation
+from echotruth.config.pathology import Infarct
 from echotruth.config.regional import Regional
 from echotruth.fem.volume import cell_volumes
 from echotruth.mechanics.geometry import left_ventricle
@@ -27,9 +27,6 @@ class Hemisphere:
 
     def with_(self, **infarct):
         return self.tissue(Pathology(infarct=Infarct(**infarct)))
-
-    def late(self, **late):
-        return self.tissue(Pathology(late_activation=LateActivation(**late)))
 
     def tissue(self, pathology=Pathology(), **regional):  # noqa: B008, a default section does not change
         return tissue(self.mesh, self.depth, pathology, Regional(**regional))
@@ -101,31 +98,6 @@ def test_without_a_border_the_edge_is_sharp(hemisphere):
     assert set(hemisphere.with_(radius_mm=1.0).region) == {0, 1}
 
 
-def test_delays_are_those_of_the_middles_of_segments_and_linear_between(hemisphere):
-    late = hemisphere.late(delay_ms={5: 20.0, 11: 15.0, 8: 0.0}, scale=0.5)
-    x, y, z = hemisphere.centre.T
-    # Segment 5 is inferolateral: its middle lies at 210 deg, and those of its neighbours 60 deg away.
-    away = np.abs((np.degrees(np.arctan2(y, x)) - 210 + 180) % 360 - 180)
-    weight = np.clip(1 - away / 60, 0, 1)
-    third = np.floor(-z / (2e-3 / 3))
-    inside = np.abs(-z / (2e-3 / 3) - np.round(-z / (2e-3 / 3))) > 0.02  # of a level, and not on its border
-    expected = np.select([third == 0, third == 1], [10e-3, 7.5e-3]) * weight
-    # Centroids of curved cells are not quite the means of their corners.
-    np.testing.assert_allclose(late.activation_delay[inside], expected[inside], atol=3e-5)
-    within, without = inside & (third < 2) & (away < 29), inside & ((third >= 2) | (away > 31))
-    assert np.all(late.region[within] == 3) and not late.region[without].any()
-    assert np.all(late.tension_scale == 1)
-
-
-def test_left_bundle_branch_block_goes_from_the_septum_to_the_lateral_wall(hemisphere):
-    late = hemisphere.late(preset="lbbb")
-    azimuth = np.abs(np.degrees(np.arctan2(hemisphere.centre[:, 1], hemisphere.centre[:, 0])))
-    above = hemisphere.centre[:, 2] > -1.3e-3
-    wave = 8e-3 * np.clip((azimuth - 30) / 120, 0, 1)
-    np.testing.assert_allclose(late.activation_delay[above], wave[above], atol=3e-5)
-    assert not late.activation_delay[above & (azimuth < 28)].any()
-
-
 def test_regional_factors_are_those_of_the_middles_of_segments_and_multiply_those_of_a_scar(hemisphere):
     healthy = hemisphere.tissue(contractility={"10": 0.5}, stiffness={10: 3.0})
     azimuth = np.degrees(np.arctan2(hemisphere.centre[:, 1], hemisphere.centre[:, 0]))
@@ -138,16 +110,6 @@ def test_regional_factors_are_those_of_the_middles_of_segments_and_multiply_thos
     scarred = hemisphere.tissue(Pathology(infarct=Infarct(segments=[10], tension_scale=0.2)), contractility={10: 0.5})
     infarct = scarred.region == 1
     np.testing.assert_allclose(scarred.tension_scale[infarct], 0.2 * healthy.tension_scale[infarct])
-
-
-def test_an_infarct_goes_before_its_border_and_that_before_lateness(hemisphere):
-    both = Pathology(
-        infarct=Infarct(segments=[5], border_mm=0.3), late_activation=LateActivation(delay_ms={5: 9.0, 6: 9.0})
-    )
-    ill = hemisphere.tissue(both)
-    assert set(ill.region) == {0, 1, 2, 3}
-    assert ill.activation_delay[ill.region == 1].max() == pytest.approx(9e-3)
-    assert np.all(ill.tension_scale[ill.region == 3] == 1)
 
 
 @pytest.mark.parametrize(

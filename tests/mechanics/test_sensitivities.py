@@ -108,7 +108,6 @@ def test_what_is_no_parameter_is_refused(parameters, message):
 @pytest.mark.parametrize(
     ("keys", "frames", "error", "message"),
     [
-        ({"pathology.late_activation.preset": "lbbb"}, None, ValueError, "late tissue needs every frame"),
         ({"loop.kind": "circulation"}, None, ValueError, "loop.kind = circulation: only a measured"),
         ({"motion.kind": "rigid"}, None, ValueError, "motion.kind = rigid: only a beat"),
         ({}, [1, 2], ValueError, r"frames = \[1, 2\]: give 0 and frames after it, in their order, below 12"),

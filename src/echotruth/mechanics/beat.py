@@ -19,6 +19,7 @@ from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.circulation import steady_beat
 from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solve, solved_cycle
+from echotruth.mechanics.solver.element import fibre_stretch
 from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
@@ -100,7 +101,7 @@ def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
 
 def check_frames(config: Config, frames: Sequence[int]) -> None:
     """Refuse frames that cannot be solved without those between them."""
-    loop, late = config.loop, config.pathology.late_activation
+    loop = config.loop
     if not (len(frames) > 1 and frames[0] == 0 and np.all(np.diff(frames) > 0) and frames[-1] < loop.frames):
         raise LoopError(f"frames = {list(frames)}: give 0 and frames after it, in their order, below {loop.frames}")
     if config.motion.kind != "beat":
@@ -108,8 +109,6 @@ def check_frames(config: Config, frames: Sequence[int]) -> None:
     if loop.kind != "measured" or loop.prescribed != "pressure_volume":
         given = f"kind = {loop.kind}" if loop.kind != "measured" else f"prescribed = {loop.prescribed}"
         raise LoopError(f"loop.{given}: only a measured pressure-volume loop can be solved in some of its frames")
-    if late.preset is not None or late.delay_ms:
-        raise LoopError("pathology.late_activation: late tissue needs every frame: leave it out, or solve all frames")
 
 
 def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
@@ -117,22 +116,31 @@ def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     settings, healthy = config.loop.circulation, healthy_heart(config)
     circulation, cycle = calibrate(cycle, settings)
     logger.info("the healthy heart, in its measured loop")
-    measured = _solve(healthy, unloaded_wall(healthy, cycle), cycle)
+    measured, stretch = _healthy_beat(healthy, cycle)
     circulation = altered(circulation.scaled(float(measured.volume[0]) / cycle.edv), settings)
-    twitch = settings.contractility * measured.active_tension
+    twitch, cells = settings.contractility * measured.active_tension, unloaded.tissue
+    delay, sensitivity = cells.activation_delay / cycle.period, config.mechanics.active.length_sensitivity
+    activation = Activation(twitch, stretch, cells.tension_scale, delay, sensitivity)
     logger.info("the heart in its circulation")
     equations = equilibrium(config, unloaded)
     try:
         stepper = filled_to_end_diastole(equations, cycle.filled(settings.preload), measured.stiffness)
-        frames = steady_beat(stepper, circulation, twitch, activation(unloaded, cycle), settings.beats_max)
+        frames = steady_beat(stepper, circulation, activation, settings.beats_max)
         return solved_cycle(equations, replace(cycle, pressure=None, volume=None), frames)
     finally:
         equations.close()
 
 
-def activation(unloaded: Wall, cycle: Cycle) -> Activation:
-    cells = unloaded.tissue
-    return Activation(cells.tension_scale, cells.activation_delay, cycle.period / len(cycle.time))
+def _healthy_beat(config: Config, cycle: Cycle) -> tuple[SolvedCycle, Floats]:
+    """A healthy heart in its loop, and the stretch along its fibres since ED, (n_frames, n_cells)."""
+    unloaded = unloaded_wall(config, cycle)
+    equations, nodes = equilibrium(config, unloaded), unloaded.mesh.nodes
+    try:
+        solved = solve(equations, cycle, unloaded.tissue.tension_scale, config.mechanics.material.si().stiffness)
+    finally:
+        equations.close()
+    stretch = np.array([fibre_stretch(nodes + moved, equations.elements) for moved in solved.displacement])
+    return solved, stretch / stretch[0]
 
 
 def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
@@ -141,7 +149,7 @@ def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
         stiffness = _healthy_stiffness(config, unloaded, cycle)
     equations = equilibrium(config, unloaded)
     try:
-        return solve(equations, cycle, activation(unloaded, cycle), stiffness)
+        return solve(equations, cycle, unloaded.tissue.tension_scale, stiffness)
     finally:
         equations.close()
 

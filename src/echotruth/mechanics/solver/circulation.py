@@ -7,10 +7,10 @@ from math import exp
 
 import numpy as np
 
-from echotruth.arrays import Floats
 from echotruth.loop.circulation import Circulation
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.cycle import SolvedFrame, extrapolated
+from echotruth.mechanics.solver.element import fibre_stretch
 from echotruth.mechanics.solver.equilibrium import Load, State
 from echotruth.mechanics.solver.newton import Diverged, LoadStepper
 
@@ -26,7 +26,7 @@ resistance half as large again. It changes the number of beats until the heart i
 
 
 def steady_beat(
-    stepper: LoadStepper, circulation: Circulation, twitch: Floats, activation: Activation, beats_max: int
+    stepper: LoadStepper, circulation: Circulation, activation: Activation, beats_max: int
 ) -> list[SolvedFrame]:
     """The frames of the first beat that ends as it began.
 
@@ -35,8 +35,6 @@ def steady_beat(
     stepper : LoadStepper
         At end-diastole (:func:`.cycle.filled_to_end_diastole`).
     circulation : Circulation
-    twitch : ndarray of shape (n_frames,), Pa
-        T_Ca of one beat.
     activation : Activation
     beats_max : int
 
@@ -51,10 +49,10 @@ def steady_beat(
         If a frame cannot be solved, or the heart is not steady after so many beats.
     """
     stepper.couple(circulation)
-    frames = _frames(stepper, circulation, twitch, activation)
+    frames = _frames(stepper, circulation, activation)
     first = next(frames)
     for number in range(1, beats_max + 1):
-        beat = [first, *(next(frames) for _ in range(len(twitch) - 1))]
+        beat = [first, *(next(frames) for _ in range(len(activation.twitch) - 1))]
         first = next(frames)
         volumes = [frame.load.volume * 1e9 for frame in beat]
         change = _change(beat, first)
@@ -69,19 +67,17 @@ def steady_beat(
     raise Diverged(f"The heart is not steady after {beats_max} beats ({100 * change:.2g} % from it): {remedy}.")
 
 
-def _frames(
-    stepper: LoadStepper, circulation: Circulation, twitch: Floats, activation: Activation
-) -> Iterator[SolvedFrame]:
+def _frames(stepper: LoadStepper, circulation: Circulation, activation: Activation) -> Iterator[SolvedFrame]:
     """The frames of all beats from end-diastole on."""
     states: list[State] = [stepper.state]
-    frame = 0
+    equations, twitch, frame = stepper.equations, activation.twitch, 0
     while True:
         yield SolvedFrame(
             stepper.state, stepper.load, stepper.factorizations, stepper.max_error, stepper.arterial_pressure
         )
+        tension = activation.advance(frame, fibre_stretch(equations.positions(stepper.state), equations.elements))
         frame += 1
-        time = frame * circulation.period / len(twitch)
-        load = Load(0.0, 1.0, 0.0, activation.periodic_tension(twitch, frame), time=time)
+        load = Load(0.0, 1.0, 0.0, tension, time=frame * circulation.period / len(twitch))
         state = stepper.advance(load, "cavity_pressure", extrapolated(states))
         stepper.state = replace(state, tension=float(twitch[frame % len(twitch)]))
         states = [*states, stepper.state][-4:]

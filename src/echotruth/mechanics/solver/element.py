@@ -215,6 +215,13 @@ def right_cauchy_green(nodes: Floats, elements: Elements, c: Floats) -> Floats:
     return j
 
 
+def fibre_stretch(nodes: Floats, elements: Elements) -> Floats:
+    """Mean stretch along the fibres over the points of each cell, (n_cells,), for nodes at (n_nodes, 3), m."""
+    c = np.empty((*elements.weight.shape, 6))
+    right_cauchy_green(nodes, elements, c)
+    return np.sqrt(c[..., 0]).mean(axis=1)
+
+
 @njit(**COMPILED)
 def _add_condensed(gradient, factor, ke):
     """Add `factor` G G^T of the eliminated pressure."""
