@@ -8,6 +8,7 @@ import pytest
 from echotruth.config import Config, Physiology
 from echotruth.heart import Heart
 from echotruth.loop.cycle import read_loop
+from echotruth.loop.phases import CONTRACTION
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.bounds import violation
 from echotruth.mechanics.derived import centroid_kinematics
@@ -102,6 +103,26 @@ def test_late_wall_stretches_the_septum_again(healthy):
     assert septal[es] - lateral[es] > 0.01
     assert found["ejection_fraction"] < normal["ejection_fraction"] - 0.05
     assert found["twist_es"] < normal["twist_es"] - np.radians(1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("age", ["fresh", "old"])
+def test_infarct_hardly_bulges_and_the_wall_away_from_it_shortens_less(age):
+    """As in mice after a day (Epstein 2002), whose ejection fraction falls and whose remote wall weakens."""
+    normal = beat(heart(frames=24, geometry=BLOCKED))
+    infarct = {"segments": [7, 8, 12, 13, 14], "age": age}
+    config = heart(frames=24, geometry=BLOCKED, pathology={"infarct": infarct})
+    arrays = beat(config)
+    curves, region = arrays["mechanics"], arrays["pathology"]["region"]
+    es, ivc = int(curves["es_frame"]), np.flatnonzero(curves["phase"] == CONTRACTION)[-1]
+    strain = arrays["kinematics"]["strain"][..., 1].astype(float)
+    scar = strain[:, region == 1].mean(axis=1)
+    assert scar[ivc] < 0.04 and -0.02 < scar[es] < 0.03
+    healthy = normal["kinematics"]["strain"][int(normal["mechanics"]["es_frame"])][:, 1][region == 0].mean()
+    assert -0.16 < healthy < strain[es, region == 0].mean()
+    fractions = [1 - volume.min() / volume[0] for volume in (normal["mechanics"]["volume"], curves["volume"])]
+    assert fractions[1] < fractions[0] - 0.14
+    assert curves["pressure"][0] > normal["mechanics"]["pressure"][0]
 
 
 @pytest.mark.slow

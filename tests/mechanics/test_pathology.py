@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from echotruth.config import Geometry, Pathology
+from echotruth.config.loading import validate
 from echotruth.config.pathology import Infarct
 from echotruth.config.regional import Regional
-from echotruth.fem.volume import cell_volumes
+from echotruth.fem.volume import cell_volumes, jacobians
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.pathology import PathologyError, infarct_centre, tissue
+from echotruth.mechanics.pathology import PathologyError, infarct_centre, thinned, tissue
 
 CONTRACTING, STIFF = {"tension_scale": 0.2}, {"stiffness_scale": 8.0}
 
@@ -125,3 +127,48 @@ def test_regional_factors_are_those_of_the_middles_of_segments_and_multiply_thos
 def test_an_infarct_that_is_nowhere_is_refused(hemisphere, infarct, sentence):
     with pytest.raises(PathologyError, match=sentence):
         hemisphere.with_(**infarct)
+
+
+def test_the_age_of_an_infarct_gives_what_is_not_given_else():
+    fresh = validate({"pathology": {"infarct": {"segments": [7], "age": "fresh", "stiffness_scale": 3}}}, "a.yaml")
+    old = validate({"pathology": {"infarct": {"segments": [7], "age": "old"}}}, "a.yaml").pathology.infarct
+    fresh = fresh.pathology.infarct
+    assert (fresh.stiffness_scale, fresh.taut_stiffness_kPa, fresh.thickness_scale) == (3, 400, 1)
+    assert old.taut_stiffness_kPa > fresh.taut_stiffness_kPa and old.thickness_scale < 1
+    assert Infarct(segments=[7]).taut_stiffness_kPa == 0
+
+
+def test_a_scar_is_taut_and_the_muscle_away_from_it_weakens(hemisphere):
+    ill = hemisphere.with_(
+        segments=[9], taut_stiffness_kPa=400.0, remote_tension_scale=0.7, tension_scale=0.1, border_mm=0.5
+    )
+    scar, remote = ill.region == 1, ill.region == 0
+    assert set(ill.taut_stiffness[scar]) == {4e5} and not ill.taut_stiffness[remote].any()
+    assert set(ill.tension_scale[scar]) == {0.1} and set(ill.tension_scale[remote]) == {0.7}
+    border = ill.region == 2
+    np.testing.assert_allclose((0.7 - ill.tension_scale[border]) / 0.6, ill.taut_stiffness[border] / 4e5)
+    assert set(hemisphere.with_(remote_tension_scale=0.7).tension_scale) == {1.0}  # remote from nothing
+
+
+def test_a_thin_scar_has_its_thickness_and_leaves_the_cavity_and_the_base_where_they_are(hemisphere):
+    infarct = Infarct(segments=[8, 9, 10], thickness_scale=0.5)
+    mesh, before = thinned(hemisphere.mesh, infarct), hemisphere.mesh
+    endo, base = np.unique(mesh.endo), np.unique(mesh.base)
+    np.testing.assert_allclose(mesh.nodes[endo], before.nodes[endo], atol=1e-12)
+    np.testing.assert_array_equal(mesh.nodes[base, 2], before.nodes[base, 2])
+    assert jacobians(mesh.nodes, mesh.cells).min() > 0
+    radius = np.linalg.norm(before.nodes, axis=1)
+    of_scar = np.unique(before.cells[tissue_of(hemisphere, infarct) == 1])
+    edge = np.unique(before.cells[tissue_of(hemisphere, infarct) != 1])
+    within = np.setdiff1d(of_scar, edge)
+    thin = np.linalg.norm(mesh.nodes[within], axis=1)
+    np.testing.assert_allclose(thin - 2e-3, 0.5 * (radius[within] - 2e-3), atol=2e-5)
+    gap, _ = KDTree(before.nodes[of_scar]).query(before.nodes)
+    far = gap > 2.5e-3  # the wall's thickness, and a cell
+    assert far.any()
+    np.testing.assert_array_equal(mesh.nodes[far], before.nodes[far])
+    assert thinned(before, Infarct(segments=[7])) is before
+
+
+def tissue_of(hemisphere, infarct):
+    return hemisphere.tissue(Pathology(infarct=infarct)).region

@@ -24,13 +24,31 @@ class Infarct(Section):
     """Sphere only: azimuth of its centre; septal 0, anterior 90, lateral 180, inferior -90."""
     transmurality: Annotated[FiniteFloat, Field(gt=0, le=1)] = 1.0
     """Wall depth to which the tissue is infarcted, from the endocardium."""
+    age: Literal["fresh", "old"] | None = None
+    """Age of the infarct, by which the stiffness and thickness below follow. `fresh`, of a day: 2 times as stiff while
+    the heart fills and 400 kPa beyond. Within six hours an infarct of dogs stops to bulge, longer by 5 % and less
+    compliant (Vokonas 1976, Am J Cardiol 37, 853; Pirzada 1976, Circulation 53, 970), and after a day those of mice
+    shorten by 0.7 +- 4.4 % (Epstein 2002, Magn Reson Med 48, 399), by which the 400 kPa were chosen. `old`, a scar of
+    collagen: 5 times, 1500 kPa and 0.6 of the thickness, all chosen."""
     tension_scale: Fraction = 0.0
     """Active tension relative to healthy tissue; infarcts of sheep had none (Wenk 2011)."""
     stiffness_scale: Annotated[FiniteFloat, Field(ge=0.1, le=100)] = 20.0
     """Stiffness relative to healthy tissue. With the default, an infarct of a third of the wall stretches by a few
-    percent when the heart ejects; in mice it shortens by 0.7 +- 4.4 % (Epstein 2002, Magn Reson Med 48, 399)."""
+    percent when the heart ejects."""
+    taut_stiffness_kPa: Annotated[FiniteFloat, Field(ge=0, le=1e4)] = 0.0
+    """Stiffness in addition from end-diastole on, stress over Green-Lagrange strain since then, the same in all
+    directions as in scars of rats (Fomovsky 2010, Am J Physiol 298, H221): the collagen, wavy in filling, is straight
+    at the length that the tissue has taken. The scar of mice has 22 MPa under the probe of a microscope (Rusu 2019, Sci
+    Rep 9, 16744)."""
+    thickness_scale: Annotated[FiniteFloat, Field(ge=0.2, le=2)] = 1.0
+    """Thickness of the unloaded scar relative to the wall that it was; the endocardium stays."""
     border_mm: Annotated[FiniteFloat, Field(ge=0)] = 0.0
-    """Width of the border zone, in which both factors return linearly to 1 (Lee 2011)."""
+    """Width of the border zone, in which all factors return linearly to those of healthy tissue (Lee 2011), so that in
+    the mean it bears half the tension; the muscle beside an infarct of sheep bears 63 % less (Shimkunas 2013, Ann
+    Thorac Surg 95, 1619)."""
+    remote_tension_scale: Annotated[FiniteFloat, Field(ge=0.1, le=1)] = 1.0
+    """Active tension of the muscle away from the infarct, relative to a healthy heart's. In cats it falls within a week
+    and is normal after six (Mathes 1976, Circ Res 38, 540); sheep's is normal after sixteen (Shimkunas 2013)."""
 
     @check
     def _check_region(self) -> None:

@@ -14,7 +14,7 @@ from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.loop.recording import LoopError
 from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
 from echotruth.mechanics.history import Arrays, collect_outputs
-from echotruth.mechanics.pathology import BORDER, INFARCT, healthy_heart, tissue
+from echotruth.mechanics.pathology import BORDER, INFARCT, healthy_heart, thinned
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.circulation import steady_beat
@@ -90,7 +90,7 @@ def simulate(config: Config) -> dict[str, Arrays]:
 
 def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
     """The unloaded wall of a configuration, solved for where its geometry is that of end-diastole."""
-    mesh = left_ventricle(config.geometry)
+    mesh = thinned(left_ventricle(config.geometry), config.pathology.infarct)
     logger.info("%d tetrahedra, %d nodes", len(mesh.cells), len(mesh.nodes))
     if config.geometry.given_state == "end_diastole":
         assert cycle.pressure is not None
@@ -146,7 +146,7 @@ def _healthy_beat(config: Config, cycle: Cycle) -> tuple[SolvedCycle, Floats]:
 def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     stiffness = config.mechanics.material.si().stiffness
     if stiffness is None and np.isin(unloaded.tissue.region, (INFARCT, BORDER)).any():
-        stiffness = _healthy_stiffness(config, unloaded, cycle)
+        stiffness = _healthy_stiffness(config, cycle)
     equations = equilibrium(config, unloaded)
     try:
         return solve(equations, cycle, unloaded.tissue.tension_scale, stiffness)
@@ -154,10 +154,10 @@ def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
         equations.close()
 
 
-def _healthy_stiffness(config: Config, unloaded: Wall, cycle: Cycle) -> float:
+def _healthy_stiffness(config: Config, cycle: Cycle) -> float:
     """C, Pa, of the heart without its scar, so that the tissue around a scar stays what it was."""
-    healthy = tissue(unloaded.mesh, unloaded.depth, Pathology(), config.mechanics.regional)
-    equations = equilibrium(config, replace(unloaded, tissue=healthy))
+    healthy = config.model_copy(update={"pathology": Pathology()})
+    equations = equilibrium(healthy, unloaded_wall(healthy, cycle))
     try:
         return filled_to_end_diastole(equations, cycle).state.stiffness
     finally:

@@ -1,7 +1,7 @@
 """Tissue: stiffness and active tension of every cell of the wall, healthy or diseased."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,8 @@ from echotruth.config import Config, Pathology
 from echotruth.config.pathology import Infarct
 from echotruth.config.regional import Regional
 from echotruth.fem.location import locate
-from echotruth.fem.tetrahedra import Floats, MaterialPoints, Mesh, interpolate, shape
+from echotruth.fem.tetrahedra import NODE_XI, Floats, MaterialPoints, Mesh, interpolate, shape
+from echotruth.mechanics.fibres import material_gradients, wall_depth
 
 HEALTHY, INFARCT, BORDER, LATE = range(4)
 """Regions; where they overlap, infarct takes precedence over border zone, and border zone over late activation."""
@@ -53,12 +54,15 @@ class Tissue:
     stiffness_scale, tension_scale : ndarray of shape (n_cells,)
         Factors on the stiffness of the passive law and on the active tension; 1 is healthy.
     activation_delay : ndarray of shape (n_cells,), s
+    taut_stiffness : ndarray of shape (n_cells,), Pa
+        Stiffness in addition from end-diastole on.
     """
 
     region: NDArray[np.uint8]
     stiffness_scale: Floats
     tension_scale: Floats
     activation_delay: Floats
+    taut_stiffness: Floats
 
 
 def healthy_heart(config: Config) -> Config:
@@ -98,8 +102,37 @@ def tissue(mesh: Mesh, depth: Floats, pathology: Pathology, regional: Regional) 
     factors = [_gradual(_by_segment(given, 1.0), segments, centroid) for given in (regional.stiffness, contractility)]
     weight = _infarct_weight(mesh, depth, infarct)
     region = np.select([weight == 1, weight > 0], [INFARCT, BORDER], HEALTHY).astype(np.uint8)
-    stiffness, tension = (1 + (scale - 1) * weight for scale in (infarct.stiffness_scale, infarct.tension_scale))
-    return Tissue(region, stiffness * factors[0], tension * factors[1], np.zeros(len(weight)))
+    stiffness = 1 + (infarct.stiffness_scale - 1) * weight
+    remote = infarct.remote_tension_scale if weight.any() else 1.0
+    tension = remote * (1 - weight) + infarct.tension_scale * weight
+    taut = infarct.si().taut_stiffness * weight
+    return Tissue(region, stiffness * factors[0], tension * factors[1], np.zeros(len(weight)), taut)
+
+
+def thinned(mesh: Mesh, infarct: Infarct) -> Mesh:
+    """The unloaded wall, as thin in an infarct as is asked for; its epicardium moves towards the endocardium.
+
+    Beside the infarct the thickness returns to that of the wall over the border zone, or over the wall's thickness if
+    that is more.
+    """
+    if infarct.thickness_scale == 1:
+        return mesh
+    depth = wall_depth(mesh)
+    gradients = np.einsum("cqai,ca->cqi", material_gradients(mesh, NODE_XI)[0], depth[mesh.cells])
+    gradient = np.stack([_at_nodes(mesh, part) for part in np.moveaxis(gradients, -1, 0)], axis=-1)
+    steepness = np.linalg.norm(gradient, axis=1)  # one over the thickness
+    border_mm = max(infarct.border_mm, 1e3 / float(np.median(steepness)))
+    weight = _infarct_weight(mesh, depth, infarct.model_copy(update={"border_mm": border_mm}))
+    of_node = _at_nodes(mesh, np.repeat(weight[:, None], 10, axis=1))
+    outwards = ((infarct.thickness_scale - 1) * of_node * depth / steepness**2)[:, None] * gradient
+    outwards[np.unique(mesh.base), 2] = 0.0
+    return replace(mesh, nodes=mesh.nodes + outwards)
+
+
+def _at_nodes(mesh: Mesh, values: Floats) -> Floats:
+    """Mean (n_nodes,) over the cells around each node of values (n_cells, 10) at their nodes."""
+    nodes = mesh.cells.ravel()
+    return np.bincount(nodes, values.ravel()) / np.bincount(nodes)
 
 
 def _by_segment(given: Mapping[int, float], otherwise: float) -> Floats:

@@ -91,17 +91,17 @@ class _Heart:
 
     def wall(self, other: Config) -> Wall:
         """Wall of another configuration; it has the mesh of this one if the geometry is the same."""
-        if other.geometry != self.config.geometry:
+        if other.geometry != self.config.geometry or other.pathology.infarct.thickness_scale != 1:
             return unloaded_wall(other, read_loop(other.loop))
         mesh, depth = self.unloaded.mesh, self.unloaded.depth
         return Wall(mesh, depth, tissue(mesh, depth, other.pathology, other.mechanics.regional))
 
     def variant(self, other: Config, wall: Wall, change: float, frames: Sequence[int]) -> Variant:
         """The heart of another configuration."""
-        same = other.geometry == self.config.geometry and other.fibres == self.config.fibres
-        section, scale = other.mechanics, wall.tissue.stiffness_scale
+        same = wall.mesh is self.unloaded.mesh and other.fibres == self.config.fibres
+        section, scale, taut = other.mechanics, wall.tissue.stiffness_scale, wall.tissue.taut_stiffness
         equations = (
-            self.variant_0.equations.changed(wall_law(section), scale, surroundings(wall.mesh, section))
+            self.variant_0.equations.changed(wall_law(section), scale, surroundings(wall.mesh, section), taut)
             if same
             else equilibrium(other, wall)
         )

@@ -62,7 +62,8 @@ def equilibrium(config: Config, wall: Wall, exact: bool = False) -> Equilibrium:
     support = base_support(wall.mesh, section.base)
     springs = surroundings(wall.mesh, section)
     law = wall_law(section)
-    return Equilibrium(wall.mesh, frames, law, support, wall.tissue.stiffness_scale, springs, exact)
+    tissue = wall.tissue
+    return Equilibrium(wall.mesh, frames, law, support, tissue.stiffness_scale, springs, exact, tissue.taut_stiffness)
 
 
 def wall_law(section: Mechanics) -> element.WallLaw:
