@@ -84,5 +84,5 @@ class Activation:
         """lambda_h(t - d), (n_cells,), of each cell; that of end-diastole until it is activated."""
         phase = np.maximum(frame - self._delay, 0.0)
         before, cells = phase.astype(int), np.arange(len(phase))
-        first, second = self._healthy[before, cells], self._healthy[before + 1 - len(self._healthy), cells]
+        first, second = self._healthy[before, cells], self._healthy[(before + 1) % len(self._healthy), cells]
         return first + (phase - before) * (second - first)
