@@ -17,7 +17,6 @@ from echotruth.fem.tetrahedra import Floats, Mesh, shape
 from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.mechanics import fibres
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.cycle import filled_to_end_diastole, solve
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
 from echotruth.mechanics.solver.newton import LoadStepper
@@ -86,8 +85,7 @@ class Ours:
 
     def cycle(self, frames: int | None = None, stiffness: float | None = None) -> dict[str, Any]:
         """Solve the first frames of the loop, its pressure and volume given."""
-        n, clock, whole = len(self._wall.mesh.cells), Clock(), read_loop(Loop())
-        everywhere = Activation(np.ones(n), np.zeros(n), whole.period / len(whole.time))
+        clock, whole, everywhere = Clock(), read_loop(Loop()), np.ones(len(self._wall.mesh.cells))
         with clock("cycle"):
             self._beat = solve(self._heart, _first(whole, frames), everywhere, stiffness)
         names = {"tension": "active_tension", "pressure": "pressure", "volume": "volume"}

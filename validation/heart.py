@@ -17,7 +17,6 @@ from echotruth.loop.cycle import read_loop
 from echotruth.mechanics import fibres, kinematics
 from echotruth.mechanics.fibres import material_gradients
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solved_cycle, solved_frames
 from echotruth.mechanics.solver.equilibrium import PreviousState
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
@@ -89,9 +88,7 @@ def solved_heart(config: Config) -> SolvedBeat:
     """The heart of a configuration."""
     cycle, unloaded = read_loop(config.loop), wall(config, left_ventricle(config.geometry))
     equations = equilibrium(config, unloaded)
-    tissue = unloaded.tissue
-    activation = Activation(tissue.tension_scale, tissue.activation_delay, cycle.period / len(cycle.time))
-    frames = solved_frames(filled_to_end_diastole(equations, cycle), cycle, activation)
+    frames = solved_frames(filled_to_end_diastole(equations, cycle), cycle, unloaded.tissue.tension_scale)
     frames, previous = zip(*((frame, equations.previous) for frame in frames), strict=True)
     beat = solved_cycle(equations, cycle, frames)
     equations.close()

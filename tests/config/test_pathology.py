@@ -9,16 +9,16 @@ from echotruth.cases import expand, table
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, validate
 
-INFARCT, LATE = "pathology.infarct", "pathology.late_activation"
+INFARCT, ORDER = "pathology.infarct", "pathology.activation"
 BAD = [
     (INFARCT, {"segments": [7, 18]}, "segments.1 = 18: should be less than or equal to 17"),
     (INFARCT, {"segments": []}, "segments = []: should have at least 1 item"),
     (INFARCT, {"segments": [7], "radius_mm": 1}, "radius_mm = 1.0: give either segments or radius_mm"),
     (INFARCT, {"segment": [1]}, "segment is not a key: did you mean pathology.infarct.segments?"),
-    (LATE, {"delay_ms": {5: -3}}, "delay_ms.5 = -3: should be greater than or equal to 0"),
-    (LATE, {"delay_ms": {"lateral": 3}}, "delay_ms.lateral = 'lateral': must be a whole number"),
-    (LATE, {"preset": "lbbb", "delay_ms": {5: 3}}, "delay_ms = {5: 3.0}: give either preset or delay_ms"),
-    (LATE, {"preset": "rbbb"}, "preset = 'rbbb': should be 'lbbb'"),
+    (ORDER, {"sites": []}, "sites = []: should have at least 1 item"),
+    (ORDER, {"sites": [{"time_ms": -3}]}, "sites.0.time_ms = -3: should be greater than or equal to 0"),
+    (ORDER, {"preset": "rbbb"}, "preset = 'rbbb': should be 'normal', 'lbbb' or 'rv_pacing'"),
+    (ORDER, {"preset": "lbbb"}, "preset = 'lbbb': needs loop.kind = circulation"),
 ]
 
 
@@ -44,10 +44,17 @@ def test_a_disease_that_cannot_be_is_refused(section, keys, sentence):
 
 
 @pytest.mark.parametrize("written", [yaml.safe_dump, json.dumps])
-def test_delays_survive_writing_and_reading(written):
-    config = validate({"pathology": {"late_activation": {"delay_ms": {5: 8, 11: 4.5}}}}, "late.yaml")
+def test_sites_survive_writing_and_reading(written):
+    sites = [{"azimuth_deg": 180, "depth": 1, "time_ms": 3}, {}]
+    config = validate({"pathology": {"activation": {"sites": sites}}, "loop": {"kind": "circulation"}}, "late.yaml")
     assert validate(yaml.safe_load(written(config.model_dump(mode="json"))), "again.yaml") == config
-    assert config.pathology.late_activation.si().delay == {5: pytest.approx(8e-3), 11: pytest.approx(4.5e-3)}
+    assert [site.si().time for site in config.pathology.activation.sites] == [pytest.approx(3e-3), 0]
+
+
+def test_a_wall_is_not_both_preset_and_paced():
+    keys = {"pathology": {"activation": {"preset": "lbbb", "sites": [{}]}}, "loop": {"kind": "circulation"}}
+    with pytest.raises(ConfigError, match="give either preset or sites"):
+        validate(keys, "bad.yaml")
 
 
 def test_disease_can_be_swept_with_a_healthy_heart_beside_it():

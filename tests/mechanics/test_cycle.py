@@ -11,7 +11,6 @@ from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.cycle import solve
 from echotruth.mechanics.solver.newton import Diverged
 from echotruth.mechanics.solver.wall import equilibrium, wall
@@ -25,10 +24,9 @@ CONFIG = Config(geometry=COARSE, loop=Loop(frames=12), mechanics=ELASTIC)
 
 def solved(cycle, config=CONFIG, stiffness=None):
     body = wall(config, left_ventricle(config.geometry))
-    activation = Activation(body.tissue.tension_scale, body.tissue.activation_delay, cycle.period / len(cycle.time))
     equations = equilibrium(config, body)
     try:
-        return solve(equations, cycle, activation, stiffness)
+        return solve(equations, cycle, body.tissue.tension_scale, stiffness)
     finally:
         equations.close()
 

@@ -23,11 +23,13 @@ def law(name="fung", power=2.0, beta=1.4, cross_fibre=(0.0, 0.0)):
     return laws._replace(cross_fibre=np.array(cross_fibre))
 
 
-def cell_state(mesh, pressure=0.0, stiffness=1.1e3, tension=4e4, rate=0.0):
+def cell_state(mesh, pressure=0.0, stiffness=1.1e3, tension=4e4, rate=0.0, taut=0.0):
     fields = (values * np.ones(len(mesh.cells)) for values in (stiffness, tension, pressure))
     previous_c = np.empty((len(mesh.cells), 14, 6))
     element.right_cauchy_green(1.05 * mesh.nodes, elements(mesh), previous_c)
-    return element.CellState(*fields, rate, previous_c)
+    taut_c = np.empty_like(previous_c)
+    element.right_cauchy_green(mesh.nodes * [1.02, 1.0, 0.97], elements(mesh), taut_c)
+    return element.CellState(*fields, rate, previous_c, taut * np.ones(len(mesh.cells)), taut_c)
 
 
 def elements(mesh, directions=None):
@@ -66,7 +68,8 @@ def test_tangent_is_the_derivative_of_the_condensed_force(mesh, name, power, cro
     directions = np.linalg.qr(rng.normal(size=(len(mesh.nodes), 3, 3)))[0]
     directions[::2] = np.eye(3)
     nodes, change = mesh.nodes + 1e-5 * rng.normal(size=mesh.nodes.shape), rng.normal(size=mesh.nodes.shape)
-    state, step = cell_state(mesh, pressure=1e4 * rng.normal(size=len(mesh.cells)), rate=200.0), 1e-9
+    state = cell_state(mesh, pressure=1e4 * rng.normal(size=len(mesh.cells)), rate=200.0, taut=2e4)
+    step = 1e-9
     here = response(mesh, nodes, state, directions, laws)
     ends = [response(mesh, nodes + side * step * change, state, directions, laws) for side in (1, -1)]
     forces = [out.force[:, TOTAL] for out in ends]
@@ -84,7 +87,7 @@ def test_each_cell_bears_its_own_stiffness_tension_and_pressure(mesh):
     nodes, factors = mesh.nodes * [1.1, 1.05, 0.95], np.random.default_rng(7).uniform(0.5, 2, size=(3, len(mesh.cells)))
     same = cell_state(mesh, pressure=1e4, rate=200.0)
     scaled = (values * factor for values, factor in zip(same[:3], factors, strict=True))
-    state = element.CellState(*scaled, same.rate, same.previous_c)
+    state = element.CellState(*scaled, *same[3:])
     unit, mixed = response(mesh, nodes, cell_state(mesh, 1.0, 1.0, 1.0, 200.0)), response(mesh, nodes, state)
     np.testing.assert_array_equal(mixed.force[:, :TOTAL], unit.force[:, :TOTAL])
     parts = np.einsum("pc,cpr->cr", state[:3], mixed.force[:, :TOTAL])
@@ -113,3 +116,21 @@ def test_viscous_force_does_the_work_of_the_strain_increment(mesh):
     state, wall = cell_state(mesh, 0.0, 0.0, 0.0, rate=0.2), np.sum(elements(mesh).weight)
     work = np.sum(summed(mesh, response(mesh, 1.1 * mesh.nodes, state).force[:, TOTAL]) * mesh.nodes)
     assert work == pytest.approx(3 * (1.1**2 - 1.05**2) / 2 * 1.1 * wall, rel=1e-12)
+
+
+def test_a_taut_scar_stores_the_energy_of_its_strain_since_end_diastole(mesh):
+    """Its forces are the derivative of V G E : E / 2, with E = (F^T F - F_ED^T F_ED) / 2, for an affine deformation."""
+    modulus, at_ed = 5e5, np.diag([1.02, 1.0, 0.97])
+    rng = np.random.default_rng(3)
+    f, change = np.eye(3) + 0.05 * rng.normal(size=(3, 3)), rng.normal(size=(3, 3))
+
+    def energy(deformation):
+        strain = (deformation.T @ deformation - at_ed.T @ at_ed) / 2
+        return elements(mesh).weight.sum() * modulus * np.sum(strain**2) / 2
+
+    nodes = mesh.nodes @ f.T
+    taut, slack = (response(mesh, nodes, cell_state(mesh, taut=value)).force[:, TOTAL] for value in (modulus, 0.0))
+    moved = (mesh.nodes @ change.T)[mesh.cells].reshape(-1, 30)
+    step = 1e-5
+    slope = (energy(f + step * change) - energy(f - step * change)) / (2 * step)
+    assert np.sum((taut - slack) * moved) == pytest.approx(slope, rel=1e-8)

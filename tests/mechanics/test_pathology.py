@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from echotruth.config import Geometry, Pathology
-from echotruth.config.pathology import Infarct, LateActivation
+from echotruth.config.loading import validate
+from echotruth.config.pathology import Infarct
 from echotruth.config.regional import Regional
-from echotruth.fem.volume import cell_volumes
+from echotruth.fem.volume import cell_volumes, jacobians
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.pathology import PathologyError, infarct_centre, tissue
+from echotruth.mechanics.pathology import PathologyError, infarct_centre, thinned, tissue
 
 CONTRACTING, STIFF = {"tension_scale": 0.2}, {"stiffness_scale": 8.0}
 
@@ -27,9 +29,6 @@ class Hemisphere:
 
     def with_(self, **infarct):
         return self.tissue(Pathology(infarct=Infarct(**infarct)))
-
-    def late(self, **late):
-        return self.tissue(Pathology(late_activation=LateActivation(**late)))
 
     def tissue(self, pathology=Pathology(), **regional):  # noqa: B008, a default section does not change
         return tissue(self.mesh, self.depth, pathology, Regional(**regional))
@@ -90,31 +89,6 @@ def test_the_border_zone_fades_linearly_with_the_distance(hemisphere):
     assert np.std(ill.stiffness_scale[border] - 1 - 7 * weight[border]) < 0.15
 
 
-def test_delays_are_those_of_the_middles_of_segments_and_linear_between(hemisphere):
-    late = hemisphere.late(delay_ms={5: 20.0, 11: 15.0, 8: 0.0}, scale=0.5)
-    x, y, z = hemisphere.centre.T
-    # Segment 5 is inferolateral: its middle lies at 210 deg, and those of its neighbours 60 deg away.
-    away = np.abs((np.degrees(np.arctan2(y, x)) - 210 + 180) % 360 - 180)
-    weight = np.clip(1 - away / 60, 0, 1)
-    third = np.floor(-z / (2e-3 / 3))
-    inside = np.abs(-z / (2e-3 / 3) - np.round(-z / (2e-3 / 3))) > 0.02  # of a level, and not on its border
-    expected = np.select([third == 0, third == 1], [10e-3, 7.5e-3]) * weight
-    # Centroids of curved cells are not quite the means of their corners.
-    np.testing.assert_allclose(late.activation_delay[inside], expected[inside], atol=3e-5)
-    within, without = inside & (third < 2) & (away < 29), inside & ((third >= 2) | (away > 31))
-    assert np.all(late.region[within] == 3) and not late.region[without].any()
-    assert np.all(late.tension_scale == 1)
-
-
-def test_left_bundle_branch_block_goes_from_the_septum_to_the_lateral_wall(hemisphere):
-    late = hemisphere.late(preset="lbbb")
-    azimuth = np.abs(np.degrees(np.arctan2(hemisphere.centre[:, 1], hemisphere.centre[:, 0])))
-    above = hemisphere.centre[:, 2] > -1.3e-3
-    wave = 8e-3 * np.clip((azimuth - 30) / 120, 0, 1)
-    np.testing.assert_allclose(late.activation_delay[above], wave[above], atol=3e-5)
-    assert not late.activation_delay[above & (azimuth < 28)].any()
-
-
 def test_regional_factors_are_those_of_the_middles_of_segments_and_multiply_those_of_a_scar(hemisphere):
     healthy = hemisphere.tissue(contractility={"10": 0.5}, stiffness={10: 3.0})
     azimuth = np.degrees(np.arctan2(hemisphere.centre[:, 1], hemisphere.centre[:, 0]))
@@ -127,16 +101,6 @@ def test_regional_factors_are_those_of_the_middles_of_segments_and_multiply_thos
     scarred = hemisphere.tissue(Pathology(infarct=Infarct(segments=[10], tension_scale=0.2)), contractility={10: 0.5})
     infarct = scarred.region == 1
     np.testing.assert_allclose(scarred.tension_scale[infarct], 0.2 * healthy.tension_scale[infarct])
-
-
-def test_an_infarct_goes_before_its_border_and_that_before_lateness(hemisphere):
-    both = Pathology(
-        infarct=Infarct(segments=[5], border_mm=0.3), late_activation=LateActivation(delay_ms={5: 9.0, 6: 9.0})
-    )
-    ill = hemisphere.tissue(both)
-    assert set(ill.region) == {0, 1, 2, 3}
-    assert ill.activation_delay[ill.region == 1].max() == pytest.approx(9e-3)
-    assert np.all(ill.tension_scale[ill.region == 3] == 1)
 
 
 @pytest.mark.parametrize(
@@ -152,3 +116,48 @@ def test_an_infarct_goes_before_its_border_and_that_before_lateness(hemisphere):
 def test_an_infarct_that_is_nowhere_is_refused(hemisphere, infarct, sentence):
     with pytest.raises(PathologyError, match=sentence):
         hemisphere.with_(**infarct)
+
+
+def test_the_age_of_an_infarct_gives_what_is_not_given_else():
+    fresh = validate({"pathology": {"infarct": {"segments": [7], "age": "fresh", "stiffness_scale": 3}}}, "a.yaml")
+    old = validate({"pathology": {"infarct": {"segments": [7], "age": "old"}}}, "a.yaml").pathology.infarct
+    fresh = fresh.pathology.infarct
+    assert (fresh.stiffness_scale, fresh.taut_stiffness_kPa, fresh.thickness_scale) == (3, 400, 1)
+    assert old.taut_stiffness_kPa > fresh.taut_stiffness_kPa and old.thickness_scale < 1
+    assert Infarct(segments=[7]).taut_stiffness_kPa == 0
+
+
+def test_a_scar_is_taut_and_the_muscle_away_from_it_weakens(hemisphere):
+    ill = hemisphere.with_(
+        segments=[9], taut_stiffness_kPa=400.0, remote_tension_scale=0.7, tension_scale=0.1, border_mm=0.5
+    )
+    scar, remote = ill.region == 1, ill.region == 0
+    assert set(ill.taut_stiffness[scar]) == {4e5} and not ill.taut_stiffness[remote].any()
+    assert set(ill.tension_scale[scar]) == {0.1} and set(ill.tension_scale[remote]) == {0.7}
+    border = ill.region == 2
+    np.testing.assert_allclose((0.7 - ill.tension_scale[border]) / 0.6, ill.taut_stiffness[border] / 4e5)
+    assert set(hemisphere.with_(remote_tension_scale=0.7).tension_scale) == {1.0}  # remote from nothing
+
+
+def test_a_thin_scar_has_its_thickness_and_leaves_the_cavity_and_the_base_where_they_are(hemisphere):
+    infarct = Infarct(segments=[8, 9, 10], thickness_scale=0.5)
+    mesh, before = thinned(hemisphere.mesh, infarct), hemisphere.mesh
+    endo, base = np.unique(mesh.endo), np.unique(mesh.base)
+    np.testing.assert_allclose(mesh.nodes[endo], before.nodes[endo], atol=1e-12)
+    np.testing.assert_array_equal(mesh.nodes[base, 2], before.nodes[base, 2])
+    assert jacobians(mesh.nodes, mesh.cells).min() > 0
+    radius = np.linalg.norm(before.nodes, axis=1)
+    of_scar = np.unique(before.cells[tissue_of(hemisphere, infarct) == 1])
+    edge = np.unique(before.cells[tissue_of(hemisphere, infarct) != 1])
+    within = np.setdiff1d(of_scar, edge)
+    thin = np.linalg.norm(mesh.nodes[within], axis=1)
+    np.testing.assert_allclose(thin - 2e-3, 0.5 * (radius[within] - 2e-3), atol=2e-5)
+    gap, _ = KDTree(before.nodes[of_scar]).query(before.nodes)
+    far = gap > 2.5e-3  # the wall's thickness, and a cell
+    assert far.any()
+    np.testing.assert_array_equal(mesh.nodes[far], before.nodes[far])
+    assert thinned(before, Infarct(segments=[7])) is before
+
+
+def tissue_of(hemisphere, infarct):
+    return hemisphere.tissue(Pathology(infarct=infarct)).region

@@ -12,6 +12,7 @@ COARSE = {"circumferential_elements": 6, "longitudinal_elements": 4, "transmural
 HEART = et.configure(geometry=COARSE | {"wall_mm": 1.0}, loop={"frames": 12, "esp_mmHg": 100.0})
 FILLED = et.configure(HEART, **{"mechanics.material.stiffness_kPa": 1.2})
 INFARCT = et.configure(HEART, pathology={"infarct": {"segments": [8, 9], "tension_scale": 0.1}})
+SCAR = et.configure(INFARCT, pathology={"infarct": {"taut_stiffness_kPa": 100.0, "thickness_scale": 0.8}})
 SEGMENT = "mechanics.regional.contractility.8"
 
 
@@ -57,17 +58,22 @@ def test_laws_fibres_shape_loop_and_stiffness(config, key, value, step):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("key", "value", "step"),
-    [("pathology.infarct.tension_scale", 0.1, 5e-3), ("pathology.infarct.stiffness_scale", 20.0, 0.2)],
+    ("config", "key", "value", "step"),
+    [
+        (INFARCT, "pathology.infarct.tension_scale", 0.1, 5e-3),
+        (INFARCT, "pathology.infarct.stiffness_scale", 20.0, 0.2),
+        (SCAR, "pathology.infarct.taut_stiffness_kPa", 100.0, 0.5),
+        (SCAR, "pathology.infarct.thickness_scale", 0.8, 2e-3),
+    ],
 )
-def test_heart_with_a_scar_fills_to_its_loop_as_its_derivatives_say(key, value, step):
+def test_heart_with_a_scar_fills_to_its_loop_as_its_derivatives_say(config, key, value, step):
     """Differences are those of hearts that were solved likewise: C of `beat` is that of the heart without the scar."""
-    heart, by = et.sensitivities(INFARCT, key)
-    cycle = read_loop(INFARCT.loop)
+    heart, by = et.sensitivities(config, key)
+    cycle = read_loop(config.loop)
     volume = heart.arrays["mechanics"]["volume"]
     np.testing.assert_allclose(volume, cycle.volume[: len(volume)], rtol=1e-4)
     others = [
-        et.sensitivities(et.configure(INFARCT, **{key: value + sign * step}), SEGMENT)[0].arrays["mechanics"]
+        et.sensitivities(et.configure(config, **{key: value + sign * step}), SEGMENT)[0].arrays["mechanics"]
         for sign in (1, -1)
     ]
     for name in ("displacement", "active_tension", "stiffness"):
@@ -106,7 +112,6 @@ def test_what_is_no_parameter_is_refused(parameters, message):
 @pytest.mark.parametrize(
     ("keys", "frames", "error", "message"),
     [
-        ({"pathology.late_activation.preset": "lbbb"}, None, ValueError, "late tissue needs every frame"),
         ({"loop.kind": "circulation"}, None, ValueError, "loop.kind = circulation: only a measured"),
         ({"motion.kind": "rigid"}, None, ValueError, "motion.kind = rigid: only a beat"),
         ({}, [1, 2], ValueError, r"frames = \[1, 2\]: give 0 and frames after it, in their order, below 12"),

@@ -108,9 +108,9 @@ def test_views_themselves_and_the_trackers_are_the_same_in_all_rows(refusal):
     assert "row 1: views.mid.position = 3" in refusal("views.mid.position\n3\n")
 
 
-def test_delays_of_segments_stand_in_a_cell_as_json(hearts):
-    (late,) = hearts('case,pathology.late_activation.delay_ms\na,"{""11"": 6, ""12"": 4.5}"\n')
-    assert late.config.pathology.late_activation.delay_ms == {11: 6, 12: 4.5}
+def test_factors_of_segments_stand_in_a_cell_as_json(hearts):
+    (weak,) = hearts('case,mechanics.regional.contractility\na,"{""11"": 0.6, ""12"": 0.45}"\n')
+    assert weak.config.mechanics.regional.contractility == {11: 0.6, 12: 0.45}
 
 
 def test_mesh_and_loop_of_a_row_stay_together(hearts, tmp_path):
@@ -239,14 +239,17 @@ def test_table_of_cases_has_labels_and_notes(hearts):
     assert "label.empty" not in table(hearts("case,label.empty\na,\n"))
 
 
+BEATS = {"loop.kind": "circulation"}
+
+
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
         ({}, "healthy"),
         ({"pathology.infarct.radius_mm": 1.0}, "infarct"),
-        ({"pathology.late_activation.preset": "lbbb"}, "late_activation"),
-        ({"pathology.late_activation.preset": "lbbb", "pathology.late_activation.scale": 0.0}, "healthy"),
-        ({"pathology.late_activation.delay_ms": {5: 0.0}}, "healthy"),
+        ({"pathology.activation.preset": "lbbb"} | BEATS, "late_activation"),
+        ({"pathology.activation.sites": [{}]} | BEATS, "late_activation"),
+        ({"pathology.activation.preset": "normal"} | BEATS, "healthy"),
         ({"geometry.hypertrophy": 1.2, "pathology.infarct.segments": [1]}, "infarct+hypertrophy"),
         ({"geometry.dilation": 1.2}, "dilation"),
         ({"geometry.dilation": 0.9}, "healthy"),

@@ -15,11 +15,10 @@ def diagnosis(config: Config) -> str:
     `infarct` and `late_activation` are those of the section pathology, `hypertrophy` and `dilation` factors above 1 in
     the section geometry. A heart with none of them is `healthy`, or `unknown` if its shape is read from a file.
     """
-    infarct, late, geometry = config.pathology.infarct, config.pathology.late_activation, config.geometry
-    delayed = late.preset is not None or any(late.delay_ms.values())
+    infarct, order, geometry = config.pathology.infarct, config.pathology.activation, config.geometry
     words = {
         "infarct": infarct.segments is not None or infarct.radius_mm is not None,
-        "late_activation": delayed and late.scale > 0,
+        "late_activation": order.preset in ("lbbb", "rv_pacing") or order.sites is not None,
         "hypertrophy": geometry.hypertrophy > 1,
         "dilation": geometry.dilation > 1,
     }

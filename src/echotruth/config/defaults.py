@@ -16,6 +16,9 @@ HEART_DEFAULTS: dict[str, dict[str, Any]] = {
         "fibres.epi_deg": -41.0,
         "mechanics.active.shortening_velocity_max_per_s": 12.0,
         "mechanics.active.sheet_share": 0.33,
+        "pathology.activation.fibre_speed_m_per_s": 0.65,
+        "pathology.activation.cross_fibre_speed_m_per_s": 0.45,
+        "pathology.activation.purkinje_speed_m_per_s": 1.2,
         "mechanics.pericardium.spring_kPa_per_mm": 0.5,
         "physiology.fibre_shortening_rate_max_per_s": 7.0,
     },
@@ -24,8 +27,12 @@ HEART_DEFAULTS: dict[str, dict[str, Any]] = {
         "probe.preset": "human_2_7MHz",
         "fibres.endo_deg": 72.0,
         "fibres.epi_deg": -52.0,
+        "pathology.activation.fibre_speed_m_per_s": 0.65,
+        "pathology.activation.cross_fibre_speed_m_per_s": 0.45,
+        "pathology.activation.purkinje_speed_m_per_s": 2.0,
         "mechanics.active.shortening_velocity_max_per_s": 8.0,
         "mechanics.active.sheet_share": 0.3,
+        "mechanics.active.length_sensitivity": 10.0,
         "mechanics.active.normal_share": 0.18,
         "mechanics.pericardium.spring_kPa_per_mm": 0.1,
         "physiology.fibre_shortening_rate_max_per_s": 3.0,
@@ -59,6 +66,15 @@ DISEASE_OF_HEART: dict[tuple[str, str], dict[str, Any]] = {
     ("dcm", "human"): {"loop.circulation.contractility": 0.7},
 }
 """`pathology.preset` and `geometry.preset` -> what differs from that."""
+SCAR_DEFAULTS: dict[str, dict[str, Any]] = {
+    "fresh": {"pathology.infarct.stiffness_scale": 2.0, "pathology.infarct.taut_stiffness_kPa": 400.0},
+    "old": {
+        "pathology.infarct.stiffness_scale": 5.0,
+        "pathology.infarct.taut_stiffness_kPa": 1500.0,
+        "pathology.infarct.thickness_scale": 0.6,
+    },
+}
+"""`pathology.infarct.age` -> default of dotted keys."""
 
 REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.2}
 """`realism.preset` -> default of the bandwidth, and of the density of scatterers, of which a longer pulse needs fewer,
@@ -99,6 +115,7 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
     values = _filled(values, HEART_DEFAULTS.get(heart, HEART_DEFAULTS["mouse"]))
     disease = str(_value(values, "pathology.preset"))
     values = _filled(_filled(values, DISEASE_OF_HEART.get((disease, heart), {})), DISEASE_DEFAULTS.get(disease, {}))
+    values = _filled(values, SCAR_DEFAULTS.get(str(_value(values, "pathology.infarct.age")), {}))
     array = str(_value(values, "probe.preset"))
     values = _filled(values, _scanner(values, array))
     values = _filled(values, ARRAY_DEFAULTS.get(array, {}))

@@ -26,16 +26,21 @@ class Active(Section):
     """Share of the tension that acts along the sheet normal too, likewise. `human` 0.18."""
     shortening_velocity_max_per_s: Annotated[FiniteFloat, Field(gt=0)] | None = 15.0
     """Velocity, in unloaded lengths per second, at which shortening muscle bears no load. `rat` 12, `human` 8. `null`:
-    the tension does not depend on the velocity, as in the paper. Nor does it where `pathology.late_activation` delays
-    tissue in a measured loop, because early tissue alone cannot raise the pressure as a healthy heart does. Muscle
-    gives most power at about a third of it, and hearts eject near there (ter Keurs 2012, PMC3568939, whose human heart
-    shortens by 1.6 per second at most): the default mouse ejects at 4.2 per second, rat at 2.6, human at 1.2."""
+    the tension does not depend on the velocity, as in the paper. Muscle gives most power at about a third of it, and
+    hearts eject near there (ter Keurs 2012, PMC3568939, whose human heart shortens by 1.6 per second at most): the
+    default mouse ejects at 4.2 per second, rat at 2.6, human at 1.2."""
     hill_curvature: Annotated[FiniteFloat, Field(gt=0, le=10)] = 0.5
     """Curvature a / F_0 of the force-velocity relation: 0.5 in the model of cardiac muscle of Hunter, McCulloch & ter
     Keurs (Prog Biophys Mol Biol 69 (1998) 289)."""
     eccentric_max: Annotated[FiniteFloat, Field(gt=1, le=5)] = 2.5
     """Force to which that of muscle tends which is stretched ever faster, over the isometric one: 2 + a / F_0 in the
     same model."""
+
+    length_sensitivity: Annotated[FiniteFloat, Field(ge=0, le=50)] = 28.0
+    """Growth dln T / dlambda of the tension with the stretch beyond that of the healthy heart at the same time since
+    activation, in `loop.kind: circulation`. `human` 10: that of half activated muscle in the human model of Land et al.
+    (J Mol Cell Cardiol 106 (2017) 68). With it the late wall of a left bundle branch block stretches the septum again,
+    as in patients; the mouse's 28 is chosen for that and has no other source."""
 
 
 class Pericardium(Section):

@@ -37,7 +37,7 @@ class Physiology(Section):
     """Largest total variation of the active tension around the cycle, over that of one rise and one fall of the same
     height. Muscle contracts once in a beat: hearts of mice, rats and people, infarcted, late and thick ones too, have
     1.00 to 1.05. Where it is larger, the tension that meets the loop oscillates from frame to frame, and with it the
-    motion: it is 3.6 in the default heart with the preset `lbbb`."""
+    motion."""
     tension_es_min_kPa: FiniteFloat | None = 20.0
     """Smallest active tension at end-systole; the default mouse has 70, and its largest is 120."""
     tension_es_max_kPa: FiniteFloat | None = 180.0

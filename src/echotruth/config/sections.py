@@ -167,6 +167,15 @@ class Config(Section):
         self.require(self.fibres.source != "file" or self.geometry.fibre is not None, "fibres.source", remedy)
 
     @check
+    def _check_activation(self) -> None:
+        order = self.pathology.activation
+        if (order.preset or order.sites) and self.motion.kind == "beat" and self.loop.kind != "circulation":
+            remedy = (
+                "needs loop.kind = circulation: no wall that is activated out of turn gives the loop of a healthy one"
+            )
+            raise self._refused("pathology.activation." + ("preset" if order.preset else "sites"), remedy)
+
+    @check
     def _check_stiffness(self) -> None:
         prescribed, end_diastolic = self.loop.prescribed, self.geometry.given_state == "end_diastole"
         if self.motion.kind != "beat":

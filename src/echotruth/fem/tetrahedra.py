@@ -18,6 +18,10 @@ Integers = NDArray[np.int32]
 EDGES = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])
 """Vertices of the edge of each mid-edge node 4..9, in VTK's order."""
 
+_VERTEX_XI = np.vstack([np.zeros(3), np.eye(3)])
+NODE_XI = np.vstack([_VERTEX_XI, _VERTEX_XI[EDGES].mean(axis=1)])
+"""Local coordinates of the nodes of a tetrahedron."""
+
 
 @dataclass(frozen=True)
 class Mesh:

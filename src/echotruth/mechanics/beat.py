@@ -16,11 +16,12 @@ from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.loop.recording import LoopError
 from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
 from echotruth.mechanics.history import Arrays, collect_outputs
-from echotruth.mechanics.pathology import BORDER, INFARCT, healthy_heart, tissue
+from echotruth.mechanics.pathology import BORDER, INFARCT, healthy_heart, thinned
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.circulation import guessed, steady_beat
 from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solve, solved_cycle
+from echotruth.mechanics.solver.element import fibre_stretch
 from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
@@ -91,7 +92,7 @@ def simulate(config: Config) -> dict[str, Arrays]:
 
 def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
     """The unloaded wall of a configuration, solved for where its geometry is that of end-diastole."""
-    mesh = left_ventricle(config.geometry)
+    mesh = thinned(left_ventricle(config.geometry), config.pathology.infarct)
     logger.info("%d tetrahedra, %d nodes", len(mesh.cells), len(mesh.nodes))
     if config.geometry.given_state == "end_diastole":
         assert cycle.pressure is not None
@@ -102,7 +103,7 @@ def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
 
 def check_frames(config: Config, frames: Sequence[int]) -> None:
     """Refuse frames that cannot be solved without those between them."""
-    loop, late = config.loop, config.pathology.late_activation
+    loop = config.loop
     if not (len(frames) > 1 and frames[0] == 0 and np.all(np.diff(frames) > 0) and frames[-1] < loop.frames):
         raise LoopError(f"frames = {list(frames)}: give 0 and frames after it, in their order, below {loop.frames}")
     if config.motion.kind != "beat":
@@ -110,8 +111,6 @@ def check_frames(config: Config, frames: Sequence[int]) -> None:
     if loop.kind != "measured" or loop.prescribed != "pressure_volume":
         given = f"kind = {loop.kind}" if loop.kind != "measured" else f"prescribed = {loop.prescribed}"
         raise LoopError(f"loop.{given}: only a measured pressure-volume loop can be solved in some of its frames")
-    if late.preset is not None or late.delay_ms:
-        raise LoopError("pathology.late_activation: late tissue needs every frame: leave it out, or solve all frames")
 
 
 def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
@@ -120,9 +119,11 @@ def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     circulation, cycle = calibrate(cycle, settings)
     logger.info("the healthy heart, in its measured loop")
     healthy_wall = unloaded_wall(healthy, cycle)
-    measured = _solve(healthy, healthy_wall, cycle)
+    measured, stretch = _healthy_beat(healthy, healthy_wall, cycle)
     circulation = altered(circulation.scaled(float(measured.volume[0]) / cycle.edv), settings)
-    twitch = settings.contractility * measured.active_tension
+    twitch, cells = settings.contractility * measured.active_tension, unloaded.tissue
+    delay, sensitivity = cells.activation_delay / cycle.period, config.mechanics.active.length_sensitivity
+    activation = Activation(twitch, stretch, cells.tension_scale, delay, sensitivity)
     logger.info("the heart in its circulation")
     equations = equilibrium(config, unloaded)
     try:
@@ -131,7 +132,7 @@ def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
         strength = settings.contractility * _strength(unloaded, edv)
         strength /= _strength(healthy_wall, float(measured.volume[0]))
         guess = guessed(measured, edv, equations.volume(equations.unloaded_state(0.0)), strength)
-        frames = steady_beat(stepper, circulation, guess, twitch, activation(unloaded, cycle), settings.beats_max)
+        frames = steady_beat(stepper, circulation, guess, activation, settings.beats_max)
         return solved_cycle(equations, replace(cycle, pressure=None, volume=None), frames)
     finally:
         equations.close()
@@ -145,26 +146,32 @@ def _strength(unloaded: Wall, volume: float) -> float:
     return float(mean * np.log(1 + cells.sum() / volume) / 3)
 
 
-def activation(unloaded: Wall, cycle: Cycle) -> Activation:
-    cells = unloaded.tissue
-    return Activation(cells.tension_scale, cells.activation_delay, cycle.period / len(cycle.time))
+def _healthy_beat(config: Config, unloaded: Wall, cycle: Cycle) -> tuple[SolvedCycle, Floats]:
+    """A healthy heart in its loop, and the stretch along its fibres since ED, (n_frames, n_cells)."""
+    equations, nodes = equilibrium(config, unloaded), unloaded.mesh.nodes
+    try:
+        solved = solve(equations, cycle, unloaded.tissue.tension_scale, config.mechanics.material.si().stiffness)
+    finally:
+        equations.close()
+    stretch = np.array([fibre_stretch(nodes + moved, equations.elements) for moved in solved.displacement])
+    return solved, stretch / stretch[0]
 
 
 def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     stiffness = config.mechanics.material.si().stiffness
     if stiffness is None and np.isin(unloaded.tissue.region, (INFARCT, BORDER)).any():
-        stiffness = _healthy_stiffness(config, unloaded, cycle)
+        stiffness = _healthy_stiffness(config, cycle)
     equations = equilibrium(config, unloaded)
     try:
-        return solve(equations, cycle, activation(unloaded, cycle), stiffness)
+        return solve(equations, cycle, unloaded.tissue.tension_scale, stiffness)
     finally:
         equations.close()
 
 
-def _healthy_stiffness(config: Config, unloaded: Wall, cycle: Cycle) -> float:
+def _healthy_stiffness(config: Config, cycle: Cycle) -> float:
     """C, Pa, of the heart without its scar, so that the tissue around a scar stays what it was."""
-    healthy = tissue(unloaded.mesh, unloaded.depth, Pathology(), config.mechanics.regional)
-    equations = equilibrium(config, replace(unloaded, tissue=healthy))
+    healthy = config.model_copy(update={"pathology": Pathology()})
+    equations = equilibrium(healthy, unloaded_wall(healthy, cycle))
     try:
         return filled_to_end_diastole(equations, cycle).state.stiffness
     finally:

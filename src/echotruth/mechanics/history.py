@@ -57,7 +57,7 @@ def collect_outputs(config: Config, wall: Wall, mechanics: Arrays) -> dict[str, 
             **{side: getattr(mesh, side) for side in ("endo", "epi", "base")},
         },
         "fibres": _fibre_arrays(mesh, depth, frames, config.fibres.layers),
-        "pathology": dict(vars(wall.tissue)),
+        "pathology": {name: values for name, values in vars(wall.tissue).items() if name != "taut_stiffness"},
         "mechanics": mechanics,
         "kinematics": {
             "strain": strain.astype(np.float32),

@@ -1,7 +1,7 @@
-"""Tissue: stiffness, active tension and activation delay of every cell of the wall, healthy or diseased."""
+"""Tissue: stiffness and active tension of every cell of the wall, healthy or diseased."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,24 +9,14 @@ from scipy.spatial import KDTree
 
 from echotruth.aha import segment
 from echotruth.config import Config, Pathology
-from echotruth.config.pathology import Infarct, LateActivation
+from echotruth.config.pathology import Infarct
 from echotruth.config.regional import Regional
 from echotruth.fem.location import locate
-from echotruth.fem.tetrahedra import Floats, MaterialPoints, Mesh, interpolate, shape
+from echotruth.fem.tetrahedra import NODE_XI, Floats, MaterialPoints, Mesh, interpolate, shape
+from echotruth.mechanics.fibres import material_gradients, wall_depth
 
 HEALTHY, INFARCT, BORDER, LATE = range(4)
 """Regions; where they overlap, infarct takes precedence over border zone, and border zone over late activation."""
-
-ACTIVATION_DELAY = {
-    "lbbb": dict.fromkeys((1, 4, 7, 10, 13, 15, 17), 4e-3) | dict.fromkeys((5, 6, 11, 12, 16), 8e-3),
-}
-"""AHA segment to delay, s, of each preset.
-
-Left bundle branch block: the wave starts in the septum and ends in the lateral wall (Auricchio et al.,
-Circulation 109 (2004) 1133). The delays are those of a wave that goes along the wall of the mouse (middle at
-1.95 mm from the axis) at an assumed 0.5 m/s: 12 ms half-way round, of which the segments next to the septum
-are a third away and the lateral ones two thirds. Between the middles of segments it goes on evenly.
-"""
 
 CONTRACTILITY = {
     "normal": dict.fromkeys((1, 7, 13), 1.05)
@@ -60,16 +50,19 @@ class Tissue:
     Attributes
     ----------
     region : ndarray of shape (n_cells,), uint8
-        0 healthy, 1 infarct, 2 border zone, 3 late activation.
+        0 healthy, 1 infarct, 2 border zone, 3 late activation (:mod:`.activation_map`).
     stiffness_scale, tension_scale : ndarray of shape (n_cells,)
         Factors on the stiffness of the passive law and on the active tension; 1 is healthy.
     activation_delay : ndarray of shape (n_cells,), s
+    taut_stiffness : ndarray of shape (n_cells,), Pa
+        Stiffness in addition from end-diastole on.
     """
 
     region: NDArray[np.uint8]
     stiffness_scale: Floats
     tension_scale: Floats
     activation_delay: Floats
+    taut_stiffness: Floats
 
 
 def healthy_heart(config: Config) -> Config:
@@ -94,9 +87,8 @@ def tissue(mesh: Mesh, depth: Floats, pathology: Pathology, regional: Regional) 
     Returns
     -------
     Tissue
-        Delay and regional factors of a segment are those of its middle, and in between they change linearly around the
-        long axis, as the front of a wave does; from level to level they do not. Late activation is the region of whole
-        segments.
+        All activated at once. Regional factors of a segment are those of its middle, and in between they change
+        linearly around the long axis; from level to level they do not.
 
     Raises
     ------
@@ -106,20 +98,41 @@ def tissue(mesh: Mesh, depth: Floats, pathology: Pathology, regional: Regional) 
     infarct = pathology.infarct
     centroid = shape(_SAMPLES)[_CENTROID] @ mesh.nodes[mesh.cells]
     segments = segment(centroid, _apex(mesh))
-    delays = _segment_delays(pathology.late_activation)
     contractility = CONTRACTILITY[regional.preset] if regional.preset else regional.contractility
     factors = [_gradual(_by_segment(given, 1.0), segments, centroid) for given in (regional.stiffness, contractility)]
     weight = _infarct_weight(mesh, depth, infarct)
-    region = np.where(delays[segments] > 0, LATE, HEALTHY)
-    region = np.select([weight == 1, weight > 0], [INFARCT, BORDER], region).astype(np.uint8)
-    stiffness, tension = (1 + (scale - 1) * weight for scale in (infarct.stiffness_scale, infarct.tension_scale))
-    return Tissue(region, stiffness * factors[0], tension * factors[1], _gradual(delays, segments, centroid))
+    region = np.select([weight == 1, weight > 0], [INFARCT, BORDER], HEALTHY).astype(np.uint8)
+    stiffness = 1 + (infarct.stiffness_scale - 1) * weight
+    remote = infarct.remote_tension_scale if weight.any() else 1.0
+    tension = remote * (1 - weight) + infarct.tension_scale * weight
+    taut = infarct.si().taut_stiffness * weight
+    return Tissue(region, stiffness * factors[0], tension * factors[1], np.zeros(len(weight)), taut)
 
 
-def _segment_delays(late: LateActivation) -> Floats:
-    """Activation delay (18,), s, by the number of the AHA segment."""
-    delays = ACTIVATION_DELAY[late.preset] if late.preset else late.si().delay
-    return late.scale * _by_segment(delays, 0.0)
+def thinned(mesh: Mesh, infarct: Infarct) -> Mesh:
+    """The unloaded wall, as thin in an infarct as is asked for; its epicardium moves towards the endocardium.
+
+    Beside the infarct the thickness returns to that of the wall over the border zone, or over the wall's thickness if
+    that is more.
+    """
+    if infarct.thickness_scale == 1:
+        return mesh
+    depth = wall_depth(mesh)
+    gradients = np.einsum("cqai,ca->cqi", material_gradients(mesh, NODE_XI)[0], depth[mesh.cells])
+    gradient = np.stack([_at_nodes(mesh, part) for part in np.moveaxis(gradients, -1, 0)], axis=-1)
+    steepness = np.linalg.norm(gradient, axis=1)  # one over the thickness
+    border_mm = max(infarct.border_mm, 1e3 / float(np.median(steepness)))
+    weight = _infarct_weight(mesh, depth, infarct.model_copy(update={"border_mm": border_mm}))
+    of_node = _at_nodes(mesh, np.repeat(weight[:, None], 10, axis=1))
+    outwards = ((infarct.thickness_scale - 1) * of_node * depth / steepness**2)[:, None] * gradient
+    outwards[np.unique(mesh.base), 2] = 0.0
+    return replace(mesh, nodes=mesh.nodes + outwards)
+
+
+def _at_nodes(mesh: Mesh, values: Floats) -> Floats:
+    """Mean (n_nodes,) over the cells around each node of values (n_cells, 10) at their nodes."""
+    nodes = mesh.cells.ravel()
+    return np.bincount(nodes, values.ravel()) / np.bincount(nodes)
 
 
 def _by_segment(given: Mapping[int, float], otherwise: float) -> Floats:
@@ -164,35 +177,47 @@ def _in_region(mesh: Mesh, depth: Floats, infarct: Infarct, positions: Floats) -
 
 
 def infarct_centre(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
-    """Centre of the sphere of an infarct: the middle of the wall in a direction from the long axis.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    depth : ndarray of shape (n_nodes,)
-        Wall depth.
-    infarct : Infarct
-        Only position and azimuth are used.
-
-    Returns
-    -------
-    ndarray of shape (3,), m
+    """Centre of the sphere of an infarct, (3,), m: the middle of the wall in a direction from the long axis.
 
     Raises
     ------
     PathologyError
         If there is no wall in that direction.
     """
-    azimuth = infarct.si().azimuth
+    centre = wall_point(mesh, depth, infarct.position, infarct.si().azimuth, 0.5)
+    if centre is None:
+        raise PathologyError(_no_cell(infarct))
+    return centre
+
+
+def wall_point(mesh: Mesh, depth: Floats, position: float, azimuth: float, at_depth: float) -> Floats | None:
+    """Point of the wall in a direction from the long axis.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    depth : ndarray of shape (n_nodes,)
+        Wall depth.
+    position : float
+        Position along the long axis, 0 at the base, 1 at the endocardial apex.
+    azimuth : float, rad
+    at_depth : float
+        Wall depth of the point.
+
+    Returns
+    -------
+    ndarray of shape (3,), m, or None
+        None if there is no wall in that direction.
+    """
     radius = np.linspace(0, np.hypot(*mesh.nodes[:, :2].T).max(), 2001)
-    height = np.full(len(radius), infarct.position * _apex(mesh))
+    height = np.full(len(radius), position * _apex(mesh))
     ray = np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height])
     points = locate(mesh.nodes, mesh.cells, ray)
     in_wall = points.cell >= 0
     if not in_wall.any():
-        raise PathologyError(_no_cell(infarct))
+        return None
     depths = interpolate(depth, mesh.cells, MaterialPoints(points.cell[in_wall], points.xi[in_wall]))
-    return ray[in_wall][np.argmin(np.abs(depths - 0.5))]
+    return ray[in_wall][np.argmin(np.abs(depths - at_depth))]
 
 
 def _apex(mesh: Mesh) -> float:

@@ -9,7 +9,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics import fibres, kinematics
-from echotruth.mechanics.beat import activation, check_frames, held, outputs, unloaded_wall
+from echotruth.mechanics.beat import check_frames, held, outputs, unloaded_wall
 from echotruth.mechanics.history import Arrays
 from echotruth.mechanics.pathology import tissue
 from echotruth.mechanics.solver.cycle import filled_to_end_diastole, solved_cycle, solved_frames
@@ -29,7 +29,7 @@ def sensitivities(
     Parameters
     ----------
     config : Config
-        Without late activation, in a measured loop.
+        In a measured loop.
     changed : mapping
         Name of a parameter to the configuration in which it is changed by a little, and that change, in its unit.
     frames : sequence of int
@@ -59,7 +59,7 @@ def sensitivities(
         stepper.on_step = steps.append
         # A heart of given C keeps the ejection fraction of its loop.
         loop = cycle if stiffness is None else cycle.scaled(stepper.load.volume / cycle.edv)
-        solved = solved_cycle(equations, loop, list(solved_frames(stepper, loop, activation(unloaded, loop))))
+        solved = solved_cycle(equations, loop, list(solved_frames(stepper, loop, unloaded.tissue.tension_scale)))
         heart = _Heart(config, unloaded, Variant(exact, cycle, unloaded.tissue.tension_scale))
         walls = [heart.wall(other) for other, _ in changed.values()]
         pairs = zip(walls, changed.values(), strict=True)
@@ -91,17 +91,17 @@ class _Heart:
 
     def wall(self, other: Config) -> Wall:
         """Wall of another configuration; it has the mesh of this one if the geometry is the same."""
-        if other.geometry != self.config.geometry:
+        if other.geometry != self.config.geometry or other.pathology.infarct.thickness_scale != 1:
             return unloaded_wall(other, read_loop(other.loop))
         mesh, depth = self.unloaded.mesh, self.unloaded.depth
         return Wall(mesh, depth, tissue(mesh, depth, other.pathology, other.mechanics.regional))
 
     def variant(self, other: Config, wall: Wall, change: float, frames: Sequence[int]) -> Variant:
         """The heart of another configuration."""
-        same = other.geometry == self.config.geometry and other.fibres == self.config.fibres
-        section, scale = other.mechanics, wall.tissue.stiffness_scale
+        same = wall.mesh is self.unloaded.mesh and other.fibres == self.config.fibres
+        section, scale, taut = other.mechanics, wall.tissue.stiffness_scale, wall.tissue.taut_stiffness
         equations = (
-            self.variant_0.equations.changed(wall_law(section), scale, surroundings(wall.mesh, section))
+            self.variant_0.equations.changed(wall_law(section), scale, surroundings(wall.mesh, section), taut)
             if same
             else equilibrium(other, wall)
         )

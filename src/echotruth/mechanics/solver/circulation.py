@@ -24,6 +24,7 @@ from echotruth.loop.circulation import (
 )
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.cycle import SolvedCycle, SolvedFrame, extrapolated
+from echotruth.mechanics.solver.element import fibre_stretch
 from echotruth.mechanics.solver.equilibrium import Load, State
 from echotruth.mechanics.solver.newton import TOLERANCE, Diverged, LoadStepper, linear_combination
 
@@ -45,12 +46,7 @@ DIASTOLIC_EXPONENT = 2.76
 
 
 def steady_beat(
-    stepper: LoadStepper,
-    circulation: Circulation,
-    guess: Cavity,
-    twitch: Floats,
-    activation: Activation,
-    beats_max: int,
+    stepper: LoadStepper, circulation: Circulation, guess: Cavity, activation: Activation, beats_max: int
 ) -> list[SolvedFrame]:
     """The frames of the first beat that ends as it began.
 
@@ -61,8 +57,6 @@ def steady_beat(
     circulation : Circulation
     guess : Cavity
         A left ventricle like this one.
-    twitch : ndarray of shape (n_frames,), Pa
-        T_Ca of one beat.
     activation : Activation
     beats_max : int
 
@@ -85,10 +79,10 @@ def steady_beat(
     cavity: Cavity | None = None
     last = np.inf
     for number in range(1, beats_max + 1):
-        _fill(stepper, begun, activation.periodic_tension(twitch, 0))
-        stepper.state = replace(stepper.state, tension=float(twitch[0]))
+        _fill(stepper, begun, activation.tension(0))
+        stepper.state = replace(stepper.state, tension=float(activation.twitch[0]))
         stepper.couple(answered, begun)
-        frames = _beat(stepper, answered, twitch, activation, states)
+        frames = _beat(stepper, answered, activation, states)
         states = [frame.state for frame in frames]
         pressure, volume = np.array([(frame.load.pressure, frame.load.volume) for frame in frames[1:]]).T
         cavity = elastance(pressure, volume, unloaded, cavity)
@@ -130,14 +124,15 @@ def _fill(stepper: LoadStepper, volumes: Floats, tension: Floats) -> None:
 
 
 def _beat(
-    stepper: LoadStepper, circulation: Circulation, twitch: Floats, activation: Activation, before: Sequence[State]
+    stepper: LoadStepper, circulation: Circulation, activation: Activation, before: Sequence[State]
 ) -> list[SolvedFrame]:
     """The frames of a beat from end-diastole to end-diastole; `before` are the states of the beat before, if any."""
-    states = [stepper.state]
-    frames = [_solved(stepper)]
+    states, frames = [stepper.state], [_solved(stepper)]
+    equations, twitch = stepper.equations, activation.twitch
     for frame in range(1, len(twitch) + 1):
+        stretch = fibre_stretch(equations.positions(stepper.state), equations.elements)
         time = frame * circulation.period / len(twitch)
-        load = Load(0.0, 1.0, 0.0, activation.periodic_tension(twitch, frame), time=time)
+        load = Load(0.0, 1.0, 0.0, activation.advance(frame - 1, stretch), time=time)
         state = stepper.advance(load, "cavity_pressure", _predicted(states, before))
         stepper.state = replace(state, tension=float(twitch[frame % len(twitch)]))
         states.append(stepper.state)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.loop.cycle import Cycle
-from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load, State, Unknown
 from echotruth.mechanics.solver.newton import Diverged, LoadStepper, linear_combination
 
@@ -63,7 +62,7 @@ class SolvedCycle:
     pressure_target, volume_target : ndarray of shape (n_frames,), Pa and m^3
         Prescribed by the cycle; not a number where it prescribes none.
     active_tension : ndarray of shape (n_frames,), Pa
-        T_Ca of the healthy, undelayed wall.
+        T_Ca of the healthy wall.
     newton_steps : ndarray of shape (n_frames,)
         Factorizations.
     residual : ndarray of shape (n_frames,)
@@ -85,15 +84,15 @@ class SolvedCycle:
     arterial_pressure: Floats
 
 
-def solve(equations: Equilibrium, cycle: Cycle, activation: Activation, stiffness: float | None = None) -> SolvedCycle:
+def solve(equations: Equilibrium, cycle: Cycle, tension_scale: Floats, stiffness: float | None = None) -> SolvedCycle:
     """Drive a heart through a cycle.
 
     Parameters
     ----------
     equations : Equilibrium
     cycle : Cycle
-    activation : Activation
-        Active tension of the cells of the heart.
+    tension_scale : ndarray of shape (n_cells,)
+        Active tension of the cells over T_Ca.
     stiffness : float, optional, Pa
         C of the passive law. If not given, it is solved from end-diastole; if given, the
         volumes of a pressure-volume loop are scaled to the volume at end-diastolic pressure.
@@ -110,7 +109,7 @@ def solve(equations: Equilibrium, cycle: Cycle, activation: Activation, stiffnes
     stepper = filled_to_end_diastole(equations, cycle, stiffness)
     if stiffness is not None and cycle.prescribed == "pressure_volume":
         cycle = cycle.scaled(stepper.load.volume / cycle.edv)
-    return solved_cycle(equations, cycle, list(solved_frames(stepper, cycle, activation)))
+    return solved_cycle(equations, cycle, list(solved_frames(stepper, cycle, tension_scale)))
 
 
 def filled_to_end_diastole(equations: Equilibrium, cycle: Cycle, stiffness: float | None = None) -> LoadStepper:
@@ -155,13 +154,13 @@ def _fill_to_pressure(stepper: LoadStepper, cycle: Cycle, pressure: float, stiff
         logger.info("C = %.4g kPa for an end-diastolic volume of %.4g uL", state.stiffness / 1e3, cycle.edv * 1e9)
 
 
-def solved_frames(stepper: LoadStepper, cycle: Cycle, activation: Activation) -> Iterator[SolvedFrame]:
+def solved_frames(stepper: LoadStepper, cycle: Cycle, tension_scale: Floats) -> Iterator[SolvedFrame]:
     """The frames of a cycle, of which a stepper has solved the first one."""
     states: list[State] = []
     for frame, time in enumerate(cycle.time):
         before = stepper.factorizations
         if frame:
-            _solve_next(stepper, cycle, activation, states)
+            _solve_next(stepper, cycle, tension_scale, states)
             loads = stepper.load.pressure / 1e3, stepper.load.volume * 1e9, stepper.state.tension / 1e3
             text = "frame %d of %d, %.4g ms: %.2f kPa, %.4g uL, T_Ca %.2f kPa, %d factorizations"
             logger.info(text, frame, len(cycle.time), time * 1e3, *loads, stepper.factorizations - before)
@@ -169,20 +168,14 @@ def solved_frames(stepper: LoadStepper, cycle: Cycle, activation: Activation) ->
         yield SolvedFrame(stepper.state, stepper.load, stepper.factorizations, stepper.max_error)
 
 
-def _solve_next(stepper: LoadStepper, cycle: Cycle, activation: Activation, states: list[State]) -> None:
+def _solve_next(stepper: LoadStepper, cycle: Cycle, tension_scale: Floats, states: list[State]) -> None:
     """Solve the frame after the given states."""
     frame, unknown = len(states), UNKNOWN[cycle.prescribed]
     pressure = 0.0 if cycle.pressure is None else float(cycle.pressure[frame])
     volume = 1.0 if cycle.volume is None else float(cycle.volume[frame])
-    fraction: Floats | float
-    if unknown == "tension":
-        fraction = activation.tension_fraction()
-        # That of this frame is unknown: late tissue has the part of it that is known, and its fraction of the rest.
-        tension = activation.tension([*(state.tension for state in states), 0.0])
-    else:
-        assert cycle.tension is not None
-        fraction, tension = 0.0, activation.tension(cycle.tension[: frame + 1])
-    load = Load(pressure, volume, fraction, tension, time=float(cycle.time[frame]))
+    load = Load(pressure, volume, tension_scale, time=float(cycle.time[frame]))
+    if cycle.tension is not None:
+        load = replace(load, tension_fraction=0.0, tension=tension_scale * cycle.tension[frame])
     stepper.advance(load, unknown, extrapolated(states))
     if cycle.tension is not None:
         stepper.state = replace(stepper.state, tension=float(cycle.tension[frame]))

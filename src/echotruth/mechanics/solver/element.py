@@ -98,6 +98,10 @@ class CellState(NamedTuple):
         One over the time since the previous state; 0 at rest.
     previous_c : ndarray of shape (n_cells, n_points, 6)
         Right Cauchy-Green tensor of that state, in the fibre axes; ignored at rest.
+    taut : ndarray of shape (n_cells,), Pa
+        Stiffness from end-diastole on, of scars.
+    taut_c : ndarray of shape (n_cells, n_points, 6)
+        Right Cauchy-Green tensor of end-diastole; ignored where nothing is taut.
     """
 
     stiffness: Floats
@@ -105,6 +109,8 @@ class CellState(NamedTuple):
     pressure: Floats
     rate: float
     previous_c: Floats
+    taut: Floats
+    taut_c: Floats
 
 
 class Response(NamedTuple):
@@ -180,12 +186,12 @@ def _evaluate_cells(nodes, elements, law, state, out, bounds):
         force[:], out.volume[cell] = 0.0, 0.0
         if with_tangent:
             ke[:] = 0.0
-        scale = state.stiffness[cell], state.tension[cell], state.pressure[cell], state.rate
+        scale = state.stiffness[cell], state.tension[cell], state.pressure[cell], state.rate, state.taut[cell]
         _gather(nodes, elements.cells, cell, x)
         for q in range(elements.weight.shape[1]):
             dN_dX, weight = elements.dN_dX[cell, q], elements.weight[cell, q]
             j = point.deform(x, dN_dX, work.f, work.c)
-            point.evaluate(j, law, scale, state.previous_c[cell, q], work, with_tangent)
+            point.evaluate(j, law, scale, state.previous_c[cell, q], state.taut_c[cell, q], work, with_tangent)
             point.add_force(work, dN_dX, weight, force, PASSIVE if with_tangent else TOTAL)
             if with_tangent:
                 point.linearize(work, weight)
@@ -213,6 +219,13 @@ def right_cauchy_green(nodes: Floats, elements: Elements, c: Floats) -> Floats:
         for q in range(elements.weight.shape[1]):
             j[cell, q] = point.deform(x, elements.dN_dX[cell, q], f, c[cell, q])
     return j
+
+
+def fibre_stretch(nodes: Floats, elements: Elements) -> Floats:
+    """Mean stretch along the fibres over the points of each cell, (n_cells,), for nodes at (n_nodes, 3), m."""
+    c = np.empty((*elements.weight.shape, 6))
+    right_cauchy_green(nodes, elements, c)
+    return np.sqrt(c[..., 0]).mean(axis=1)
 
 
 @njit(**COMPILED)

@@ -19,7 +19,8 @@ with the second Piola-Kirchhoff stress S of the wall, term by term (:func:`.stre
       + T sum_a share_a S_active(lambda_a, lambda_a') a (x) a
                                                          active_stress.py; the T of each cell: activation.py
       + [p_c + C b (J - 1)] J C_G^-1                     stress_point.evaluate; b is the pointwise bulk ratio
-      + eta dE/dt                                        the same, over the step since the previous state.
+      + eta dE/dt                                        the same, over the step since the previous state
+      + G (E - E_ED)                                     the same; G is the stiffness of a taut scar.
 
 Here x = X + u, F = dx/dX, J = det F, C_G = F^T F, E = (C_G - I) / 2, and a is fibre, sheet and normal, along which the
 stretch is lambda_a and the share of the tension 1 and those of the configuration; only the stress along the fibre
@@ -232,6 +233,8 @@ class Equilibrium:
         Surroundings of the heart.
     exact : bool
         Whether corrections are exact and not only good enough for Newton's method.
+    taut : ndarray of shape (n_cells,), optional, Pa
+        Stiffness of each cell in addition from end-diastole on.
     """
 
     def __init__(
@@ -243,23 +246,27 @@ class Equilibrium:
         stiffness_scale: Floats | None = None,
         springs: tuple[Springs, ...] = (),
         exact: bool = False,
+        taut: Floats | None = None,
     ):
         self.mesh, self.law, self.support, self.springs = mesh, law, support, springs
         self.assembly = Assembly(mesh, support, tuple(surface.group for surface in springs))
         self.elements = element.build_elements(mesh, fibre_frames, support.directions)
         self.unloaded_volume = np.sum(self.elements.weight, axis=1)
         self.stiffness_scale = np.ones(len(mesh.cells)) if stiffness_scale is None else stiffness_scale
+        self.taut = np.zeros(len(mesh.cells)) if taut is None else taut
         self._response = element.allocate_response(len(mesh.cells), with_tangent=True)
         self._solver = factorization(single=not exact)
         self.previous: PreviousState | None = None
         self._end_diastole: Floats | None = None
         self._previous_nodes, self._rate = mesh.nodes, 0.0
-        self._previous_c = np.zeros((*self.elements.weight.shape, 6))
+        self._previous_c = self._taut_c = np.zeros((*self.elements.weight.shape, 6))
 
-    def changed(self, law: element.WallLaw, stiffness_scale: Floats, springs: tuple[Springs, ...]) -> Equilibrium:
+    def changed(
+        self, law: element.WallLaw, stiffness_scale: Floats, springs: tuple[Springs, ...], taut: Floats
+    ) -> Equilibrium:
         """The equations with other laws, stiffness and surroundings, before end-diastole; they share what is large."""
         other = copy(self)
-        other.law, other.stiffness_scale, other.springs = law, stiffness_scale, springs
+        other.law, other.stiffness_scale, other.springs, other.taut = law, stiffness_scale, springs, taut
         other._previous_c, other._end_diastole = np.zeros_like(self._previous_c), None
         return other
 
@@ -272,8 +279,11 @@ class Equilibrium:
             element.right_cauchy_green(self._previous_nodes, self.elements, self._previous_c)
 
     def rest_at(self, state: State) -> None:
-        """Set the state of end-diastole, where the pericardium is at rest and from which on it acts."""
+        """Set the state of end-diastole, where pericardium and scars are at rest and from which on they are taut."""
         self._end_diastole = self.positions(state)
+        if self.taut.any():
+            self._taut_c = np.empty_like(self._previous_c)
+            element.right_cauchy_green(self._end_diastole, self.elements, self._taut_c)
 
     def close(self) -> None:
         """Free the memory of the factors."""
@@ -302,7 +312,9 @@ class Equilibrium:
         nodes = self.positions(state, load.prescribed_fraction)
         stiffness = state.stiffness * self.stiffness_scale
         tension = np.zeros(len(self.mesh.cells)) + state.tension * load.tension_fraction + load.tension
-        cell_state = element.CellState(stiffness, tension, state.cell_pressure, self._rate, self._previous_c)
+        velocity = self._rate, self._previous_c
+        taut = np.zeros_like(self.taut) if self._end_diastole is None else self.taut
+        cell_state = element.CellState(stiffness, tension, state.cell_pressure, *velocity, taut, self._taut_c)
         element.evaluate(nodes, self.elements, self.law, cell_state, response)
         gradient = cavity.volume_gradient(nodes, self.mesh.endo)
         self._volume_gradient = self.assembly.vector(self.assembly.rotate(self.mesh.endo, gradient), ENDO)

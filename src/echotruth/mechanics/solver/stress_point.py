@@ -1,8 +1,8 @@
 """Stress at one point of the wall, and its derivative by the deformation.
 
 Parts of the stress stand in the order `PASSIVE`, `ACTIVE`, `VOLUMETRIC`, each for a factor of one, and
-after them `TOTAL`, with the viscous stress; `scale` holds the factors C, T_Ca and p, and one over the time since the
-previous state, 1/s.
+after them `TOTAL`, with the viscous stress and that of taut scars; `scale` holds the factors C, T_Ca and p, one over
+the time since the previous state, 1/s, and the stiffness of a taut scar.
 """
 
 from typing import Any, NamedTuple
@@ -92,17 +92,18 @@ def deform(x, dN_dX, f, c):
 
 
 @njit(**COMPILED)
-def evaluate(j, law, scale, previous_c, work, with_tangent):
+def evaluate(j, law, scale, previous_c, taut_c, work, with_tangent):
     """Fill the parts of the stress and its tangent of a point whose C and J are known.
 
     S = C S_passive + T_Ca S_active + (p + C pointwise_bulk_ratio (J - 1)) J C^-1
-    + viscosity (C - C_previous) / (2 time since); the last term is viscous (Kelvin-Voigt), with the growth of C since
-    the previous state. S_active acts along the fibre, and by its shares along sheet and normal, in each direction as
-    the stretch there demands: the stress of fibres that are dispersed into these directions. Only that along the fibre
-    falls with the velocity, because fibres midway to a direction in which the wall lengthens hardly shorten; and so
-    does no tension below zero, which is none of muscle but what is left of a solution.
+    + viscosity (C - C_previous) / (2 time since) + taut stiffness (C - C_ED) / 2; the last term but one is viscous
+    (Kelvin-Voigt), with the growth of C since the previous state, the last one that of a scar. S_active acts along the
+    fibre, and by its shares along sheet and normal, in each direction as the stretch there demands: the stress of
+    fibres that are dispersed into these directions. Only that along the fibre falls with the velocity, because fibres
+    midway to a direction in which the wall lengthens hardly shorten; and so does no tension below zero, which is none
+    of muscle but what is left of a solution.
     """
-    stiffness, tension, pressure, rate = scale
+    stiffness, tension, pressure, rate, taut = scale
     viscous_modulus = law.viscosity * rate
     c, inverse, passive, stress, tangent = work.c, work.inverse, work.passive, work.stress, work.dS_dE
     active_stiffness = work.active_stiffness
@@ -113,7 +114,7 @@ def evaluate(j, law, scale, previous_c, work, with_tangent):
     bulk = stiffness * law.pointwise_bulk_ratio
     hydrostatic = bulk * (j - 1) + pressure
     for k in range(6):
-        viscous = viscous_modulus * (c[k] - previous_c[k]) / 2
+        viscous = (viscous_modulus * (c[k] - previous_c[k]) + taut * (c[k] - taut_c[k])) / 2
         stress[TOTAL, k] = stiffness * passive[k] + hydrostatic * j * inverse[k] + viscous
     for k in range(3):
         share = 1.0 if k == 0 else law.cross_fibre[k - 1]
@@ -128,7 +129,7 @@ def evaluate(j, law, scale, previous_c, work, with_tangent):
         for k in range(3):
             tangent[k, k] += tension * active_stiffness[k]
         for k in range(6):
-            tangent[k, k] += viscous_modulus / laws.MULTIPLICITY[k]
+            tangent[k, k] += (viscous_modulus + taut) / laws.MULTIPLICITY[k]
             for m in range(k):
                 tangent[k, m] = tangent[m, k]
             stress[PASSIVE, k] = passive[k] + law.pointwise_bulk_ratio * (j - 1) * j * inverse[k]

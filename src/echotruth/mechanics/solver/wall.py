@@ -10,6 +10,7 @@ from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.materials import compiled
 from echotruth.mechanics import fibres
+from echotruth.mechanics.activation_map import activated
 from echotruth.mechanics.pathology import Tissue, tissue
 from echotruth.mechanics.solver import element
 from echotruth.mechanics.solver.active_stress import ActiveLaw
@@ -41,10 +42,11 @@ def wall(config: Config, mesh: Mesh) -> Wall:
     Raises
     ------
     PathologyError
-        If no cell of the mesh has the pathology.
+        If no cell of the mesh has the pathology, or a site of activation does not lie in it.
     """
     depth = fibres.wall_depth(mesh)
-    return Wall(mesh, depth, tissue(mesh, depth, config.pathology, config.mechanics.regional))
+    found = tissue(mesh, depth, config.pathology, config.mechanics.regional)
+    return Wall(mesh, depth, activated(found, mesh, depth, config))
 
 
 def equilibrium(config: Config, wall: Wall, exact: bool = False) -> Equilibrium:
@@ -60,10 +62,8 @@ def equilibrium(config: Config, wall: Wall, exact: bool = False) -> Equilibrium:
     support = base_support(wall.mesh, section.base)
     springs = surroundings(wall.mesh, section)
     law = wall_law(section)
-    if config.loop.kind == "measured" and wall.tissue.activation_delay.any():
-        # What is early alone cannot raise the pressure as fast as a healthy loop does, if it weakens as it shortens.
-        law = law._replace(active=law.active._replace(max_velocity=np.inf))
-    return Equilibrium(wall.mesh, frames, law, support, wall.tissue.stiffness_scale, springs, exact)
+    tissue = wall.tissue
+    return Equilibrium(wall.mesh, frames, law, support, tissue.stiffness_scale, springs, exact, tissue.taut_stiffness)
 
 
 def wall_law(section: Mechanics) -> element.WallLaw:
