@@ -169,11 +169,11 @@ class Config(Section):
     @check
     def _check_activation(self) -> None:
         order = self.pathology.activation
-        if (order.preset or order.sites) and self.motion.kind == "beat" and self.loop.kind != "circulation":
-            remedy = (
-                "needs loop.kind = circulation: no wall that is activated out of turn gives the loop of a healthy one"
-            )
-            raise self._refused("pathology.activation." + ("preset" if order.preset else "sites"), remedy)
+        is_at_once = order.preset is None and order.sites is None
+        key = "sites" if order.preset is None else "preset"
+        remedy = "needs loop.kind = circulation: a wall that is activated out of turn has no loop of a healthy heart"
+        circulates = self.motion.kind != "beat" or self.loop.kind == "circulation"
+        self.require(is_at_once or circulates, f"pathology.activation.{key}", remedy)
 
     @check
     def _check_stiffness(self) -> None:
