@@ -7,6 +7,7 @@ import yaml
 
 from echotruth.cases import expand, table
 from echotruth.config import Config
+from echotruth.config.building import configure
 from echotruth.config.loading import ConfigError, validate
 
 INFARCT, ORDER = "pathology.infarct", "pathology.activation"
@@ -34,6 +35,20 @@ def test_preset_of_a_disease_sets_growth_and_load_but_not_what_is_given():
     assert dilated.loop.circulation.retained_volume_stroke_volumes == 5
     # What is stored is read back as it is.
     assert validate(json.loads(dilated.model_dump_json()), "a.yaml") == dilated
+
+
+def test_disease_is_changed_with_all_that_follows_from_it_and_nothing_that_was_given():
+    given = configure(pathology={"preset": "hypertension"}, geometry={"hypertrophy": 1.0})
+    assert configure(given, **{"loop.frames": 24}).geometry.hypertrophy == 1.0
+    wide = configure(pathology={"preset": "dcm"})
+    for changed in (configure(wide, **{"pathology.preset": None}), Config()):
+        assert (changed.geometry.dilation, changed.loop) == (1.0, Config().loop)
+    of_rats = configure(pathology={"preset": "dcm"}, geometry={"preset": "rat"})
+    assert configure(wide, **{"geometry.preset": "rat"}) == of_rats
+    with pytest.raises(ConfigError, match="pathology.preset = 'dcm': needs motion.kind = beat and loop.kind = circ"):
+        configure(wide, **{"loop.kind": "measured"})
+    with pytest.raises(ConfigError, match="pathology.preset cannot be swept"):
+        expand(configure(cases={"pathology.preset": [None, "dcm"]}))
 
 
 @pytest.mark.parametrize(("section", "keys", "sentence"), BAD, ids=lambda part: str(part)[:30])

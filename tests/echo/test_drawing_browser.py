@@ -183,7 +183,9 @@ def test_long_axis_is_open_and_has_no_insertions(page, folder):
 
 def test_what_is_wrong_is_said_in_the_page(page, folder):
     page.locator("#save").click()
-    assert said(page, "Not saved") == "Not saved. endocardium: has 0 points: click three or more"
+    assert (
+        said(page, "Not saved") == "Not saved. endocardium: give three points or more, (n, 2) lateral and axial in px"
+    )
     for part, radius in zip(RADII, reversed(RADII.values()), strict=True):
         page.locator(f"#{part}").click()
         click(page, *circle(radius))

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
+from echotruth.cases import expand
 from echotruth.config import Geometry, Pathology
+from echotruth.config.building import configure
 from echotruth.config.loading import validate
-from echotruth.config.pathology import Infarct
+from echotruth.config.pathology import SCARS, Infarct
 from echotruth.config.regional import Regional
 from echotruth.fem.volume import cell_volumes, jacobians
 from echotruth.mechanics.geometry import left_ventricle
@@ -118,13 +120,16 @@ def test_an_infarct_that_is_nowhere_is_refused(hemisphere, infarct, sentence):
         hemisphere.with_(**infarct)
 
 
-def test_the_age_of_an_infarct_gives_what_is_not_given_else():
-    fresh = validate({"pathology": {"infarct": {"segments": [7], "age": "fresh", "stiffness_scale": 3}}}, "a.yaml")
-    old = validate({"pathology": {"infarct": {"segments": [7], "age": "old"}}}, "a.yaml").pathology.infarct
-    fresh = fresh.pathology.infarct
-    assert (fresh.stiffness_scale, fresh.taut_stiffness_kPa, fresh.thickness_scale) == (3, 400, 1)
-    assert old.taut_stiffness_kPa > fresh.taut_stiffness_kPa and old.thickness_scale < 1
-    assert Infarct(segments=[7]).taut_stiffness_kPa == 0
+def test_the_age_of_an_infarct_gives_what_is_not_given_else_however_the_heart_is_configured():
+    given = {"segments": [7], "age": "fresh", "stiffness_scale": 3}
+    fresh = validate({"pathology": {"infarct": given}}, "a.yaml")
+    assert fresh.pathology.infarct.scar() == Infarct(**given).scar() == SCARS["fresh"] | {"stiffness_scale": 3}
+    old = configure(fresh, **{"pathology.infarct.age": "old"}).pathology.infarct.scar()
+    assert old == SCARS["old"] | {"stiffness_scale": 3}
+    ages = configure(pathology={"infarct": {"segments": [7]}}, cases={"pathology.infarct.age": [None, "fresh", "old"]})
+    assert [case.config.pathology.infarct.scar() for case in expand(ages)] == list(SCARS.values())
+    none, fresh, old = (scar["taut_stiffness_kPa"] for scar in SCARS.values())
+    assert old > fresh > none == 0
 
 
 def test_a_scar_is_taut_and_the_muscle_away_from_it_weakens(hemisphere):

@@ -17,9 +17,10 @@ from echotruth.section import dotted_values, value_of
 
 NOT_SWEPT = (
     *("name", "cases", "views", "tracking", "inference", "geometry.shape", "fibres.layers", "loop.frames"),
-    *("rf.keep", "bmode.field_of_view_mm", "bmode.size_px", "bmode.downsampling"),
+    *("rf.keep", "bmode.field_of_view_mm", "bmode.size_px", "bmode.downsampling", "pathology.preset"),
 )
-"""Keys that cannot be swept (nor can `geometry.*_elements`), because they set the sizes of arrays over all cases."""
+"""Keys that cannot be swept (nor can `geometry.*_elements`), because they set the sizes of arrays over all cases, or
+defaults of other sections."""
 
 _SWEPT_WITHIN = re.compile(r"views\.\w+\.(position|rotation_deg|tilt_deg)|tracking\.frame_step")
 """Keys that can be swept within those that cannot."""

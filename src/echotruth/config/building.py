@@ -60,12 +60,13 @@ def configure(source: Source = None, **keys: Any) -> Config:
 
 def _given(config: Config) -> dict[str, Any]:
     """Keys in which a configuration differs from the default one of its presets."""
-    presets = {name: {"preset": getattr(config, name).preset} for name in ("geometry", "probe", "realism")}
+    named = ("geometry", "probe", "realism", "pathology")
+    presets = {name: {"preset": getattr(config, name).preset} for name in named}
     # What a preset is by default follows another preset.
     follows = validate({"geometry": presets["geometry"]}, "presets").probe.preset == config.probe.preset
     default = validate(presets, "presets").model_dump()
     found = difference(config.model_dump(), default)
-    found |= {name: presets[name] | found.get(name, {}) for name in ("geometry", "realism")}
+    found |= {name: presets[name] | found.get(name, {}) for name in ("geometry", "realism", "pathology")}
     return found if follows else found | {"probe": presets["probe"] | found.get("probe", {})}
 
 

@@ -66,16 +66,6 @@ DISEASE_OF_HEART: dict[tuple[str, str], dict[str, Any]] = {
     ("dcm", "human"): {"loop.circulation.contractility": 0.7},
 }
 """`pathology.preset` and `geometry.preset` -> what differs from that."""
-SCAR_DEFAULTS: dict[str, dict[str, Any]] = {
-    "fresh": {"pathology.infarct.stiffness_scale": 2.0, "pathology.infarct.taut_stiffness_kPa": 400.0},
-    "old": {
-        "pathology.infarct.stiffness_scale": 5.0,
-        "pathology.infarct.taut_stiffness_kPa": 1500.0,
-        "pathology.infarct.thickness_scale": 0.6,
-    },
-}
-"""`pathology.infarct.age` -> default of dotted keys."""
-
 REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.2}
 """`realism.preset` -> default of the bandwidth, and of the density of scatterers, of which a longer pulse needs fewer,
 over those of the array."""
@@ -114,8 +104,8 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
     heart = str(_value(values, "geometry.preset"))
     values = _filled(values, HEART_DEFAULTS.get(heart, HEART_DEFAULTS["mouse"]))
     disease = str(_value(values, "pathology.preset"))
-    values = _filled(_filled(values, DISEASE_OF_HEART.get((disease, heart), {})), DISEASE_DEFAULTS.get(disease, {}))
-    values = _filled(values, SCAR_DEFAULTS.get(str(_value(values, "pathology.infarct.age")), {}))
+    if _value(values, "loop.kind") in (None, "circulation"):
+        values = _filled(_filled(values, DISEASE_OF_HEART.get((disease, heart), {})), DISEASE_DEFAULTS.get(disease, {}))
     array = str(_value(values, "probe.preset"))
     values = _filled(values, _scanner(values, array))
     values = _filled(values, ARRAY_DEFAULTS.get(array, {}))

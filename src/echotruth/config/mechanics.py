@@ -15,7 +15,7 @@ class Active(Section):
     """Active tension along the fibres, T_a = h T_Ca [1 + beta (lambda - 1)], with the force-velocity relation h."""
 
     length_dependence: Annotated[FiniteFloat, Field(ge=0, le=5)] = 1.4
-    """beta."""
+    """beta: growth of T_a with the stretch from the unloaded wall, in every heart."""
     stress: Literal["cauchy", "second_piola_kirchhoff"] = "cauchy"
     """Meaning of T_a: the paper's tension per deformed area (S_ff = T_a / lambda^2), or S_ff itself."""
     sheet_share: Fraction = 0.35
@@ -37,9 +37,9 @@ class Active(Section):
     same model."""
 
     length_sensitivity: Annotated[FiniteFloat, Field(ge=0, le=50)] = 28.0
-    """Growth dln T / dlambda of the tension with the stretch beyond that of the healthy heart at the same time since
-    activation, in `loop.kind: circulation`. `human` 10: that of half activated muscle in the human model of Land et al.
-    (J Mol Cell Cardiol 106 (2017) 68). With it the late wall of a left bundle branch block stretches the septum again,
+    """Besides beta, growth dln T / dlambda of the tension with the stretch beyond that of the healthy heart, as long
+    after activation, in `loop.kind: circulation`. `human` 10: that of half activated muscle in the human model of Land
+    et al. (J Mol Cell Cardiol 106 (2017) 68). With it the late wall of a left bundle branch block stretches the septum again,
     as in patients; the mouse's 28 is chosen for that and has no other source."""
 
 

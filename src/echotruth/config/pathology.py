@@ -1,5 +1,7 @@
 """Section `pathology`: infarct and order of activation."""
 
+from __future__ import annotations
+
 from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
@@ -9,6 +11,14 @@ from echotruth.section import Fraction, Positive, Section, check
 
 Azimuth = Annotated[FiniteFloat, Field(ge=-180, le=180)]
 Speed = Annotated[FiniteFloat, Field(ge=0.01, le=10)]
+
+
+SCARS: dict[str | None, dict[str, float]] = {
+    None: {"stiffness_scale": 20.0, "taut_stiffness_kPa": 0.0, "thickness_scale": 1.0},
+    "fresh": {"stiffness_scale": 2.0, "taut_stiffness_kPa": 400.0, "thickness_scale": 1.0},
+    "old": {"stiffness_scale": 5.0, "taut_stiffness_kPa": 1500.0, "thickness_scale": 0.6},
+}
+"""`age` of an infarct -> values of keys that are not given."""
 
 
 class Infarct(Section):
@@ -32,15 +42,15 @@ class Infarct(Section):
     collagen: 5 times, 1500 kPa and 0.6 of the thickness, all chosen."""
     tension_scale: Fraction = 0.0
     """Active tension relative to healthy tissue; infarcts of sheep had none (Wenk 2011)."""
-    stiffness_scale: Annotated[FiniteFloat, Field(ge=0.1, le=100)] = 20.0
-    """Stiffness relative to healthy tissue. With the default, an infarct of a third of the wall stretches by a few
-    percent when the heart ejects."""
-    taut_stiffness_kPa: Annotated[FiniteFloat, Field(ge=0, le=1e4)] = 0.0
+    stiffness_scale: Annotated[FiniteFloat, Field(ge=0.1, le=100)] | None = None
+    """Stiffness relative to healthy tissue; without an age 20, with which an infarct of a third of the wall stretches
+    by a few percent when the heart ejects."""
+    taut_stiffness_kPa: Annotated[FiniteFloat, Field(ge=0, le=1e4)] | None = None
     """Stiffness in addition from end-diastole on, stress over Green-Lagrange strain since then, the same in all
     directions as in scars of rats (Fomovsky 2010, Am J Physiol 298, H221): the collagen, wavy in filling, is straight
     at the length that the tissue has taken. The scar of mice has 22 MPa under the probe of a microscope (Rusu 2019, Sci
     Rep 9, 16744)."""
-    thickness_scale: Annotated[FiniteFloat, Field(ge=0.2, le=2)] = 1.0
+    thickness_scale: Annotated[FiniteFloat, Field(ge=0.2, le=2)] | None = None
     """Thickness of the unloaded scar relative to the wall that it was; the endocardium stays."""
     border_mm: Annotated[FiniteFloat, Field(ge=0)] = 0.0
     """Width of the border zone, in which all factors return linearly to those of healthy tissue (Lee 2011), so that in
@@ -54,6 +64,15 @@ class Infarct(Section):
     def _check_region(self) -> None:
         is_one = self.segments is None or self.radius_mm is None
         self.require(is_one, "radius_mm", "give either segments or radius_mm and set the other to null")
+
+    def scar(self) -> dict[str, float]:
+        """Stiffness and thickness by their keys, with those of the age where none is given."""
+        given = {key: getattr(self, key) for key in SCARS[self.age]}
+        return SCARS[self.age] | {key: value for key, value in given.items() if value is not None}
+
+    def resolved(self) -> Infarct:
+        """The section with the values filled in that follow from the age."""
+        return self.model_copy(update=self.scar())
 
 
 class Site(Section):
@@ -70,8 +89,8 @@ class Site(Section):
 
 
 class Activation(Section):
-    """Order in which the wall is activated; it contracts as late as it is activated. By default all of it is at once:
-    the tension that is solved for from the loop of a healthy heart is that of a wall with its small delays."""
+    """Order in which the wall is activated; it contracts as late as it is activated. By default all of it is
+    activated at once: the tension that a healthy heart's loop gives has the small delays of a healthy wall in it."""
 
     preset: Literal["normal", "lbbb", "rv_pacing"] | None = None
     """`normal`: from the three fascicles of the left bundle, by the Purkinje network of the endocardium. `lbbb`: left
@@ -109,3 +128,7 @@ class Pathology(Section):
     """Stiff tissue that does not contract: whole AHA segments, or a sphere. There is none if neither is given."""
     activation: Activation = Activation()
     """Order in which the wall is activated."""
+
+    def resolved(self) -> Pathology:
+        """The section with the values of the infarct filled in that follow from its age."""
+        return self.model_copy(update={"infarct": self.infarct.resolved()})

@@ -167,6 +167,12 @@ class Config(Section):
         self.require(self.fibres.source != "file" or self.geometry.fibre is not None, "fibres.source", remedy)
 
     @check
+    def _check_disease(self) -> None:
+        disease, beats = self.pathology.preset, self.motion.kind == "beat" and self.loop.kind == "circulation"
+        remedy = "needs motion.kind = beat and loop.kind = circulation, which it sets unless they are given"
+        self.require(disease is None or beats, "pathology.preset", remedy)
+
+    @check
     def _check_activation(self) -> None:
         order = self.pathology.activation
         is_at_once = order.preset is None and order.sites is None

@@ -1,4 +1,4 @@
-"""The exponential law of an orthotropic wall."""
+"""The exponential law of an orthotropic wall, with six moduli; the law of Guccione 1991 is `fung`."""
 
 from typing import Literal
 

@@ -16,7 +16,7 @@ from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.loop.recording import LoopError
 from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
 from echotruth.mechanics.history import Arrays, collect_outputs
-from echotruth.mechanics.pathology import BORDER, INFARCT, healthy_heart, thinned
+from echotruth.mechanics.pathology import BORDER, INFARCT, PathologyError, healthy_heart, thinned
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.circulation import guessed, steady_beat
@@ -26,6 +26,9 @@ from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
 logger = logging.getLogger("echotruth.mechanics")
+
+LATEST = 0.5
+"""Latest activation, in beats: a later twitch would go on in the next beat, in which each cell begins anew."""
 
 
 def beat(config: Config, frames: Sequence[int] | None = None) -> dict[str, Arrays]:
@@ -123,6 +126,12 @@ def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     circulation = altered(circulation.scaled(float(measured.volume[0]) / cycle.edv), settings)
     twitch, cells = settings.contractility * measured.active_tension, unloaded.tissue
     delay, sensitivity = cells.activation_delay / cycle.period, config.mechanics.active.length_sensitivity
+    if delay.max() > LATEST:
+        late, beat_ms = 1e3 * cells.activation_delay.max(), 1e3 * cycle.period
+        said = f"the last muscle is activated after {late:.3g} ms of a beat of {beat_ms:.3g} ms"
+        raise PathologyError(
+            f"pathology.activation: {said}: let it be half at most, by greater speeds or earlier sites"
+        )
     activation = Activation(twitch, stretch, cells.tension_scale, delay, sensitivity)
     logger.info("the heart in its circulation")
     equations = equilibrium(config, unloaded)

@@ -95,17 +95,17 @@ def tissue(mesh: Mesh, depth: Floats, pathology: Pathology, regional: Regional) 
     PathologyError
         If no cell has its centroid in the infarct.
     """
-    infarct = pathology.infarct
+    infarct, scar = pathology.infarct, pathology.infarct.scar()
     centroid = shape(_SAMPLES)[_CENTROID] @ mesh.nodes[mesh.cells]
     segments = segment(centroid, _apex(mesh))
     contractility = CONTRACTILITY[regional.preset] if regional.preset else regional.contractility
     factors = [_gradual(_by_segment(given, 1.0), segments, centroid) for given in (regional.stiffness, contractility)]
     weight = _infarct_weight(mesh, depth, infarct)
     region = np.select([weight == 1, weight > 0], [INFARCT, BORDER], HEALTHY).astype(np.uint8)
-    stiffness = 1 + (infarct.stiffness_scale - 1) * weight
+    stiffness = 1 + (scar["stiffness_scale"] - 1) * weight
     remote = infarct.remote_tension_scale if weight.any() else 1.0
     tension = remote * (1 - weight) + infarct.tension_scale * weight
-    taut = infarct.si().taut_stiffness * weight
+    taut = 1e3 * scar["taut_stiffness_kPa"] * weight
     return Tissue(region, stiffness * factors[0], tension * factors[1], np.zeros(len(weight)), taut)
 
 
@@ -115,7 +115,8 @@ def thinned(mesh: Mesh, infarct: Infarct) -> Mesh:
     Beside the infarct the thickness returns to that of the wall over the border zone, or over the wall's thickness if
     that is more.
     """
-    if infarct.thickness_scale == 1:
+    thickness_scale = infarct.scar()["thickness_scale"]
+    if thickness_scale == 1:
         return mesh
     depth = wall_depth(mesh)
     gradients = np.einsum("cqai,ca->cqi", material_gradients(mesh, NODE_XI)[0], depth[mesh.cells])
@@ -124,7 +125,7 @@ def thinned(mesh: Mesh, infarct: Infarct) -> Mesh:
     border_mm = max(infarct.border_mm, 1e3 / float(np.median(steepness)))
     weight = _infarct_weight(mesh, depth, infarct.model_copy(update={"border_mm": border_mm}))
     of_node = _at_nodes(mesh, np.repeat(weight[:, None], 10, axis=1))
-    outwards = ((infarct.thickness_scale - 1) * of_node * depth / steepness**2)[:, None] * gradient
+    outwards = ((thickness_scale - 1) * of_node * depth / steepness**2)[:, None] * gradient
     outwards[np.unique(mesh.base), 2] = 0.0
     return replace(mesh, nodes=mesh.nodes + outwards)
 

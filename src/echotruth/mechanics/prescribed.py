@@ -12,6 +12,7 @@ from echotruth.loop.phases import FILLING
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.geometry.lattice import Tube, tube_dimensions
 from echotruth.mechanics.history import Arrays, collect_outputs
+from echotruth.mechanics.pathology import thinned
 from echotruth.mechanics.solver.wall import wall
 
 
@@ -38,7 +39,7 @@ def prescribed_motion(config: Config) -> dict[str, Arrays]:
     GeometryError, FibreError, PathologyError, LoopError, MotionError
         With one sentence, if the heart or the period is invalid, or the heart would move into the array.
     """
-    mesh = left_ventricle(config.geometry)
+    mesh = thinned(left_ventricle(config.geometry), config.pathology.infarct)
     amplitude = motion_amplitude(config.motion.time_course, config.loop.frames)
     displacement = np.stack([displacement_at(config, mesh, mesh.nodes, a) for a in amplitude])
     _check_clearance(config, mesh, displacement)

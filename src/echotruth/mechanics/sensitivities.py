@@ -91,7 +91,8 @@ class _Heart:
 
     def wall(self, other: Config) -> Wall:
         """Wall of another configuration; it has the mesh of this one if the geometry is the same."""
-        if other.geometry != self.config.geometry or other.pathology.infarct.thickness_scale != 1:
+        is_thin = [one.pathology.infarct.scar()["thickness_scale"] != 1 for one in (self.config, other)]
+        if other.geometry != self.config.geometry or any(is_thin):
             return unloaded_wall(other, read_loop(other.loop))
         mesh, depth = self.unloaded.mesh, self.unloaded.depth
         return Wall(mesh, depth, tissue(mesh, depth, other.pathology, other.mechanics.regional))

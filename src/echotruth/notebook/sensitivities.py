@@ -108,7 +108,8 @@ def _changed(config: Config, key: str) -> tuple[Config, float]:
 
 def _value(config: Config, key: str) -> float:
     """Number that a dotted key has; a segment of `mechanics.regional` that is not given has 1."""
-    found: Any = {name: getattr(config, name).model_dump() for name in SECTIONS}
+    sections_of = config.model_copy(update={"pathology": config.pathology.resolved()})
+    found: Any = {name: getattr(sections_of, name).model_dump() for name in SECTIONS}
     *sections, last = key.split(".")
     for name in sections:
         found = found.get(name) if isinstance(found, dict) else None

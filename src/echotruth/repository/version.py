@@ -186,7 +186,7 @@ def _bmode(config: Config, view: str) -> Settings:
 def _tracking(config: Config, view: str) -> Settings:
     """What trackers find in a view: also what the files hold that the command of a tracker names."""
     words = [word for tracker in config.tracking.trackers.values() for word in getattr(tracker, "command", None) or []]
-    return config.seed, config.tracking, [_file_hash(Path(word).absolute()) for word in words if Path(word).is_file()]
+    return config.seed, config.tracking, [_content_of(Path(word)) for word in words if Path(word).is_file()]
 
 
 SETTINGS: dict[str, Callable[[Config, str], Settings]] = {
@@ -201,11 +201,16 @@ SETTINGS: dict[str, Callable[[Config, str], Settings]] = {
 def errors_of(config: Config) -> str:
     """Hash of the table of the tracker's errors that is used in inference; "" if it is that of the package, or none."""
     path = Path(config.inference.errors or "")
-    return _file_hash(path.absolute()) if path.is_file() else ""
+    return _content_of(path) if path.is_file() else ""
+
+
+def _content_of(path: Path) -> str:
+    """Hash of a file, which is read anew where its date is another."""
+    return _file_hash(path.absolute(), path.stat().st_mtime_ns)
 
 
 @cache
-def _file_hash(path: Path) -> str:
+def _file_hash(path: Path, date: int) -> str:
     return sha256(path.read_bytes()).hexdigest()[:16]
 
 

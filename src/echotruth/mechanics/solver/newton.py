@@ -157,6 +157,12 @@ class LoadStepper:
         self.equations.rest_at(self.state)
         self._tangent = None
 
+    def tauten(self, is_taut: bool) -> None:
+        """Let scars be taut from the last solved state on, or slack."""
+        if self.equations.taut.any():
+            self.equations.tauten(self.state if is_taut else None)
+            self._tangent = None
+
     def _remedy(self) -> str:
         if self.state.tension < OVERSTRAINED:
             return "use a finer mesh or more frames"

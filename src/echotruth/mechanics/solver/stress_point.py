@@ -100,8 +100,8 @@ def evaluate(j, law, scale, previous_c, taut_c, work, with_tangent):
     (Kelvin-Voigt), with the growth of C since the previous state, the last one that of a scar. S_active acts along the
     fibre, and by its shares along sheet and normal, in each direction as the stretch there demands: the stress of
     fibres that are dispersed into these directions. Only that along the fibre falls with the velocity, because fibres
-    midway to a direction in which the wall lengthens hardly shorten; and so does no tension below zero, which is none
-    of muscle but what is left of a solution.
+    midway to a direction in which the wall lengthens hardly shorten. A tension below zero is left over from a
+    solution and not of muscle: it does not fall with the velocity.
     """
     stiffness, tension, pressure, rate, taut = scale
     viscous_modulus = law.viscosity * rate
