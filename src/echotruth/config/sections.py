@@ -173,7 +173,7 @@ class Config(Section):
             remedy = (
                 "needs loop.kind = circulation: no wall that is activated out of turn gives the loop of a healthy one"
             )
-            raise self._refused("pathology.activation." + ("preset" if order.preset else "sites"), remedy)
+            self.require(False, "pathology.activation." + ("preset" if order.preset else "sites"), remedy)
 
     @check
     def _check_stiffness(self) -> None:
