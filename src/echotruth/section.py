@@ -45,6 +45,9 @@ UNITS: dict[str, float] = {
     "Pa_s": 1.0,
     "MHz": 1e6,
     "m_per_s": 1.0,
+    "g": 1e-3,
+    "mL_per_g": 1e-3,
+    "mL_per_min_per_g": 1e-3 / 60,
     "deg": pi / 180,
     "dB": 1.0,
 }

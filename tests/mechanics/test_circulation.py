@@ -5,7 +5,8 @@ import warnings
 import numpy as np
 import pytest
 
-from echotruth.config import Config, Physiology
+from echotruth.config import Config
+from echotruth.config.diagnosis import BOUNDS_OF, bounds_of
 from echotruth.heart import Heart
 from echotruth.loop.calibration import calibrate
 from echotruth.loop.cycle import read_loop
@@ -191,13 +192,14 @@ def test_heart_that_is_not_steady_in_time_is_refused():
 
 @pytest.mark.parametrize("contractility", [1.0, 0.6])
 def test_notebook_and_workflow_judge_a_heart_alike(healthy, monkeypatch, contractility):
-    """The bounds of healthy hearts, here one that none meets, are asked of those that differ in nothing."""
+    """Those that differ in nothing by the bounds of the healthy, here one that none meets, and others by their own."""
     monkeypatch.setattr(simulation, "simulate", lambda config: dict(healthy))
     config = heart(40, contractility=contractility)
-    config = config.model_copy(update={"physiology": Physiology(circumferential_strain_min=-0.08)})
+    bounds = BOUNDS_OF["healthy"] | {"circumferential_strain_max": -0.19}
+    monkeypatch.setitem(BOUNDS_OF, "healthy", bounds)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         simulation.beat(config, progress=False)
-    reason = violation(measured_heart(healthy, config)[1], config.physiology)
+    reason = violation(measured_heart(healthy, config)[1], bounds_of(config))
     assert bool(reason) == (contractility == 1)
     assert [str(each.message) for each in told] == [f"implausible heart: {reason}"] * bool(reason)

@@ -21,6 +21,8 @@ HEART_DEFAULTS: dict[str, dict[str, Any]] = {
         "pathology.activation.purkinje_speed_m_per_s": 1.2,
         "mechanics.pericardium.spring_kPa_per_mm": 0.5,
         "physiology.fibre_shortening_rate_max_per_s": 7.0,
+        "physiology.wall_mass_min_g": 0.2,
+        "physiology.wall_mass_max_g": 2.0,
     },
     "human": {
         "loop.file": "human",
@@ -40,6 +42,19 @@ HEART_DEFAULTS: dict[str, dict[str, Any]] = {
         "physiology.circumferential_strain_min": -0.26,
         "physiology.circumferential_strain_max": -0.1,
         "physiology.gls_max": -0.13,
+        "physiology.ejection_fraction_min": 0.45,
+        "physiology.ejection_fraction_max": 0.8,
+        "physiology.edp_min_mmHg": 3.0,
+        "physiology.edp_max_mmHg": 14.0,
+        "physiology.edv_per_mass_min_mL_per_g": 0.9,
+        "physiology.edv_per_mass_max_mL_per_g": 2.8,
+        "physiology.output_per_mass_min_mL_per_min_per_g": 25.0,
+        "physiology.output_per_mass_max_mL_per_min_per_g": 120.0,
+        "physiology.wall_mass_min_g": 40.0,
+        "physiology.wall_mass_max_g": 350.0,
+        "physiology.radial_strain_min": 0.2,
+        "physiology.radial_strain_max": 0.95,
+        "physiology.segment_circumferential_strain_min": -0.32,
     },
 }
 """`geometry.preset` -> default of dotted keys."""

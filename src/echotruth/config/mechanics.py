@@ -39,8 +39,8 @@ class Active(Section):
     length_sensitivity: Annotated[FiniteFloat, Field(ge=0, le=50)] = 28.0
     """Besides beta, growth dln T / dlambda of the tension with the stretch beyond that of the healthy heart, as long
     after activation, in `loop.kind: circulation`. `human` 10: that of half activated muscle in the human model of Land
-    et al. (J Mol Cell Cardiol 106 (2017) 68). With it the late wall of a left bundle branch block stretches the septum again,
-    as in patients; the mouse's 28 is chosen for that and has no other source."""
+    et al. (J Mol Cell Cardiol 106 (2017) 68). With it the late wall of a left bundle branch block stretches the septum
+    again, as in patients; the mouse's 28 is chosen for that and has no other source."""
 
 
 class Pericardium(Section):

@@ -4,16 +4,15 @@ from typing import Annotated
 
 from pydantic import Field, FiniteFloat
 
-from echotruth.section import Angle, Fraction, Section, check, invalid
+from echotruth.section import Angle, Fraction, Positive, Section, check, invalid
 
 
 class Physiology(Section):
     """Bounds on a solved heart; a heart outside is kept and marked with the reason. `null` switches a bound off.
 
-    Those of twist, of the strains since ED, of GLS and of the Tei index (from `twist_ivc_min_deg` on) mark motion that
-    no healthy heart has: they enclose with a margin what the named sources measured. They are not checked in a heart
-    with an infarct or late activation (section `pathology`). Defaults are those of mice and rats; `human` has others
-    where people were measured to differ.
+    Defaults are those of healthy mice and rats, and enclose with a margin what the named sources measured; `human` has
+    others where people were measured to differ. In a heart with a disease, or with a circulation that is changed, those
+    from `edp_min_mmHg` on, and of the ejection fraction, are by default those of its diagnosis (docs/physiology.md).
     """
 
     exclude_implausible: bool = True
@@ -43,11 +42,38 @@ class Physiology(Section):
     tension_es_max_kPa: FiniteFloat | None = 180.0
     """Largest active tension at end-systole; the default human has 90, and with five or six frames a beat the mouse
     140 to 155."""
-    ejection_fraction_min: Fraction | None = 0.2
+    ejection_fraction_min: Fraction | None = 0.4
     """Smallest ejection fraction; healthy mice and rats have 0.42 to 0.89 (Pacher 2008, doi 10.1038/nprot.2008.138,
-    table 1), failing hearts less."""
+    table 1). `human` 0.45: 0.58 +- 0.05 and 0.61 +- 0.05 in men and women (Petersen 2017, doi
+    10.1186/s12968-017-0327-9)."""
     ejection_fraction_max: Fraction | None = 0.9
-    """Largest ejection fraction."""
+    """Largest ejection fraction; `human` 0.8."""
+    edp_min_mmHg: Annotated[FiniteFloat, Field(ge=0)] | None = 0.5
+    """Smallest end-diastolic pressure: 1 to 9 in mice, 0.5 to 8 in rats (Pacher 2008, table 1); `human` 3."""
+    edp_max_mmHg: Annotated[FiniteFloat, Field(ge=0)] | None = 10.0
+    """Largest end-diastolic pressure; `human` 14, because it is 5 to 12 in people with a normal and 13 to 38 in those
+    with a diseased ventricle ("Evaluation of Pulmonary Arterial End-Diastolic Pressure", 50 people)."""
+    edv_of_healthy_min: Positive | None = 0.95
+    """Smallest end-diastolic volume over that of the loop, which the heart without its disease has: no disease here
+    empties a ventricle but loss of blood. Hearts whose loop prescribes no volume have none."""
+    edv_per_mass_min_mL_per_g: Positive | None = 0.3
+    """Smallest end-diastolic volume over the mass of the wall, of a density of 1.05 g/mL: 59.9 +- 8.8 uL over 81.9 +-
+    9.7 mg in mice (doi 10.1186/1476-7120-11-12); conductance finds 25 to 53 uL (Pacher 2008). `human` 0.9."""
+    edv_per_mass_max_mL_per_g: Positive | None = 1.2
+    """Largest end-diastolic volume over the mass of the wall; `human` 2.8: some 80 over 53 +- 9 g/m2 in men, 75 over 42
+    +- 7 in women (masses of Petersen 2017, volumes recalled from there)."""
+    output_per_mass_min_mL_per_min_per_g: Positive | None = 40.0
+    """Smallest cardiac output over the mass of the wall: 14.3 mL/min and 101 mg in grown mice (MRI; Wiesmann 2000, Am J
+    Physiol 278, H652), 29.7 +- 10 mL/min and 82 mg by echo (doi 10.1186/1476-7120-11-12), 42 to 70 mL/min in rats
+    (Pacher 2008) of some 0.8 g (recalled). `human` 25: 5 to 6 L/min over some 110 g (recalled)."""
+    output_per_mass_max_mL_per_min_per_g: Positive | None = 450.0
+    """Largest cardiac output over the mass of the wall; `human` 120."""
+    wall_mass_min_g: Positive | None = 0.03
+    """Smallest mass of the wall: 82 +- 10 mg in mice of 8 weeks (doi 10.1186/1476-7120-11-12). `rat` 0.2, `human`
+    40."""
+    wall_mass_max_g: Positive | None = 0.2
+    """Largest mass of the wall, grown ones too. `rat` 2, `human` 350: 53 +- 9 g/m2 in men (Petersen 2017), and twice
+    that in disease."""
     twist_ivc_min_deg: Angle | None = -8.0
     """Smallest twist at the end of isovolumic contraction, counter-clockwise seen from the apex. Base and apex turn
     together before ejection, so that it is near 0 (Young & Cowan 2012); in children the twist early in systole is
@@ -71,6 +97,8 @@ class Physiology(Section):
     """Largest mean of E_CC over a fifth of the wall's height, in either direction, at the end of isovolumic
     contraction. No part of a healthy wall beats before the heart ejects: base, middle and apex begin to shorten
     together (Young & Cowan 2012)."""
+    segment_circumferential_strain_ivc_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.07
+    """Largest mean of E_CC over an AHA segment, in either direction, at the end of isovolumic contraction."""
     level_radial_strain_ivc_max: FiniteFloat | None = 0.15
     """Largest mean of E_RR over a level at the end of isovolumic contraction."""
     level_fibre_strain_ivc_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.07
@@ -87,6 +115,20 @@ class Physiology(Section):
     intervals of people reach from -12.5 to -21.3 % (Venkatesh 2015, doi 10.1002/jmri.24749)."""
     circumferential_strain_max: FiniteFloat | None = -0.07
     """Largest wall-mean circumferential strain at end-systole; `human` -0.1."""
+    radial_strain_min: FiniteFloat | None = 0.1
+    """Smallest wall-mean radial strain at end-systole: 0.29 +- 0.17 in mice (Zhong 2011). `human` 0.2."""
+    radial_strain_max: FiniteFloat | None = 0.65
+    """Largest wall-mean radial strain at end-systole; `human` 0.95: studies of people by echo have means of 35 to 59 %,
+    an E_RR of 0.41 to 0.76 (Yingchoncharoen 2013, J Am Soc Echocardiogr 26, 185)."""
+    segment_circumferential_strain_min: FiniteFloat | None = -0.3
+    """Smallest mean of E_CC over an AHA segment at end-systole; bounds of segments are those of the wall, wider by what
+    segments of people differ: septum -17, lateral wall -22 % (docs/physiology.md). `human` -0.32."""
+    segment_circumferential_strain_max: FiniteFloat | None = -0.04
+    """Largest mean of E_CC over an AHA segment at end-systole: every segment of a healthy heart shortens."""
+    segment_longitudinal_strain_min: FiniteFloat | None = -0.32
+    """Smallest mean of E_LL over an AHA segment at end-systole; -0.18 +- 0.14 over the wall of mice (Zhong 2011)."""
+    segment_longitudinal_strain_max: FiniteFloat | None = -0.03
+    """Largest mean of E_LL over an AHA segment at end-systole."""
     gls_min: FiniteFloat | None = -0.28
     """Smallest global longitudinal strain (relative change of length) at end-systole. In mice it is -16.8 +- 1.7 % and
     -18.7 +- 3.1 % on two scanners (Tee 2015), in people -20.4 +- 2.2 % (NORMAL study, PMC5234340)."""

@@ -14,6 +14,9 @@ _MAX_LEAK = (0.01, 0.1)
 _NOISE_SDS = 4.0
 """Standard deviations of the noise that count as no change of volume."""
 
+_NOISY_FRAMES = 32
+"""With fewer frames the second differences of a curve are its own bend, of several percent, and tell no noise."""
+
 
 def es_frame(pressure: Floats, volume: Floats) -> int:
     """Frame of end-systole, argmax P/V (time-varying elastance, Suga & Sagawa 1974).
@@ -57,13 +60,16 @@ def phases(pressure: Floats, volume: Floats) -> NDArray[np.uint8]:
 def leak(volume: Floats, stroke_volume: float) -> float:
     """Change of volume, m^3, that may pass a closed valve: noise, and 1 to 10 % of the stroke volume.
 
+    With fewer than 32 frames, noise cannot be told from the bends of the curve, and it is 1 %.
+
     Parameters
     ----------
     volume : ndarray of shape (n_frames,), m^3
     stroke_volume : float, m^3
     """
     smallest, largest = (share * abs(stroke_volume) for share in _MAX_LEAK)
-    return float(np.clip(_NOISE_SDS * noise(volume), smallest, largest))
+    margin = _NOISE_SDS * noise(volume) if len(volume) >= _NOISY_FRAMES else 0.0
+    return float(np.clip(margin, smallest, largest))
 
 
 def noise(volume: Floats) -> float:

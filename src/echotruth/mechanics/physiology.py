@@ -3,21 +3,26 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from echotruth.aha import APEX_SEGMENT, segment
 from echotruth.arrays import Floats
 from echotruth.config import Config
-from echotruth.config.loop import Circulation
-from echotruth.fem.tetrahedra import Mesh
+from echotruth.fem.tetrahedra import Mesh, shape
+from echotruth.fem.volume import cell_volumes
 from echotruth.loop.cycle import read_loop
 from echotruth.loop.haemodynamics import filling_ratio, intervals, pressure_rates
 from echotruth.loop.phases import CONTRACTION, FILLING, RELAXATION
 from echotruth.mechanics.bounds import CC, LL, bounded
 from echotruth.mechanics.contours import MID_SLICE, global_longitudinal_strain, wall_thickness
-from echotruth.mechanics.fibres import wall_depth
+from echotruth.mechanics.fibres import CENTROID, wall_depth
 from echotruth.mechanics.geometry import epicardial_apex
 from echotruth.mechanics.geometry.boundary import area_vectors
 from echotruth.mechanics.history import Arrays
-from echotruth.mechanics.pathology import healthy_heart
+from echotruth.mechanics.kinematics import group_means
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation
+
+DENSITY = 1050.0
+"""Of heart muscle, kg/m^3: 1.05 g/mL, by which MRI turns the volume of a wall into its mass (Petersen 2017, doi
+10.1186/s12968-017-0327-9)."""
 
 
 def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays, depth: Floats | None = None) -> Arrays:
@@ -38,14 +43,14 @@ def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays, depth: Flo
     """
     mesh = Mesh(*(geometry[name] for name in ("node_position", "cell_node", "endo", "epi", "base")))
     positions = mesh.nodes + mechanics["displacement"]
-    volume, tension, es = mechanics["volume"], mechanics["active_tension"], int(mechanics["es_frame"])
+    tension, es = mechanics["active_tension"], int(mechanics["es_frame"])
     return {
         **_rotations(mesh, positions, mechanics),
-        **_strains(kinematics, mechanics),
+        **_strains(kinematics | {"segment_strain": _segment_strain(mesh, kinematics["strain"])}, mechanics),
         **_axial_motion(mesh, mechanics["displacement"]),
         **_lengths(mesh, wall_depth(mesh) if depth is None else depth, positions[[0, es]]),
         **_times(mechanics),
-        "ejection_fraction": np.asarray(1 - volume.min() / volume[0]),
+        **_pump(mesh, mechanics),
         "volume_ratio_min": kinematics["volume_ratio_min"].min(),
         "loop_error": np.asarray(max(_largest_error(mechanics, quantity) for quantity in ("pressure", "volume"))),
         "tension_min": tension.min(),
@@ -69,17 +74,34 @@ def measured_heart(groups: dict[str, Arrays], config: Config) -> tuple[Arrays, d
     bounded : dict
         As :func:`bounded` returns it; empty for prescribed motions, to which the bounds do not apply.
     """
-    mechanics = groups["mechanics"] | {"time": read_loop(config.loop).time}
+    loop = read_loop(config.loop)
+    mechanics = groups["mechanics"] | {"time": loop.time}
     found = measures(groups["geometry"], mechanics, groups["kinematics"], groups["fibres"]["wall_depth"])
     if config.motion.kind != "beat":
         return found, {}
-    return found, bounded({**found, "active_tension": mechanics["active_tension"]}, _is_healthy(groups, config))
+    healthy = np.nan if loop.volume is None else loop.edv
+    others = {"active_tension": mechanics["active_tension"], "edv_of_healthy": found["edv"] / healthy}
+    return found, bounded(found | others)
 
 
-def _is_healthy(groups: dict[str, Arrays], config: Config) -> bool:
-    """Whether no tissue is diseased and, in a circulation, nothing else differs from the healthy heart."""
-    changed = config.loop.circulation != Circulation() or config != healthy_heart(config)
-    return not groups["pathology"]["region"].any() and not (config.loop.kind == "circulation" and changed)
+def _pump(mesh: Mesh, mechanics: Arrays) -> Arrays:
+    """What the heart holds, weighs and puts out."""
+    volume, time = mechanics["volume"], mechanics["time"]
+    stroke, period = volume[0] - volume.min(), 2 * time[-1] - time[-2]
+    return {
+        "edv": volume[0],
+        "edp": mechanics["pressure"][0],
+        "stroke_volume": stroke,
+        "ejection_fraction": stroke / volume[0],
+        "cardiac_output": stroke / period,
+        "wall_mass": DENSITY * cell_volumes(mesh.nodes, mesh.cells).sum(),
+    }
+
+
+def _segment_strain(mesh: Mesh, strain: Floats) -> Floats:
+    """Mean (frame, segment, 6) of the strain (frame, cell, 6) at the centroids over the cells of each AHA segment."""
+    segments = segment(shape(CENTROID)[0] @ mesh.nodes[mesh.cells], mesh.nodes[mesh.endo, 2].min())
+    return group_means(strain, cell_volumes(mesh.nodes, mesh.cells), segments, APEX_SEGMENT)
 
 
 def _rotations(mesh: Mesh, positions: Floats, mechanics: Arrays) -> Arrays:
@@ -111,7 +133,8 @@ def _untwisting(twist: Floats, mechanics: Arrays) -> Arrays:
 
 def _strains(kinematics: Arrays, mechanics: Arrays) -> Arrays:
     es, phase = int(mechanics["es_frame"]), mechanics["phase"]
-    names = {"strain": "strain_mean"} | {name: name for name in ("layer_strain", "level_strain", "level_fibre_strain")}
+    parts = ("layer_strain", "level_strain", "segment_strain", "level_fibre_strain")
+    names = {"strain": "strain_mean"} | {name: name for name in parts}
     ends: Arrays = {}
     for name, array in names.items():
         ends |= {f"{name}_ivc": _at_end_of_ivc(kinematics[array], phase), f"{name}_es": kinematics[array][es]}

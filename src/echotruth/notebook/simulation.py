@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from echotruth.cases import Case
 from echotruth.config import Config, Probe, View
 from echotruth.config.building import Source, configure, tracker_section
+from echotruth.config.diagnosis import bounds_of
 from echotruth.evaluation.clip import Clip, tracker_seed
 from echotruth.evaluation.scoring import metrics, score, truth_at
 from echotruth.heart import Heart
@@ -83,7 +84,7 @@ def beat(config: Source = None, progress: bool = True, *, frames: Iterable[int] 
     if frames is not None:
         return Heart.of(arrays, settings)
     arrays["physiology"], bounded = measured_heart(arrays, settings)
-    if reason := violation(bounded, settings.physiology):
+    if reason := violation(bounded, bounds_of(settings)):
         warnings.warn(f"implausible heart: {reason}", stacklevel=2)
     return Heart.of(arrays, settings)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from echotruth import files
 from echotruth.cases import Case, table
 from echotruth.config import Config
+from echotruth.config.diagnosis import bounds_of
 from echotruth.repository import metadata
 from echotruth.repository.places import METADATA, SIZED
 from echotruth.repository.status import verdict
@@ -48,7 +49,7 @@ def publish(folder: Path, config: Config, cases: list[Case]) -> dict[str, int]:
 
 def table_of(store: Path, cases: list[Case]) -> pd.DataFrame:
     """Table of the cases, with what became of their hearts until now."""
-    found = [verdict(metadata.attributes(store / "hearts" / case.heart), case.config.physiology) for case in cases]
+    found = [verdict(metadata.attributes(store / "hearts" / case.heart), bounds_of(case.config)) for case in cases]
     columns = table(cases)
     columns.insert(1, "heart", [case.heart for case in cases])
     columns.insert(2, "status", [one.status for one in found])

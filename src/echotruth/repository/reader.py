@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from echotruth.cases import Case, all_cases, find_case
 from echotruth.config import Config, shipped
+from echotruth.config.diagnosis import DECISIVE, bounds_of
 from echotruth.config.loading import load, validate
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane, imaging_plane
@@ -169,9 +170,9 @@ class Repository:
         """What became of the heart of a case, which is read for it, but in object storage, where the table tells."""
         if self._remote:
             return status.Verdict(*self._table.loc[case, ["status", "reason"]])
-        differs = any(name.startswith("physiology.") for name in self.distinctions)
-        bounds = (self.every[case].config if differs else self.config).physiology
-        return status.verdict(self.attributes("heart", case), bounds)
+        differs = any(name.startswith(DECISIVE) for name in self.distinctions)
+        config = self.every[case].config if differs else self.config
+        return status.verdict(self.attributes("heart", case), bounds_of(config))
 
     @cached_property
     def rows(self) -> dict[str, int]:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from echotruth.cases.case import Case
 from echotruth.config import Config, View
+from echotruth.config.diagnosis import bounds_of
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane, imaging_plane
 from echotruth.repository import group, metadata, schema
@@ -130,7 +131,7 @@ class Job:
         """Why this stage is not run for this heart; empty if it is to be run."""
         if self.stage == "mechanics":
             return ""
-        return excluded(metadata.attributes(self.store / self._place("heart")), self.config.physiology)
+        return excluded(metadata.attributes(self.store / self._place("heart")), bounds_of(self.config))
 
     @cached_property
     def version(self) -> str:

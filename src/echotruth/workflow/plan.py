@@ -15,6 +15,7 @@ import yaml
 from echotruth import files
 from echotruth.cases import Case, expand
 from echotruth.config import Config
+from echotruth.config.diagnosis import bounds_of
 from echotruth.config.loading import validate
 from echotruth.config.reading import SHORT_FLOAT
 from echotruth.repository import metadata
@@ -117,7 +118,7 @@ class Plan:
             yield f"hearts/{heart}", version_of("mechanics", self.cases[id].config)
         stages = [stage for stage in STAGES if stage not in OF_HEART]
         for case in self.cases.values():
-            why = excluded(metadata.attributes(self.store / "hearts" / case.heart), case.config.physiology)
+            why = excluded(metadata.attributes(self.store / "hearts" / case.heart), bounds_of(case.config))
             for stage, view in product(stages, self.config.views):
                 version = version_of(stage, case.config, view, why)
                 for group in groups_of(stage, self.config.bmode.sizes):
