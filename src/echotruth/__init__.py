@@ -2,7 +2,7 @@
 
 >>> import echotruth as et
 >>> heart, clip = et.sample().heart("infarct"), et.sample().clip("infarct", "mid")
->>> tracked = et.track(clip, "dis")
+>>> tracked = et.track(clip, "bspline_dic")
 >>> bool(et.evaluate(tracked, heart)["nrmse_percent"] < 50)
 True
 
