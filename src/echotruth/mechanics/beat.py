@@ -15,7 +15,7 @@ from echotruth.loop.circulation import altered
 from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.loop.recording import LoopError
 from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
-from echotruth.mechanics.history import Arrays, collect_outputs
+from echotruth.mechanics.outputs import Arrays, collect_outputs
 from echotruth.mechanics.pathology import BORDER, INFARCT, PathologyError, healthy_heart, thinned
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation

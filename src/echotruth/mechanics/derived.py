@@ -8,8 +8,8 @@ from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.heart import Heart
 from echotruth.mechanics import fibres
 from echotruth.mechanics.angles import angles_from_frames
-from echotruth.mechanics.history import Arrays
 from echotruth.mechanics.kinematics import centroid_strains
+from echotruth.mechanics.outputs import Arrays
 
 
 def centroid_kinematics(heart: Heart, frames: Sequence[int] | None = None) -> Arrays:

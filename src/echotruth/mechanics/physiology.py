@@ -16,8 +16,8 @@ from echotruth.mechanics.contours import MID_SLICE, global_longitudinal_strain, 
 from echotruth.mechanics.fibres import CENTROID, wall_depth
 from echotruth.mechanics.geometry import epicardial_apex
 from echotruth.mechanics.geometry.boundary import area_vectors
-from echotruth.mechanics.history import Arrays
 from echotruth.mechanics.kinematics import group_means
+from echotruth.mechanics.outputs import Arrays
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation
 
 DENSITY = 1050.0

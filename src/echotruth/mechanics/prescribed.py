@@ -11,7 +11,7 @@ from echotruth.loop.cycle import read_loop
 from echotruth.loop.phases import FILLING
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.geometry.lattice import Tube, tube_dimensions
-from echotruth.mechanics.history import Arrays, collect_outputs
+from echotruth.mechanics.outputs import Arrays, collect_outputs
 from echotruth.mechanics.pathology import thinned
 from echotruth.mechanics.solver.wall import wall
 

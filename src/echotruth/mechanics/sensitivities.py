@@ -10,7 +10,7 @@ from echotruth.config import Config
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics import fibres, kinematics
 from echotruth.mechanics.beat import check_frames, held, outputs, unloaded_wall
-from echotruth.mechanics.history import Arrays
+from echotruth.mechanics.outputs import Arrays
 from echotruth.mechanics.pathology import tissue
 from echotruth.mechanics.solver.cycle import filled_to_end_diastole, solved_cycle, solved_frames
 from echotruth.mechanics.solver.newton import Step

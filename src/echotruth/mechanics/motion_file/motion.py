@@ -7,9 +7,9 @@ import numpy as np
 from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.loop import phases
-from echotruth.mechanics.history import Arrays, collect_outputs
 from echotruth.mechanics.motion_file.cycle import periodic_weights
 from echotruth.mechanics.motion_file.wall import MovingWall, moving_wall
+from echotruth.mechanics.outputs import Arrays, collect_outputs
 from echotruth.mechanics.prescribed import MotionError, unsolved
 from echotruth.mechanics.solver.wall import wall
 
