@@ -8,7 +8,7 @@ from echotruth.repository import schema
 from echotruth.repository.places import group_of
 
 ALL = [*schema.COORDINATES.values(), *schema.DERIVED, *(array for arrays in schema.KINDS.values() for array in arrays)]
-UNITS = {"1", "m", "m3", "s", "s-1", "Pa", "Pa s-1", "rad", "rad s-1", "percent"}
+UNITS = {"1", "m", "m3", "m3 s-1", "kg", "s", "s-1", "Pa", "Pa s-1", "rad", "rad s-1", "percent"}
 
 
 @pytest.mark.parametrize("array", ALL, ids=lambda array: f"{array.name}-{len(array.dims)}")
