@@ -10,7 +10,7 @@ from typing import NamedTuple
 from echotruth.config import Config
 from echotruth.repository import group, values
 from echotruth.repository.group import NotWritten
-from echotruth.repository.metadata import files_of
+from echotruth.repository.metadata import OUTDATED, files_of
 from echotruth.repository.places import METADATA, NOT_NEEDED, group_of, job_of
 from echotruth.repository.publication import CHECKSUMS, checksum, published_files
 from echotruth.repository.reader import Repository
@@ -89,7 +89,12 @@ def _check_files(folder: Path, store: Path, report: Report) -> None:
         listed[name] = hash
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         hashes = dict(zip(present, pool.map(checksum, present.values()), strict=True))
-    for name in sorted({*listed, *present}):
+    aside = {path.parent.relative_to(folder).as_posix() for path in store.rglob(OUTDATED)}
+    outdated = {name: group for name in listed if (group := _group_of(name).partition(" ")[0]) in aside}
+    for group in sorted(set(outdated.values())):
+        problem = "was made with other settings or by other code"
+        report.faults.append(Fault(group, problem, "run the configuration again, which makes it"))
+    for name in sorted({*listed, *present} - outdated.keys()):
         if name not in present:
             report.faults.append(Fault(name, "is missing", REMEDY.format(_group_of(name))))
         elif name not in listed:
