@@ -17,8 +17,8 @@ def diagnosis(config: Config) -> str:
     """
     infarct, order, geometry = config.pathology.infarct, config.pathology.activation, config.geometry
     words = {
-        "infarct": infarct.segments is not None or infarct.radius_mm is not None,
-        "late_activation": order.preset in ("lbbb", "rv_pacing") or order.sites is not None,
+        "infarct": infarct.is_there,
+        "late_activation": order.is_late,
         "hypertrophy": geometry.hypertrophy > 1,
         "dilation": geometry.dilation > 1,
     }

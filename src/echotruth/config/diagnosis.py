@@ -128,9 +128,9 @@ def diagnosis(config: Config) -> str:
     """
     infarct, activation, load = config.pathology.infarct, config.pathology.activation, config.loop.circulation
     found: list[str] = []
-    if infarct.segments is not None or infarct.radius_mm is not None:
+    if infarct.is_there:
         found.append(infarct.age or "infarct")
-    if activation.sites is not None or activation.preset not in (None, "normal"):
+    if activation.is_late:
         found.append("late")
     grown = config.geometry.hypertrophy, config.geometry.dilation, config.fibres.disarray_deg
     loaded = load.resistance, load.compliance, load.retained_volume_stroke_volumes

@@ -65,6 +65,11 @@ class Infarct(Section):
         is_one = self.segments is None or self.radius_mm is None
         self.require(is_one, "radius_mm", "give either segments or radius_mm and set the other to null")
 
+    @property
+    def is_there(self) -> bool:
+        """Whether there is an infarct."""
+        return self.segments is not None or self.radius_mm is not None
+
     def scar(self) -> dict[str, float]:
         """Stiffness and thickness by their keys, with those of the age where none is given."""
         given = {key: getattr(self, key) for key in SCARS[self.age]}
@@ -108,6 +113,16 @@ class Activation(Section):
     """Speed of the wave along the endocardium with the preset `normal`: that of a mouse's bundle branch (Tamaddon 2000,
     Circ Res 87, 929). `human` 2, with which three fronts meet as early as in people, 32 ms after the first (Durrer
     1970, Circulation 41, 899)."""
+
+    @property
+    def is_at_once(self) -> bool:
+        """Whether all of the wall is activated at once."""
+        return self.preset is None and self.sites is None
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the order is another than the normal one."""
+        return not self.is_at_once and self.preset != "normal"
 
     @check
     def _check_sites(self) -> None:

@@ -175,11 +175,10 @@ class Config(Section):
     @check
     def _check_activation(self) -> None:
         order = self.pathology.activation
-        is_at_once = order.preset is None and order.sites is None
         key = "sites" if order.preset is None else "preset"
         remedy = "needs loop.kind = circulation: a wall that is activated out of turn has no loop of a healthy heart"
         circulates = self.motion.kind != "beat" or self.loop.kind == "circulation"
-        self.require(is_at_once or circulates, f"pathology.activation.{key}", remedy)
+        self.require(order.is_at_once or circulates, f"pathology.activation.{key}", remedy)
 
     @check
     def _check_stiffness(self) -> None:

@@ -35,6 +35,7 @@ from scipy.optimize import brentq
 from echotruth.arrays import Floats
 from echotruth.config.loop import Circulation as Settings
 from echotruth.loop.recording import LoopError
+from echotruth.section import UNITS
 
 (
     LEFT_VENTRICLE,
@@ -51,7 +52,7 @@ from echotruth.loop.recording import LoopError
 VALVES = np.isin(np.arange(8), (LEFT_VENTRICLE, RIGHT_ATRIUM, RIGHT_VENTRICLE, LEFT_ATRIUM))
 """Whether the flow out of a compartment (8,) passes a valve."""
 
-MMHG = 133.322387415
+MMHG = UNITS["mmHg"]
 """Pascals in a millimetre of mercury."""
 
 REFERENCE_STROKE_VOLUME = 70.0

@@ -68,7 +68,7 @@ def activated(tissue: Tissue, mesh: Mesh, depth: Floats, config: Config) -> Tiss
         If a site does not lie in the wall.
     """
     activation = config.pathology.activation
-    if activation.preset is None and activation.sites is None:
+    if activation.is_at_once:
         return tissue
     normal = activation.model_copy(update={"preset": "normal", "sites": None})
     delay, usual = (_delays(mesh, depth, order, config.fibres, config.seed) for order in (activation, normal))

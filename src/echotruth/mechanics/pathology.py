@@ -154,7 +154,7 @@ def _gradual(values: Floats, segments: NDArray[np.uint8], centroid: Floats) -> F
 
 def _infarct_weight(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
     """Weight (n_cells,) of the infarct: 1 in it, falling linearly to 0 through the border zone (Lee 2011)."""
-    if infarct.segments is None and infarct.radius_mm is None:
+    if not infarct.is_there:
         return np.zeros(len(mesh.cells))
     values, border = shape(_SAMPLES), infarct.si().border
     positions = values @ mesh.nodes[mesh.cells]

@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from echotruth.imaging.labels import TissueLabel
+from echotruth.section import UNITS
 
 RADIAL, CIRCUMFERENTIAL, LONGITUDINAL = "#b5382a", "#1f5fa8", "#2f8550"
 """Colours of the wall directions."""
@@ -53,7 +54,7 @@ TISSUE_ENTRIES = {
 }
 """Tissue to the entry of Matplotlib's `tab20`: blood in a full colour, its wall in a pale one."""
 
-MMHG = 133.322387415
+MMHG = UNITS["mmHg"]
 """Pa."""
 
 NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}

@@ -89,12 +89,12 @@ def _check_files(folder: Path, store: Path, report: Report) -> None:
         listed[name] = hash
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         hashes = dict(zip(present, pool.map(checksum, present.values()), strict=True))
-    aside = {path.parent.relative_to(folder).as_posix() for path in store.rglob(OUTDATED)}
-    outdated = {name: group for name in listed if (group := _group_of(name).partition(" ")[0]) in aside}
-    for group in sorted(set(outdated.values())):
+    lost = {name: _group_of(name).partition(" ")[0] for name in listed if name not in present}
+    outdated = {place for place in lost.values() if (folder / place / OUTDATED).is_file()}
+    for place in sorted(outdated):
         problem = "was made with other settings or by other code"
-        report.faults.append(Fault(group, problem, "run the configuration again, which makes it"))
-    for name in sorted({*listed, *present} - outdated.keys()):
+        report.faults.append(Fault(place, problem, "run the configuration again, which makes it"))
+    for name in sorted(name for name in {*listed, *present} if lost.get(name) not in outdated):
         if name not in present:
             report.faults.append(Fault(name, "is missing", REMEDY.format(_group_of(name))))
         elif name not in listed:

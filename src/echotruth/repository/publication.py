@@ -72,9 +72,10 @@ def _write_groups(store: Path, config: Config, cases: Iterable[Case]) -> None:
     holders |= {clip / stage for clip in clips for stage in SIZED}
     if config.inference.tracker:
         holders.add(store / "inference")
+    wanted = {*holders, *clips}
     for pattern in ("inference", "clips/*", "clips/*/*", *(f"clips/*/*/{stage}" for stage in SIZED)):
         for path in store.glob(f"{pattern}/{METADATA}"):
-            if path.parent not in {*holders, *clips}:
+            if path.parent not in wanted:
                 path.unlink()
     for folder in holders:
         metadata.write(folder, {}, consolidated=False)
