@@ -7,7 +7,7 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 BIN := .venv/bin
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo benchmark pytest static test test-all test-integration docs reference sample validation lock clean
+.PHONY: demo benchmark pytest static test test-all test-integration docs reference pictures sample validation lock clean
 
 demo: .venv/ready
 	$(BIN)/echotruth run config/demo.yaml
@@ -54,6 +54,11 @@ test-integration: .venv-integration/ready
 
 docs: .venv-integration/ready  ## the site, in out/site
 	.venv-integration/bin/python -m sphinx -W --keep-going -b html -c docs . out/site
+
+pictures: .venv/ready  ## of docs/physiology.md and docs/strain.md
+	$(BIN)/python benchmarks/physiology_pictures.py
+	$(BIN)/echotruth run benchmarks/default.yaml
+	$(BIN)/python benchmarks/default_pictures.py out/default
 
 reference: .venv/ready  ## generated pages: schema and tables
 	$(BIN)/python docs/reference.py

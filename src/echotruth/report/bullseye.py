@@ -102,10 +102,10 @@ def disc(axes: Axes, values: np.ndarray, scale: TwoSlopeNorm, decimals: int = 0)
             x, y, text = radius * np.cos(angle), radius * np.sin(angle), f"{float(value):z.{decimals}f}"
             colour = style.ON_IMAGE if is_dark else ON_LIGHT
             axes.text(x, y, text.replace("-", "−"), ha="center", va="center", fontsize=7, color=colour)
-    _names(axes)
+    names(axes)
 
 
-def _names(axes: Axes) -> None:
+def names(axes: Axes) -> None:
     """Write the names of the walls around the disc."""
     for angle, name, rotation in ((90, "anterior", 0), (180, "septal", 90), (270, "inferior", 0), (0, "lateral", 270)):
         x, y = 1.09 * np.cos(np.radians(angle)), 1.09 * np.sin(np.radians(angle))

@@ -38,7 +38,7 @@ SHEAR = {"RC": "#8a4f9e", "RL": "#c98a1b", "CL": "#2f9aa0"}
 """Component -> colour."""
 
 HEADROOM = 0.06
-"""Room above the curves for the word ES, over the height of the others."""
+"""Room above the curves for the names of phases, over the height of the others."""
 _UL, _MM = 1e-9, 1e-3
 
 Cycle = dict[str, NDArray[Any]]
@@ -96,10 +96,10 @@ def _levels(axes: Axes, cycle: Cycle, values: np.ndarray) -> None:
 
 
 def _rotations(axes: Axes, cycle: Cycle, published: Published) -> None:
-    _line(axes, cycle, "base", np.degrees(cycle["rotation_base"]), style.CIRCUMFERENTIAL)
-    _line(axes, cycle, "apex", np.degrees(cycle["rotation_apex"]), style.RADIAL)
-    _line(axes, cycle, "twist", np.degrees(cycle["twist"]), style.SOLVED)
-    _measured(axes, cycle, {"twist": style.SOLVED}, published)
+    _line(axes, cycle, "base", np.degrees(cycle["rotation_base"]), style.BASE)
+    _line(axes, cycle, "apex", np.degrees(cycle["rotation_apex"]), style.APEX)
+    _line(axes, cycle, "twist", np.degrees(cycle["twist"]), style.TWIST)
+    _measured(axes, cycle, {"twist": style.TWIST}, published)
     axes.set_ylabel("Counter-clockwise from apex (deg)")
     _finish(axes, 0.1)
 
@@ -113,7 +113,7 @@ def _strains(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Publi
 
 
 def _axial_motion(axes: Axes, cycle: Cycle) -> None:
-    for name, colour in (("base", style.CIRCUMFERENTIAL), ("apex", style.RADIAL)):
+    for name, colour in (("base", style.BASE), ("apex", style.APEX)):
         _line(axes, cycle, name, cycle[f"{name}_motion"] / _MM, colour, decimals=2)
     axes.set_ylabel("Towards the base (mm)")
     _finish(axes, 0.01, 0.2)
@@ -162,8 +162,8 @@ def _phases(axes: Axes, cycle: Cycle) -> None:
         return
     for name, start, stop in (("IVC", 0, opening), ("IVR", closing, mitral)):
         axes.axvspan(start, stop, color=style.SHADE, zorder=0, linewidth=0)
-        look: dict[str, Any] = {"color": style.MUTED, "fontsize": 6.5, "ha": "center", "va": "bottom"}
-        axes.text((start + stop) / 2, 0.015, name, transform=top, **look)
+        look: dict[str, Any] = {"color": style.MUTED, "fontsize": 6.5, "va": "top", "textcoords": "offset points"}
+        axes.annotate(name, (start, 0.985), (2, 0), xycoords=top, **look)
 
 
 def _finish(axes: Axes, smallest: float, below: float = 0.02, columns: int = 3) -> None:

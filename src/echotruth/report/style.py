@@ -21,6 +21,9 @@ from echotruth.section import UNITS
 RADIAL, CIRCUMFERENTIAL, LONGITUDINAL = "#b5382a", "#1f5fa8", "#2f8550"
 """Colours of the wall directions."""
 
+BASE, APEX, TWIST = "#2f9aa0", "#c8641b", "#1b2026"
+"""Colours of the base, the apex and the twist between them."""
+
 INK, MUTED, GRID, SHADE, PAPER = "#1b2026", "#5b646e", "#e3e6e9", "#f2efe8", "#ffffff"
 """Colours of text and axes, of remarks, of grid lines, of shaded spans, and of the paper."""
 
