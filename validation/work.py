@@ -68,6 +68,7 @@ class _VirtualWork:
     def __init__(self, solved: heart.SolvedBeat) -> None:
         self.mesh, self.beat, self.previous_states = solved.wall.mesh, solved.beat, solved.previous_states
         self.section, xi = solved.config.mechanics, tetrahedron()[0]
+        self.tension_scale = solved.wall.tissue.tension_scale[:, None]
         dN_dX, volume = material_gradients(self.mesh, xi)
         self.volume = volume * tetrahedron()[1]
         frames = fibre_frames(self.mesh, solved.wall.depth, solved.config.fibres, xi, solved.config.seed)
@@ -113,7 +114,7 @@ class _VirtualWork:
         power = 2.0 if section.stress == "cauchy" else 0.0
         shares = self._force_velocity(f.real, frame), section.sheet_share, section.normal_share
         return sum(
-            np.sum(share * energies.active(f, section.length_dependence, power, axis) * self.volume)
+            np.sum(self.tension_scale * share * energies.active(f, section.length_dependence, power, axis) * self.volume)
             for axis, share in enumerate(shares)
         )
 

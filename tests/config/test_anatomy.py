@@ -30,5 +30,5 @@ def test_cavity_and_wall_have_the_published_volumes(species):
 
 
 def test_apical_wall_keeps_its_proportion():
-    assert Geometry(wall_mm=0.7).lengths()["apex_wall_mm"] == pytest.approx(0.3)
+    assert Geometry(wall_mm=2.18).lengths()["apex_wall_mm"] == pytest.approx(0.48)
     assert Geometry(wall_mm=0.7, apex_wall_mm=0.3).lengths()["apex_wall_mm"] == 0.3

@@ -33,7 +33,7 @@ class Hemisphere:
         return self.tissue(Pathology(infarct=Infarct(**infarct)))
 
     def tissue(self, pathology=Pathology(), **regional):  # noqa: B008, a default section does not change
-        return tissue(self.mesh, self.depth, pathology, Regional(**regional))
+        return tissue(self.mesh, self.depth, pathology, Regional(**({"preset": "even"} | regional)))
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +103,8 @@ def test_regional_factors_are_those_of_the_middles_of_segments_and_multiply_thos
     scarred = hemisphere.tissue(Pathology(infarct=Infarct(segments=[10], tension_scale=0.2)), contractility={10: 0.5})
     infarct = scarred.region == 1
     np.testing.assert_allclose(scarred.tension_scale[infarct], 0.2 * healthy.tension_scale[infarct])
+    walls, weak = (hemisphere.tissue(preset="normal", contractility=given) for given in ({}, {10: 0.5}))
+    np.testing.assert_allclose(weak.tension_scale, walls.tension_scale * healthy.tension_scale)
 
 
 @pytest.mark.parametrize(

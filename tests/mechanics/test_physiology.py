@@ -440,11 +440,11 @@ def test_the_heart_of_a_species_is_within_its_bounds(species):
 MOTION = {
     "mouse": {
         "twist_es": (3.0, 9.0),
-        "circumferential": (-0.19, -0.14),
+        "circumferential": (-0.19, -0.07),
         "longitudinal": (-0.30, -0.10),
         "torsional_shear": (0.01, 0.08),
         "gls": (-0.25, -0.11),
-        "base_mm": (0.4, 1.2),
+        "base_mm": (0.4, 1.4),
         "tei_index": (0.35, 0.50),
     },
     "human": {
@@ -457,8 +457,9 @@ MOTION = {
         "tei_index": (0.29, 0.50),
     },
 }
-"""Ranges at end-systole, deg and mm. Mouse: means and spread of 3-D DENSE (doi 10.1186/1532-429X-13-83), Tei index
-J Am Soc Echocardiogr 16 (2003) 814. Human: doi 10.1186/1532-429X-14-49, PMC5234340, Tei 1995."""
+"""Ranges at end-systole, deg and mm. Mouse: means and two standard deviations of 3-D DENSE (doi
+10.1186/1532-429X-13-83), a base that descends by the 15 to 19 % by which a wall of 7 mm shortens (PMC4337396), Tei
+index J Am Soc Echocardiogr 16 (2003) 814. Human: doi 10.1186/1532-429X-14-49, PMC5234340, Tei 1995."""
 
 
 def test_the_heart_of_a_species_moves_as_measured_in_life(species):
@@ -482,7 +483,8 @@ def test_the_heart_of_a_species_moves_as_measured_in_life(species):
     assert found["level_strain_ivc"][:, 0].max() < 0.08
     assert np.abs(found["level_fibre_strain_ivc"]).max() < 0.035
     assert found["fibre_shortening_rate"] < {"mouse": 5.5, "rat": 4.0, "human": 2.0}[config.geometry.preset]
-    assert found["fibre_strain_spread"] < 0.2
+    # 0.2 by depth and level, and 0.12 by which the walls differ around the ventricle.
+    assert found["fibre_strain_spread"] < np.hypot(0.2, 0.12)
     assert found["untwist_ivr"] > 0.2
     assert np.all(np.diff(found["layer_strain_es"][:, 0]) < 0)
     assert np.abs(found["layer_strain_ivc"][:, 3:5]).max() < 0.08
@@ -496,7 +498,7 @@ def test_the_walls_of_a_normal_heart_shorten_as_those_of_people():
     """Lateral wall most, septum and inferior wall least; the mean as without (docs/physiology.md)."""
     counts = {"circumferential_elements": 12, "longitudinal_elements": 8, "transmural_elements": 2}
     found = {}
-    for preset in (None, "normal"):
+    for preset in ("even", "normal"):
         config = Config(geometry=counts, loop={"frames": 10}, mechanics={"regional": {"preset": preset}})
         heart = beat(config, frames=et.systole(config))
         shortening = heart["kinematics"]["strain"][int(heart["mechanics"]["es_frame"])][:, 1]
@@ -508,7 +510,7 @@ def test_the_walls_of_a_normal_heart_shorten_as_those_of_people():
         }
         segment = heart["fibres"]["segment"]
         found[preset] = np.array([shortening[np.isin(segment, numbers)].mean() for numbers in walls.values()])
-    even, normal = found[None], found["normal"]
+    even, normal = found["even"], found["normal"]
     assert np.ptp(even) < 0.003
     assert normal.mean() == pytest.approx(even.mean(), abs=0.003)
     np.testing.assert_allclose(normal / normal.mean(), [1.05, 0.91, 0.91, 1.13], atol=0.03)

@@ -15,7 +15,7 @@ HEART_DEFAULTS: dict[str, dict[str, Any]] = {
         "probe.preset": "rat_15MHz",
         "fibres.epi_deg": -41.0,
         "mechanics.active.shortening_velocity_max_per_s": 12.0,
-        "mechanics.active.sheet_share": 0.33,
+        "mechanics.active.sheet_share": 0.38,
         "pathology.activation.fibre_speed_m_per_s": 0.65,
         "pathology.activation.cross_fibre_speed_m_per_s": 0.45,
         "pathology.activation.purkinje_speed_m_per_s": 1.2,

@@ -18,10 +18,10 @@ class Active(Section):
     """beta: growth of T_a with the stretch from the unloaded wall, in every heart."""
     stress: Literal["cauchy", "second_piola_kirchhoff"] = "cauchy"
     """Meaning of T_a: the paper's tension per deformed area (S_ff = T_a / lambda^2), or S_ff itself."""
-    sheet_share: Fraction = 0.35
+    sheet_share: Fraction = 0.43
     """Share of the tension that acts along the sheet direction too, by the stretch there, since fibres are dispersed. A
     share of 0.4 across the fibre in the wall brings a sheep's heart closest to its tagged MRI (Walker 2005, Am J
-    Physiol 289, H692). `rat` 0.33, `human` 0.3."""
+    Physiol 289, H692). `rat` 0.38, `human` 0.3."""
     normal_share: Fraction = 0.2
     """Share of the tension that acts along the sheet normal too, likewise. `human` 0.18."""
     shortening_velocity_max_per_s: Annotated[FiniteFloat, Field(gt=0)] | None = 15.0
@@ -36,7 +36,7 @@ class Active(Section):
     """Force to which that of muscle tends which is stretched ever faster, over the isometric one: 2 + a / F_0 in the
     same model."""
 
-    length_sensitivity: Annotated[FiniteFloat, Field(ge=0, le=50)] = 28.0
+    length_sensitivity: Annotated[FiniteFloat, Field(ge=0, le=50)] = 16.0
     """Besides beta, growth dln T / dlambda of the tension with the stretch beyond that of the healthy heart, as long
     after activation, in `loop.kind: circulation`. `human` 10: that of half activated muscle in the human model of Land
     et al. (J Mol Cell Cardiol 106 (2017) 68). With it the late wall of a left bundle branch block stretches the septum
@@ -87,5 +87,6 @@ class Mechanics(Section):
     pericardium: Pericardium = Pericardium()
     """Surroundings of the epicardium."""
     hold: Literal["apex", "base"] = "apex"
-    """What stays in place along the long axis: the solved heart is shifted along it as a whole, which changes neither
-    strain nor pressure. In life the apex of the epicardium stays and the base descends."""
+    """What stays in place: the solved heart is moved as a whole, which changes neither strain nor pressure. `apex`, as
+    in life: the apex of the epicardium stays, and the epicardium does not turn on the whole, so that the base descends,
+    tilts and turns against the apex. `base`: as it was solved, the base in its plane."""

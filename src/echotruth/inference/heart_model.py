@@ -56,7 +56,7 @@ def model_config(observed: xr.Dataset, mesh: tuple[int, int, int] | None, folder
     shares = {name: getattr(species.mechanics.active, name) for name in ("sheet_share", "normal_share")}
     mechanics = given.mechanics.model_copy(
         update={
-            "regional": Regional(),
+            "regional": Regional(preset="even"),
             "active": given.mechanics.active.model_copy(update=shares),
             "material": given.mechanics.material.model_copy(update=_unknown_stiffness(given)),
         }

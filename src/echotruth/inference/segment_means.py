@@ -50,7 +50,7 @@ class SegmentMeans:
         number = segment(nodes[cells[:, :4]].mean(axis=1), float(nodes[body.mesh.endo, 2].min()))
         columns = []
         for one in SEGMENTS:
-            factors = tissue(body.mesh, body.depth, Pathology(), Regional(contractility={one: 2.0}))
+            factors = tissue(body.mesh, body.depth, Pathology(), Regional(preset="even", contractility={one: 2.0}))
             means, volume = means_of_cells(nodes, cells, number, factors.tension_scale - 1.0)
             columns.append(means)
         shown = np.flatnonzero(volume)

@@ -14,7 +14,8 @@ from echotruth.loop.calibration import calibrate
 from echotruth.loop.circulation import altered
 from echotruth.loop.cycle import Cycle, read_loop
 from echotruth.loop.recording import LoopError
-from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
+from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.hold import held
 from echotruth.mechanics.outputs import Arrays, collect_outputs
 from echotruth.mechanics.pathology import BORDER, INFARCT, PathologyError, healthy_heart, thinned
 from echotruth.mechanics.prescribed import prescribed_motion
@@ -74,7 +75,7 @@ def outputs(
         phase = phases.phases(whole.pressure, whole.volume)[list(frames)]
     mechanics = vars(solved) | {
         "time": whole.time[list(frames)],
-        "displacement": held(config, unloaded, solved.displacement),
+        "displacement": held(unloaded.mesh, solved.displacement, config.mechanics.hold),
         "stiffness": np.array(solved.stiffness),
         "es_frame": np.array(phases.es_frame(solved.pressure, solved.volume)),
         "phase": phase,
@@ -185,11 +186,3 @@ def _healthy_stiffness(config: Config, cycle: Cycle) -> float:
         return filled_to_end_diastole(equations, cycle).state.stiffness
     finally:
         equations.close()
-
-
-def held(config: Config, unloaded: Wall, displacement: Floats) -> Floats:
-    """Displacements (n_frames, n_nodes, 3), m, with what `mechanics.hold` names in place along the axis since ED."""
-    if config.mechanics.hold == "base":
-        return displacement
-    axial = displacement[:, epicardial_apex(unloaded.mesh), 2]
-    return displacement - (axial - axial[0])[:, None, None] * [0.0, 0.0, 1.0]

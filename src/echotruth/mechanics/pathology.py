@@ -10,28 +10,13 @@ from scipy.spatial import KDTree
 from echotruth.aha import segment
 from echotruth.config import Config, Pathology
 from echotruth.config.pathology import Infarct
-from echotruth.config.regional import Regional
+from echotruth.config.regional import CONTRACTILITY, Regional
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import NODE_XI, Floats, MaterialPoints, Mesh, interpolate, shape
 from echotruth.mechanics.fibres import material_gradients, wall_depth
 
 HEALTHY, INFARCT, BORDER, LATE = range(4)
 """Regions; where they overlap, infarct takes precedence over border zone, and border zone over late activation."""
-
-CONTRACTILITY = {
-    "normal": dict.fromkeys((1, 7, 13), 1.05)
-    | dict.fromkeys((2, 3, 8, 9, 14), 0.85)
-    | dict.fromkeys((4, 10, 15), 0.8)
-    | dict.fromkeys((5, 6, 11, 12, 16), 1.3),
-}
-"""AHA segment to contractility of each preset.
-
-Tagging of 39 people without heart disease ("Characterization of normal regional myocardial function by MRI cardiac
-tagging", sine wave modelling) finds E_CC of -20.2 % in the anterior and -21.8 % in the lateral wall, and -17.2, -20.1
-and -20.3 % at base, mid and apex, which leaves -17.4 % for septum and inferior wall; in another 31 the anterolateral
-wall shortens most too (Moore 2000, doi 10.1148/radiology.214.2.r00fe17453). With these factors the walls of a body of
-revolution shorten in the same proportions, 1.05, 0.91, 0.91 and 1.13 of their mean.
-"""
 
 _SAMPLES = np.array([(i, j, k) for i in range(5) for j in range(5 - i) for k in range(5 - i - j)]) / 4
 """Local coordinates at which a cell is sampled: corners, quarters of edges, ..., and the centroid."""
@@ -98,15 +83,15 @@ def tissue(mesh: Mesh, depth: Floats, pathology: Pathology, regional: Regional) 
     infarct, scar = pathology.infarct, pathology.infarct.scar()
     centroid = shape(_SAMPLES)[_CENTROID] @ mesh.nodes[mesh.cells]
     segments = segment(centroid, _apex(mesh))
-    contractility = CONTRACTILITY[regional.preset] if regional.preset else regional.contractility
-    factors = [_gradual(_by_segment(given, 1.0), segments, centroid) for given in (regional.stiffness, contractility)]
+    given = regional.stiffness, regional.contractility, CONTRACTILITY if regional.preset == "normal" else {}
+    of_stiffness, of_tension, healthy = (_gradual(_by_segment(one), segments, centroid) for one in given)
     weight = _infarct_weight(mesh, depth, infarct)
     region = np.select([weight == 1, weight > 0], [INFARCT, BORDER], HEALTHY).astype(np.uint8)
     stiffness = 1 + (scar["stiffness_scale"] - 1) * weight
     remote = infarct.remote_tension_scale if weight.any() else 1.0
     tension = remote * (1 - weight) + infarct.tension_scale * weight
     taut = 1e3 * scar["taut_stiffness_kPa"] * weight
-    return Tissue(region, stiffness * factors[0], tension * factors[1], np.zeros(len(weight)), taut)
+    return Tissue(region, stiffness * of_stiffness, tension * of_tension * healthy, np.zeros(len(weight)), taut)
 
 
 def thinned(mesh: Mesh, infarct: Infarct) -> Mesh:
@@ -136,9 +121,9 @@ def _at_nodes(mesh: Mesh, values: Floats) -> Floats:
     return np.bincount(nodes, values.ravel()) / np.bincount(nodes)
 
 
-def _by_segment(given: Mapping[int, float], otherwise: float) -> Floats:
-    """Values (18,) by the number of the AHA segment."""
-    return np.array([given.get(number, otherwise) for number in range(18)])
+def _by_segment(given: Mapping[int, float]) -> Floats:
+    """Factors (18,) by the number of the AHA segment."""
+    return np.array([given.get(number, 1.0) for number in range(18)])
 
 
 def _gradual(values: Floats, segments: NDArray[np.uint8], centroid: Floats) -> Floats:

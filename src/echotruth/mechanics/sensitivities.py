@@ -9,7 +9,8 @@ from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics import fibres, kinematics
-from echotruth.mechanics.beat import check_frames, held, outputs, unloaded_wall
+from echotruth.mechanics.beat import check_frames, outputs, unloaded_wall
+from echotruth.mechanics.hold import held
 from echotruth.mechanics.outputs import Arrays
 from echotruth.mechanics.pathology import tissue
 from echotruth.mechanics.solver.cycle import filled_to_end_diastole, solved_cycle, solved_frames
@@ -60,7 +61,7 @@ def sensitivities(
         # A heart of given C keeps the ejection fraction of its loop.
         loop = cycle if stiffness is None else cycle.scaled(stepper.load.volume / cycle.edv)
         solved = solved_cycle(equations, loop, list(solved_frames(stepper, loop, unloaded.tissue.tension_scale)))
-        heart = _Heart(config, unloaded, Variant(exact, cycle, unloaded.tissue.tension_scale))
+        heart = _Heart(config, unloaded, solved.displacement, Variant(exact, cycle, unloaded.tissue.tension_scale))
         walls = [heart.wall(other) for other, _ in changed.values()]
         pairs = zip(walls, changed.values(), strict=True)
         variants = [heart.variant(other, wall, change, frames) for wall, (other, change) in pairs]
@@ -70,7 +71,7 @@ def sensitivities(
         exact.close()
     arrays = outputs(config, unloaded, solved, whole, frames)
     parts = zip(changed, walls, found, (change for _, change in changed.values()), strict=True)
-    return arrays, {name: heart.arrays(arrays, wall, derivative, change) for name, wall, derivative, change in parts}
+    return arrays, {name: heart.arrays(wall, derivative, change) for name, wall, derivative, change in parts}
 
 
 @dataclass(frozen=True)
@@ -81,12 +82,15 @@ class _Heart:
     ----------
     config : Config
     unloaded : Wall
+    displacement : ndarray of shape (n_frames, n_nodes, 3), m
+        As it was solved.
     variant_0 : Variant
         The heart itself.
     """
 
     config: Config
     unloaded: Wall
+    displacement: Floats
     variant_0: Variant
 
     def wall(self, other: Config) -> Wall:
@@ -109,18 +113,16 @@ class _Heart:
         cycle, given = read_loop(other.loop).at(frames), section.material.si().stiffness
         return Variant(equations, cycle, wall.tissue.tension_scale, change, given)
 
-    def arrays(self, arrays: dict[str, Arrays], wall: Wall, derivative: Derivative, change: float) -> Arrays:
+    def arrays(self, wall: Wall, derivative: Derivative, change: float) -> Arrays:
         """Derivatives of the arrays of this heart, of which another wall is changed by so much."""
-        displacement = arrays["mechanics"]["displacement"]
-        moved = [self.variant_0.equations.assembly.displacement(state.solution) for state in derivative.states]
-        taken = held(self.config, self.unloaded, np.array(moved))
-        strains = [
-            _strain(self.unloaded, displacement),
-            _strain(wall, displacement + change * taken),
-        ]
+        free = self.variant_0.equations.assembly.displacement
+        moved = self.displacement + change * np.array([free(state.solution) for state in derivative.states])
+        motions = (self.unloaded, self.displacement), (wall, moved)
+        strains = [_strain(body, motion) for body, motion in motions]
+        kept = [held(body.mesh, motion, self.config.mechanics.hold) for body, motion in motions]
         return {
             "node_position": (wall.mesh.nodes - self.unloaded.mesh.nodes) / change,
-            "displacement": taken,
+            "displacement": (kept[1] - kept[0]) / change,
             "strain": (strains[1] - strains[0]) / change,
             "volume": derivative.volume,
             "active_tension": np.array([state.tension for state in derivative.states]),

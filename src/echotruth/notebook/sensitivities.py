@@ -114,8 +114,6 @@ def _value(config: Config, key: str) -> float:
     for name in sections:
         found = found.get(name) if isinstance(found, dict) else None
     if sections[:2] == ["mechanics", "regional"] and last.isdecimal() and 1 <= int(last) <= 17:
-        if config.mechanics.regional.preset is not None:
-            raise ConfigError(f"{key}: mechanics.regional.preset names it: give the factors of the segments themselves")
         return float((found or {}).get(int(last), 1.0))
     if not isinstance(found, dict) or last not in found:
         known = ", ".join(SECTIONS)
