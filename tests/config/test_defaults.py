@@ -78,7 +78,7 @@ def test_lengths_of_trackers_follow_the_field_of_view():
 
 @pytest.mark.parametrize("sections", [{"probe": {"preset": "mouse_25MHz"}}, {"rf": {"focus_mm": 31.0}}])
 def test_array_inside_of_the_heart_is_refused(sections):
-    with pytest.raises(ConfigError, match=r"rf\.focus_mm = \S+: must exceed 31\.55, the radius of the heart"):
+    with pytest.raises(ConfigError, match=r"rf\.focus_mm = \S+: must exceed 31\.9, the radius of the heart"):
         configured(geometry={"preset": "human"}, **sections)
 
 
