@@ -19,7 +19,7 @@ def means():
 
 def test_means_are_those_of_the_tissue_that_a_configuration_makes(means):
     given = {str(number): float(factor) for number, factor in enumerate(FACTORS, 1)}
-    config = et.configure(geometry=COARSE, mechanics={"regional": {"contractility": given}})
+    config = et.configure(geometry=COARSE, mechanics={"regional": {"preset": "even", "contractility": given}})
     body = wall(config, left_ventricle(config.geometry))
     from echotruth.aha import segment
 
