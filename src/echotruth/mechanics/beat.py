@@ -123,11 +123,11 @@ def check_frames(config: Config, frames: Sequence[int]) -> None:
 
 
 def _untried(config: Config) -> str:
-    """Keys of a heart outside of the ranges whose hearts are usable, with these, in a clause; empty if there are none."""
+    """Keys outside of the ranges whose hearts are usable, and these, in a clause; empty if there are none."""
     ranges = {key: drawn["uniform"] for key, drawn in HEARTS.items() if "uniform" in drawn}
     values = {key: value_of(config, key) for key in ranges}
     found = [f"{key} = {values[key]:g} ({a:g} to {b:g})" for key, (a, b) in ranges.items() if not a <= values[key] <= b]
-    return f"; outside of the ranges of cases.draw.preset: hearts is {', '.join(found)}" if found else ""
+    return f"; beyond what was tried (cases.draw.preset = hearts): {', '.join(found)}" if found else ""
 
 
 def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
