@@ -140,7 +140,9 @@ def test_heart_that_is_asked_for_more_than_muscle_bears_is_told_how_far_it_may_e
 
 
 def test_muscle_that_works_against_itself_is_told_the_share_that_does_not():
-    even = Config(geometry=COARSE, loop=Loop(frames=12), mechanics={"active": {"normal_share": 0.35, "sheet_share": 0.35}})
+    even = Config(
+        geometry=COARSE, loop=Loop(frames=12), mechanics={"active": {"normal_share": 0.35, "sheet_share": 0.35}}
+    )
     told = refusal(even)
     (share,) = re.search(r"normal_share of ([\d.]+) or less", told).groups()
     borne = beat(configure(even, mechanics={"active": {"normal_share": float(share)}}))["mechanics"]

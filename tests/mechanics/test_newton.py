@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from echotruth.config import Config, Fibres, Geometry
+from echotruth.config import Fibres, Geometry
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.materials import LAWS, compiled
 from echotruth.mechanics import fibres

@@ -124,9 +124,9 @@ class Draw(Section):
     """Hearts drawn at random: each has one value of every key in `keys`."""
 
     preset: Literal["none", "acoustics", "hearts"] = "none"
-    """Keys that are drawn beside those in `keys`. `hearts`: size, shape, fibres, muscle, load and disease, over ranges in
-    which hearts of all species are usable (docs/cases.md); use it with `loop.kind: circulation`. `acoustics`: levels of
-    tissues, noise and artefacts, attenuation, gain and grey map, each over its published or chosen range
+    """Keys that are drawn beside those in `keys`. `hearts`: size, shape, fibres, muscle, load and disease, over ranges
+    in which hearts of all species are usable (docs/cases.md); use it with `loop.kind: circulation`. `acoustics`: levels
+    of tissues, noise and artefacts, attenuation, gain and grey map, each over its published or chosen range
     (docs/realism.md), so that the looks of a training set differ; use it with a `realism.preset`."""
     number: Annotated[int, Field(ge=1, le=MAX_CASES)]
     """Number of hearts (of each row of the table and each combination of the grid). A larger number adds hearts, and

@@ -117,7 +117,7 @@ class Geometry(Section):
         return round(self.scale * (lengths["endo_radius_mm"] * self.dilation + wall), 9)
 
     def cavity_uL(self) -> float:
-        """Volume of the cavity of the unloaded ellipsoid, uL: an ellipsoid of revolution, cut level above its equator."""
+        """Volume of the cavity of the unloaded ellipsoid, uL: of revolution, cut level above its equator."""
         lengths, width = self.lengths(), self.scale * self.dilation
         radius, along = lengths["endo_radius_mm"] * width, width * self.elongation
         length, base = lengths["endo_length_mm"] * along, lengths["base_mm"] * along
