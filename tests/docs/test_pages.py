@@ -10,6 +10,7 @@ import yaml
 
 import echotruth as et
 from echotruth.cli import parser
+from echotruth.config.cases import HEARTS
 from echotruth.loop.cycle import read_loop
 
 ROOT = Path(__file__).parents[2]
@@ -62,6 +63,18 @@ def test_hearts_can_be_drawn_as_the_page_on_realistic_images_says():
     cases = et.expand(et.configure(yaml.safe_load(block)))
     assert len(cases) == 64
     assert len({case.config.bmode.gain_dB for case in cases}) == 64
+
+
+@pytest.mark.parametrize("species", ["mouse", "rat", "human"])
+def test_hearts_of_any_species_can_be_drawn_as_the_page_on_cases_says(species):
+    page = (ROOT / "docs/cases.md").read_text()
+    (block,) = (block for block in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL) if "preset: hearts" in block)
+    cases = et.expand(et.configure(yaml.safe_load(block.replace("rat", species))))
+    assert len({case.heart for case in cases}) == 64
+    ranges = {key: given["uniform"] for key, given in HEARTS.items() if "uniform" in given}
+    assert {f"{low:g} to {high:g}" for low, high in ranges.values()} <= set(re.findall(r"-?[\d.]+ to -?[\d.]+", page))
+    for case in cases:
+        assert all(low <= case.parameters[key] <= high for key, (low, high) in ranges.items())
 
 
 def test_table_of_a_loop_on_the_page_is_one_that_is_read(tmp_path):

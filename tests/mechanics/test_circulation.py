@@ -185,6 +185,26 @@ def test_blood_is_kept_from_beat_to_beat(monkeypatch):
     assert filled[-1] == pytest.approx(given[-1], rel=1e-7)
 
 
+def test_beat_that_no_way_leads_to_from_the_last_frame_begins_at_rest(monkeypatch):
+    config, advance, refused = heart(contractility=0.6), LoadStepper.advance, []
+    usual = beat(config)["mechanics"]["volume"]
+
+    def advance_from_rest(stepper, load, unknown, *others):
+        fills_again = unknown == "cavity_pressure" and stepper.circulation is None and stepper.load.time > 0
+        if fills_again and not refused:
+            refused.append(stepper.state)
+            raise Diverged("no way leads on")
+        if fills_again and len(refused) == 1:
+            refused.append(stepper.state)
+        return advance(stepper, load, unknown, *others)
+
+    monkeypatch.setattr(LoadStepper, "advance", advance_from_rest)
+    found = beat(config)["mechanics"]["volume"]
+    last, rested = refused
+    assert np.abs(last.solution - rested.solution).max() > 0
+    np.testing.assert_allclose(found, usual, rtol=0, atol=1e-3 * np.ptp(usual))
+
+
 def test_heart_that_is_not_steady_in_time_is_refused():
     with pytest.raises(Diverged, match=r"not steady after 1 beats .*raise loop.circulation.beats_max"):
         beat(heart(frames=12, resistance=1.5, beats_max=1))

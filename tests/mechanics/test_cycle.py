@@ -1,13 +1,15 @@
-"""Hearts driven by each of the prescribed quantities, diseased and healthy."""
+"""Hearts driven by each of the prescribed quantities, diseased and healthy, large and small, and those refused."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from echotruth.config import Config, Geometry, Loop, Mechanics, Pathology
+from echotruth.config.building import configure
 from echotruth.heart import Heart
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import heart_cycle, read_loop
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.geometry import left_ventricle
@@ -79,8 +81,69 @@ def test_infarct_stretches_where_healthy_wall_shortens():
     assert fibre[region == 0].mean() < -0.08
 
 
-def test_heart_that_is_asked_for_more_than_muscle_bears_is_told_so():
+def test_heart_that_is_larger_by_a_factor_moves_alike():
+    """What has a length apart from the shape, springs and dashpots over an area, is scaled too."""
+    factor, support = 1.3, CONFIG.mechanics.pericardium
+    soft = {key: value / factor for key, value in support.model_dump().items()}
+    large = configure(CONFIG, geometry={"scale": factor}, mechanics={"pericardium": soft})
+    of_small, of_large = (beat(config)["mechanics"] for config in (CONFIG, large))
+    np.testing.assert_allclose(of_large["volume"], factor**3 * of_small["volume"], rtol=1e-6)
+    np.testing.assert_allclose(of_large["active_tension"], of_small["active_tension"], rtol=1e-4, atol=1.0)
+    moved = factor * of_small["displacement"]
+    np.testing.assert_allclose(of_large["displacement"], moved, rtol=0, atol=1e-5 * np.abs(moved).max())
+
+
+@pytest.mark.parametrize("shape", [{"dilation": 1.2}, {"elongation": 0.8}, {"endo_radius_mm": 1.6, "scale": 0.7}, {}])
+def test_default_loop_is_as_much_larger_as_the_cavity_of_the_mesh(shape):
+    config = configure(CONFIG, geometry=shape)
+    ratio = unloaded_volume(config) / unloaded_volume(CONFIG)
+    # The mesh is made of quadratic elements, of which few go around and along the cavity.
+    assert heart_cycle(config).edv == pytest.approx(ratio * read_loop(CONFIG.loop).edv, rel=5e-4)
+    healthy = configure(config, loop={"kind": "circulation"})
+    undilated = ratio / shape.get("dilation", 1.0) ** 3
+    assert heart_cycle(healthy).edv == pytest.approx(undilated * read_loop(CONFIG.loop).edv, rel=5e-4)
+    given = configure(config, loop={"edv_uL": 60.0, "esv_uL": 20.0})
+    np.testing.assert_array_equal(heart_cycle(given).volume, read_loop(given.loop).volume)
+
+
+def unloaded_volume(config):
+    equations = equilibrium(config, wall(config, left_ventricle(config.geometry)))
+    try:
+        return equations.volume(equations.unloaded_state(0.0))
+    finally:
+        equations.close()
+
+
+def refusal(config):
+    with pytest.raises(Diverged) as refused:
+        beat(config)
+    return str(refused.value)
+
+
+def test_heart_that_cannot_be_filled_is_told_a_volume_and_a_size_that_work():
+    small = configure(CONFIG, geometry={"scale": 1.3}, loop={"edv_uL": 50.0})
+    told = refusal(small)
+    volume, factor = map(float, re.search(r"edv_uL of ([\d.]+) or more, or ([\d.]+) of this", told).groups())
+    assert "geometry.scale = 1.3 (0.88 to 1.12)" in told
+    for remedy in ({"loop.edv_uL": volume}, {"geometry.scale": 1.3 * factor}):
+        beat(configure(small, **remedy))
+
+
+def test_heart_that_is_asked_for_more_than_muscle_bears_is_told_how_far_it_may_eject():
     active = {"length_dependence": 2.0}
     config = CONFIG.model_copy(update={"loop": Loop(frames=20, esv_uL=6.0), "mechanics": Mechanics(active=active)})
-    with pytest.raises(Diverged, match=r"T_Ca has risen to \d+ kPa, which no muscle bears: let the heart eject less"):
-        solved(read_loop(config.loop), config)
+    told = refusal(config)
+    assert re.search(r"asks for a T_Ca of \d+ kPa, and muscle bears 200: give loop\.esv_uL", told)
+    (remaining,) = re.search(r"esv_uL of ([\d.]+) times", told).groups()
+    borne = beat(configure(config, loop={"esv_uL": float(remaining) * heart_cycle(config).edv * 1e9}))["mechanics"]
+    assert borne["active_tension"].max() < 200e3
+
+
+def test_muscle_that_works_against_itself_is_told_the_share_that_does_not():
+    even = Config(
+        geometry=COARSE, loop=Loop(frames=12), mechanics={"active": {"normal_share": 0.35, "sheet_share": 0.35}}
+    )
+    told = refusal(even)
+    (share,) = re.search(r"normal_share of ([\d.]+) or less", told).groups()
+    borne = beat(configure(even, mechanics={"active": {"normal_share": float(share)}}))["mechanics"]
+    assert borne["active_tension"].max() < 200e3

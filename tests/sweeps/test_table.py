@@ -262,7 +262,7 @@ def test_diagnosis_is_what_the_configuration_makes_of_the_heart(keys, words):
 
 def test_blocks_of_the_page_are_valid(tmp_path, monkeypatch):
     page = (Path(__file__).parents[2] / "docs/cases.md").read_text()
-    (settings,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    settings, _ = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
     (meshes,) = re.findall(r"```\n(case,.*?)```", page, re.DOTALL)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "hearts.csv").write_text("case,seed\na,1\nb,2\n")

@@ -96,16 +96,38 @@ ACOUSTICS: dict[str, dict[str, Any]] = {
     "bmode.dropout.loss_dB": {"uniform": [0, 10]},
 }
 """Distributions of `cases.draw.preset: acoustics`; docs/realism.md says where each range is from."""
-DRAW_PRESETS: dict[str, dict[str, Any]] = {"none": {}, "acoustics": ACOUSTICS}
+HEARTS: dict[str, dict[str, Any]] = {
+    "geometry.scale": {"uniform": [0.88, 1.12]},
+    "geometry.elongation": {"uniform": [0.88, 1.12]},
+    "geometry.hypertrophy": {"choice": [1.0, 1.1, 1.2, 1.3], "weights": [3, 1, 1, 1]},
+    "geometry.dilation": {"choice": [1.0, 1.05, 1.1], "weights": [2, 1, 1]},
+    "fibres.endo_deg": {"uniform": [60, 85]},
+    "fibres.epi_deg": {"uniform": [-60, -35]},
+    "mechanics.active.sheet_share": {"uniform": [0.28, 0.45]},
+    "mechanics.active.normal_share": {"uniform": [0.1, 0.22]},
+    "loop.circulation.contractility": {"uniform": [0.6, 1.4]},
+    "loop.circulation.resistance": {"uniform": [0.7, 1.4]},
+    "loop.circulation.retained_volume_stroke_volumes": {"uniform": [-1, 4]},
+    "pathology.infarct.segments": {
+        "choice": [None, [7, 8], [9, 10], [11, 12], [1, 7, 8, 13, 14], [13, 14, 15, 16, 17]],
+        "weights": [5, 1, 1, 1, 1, 1],
+    },
+    "pathology.infarct.age": {"choice": ["fresh", "old"]},
+    "pathology.activation.preset": {"choice": [None, "lbbb"], "weights": [3, 1]},
+}
+"""Distributions of `cases.draw.preset: hearts`, of any species; docs/cases.md says where each range is from, and how
+many of the hearts are usable."""
+DRAW_PRESETS: dict[str, dict[str, Any]] = {"none": {}, "acoustics": ACOUSTICS, "hearts": HEARTS}
 
 
 class Draw(Section):
     """Hearts drawn at random: each has one value of every key in `keys`."""
 
-    preset: Literal["none", "acoustics"] = "none"
-    """Keys that are drawn beside those in `keys`. `acoustics`: levels of tissues, noise and artefacts, attenuation,
-    gain and grey map, each over its published or chosen range (docs/realism.md), so that the looks of a training set
-    differ; use it with a `realism.preset`."""
+    preset: Literal["none", "acoustics", "hearts"] = "none"
+    """Keys that are drawn beside those in `keys`. `hearts`: size, shape, fibres, muscle, load and disease, over ranges
+    in which hearts of all species are usable (docs/cases.md); use it with `loop.kind: circulation`. `acoustics`: levels
+    of tissues, noise and artefacts, attenuation, gain and grey map, each over its published or chosen range
+    (docs/realism.md), so that the looks of a training set differ; use it with a `realism.preset`."""
     number: Annotated[int, Field(ge=1, le=MAX_CASES)]
     """Number of hearts (of each row of the table and each combination of the grid). A larger number adds hearts, and
     those that were there stay; a power of 2 is the most even."""

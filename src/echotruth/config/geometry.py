@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat
@@ -114,6 +115,13 @@ class Geometry(Section):
         lengths = self.lengths()
         wall = lengths["wall_mm"] * self.hypertrophy
         return round(self.scale * (lengths["endo_radius_mm"] * self.dilation + wall), 9)
+
+    def cavity_uL(self) -> float:
+        """Volume of the cavity of the unloaded ellipsoid, uL: of revolution, cut level above its equator."""
+        lengths, width = self.lengths(), self.scale * self.dilation
+        radius, along = lengths["endo_radius_mm"] * width, width * self.elongation
+        length, base = lengths["endo_length_mm"] * along, lengths["base_mm"] * along
+        return pi * radius**2 * (2 / 3 * length + base - base**3 / (3 * length**2))
 
     def resolved(self) -> Geometry:
         """The section with the lengths of the preset filled in, if the shape is not read from a file."""

@@ -66,7 +66,9 @@ class Loop(Section):
     heart_rate_per_min: Annotated[FiniteFloat, Field(ge=1, le=10_000)] | None = None
     """Heart rate; the cycle's time is scaled to it. Default: that of the file."""
     edv_uL: Volume | None = None
-    """End-diastolic volume; the cycle's volumes are mapped linearly to it. Default: that of the file."""
+    """End-diastolic volume; the cycle's volumes are mapped linearly to it. Default: that of the file; a shipped cycle,
+    which is that of the default ellipsoid of its species, has it in proportion to the unloaded cavity of this one. In
+    a circulation it is that of the heart before its `dilation`."""
     esv_uL: Volume | None = None
     """End-systolic volume, likewise."""
     edp_mmHg: Pressure | None = None

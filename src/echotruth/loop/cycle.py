@@ -11,11 +11,16 @@ from types import SimpleNamespace
 import numpy as np
 
 from echotruth.arrays import Floats
+from echotruth.config import Config, Geometry
+from echotruth.config.anatomy import HEART_PRESETS
 from echotruth.config.loop import Loop, Prescribed
 from echotruth.loop.phases import es_frame
 from echotruth.loop.recording import LoopError, Recording, read
 
 SHIPPED = Path(__file__).parent / "recordings"
+
+SPECIES_OF = {species: species for species in HEART_PRESETS} | {"twitch": "mouse"}
+"""Shipped cycle -> species whose ellipsoid it suits."""
 
 PRESCRIBED: dict[Prescribed, tuple[str, ...]] = {
     "pressure_volume": ("pressure", "volume"),
@@ -94,12 +99,42 @@ class Cycle:
         return replace(self, volume=None if self.volume is None else factor * self.volume)
 
 
-def read_loop(loop: Loop) -> Cycle:
+def heart_cycle(config: Config) -> Cycle:
+    """The cycle of the heart of a configuration.
+
+    A shipped loop is that of the ellipsoid of its species. In another ellipsoid its volumes are in proportion to that
+    of the cavity, so that a heart that is larger fills by as much and ejects the same fraction. With `loop.kind:
+    circulation` it is the loop of the heart before it was dilated.
+
+    Parameters
+    ----------
+    config : Config
+
+    Returns
+    -------
+    Cycle
+
+    Raises
+    ------
+    LoopError
+        As :func:`read_loop`.
+    """
+    geometry, species = config.geometry, SPECIES_OF.get(config.loop.file)
+    if species is None or geometry.file:
+        return read_loop(config.loop)
+    if config.loop.kind == "circulation":
+        geometry = geometry.model_copy(update={"dilation": 1.0})
+    return read_loop(config.loop, geometry.cavity_uL() / Geometry(preset=species).cavity_uL())
+
+
+def read_loop(loop: Loop, size: float = 1.0) -> Cycle:
     """Read, check, scale and sample a cycle.
 
     Parameters
     ----------
     loop : Loop
+    size : float
+        Factor on the volumes of the file, where the section gives none.
 
     Returns
     -------
@@ -111,7 +146,7 @@ def read_loop(loop: Loop) -> Cycle:
     LoopError
         If the file cannot be read or holds no valid cycle: one sentence with the file, the row and the remedy.
     """
-    recording, curves = _read_recording(loop), recorded_curves(loop)
+    recording, curves = _read_recording(loop), recorded_curves(loop, size)
     time = curves.pop("time")
     assert time is not None
     period, phase = _period(recording, loop), np.arange(loop.frames) / loop.frames
@@ -145,12 +180,14 @@ def frame_times(loop: Loop) -> Floats:
     return np.arange(loop.frames) / loop.frames * _period(_read_recording(loop), loop)
 
 
-def recorded_curves(loop: Loop) -> dict[str, Floats | None]:
+def recorded_curves(loop: Loop, size: float = 1.0) -> dict[str, Floats | None]:
     """Curves at the rows of the file, mapped to the volumes and pressures of the loop.
 
     Parameters
     ----------
     loop : Loop
+    size : float
+        Factor on the volumes of the file, where the section gives none.
 
     Returns
     -------
@@ -167,7 +204,7 @@ def recorded_curves(loop: Loop) -> dict[str, Floats | None]:
     if curves["pressure"] is not None:
         curves["pressure"] = _map_pressure(recording.path, curves["pressure"], curves["volume"], si)
     if curves["volume"] is not None:
-        curves["volume"] = _map_volume(recording.path, curves["volume"], si)
+        curves["volume"] = _map_volume(recording.path, curves["volume"], si, size)
     return curves
 
 
@@ -243,11 +280,12 @@ def _check_end_diastole(recording: Recording) -> None:
             raise LoopError(f"{recording.path}: {first}; {remedy}.")
 
 
-def _map_volume(path: Path, volume: Floats, si: SimpleNamespace) -> Floats:
-    """Volumes mapped linearly so that the first is `si.edv` and the smallest `si.esv` (m^3)."""
+def _map_volume(path: Path, volume: Floats, si: SimpleNamespace, size: float) -> Floats:
+    """Volumes mapped linearly so that the first is `si.edv` and the smallest `si.esv` (m^3), by default those of the
+    file times a factor."""
     first, smallest = volume[0], volume.min()
-    edv = first if si.edv is None else si.edv
-    esv = smallest if si.esv is None else si.esv
+    edv = size * first if si.edv is None else si.edv
+    esv = size * smallest if si.esv is None else si.esv
     if esv >= edv:
         volumes = f"the end-systolic volume is {esv * 1e9:g} uL and the end-diastolic {edv * 1e9:g} uL"
         raise LoopError(f"{path}: {volumes}; set edv_uL and esv_uL so that the heart ejects.")

@@ -8,11 +8,12 @@ import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.config import Config, Pathology
+from echotruth.config.cases import HEARTS
 from echotruth.fem.volume import cell_volumes
 from echotruth.loop import phases
 from echotruth.loop.calibration import calibrate
 from echotruth.loop.circulation import altered
-from echotruth.loop.cycle import Cycle, read_loop
+from echotruth.loop.cycle import Cycle, heart_cycle
 from echotruth.loop.recording import LoopError
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.hold import held
@@ -21,10 +22,12 @@ from echotruth.mechanics.pathology import BORDER, INFARCT, PathologyError, healt
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.circulation import guessed, steady_beat
-from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solve, solved_cycle
+from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, overstrained, solve, solved_cycle
 from echotruth.mechanics.solver.element import fibre_stretch
+from echotruth.mechanics.solver.newton import Diverged
 from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
+from echotruth.section import value_of
 
 logger = logging.getLogger("echotruth.mechanics")
 
@@ -55,12 +58,15 @@ def beat(config: Config, frames: Sequence[int] | None = None) -> dict[str, Array
     GeometryError, FibreError, PathologyError, LoopError, Diverged
         With one sentence, if the heart or the loop is invalid, or there is no equilibrium.
     """
-    whole = cycle = read_loop(config.loop)
+    whole = cycle = heart_cycle(config)
     if frames is not None:
         check_frames(config, frames)
         cycle = whole.at(frames)
     unloaded = unloaded_wall(config, cycle)
-    solved = (_circulate if config.loop.kind == "circulation" else _solve)(config, unloaded, cycle)
+    try:
+        solved = (_circulate if config.loop.kind == "circulation" else _solve)(config, unloaded, cycle)
+    except Diverged as failure:
+        raise Diverged(f"{str(failure).removesuffix('.')}{_untried(config)}.") from None
     return outputs(config, unloaded, solved, whole, frames)
 
 
@@ -117,6 +123,14 @@ def check_frames(config: Config, frames: Sequence[int]) -> None:
         raise LoopError(f"loop.{given}: only a measured pressure-volume loop can be solved in some of its frames")
 
 
+def _untried(config: Config) -> str:
+    """Keys outside of the ranges whose hearts are usable, and these, in a clause; empty if there are none."""
+    ranges = {key: drawn["uniform"] for key, drawn in HEARTS.items() if "uniform" in drawn}
+    values = {key: value_of(config, key) for key in ranges}
+    found = [f"{key} = {values[key]:g} ({a:g} to {b:g})" for key, (a, b) in ranges.items() if not a <= values[key] <= b]
+    return f"; beyond what was tried (cases.draw.preset = hearts): {', '.join(found)}" if found else ""
+
+
 def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     """Drive a heart by the tension of the healthy one, in the circulation that gives the healthy one its loop."""
     settings, healthy = config.loop.circulation, healthy_heart(config)
@@ -144,6 +158,9 @@ def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
         guess = guessed(measured, edv, equations.volume(equations.unloaded_state(0.0)), strength)
         frames = steady_beat(stepper, circulation, guess, activation, settings.beats_max)
         return solved_cycle(equations, replace(cycle, pressure=None, volume=None), frames)
+    except Diverged as failure:
+        said = overstrained(cycle, measured.active_tension, equations.law.cross_fibre)
+        raise Diverged(said or str(failure)) from None
     finally:
         equations.close()
 

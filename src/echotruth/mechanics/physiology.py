@@ -8,7 +8,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.fem.tetrahedra import Mesh, shape
 from echotruth.fem.volume import cell_volumes
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import heart_cycle
 from echotruth.loop.haemodynamics import filling_ratio, intervals, pressure_rates
 from echotruth.loop.phases import CONTRACTION, FILLING, RELAXATION
 from echotruth.mechanics.bounds import CC, LL, bounded
@@ -74,7 +74,7 @@ def measured_heart(groups: dict[str, Arrays], config: Config) -> tuple[Arrays, d
     bounded : dict
         As :func:`bounded` returns it; empty for prescribed motions, to which the bounds do not apply.
     """
-    loop = read_loop(config.loop)
+    loop = heart_cycle(config)
     mechanics = groups["mechanics"] | {"time": loop.time}
     found = measures(groups["geometry"], mechanics, groups["kinematics"], groups["fibres"]["wall_depth"])
     if config.motion.kind != "beat":

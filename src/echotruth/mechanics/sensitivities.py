@@ -7,7 +7,7 @@ import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.config import Config
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import heart_cycle
 from echotruth.mechanics import fibres, kinematics
 from echotruth.mechanics.beat import check_frames, outputs, unloaded_wall
 from echotruth.mechanics.hold import held
@@ -51,7 +51,7 @@ def sensitivities(
         As :func:`.beat.beat`.
     """
     check_frames(config, frames)
-    whole, stiffness = read_loop(config.loop), config.mechanics.material.si().stiffness
+    whole, stiffness = heart_cycle(config), config.mechanics.material.si().stiffness
     cycle = whole.at(frames)
     unloaded, steps = unloaded_wall(config, cycle), list[Step]()
     equations, exact = equilibrium(config, unloaded), equilibrium(config, unloaded, exact=True)
@@ -97,7 +97,7 @@ class _Heart:
         """Wall of another configuration; it has the mesh of this one if the geometry is the same."""
         is_thin = [one.pathology.infarct.scar()["thickness_scale"] != 1 for one in (self.config, other)]
         if other.geometry != self.config.geometry or any(is_thin):
-            return unloaded_wall(other, read_loop(other.loop))
+            return unloaded_wall(other, heart_cycle(other))
         mesh, depth = self.unloaded.mesh, self.unloaded.depth
         return Wall(mesh, depth, tissue(mesh, depth, other.pathology, other.mechanics.regional))
 
@@ -110,7 +110,7 @@ class _Heart:
             if same
             else equilibrium(other, wall)
         )
-        cycle, given = read_loop(other.loop).at(frames), section.material.si().stiffness
+        cycle, given = heart_cycle(other).at(frames), section.material.si().stiffness
         return Variant(equations, cycle, wall.tissue.tension_scale, change, given)
 
     def arrays(self, wall: Wall, derivative: Derivative, change: float) -> Arrays:

@@ -78,11 +78,12 @@ def steady_beat(
     begun = steady.volumes
     moved = _distance(circulation, begun, circulation.volumes)
     stepper.tolerance = TOLERANCE if moved < STEADY else ROUGH_TOLERANCE
+    frames: list[SolvedFrame] = []
     states: list[State] = []
     cavity: Cavity | None = None
     last = np.inf
     for number in range(1, beats_max + 1):
-        _fill(stepper, begun, activation.tension(0))
+        _fill(stepper, begun, activation.tension(0), frames[0] if frames else None)
         stepper.state = replace(stepper.state, tension=float(activation.twitch[0]))
         stepper.couple(answered, begun)
         frames = _beat(stepper, answered, activation, states)
@@ -117,13 +118,23 @@ def _log(number: int, cavity: Cavity, change: float) -> None:
     logger.info(text, number, volumes[-1], volumes[-1] - volumes.min(), highest, 100 * change)
 
 
-def _fill(stepper: LoadStepper, volumes: Floats, tension: Floats) -> None:
-    """Fill the heart at rest from end-diastole to the volume of another, from which a beat begins, with slack scars."""
+def _fill(stepper: LoadStepper, volumes: Floats, tension: Floats, rested: SolvedFrame | None) -> None:
+    """Fill the heart at rest from end-diastole to the volume of another, from which a beat begins, with slack scars.
+
+    The last frame of a beat is not at rest. Where no way leads on from there, the heart is filled from the end-diastole
+    with which that beat began.
+    """
     stepper.circulation = None
     stepper.tauten(False)
     stepper.state = replace(stepper.state, cavity_pressure=stepper.load.pressure)
     load = Load(0.0, float(volumes[LEFT_VENTRICLE]), 0.0, tension, time=stepper.load.time)
-    stepper.advance(load, "cavity_pressure")
+    try:
+        stepper.advance(load, "cavity_pressure")
+    except Diverged:
+        if rested is None:
+            raise
+        stepper.state, stepper.load = rested.state, replace(rested.load, time=load.time)
+        stepper.advance(load, "cavity_pressure")
     stepper.tauten(True)
     stepper.load = replace(stepper.load, time=0.0)
 

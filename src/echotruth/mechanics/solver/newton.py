@@ -49,9 +49,7 @@ REFACTOR_COST = 15
 _MAX_NEWTON_STEPS = 25
 _MIN_DAMPING = 1 / 16
 _MIN_LOAD_STEP = 1 / 128
-
-OVERSTRAINED = 200e3
-"""Tension, Pa, beyond what muscle bears, from which on a load step that fails asks too much of the heart."""
+_REMEDY = "use a finer mesh or more frames"
 
 
 class Diverged(ValueError):
@@ -163,12 +161,6 @@ class LoadStepper:
             self.equations.tauten(self.state if is_taut else None)
             self._tangent = None
 
-    def _remedy(self) -> str:
-        if self.state.tension < OVERSTRAINED:
-            return "use a finer mesh or more frames"
-        tension = f"T_Ca has risen to {self.state.tension / 1e3:.3g} kPa, which no muscle bears"
-        return f"{tension}: let the heart eject less or more slowly, or at a lower pressure"
-
     def couple(self, circulation: Circulation, volumes: Floats) -> None:
         """Let the last solved state be that of end-diastole of a heart in a circulation, from which it goes on.
 
@@ -206,9 +198,7 @@ class LoadStepper:
                 return state
             state, residual = self._newton(state, residual, load, unknown)
         self._tangent = None
-        raise Diverged(
-            f"No equilibrium within {_MAX_NEWTON_STEPS} Newton steps {_at(load, unknown)}: {self._remedy()}."
-        )
+        raise Diverged(f"No equilibrium within {_MAX_NEWTON_STEPS} Newton steps {_at(load, unknown)}: {_REMEDY}.")
 
     def _follows_velocity(self, load: Load) -> bool:
         """Whether the tension follows the velocity, so that a shorter step brings no state nearer."""
@@ -256,7 +246,7 @@ class LoadStepper:
                 damping /= 2
                 if damping < _MIN_DAMPING:
                     self._tangent = None
-                    raise Diverged(f"The load step did not converge {_at(load, unknown)}: {self._remedy()}.")
+                    raise Diverged(f"The load step did not converge {_at(load, unknown)}: {_REMEDY}.")
 
     def _keeps_factors(self, ratio: float, residual: Residual) -> bool:
         """Whether corrections that shrink by a ratio reach the tolerance sooner than new factors would."""
