@@ -113,8 +113,9 @@ class _VirtualWork:
         section = self.section.active
         power = 2.0 if section.stress == "cauchy" else 0.0
         shares = self._force_velocity(f.real, frame), section.sheet_share, section.normal_share
+        muscle = self.tension_scale * self.volume
         return sum(
-            np.sum(self.tension_scale * share * energies.active(f, section.length_dependence, power, axis) * self.volume)
+            np.sum(share * energies.active(f, section.length_dependence, power, axis) * muscle)
             for axis, share in enumerate(shares)
         )
 
